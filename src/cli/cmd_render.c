@@ -17,6 +17,10 @@
 
 #define DEFAULT_WIDTH  1280
 #define DEFAULT_HEIGHT 720
+#define DEFAULT_SHADE  "linen"
+#define MAX_SLOW       1000
+#define MAX_FINE       4  /* largest --fine */
+#define TURN_ANGLES    24 /* at which a turntable is framed */
 #define MIN_SIDE       16
 #define MIN_RANGE      1e-9 /* of a field whose values are all the same */
 #define PICTURE_DIGITS 5    /* smallest number of digits in the name of a frame */
@@ -25,14 +29,15 @@
 typedef struct render_request {
     cli_command command;
     const char *out, *shade, *size, *camera, *range, *frame, *texture, *height, *environment;
-    int every;
-    bool compare, small;
+    int every, slow, fine;
+    bool compare, small, turntable;
 } render_request;
 
 typedef struct render {
     const render_request *request;
     cli_frames_def frames;
     int width, height;
+    int fine;                        /* pixels that are drawn along a side of one of the picture */
     double azimuth, elevation, zoom; /* of the camera */
     double low, high;                /* range of the field; NaN: that of its values */
     const drape_shading *shading;
@@ -45,7 +50,7 @@ typedef struct render {
     drape_painter *painter;
     drape_stage *stages;
     drape_camera view;
-    uint8_t *pixels;
+    uint8_t *drawn, *pixels; /* fine^2 as many; of the picture */
 } render;
 
 /* ---- The command line ---- */
@@ -68,7 +73,7 @@ static bool read_numbers(const char *text, double *values, int min, int max)
 
 static int read_shade(render *r)
 {
-    const char *name = r->request->shade ? r->request->shade : "diffuse";
+    const char *name = r->request->shade ? r->request->shade : DEFAULT_SHADE;
     const int i = drape_registry_find(&drape_shading_registry, NULL, name);
     if (i < 0) {
         char text[DRAPE_UNKNOWN_SIZE];
@@ -195,11 +200,18 @@ static int read_out(render *r)
         return cli_misuse("render", "--frame is for a picture: --out NAME.png");
     if (q->every && r->picture)
         return cli_misuse("render", "--every is for films and folders; --frame N is for a picture");
+    if (q->slow && !r->film)
+        return cli_misuse("render", "--slow is for films: pictures have no speed");
+    if (q->turntable && r->picture)
+        return cli_misuse("render", "--turntable is for films and folders: a picture has one view");
     if (!q->compare && q->command.operand_count > 1)
         return cli_misuse("render", "%d scenes or runs are given; --compare draws them side by side",
                           q->command.operand_count);
     if (r->film && drape_film_check(r->ctx))
         return cli_misuse("render", "%s", drape_context_message(r->ctx));
+    r->fine = q->fine ? q->fine : r->picture ? 2 : 1;
+    while (r->fine > 1 && (r->fine * r->width > DRAPE_MAX_PICTURE || r->fine * r->height > DRAPE_MAX_PICTURE))
+        r->fine--;
     r->frames = (cli_frames_def){.every = r->picture || !q->every ? 1 : q->every,
                                  .one = r->picture ? (int)frame : CLI_ALL_FRAMES,
                                  .field = r->shading->field};
@@ -243,16 +255,19 @@ static int open_sources(render *r)
 /* Before anything is simulated, so that failures to draw are reported at once. */
 static int open_painter(render *r)
 {
-    const drape_painter_def def = {.width = r->width,
-                                   .height = r->height,
+    const size_t size = (size_t)r->width * (size_t)r->height, finer = (size_t)(r->fine * r->fine);
+    const drape_painter_def def = {.width = r->fine * r->width,
+                                   .height = r->fine * r->height,
+                                   .fine = r->fine,
                                    .pattern = r->request->texture,
                                    .heights = r->request->height,
                                    .environment = r->request->environment};
     drape_status status = drape_offscreen_create(r->ctx, &r->offscreen);
     if (!status)
         status = drape_painter_create(r->ctx, &def, &r->painter);
-    r->pixels = drape_arena_take(r->request->command.arena, (size_t)r->width * (size_t)r->height, 4);
-    return status || !r->pixels ? report(r, CLI_BAD_INPUT) : CLI_GO_ON;
+    r->drawn = drape_arena_take(r->request->command.arena, finer * size, 4);
+    r->pixels = finer == 1 ? r->drawn : drape_arena_take(r->request->command.arena, size, 4);
+    return status || !r->drawn || !r->pixels ? report(r, CLI_BAD_INPUT) : CLI_GO_ON;
 }
 
 static int fill_sources(render *r)
@@ -261,6 +276,34 @@ static int fill_sources(render *r)
     for (int i = 0; i < r->source_count && code == CLI_GO_ON; i++)
         code = cli_source_fill(&r->frames, &r->sources[i]);
     return code;
+}
+
+/* Adds all frames of all runs to a framing. */
+static void add_frames(render *r, drape_framing *framing, const float *offset)
+{
+    for (int i = 0; i < r->source_count; i++) {
+        const drape_reel *reel = &r->sources[i].reel;
+        for (size_t k = 0; k < reel->count; k++)
+            drape_stage_frame(&r->stages[i], framing, reel->times[k], drape_reel_positions(reel, k), offset);
+    }
+}
+
+/* A camera about the middle of the first stage, as far as the angle that needs most. */
+static drape_camera turning_camera(render *r, float aspect)
+{
+    drape_camera camera = {.azimuth = (float)r->azimuth, .elevation = (float)r->elevation};
+    float offset[3];
+    for (int k = 0; k < 3; k++) {
+        camera.target[k] = r->stages[0].center[k];
+        offset[k] = -camera.target[k];
+    }
+    for (int i = 0; i < TURN_ANGLES; i++) {
+        drape_framing framing = drape_framing_begin((float)r->azimuth + 360.0f * (float)i / TURN_ANGLES,
+                                                    (float)r->elevation, aspect);
+        add_frames(r, &framing, offset);
+        camera.distance = fmaxf(camera.distance, drape_framing_distance(&framing) / (float)r->zoom);
+    }
+    return camera;
 }
 
 /* One camera for all panels and all frames. */
@@ -277,12 +320,15 @@ static int set_stages(render *r)
         const drape_reel *reel = &r->sources[i].reel;
         if (drape_stage_create(r->ctx, r->sources[i].in.model, stage))
             return report(r, CLI_FAILED);
-        for (size_t k = 0; k < reel->count; k++) {
+        for (size_t k = 0; k < reel->count; k++)
             drape_stage_add(stage, drape_reel_positions(reel, k));
-            drape_stage_frame(stage, &framing, reel->times[k], drape_reel_positions(reel, k));
-        }
         drape_stage_finish(stage);
     }
+    if (r->request->turntable) {
+        r->view = turning_camera(r, aspect);
+        return CLI_GO_ON;
+    }
+    add_frames(r, &framing, (const float[3]){0});
     r->view = drape_framing_end(&framing, (float)r->azimuth, (float)r->elevation, (float)r->zoom);
     return CLI_GO_ON;
 }
@@ -319,14 +365,31 @@ static drape_status draw(render *r, size_t k)
                                   .label = r->source_count > 1 ? s->label : NULL};
     }
     snprintf(caption, sizeof caption, "t = %.3f s", t);
+    drape_camera camera = r->view;
+    if (r->request->turntable) /* the frame after the last one would be the first one again */
+        camera.azimuth += 360.0f * (float)k / (float)r->sources[0].reel.count;
     const drape_picture picture = {.panels = panels,
                                    .panel_count = r->source_count,
                                    .shading = r->shading,
                                    .low = r->low,
                                    .high = r->high,
-                                   .camera = r->view,
+                                   .camera = camera,
                                    .caption = r->picture ? NULL : caption};
     return drape_painter_draw(r->painter, &picture);
+}
+
+/* Averages the pixels that were drawn. */
+static void average(render *r)
+{
+    const size_t fine = (size_t)r->fine, width = (size_t)r->width, count = fine * fine;
+    for (size_t y = 0; fine > 1 && y < (size_t)r->height; y++)
+        for (size_t i = 0; i < 4 * width; i++) {
+            const uint8_t *from = r->drawn + 4 * fine * (y * fine * width + i / 4) + i % 4;
+            size_t sum = count / 2;
+            for (size_t k = 0; k < count; k++)
+                sum += from[4 * (k / fine * fine * width + k % fine)];
+            r->pixels[4 * width * y + i] = (uint8_t)(sum / count);
+        }
 }
 
 static drape_status write_png(render *r, drape_folder *folder, const char *path)
@@ -343,7 +406,8 @@ static drape_status draw_frames(render *r, frame_writer *write, void *user)
     size_t count = r->sources[0].reel.count;
     drape_status status = draw(r, 0);
     for (size_t k = 0; k < count && !status && !cli_interrupted(); k++) {
-        status = drape_canvas_read(r->ctx, drape_painter_canvas(r->painter), r->pixels);
+        status = drape_canvas_read(r->ctx, drape_painter_canvas(r->painter), r->drawn);
+        average(r);
         drape_status next = !status && k + 1 < count ? draw(r, k + 1) : DRAPE_OK;
         if (!status)
             status = write(r, k, user);
@@ -369,7 +433,8 @@ static drape_status add_to_film(render *r, size_t k, void *film)
 static drape_status make_film(render *r)
 {
     drape_film *film = NULL;
-    double rate = drape_model_frame_rate(r->sources[0].in.model) / r->frames.every;
+    double rate = drape_model_frame_rate(r->sources[0].in.model) / r->frames.every /
+                  (r->request->slow ? r->request->slow : 1);
     drape_status status = drape_film_begin(r->ctx, r->request->out, r->width, r->height, rate, &film);
     if (!status)
         status = draw_frames(r, add_to_film, film);
@@ -485,17 +550,23 @@ static int run(const void *command)
 #define AT(member) offsetof(render_request, member)
 static const cli_option options[] = {
     {"out", CLI_TEXT, "FILE|DIR",
-     "x.png: one frame; x.mp4, x.webm, x.gif: a film, by ffmpeg; no ending: a folder of frames", AT(out), 0,
-     NULL},
+     "x.png: one frame; x.mp4, x.webm, x.gif, x.apng: a film, by ffmpeg; no ending: a folder of frames",
+     AT(out), 0, NULL},
     {"frame", CLI_TEXT, "N", "the frame of a picture, from 0 (default: the last)", AT(frame), 0, NULL},
     {"every", CLI_NUMBER, "N", "every Nth frame in a film or folder", AT(every), 1000000, NULL},
-    {"shade", CLI_TEXT, "NAME", "how cloth is coloured (default diffuse); `drape list shadings` shows all",
+    {"shade", CLI_TEXT, "NAME", "how cloth is coloured (default linen); `drape list shadings` shows all",
      AT(shade), 0, NULL},
     {"size", CLI_TEXT, "WxH", "pixels (default 1280x720)", AT(size), 0, NULL},
     {"camera", CLI_TEXT, "A,E[,Z]",
      "azimuth and elevation in degrees, zoom (default 32,24,1, which shows all)", AT(camera), 0, NULL},
     {"range", CLI_TEXT, "LOW,HIGH",
      "range of a field's colours, in the legend's unit (default: that of its values)", AT(range), 0, NULL},
+    {"slow", CLI_NUMBER, "N", "make a film that runs N times slower than the scene", AT(slow), MAX_SLOW,
+     NULL},
+    {"turntable", CLI_FLAG, NULL, "turn the camera once around during a film", AT(turntable), 0, NULL},
+    {"fine", CLI_NUMBER, "N",
+     "draw N x N pixels for each and average them (default 2 for a picture, 1 for films and folders)",
+     AT(fine), MAX_FINE, NULL},
     {"compare", CLI_FLAG, NULL, "draw several scenes or runs side by side, at equal times", AT(compare), 0,
      NULL},
     {"texture", CLI_TEXT, "PNG", "picture on the cloth", AT(texture), 0, NULL},

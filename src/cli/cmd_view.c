@@ -68,7 +68,7 @@ static int report(const window_view *w, int code)
 
 static drape_status make_painter(window_view *w)
 {
-    drape_painter_def def = {.width = WIDTH, .height = HEIGHT};
+    drape_painter_def def = {.width = WIDTH, .height = HEIGHT, .fine = 1};
     drape_window_size(w->window, &def.width, &def.height);
     drape_painter_destroy(&w->painter);
     return drape_painter_create(w->ctx, &def, &w->painter);
@@ -133,7 +133,7 @@ static void set_camera(window_view *w)
     float aspect = drape_painter_aspect(w->painter, &picture);
     drape_framing framing = drape_framing_begin(DRAPE_CAMERA_AZIMUTH, DRAPE_CAMERA_ELEVATION, aspect);
     const float *x = drape_reel_positions(&w->reel, 0);
-    drape_stage_frame(&w->stage, &framing, 0, x);
+    drape_stage_frame(&w->stage, &framing, 0, x, (const float[3]){0});
     drape_stage_add(&w->stage, x);
     if (!w->stage.has_ground) {
         float low[3] = {0};
@@ -517,7 +517,7 @@ static drape_status set_up(window_view *w, int width, int height)
 
 static int read_shade(window_view *w)
 {
-    const char *name = w->request->shade ? w->request->shade : "diffuse";
+    const char *name = w->request->shade ? w->request->shade : "linen";
     char text[DRAPE_UNKNOWN_SIZE];
     w->shading = drape_registry_find(&drape_shading_registry, NULL, name);
     if (w->shading >= 0)
@@ -567,7 +567,7 @@ static int run(const void *command)
 }
 
 static const cli_option options[] = {
-    {"shade", CLI_TEXT, "NAME", "how cloth is coloured (default diffuse); `drape list shadings` shows all",
+    {"shade", CLI_TEXT, "NAME", "how cloth is coloured (default linen); `drape list shadings` shows all",
      offsetof(view_request, shade), 0, NULL},
     {"size", CLI_TEXT, "WxH", "pixels of the window (default 1280x720)", offsetof(view_request, size), 0,
      NULL},

@@ -10,7 +10,9 @@
 #define FLAT_CELLS   12   /* the same for an endless body */
 #define FAR          1e4  /* distance in reaches from which the extent along an axis is measured */
 #define ENDLESS      2.0  /* half the side of the box of an endless body, in reaches */
-#define NORMAL_SHIFT 0.15 /* shift of a corner to the middle of its face, for the normal */
+#define NORMAL_SHIFT 0.15 /* shift of a corner to the middle of its face, to find the side it is on */
+#define NORMAL_RISE  0.05 /* height above the corner on that side where its normal is taken, in cells */
+#define CREASE       0.8  /* cosine between two faces of a mesh above which their edge is drawn smooth */
 #define CUT_STEPS    24   /* bisections that find where the surface cuts an edge of the grid */
 #define MEAN_WEIGHT  1e-2 /* of the mean, for directions that the planes leave free */
 #define NEWTON_STEPS 4    /* that move a point onto the surface */
@@ -219,8 +221,9 @@ static drape_status make_point(grid *g, int i, int j, int k)
 
 /* ---- Faces: one for each edge of the grid that is cut ---- */
 
-/* The normal of a corner is taken a little towards the middle of its face, so that at an edge of the body it
- * is the normal of the side on which the face lies. */
+/* The normal of a corner is taken a little above it, on the side of the face: where the body is round it is
+ * that of the body, and at an edge that of the side on which the face lies. Which side that is, the normal
+ * a little towards the middle of the face tells. */
 static void put_triangle(const grid *g, const int32_t *corner, drape_body *body)
 {
     double middle[3] = {0}, normal[3], x[3];
@@ -231,6 +234,9 @@ static void put_triangle(const grid *g, const int32_t *corner, drape_body *body)
         float *to = body->vertex + 6 * body->vertex_count++;
         for (int k = 0; k < 3; k++)
             x[k] = p[k] + NORMAL_SHIFT * (middle[k] - p[k]);
+        distance(g->collider, x, normal);
+        for (int k = 0; k < 3; k++)
+            x[k] = p[k] + NORMAL_RISE * g->cell * normal[k];
         distance(g->collider, x, normal);
         for (int k = 0; k < 3; k++) {
             to[k] = (float)p[k];
@@ -288,6 +294,36 @@ static drape_status contour(drape_arena *arena, const drape_collider *collider, 
 
 /* ---- Colliders that have triangles ---- */
 
+/* Normals of points, the mean of those of their triangles weighted by area, for triangles that differ
+ * little from it; others stay crisp. */
+static drape_status smooth_normals(drape_context *ctx, const drape_collider_shape *shape, drape_body *body)
+{
+    double *sum = drape_alloc(ctx, 3 * (size_t)shape->point_count, sizeof *sum);
+    if (!sum)
+        return DRAPE_E_MEMORY;
+    for (size_t i = 0; i < body->vertex_count; i++) {
+        const float *corner = body->vertex + 6 * (i - i % 3);
+        double e1[3], e2[3], normal[3];
+        for (int k = 0; k < 3; k++) {
+            e1[k] = (double)(corner[6 + k] - corner[k]);
+            e2[k] = (double)(corner[12 + k] - corner[k]);
+        }
+        vec3_cross(e1, e2, normal);
+        vec3_add_scaled(1, normal, sum + 3 * (size_t)shape->triangle[i]);
+    }
+    for (size_t i = 0; i < body->vertex_count; i++) {
+        float *normal = body->vertex + 6 * i + 3;
+        const double *mean = sum + 3 * (size_t)shape->triangle[i];
+        double length = vec3_norm(mean), along = 0;
+        for (int k = 0; k < 3; k++)
+            along += mean[k] * (double)normal[k];
+        for (int k = 0; k < 3 && along > CREASE * length; k++)
+            normal[k] = (float)(mean[k] / length);
+    }
+    drape_free(ctx, sum);
+    return DRAPE_OK;
+}
+
 static drape_status copy_triangles(drape_arena *arena, const drape_collider_shape *shape, drape_body *body)
 {
     size_t count = 3 * (size_t)shape->triangle_count;
@@ -310,7 +346,7 @@ static drape_status copy_triangles(drape_arena *arena, const drape_collider_shap
             }
     }
     body->vertex_count = count;
-    return DRAPE_OK;
+    return smooth_normals(arena->ctx, shape, body);
 }
 
 drape_status drape_body_create(drape_arena *arena, const drape_collider *collider, const double center[3],

@@ -64,6 +64,11 @@ drape_camera drape_framing_end(const drape_framing *f, float azimuth, float elev
     return camera;
 }
 
+float drape_framing_distance(const drape_framing *f)
+{
+    return fmaxf(fmaxf(f->side[0], f->side[1]), fmaxf(f->side[2], f->side[3]));
+}
+
 drape_view drape_camera_view(const drape_camera *camera, float aspect, float radius)
 {
     drape_view view = {.center = {0, 0}};

@@ -39,6 +39,10 @@ void drape_framing_add(drape_framing *framing, const float *points, size_t count
 /* The nearest camera that shows all points, with a margin; zoom > 1 goes nearer. */
 drape_camera drape_framing_end(const drape_framing *framing, float azimuth, float elevation, float zoom);
 
+/* The distance at which a camera that looks at the origin shows all points [m]: for one that turns about
+ * it. */
+float drape_framing_distance(const drape_framing *framing);
+
 /* radius: of the scene around the target, for the near and far planes. */
 drape_view drape_camera_view(const drape_camera *camera, float aspect, float radius);
 

@@ -32,8 +32,10 @@ static const kind kinds[] = {
      " -c:v libx264 -preset medium -crf 17 -pix_fmt yuv420p -colorspace bt709 -movflags +faststart -f mp4"},
     {".webm", "-vf " EVEN " -c:v libvpx-vp9 -crf 24 -b:v 0 -row-mt 1 -cpu-used 4 -pix_fmt yuv420p -f webm"},
     {".gif", "-filter_complex "
-             "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer:bayer_scale=4 "
+             "split[a][b];[a]palettegen=max_colors=192:stats_mode=full[p];"
+             "[b][p]paletteuse=dither=bayer:bayer_scale=5:diff_mode=rectangle "
              "-loop 0 -f gif"},
+    {".apng", "-plays 0 -pred mixed -f apng"},
 };
 
 struct drape_film {

@@ -214,7 +214,7 @@ static void draw_glyph(drape_font *font, int index)
 
 drape_status drape_font_create(drape_arena *arena, float height, drape_font *font)
 {
-    float scale = height / CAPITAL, margin = 1.5f;
+    float scale = height / CAPITAL, margin = 2; /* whole pixels: a letter is drawn texel by texel */
     *font = (drape_font){.height = height};
     font->cell_width = (int)ceilf(WIDEST * scale + 2 * margin);
     font->cell_height = (int)ceilf((CAPITAL + TAIL + HEAD) * scale + 2 * margin);

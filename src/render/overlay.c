@@ -59,11 +59,11 @@ static GLuint upload_font(const drape_font *font)
     return name;
 }
 
-drape_status drape_overlay_create(drape_arena *arena, int width, int height, drape_overlay *overlay)
+drape_status drape_overlay_create(drape_arena *arena, int width, int height, int fine, drape_overlay *overlay)
 {
     static const int sizes[] = {2, 2, 1, 4, 0};
     *overlay = (drape_overlay){.width = width, .height = height};
-    overlay->unit = fmaxf(0.75f, fminf((float)height / 720, (float)width / 960));
+    overlay->unit = fmaxf(0.75f * (float)fine, fminf((float)height / 720, (float)width / 960));
     overlay->quads =
         drape_arena_take(arena, (size_t)DRAPE_OVERLAY_QUADS * 6 * VERTEX, sizeof *overlay->quads);
     drape_status status = drape_font_create(arena, roundf(TEXT_SIZE * overlay->unit), &overlay->font);

@@ -18,8 +18,10 @@ typedef struct drape_overlay {
     size_t count;
 } drape_overlay;
 
-/* Takes its memory from an arena. Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
-drape_status drape_overlay_create(drape_arena *arena, int width, int height, drape_overlay *overlay);
+/* fine: pixels along a side of one that will be seen, for the smallest text. Takes its memory from an arena.
+ * Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
+drape_status drape_overlay_create(drape_arena *arena, int width, int height, int fine,
+                                  drape_overlay *overlay);
 void drape_overlay_free(drape_overlay *overlay); /* its OpenGL objects; may be empty */
 
 typedef enum drape_align { DRAPE_LEFT, DRAPE_MIDDLE, DRAPE_RIGHT } drape_align;

@@ -3,15 +3,14 @@
 
 #include "render/images.h"
 #include "render/layout.h"
+#include "render/lighting.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#define SHADOW       1024   /* texels along a side of the shadow map */
-#define SOFT         1.5f   /* texels between the samples of the shadow map */
-#define LAMP_AZIMUTH -16.0f /* [degrees], as a camera's; it does not move with the camera */
-#define LAMP_HEIGHT  54.0f  /* [degrees] */
+#define LAMP_AZIMUTH -14.0f /* [degrees], as a camera's; it does not move with the camera */
+#define LAMP_HEIGHT  52.0f  /* [degrees] */
 #define SHADOW_REACH 1.3f   /* half the width of the shadow map, in radii of the stage */
 #define DEEP         5.0f   /* distance of the lamp, in radii of the stage */
 #define RELIEF       0.016f /* height of displacements over the longer side of the largest cloth */
@@ -31,14 +30,13 @@ static const char surface_vertex[] =
     "layout(location = 3) in vec2 at_uv;\n"
     "layout(location = 4) in float at_value;\n"
     "layout(location = 5) in float at_piece;\n"
-    "uniform mat4 view, lamp;\n"
+    "uniform mat4 view;\n"
     "uniform vec3 offset;\n"
     "uniform float relief, spread, grain; // grain: of the mesh that is drawn, in texture coordinates\n"
     "uniform sampler2D heights;\n"
     "out vec3 place, normal, tangent;\n"
     "out vec2 at;\n"
     "out float value, piece;\n"
-    "out vec4 shadow_at;\n"
     "void main() {\n"
     "    float level = relief > 0.0 ? log2(max(1.0, grain * float(textureSize(heights, 0).x))) : 0.0;\n"
     "    float rise = relief > 0.0 ? relief * textureLod(heights, at_uv, level).r : 0.0;\n"
@@ -48,7 +46,6 @@ static const char surface_vertex[] =
     "    at = at_uv;\n"
     "    value = at_value;\n"
     "    piece = at_piece;\n"
-    "    shadow_at = lamp * vec4(place, 1.0);\n"
     "    gl_Position = view * vec4(place, 1.0);\n"
     "}\n";
 
@@ -66,45 +63,40 @@ static const char surface_main[] =
     "    s.at = at;\n"
     "    s.value = value;\n"
     "    s.piece = piece;\n"
-    "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
-    "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
-    "    if (relief > 0.0) facing = dot(s.n, light); // the slopes of a relief come from its map, not its "
-    "mesh\n"
-    "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
+    "    vec2 reached = lighting(place);\n"
+    "    s.sun = mix(reached.x, 1.0, clear);\n"
+    "    s.open = reached.y;\n"
     "    colour = vec4(encoded(shade(s)), 1.0);\n"
     "}\n";
 
-static const char body_source[] =
-    "vec3 shade(Surface s) {\n"
-    "    vec3 h = normalize(light + s.v);\n"
-    "    return vec3(0.42, 0.45, 0.50) * arriving(s) / PI * 1.5 + 0.06 * power(dot(s.n, h), 24.0) * s.sun;\n"
-    "}\n";
+static const char body_source[] = "vec3 shade(Surface s) {\n"
+                                  "    vec3 h = normalize(light + s.v);\n"
+                                  "    return vec3(0.44, 0.435, 0.43) * arriving(s) / PI * 1.45 + 0.05 * "
+                                  "power(dot(s.n, h), 30.0) * s.sun + 0.06 * "
+                                  "s.open * power(1.0 - dot(s.n, s.v), 4.0);\n"
+                                  "}\n";
 
 /* Most pixels of a picture are ground, so its shader is cheap: it mixes light directly in sRGB. */
 static const char ground_source[] =
     "uniform vec3 center;\n"
-    "uniform float radius, spacing, solid;\n"
+    "uniform float radius, solid;\n"
     "\n"
-    "// Lines of a square lattice on the plane.\n"
-    "float lattice(vec2 q) {\n"
-    "    vec2 w = fwidth(q) + 1e-6, near = abs(fract(q - 0.5) - 0.5) / w;\n"
-    "    float line = 1.0 - min(min(near.x, near.y), 1.0);\n"
-    "    return line * clamp(0.5 / max(w.x, w.y) - 1.0, 0.0, 1.0);\n"
-    "}\n"
-    "\n"
-    "// Fades into the wall. Without a ground in the scene only the shadow is drawn.\n"
+    "// Continues the wall towards the eye, so that no horizon is seen, and fades into it. Without a ground "
+    "in the "
+    "scene only the shadow is drawn.\n"
     "void main() {\n"
-    "    vec3 u = abs(normal.y) > 0.7 ? vec3(normal.y, -normal.x, 0.0) : vec3(normal.z, 0.0, -normal.x);\n"
-    "    u *= inversesqrt(dot(u, u)) / spacing;\n"
     "    vec3 c = wall(), far = (place - center) / radius;\n"
-    "    float line = solid < 0.5 ? 0.0 : lattice(vec2(dot(place, u), dot(place, cross(normal, u))));\n"
-    "    float fade = 1.0 - smoothstep(1.3, 3.4, sqrt(dot(far, far))), facing = dot(normal, light);\n"
+    "    float fade = 1.0 - smoothstep(1.3, 3.3, sqrt(dot(far, far))), facing = dot(normal, light) / "
+    "max(light.y, 0.1);\n"
     "    if (fade > 0.0) {\n"
-    "        float sun = sunlight(shadow_at, facing);\n"
-    "        vec3 lit = mix(vec3(0.40, 0.41, 0.425), vec3(0.745, 0.735, 0.725), sun * min(1.2 * facing, "
-    "1.0));\n"
-    "        vec3 shade = mix(c, vec3(0.24, 0.26, 0.31), 0.40 * (1.0 - sun) * max(normal.y, 0.0));\n"
-    "        c = mix(c, solid < 0.5 ? shade : lit * (1.0 - 0.07 * line), fade);\n"
+    "        vec2 reached = lighting(place);\n"
+    "        float slope = 1.0 - smoothstep(0.97, 1.0, normal.y);\n"
+    "        float sun = mix(reached.x, 1.0, clear) * clamp(facing, 0.0, 1.2), held = (1.0 - sun) * (0.45 + "
+    "0.55 * max(normal.y, 0.0));\n"
+    "        vec3 lit = c * mix(vec3(1.0), vec3(0.955, 0.95, 0.945), solid * (0.4 + 0.6 * slope));\n"
+    "        lit *= 1.0 - held * vec3(0.50, 0.475, 0.435);\n"
+    "        lit *= mix(vec3(0.56, 0.555, 0.57), vec3(1.0), reached.y);\n"
+    "        c = mix(c, lit, fade);\n"
     "    }\n"
     "    colour = vec4(c, 1.0);\n"
     "}\n";
@@ -120,9 +112,9 @@ static const char wall_source[] =
     "vec3 wall() {\n"
     "    vec2 at = (gl_FragCoord.xy - box.xy) / box.zw * 2.0 - 1.0;\n"
     "    float up = 0.5 + 0.5 * at.y;\n"
-    "    vec3 c = mix(vec3(0.80, 0.81, 0.825), vec3(0.935, 0.94, 0.95), up * up * (3.0 - 2.0 * up));\n"
+    "    vec3 c = mix(vec3(0.925, 0.918, 0.908), vec3(0.845, 0.853, 0.865), up * up * (3.0 - 2.0 * up));\n"
     "    float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715)))) - 0.5;\n"
-    "    return c - 0.03 * dot(at, at) * vec3(1.0, 0.95, 0.9) + noise / 255.0;\n"
+    "    return c - 0.035 * dot(at, at) * vec3(1.0, 0.98, 0.95) + noise / 255.0;\n"
     "}\n";
 static const char wall_main[] = "out vec4 colour;\n"
                                 "void main() { colour = vec4(wall(), 1.0); }\n";
@@ -173,9 +165,9 @@ struct drape_painter {
     drape_canvas canvas;
     drape_overlay overlay;
     GLuint textures[3], ramp; /* that shadings read, in the order of DRAPE_READS_*; 0: not made yet */
-    GLuint shadow, shadow_buffer;
+    drape_lighting lighting;
     GLuint empty; /* vertex array without attributes */
-    GLuint depth, body, ground, wall, wire, pin;
+    GLuint depth, seen, body, ground, wall, wire, pin;
     GLuint shadings[MAX_SHADINGS]; /* 0: not made yet */
     drape_gl_mesh floor;           /* a horizontal square with sides of 2 */
 };
@@ -186,7 +178,8 @@ static GLuint surface_program(drape_context *ctx, const char *name, const char *
 {
     const char *const *p = drape_shading_prelude;
     return drape_gl_program(ctx, name, (const char *const[]){surface_vertex, NULL},
-                            (const char *const[]){p[0], p[1], p[2], source[0], source[1], source[2], NULL});
+                            (const char *const[]){p[0], p[1], p[2], drape_lighting_lookup_source, source[0],
+                                                  source[1], source[2], NULL});
 }
 
 static GLuint program(drape_context *ctx, const char *name, const char *vertex, const char *first,
@@ -201,32 +194,12 @@ static bool create_programs(drape_painter *p)
     static const char *const body[] = {body_source, surface_main, NULL};
     static const char *const ground[] = {wall_source, ground_source, NULL};
     return (p->depth = program(p->ctx, "depth", surface_vertex, depth_fragment, NULL)) &&
+           (p->seen = program(p->ctx, "seen", surface_vertex, drape_lighting_seen_source, NULL)) &&
            (p->body = surface_program(p->ctx, "body", body)) &&
            (p->ground = surface_program(p->ctx, "ground", ground)) &&
            (p->wall = program(p->ctx, "wall", wall_vertex, wall_source, wall_main)) &&
            (p->wire = program(p->ctx, "wire", wire_vertex, wire_fragment, NULL)) &&
            (p->pin = program(p->ctx, "pin", pin_vertex, pin_fragment, NULL));
-}
-
-static void create_shadow(drape_painter *p)
-{
-    static const float lit[] = {1, 1, 1, 1};
-    glGenTextures(1, &p->shadow);
-    glBindTexture(GL_TEXTURE_2D, p->shadow);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT24, SHADOW, SHADOW, 0, GL_DEPTH_COMPONENT,
-                 GL_UNSIGNED_INT, NULL);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
-    glTexParameterfv(GL_TEXTURE_2D, GL_TEXTURE_BORDER_COLOR, lit);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
-    glGenFramebuffers(1, &p->shadow_buffer);
-    glBindFramebuffer(GL_FRAMEBUFFER, p->shadow_buffer);
-    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, p->shadow, 0);
-    glDrawBuffer(GL_NONE);
-    glReadBuffer(GL_NONE);
 }
 
 static drape_status make_texture(drape_painter *p, int which, const char *path)
@@ -244,7 +217,9 @@ static drape_status create_all(drape_painter *p, const drape_painter_def *def)
     const char *const paths[] = {def->pattern, def->heights, def->environment};
     drape_status status = drape_canvas_create(p->ctx, def->width, def->height, &p->canvas);
     if (!status)
-        status = drape_overlay_create(&p->arena, def->width, def->height, &p->overlay);
+        status = drape_overlay_create(&p->arena, def->width, def->height, def->fine, &p->overlay);
+    if (!status)
+        status = drape_lighting_create(p->ctx, def->width, def->height, &p->lighting);
     for (int i = 0; i < 3 && !status; i++)
         if (paths[i])
             status = make_texture(p, i, paths[i]);
@@ -254,7 +229,6 @@ static drape_status create_all(drape_painter *p, const drape_painter_def *def)
         return status;
     p->ramp = drape_texture_ramp();
     glGenVertexArrays(1, &p->empty);
-    create_shadow(p);
     drape_gl_mesh_create(&p->floor, sizes, false);
     drape_gl_mesh_fill(&p->floor, square, 6, false);
     return drape_gl_check(p->ctx, "set up drawing");
@@ -278,15 +252,15 @@ void drape_painter_destroy(drape_painter **painter)
     drape_painter *p = *painter;
     if (!p)
         return;
-    const GLuint textures[] = {p->textures[0], p->textures[1], p->textures[2], p->ramp, p->shadow};
-    const GLuint programs[] = {p->depth, p->body, p->ground, p->wall, p->wire, p->pin};
+    const GLuint textures[] = {p->textures[0], p->textures[1], p->textures[2], p->ramp};
+    const GLuint programs[] = {p->depth, p->seen, p->body, p->ground, p->wall, p->wire, p->pin};
     glDeleteTextures(sizeof textures / sizeof *textures, textures);
     for (size_t i = 0; i < sizeof programs / sizeof *programs; i++)
         glDeleteProgram(programs[i]);
     for (int i = 0; i < MAX_SHADINGS; i++)
         glDeleteProgram(p->shadings[i]);
-    glDeleteFramebuffers(1, &p->shadow_buffer);
     glDeleteVertexArrays(1, &p->empty);
+    drape_lighting_free(&p->lighting);
     drape_gl_mesh_free(&p->floor);
     drape_overlay_free(&p->overlay);
     drape_arena_free(&p->arena);
@@ -341,9 +315,10 @@ drape_view drape_painter_view(const drape_painter *painter, const drape_picture 
 /* The quantities common to everything drawn in a panel. */
 typedef struct panel_view {
     drape_view view;
-    drape_matrix lamp;               /* from space to the shadow map */
-    float light[3], window[3];       /* directions to the lamp and to a window opposite it */
+    drape_lighting_view light;       /* of the lamp */
+    float window[3];                 /* direction to a window opposite it */
     int left, bottom, width, height; /* pixels */
+    bool first;                      /* of the picture */
     float clear, reach;              /* of the shading; length of a refracted ray [m] */
     GLuint behind;                   /* texture of the picture without cloth; 0: none */
 } panel_view;
@@ -352,15 +327,26 @@ static void set_lamp(const drape_stage *stage, panel_view *v)
 {
     const drape_camera camera = {.azimuth = LAMP_AZIMUTH, .elevation = LAMP_HEIGHT};
     drape_view lamp = drape_camera_view(&camera, 1, 1);
-    float reach = stage->radius, eye[3];
-    memcpy(v->light, lamp.axes[2], sizeof v->light);
-    memcpy(v->window, (const float[]){-v->light[0], 0.3f, -v->light[2]}, sizeof v->window);
+    drape_lighting_view *l = &v->light;
+    float reach = stage->radius, near = 0.1f * reach, far = 4 * DEEP * reach, eye[3];
+    memcpy(l->right, lamp.axes[0], sizeof l->right);
+    memcpy(l->up, lamp.axes[1], sizeof l->up);
+    memcpy(l->light, lamp.axes[2], sizeof l->light);
+    memcpy(v->window, (const float[]){-l->light[0], 0.3f, -l->light[2]}, sizeof v->window);
     drape_normalize(v->window);
     for (int k = 0; k < 3; k++)
-        eye[k] = stage->center[k] + DEEP * reach * v->light[k];
+        eye[k] = stage->center[k] + DEEP * reach * l->light[k];
     drape_matrix look = drape_look((const float(*)[3])lamp.axes, eye);
-    drape_matrix box = drape_orthographic(SHADOW_REACH * reach, 0.1f * reach, 4 * DEEP * reach);
-    v->lamp = drape_multiply(&box, &look);
+    drape_matrix box = drape_orthographic(SHADOW_REACH * reach, near, far);
+    l->lamp = drape_multiply(&box, &look);
+    l->width = 2 * SHADOW_REACH * reach;
+    l->range = far - near;
+    l->radius = reach;
+    l->scale = (float)v->height / (2 * v->view.ty);
+    l->left = v->left;
+    l->bottom = v->bottom;
+    l->panel_width = v->width;
+    l->panel_height = v->height;
 }
 
 static void set_box(GLuint program, const char *name, const panel_view *v)
@@ -370,46 +356,32 @@ static void set_box(GLuint program, const char *name, const panel_view *v)
 }
 
 /* Sets the uniforms and textures that all programs of surfaces share. */
-static void use_surface(drape_painter *p, GLuint program, const panel_view *v, const drape_matrix *view)
+static void use_surface(const drape_painter *p, GLuint program, const panel_view *v, const drape_matrix *view)
 {
-    static const float nowhere[3] = {0}, front[3] = {0.50f, 0.062f, 0.048f}, back[3] = {0.40f, 0.29f, 0.18f};
+    static const float nowhere[3] = {0};
     const struct {
         const char *name;
         GLuint texture;
-    } units[] = {{"shadow_map", p->shadow},       {"picture", p->textures[0]}, {"heights", p->textures[1]},
+    } units[] = {{"visible", p->lighting.result}, {"picture", p->textures[0]}, {"heights", p->textures[1]},
                  {"environment", p->textures[2]}, {"ramp", p->ramp},           {"behind", v->behind}};
     glUseProgram(program);
     for (int i = 0; i < 6; i++) {
         glActiveTexture(GL_TEXTURE0 + (GLenum)i);
-        glBindTexture(GL_TEXTURE_2D, program == p->depth && i == 0 ? 0 : units[i].texture);
+        glBindTexture(GL_TEXTURE_2D, units[i].texture);
         drape_gl_set_int(program, units[i].name, i);
     }
     glActiveTexture(GL_TEXTURE0);
     drape_gl_set_matrix(program, "view", view->m);
-    drape_gl_set_matrix(program, "lamp", v->lamp.m);
     drape_gl_set_vec3(program, "eye", v->view.eye);
-    drape_gl_set_vec3(program, "light", v->light);
+    drape_gl_set_vec3(program, "light", v->light.light);
     drape_gl_set_vec3(program, "window", v->window);
     drape_gl_set_vec3(program, "offset", nowhere);
-    drape_gl_set_vec3(program, "front", front);
-    drape_gl_set_vec3(program, "back", back);
-    drape_gl_set_float(program, "soft", SOFT / SHADOW);
-    drape_gl_set_float(program, "texel_depth",
-                       2 * SHADOW_REACH / SHADOW / (4 * DEEP - 0.1f)); /* the width of a texel as depth */
     drape_gl_set_float(program, "clear", v->clear);
     drape_gl_set_float(program, "reach", v->reach);
     drape_gl_set_vec2(program, "pixels", (float)p->canvas.width, (float)p->canvas.height);
     set_box(program, "panel", v);
     drape_gl_set_float(program, "relief", 0);
     drape_gl_set_float(program, "spread", 1);
-}
-
-static float mean_edge(const drape_model *m)
-{
-    double sum = 0;
-    for (int32_t e = 0; e < m->edge_count; e++)
-        sum += m->edge_length[e];
-    return (float)(sum / m->edge_count);
 }
 
 static void draw_bodies(const drape_stage *stage, GLuint program, bool endless)
@@ -429,28 +401,14 @@ static void draw_cloth(GLuint program, const drape_stage *stage, const drape_sha
 {
     float side = (float)stage->model->length / 1.4142f;
     drape_gl_set_float(program, "relief", shading->displaced ? RELIEF * side : 0);
-    drape_gl_set_float(program, "grain", mean_edge(stage->model) / (float)stage->skin.level / side);
+    drape_gl_set_float(program, "grain", stage->skin.edge / (float)stage->skin.level / side);
     glBindVertexArray(stage->cloth.array);
     glDrawElements(GL_TRIANGLES, stage->cloth.index_count, GL_UNSIGNED_INT, NULL);
-}
-
-/* The shadow map: depths seen from the lamp. */
-static void draw_shadows(drape_painter *p, const drape_stage *stage, const drape_shading *shading,
-                         const panel_view *v)
-{
-    glBindFramebuffer(GL_FRAMEBUFFER, p->shadow_buffer);
-    glViewport(0, 0, SHADOW, SHADOW);
-    glDisable(GL_SCISSOR_TEST);
-    glEnable(GL_DEPTH_TEST);
-    glDepthMask(GL_TRUE);
-    glClear(GL_DEPTH_BUFFER_BIT);
-    glEnable(GL_POLYGON_OFFSET_FILL);
-    glPolygonOffset(2, 4);
-    use_surface(p, p->depth, v, &v->lamp);
-    draw_bodies(stage, p->depth, false);
-    drape_gl_set_vec3(p->depth, "offset", (const float[3]){0});
-    draw_cloth(p->depth, stage, shading);
-    glDisable(GL_POLYGON_OFFSET_FILL);
+    if (shading->wires)
+        return;
+    drape_gl_set_float(program, "relief", 0);
+    glBindVertexArray(stage->hem.array);
+    glDrawElements(GL_TRIANGLES, stage->hem.index_count, GL_UNSIGNED_INT, NULL);
 }
 
 /* The background, wherever nothing else was drawn. */
@@ -463,26 +421,19 @@ static void draw_wall(const drape_painter *p, const panel_view *v)
     glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
-static float round_length(float rough)
-{
-    float power = powf(10, floorf(log10f(rough))), s = rough / power;
-    return power * (s < 1.5f ? 1.0f : s < 3.5f ? 2.0f : s < 7.5f ? 5.0f : 10.0f);
-}
-
 /* Endless colliders; if there are none, a floor that shows the shadow. */
-static void draw_ground(drape_painter *p, const drape_stage *stage, const panel_view *v)
+static void draw_ground(const drape_painter *p, const drape_stage *stage, GLuint program, const panel_view *v)
 {
-    use_surface(p, p->ground, v, &v->view.matrix);
-    drape_gl_set_vec3(p->ground, "center", stage->center);
-    drape_gl_set_float(p->ground, "radius", stage->radius);
-    drape_gl_set_float(p->ground, "spacing", round_length(stage->radius / 3));
-    drape_gl_set_float(p->ground, "solid", stage->has_ground);
-    set_box(p->ground, "box", v);
+    use_surface(p, program, v, &v->view.matrix);
+    drape_gl_set_vec3(program, "center", stage->center);
+    drape_gl_set_float(program, "radius", stage->radius);
+    drape_gl_set_float(program, "solid", stage->has_ground);
+    set_box(program, "box", v);
     glEnable(GL_CULL_FACE);
-    draw_bodies(stage, p->ground, true);
+    draw_bodies(stage, program, true);
     if (!stage->has_ground) {
-        drape_gl_set_float(p->ground, "spread", 3.5f * stage->radius);
-        drape_gl_set_vec3(p->ground, "offset",
+        drape_gl_set_float(program, "spread", 3.5f * stage->radius);
+        drape_gl_set_vec3(program, "offset",
                           (const float[]){stage->center[0], stage->floor, stage->center[2]});
         glBindVertexArray(p->floor.array);
         glDrawArrays(GL_TRIANGLES, 0, 6);
@@ -490,11 +441,45 @@ static void draw_ground(drape_painter *p, const drape_stage *stage, const panel_
     glDisable(GL_CULL_FACE);
 }
 
+static void draw_bounded(const drape_painter *p, const drape_stage *stage, GLuint program,
+                         const panel_view *v)
+{
+    use_surface(p, program, v, &v->view.matrix);
+    glEnable(GL_CULL_FACE);
+    draw_bodies(stage, program, false);
+    glDisable(GL_CULL_FACE);
+}
+
+/* Finds the light that reaches what is seen, with cloth or without. The floor casts no shadow. */
+static void light_panel(const drape_painter *p, const drape_stage *stage, const drape_shading *shading,
+                        const panel_view *v, bool with_cloth)
+{
+    drape_lighting_begin_shadow(&p->lighting);
+    use_surface(p, p->depth, v, &v->light.lamp);
+    draw_bodies(stage, p->depth, false);
+    drape_gl_set_vec3(p->depth, "offset", (const float[3]){0});
+    draw_cloth(p->depth, stage, shading);
+    drape_lighting_begin_seen(&p->lighting, &v->light);
+    if (with_cloth) {
+        use_surface(p, p->seen, v, &v->view.matrix);
+        draw_cloth(p->seen, stage, shading);
+    }
+    draw_bounded(p, stage, p->seen, v);
+    draw_ground(p, stage, p->seen, v);
+    drape_lighting_find(&p->lighting, &v->light);
+}
+
+static void use_canvas(const drape_painter *p, const panel_view *v)
+{
+    glBindFramebuffer(GL_FRAMEBUFFER, p->canvas.many);
+    glViewport(v->left, v->bottom, v->width, v->height);
+}
+
 static void draw_wires(const drape_painter *p, const drape_stage *stage, const drape_camera *camera,
                        const panel_view *v)
 {
     /* the mean edge in pixels at the camera's distance */
-    float edge = mean_edge(stage->model) / (2 * camera->distance * v->view.ty) * (float)v->height;
+    float edge = stage->skin.edge / (2 * camera->distance * v->view.ty) * (float)v->height;
     float width = fminf(WIRE * p->overlay.unit, WIRE_SHARE * edge);
     const float thin = fminf(1, width); /* lines thinner than a pixel are drawn fainter */
     glEnable(GL_BLEND);
@@ -529,18 +514,22 @@ static void draw_shaded(drape_painter *p, const drape_picture *picture, const dr
 static void draw_scene(drape_painter *p, const drape_picture *picture, const drape_stage *stage,
                        GLuint program, panel_view *v)
 {
-    bool transparent = picture->shading->reads & DRAPE_READS_BEHIND;
+    const drape_shading *shading = picture->shading;
+    bool transparent = shading->reads & DRAPE_READS_BEHIND;
+    light_panel(p, stage, shading, v, !transparent);
+    if (v->first) /* after the light: leaving a cleared canvas would store and load it */
+        drape_canvas_begin(&p->canvas);
+    use_canvas(p, v);
     if (!transparent)
         draw_shaded(p, picture, stage, program, v);
-    use_surface(p, p->body, v, &v->view.matrix);
-    glEnable(GL_CULL_FACE);
-    draw_bodies(stage, p->body, false);
-    glDisable(GL_CULL_FACE);
-    draw_ground(p, stage, v);
+    draw_bounded(p, stage, p->body, v);
+    draw_ground(p, stage, p->ground, v);
     draw_wall(p, v);
     if (!transparent)
         return;
     v->behind = drape_canvas_copy(&p->canvas);
+    light_panel(p, stage, shading, v, true);
+    use_canvas(p, v);
     draw_shaded(p, picture, stage, program, v);
 }
 
@@ -555,6 +544,7 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
                     .bottom = whole.bottom,
                     .width = whole.width,
                     .height = whole.height,
+                    .first = index == 0,
                     .clear = shading->clear,
                     .reach = REFRACTED * stage->radius};
     drape_status status = program ? DRAPE_OK : DRAPE_E_FILE;
@@ -566,11 +556,6 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
     v.view = drape_painter_view(p, picture, index);
     set_lamp(stage, &v);
     drape_stage_set(stage, &panel->moment, shading->wires);
-    draw_shadows(p, stage, shading, &v);
-    if (index == 0) /* after the shadow map: leaving a cleared canvas would store and load it */
-        drape_canvas_begin(&p->canvas);
-    glBindFramebuffer(GL_FRAMEBUFFER, p->canvas.many);
-    glViewport(v.left, v.bottom, v.width, v.height);
     draw_scene(p, picture, stage, program, &v);
     if (shading->wires)
         draw_wires(p, stage, &picture->camera, &v);

@@ -16,6 +16,7 @@ typedef struct drape_painter drape_painter;
 
 typedef struct drape_painter_def {
     int width, height;                           /* pixels, 16 to DRAPE_MAX_PICTURE */
+    int fine;                                    /* pixels along a side of one that will be seen, from 1 */
     const char *pattern, *heights, *environment; /* PNG files; NULL: the built-in ones */
 } drape_painter_def;
 

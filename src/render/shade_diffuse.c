@@ -3,5 +3,5 @@
 
 const drape_shading drape_shading_diffuse = {
     .entry = {.name = "diffuse", .summary = "matt: light by the angle to it", .reference = "Lambert 1760"},
-    .source = "vec3 shade(Surface s) { return tint(s) * arriving(s) / PI * 1.6; }\n",
+    .source = "vec3 shade(Surface s) { return tint(s) * arriving(s) / PI * 1.55; }\n",
 };

@@ -3,6 +3,7 @@
 #include "render/skin.h"
 
 #include "base/vec3.h"
+#include "colliders/colliders.h"
 #include "render/matrix.h"
 
 #include <math.h>
@@ -12,6 +13,14 @@
 #define MAX_LEVEL       8
 /* sine of the angle between edge and tangent plane at which a curve is half as round */
 #define BULGE 0.35f
+#define CLEARANCE                                                                                            \
+    0.05f /* distance from colliders that curved triangles keep if flat ones do, in mean edges */
+#define FLATTER    0.6f /* factor on the roundness of what comes nearer, and how often it is tried */
+#define TRIES      6
+#define HEM        0.0019f /* radius of a hem over the longest cloth's diagonal */
+#define HEM_GRID   0.14f   /* the same over the mean edge, at most */
+#define HEM_POINTS 4       /* around half of a hem */
+#define PI         3.14159265f
 
 /* ---- Numbering of edges and points ---- */
 
@@ -183,6 +192,56 @@ static void unroll(const drape_cloth *cloth, float *uv)
     reverse(mesh, uv, 1);
 }
 
+/* ---- The border ---- */
+
+/* Lists the edges that belong to one triangle, and numbers the triangles of their hem. */
+static drape_status create_hem(drape_arena *arena, drape_skin *s)
+{
+    const drape_model *m = s->model;
+    const size_t ring = 2 * HEM_POINTS, sides = 3 * (size_t)m->triangle_count;
+    drape_arena scratch = drape_arena_of(arena->ctx);
+    int32_t *uses = drape_arena_take(&scratch, (size_t)m->edge_count, sizeof *uses);
+    for (size_t i = 0; uses && i < sides; i++)
+        s->border_count +=
+            ++uses[s->triangle_edge[i] >= 0 ? s->triangle_edge[i] : -1 - s->triangle_edge[i]] == 1 ? 1 : -1;
+    const size_t pieces = s->border_count * (size_t)s->level;
+    s->hem_count = s->border_count * (size_t)(s->level + 1) * ring;
+    s->border = drape_arena_take(arena, 2 * s->border_count, sizeof *s->border);
+    s->hem = drape_arena_take(arena, s->hem_count, sizeof *s->hem);
+    s->hem_index = drape_arena_take(arena, pieces * 2 * (HEM_POINTS - 1) * 6, sizeof *s->hem_index);
+    if (!uses || drape_arena_status(arena)) {
+        drape_arena_free(&scratch);
+        return DRAPE_E_MEMORY;
+    }
+    int32_t *border = s->border;
+    uint32_t *to = s->hem_index;
+    for (size_t i = 0; i < sides; i++)
+        if (uses[s->triangle_edge[i] >= 0 ? s->triangle_edge[i] : -1 - s->triangle_edge[i]] == 1) {
+            *border++ = (int32_t)(i / 3);
+            *border++ = (int32_t)(i % 3);
+        }
+    drape_arena_free(&scratch);
+    for (size_t e = 0; e < s->border_count; e++)
+        for (size_t k = 0; k < (size_t)s->level * ring; k++) {
+            uint32_t at = (uint32_t)(e * (size_t)(s->level + 1) * ring + k), next = at + (uint32_t)ring;
+            if (k % HEM_POINTS == HEM_POINTS - 1)
+                continue;
+            const uint32_t corners[6] = {at, next, next + 1, at, next + 1, at + 1};
+            memcpy(to, corners, sizeof corners);
+            to += 6;
+        }
+    s->hem_index_count = (size_t)(to - s->hem_index);
+    return DRAPE_OK;
+}
+
+static float mean_edge(const drape_model *m)
+{
+    double sum = 0;
+    for (int32_t e = 0; e < m->edge_count; e++)
+        sum += m->edge_length[e];
+    return (float)(sum / m->edge_count);
+}
+
 drape_status drape_skin_create(drape_arena *arena, const drape_model *model, drape_skin *skin)
 {
     const size_t nodes = (size_t)model->node_count, triangles = (size_t)model->triangle_count;
@@ -200,6 +259,11 @@ drape_status drape_skin_create(drape_arena *arena, const drape_model *model, dra
     skin->vertex = drape_arena_take(arena, skin->vertex_count, sizeof *skin->vertex);
     skin->index = drape_arena_take(arena, 3 * triangles * (size_t)(level * level), sizeof *skin->index);
     skin->segment = drape_arena_take(arena, 6 * skin->segment_count, sizeof *skin->segment);
+    skin->gap = drape_arena_take(arena, nodes, sizeof *skin->gap);
+    skin->roundness = drape_arena_take(arena, (size_t)model->edge_count, sizeof *skin->roundness);
+    skin->outward = drape_arena_take(arena, 3 * nodes, sizeof *skin->outward);
+    skin->edge = mean_edge(model);
+    skin->hem_radius = fminf(HEM * (float)model->length, HEM_GRID * skin->edge);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < 3 * triangles; i++) {
@@ -214,7 +278,7 @@ drape_status drape_skin_create(drape_arena *arena, const drape_model *model, dra
         for (int32_t i = 0; i < cloth->mesh.node_count; i++)
             skin->cloth[cloth->first_node + i] = (float)c;
     }
-    return DRAPE_OK;
+    return create_hem(arena, skin);
 }
 
 /* ---- Normals and tangents of the nodes ---- */
@@ -223,6 +287,13 @@ static void subtract(const float *a, const float *b, float *out)
 {
     for (int k = 0; k < 3; k++)
         out[k] = a[k] - b[k];
+}
+
+static float distance(const float *a, const float *b)
+{
+    float difference[3];
+    subtract(a, b, difference);
+    return sqrtf(drape_dot(difference, difference));
 }
 
 /* Adds a triangle to the normals and tangents of its corners, weighted by area: the cross product of two
@@ -279,6 +350,49 @@ static void update_nodes(drape_skin *s, const float *x, const float *values)
     }
 }
 
+/* ---- Colliders ---- */
+
+/* Distance of a point from the nearest collider at time t [m]; infinite without any. */
+static float clearance(const drape_model *m, double t, const float *p)
+{
+    double nearest = INFINITY;
+    for (int32_t c = 0; c < m->collider_count; c++) {
+        const drape_collider *collider = &m->colliders[c];
+        const drape_collider_pose pose = drape_collider_pose_at(collider, t);
+        const double x[3] = {(double)p[0], (double)p[1], (double)p[2]};
+        nearest = fmin(nearest, drape_collider_distance(collider, &pose, x, NULL, NULL));
+    }
+    return (float)nearest;
+}
+
+/* Whether a curved point is nearer to a collider than it may be. */
+static bool cuts(const drape_skin *s, double t, const float *curved, const float *flat)
+{
+    float enough = CLEARANCE * s->edge, d = clearance(s->model, t, curved);
+    return d < enough && d < clearance(s->model, t, flat) - 1e-3f * enough;
+}
+
+/* Moves curved points towards the flat ones, all by the same share, until none of them cuts a collider.
+ * Returns what remains of the difference, at most `roundness`. */
+static float flatten_points(const drape_skin *s, double t, drape_skin_vertex *point, const float (*flat)[3],
+                            size_t count, float roundness)
+{
+    float remains = roundness, curved[3];
+    int tries = 0;
+    for (size_t i = 0; i < count; i++)
+        for (bool cut = true; cut && remains > 0;) {
+            for (int k = 0; k < 3; k++)
+                curved[k] = flat[i][k] + remains * (point[i].p[k] - flat[i][k]);
+            cut = cuts(s, t, curved, flat[i]);
+            if (cut)
+                remains = ++tries < TRIES ? FLATTER * remains : 0;
+        }
+    for (size_t i = 0; remains < 1 && i < count; i++)
+        for (int k = 0; k < 3; k++)
+            point[i].p[k] = flat[i][k] + remains * (point[i].p[k] - flat[i][k]);
+    return remains;
+}
+
 /* ---- Points on edges and in triangles ---- */
 
 /* The inner control point, relative to a, of a curve from a to b that is orthogonal to the normal at a: a
@@ -328,8 +442,9 @@ static void normalize(drape_skin_vertex *v)
     orthogonalize(v->n, v->t);
 }
 
-static void update_edge(drape_skin *s, int32_t e)
+static void update_edge(drape_skin *s, double t, int32_t e)
 {
+    float flat[MAX_LEVEL][3];
     const drape_model *m = s->model;
     const drape_skin_vertex *const ends[2] = {&s->vertex[m->edge[2 * (size_t)e]],
                                               &s->vertex[m->edge[2 * (size_t)e + 1]]};
@@ -345,9 +460,16 @@ static void update_edge(drape_skin *s, int32_t e)
             to->p[k] = w * w * w * ends[0]->p[k] + 3 * w * w * u * (ends[0]->p[k] + from_a[k]) +
                        3 * w * u * u * (ends[1]->p[k] + from_b[k]) + u * u * u * ends[1]->p[k];
             to->n[k] = w * w * ends[0]->n[k] + u * u * ends[1]->n[k] + w * u * normal[k];
+            flat[i - 1][k] = w * ends[0]->p[k] + u * ends[1]->p[k];
         }
         normalize(to);
     }
+    /* between the ends a curve bulges by less than its length */
+    s->roundness[e] = 1;
+    if (fminf(s->gap[m->edge[2 * (size_t)e]], s->gap[m->edge[2 * (size_t)e + 1]]) <
+        distance(ends[0]->p, ends[1]->p))
+        s->roundness[e] =
+            flatten_points(s, t, to - (s->level - 1), (const float(*)[3])flat, (size_t)(s->level - 1), 1);
 }
 
 /* The control net of a triangle: two points on each side, one inside, and the normals at the middles of its
@@ -400,24 +522,104 @@ static void update_inner(const patch *p, const float *w, drape_skin_vertex *to)
     normalize(to);
 }
 
-static void update_triangle(drape_skin *s, int32_t t)
+/* The inner points, as round as the straightest of the sides. They are numbered one after the other. */
+static void update_triangle(drape_skin *s, double t, int32_t triangle)
 {
     patch p;
-    float n = (float)s->level;
-    make_patch(s, t, &p);
+    float n = (float)s->level, flat[MAX_LEVEL * MAX_LEVEL][3], nearest = INFINITY, longest = 0, roundness = 1;
+    size_t count = 0;
+    drape_skin_vertex *first = &s->vertex[point_number(s, triangle, 1, 1)];
+    make_patch(s, triangle, &p);
     for (int j = 1; j < s->level; j++)
-        for (int i = 1; i + j < s->level; i++)
-            update_inner(&p, (float[]){(n - (float)i - (float)j) / n, (float)i / n, (float)j / n},
-                         &s->vertex[point_number(s, t, i, j)]);
+        for (int i = 1; i + j < s->level; i++, count++) {
+            const float w[3] = {(n - (float)i - (float)j) / n, (float)i / n, (float)j / n};
+            update_inner(&p, w, first + count);
+            for (int k = 0; k < 3; k++)
+                flat[count][k] =
+                    w[0] * p.corner[0]->p[k] + w[1] * p.corner[1]->p[k] + w[2] * p.corner[2]->p[k];
+        }
+    for (int k = 0; k < 3; k++) {
+        int32_t e = s->triangle_edge[3 * (size_t)triangle + (size_t)k];
+        nearest = fminf(nearest, s->gap[s->model->triangle[3 * (size_t)triangle + (size_t)k]]);
+        longest = fmaxf(longest, distance(p.corner[k]->p, p.corner[(k + 1) % 3]->p));
+        roundness = fminf(roundness, s->roundness[e >= 0 ? e : -1 - e]);
+    }
+    if (nearest < longest)
+        flatten_points(s, t, first, (const float(*)[3])flat, count, roundness);
 }
 
-void drape_skin_update(drape_skin *skin, const float *positions, const float *values)
+void drape_skin_update(drape_skin *skin, double t, const float *positions, const float *values)
 {
     update_nodes(skin, positions, values);
+    for (int32_t i = 0; i < skin->model->node_count; i++)
+        skin->gap[i] = clearance(skin->model, t, skin->vertex[i].p);
     for (int32_t e = 0; skin->level > 1 && e < skin->model->edge_count; e++)
-        update_edge(skin, e);
-    for (int32_t t = 0; skin->level > 2 && t < skin->model->triangle_count; t++)
-        update_triangle(skin, t);
+        update_edge(skin, t, e);
+    for (int32_t k = 0; skin->level > 2 && k < skin->model->triangle_count; k++)
+        update_triangle(skin, t, k);
+}
+
+/* ---- The hem ---- */
+
+/* Adds the direction out of a side of a triangle to that of its ends: T x n, with T along the side. */
+static void add_outward(drape_skin *s, const int32_t *corner, int side)
+{
+    const drape_skin_vertex *a = &s->vertex[corner[side]], *b = &s->vertex[corner[(side + 1) % 3]];
+    float along[3], normal[3], out[3];
+    subtract(b->p, a->p, along);
+    for (int k = 0; k < 3; k++)
+        normal[k] = a->n[k] + b->n[k];
+    drape_cross(along, normal, out);
+    drape_normalize(out);
+    for (int k = 0; k < 3; k++) {
+        s->outward[3 * (size_t)corner[side] + (size_t)k] += out[k];
+        s->outward[3 * (size_t)corner[(side + 1) % 3] + (size_t)k] += out[k];
+    }
+}
+
+/* A ring of the hem around a point of the border: its upper half as part of the front, and its lower one as
+ * part of the back. */
+static drape_skin_vertex *put_ring(const drape_skin *s, const drape_skin_vertex *point, const float *outward,
+                                   drape_skin_vertex *to)
+{
+    const float r = s->hem_radius;
+    float out[3] = {outward[0], outward[1], outward[2]};
+    orthogonalize(point->n, out);
+    for (int half = 1; half >= -1; half -= 2)
+        for (int i = 0; i < HEM_POINTS; i++, to++) {
+            float angle = PI * (float)i / (HEM_POINTS - 1), c = cosf(angle), h = (float)half * sinf(angle);
+            *to = *point;
+            for (int k = 0; k < 3; k++) {
+                float direction = c * out[k] + h * point->n[k];
+                to->p[k] = point->p[k] + r * (direction - out[k]);
+                to->n[k] = (float)half * direction;
+            }
+        }
+    return to;
+}
+
+void drape_skin_update_hem(drape_skin *skin)
+{
+    const int n = skin->level;
+    drape_skin_vertex *to = skin->hem;
+    memset(skin->outward, 0, 3 * (size_t)skin->model->node_count * sizeof *skin->outward);
+    for (size_t i = 0; i < skin->border_count; i++)
+        add_outward(skin, skin->model->triangle + 3 * (size_t)skin->border[2 * i], skin->border[2 * i + 1]);
+    for (size_t i = 0; i < skin->border_count; i++) {
+        const int32_t t = skin->border[2 * i], side = skin->border[2 * i + 1];
+        const int32_t *corner = skin->model->triangle + 3 * (size_t)t;
+        const float *a = skin->outward + 3 * (size_t)corner[side],
+                    *b = skin->outward + 3 * (size_t)corner[(side + 1) % 3];
+        for (int k = 0; k <= n; k++) {
+            float u = (float)k / (float)n, out[3];
+            for (int c = 0; c < 3; c++)
+                out[c] = (1 - u) * a[c] + u * b[c];
+            uint32_t at = side == 0   ? point_number(skin, t, k, 0)
+                          : side == 1 ? point_number(skin, t, n - k, k)
+                                      : point_number(skin, t, 0, n - k);
+            to = put_ring(skin, &skin->vertex[at], out, to);
+        }
+    }
 }
 
 void drape_skin_update_segments(drape_skin *skin)

@@ -1,8 +1,9 @@
 /*
  * skin.h: the surface of all cloth of a model as it is drawn: smooth normals and tangents weighted by area,
- * texture coordinates, and curved point-normal triangles (Vlachos, Peters, Boyd & Mitchell 2001) through the
- * nodes, so that a coarse mesh has a smooth outline and enough points to be displaced. Nodes are drawn where
- * they are.
+ * texture coordinates, and curved point-normal triangles (Vlachos, Peters, Boyd & Mitchell 2001) through
+ * the nodes, so that a coarse mesh has a smooth outline and enough points to be displaced. Nodes are drawn
+ * where they are. Where a curved triangle would cut a collider that the flat one clears, it is flattened.
+ * The border of a cloth has a hem: a tube just inside it, so that cloth is seen to have a thickness.
  */
 #ifndef DRAPE_RENDER_SKIN_H
 #define DRAPE_RENDER_SKIN_H
@@ -21,6 +22,7 @@ typedef struct drape_skin_vertex {
 typedef struct drape_skin {
     const drape_model *model;
     int level;               /* pieces of an edge */
+    float edge;              /* mean length of the edges at rest [m] */
     int32_t *triangle_edge;  /* (triangle_count x 3) edge e from corner k to k + 1; -1 - e if e is reversed */
     float *uv;               /* (node_count x 2) */
     float *normal, *tangent; /* (node_count x 3) */
@@ -28,15 +30,29 @@ typedef struct drape_skin {
     drape_skin_vertex *vertex; /* (vertex_count) nodes, then points of edges, then of triangles */
     uint32_t *index;           /* (index_count) */
     size_t vertex_count, index_count;
-    float *segment; /* (segment_count x 6) both ends of each piece of the mesh's edges, for wires */
+    float *gap;       /* (node_count) distance from the nearest collider [m] */
+    float *roundness; /* (edge_count) of its curve: 1 as curved as normals say, 0 straight */
+    float *outward;   /* (node_count x 3) at the border: in the surface, away from the cloth */
+    int32_t
+        *border; /* (border_count x 2) triangle of each edge at the border, and which of its sides it is */
+    size_t border_count;
+    drape_skin_vertex *hem; /* (hem_count) */
+    uint32_t *hem_index;    /* (hem_index_count) */
+    size_t hem_count, hem_index_count;
+    float hem_radius; /* [m] */
+    float *segment;   /* (segment_count x 6) both ends of each piece of the mesh's edges, for wires */
     size_t segment_count;
 } drape_skin;
 
 /* Makes the skin in an arena. Errors: DRAPE_E_MEMORY. */
 drape_status drape_skin_create(drape_arena *arena, const drape_model *model, drape_skin *skin);
 
-/* Computes the vertices at positions (node_count x 3) [m], with values (node_count); NULL: 0. */
-void drape_skin_update(drape_skin *skin, const float *positions, const float *values);
+/* Computes the vertices at positions (node_count x 3) [m] and the time t [s] of the colliders, with values
+ * (node_count); NULL: 0. */
+void drape_skin_update(drape_skin *skin, double t, const float *positions, const float *values);
+
+/* Computes the hem from the vertices. */
+void drape_skin_update_hem(drape_skin *skin);
 
 /* Computes the segments from the vertices. */
 void drape_skin_update_segments(drape_skin *skin);

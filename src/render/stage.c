@@ -39,9 +39,11 @@ static drape_status create_cloth(drape_stage *s)
     if (status)
         return status;
     drape_gl_mesh_create(&s->cloth, vertex, false);
+    drape_gl_mesh_create(&s->hem, vertex, false);
     drape_gl_mesh_create(&s->wires, segment, true);
     drape_gl_mesh_create(&s->pins, point, false);
     drape_gl_mesh_index(&s->cloth, s->skin.index, s->skin.index_count);
+    drape_gl_mesh_index(&s->hem, s->skin.hem_index, s->skin.hem_index_count);
     return DRAPE_OK;
 }
 
@@ -85,6 +87,7 @@ void drape_stage_free(drape_stage *stage)
     for (int32_t c = 0; c < stage->body_count; c++)
         drape_gl_mesh_free(&stage->bodies[c].mesh);
     drape_gl_mesh_free(&stage->cloth);
+    drape_gl_mesh_free(&stage->hem);
     drape_gl_mesh_free(&stage->wires);
     drape_gl_mesh_free(&stage->pins);
     drape_arena_free(&stage->arena);
@@ -120,14 +123,18 @@ void drape_stage_finish(drape_stage *stage)
     stage->floor = stage->low[1] - FLOOR_GAP * stage->radius;
 }
 
-void drape_stage_frame(drape_stage *stage, drape_framing *framing, double t, const float *positions)
+void drape_stage_frame(drape_stage *stage, drape_framing *framing, double t, const float *positions,
+                       const float *offset)
 {
     move_bodies(stage, t);
-    drape_framing_add(framing, positions, (size_t)stage->model->node_count, nowhere);
+    drape_framing_add(framing, positions, (size_t)stage->model->node_count, offset);
     for (int32_t c = 0; c < stage->body_count; c++) {
         const drape_stage_body *body = &stage->bodies[c];
+        float moved[3];
+        for (int k = 0; k < 3; k++)
+            moved[k] = body->offset[k] + offset[k];
         for (size_t i = 0; !body->shape.endless && i < body->shape.vertex_count; i++)
-            drape_framing_add(framing, body->shape.vertex + 6 * i, 1, body->offset);
+            drape_framing_add(framing, body->shape.vertex + 6 * i, 1, moved);
     }
 }
 
@@ -135,11 +142,14 @@ void drape_stage_set(drape_stage *stage, const drape_moment *moment, bool wires)
 {
     float *pin = stage->pin;
     move_bodies(stage, moment->t);
-    drape_skin_update(&stage->skin, moment->positions, moment->values);
+    drape_skin_update(&stage->skin, moment->t, moment->positions, moment->values);
     drape_gl_mesh_fill(&stage->cloth, stage->skin.vertex[0].p, stage->skin.vertex_count, true);
     stage->wire_count = 0;
-    if (!wires)
+    if (!wires) {
+        drape_skin_update_hem(&stage->skin);
+        drape_gl_mesh_fill(&stage->hem, stage->skin.hem[0].p, stage->skin.hem_count, true);
         return;
+    }
     drape_skin_update_segments(&stage->skin);
     drape_gl_mesh_fill(&stage->wires, stage->skin.segment, stage->skin.segment_count, true);
     stage->wire_count = stage->skin.segment_count;

@@ -25,7 +25,7 @@ typedef struct drape_stage {
     drape_arena arena; /* holds skin, bodies and pins */
     const drape_model *model;
     drape_skin skin;
-    drape_gl_mesh cloth, wires, pins;
+    drape_gl_mesh cloth, hem, wires, pins;
     drape_stage_body *bodies; /* (body_count) the model's colliders */
     int32_t body_count;
     size_t wire_count, pin_count;
@@ -45,10 +45,12 @@ void drape_stage_free(drape_stage *stage); /* may be empty; the model may be gon
 void drape_stage_add(drape_stage *stage, const float *positions);
 void drape_stage_finish(drape_stage *stage);
 
-/* Adds the cloth and the bounded colliders at a time to what the camera has to show. */
-void drape_stage_frame(drape_stage *stage, drape_framing *framing, double t, const float *positions);
+/* Adds the cloth and the bounded colliders at a time, moved by `offset` (3) [m], to what the camera has to
+ * show. */
+void drape_stage_frame(drape_stage *stage, drape_framing *framing, double t, const float *positions,
+                       const float *offset);
 
-/* Sets cloth and colliders to a moment. */
+/* Sets cloth and colliders to a moment. wires: with its edges and pins, instead of the hem. */
 void drape_stage_set(drape_stage *stage, const drape_moment *moment, bool wires);
 
 #endif

@@ -1,6 +1,7 @@
 // page.js: the time, its controls, and the texts.
 
-const state = { time: run.begin, playing: false, rate: 1, shade: 'plain', edges: false };
+// It opens on the last frame, in which most runs have something to show.
+const state = { time: run.end, playing: false, rate: 1, shade: 'plain', edges: false };
 const dark = window.matchMedia('(prefers-color-scheme: dark)');
 let player = null, plots = [], stale = true, moved = true, last = null;
 

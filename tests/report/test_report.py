@@ -364,6 +364,9 @@ def test_moves():
     good("report", "out")
     with Browser(address("out/report.html")) as page:
         page.settle()
+        opened = page.evaluate(LOOK)
+        assert opened["time"] == 0.5 and opened["shown"].endswith("frame 20 of 20"), opened
+        page.press("Home")
         start = page.evaluate(LOOK)
         assert start["time"] == 0 and start["shown"] == "0.000 s, frame 0 of 20" and len(start["cursors"]) == 4, start
         for _ in range(5):

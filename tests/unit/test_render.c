@@ -76,7 +76,97 @@ START_TEST(corners_of_a_box_are_sharp)
 }
 END_TEST
 
+/* On a sphere every normal is that of the sphere: it is taken a twentieth of a cell above, which changes
+ * its direction by less than that over the radius times the angle of a face, 1e-3. On a box every normal is
+ * that of one of its sides. */
+START_TEST(bodies_are_round_or_crisp)
+{
+    scene h = scene_model(CLOTH, "",
+                          ", 'colliders': [{'type': 'sphere', 'center': [0, 1, 0], 'radius': 0.3},"
+                          " {'type': 'box', 'center': [0, 0, 0], 'size': [0.5, 0.3, 0.7]}]");
+    const drape_model *model = h.model;
+    drape_arena arena = drape_arena_of(h.ctx);
+    for (int c = 0; c < 2; c++) {
+        drape_body body;
+        ck_assert_int_eq(drape_body_create(&arena, &model->colliders[c], (const double[3]){0}, 2, &body),
+                         DRAPE_OK);
+        for (size_t i = 0; i < body.vertex_count; i++) {
+            const float *v = body.vertex + 6 * i, *n = v + 3, out[3] = {v[0], v[1] - 1, v[2]};
+            float largest = fmaxf(fabsf(n[0]), fmaxf(fabsf(n[1]), fabsf(n[2])));
+            if (c == 0)
+                ck_assert(drape_dot(n, out) / sqrtf(drape_dot(out, out)) > 1 - 0.5e-6f);
+            else
+                ck_assert_msg(largest > 1 - 1e-5f, "%g %g %g", (double)n[0], (double)n[1], (double)n[2]);
+        }
+    }
+    drape_arena_free(&arena);
+    scene_close(&h);
+}
+END_TEST
+
 /* ---- Cloth ---- */
+
+/* Rows of nodes lie 2 mm above a plane in pairs, between rows 60 mm higher. Slopes of 60 mm over 125 mm are
+ * those of the normals at the pairs by half; a curve between them would sink by about a quarter of that
+ * times the edge, 7 mm, into the plane, and does so without a collider. With the plane no point is below
+ * it. */
+START_TEST(curved_cloth_clears_colliders)
+{
+    static const char *const planes[] = {
+        "", ", 'colliders': [{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0]}]"};
+    for (int c = 0; c < 2; c++) {
+        drape_skin skin;
+        scene h = scene_model(CLOTH, "", planes[c]);
+        drape_arena arena = drape_arena_of(h.ctx);
+        float x[3 * 81], lowest = 1;
+        for (size_t i = 0; i < 81; i++) {
+            x[3 * i] = (float)h.model->rest[3 * i];
+            x[3 * i + 1] = i % 9 % 4 < 2 ? 0.002f : 0.062f;
+            x[3 * i + 2] = (float)h.model->rest[3 * i + 2];
+        }
+        ck_assert_int_eq(drape_skin_create(&arena, h.model, &skin), DRAPE_OK);
+        drape_skin_update(&skin, 0, x, NULL);
+        for (size_t i = 0; i < skin.vertex_count; i++)
+            lowest = fminf(lowest, skin.vertex[i].p[1]);
+        if (c == 0)
+            ck_assert_msg(lowest < -0.002f, "%g", (double)lowest);
+        else
+            ck_assert_msg(lowest > 0, "%g", (double)lowest);
+        drape_arena_free(&arena);
+        scene_close(&h);
+    }
+}
+END_TEST
+
+/* A flat sheet has 32 edges at its border. Its hem lies on both sides of it, no farther than its radius,
+ * and not outside of it, up to the rounding of floats. */
+START_TEST(hem_lies_inside_the_border)
+{
+    drape_skin skin;
+    float x[3 * 81], above = 0, below = 0;
+    scene h = scene_model(CLOTH, "", "");
+    drape_arena arena = drape_arena_of(h.ctx);
+    ck_assert_int_eq(drape_skin_create(&arena, h.model, &skin), DRAPE_OK);
+    ck_assert_uint_eq(skin.border_count, 32);
+    for (size_t i = 0; i < 3 * 81; i++)
+        x[i] = (float)h.model->rest[i];
+    drape_skin_update(&skin, 0, x, NULL);
+    drape_skin_update_hem(&skin);
+    for (size_t i = 0; i < skin.hem_count; i++) {
+        const float *p = skin.hem[i].p;
+        above = fmaxf(above, p[1] - x[1]);
+        below = fmaxf(below, x[1] - p[1]);
+        ck_assert(p[0] > -1e-6f && p[0] < 1 + 1e-6f && p[2] > -1 - 1e-6f && p[2] < 1e-6f);
+        ck_assert(fabsf(drape_dot(skin.hem[i].n, skin.hem[i].n) - 1) < 1e-5f);
+    }
+    ck_assert(above > 0.8f * skin.hem_radius && above < 1.0001f * skin.hem_radius);
+    ck_assert(below > 0.8f * skin.hem_radius && below < 1.0001f * skin.hem_radius);
+    for (size_t i = 0; i < skin.hem_index_count; i++)
+        ck_assert(skin.hem_index[i] < skin.hem_count);
+    drape_arena_free(&arena);
+    scene_close(&h);
+}
+END_TEST
 
 /* Nodes on an eighth of a sphere of radius 1. Normals weighted by area are exact up to the square of an
  * edge's angle, below 0.16 rad; the points of curved patches are nearer to the sphere than flat triangles,
@@ -96,7 +186,7 @@ START_TEST(cloth_is_drawn_round_through_its_nodes)
     }
     ck_assert_int_eq(drape_skin_create(&arena, model, &skin), DRAPE_OK);
     ck_assert_int_ge(skin.level, 4);
-    drape_skin_update(&skin, x, NULL);
+    drape_skin_update(&skin, 0, x, NULL);
     double off_normal = 0, off_sphere = 0;
     for (size_t i = 0; i < skin.vertex_count; i++) {
         const drape_skin_vertex *v = &skin.vertex[i];
@@ -133,7 +223,7 @@ START_TEST(texture_is_not_mirrored)
         ck_assert_int_eq(drape_skin_create(&arena, model, &skin), DRAPE_OK);
         for (size_t i = 0; i < 3 * 81; i++)
             x[i] = (float)model->rest[i];
-        drape_skin_update(&skin, x, NULL);
+        drape_skin_update(&skin, 0, x, NULL);
         for (size_t i = 0; i < skin.index_count; i += 3) {
             const drape_skin_vertex *a = &skin.vertex[skin.index[i]], *b = &skin.vertex[skin.index[i + 1]],
                                     *c = &skin.vertex[skin.index[i + 2]];
@@ -189,6 +279,11 @@ START_TEST(letters_are_all_there)
     float advance;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     drape_arena arena = drape_arena_of(ctx);
+    for (float height = 8; height < 40;
+         height += 0.7f) { /* letters begin at whole pixels: no neighbour shows */
+        ck_assert_int_eq(drape_font_create(&arena, height, &font), DRAPE_OK);
+        ck_assert(font.origin[0] == floorf(font.origin[0]) && font.origin[1] == floorf(font.origin[1]));
+    }
     ck_assert_int_eq(drape_font_create(&arena, 12, &font), DRAPE_OK);
     for (char c = 33; c < 127; c++) {
         if (strchr("$&@`", c))
@@ -253,6 +348,7 @@ START_TEST(shadings_are_found_by_name)
 }
 END_TEST
 
-SUITE("render", bodies_lie_on_their_surface, corners_of_a_box_are_sharp,
-      cloth_is_drawn_round_through_its_nodes, texture_is_not_mirrored, ramp_is_even_in_lightness,
-      letters_are_all_there, camera_frames_all_points, shadings_are_found_by_name)
+SUITE("render", bodies_lie_on_their_surface, corners_of_a_box_are_sharp, bodies_are_round_or_crisp,
+      curved_cloth_clears_colliders, hem_lies_inside_the_border, cloth_is_drawn_round_through_its_nodes,
+      texture_is_not_mirrored, ramp_is_even_in_lightness, letters_are_all_there, camera_frames_all_points,
+      shadings_are_found_by_name)
