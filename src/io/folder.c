@@ -455,7 +455,11 @@ static drape_status append(drape_folder *f, const char *text, size_t length, boo
         n = write(f->manifest, text, length);
     while (n < 0 && errno == EINTR);
     int error = n == (ssize_t)length ? 0 : n < 0 ? errno : EFBIG;
-    f->torn = f->torn || (n > 0 && error);
+    if (n > 0 &&
+        error) { /* the disk is full: the line that does not fit is taken back, if no other follows it */
+        struct stat info;
+        f->torn = f->shared || fstat(f->manifest, &info) || ftruncate(f->manifest, info.st_size - n);
+    }
     if (!error && durable && fdatasync(f->manifest) && errno != EINVAL)
         error = errno;
     return error ? fail(f, "write", DRAPE_MANIFEST_NAME, error) : DRAPE_OK;
