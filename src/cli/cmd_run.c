@@ -138,6 +138,16 @@ static drape_status check_input(void *user, const char *path, const char *pointe
     return drape_file_check_named(r->in.ctx, r->request->summary, path);
 }
 
+/* Checked again when the folder is there, if it was not before. */
+static int check_summary_folder(const run_request *request)
+{
+    if (!request->out || !request->summary || !drape_folder_has(request->out, request->summary))
+        return CLI_GO_ON;
+    return cli_misuse(request->command.verb,
+                      "--summary \"%.300s\" is in the folder of --out, which has its own summary.json",
+                      request->summary);
+}
+
 /* --summary must not replace the scene, a mesh, or a file in the folder of the run. */
 static int check_summary(run *r)
 {
@@ -149,11 +159,7 @@ static int check_summary(run *r)
         status = drape_scene_files(r->in.ctx, r->in.model, request->command.operand, check_input, r);
     if (status)
         return cli_report(r->in.ctx, CLI_BAD_INPUT);
-    if (request->out && drape_folder_has(request->out, request->summary))
-        return cli_misuse(request->command.verb,
-                          "--summary \"%.300s\" is in the folder of --out, which has its own summary.json",
-                          request->summary);
-    return CLI_GO_ON;
+    return check_summary_folder(request);
 }
 
 static void write_summary(run *r, drape_folder *folder, const char *path)
@@ -413,6 +419,8 @@ static int load_and_run(const void *command)
         code = resume(&r);
     if (code == CLI_GO_ON)
         code = open_output(&r);
+    if (code == CLI_GO_ON)
+        code = check_summary_folder(request);
     if (code == CLI_GO_ON) {
         simulate(&r);
         code = conclude(&r);

@@ -40,6 +40,7 @@ static int unknown_verb(const char *name)
 {
     char text[DRAPE_UNKNOWN_SIZE];
     drape_registry_unknown(&drape_verb_registry, NULL, name, text);
+    drape_make_printable(text);
     fprintf(stderr, "drape: %s\n", text);
     return CLI_BAD_INPUT;
 }

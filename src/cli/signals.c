@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <sys/time.h>
 
-#define PERIOD 100000 /* [us] */
+#define PERIOD 10000 /* [us]; each of several prints may wait once */
 
 static volatile sig_atomic_t interrupted; /* set by the handler */
 static const int caught[] = {SIGINT, SIGTERM, SIGHUP};

@@ -6,9 +6,9 @@
 
 #include <stdbool.h>
 
-/* After this call the first signal is recorded, and from then on no call of the system waits for longer than a
- * tenth of a second, such as a read of a scene from a pipe or a write to one; a second signal ends the program
- * at once. */
+/* After this call the first signal is recorded, and from then on no call of the system waits for longer
+ * than a hundredth of a second, such as a read of a scene from a pipe or a write to one; a second signal
+ * ends the program at once. */
 void cli_catch_signals(void);
 
 bool cli_interrupted(void);

@@ -95,13 +95,14 @@ typedef struct drape_frame_files {
 
 #define DRAPE_FRAME_DIGITS 6 /* minimum number of digits in these names */
 
-/* Whether a file is named by this pattern, with at least that many digits. *frame (may be NULL): its number. */
+/* Whether a file is named by this pattern, with at least that many digits. *frame (may be NULL): its
+ * number. */
 bool drape_frame_files_name(const char *name, size_t digits, const char *ending, int64_t *frame);
 /* Takes the memory. Errors: DRAPE_E_MEMORY. */
 drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
                                     drape_frame_files *frames);
-/* The same if `count` frames exist already, with the bytes that were written. Errors: DRAPE_E_FILE (a frame is
- * missing), DRAPE_E_PARSE (a frame is damaged), DRAPE_E_MEMORY. */
+/* The same if `count` frames exist already, with the bytes that were written. Errors: DRAPE_E_FILE (a frame
+ * is missing), DRAPE_E_PARSE (a frame is damaged), DRAPE_E_MEMORY. */
 drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def *def, const char *ending,
                                       int64_t count, drape_frame_files *frames);
 /* archive and cut for a state that begins with a drape_frame_files. The first archives nothing, because the

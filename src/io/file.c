@@ -389,8 +389,8 @@ static int patch(drape_file *file, off_t offset, const void *data, size_t size)
     return 0;
 }
 
-/* Reads the beginning of the file as far as `size`, and takes it out of the checksum: it is added again when it
- * is known how it would be. */
+/* Reads the beginning of the file as far as `size`, and takes it out of the checksum: it is added again
+ * when it is known how it would be. */
 static drape_status read_beginning(drape_file *file, size_t size)
 {
     const size_t had = file->rehearsed_size;

@@ -1,13 +1,13 @@
 /*
  * file.h: one output file at a time, written such that nobody sees an incomplete one.
  *
- * A file belongs to a folder (folder.h), whose rule says what it may replace, or it was named by the user, who
- * means to replace a regular file of that name. It is begun under a temporary name beside its own, filled through a buffer, and then renamed to its
- * own name. Some files then grow by records: a record that does not fit on the disk is cut off again. A
- * killed process leaves complete files and complete records. A durable file also survives a power failure,
- * with its content at the time when drape_file_sync or drape_file_finish returned and the folder was
- * synced. It uses write(2) instead of stdio, so that no file needs the heap, and errno belongs to the call
- * that failed.
+ * A file belongs to a folder (folder.h), whose rule says what it may replace, or it was named by the user,
+ * who means to replace a regular file of that name. It is begun under a temporary name beside its own,
+ * filled through a buffer, and then renamed to its own name. Some files then grow by records: a record that
+ * does not fit on the disk is cut off again. A killed process leaves complete files and complete records. A
+ * durable file also survives a power failure, with its content at the time when drape_file_sync or
+ * drape_file_finish returned and the folder was synced. It uses write(2) instead of stdio, so that no file
+ * needs the heap, and errno belongs to the call that failed.
  */
 #ifndef DRAPE_IO_FILE_H
 #define DRAPE_IO_FILE_H

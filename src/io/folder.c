@@ -175,7 +175,7 @@ static drape_status take_lines(drape_folder *f, const char *text, size_t size)
         take_line(f, at, (size_t)(end - at));
     f->torn = size > 0 && text[size - 1] != '\n';
     qsort(f->entries, f->entry_count, sizeof *f->entries, by_name);
-    if (size > 0 && f->token_count == 0)
+    if (f->token_count == 0 && !f->shared)
         return drape_fail(f->ctx, DRAPE_E_ARGUMENT,
                           "\"%.500s/" DRAPE_MANIFEST_NAME "\" is not a manifest of Drape; " ADVICE, f->path);
     return drape_arena_status(&f->lines);
@@ -186,7 +186,7 @@ static drape_status read_manifest(drape_folder *f)
     struct stat info;
     int fd = drape_folder_open_file(f, DRAPE_MANIFEST_NAME, O_RDONLY);
     if (fd < 0 && errno == ENOENT)
-        return take_lines(f, "", 0);
+        return DRAPE_OK;
     if (fd < 0)
         return errno == EINVAL ? refuse(f, DRAPE_MANIFEST_NAME, "it is not a regular file")
                                : fail(f, "read", DRAPE_MANIFEST_NAME, errno);
@@ -455,7 +455,11 @@ static drape_status append(drape_folder *f, const char *text, size_t length, boo
         n = write(f->manifest, text, length);
     while (n < 0 && errno == EINTR);
     int error = n == (ssize_t)length ? 0 : n < 0 ? errno : EFBIG;
-    f->torn = f->torn || (n > 0 && error);
+    if (n > 0 &&
+        error) { /* the disk is full: the line that does not fit is taken back, if no other follows it */
+        struct stat info;
+        f->torn = f->shared || fstat(f->manifest, &info) || ftruncate(f->manifest, info.st_size - n);
+    }
     if (!error && durable && fdatasync(f->manifest) && errno != EINVAL)
         error = errno;
     return error ? fail(f, "write", DRAPE_MANIFEST_NAME, error) : DRAPE_OK;
@@ -519,7 +523,9 @@ static drape_status put_entries(drape_folder *f)
     return status;
 }
 
-/* A new manifest takes the place of the old one when it is complete. */
+static int rename_new(int fd, const char *part, const char *name);
+
+/* A new manifest takes the place of the old one, if there was one, when it is complete. */
 static drape_status replace_manifest(drape_folder *f)
 {
     char part[DRAPE_PART_SIZE];
@@ -532,7 +538,8 @@ static drape_status replace_manifest(drape_folder *f)
     drape_status status = put_head(f);
     if (!status)
         status = put_entries(f);
-    if (!status && renameat(f->fd, part, f->fd, DRAPE_MANIFEST_NAME))
+    if (!status && (f->token_count ? renameat(f->fd, part, f->fd, DRAPE_MANIFEST_NAME)
+                                   : rename_new(f->fd, part, DRAPE_MANIFEST_NAME)))
         status = fail(f, "write", DRAPE_MANIFEST_NAME, errno);
     if (status)
         unlinkat(f->fd, part, 0);
@@ -553,7 +560,7 @@ drape_status drape_folder_begin(drape_folder *f, drape_folder_claim *clears, con
     drape_status status = visit_files(f, remove_one, &c);
     if (status)
         return status;
-    return clears ? replace_manifest(f) : continue_manifest(f);
+    return clears || (!f->shared && f->token_count == 0) ? replace_manifest(f) : continue_manifest(f);
 }
 
 /* ---- Names ---- */

@@ -2,11 +2,11 @@
  * folder.h: a folder that receives the files of a run, of pictures or of an experiment, and the rule for it:
  * Drape replaces and removes only files that it wrote.
  *
- * The folder has a manifest, manifest.jsonl, a line of JSON for each file that was written into it: name, size
- * and checksum. A line is appended before the file gets its name, so that a killed process leaves no file that
- * the manifest does not have. A file is Drape's if its name is in the manifest and its bytes are those that the
- * manifest describes; a file that was still growing when a process was killed is known by its inode and its
- * time of birth instead. All else in the folder is somebody else's, whatever its name is.
+ * The folder has a manifest, manifest.jsonl, a line of JSON for each file that was written into it: name,
+ * size and checksum. A line is appended before the file gets its name, so that a killed process leaves no
+ * file that the manifest does not have. A file is Drape's if its name is in the manifest and its bytes are
+ * those that the manifest describes; a file that was still growing when a process was killed is known by
+ * its inode and its time of birth instead. All else in the folder is somebody else's, whatever its name is.
  *
  * Files are reached from the descriptor of the folder. They are written under temporary names with a random
  * number, which the manifest has too; they get their names by a rename that replaces nothing, or by one that
@@ -30,9 +30,9 @@ typedef struct drape_folder drape_folder;
 /* Whether a writer may write a file of this name. */
 typedef bool drape_folder_claim(const void *user, const char *name);
 
-/* Makes the folder and its missing parents, locks it and reads its manifest. shared: other processes may write
- * other files into it at the same time, if they open it as shared too. Errors: DRAPE_E_ARGUMENT (it is locked,
- * or it has a manifest of another format), DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Makes the folder and its missing parents, locks it and reads its manifest. shared: other processes may
+ * write other files into it at the same time, if they open it as shared too. Errors: DRAPE_E_ARGUMENT (it
+ * is locked, or it has a manifest of another format), DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_folder_open(drape_context *ctx, const char *path, bool shared, drape_folder **out);
 void drape_folder_close(drape_folder **folder); /* *folder may be NULL */
 
@@ -78,13 +78,13 @@ drape_status drape_folder_note(drape_folder *folder, const char *name, const dra
                                bool durable);
 drape_status drape_folder_note_growing(drape_folder *folder, const char *name, int fd, bool durable);
 
-/* Renames a temporary file. last: the file that this process wrote under the name before, which it may replace;
- * NULL: none. Errors: DRAPE_E_FILE; then the temporary file is still there. */
+/* Renames a temporary file. last: the file that this process wrote under the name before, which it may
+ * replace; NULL: none. Errors: DRAPE_E_FILE; then the temporary file is still there. */
 drape_status drape_folder_publish(drape_folder *folder, const char *part, const char *name,
                                   const struct stat *last);
 
-/* Opens a regular file of the folder. Returns -1 with errno, which is EINVAL for anything else, such as a link
- * or a pipe. */
+/* Opens a regular file of the folder. Returns -1 with errno, which is EINVAL for anything else, such as a
+ * link or a pipe. */
 int drape_folder_open_file(const drape_folder *folder, const char *name, int flags);
 
 /* Whether a file at path is directly in a folder. */

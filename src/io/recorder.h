@@ -28,19 +28,20 @@ typedef struct drape_recorder drape_recorder;
 drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, const char *pointer,
                                   const char *format);
 
-/* Opens all files, replacing those that an earlier run wrote, and begins to observe the sim. All memory is taken
- * here. A failed write stops the advance of the sim with DRAPE_E_FILE; its message is set on ctx, which
- * should be the sim's. An observer cannot be removed from a sim, so the sim must not advance after the
- * recorder is destroyed. Errors: DRAPE_E_ARGUMENT (unknown format, no folder, another process writes into it, it
- * has a file of a name to be written that is not ours or is an input of the model, too many observers),
- * DRAPE_E_FILE, DRAPE_E_MEMORY; those of the first kind are found before anything is written. */
+/* Opens all files, replacing those that an earlier run wrote, and begins to observe the sim. All memory is
+ * taken here. A failed write stops the advance of the sim with DRAPE_E_FILE; its message is set on ctx,
+ * which should be the sim's. An observer cannot be removed from a sim, so the sim must not advance after
+ * the recorder is destroyed. Errors: DRAPE_E_ARGUMENT (unknown format, no folder, another process writes
+ * into it, it has a file of a name to be written that is not ours or is an input of the model, too many
+ * observers), DRAPE_E_FILE, DRAPE_E_MEMORY; those of the first kind are found before anything is written.
+ * */
 drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
                                    drape_recorder **out);
 
 /* Continues an earlier run in its folder: reads the recorder's part of a checkpoint, after the sim's part
  * was read; checks by their checksums that the files still contain what they did at the checkpoint, and then
- * removes what came later. If the run had finished (drape_recorder_is_finished) no file is changed. Errors: those of create;
- * those of the archive, such as other formats. */
+ * removes what came later. If the run had finished (drape_recorder_is_finished) no file is changed. Errors:
+ * those of create; those of the archive, such as other formats. */
 drape_status drape_recorder_resume(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
                                    drape_archive *a, drape_recorder **out);
 bool drape_recorder_is_finished(const drape_recorder *recorder);

@@ -222,8 +222,8 @@ drape_status lab_write_page(lab *l, const char *title)
 
 /* ---- Pictures ---- */
 
-/* Runs a program and waits for it; returns its exit code, -1 where it did not run. Its standard output goes to
- * `to`; its messages are discarded. */
+/* Runs a program and waits for it; returns its exit code, -1 where it did not run. Its standard output goes
+ * to `to`; its messages are discarded. */
 static int run_program(char *const *arguments, int to)
 {
     posix_spawn_file_actions_t actions;

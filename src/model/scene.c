@@ -482,9 +482,7 @@ static drape_status new_override(drape_scene *scene, const char *path, const cha
     snprintf(some, sizeof some, "%s", text);
     drape_text_mend_end(some);
     snprintf(shown, sizeof shown, "--set %s=%s%s", pointer, some, strlen(some) < strlen(text) ? "..." : "");
-    for (char *p = shown; *p; p++)
-        if ((unsigned char)*p < ' ' || *p == 127)
-            *p = ' ';
+    drape_make_printable(shown);
     override *o = drape_arena_take(&scene->kept, 1, sizeof *o);
     if (!o || !(o->pointer = drape_arena_text(&scene->kept, path)) ||
         !(o->shown = drape_arena_text(&scene->kept, shown)))

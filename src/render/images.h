@@ -5,9 +5,9 @@
 #include "io/folder.h"
 #include "render/gl.h"
 
-/* Writes pixels (width x height x 4, top row first) to a PNG, completely or not at all: into a folder, or with
- * folder NULL to a path that the user named. small: compresses as
- * well as zlib can instead of fast. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Writes pixels (width x height x 4, top row first) to a PNG, completely or not at all: into a folder, or
+ * with folder NULL to a path that the user named. small: compresses as well as zlib can instead of fast.
+ * Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_png_write(drape_context *ctx, drape_folder *folder, const char *path,
                              const uint8_t *pixels, int width, int height, bool small);
 

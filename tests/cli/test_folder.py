@@ -187,8 +187,9 @@ def test_summary():
     put("target")
     os.symlink("target", "to_target")
     keeps(".", "run", "scene.json", "--summary", "to_target", says="is a link")
-    os.mkdir("out")
-    keeps(".", "run", "scene.json", "--out", "out", "--summary", "out/positions.npy", says="in the folder of --out")
+    result = drape("run", "scene.json", "--out", "out", "--summary", "out/steps.csv")  # the folder is made
+    equal((result.returncode, "in the folder of --out" in result.stderr), (2, True), result.stderr)
+    keeps("out", "run", "scene.json", "--out", "out", "--summary", "out/positions.npy", says="in the folder of --out")
     os.mkfifo("pipe")
     equal(drape("run", "scene.json", "--summary", "pipe").returncode, 1)
     good("run", "scene.json", "--summary", "target")

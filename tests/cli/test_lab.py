@@ -12,7 +12,7 @@ import time
 
 import json
 
-from program import PROGRAM, SOURCES, drape, equal, good, read_json, refused, run_tests, scene, write_scene
+from program import PROGRAM, SOURCES, claim, drape, equal, good, read_json, refused, run_tests, scene, write_scene
 
 AXES = ["--axis", "/integrator/dt=1e-3:1e-1:3log", "--axis", "/cloth/0/material/young_modulus=1e4:1e6:2log"]
 
@@ -142,7 +142,7 @@ def test_shards():
     for i in (1, 2, 3):
         out = good(*command, "--shard", f"{i}/3", "--out", f"part{i}")
     assert "once all cases are done" in out, out
-    equal(sorted(os.listdir("part1")), ["cases-1-of-3.jsonl", "experiment.json"], "what a shard writes: others may write beside it")
+    equal(sorted(os.listdir("part1")), ["cases-1-of-3.jsonl", "experiment.json", "manifest.jsonl"], "what a shard writes: others may write beside it")
     missing = drape("merge", "part1", "part3", "--out", "some")
     equal(missing.returncode, 1, "exit code of a merge that lacks cases")
     assert "12 of 18" in missing.stdout, missing.stdout
@@ -189,7 +189,7 @@ def test_recipes():
 def test_validate_goes_on():
     """validate --out keeps its cases and resumes after Ctrl-C"""
     good("validate", "--scenes", "scenes")
-    cases = len(os.listdir("scenes"))
+    cases = len(os.listdir("scenes")) - 1  # but for the manifest
     with subprocess.Popen([PROGRAM, "validate", "--out", "v"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
         for _ in range(6000):
             time.sleep(0.02)
@@ -205,6 +205,7 @@ def test_validate_goes_on():
     kept[0]["obtained"] = 2 * kept[0]["expected"]
     with open("v/cases.jsonl", "w", encoding="utf-8") as file:
         file.write(json.dumps(kept[0]) + "\n" + json.dumps({**kept[0], "scene_hash": "0"}) + "\n{\"name")
+    claim("v", "cases.jsonl")
     result = drape("validate", "cantilever", "--json", "--out", "v") if kept[0]["name"] == "cantilever" else None
     rows = json.loads(result.stdout)
     equal((rows[0]["verdict"], result.returncode), ("fail", 1), "a line that is wrong")
@@ -229,6 +230,7 @@ def test_reference_goes_on():
         about["error_m"] = 1e-12
         with open("t/reference-ida.json", "w", encoding="utf-8") as file:
             json.dump(about, file)
+        claim("t", "reference-ida.json")
         good(*command)
         equal(read_json("t/reference.json"), about, "the reference")
     else:
@@ -276,10 +278,12 @@ def test_torn_line():
         text = file.read()
     with open("s/cases.jsonl", "w", encoding="utf-8") as file:
         file.write(text[:-40])
+    claim("s", "cases.jsonl")
     good(*command)
     equal(lines("s"), whole, "results")
     with open("s/cases.jsonl", "w", encoding="utf-8") as file:
         file.write("{\n" + text)
+    claim("s", "cases.jsonl")
     result = drape(*command)
     equal((result.returncode, result.stdout), (2, ""), result.stderr)
     assert "cases.jsonl:1: not a result" in result.stderr, result.stderr
@@ -391,6 +395,7 @@ def test_map_is_labelled():
         text = file.read()
     with open("s/cases.jsonl", "w", encoding="utf-8") as file:
         file.write(text.replace('"rejected":0', '"rejected":3'))
+    claim("s", "cases.jsonl")
     good("stability", "scene.json", *AXES, "--integrators", "be,verlet", "--out", "s")
     with open("s/map_be.gp", encoding="utf-8") as file:
         script = file.read()

@@ -170,6 +170,39 @@ def test_reading():
             os.close(writer)
 
 
+def test_waiting():
+    """a pipe that nobody reads or writes is left within a second: results that wait for a reader, a run whose files are pipes"""
+    write_scene(mesh={"grid": "square", "columns": 20, "rows": 20, "width": 1, "height": 1})
+    for verb in ["list"], ["info", "scene.json", "--json"], ["run", "scene.json"]:
+        reading, writing = os.pipe()
+        os.set_blocking(writing, False)
+        try:  # full but for 100 bytes: a part of the results can be written
+            while True:
+                os.write(writing, bytes(4096))
+        except BlockingIOError:
+            pass
+        os.read(reading, 4096)
+        os.set_blocking(writing, True)
+        os.write(writing, bytes(3996))
+        with subprocess.Popen([PROGRAM, *verb], stdin=subprocess.DEVNULL, stdout=writing, stderr=subprocess.PIPE, text=True) as child:
+            time.sleep(1)  # it has its results and waits
+            equal(child.poll(), None, " ".join(verb) + " did not wait")
+            begun = time.monotonic()
+            child.send_signal(signal.SIGTERM)
+            _, err = child.communicate(timeout=LIMIT)
+        took = time.monotonic() - begun
+        os.close(reading)
+        os.close(writing)
+        equal(child.returncode, 130, err)
+        assert re.fullmatch(r"drape: interrupted\n", err) and took < 1, (verb, err, took)
+    good("run", "scene.json", "--out", "run", "--format", "npy")
+    os.remove("run/positions.npy")
+    os.mkfifo("run/positions.npy")
+    begun = time.monotonic()
+    code, _, err = struck(0.2, signal.SIGTERM, "report", "run", "--out", "page.html")
+    assert code in (2, 130) and time.monotonic() - begun < 2, (code, err)
+
+
 def test_asking():
     """info and check"""
     large()
