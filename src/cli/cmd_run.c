@@ -19,6 +19,8 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#define MAX_WARNINGS 8
+
 typedef struct run_request {
     cli_command command;
     const char *out, *summary;
@@ -34,10 +36,12 @@ typedef struct run {
     void *checkpoint;         /* contents of the checkpoint that the run resumes from; NULL: it starts anew */
     drape_archive archive;    /* reads the contents */
     cli_progress progress;
-    cli_realtime realtime; /* of --realtime */
-    double start;          /* clock at the start minus the run time before the checkpoint [s] */
-    double wall;           /* duration of the run [s] */
-    bool begun;            /* the output could be created */
+    cli_realtime realtime;            /* of --realtime */
+    double start;                     /* clock at the start minus the run time before the checkpoint [s] */
+    double wall;                      /* duration of the run [s] */
+    bool begun;                       /* the output could be created */
+    const char *warned[MAX_WARNINGS]; /* names of the warnings that are printed already */
+    int warned_count;
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
 } run;
@@ -235,6 +239,23 @@ static void print_results(const run *r)
                (long long)drape_recorder_frames(r->recorder), r->request->out);
 }
 
+/* ---- Warnings, on stderr ---- */
+
+/* Prints those that apply by now, each once: those of the scene before the run, those of the run after it. */
+static void print_warnings(run *r)
+{
+    drape_warning w;
+    for (int i = 0; drape_sim_warning(r->in.sim, i, &w); i++) {
+        bool printed = r->warned_count == MAX_WARNINGS;
+        for (int k = 0; k < r->warned_count && !printed; k++)
+            printed = strcmp(r->warned[k], w.name) == 0;
+        if (printed)
+            continue;
+        r->warned[r->warned_count++] = w.name;
+        fprintf(stderr, "warning: %s\n", w.text);
+    }
+}
+
 /* ---- The run ---- */
 
 /* Registered after the recorder, so that the step during which the signal came is logged. */
@@ -286,6 +307,7 @@ static void simulate(run *r)
     const bool done = drape_recorder_is_finished(r->recorder);
     note(r, begin_output(r));
     r->begun = !r->status;
+    print_warnings(r);
     if (r->begun && !done)
         advance(r);
     if (done)
@@ -297,13 +319,14 @@ static void simulate(run *r)
 }
 
 /* A signal after the last step does not interrupt the run. */
-static int conclude(const run *r)
+static int conclude(run *r)
 {
     if (r->begun)
         print_results(r);
+    fflush(stdout);
+    print_warnings(r);
     if (!r->status)
         return CLI_DONE;
-    fflush(stdout);
     fprintf(stderr, "%s\n", r->message);
     return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
 }

@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 static const cli_option options[] = {
-    CLI_LAB_OPTION("axis", CLI_TEXTS, "/POINTER=FROM:TO:N[log]", "2 or 3 values of the scene, and where",
+    CLI_LAB_OPTION("axis", CLI_TEXTS, "/POINTER=FROM:TO:N[log]", "1 to 3 values of the scene, and where",
                    axes, 0),
     CLI_LAB_OPTIONS,
     CLI_LAB_OPTION("strain-limit", CLI_REAL, "E", "strain of an edge that no cloth has (default 0.2)",
@@ -14,7 +14,7 @@ static const cli_option options[] = {
 static int run(const void *request)
 {
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    return cli_lab_run(request, cores < 1 ? 1 : cores > 256 ? 256 : (int)cores);
+    return cli_lab_run(request, cores < 1 ? 1 : cores > 256 ? 256 : (int)cores, 0);
 }
 
 const drape_verb drape_verb_stability = {

@@ -12,6 +12,7 @@
 
 #define MAX_LEVELS  6
 #define BUDGET      20.0 /* case_seconds that each sequence may take */
+#define SHARE       0.5  /* of the experiment's budget, if it has one, that the sequences may take together */
 #define BEST        1e-8 /* of the scene's size: no further level is needed */
 #define GOOD_ENOUGH 1e-5 /* of the scene's size: no second sequence is tried */
 #define GROWTH      2.5  /* expected cost of a level over that of the one before */
@@ -39,6 +40,21 @@ typedef struct level {
     int count;          /* levels so far; 0: none */
     double took, spent; /* CPU [s] of this level, of all */
 } level;
+
+/* [s] of the wall clock by which sequence i has to be done; 0: the experiment has no budget. */
+static double deadline_of(const lab *l, int i)
+{
+    const double budget = l->def->budget_seconds;
+    return budget > 0 ? l->start + SHARE * budget * (i + 1) / SEQUENCES : 0;
+}
+
+/* Whether the next level, which takes GROWTH times the last one, is expected to end in time. */
+static bool has_time(const lab *l, int i, const level *last)
+{
+    const double next = GROWTH * last->took, deadline = deadline_of(l, i);
+    return next < BUDGET * l->def->case_seconds - last->spent &&
+           (deadline <= 0 || drape_clock_seconds() + next < deadline);
+}
 
 static json_t *settings_of(const sequence *s, double knob)
 {
@@ -133,8 +149,9 @@ static void remove_sequences(const lab *l)
 /* ---- Runs ---- */
 
 /* Runs and saves the next level. *good: it completed; otherwise *last keeps the level before. */
-static drape_status refine(lab *l, const drape_model *model, const sequence *s, level *last, bool *good)
+static drape_status refine(lab *l, const drape_model *model, int i, level *last, bool *good)
 {
+    const sequence *s = &sequences[i];
     const double knob = last->count ? last->knob * s->ratio : s->first, start = drape_clock_thread_seconds();
     lab_trace trace = {0};
     json_t *settings = settings_of(s, knob), *result = NULL;
@@ -143,6 +160,7 @@ static drape_status refine(lab *l, const drape_model *model, const sequence *s, 
                                  .record = &trace,
                                  .arena = &l->arena,
                                  .seconds = BUDGET * l->def->case_seconds - last->spent,
+                                 .deadline = deadline_of(l, i),
                                  .repeats = 1};
     drape_status status = lab_run(l->ctx, &request, &result);
     *good = !status && lab_is_good(result);
@@ -167,7 +185,6 @@ static drape_status refine(lab *l, const drape_model *model, const sequence *s, 
 static drape_status choose(lab *l, const drape_model *model, level *best)
 {
     const sequence *chosen = NULL;
-    const double budget = BUDGET * l->def->case_seconds;
     drape_status status = DRAPE_OK;
     *best = (level){.error = INFINITY};
     for (int i = 0; !status && i < SEQUENCES && !(best->error < GOOD_ENOUGH * model->length); i++) {
@@ -175,18 +192,21 @@ static drape_status choose(lab *l, const drape_model *model, level *best)
         bool good = true;
         read_saved(l, &sequences[i], &last);
         while (!status && good && last.count < MAX_LEVELS && last.error > BEST * model->length &&
-               GROWTH * last.took < budget - last.spent)
-            status = refine(l, model, &sequences[i], &last, &good);
+               has_time(l, i, &last))
+            status = refine(l, model, i, &last, &good);
         if (!status && last.error < best->error) {
             *best = last;
             chosen = &sequences[i];
         }
     }
     if (!status && !chosen)
-        status = drape_fail(l->ctx, DRAPE_E_SOLVER,
-                            "no reference: neither ida nor trbdf2 completes twice within %g s; give more by "
-                            "--case-seconds, or a shorter duration",
-                            budget);
+        status =
+            drape_fail(l->ctx, DRAPE_E_SOLVER,
+                       "no reference: neither ida nor trbdf2 completes twice within %g s%s; give more, or a "
+                       "shorter duration",
+                       BUDGET * l->def->case_seconds,
+                       l->def->budget_seconds > 0 ? " of CPU time and a quarter of --budget each"
+                                                  : ", 20 times --case-seconds");
     else if (!status)
         status = save(l, chosen, true, best);
     if (!status || status == DRAPE_E_SOLVER)
