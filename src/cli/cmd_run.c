@@ -307,7 +307,8 @@ static void simulate(run *r)
     const bool done = drape_recorder_is_finished(r->recorder);
     note(r, begin_output(r));
     r->begun = !r->status;
-    print_warnings(r);
+    if (r->begun)
+        print_warnings(r);
     if (r->begun && !done)
         advance(r);
     if (done)
@@ -321,10 +322,11 @@ static void simulate(run *r)
 /* A signal after the last step does not interrupt the run. */
 static int conclude(run *r)
 {
-    if (r->begun)
+    if (r->begun) {
         print_results(r);
-    fflush(stdout);
-    print_warnings(r);
+        fflush(stdout);
+        print_warnings(r);
+    }
     if (!r->status)
         return CLI_DONE;
     fprintf(stderr, "%s\n", r->message);

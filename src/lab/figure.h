@@ -17,6 +17,7 @@
 #define LAB_BLACK  0x000000
 #define LAB_WHITE  0xffffff
 #define LAB_GREY   0x999999
+#define LAB_DARK   0x4d4d4d
 #define LAB_BLUE   0x0072b2
 #define LAB_YELLOW 0xf0e442
 #define LAB_ORANGE 0xe69f00

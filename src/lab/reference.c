@@ -41,17 +41,18 @@ typedef struct level {
     double took, spent; /* CPU [s] of this level, of all */
 } level;
 
-/* [s] of the wall clock by which sequence i has to be done; 0: the experiment has no budget. */
-static double deadline_of(const lab *l, int i)
+/* [s] of the wall clock by which the next level of sequence i has to be done; 0: the experiment has no budget.
+ * needed: there is no reference yet, and without one there is no experiment. */
+static double deadline_of(const lab *l, int i, bool needed)
 {
     const double budget = l->def->budget_seconds;
-    return budget > 0 ? l->start + SHARE * budget * (i + 1) / SEQUENCES : 0;
+    return budget > 0 ? l->start + (needed ? 1 : SHARE * (i + 1) / SEQUENCES) * budget : 0;
 }
 
 /* Whether the next level, which takes GROWTH times the last one, is expected to end in time. */
-static bool has_time(const lab *l, int i, const level *last)
+static bool has_time(const lab *l, const level *last, double deadline)
 {
-    const double next = GROWTH * last->took, deadline = deadline_of(l, i);
+    const double next = GROWTH * last->took;
     return next < BUDGET * l->def->case_seconds - last->spent &&
            (deadline <= 0 || drape_clock_seconds() + next < deadline);
 }
@@ -149,9 +150,9 @@ static void remove_sequences(const lab *l)
 /* ---- Runs ---- */
 
 /* Runs and saves the next level. *good: it completed; otherwise *last keeps the level before. */
-static drape_status refine(lab *l, const drape_model *model, int i, level *last, bool *good)
+static drape_status refine(lab *l, const drape_model *model, const sequence *s, double deadline, level *last,
+                           bool *good)
 {
-    const sequence *s = &sequences[i];
     const double knob = last->count ? last->knob * s->ratio : s->first, start = drape_clock_thread_seconds();
     lab_trace trace = {0};
     json_t *settings = settings_of(s, knob), *result = NULL;
@@ -160,7 +161,7 @@ static drape_status refine(lab *l, const drape_model *model, int i, level *last,
                                  .record = &trace,
                                  .arena = &l->arena,
                                  .seconds = BUDGET * l->def->case_seconds - last->spent,
-                                 .deadline = deadline_of(l, i),
+                                 .deadline = deadline,
                                  .repeats = 1};
     drape_status status = lab_run(l->ctx, &request, &result);
     *good = !status && lab_is_good(result);
@@ -185,28 +186,30 @@ static drape_status refine(lab *l, const drape_model *model, int i, level *last,
 static drape_status choose(lab *l, const drape_model *model, level *best)
 {
     const sequence *chosen = NULL;
+    const bool budget = l->def->budget_seconds > 0;
     drape_status status = DRAPE_OK;
     *best = (level){.error = INFINITY};
     for (int i = 0; !status && i < SEQUENCES && !(best->error < GOOD_ENOUGH * model->length); i++) {
         level last = {.error = INFINITY};
         bool good = true;
         read_saved(l, &sequences[i], &last);
-        while (!status && good && last.count < MAX_LEVELS && last.error > BEST * model->length &&
-               has_time(l, i, &last))
-            status = refine(l, model, i, &last, &good);
+        while (!status && good && last.count < MAX_LEVELS && last.error > BEST * model->length) {
+            const double deadline = deadline_of(l, i, !isfinite(best->error) && last.count < 2);
+            if (!has_time(l, &last, deadline))
+                break;
+            status = refine(l, model, &sequences[i], deadline, &last, &good);
+        }
         if (!status && last.error < best->error) {
             *best = last;
             chosen = &sequences[i];
         }
     }
     if (!status && !chosen)
-        status =
-            drape_fail(l->ctx, DRAPE_E_SOLVER,
-                       "no reference: neither ida nor trbdf2 completes twice within %g s%s; give more, or a "
-                       "shorter duration",
-                       BUDGET * l->def->case_seconds,
-                       l->def->budget_seconds > 0 ? " of CPU time and a quarter of --budget each"
-                                                  : ", 20 times --case-seconds");
+        status = drape_fail(
+            l->ctx, DRAPE_E_SOLVER,
+            "no reference: neither ida nor trbdf2 completes twice within %g s of CPU time%s; give more by "
+            "--case-seconds%s, or a shorter duration",
+            BUDGET * l->def->case_seconds, budget ? " and the budget" : "", budget ? " and --budget" : "");
     else if (!status)
         status = save(l, chosen, true, best);
     if (!status || status == DRAPE_E_SOLVER)

@@ -267,15 +267,15 @@ static const struct {
     const char *name;
     int colour;
 } verdicts[VERDICTS] = {
-    [CLEAN] = {"no step rejected", LAB_BLUE},
-    [FEW] = {"up to 1 rejected in 100", 0x4c9ccb},
-    [SOME] = {"up to 1 in 10", 0x93c4e2},
-    [MANY] = {"more", 0xd3e6f3},
+    [CLEAN] = {"none rejected", LAB_BLUE},
+    [FEW] = {"up to 1/100 rejected", 0x4c9ccb},
+    [SOME] = {"up to 1/10 rejected", 0x93c4e2},
+    [MANY] = {"over 1/10 rejected", 0xd3e6f3},
     [SHORT] = {"fewer than " NUMBER(DRAPE_FEW_STEPS) " steps", LAB_YELLOW},
     [STRAINED] = {"unphysical strain", LAB_PURPLE},
     [STOPPED] = {"stopped", LAB_ORANGE},
     [EXPLODED] = {"exploded", LAB_RED},
-    [LATE] = {"over budget", LAB_GREY},
+    [LATE] = {"over budget", LAB_DARK},
 };
 
 static verdict judge(const lab *l, const json_t *result)

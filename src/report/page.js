@@ -129,6 +129,7 @@ function describe() {
   status.classList.toggle('failed', !s || s.status !== 'ok');
   if (!s) notes.push('The folder of the run has no summary: it was ended from outside, or goes on.');
   else if (s.message) notes.push(s.message);
+  for (const warning of (s && s.warnings) || []) notes.push(`Warning: ${warning.text}.`);
   if (run.frames.numbers.length < run.frames.all) {
     notes.push(`The page has ${run.frames.numbers.length} of ${run.frames.all} frames, evenly spread, to stay small; drape report --megabytes N makes room for more.`);
   }
