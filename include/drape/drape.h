@@ -579,10 +579,11 @@ typedef struct drape_warning {
     char text[400];   /* one line */
 } drape_warning;
 
-/* The warnings about a sim and its run so far, computed at the call: index 0 is the first that applies. no_terms:
- * nothing but weight is modelled for a cloth. few_steps: the duration of the scene is fewer than 20 steps of dt.
- * numerical_dissipation: the integrator took more than half of the energy that went in. slow_contact: contact takes
- * most of the time of the steps, and longer than the motion lasts, and a setting is known to help. Returns false past the last. */
+/* The warnings about a sim and its run so far, computed at the call: index 0 is the first that applies.
+ * no_terms: nothing but weight is modelled for a cloth. few_steps: the duration of the scene is fewer
+ * than 20 steps of dt. numerical_dissipation: the integrator took more than half of the energy that went
+ * in. slow_contact: contact takes most of the time of the steps, and longer than the motion lasts, and a
+ * setting is known to help. Returns false past the last. */
 DRAPE_API bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out);
 
 /* ---- Checkpoints ---- */

@@ -77,12 +77,13 @@ typedef struct drape_lab_outcome {
 /* Frees the text of an outcome. The struct itself belongs to the caller. */
 DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
 
-/* Runs "tradeoff", "stability" or "converge" and writes cases.jsonl, experiment.json, results.csv, figures
- * (SVG and PDF) and report.html into the folder. A shard, whose folder other shards may share, writes only experiment.json
- * and cases-1-of-4.jsonl; the merge writes the rest. Existing results of the same experiment are kept as they
- * are. Errors: DRAPE_E_ARGUMENT (no such experiment, an invalid def, a setting that no case uses, a folder
- * that holds another experiment), those of loading the scene, DRAPE_E_FILE, DRAPE_E_SOLVER (the reference
- * could not be computed: the folder is left as it was), DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
+/* Runs "tradeoff", "stability" or "converge" and writes cases.jsonl, experiment.json, results.csv,
+ * figures (SVG and PDF) and report.html into the folder. A shard, whose folder other shards may share,
+ * writes only experiment.json and cases-1-of-4.jsonl; the merge writes the rest. Existing results of the
+ * same experiment are kept as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, an invalid def, a
+ * setting that no case uses, a folder that holds another experiment), those of loading the scene,
+ * DRAPE_E_FILE, DRAPE_E_SOLVER (the reference could not be computed: the folder is left as it was),
+ * DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
 DRAPE_API drape_status drape_lab_run(drape_context *ctx, const char *experiment, const drape_lab_def *def,
                                      drape_lab_outcome *outcome);
 

@@ -36,7 +36,8 @@ static int read_shard(const cli_lab_request *request, drape_lab_def *def)
     return CLI_GO_ON;
 }
 
-/* Minutes, or "none". A shard is part of a sweep that is to run in full: it has no budget unless it is given one. */
+/* Minutes, or "none". A shard is part of a sweep that is to run in full: it has no budget unless it is
+ * given one. */
 static int read_budget(const cli_lab_request *request, double default_minutes, drape_lab_def *def)
 {
     const char *text = request->budget;

@@ -47,7 +47,7 @@ lab_style lab_style_of(const char *integrator, size_t variant)
 
 /* ---- Text ---- */
 
-/* The width of a text [mm]: DejaVu Sans [em / 1000], wider than the usual fonts without serifs. */
+/* The width of a text [mm]: DejaVu Sans [em / 1000], the widest of the usual fonts without serifs. */
 static double text_width(const char *text)
 {
     static const short widths[] = {
@@ -78,8 +78,8 @@ static double ends_ratio(const lab_axis *a)
     return a->log ? log10(a->to / a->from) : a->to - a->from;
 }
 
-/* Powers of ten, at most about six; between them ticks without numbers. If there is at most one, 1, 2 and 5 times
- * such a power, or over less than a factor of 4 all multiples. */
+/* Powers of ten, at most about six; between them ticks without numbers. If there is at most one, 1, 2 and
+ * 5 times such a power, or over less than a factor of 4 all multiples. */
 static void put_log_ticks(const lab_axis *a, FILE *out)
 {
     const int first = (int)floor(log10(a->from)), last = (int)ceil(log10(a->to));
@@ -164,7 +164,8 @@ void lab_figure_fit(lab_figure *f, const double *xy, size_t count, bool slopes)
     }
     if (!slopes)
         return;
-    /* The lines of orders 1 and 2 begin at (left, low); their ends, and the numbers at these, are 4 mm apart. */
+    /* The lines of orders 1 and 2 begin at (left, low); their ends, and the numbers at these, are 4 mm
+     * apart. */
     const double span = fmax(0.15 * ends_ratio(x), 4 / f->plot_height * ends_ratio(y));
     const double right = x->to * pow(10, -0.07 * ends_ratio(x)), left = right * pow(10, -span);
     double top = INFINITY;
@@ -221,8 +222,8 @@ static void add_entry(lab_figure *f, const lab_entry *entry)
         f->legend[f->entries++] = *entry;
 }
 
-/* gnuplot's SVG joins neighbouring arrows of one width and colour and gives all of them the dashes of the first: each
- * kind of dashes has a width of its own. */
+/* gnuplot's SVG joins neighbouring arrows of one width and colour and gives all of them the dashes of the
+ * first: each kind of dashes has a width of its own. */
 static void put_style(FILE *out, lab_style s)
 {
     fprintf(out, "lw %.2f dt %d lc rgb '#%06x'", THICK + 0.01 * (s.dash - 1), s.dash, (unsigned)s.colour);

@@ -1,10 +1,10 @@
 /*
- * figure.h: the figures of the experiments, as a column of a paper: 84 mm wide, text of 7 pt and more, as SVG and
- * as PDF with its font embedded. gnuplot draws them; where text stands is computed here, from the widths of its
- * characters, so that legends and labels touch nothing.
+ * figure.h: the figures of the experiments, as a column of a paper: 84 mm wide, text of 7 pt and more,
+ * as SVG and as PDF with its font embedded. gnuplot draws them; where text stands is computed here,
+ * from the widths of its characters, so that legends and labels touch nothing.
  *
- * Colours are those of Okabe and Ito, Color Universal Design (2008), which people with any form of colour blindness
- * tell apart. An integrator has the same colour and marker in every figure.
+ * Colours are those of Okabe and Ito, Color Universal Design (2008), which people with any form of
+ * colour blindness tell apart. An integrator has the same colour and marker in every figure.
  */
 #ifndef DRAPE_LAB_FIGURE_H
 #define DRAPE_LAB_FIGURE_H
@@ -30,7 +30,8 @@ typedef struct lab_style {
     int point; /* a marker of gnuplot's; 0: none */
 } lab_style;
 
-/* The style of an integrator. Its variants, numbered from 0, have its colour, other dashes and open markers. */
+/* The style of an integrator. Its variants, numbered from 0, have its colour, other dashes and open
+ * markers. */
 lab_style lab_style_of(const char *integrator, size_t variant);
 
 /* An axis. Names replace the numbers, one for each integer from 0. */
@@ -79,12 +80,13 @@ void lab_figure_boxes(lab_figure *f, int block);
 /* A swatch in the legend. */
 void lab_figure_swatch(lab_figure *f, int colour, const char *text);
 
-/* Widens logarithmic axes, on which the curves end, by a margin; slopes: makes room below the curves (points: x, y
- * in turn) and draws reference lines of orders 1 and 2 there. */
+/* Widens logarithmic axes, on which the curves end, by a margin; slopes: makes room below the curves
+ * (points: x, y in turn) and draws reference lines of orders 1 and 2 there. */
 void lab_figure_fit(lab_figure *f, const double *points, size_t count, bool slopes);
 
-/* Writes name.gp, has gnuplot make name.svg and name.pdf, and adds the figure with its caption to the page. Without
- * an element there is no figure. If gnuplot is missing or fails, only the summary says so. Frees the memory. */
+/* Writes name.gp, has gnuplot make name.svg and name.pdf, and adds the figure with its caption to the
+ * page. Without an element there is no figure. If gnuplot is missing or fails, only the summary says so.
+ * Frees the memory. */
 drape_status lab_figure_end(lab *l, lab_figure *f, const char *caption);
 
 #endif

@@ -35,8 +35,8 @@ typedef struct lab_experiment_ops {
     drape_status (*check)(lab *l);
     /* Makes l->reference or l->probe. NULL: there is nothing to prepare. */
     drape_status (*prepare)(lab *l);
-    /* Writes figures, sentences (l->summary) and the body of the page (lab_page_*). All cases have results; with
-     * `partial`, any of them may be missing. */
+    /* Writes figures, sentences (l->summary) and the body of the page (lab_page_*). All cases have
+     * results; with `partial`, any of them may be missing. */
     drape_status (*report)(lab *l);
     bool partial; /* a def may have a budget, after which the cases with the highest ranks are left out */
 } lab_experiment_ops;
@@ -89,8 +89,8 @@ const drape_integrator_ops *lab_find_integrator(const char *name); /* NULL: ther
 /* Whether the integrators that the def names include this one; fallback if it names none. */
 bool lab_wants_integrator(const lab *l, const char *name, bool fallback);
 
-/* The limits of its order that an integrator is run with: 2 and 5 if it has the parameter max_order and the def does
- * not set it; otherwise 0, for none, alone. Returns their number. */
+/* The limits of its order that an integrator is run with: 2 and 5 if it has the parameter max_order and
+ * the def does not set it; otherwise 0, for none, alone. Returns their number. */
 size_t lab_order_limits(const lab *l, const drape_integrator_ops *integrator, int limits[2]);
 
 /* "ida, order 2", the name of a series */

@@ -41,8 +41,8 @@ typedef struct level {
     double took, spent; /* CPU [s] of this level, of all */
 } level;
 
-/* [s] of the wall clock by which the next level of sequence i has to be done; 0: the experiment has no budget.
- * needed: there is no reference yet, and without one there is no experiment. */
+/* [s] of the wall clock by which the next level of sequence i has to be done; 0: the experiment has no
+ * budget. needed: there is no reference yet, and without one there is no experiment. */
 static double deadline_of(const lab *l, int i, bool needed)
 {
     const double budget = l->def->budget_seconds;

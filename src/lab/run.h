@@ -30,9 +30,9 @@ drape_status lab_load(drape_context *ctx, const lab_request *request, drape_mode
 /* Whether it compiles. settings: of a case; NULL: the scene itself. */
 drape_status lab_try(drape_context *ctx, const drape_lab_def *def, const json_t *settings);
 
-/* Runs it. *result: what was measured, to be freed by the caller; a simulation that stops is a result. NULL: the
- * deadline passed before it was done.
- * Errors: those of loading, DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
+/* Runs it. *result: what was measured, to be freed by the caller; a simulation that stops is a result.
+ * NULL: the deadline passed before it was done. Errors: those of loading, DRAPE_E_MEMORY, DRAPE_E_STOPPED
+ * (cancelled). */
 drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **result);
 
 #endif

@@ -1,7 +1,8 @@
 /*
- * stability: maps. Values of the scene over one to three axes, every point with every integrator asked for: the
- * outcome is one of a few, each with a colour. Over a single axis all integrators share one figure, a row each. Where the first or second axis is the step of an explicit
- * integrator, its stability limit, as estimated at the start of each run, is drawn over the map.
+ * stability: maps. Values of the scene over one to three axes, every point with every integrator asked
+ * for: the outcome is one of a few, each with a colour. Over a single axis all integrators share one
+ * figure, a row each. Where the first or second axis is the step of an explicit integrator, its
+ * stability limit, as estimated at the start of each run, is drawn over the map.
  */
 #include "base/param.h"
 #include "lab/figure.h"
@@ -296,8 +297,8 @@ static verdict judge(const lab *l, const json_t *result)
 
 /* ---- Figures ---- */
 
-/* What one figure shows: the cells of an integrator, at an index on the third axis, or those of all integrators over
- * a single axis. */
+/* What one figure shows: the cells of an integrator, at an index on the third axis, or those of all
+ * integrators over a single axis. */
 typedef struct map {
     const lab *l;
     const space *s;

@@ -140,8 +140,8 @@ static bool is_late(const sweep *s)
     return s->deadline > 0 && drape_clock_seconds() > s->deadline;
 }
 
-/* Takes the next case that has no result. Returns l->count if there is none, the budget is used up, or a thread
- * failed. */
+/* Takes the next case that has no result. Returns l->count if there is none, the budget is used up, or a
+ * thread failed. */
 static size_t take_case(sweep *s)
 {
     lab *l = s->l;

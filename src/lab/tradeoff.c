@@ -17,8 +17,8 @@
 #define BASE_METHOD "be"  /* the usual integrator: others are compared with it */
 #define BASE_DT     (1.0 / 60)
 
-/* Values of a knob. If there is a budget, cases of low rank come first: a few points of every integrator, over all of
- * its range, then the points between, then controllers and linear solvers. */
+/* Values of a knob. If there is a budget, cases of low rank come first: a few points of every integrator,
+ * over all of its range, then the points between, then controllers and linear solvers. */
 typedef struct level {
     double value;
     int rank;
@@ -226,7 +226,8 @@ static void report_reference(lab *l)
     }
     fprintf(l->summary, "The reference's error is estimated as %.2g m; ", reference);
     if (!isfinite(smallest))
-        fprintf(l->summary, "no error is plotted. ");
+        fprintf(l->summary,
+                "no error is plotted: a shorter --duration, or a larger --budget, may give a better one. ");
     else if (reference > 0)
         fprintf(l->summary, "the smallest error plotted is %.2g m, %.3g times that. ", smallest,
                 smallest / reference);

@@ -1,6 +1,6 @@
 /*
- * warnings.c: drape_sim_warning: runs that complete and are yet unlikely to be what was wanted. Each check is a
- * function that describes what it found; none of them changes the sim.
+ * warnings.c: drape_sim_warning: runs that complete and are yet unlikely to be what was wanted. Each
+ * check is a function that describes what it found; none of them changes the sim.
  */
 #include "sim/warnings.h"
 
@@ -48,7 +48,8 @@ static bool has_few_steps(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
-/* Energy that the integrator took, as a share of all that went in: by gravity, pins, colliders, hosts and wind. */
+/* Energy that the integrator took, as a share of all that went in: by gravity, pins, colliders, hosts and
+ * wind. */
 static bool dissipates_most(drape_sim *sim, char *text, size_t size)
 {
     const drape_integrator_ops *integrator = sim->chosen.integrator;
@@ -75,9 +76,10 @@ static bool has_implicit_friction(const drape_model *m)
     return any && !m->contact.lagged;
 }
 
-/* Contact that takes most of the time, and longer than the motion lasts, where a setting is known to help. Measured on examples/scenes over 0.5 s: lagged
- * friction halves the time of crumple and fold; newton_k takes a third of the time of crumple, a seventh of that of
- * floor_drop, half of that of sphere_drape. */
+/* Contact that takes most of the time, and longer than the motion lasts, where a setting is known to
+ * help. Measured on examples/scenes over 0.5 s: lagged friction halves the time of crumple and fold;
+ * newton_k takes a third of the time of crumple, a seventh of that of floor_drop, half of that of
+ * sphere_drape. */
 static bool is_contact_slow(drape_sim *sim, char *text, size_t size)
 {
     const drape_statistics s = drape_sim_statistics(sim);
