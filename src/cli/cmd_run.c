@@ -325,7 +325,8 @@ static int conclude(run *r)
     if (r->begun) {
         print_results(r);
         fflush(stdout);
-        print_warnings(r);
+        if (!r->status) /* a failure has its own line */
+            print_warnings(r);
     }
     if (!r->status)
         return CLI_DONE;
