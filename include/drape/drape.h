@@ -573,6 +573,19 @@ DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);
  * and the result is NULL. */
 DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count);
 
+/* A doubt about a run: what is unusual, and which setting would help. */
+typedef struct drape_warning {
+    const char *name; /* "no_terms", "few_steps", "numerical_dissipation" or "slow_contact" */
+    char text[400];   /* one line */
+} drape_warning;
+
+/* The warnings about a sim and its run so far, computed at the call: index 0 is the first that applies.
+ * no_terms: nothing but weight is modelled for a cloth. few_steps: the duration of the scene is fewer
+ * than 20 steps of dt. numerical_dissipation: the integrator took more than half of the energy that went
+ * in. slow_contact: contact takes most of the time of the steps, and longer than the motion lasts, and a
+ * setting is known to help. Returns false past the last. */
+DRAPE_API bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out);
+
 /* ---- Checkpoints ---- */
 
 /* Receives the next size bytes of a stream. Returns DRAPE_OK to continue, or a negative status to stop; it

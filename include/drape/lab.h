@@ -38,7 +38,7 @@ typedef struct drape_lab_def {
     size_t setting_count;              /* length of settings */
     const char *const *integrators;    /* names of integrators; none: the default of the experiment */
     size_t integrator_count;           /* length of integrators */
-    const char *const *axes;           /* stability: 2 or 3 axes of the form "/pointer=from:to:n" or
+    const char *const *axes;           /* stability: 1 to 3 axes of the form "/pointer=from:to:n" or
                                           "/pointer=from:to:nlog" */
     size_t axis_count;                 /* length of axes */
     int levels;                        /* converge: number of refinements, 3 to 12; default 6 */
@@ -51,6 +51,9 @@ typedef struct drape_lab_def {
                             down */
     int shard, shards;   /* this shard runs the cases whose number is shard - 1 modulo shards; default 1 of
                             1 */
+    double
+        budget_seconds; /* tradeoff: [s] wall-clock time of the call, after which the cases that are left are
+                              left out, the least telling ones; default 0: none is left out */
     drape_lab_progress *progress; /* NULL: no reports */
     drape_lab_cancel *cancel;     /* NULL: never */
     void *user;                   /* passed to progress and cancel */
@@ -65,6 +68,7 @@ typedef struct drape_lab_outcome {
     int64_t done;     /* cases that have a result by now */
     int64_t resumed;  /* those of them whose result was found in the folder */
     int64_t failed;   /* those of them that did not complete */
+    int64_t left_out; /* cases without a result because the budget was used up; the text names them */
     int64_t rejected; /* steps that were rejected in all of them together */
     bool input;       /* a failure is due to the input, not to the output folder */
     char *text;       /* summary of the report, several lines; free it with drape_lab_outcome_free */
@@ -73,12 +77,13 @@ typedef struct drape_lab_outcome {
 /* Frees the text of an outcome. The struct itself belongs to the caller. */
 DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
 
-/* Runs "tradeoff", "stability" or "converge" and writes cases.jsonl, experiment.json, results.csv, pictures
- * and report.html into the folder. A shard, whose folder other shards may share, writes only experiment.json
- * and cases-1-of-4.jsonl; the merge writes the rest. Existing results of the same experiment are kept as they
- * are. Errors: DRAPE_E_ARGUMENT (no such experiment, an invalid def, a setting that no case uses, a folder
- * that holds another experiment), those of loading the scene, DRAPE_E_FILE, DRAPE_E_SOLVER (the reference
- * could not be computed: the folder is left as it was), DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
+/* Runs "tradeoff", "stability" or "converge" and writes cases.jsonl, experiment.json, results.csv,
+ * figures (SVG and PDF) and report.html into the folder. A shard, whose folder other shards may share,
+ * writes only experiment.json and cases-1-of-4.jsonl; the merge writes the rest. Existing results of the
+ * same experiment are kept as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, an invalid def, a
+ * setting that no case uses, a folder that holds another experiment), those of loading the scene,
+ * DRAPE_E_FILE, DRAPE_E_SOLVER (the reference could not be computed: the folder is left as it was),
+ * DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
 DRAPE_API drape_status drape_lab_run(drape_context *ctx, const char *experiment, const drape_lab_def *def,
                                      drape_lab_outcome *outcome);
 

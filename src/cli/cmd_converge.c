@@ -9,7 +9,7 @@ static const cli_option options[] = {
 
 static int run(const void *request)
 {
-    return cli_lab_run(request, 1);
+    return cli_lab_run(request, 1, 0);
 }
 
 const drape_verb drape_verb_converge = {

@@ -19,6 +19,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define MAX_WARNINGS 8
+
 typedef struct run_request {
     cli_command command;
     const char *out, *summary;
@@ -33,9 +35,11 @@ typedef struct run {
     void *checkpoint;         /* contents of the checkpoint that the run resumes from; NULL: it starts anew */
     drape_archive archive;    /* reads the contents */
     cli_progress progress;
-    cli_realtime realtime; /* of --realtime */
-    double start;          /* clock at the start minus the run time before the checkpoint [s] */
-    double wall;           /* duration of the run [s] */
+    cli_realtime realtime;            /* of --realtime */
+    double start;                     /* clock at the start minus the run time before the checkpoint [s] */
+    double wall;                      /* duration of the run [s] */
+    const char *warned[MAX_WARNINGS]; /* names of the warnings that are printed already */
+    int warned_count;
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
 } run;
@@ -283,6 +287,23 @@ static void print_results(const run *r)
                (long long)drape_recorder_frames(r->recorder), CLI_SHOWN(r->request->out));
 }
 
+/* ---- Warnings, on stderr ---- */
+
+/* Prints those that apply by now, each once: those of the scene before the run, those of the run after it. */
+static void print_warnings(run *r)
+{
+    drape_warning w;
+    for (int i = 0; drape_sim_warning(r->in.sim, i, &w); i++) {
+        bool printed = r->warned_count == MAX_WARNINGS;
+        for (int k = 0; k < r->warned_count && !printed; k++)
+            printed = strcmp(r->warned[k], w.name) == 0;
+        if (printed)
+            continue;
+        r->warned[r->warned_count++] = w.name;
+        fprintf(stderr, "warning: %s\n", w.text);
+    }
+}
+
 /* ---- The run ---- */
 
 /* Registered after the recorder, so that the step during which the signal came is logged. */
@@ -332,6 +353,7 @@ static void finish(run *r)
 static void simulate(run *r)
 {
     const bool done = drape_recorder_is_finished(r->recorder);
+    print_warnings(r);
     if (!done)
         advance(r);
     if (done)
@@ -345,12 +367,14 @@ static void simulate(run *r)
 }
 
 /* A signal after the last step does not interrupt the run. */
-static int conclude(const run *r)
+static int conclude(run *r)
 {
     print_results(r);
+    fflush(stdout);
+    if (!r->status) /* a failure has its own line */
+        print_warnings(r);
     if (!r->status)
         return CLI_DONE;
-    fflush(stdout);
     fprintf(stderr, "%s\n", r->message);
     return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
 }

@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 static const cli_option options[] = {
-    CLI_LAB_OPTION("axis", CLI_TEXTS, "/POINTER=FROM:TO:N[log]", "an axis of the map; give 2 or 3", axes, 0),
+    CLI_LAB_OPTION("axis", CLI_TEXTS, "/POINTER=FROM:TO:N[log]", "an axis of the map; give 1 to 3", axes, 0),
     CLI_LAB_OPTIONS,
     CLI_LAB_OPTION("strain-limit", CLI_REAL, "E",
                    "a run with a larger strain of an edge counts as overstretched (default 0.2)",
@@ -14,7 +14,7 @@ static const cli_option options[] = {
 static int run(const void *request)
 {
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    return cli_lab_run(request, cores < 1 ? 1 : cores > 256 ? 256 : (int)cores);
+    return cli_lab_run(request, cores < 1 ? 1 : cores > 256 ? 256 : (int)cores, 0);
 }
 
 const drape_verb drape_verb_stability = {

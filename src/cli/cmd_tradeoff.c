@@ -1,15 +1,21 @@
 /* cmd_tradeoff.c: `drape tradeoff`: work against accuracy. */
 #include "cli/lab.h"
 
+#define BUDGET 5 /* [min] */
+
 static const cli_option options[] = {
     CLI_LAB_OPTIONS,
     CLI_LAB_OPTION("repeats", CLI_NUMBER, "N",
                    "runs of a short case, of which the fastest counts (default 3)", repeats, 100),
+    CLI_LAB_OPTION(
+        "budget", CLI_TEXT, "MINUTES",
+        "when the time is up, the cases that tell least are left out and named; or none (default 5)", budget,
+        0),
 };
 
 static int run(const void *request)
 {
-    return cli_lab_run(request, 1);
+    return cli_lab_run(request, 1, BUDGET);
 }
 
 const drape_verb drape_verb_tradeoff = {
@@ -17,11 +23,11 @@ const drape_verb drape_verb_tradeoff = {
               .summary = "compare the cost and the accuracy of all integrators, against a precise reference"},
     .operand = "SCENE",
     .takes_scene = true,
-    .details = "Runs a scene with every integrator over its dt or rtol, and compares with a reference "
-               "solution whose\n"
-               "own error is estimated. After Ctrl-C, the same command resumes where it stopped. Cases run "
-               "one at a\n"
-               "time, so that their CPU times can be compared; --jobs runs several.",
+    .details =
+        "Runs a scene with every integrator over its dt or rtol, and compares with a reference "
+        "solution whose\n"
+        "own error is estimated. After Ctrl-C, or where cases were left out, the same command continues.\n"
+        "Cases run one at a time, so that their CPU times can be compared; --jobs runs several.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(cli_lab_request),

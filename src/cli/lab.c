@@ -36,6 +36,25 @@ static int read_shard(const cli_lab_request *request, drape_lab_def *def)
     return CLI_GO_ON;
 }
 
+/* Minutes, or "none". A shard is part of a sweep that is to run in full: it has no budget unless it is
+ * given one. */
+static int read_budget(const cli_lab_request *request, double default_minutes, drape_lab_def *def)
+{
+    const char *text = request->budget;
+    char *end;
+    double minutes = request->shard ? 0 : default_minutes;
+    if (text && strcmp(text, "none") == 0)
+        minutes = 0;
+    else if (text) {
+        minutes = strtod(text, &end);
+        if (end == text || *end || !(minutes > 0 && minutes < 1e9))
+            return cli_misuse(request->command.verb, "--budget \"%.60s\": must be minutes, above 0, or none",
+                              text);
+    }
+    def->budget_seconds = 60 * minutes;
+    return CLI_GO_ON;
+}
+
 /* Its range is checked by the experiment. */
 static int read_levels(const cli_lab_request *request, drape_lab_def *def)
 {
@@ -51,7 +70,8 @@ static int read_levels(const cli_lab_request *request, drape_lab_def *def)
 }
 
 /* Fills the def; its texts and arrays are those of the request or in the arena. */
-static int make_def(const cli_lab_request *request, int default_jobs, drape_arena *arena, drape_lab_def *def)
+static int make_def(const cli_lab_request *request, int default_jobs, double default_minutes,
+                    drape_arena *arena, drape_lab_def *def)
 {
     const cli_command *command = &request->command;
     const char *slash = strrchr(command->operand, '/'), *name = slash ? slash + 1 : command->operand,
@@ -87,6 +107,8 @@ static int make_def(const cli_lab_request *request, int default_jobs, drape_aren
     int code = read_levels(request, def);
     if (code == CLI_GO_ON)
         code = read_shard(request, def);
+    if (code == CLI_GO_ON)
+        code = read_budget(request, default_minutes, def);
     if (code == CLI_GO_ON && command->threads)
         code = cli_misuse(
             command->verb,
@@ -108,11 +130,11 @@ int cli_lab_conclude(drape_context *ctx, drape_status status, drape_lab_outcome 
     return code;
 }
 
-int cli_lab_run(const cli_lab_request *request, int default_jobs)
+int cli_lab_run(const cli_lab_request *request, int default_jobs, double default_minutes)
 {
     const cli_command *command = &request->command;
     drape_lab_def def;
-    int code = make_def(request, default_jobs, command->arena, &def);
+    int code = make_def(request, default_jobs, default_minutes, command->arena, &def);
     if (code == CLI_GO_ON) {
         cli_progress progress;
         drape_lab_outcome outcome;

@@ -7,7 +7,7 @@
 /* The command line of an experiment; each verb has options for the members that it uses. */
 typedef struct cli_lab_request {
     cli_command command;
-    const char *out, *shard, *integrators, *levels;
+    const char *out, *shard, *integrators, *levels, *budget;
     cli_texts axes;
     int jobs, repeats; /* 0: not given */
     bool space;
@@ -23,7 +23,7 @@ typedef struct cli_lab_request {
 /* The options that all experiments have. */
 #define CLI_LAB_OPTIONS                                                                                      \
     CLI_LAB_OPTION("out", CLI_TEXT, "DIR",                                                                   \
-                   "folder for cases.jsonl, results.csv, pictures, report.html (default SCENE.VERB)", out,   \
+                   "folder for cases.jsonl, results.csv, figures, report.html (default SCENE.VERB)", out,    \
                    0),                                                                                       \
         CLI_LAB_OPTION("integrators", CLI_TEXT, "A,B", "only these integrators", integrators, 0),            \
         CLI_LAB_OPTION("jobs", CLI_NUMBER, "N", "number of cases at a time, each in a thread", jobs, 256),   \
@@ -32,8 +32,8 @@ typedef struct cli_lab_request {
         CLI_LAB_OPTION("shard", CLI_TEXT, "I/N",                                                             \
                        "run only part I of N of the cases; `drape merge` merges the parts", shard, 0)
 
-/* Runs the experiment of the request's verb. Returns the exit code. */
-int cli_lab_run(const cli_lab_request *request, int default_jobs);
+/* Runs the experiment of the request's verb. default_minutes: its budget; 0: none. Returns the exit code. */
+int cli_lab_run(const cli_lab_request *request, int default_jobs, double default_minutes);
 
 /* Prints the summary, or the message of a failure, and frees the outcome. Returns the exit code. */
 struct drape_lab_outcome;

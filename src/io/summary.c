@@ -130,6 +130,21 @@ static json_t *with_inside(json_t *object, const drape_sim *sim)
     return drape_json_with(object, "inside", list);
 }
 
+static json_t *warnings(drape_sim *sim)
+{
+    json_t *list = json_array();
+    drape_warning w;
+    for (int i = 0; drape_sim_warning(sim, i, &w); i++) {
+        json_t *one = drape_json_with(json_object(), "name", json_string(w.name));
+        one = drape_json_with(one, "text", drape_json_text(w.text));
+        if (json_array_append_new(list, one)) {
+            json_decref(list);
+            return NULL;
+        }
+    }
+    return list;
+}
+
 static json_t *hash(const drape_sim *sim)
 {
     char digits[17];
@@ -158,6 +173,7 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     if (s.stability_known)
         object = drape_json_with(object, "equilibrium", stability(&s));
     object = with_inside(object, sim);
+    object = drape_json_with(object, "warnings", warnings(sim));
     if (def->realtime)
         object = drape_json_with(object, "realtime", realtime(def->realtime));
     return drape_json_with(object, "hash", hash(sim));

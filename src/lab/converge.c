@@ -5,6 +5,7 @@
  * the edges of every grid, with positions compared at the nodes of the coarsest mesh.
  */
 #include "base/param.h"
+#include "lab/figure.h"
 #include "lab/run.h"
 #include "lab/statistics.h"
 #include "lab/text.h"
@@ -24,9 +25,11 @@
 
 /* ---- The cases ---- */
 
-static drape_status add(lab *l, const char *series, const char *knob, double value, json_t *settings)
+static drape_status add(lab *l, const char *series, const char *integrator, const char *knob, double value,
+                        json_t *settings)
 {
-    json_t *tags = json_pack("{s:s, s:s, s:f}", "series", series, "knob", knob, "value", value);
+    json_t *tags = json_pack("{s:s, s:s, s:s, s:f}", "series", series, "integrator", integrator, "knob", knob,
+                             "value", value);
     return lab_add_case(l, tags, settings, -1);
 }
 
@@ -46,10 +49,22 @@ static drape_status add_time(lab *l, const drape_integrator_ops *integrator, con
     drape_status status = DRAPE_OK;
     const char *knob = integrator->own_steps ? "rtol" : has_own_substeps(integrator, given) ? OWN : "dt";
     const char *pointer = integrator->own_steps ? "/integrator/rtol" : "/integrator/dt";
-    double value = integrator->own_steps ? FIRST_RTOL : FIRST_DT, ratio = integrator->own_steps ? 0.1 : 0.5;
-    for (int k = 0; k < l->def->levels && !status; k++, value *= ratio)
-        status = add(l, integrator->entry.name, knob, value,
-                     json_pack("{s:s, s:f}", "/integrator/method", integrator->entry.name, pointer, value));
+    const double ratio = integrator->own_steps ? 0.1 : 0.5;
+    int limits[2];
+    /* Each series has one limit of the order: a line through points of different limits has no meaning. */
+    const size_t count = lab_order_limits(l, integrator, limits);
+    for (size_t i = 0; i < count; i++) {
+        char series[96];
+        double value = integrator->own_steps ? FIRST_RTOL : FIRST_DT;
+        lab_name_series(integrator, limits[i], series, sizeof series);
+        for (int k = 0; k < l->def->levels && !status; k++, value *= ratio) {
+            json_t *settings =
+                json_pack("{s:s, s:f}", "/integrator/method", integrator->entry.name, pointer, value);
+            if (limits[i])
+                json_object_set_new(settings, "/integrator/max_order", json_integer(limits[i]));
+            status = add(l, series, integrator->entry.name, knob, value, settings);
+        }
+    }
     return status;
 }
 
@@ -81,7 +96,7 @@ static drape_status add_level(lab *l, const drape_scene_def *def, int level)
         }
         refine(&def->cloths[c].mesh.grid, c, 1 << level, settings);
     }
-    return add(l, SPACE, "edge", ldexp(1, -level), settings);
+    return add(l, SPACE, SPACE_METHOD, "edge", ldexp(1, -level), settings);
 }
 
 static drape_status add_cases(lab *l)
@@ -129,7 +144,7 @@ static drape_status prepare(lab *l)
 
 /* The refinements of one series: how far the end moved from each to the next. */
 typedef struct sequence {
-    const char *series, *knob;
+    const char *series, *integrator, *knob;
     double value[MAX_LEVELS], moved[MAX_LEVELS]; /* of the coarser of two, [m] */
     size_t count;
     int failed;
@@ -154,6 +169,7 @@ static void read_sequence(const lab *l, size_t first, sequence *s)
 {
     const json_t *before = NULL;
     *s = (sequence){.series = lab_tag_text(l->results[first], "series"),
+                    .integrator = lab_tag_text(l->results[first], "integrator"),
                     .knob = lab_tag_text(l->results[first], "knob")};
     for (size_t i = first; i < l->count && strcmp(lab_tag_text(l->results[i], "series"), s->series) == 0;
          i++) {
@@ -203,34 +219,55 @@ static void report_order(const sequence *s, FILE *out)
     fprintf(out, "\n");
 }
 
-/* ---- The picture and the table ---- */
+/* ---- The figures and the tables ---- */
 
-static drape_status draw(lab *l, const sequence *sequences, size_t count)
+static size_t count_before(const sequence *sequences, size_t k)
 {
-    lab_plot plot;
-    bool any = false;
-    drape_status status = lab_plot_begin(l, &plot, "converge", 900, 560);
+    size_t count = 0;
+    for (size_t i = 0; i < k; i++)
+        count += strcmp(sequences[i].integrator, sequences[k].integrator) == 0 &&
+                 strcmp(sequences[i].knob, sequences[k].knob) == 0;
+    return count;
+}
+
+static void draw_sequence(lab_figure *f, const sequence *s, size_t variant)
+{
+    char text[96];
+    const int block = lab_figure_data(f);
+    for (size_t i = 0; i < s->count; i++)
+        fprintf(f->script, "%.9g %.9g\n", s->value[i], s->moved[i]);
+    lab_figure_data_end(f);
+    snprintf(text, sizeof text, isnan(s->line.slope) ? "%s" : "%s (%.2f)", s->series, s->line.slope);
+    lab_figure_curve(f, block, lab_style_of(s->integrator, variant), text);
+}
+
+/* The sequences over one knob. */
+static drape_status draw(lab *l, const sequence *sequences, size_t count, const char *knob, const char *label)
+{
+    lab_figure f;
+    char name[64];
+    size_t points = 0;
+    double *xy = drape_arena_take(&l->arena, 2 * MAX_LEVELS * count, sizeof *xy);
+    snprintf(name, sizeof name, "converge_%s", knob);
+    drape_status status = xy ? lab_figure_begin(l, &f, name) : DRAPE_E_MEMORY;
     if (status)
         return status;
-    fprintf(plot.script, "set logscale xy\nset format '10^{%%T}'\n"
-                         "set grid lc rgb '#dddddd'\nset key outside right top noenhanced\n"
-                         "set xlabel 'dt [s], rtol, or edge over that of the coarsest mesh'\n"
-                         "set ylabel 'distance of the end from that of the next refinement, RMS [m]'\n");
     for (size_t k = 0; k < count; k++) {
-        fprintf(plot.script, "$s%zu << EOD\n", k);
-        for (size_t i = 0; i < sequences[k].count; i++)
-            fprintf(plot.script, "%.9g %.9g\n", sequences[k].value[i], sequences[k].moved[i]);
-        fprintf(plot.script, "EOD\n");
-    }
-    for (size_t k = 0; k < count; k++)
-        if (sequences[k].count > 0 && !sequences[k].unrefined) {
-            fprintf(plot.script, "%s $s%zu with linespoints lw 1.6 pt %zu ps .6 title \"%s (%.3g)\"",
-                    any ? "," : "plot", k, 4 + k % 10, sequences[k].series, sequences[k].line.slope);
-            any = true;
+        const sequence *s = &sequences[k];
+        if (s->count == 0 || strcmp(s->knob, knob) != 0)
+            continue;
+        draw_sequence(&f, s, count_before(sequences, k));
+        for (size_t i = 0; i < s->count; i++, points++) {
+            xy[2 * points] = s->value[i];
+            xy[2 * points + 1] = s->moved[i];
         }
-    fprintf(plot.script, "\n");
-    return lab_plot_end(l, &plot, any, /* logarithmic axes need a point */
-                        "How far the end moves with each refinement; in brackets the order");
+    }
+    snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", label);
+    snprintf(f.axes[1].label, sizeof f.axes[1].label, "change to the next level [m]");
+    if (points > 0)
+        lab_figure_fit(&f, xy, points, strcmp(knob, "rtol") != 0);
+    return lab_figure_end(
+        l, &f, "How far the end moves with each refinement (root mean square); in brackets the order");
 }
 
 static void write_table(lab *l, const sequence *s)
@@ -248,6 +285,9 @@ static void write_table(lab *l, const sequence *s)
 
 static drape_status report(lab *l)
 {
+    static const struct {
+        const char *knob, *label;
+    } knobs[] = {{"dt", "dt [s]"}, {"rtol", "rtol"}, {"edge", "edge length / that of the coarsest mesh"}};
     size_t count = 0;
     sequence *sequences = drape_arena_take(&l->arena, l->count, sizeof *sequences);
     if (!sequences)
@@ -258,7 +298,9 @@ static drape_status report(lab *l)
             read_sequence(l, i, &sequences[count++]);
     for (size_t k = 0; k < count; k++)
         report_order(&sequences[k], l->summary);
-    drape_status status = draw(l, sequences, count);
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; i < sizeof knobs / sizeof *knobs && !status; i++)
+        status = draw(l, sequences, count, knobs[i].knob, knobs[i].label);
     for (size_t k = 0; k < count; k++)
         write_table(l, &sequences[k]);
     return status;

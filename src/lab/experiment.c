@@ -1,6 +1,7 @@
 /* experiment.c: an experiment from its def to its report, and the merging of shards. */
 #include "drape/lab.h"
 
+#include "base/clock.h"
 #include "base/hash.h"
 #include "base/param.h"
 #include "lab/run.h"
@@ -73,6 +74,12 @@ drape_status lab_add_case(lab *l, json_t *tags, json_t *settings, int64_t same_a
     return failed ? drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for the cases") : DRAPE_OK;
 }
 
+void lab_rank_case(lab *l, int rank)
+{
+    json_t *last = json_array_get(l->cases, json_array_size(l->cases) - 1);
+    json_object_set_new(last, "rank", json_integer(rank));
+}
+
 const drape_integrator_ops *lab_find_integrator(const char *name)
 {
     const int i = drape_registry_find(&drape_integrator_registry, NULL, name);
@@ -92,6 +99,21 @@ bool lab_wants_integrator(const lab *l, const char *name, bool fallback)
         if (strcmp(l->def->integrators[i], name) == 0)
             return true;
     return l->def->integrator_count == 0 && fallback;
+}
+
+size_t lab_order_limits(const lab *l, const drape_integrator_ops *integrator, int limits[2])
+{
+    bool chosen = drape_param_find(integrator->entry.params, integrator->entry.param_count, "max_order") < 0;
+    for (size_t i = 0; i < l->def->setting_count; i++)
+        chosen |= strcmp(l->def->settings[i].pointer, "/integrator/max_order") == 0;
+    limits[0] = chosen ? 0 : 2;
+    limits[1] = 5;
+    return chosen ? 1 : 2;
+}
+
+void lab_name_series(const drape_integrator_ops *integrator, int limit, char *text, size_t size)
+{
+    snprintf(text, size, limit ? "%s, order %d" : "%s", integrator->entry.name, limit);
 }
 
 drape_status lab_check_integrators(const lab *l)
@@ -214,7 +236,7 @@ static bool writes(const void *user, const char *name)
     lab_cases_name(user, cases);
     return strcmp(name, ABOUT) == 0 || strcmp(name, cases) == 0 || strcmp(name, "results.csv") == 0 ||
            strcmp(name, "report.html") == 0 || strncmp(name, "reference", 9) == 0 || ends_in(name, ".svg") ||
-           ends_in(name, ".gp");
+           ends_in(name, ".pdf") || ends_in(name, ".gp");
 }
 
 /* Shards may write into one folder at the same time. */
@@ -287,6 +309,36 @@ static drape_status prepare(lab *l)
 
 /* ---- Reporting ---- */
 
+/* Writes which cases have no result because the budget was used up, by series. Returns their number. */
+static int64_t list_left_out(lab *l)
+{
+    const double budget = l->def->budget_seconds;
+    int64_t all = 0;
+    for (size_t i = 0; budget > 0 && i < l->count; i++)
+        all += !l->results[i];
+    if (all == 0)
+        return 0;
+    fprintf(l->summary,
+            "%lld of %zu cases were left out, as the budget of %.3g minutes was used up; the same command "
+            "continues with them. Left out:",
+            (long long)all, l->count, budget / 60);
+    const char *comma = " ";
+    for (size_t i = 0, end; i < l->count; i = end) {
+        const char *series = lab_tag_text(json_array_get(l->cases, i), "series");
+        int64_t missing = 0;
+        for (end = i;
+             end < l->count && strcmp(lab_tag_text(json_array_get(l->cases, end), "series"), series) == 0;
+             end++)
+            missing += !l->results[end];
+        if (missing > 0) {
+            fprintf(l->summary, "%s%s (%lld of %zu)", comma, series, (long long)missing, end - i);
+            comma = ", ";
+        }
+    }
+    fprintf(l->summary, ". What follows is about the cases that were run.\n");
+    return all;
+}
+
 /* Shards leave the report to the merge: several at once in one folder would write the same files. */
 static drape_status report(lab *l)
 {
@@ -313,7 +365,8 @@ static drape_status report(lab *l)
             (long long)outcome->done, (long long)outcome->cases, (long long)outcome->failed,
             (long long)outcome->rejected);
     drape_status status = shard ? DRAPE_OK : lab_write_csv(l);
-    if (status || shard || outcome->done < outcome->cases) {
+    outcome->left_out = status || shard ? 0 : list_left_out(l);
+    if (status || shard || outcome->done + outcome->left_out < outcome->cases) {
         fprintf(l->summary,
                 "the report is made once all cases are done: run the other shards, or `drape merge`\n");
         return status;
@@ -334,7 +387,11 @@ static drape_status report(lab *l)
 static drape_status begin(drape_context *ctx, const drape_lab_def *def, const char *folder,
                           drape_lab_outcome *outcome, lab *l)
 {
-    *l = (lab){.ctx = ctx, .def = def, .outcome = outcome, .arena = drape_arena_of(ctx)};
+    *l = (lab){.ctx = ctx,
+               .def = def,
+               .outcome = outcome,
+               .arena = drape_arena_of(ctx),
+               .start = drape_clock_seconds()};
     l->folder = drape_arena_text(&l->arena, folder);
     l->summary = open_memstream(&l->summary_text, &l->summary_size);
     l->page = open_memstream(&l->page_text, &l->page_size);
@@ -364,6 +421,9 @@ static drape_status find(lab *l, const char *name)
     drape_status status = drape_registry_choose(l->ctx, &lab_experiment_registry, "", name, &i);
     if (!status)
         l->experiment = lab_experiments[i];
+    if (!status && l->def->budget_seconds > 0 && !l->experiment->partial)
+        status = drape_fail(l->ctx, DRAPE_E_ARGUMENT, "budget_seconds = %g: %s needs all of its cases",
+                            l->def->budget_seconds, name);
     return status;
 }
 
@@ -378,6 +438,9 @@ static drape_status check_def(drape_context *ctx, const drape_lab_def *def)
                           def->shard, def->shards);
     if (def->jobs < 1 || def->jobs > 256)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "jobs = %d; must be 1 to 256", def->jobs);
+    if (!(def->budget_seconds >= 0))
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "budget_seconds = %g; must be 0 (none) or more",
+                          def->budget_seconds);
     if (!(def->case_seconds > 0) || def->repeats < 1 || !(def->strain_limit > 0))
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
                           "case_seconds, repeats and strain_limit must be above 0: %g, %d, %g",

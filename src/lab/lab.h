@@ -37,8 +37,10 @@ typedef struct lab_experiment_ops {
     drape_status (*check)(lab *l);
     /* Makes l->reference or l->probe. NULL: there is nothing to prepare. */
     drape_status (*prepare)(lab *l);
-    /* All cases have results: writes the CSV, pictures, sentences (l->summary) and figures (lab_page_*). */
+    /* Writes figures, sentences (l->summary) and the body of the page (lab_page_*). All cases have
+     * results; with `partial`, any of them may be missing. */
     drape_status (*report)(lab *l);
+    bool partial; /* a def may have a budget, after which the cases with the highest ranks are left out */
 } lab_experiment_ops;
 
 extern const lab_experiment_ops *const lab_experiments[]; /* NULL-ended */
@@ -60,6 +62,7 @@ struct lab {
     size_t count;              /* of cases */
     lab_trace reference;       /* the motion that cases are compared with; no frames: none */
     double reference_error;    /* [m] RMS at the end: its distance from the next less accurate one */
+    double start;              /* [s] wall clock at the start of the run */
     lab_probe probe;           /* where final positions are taken; no points: nowhere */
     FILE *summary;             /* sentences for the terminal and the head of the page, one a line */
     char *summary_text;        /* valid when summary is flushed or closed */
@@ -69,8 +72,11 @@ struct lab {
     size_t page_size;
 };
 
-/* Takes the references of tags and settings. same_as < 0: none. */
+/* Adds a case of rank 0. Takes the references of tags and settings. same_as < 0: none. */
 drape_status lab_add_case(lab *l, json_t *tags, json_t *settings, int64_t same_as);
+
+/* Sets the rank of the case that was added last: cases of low rank are run first. */
+void lab_rank_case(lab *l, int rank);
 
 /* A number or text of an object; NaN and "" where there is none. */
 double lab_number(const json_t *object, const char *key);
@@ -79,12 +85,19 @@ const char *lab_text(const json_t *object, const char *key);
 double lab_tag_number(const json_t *result, const char *key);
 const char *lab_tag_text(const json_t *result, const char *key);
 
-bool lab_is_good(const json_t *result); /* whether the run completed */
+bool lab_is_good(const json_t *result); /* whether there is a result and the run completed */
 
 const drape_integrator_ops *lab_find_integrator(const char *name); /* NULL: there is none */
 
 /* Whether the integrators that the def names include this one; fallback if it names none. */
 bool lab_wants_integrator(const lab *l, const char *name, bool fallback);
+
+/* The limits of its order that an integrator is run with: 2 and 5 if it has the parameter max_order and
+ * the def does not set it; otherwise 0, for none, alone. Returns their number. */
+size_t lab_order_limits(const lab *l, const drape_integrator_ops *integrator, int limits[2]);
+
+/* "ida, order 2", the name of a series */
+void lab_name_series(const drape_integrator_ops *integrator, int limit, char *text, size_t size);
 
 /* Faults of the def: an integrator that does not exist, or that has no steps in time. */
 drape_status lab_check_integrators(const lab *l);

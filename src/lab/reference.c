@@ -12,6 +12,7 @@
 
 #define MAX_LEVELS  6
 #define BUDGET      20.0 /* case_seconds that each sequence may take */
+#define SHARE       0.5  /* of the experiment's budget, if it has one, that the sequences may take together */
 #define BEST        1e-8 /* of the scene's size: no further level is needed */
 #define GOOD_ENOUGH 1e-5 /* of the scene's size: no second sequence is tried */
 #define GROWTH      2.5  /* expected cost of a level over that of the one before */
@@ -39,6 +40,22 @@ typedef struct level {
     int count;          /* levels so far; 0: none */
     double took, spent; /* CPU [s] of this level, of all */
 } level;
+
+/* [s] of the wall clock by which the next level of sequence i has to be done; 0: the experiment has no
+ * budget. needed: there is no reference yet, and without one there is no experiment. */
+static double deadline_of(const lab *l, int i, bool needed)
+{
+    const double budget = l->def->budget_seconds;
+    return budget > 0 ? l->start + (needed ? 1 : SHARE * (i + 1) / SEQUENCES) * budget : 0;
+}
+
+/* Whether the next level, which takes GROWTH times the last one, is expected to end in time. */
+static bool has_time(const lab *l, const level *last, double deadline)
+{
+    const double next = GROWTH * last->took;
+    return next < BUDGET * l->def->case_seconds - last->spent &&
+           (deadline <= 0 || drape_clock_seconds() + next < deadline);
+}
 
 static json_t *settings_of(const sequence *s, double knob)
 {
@@ -134,7 +151,8 @@ static bool is_sequence(const void *user, const char *name)
 /* ---- Runs ---- */
 
 /* Runs and saves the next level. *good: it completed; otherwise *last keeps the level before. */
-static drape_status refine(lab *l, const drape_model *model, const sequence *s, level *last, bool *good)
+static drape_status refine(lab *l, const drape_model *model, const sequence *s, double deadline, level *last,
+                           bool *good)
 {
     const double knob = last->count ? last->knob * s->ratio : s->first, start = drape_clock_thread_seconds();
     lab_trace trace = {0};
@@ -144,6 +162,7 @@ static drape_status refine(lab *l, const drape_model *model, const sequence *s, 
                                  .record = &trace,
                                  .arena = &l->arena,
                                  .seconds = BUDGET * l->def->case_seconds - last->spent,
+                                 .deadline = deadline,
                                  .repeats = 1};
     drape_status status = lab_run(l->ctx, &request, &result);
     *good = !status && lab_is_good(result);
@@ -168,26 +187,30 @@ static drape_status refine(lab *l, const drape_model *model, const sequence *s, 
 static drape_status choose(lab *l, const drape_model *model, level *best)
 {
     const sequence *chosen = NULL;
-    const double budget = BUDGET * l->def->case_seconds;
+    const bool budget = l->def->budget_seconds > 0;
     drape_status status = DRAPE_OK;
     *best = (level){.error = INFINITY};
     for (int i = 0; !status && i < SEQUENCES && !(best->error < GOOD_ENOUGH * model->length); i++) {
         level last = {.error = INFINITY};
         bool good = true;
         read_saved(l, &sequences[i], &last);
-        while (!status && good && last.count < MAX_LEVELS && last.error > BEST * model->length &&
-               GROWTH * last.took < budget - last.spent)
-            status = refine(l, model, &sequences[i], &last, &good);
+        while (!status && good && last.count < MAX_LEVELS && last.error > BEST * model->length) {
+            const double deadline = deadline_of(l, i, !isfinite(best->error) && last.count < 2);
+            if (!has_time(l, &last, deadline))
+                break;
+            status = refine(l, model, &sequences[i], deadline, &last, &good);
+        }
         if (!status && last.error < best->error) {
             *best = last;
             chosen = &sequences[i];
         }
     }
     if (!status && !chosen)
-        status = drape_fail(l->ctx, DRAPE_E_SOLVER,
-                            "no reference: neither ida nor trbdf2 completes two levels within %g s; raise "
-                            "--case-seconds, or shorten the duration",
-                            budget);
+        status = drape_fail(
+            l->ctx, DRAPE_E_SOLVER,
+            "no reference: neither ida nor trbdf2 completes two levels within %g s of CPU time%s; raise "
+            "--case-seconds%s, or shorten the duration",
+            BUDGET * l->def->case_seconds, budget ? " and the budget" : "", budget ? " and --budget" : "");
     else if (!status)
         status = save(l, chosen, true, best);
     if (status && status != DRAPE_E_SOLVER)

@@ -22,6 +22,7 @@ typedef struct run {
     double squares, far; /* [m2], [m] of the frames that were compared: sum, largest */
     int64_t compared;    /* frames */
     bool over_budget;    /* stopped for its CPU time */
+    bool late;           /* stopped at the deadline */
     bool cancelled;
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
@@ -86,9 +87,10 @@ static drape_status watch(void *user, const drape_event *event)
     }
     r->kinetic = fmax(r->kinetic, drape_sim_energy(event->sim).kinetic);
     r->over_budget = drape_clock_thread_seconds() - r->start > request->seconds;
+    r->late = request->deadline > 0 && drape_clock_seconds() > request->deadline;
     r->cancelled =
         (request->given_up && atomic_load(request->given_up)) || (def->cancel && def->cancel(def->user));
-    return r->over_budget || r->cancelled ? DRAPE_RETRY_REJECTED : DRAPE_OK;
+    return r->over_budget || r->late || r->cancelled ? DRAPE_RETRY_REJECTED : DRAPE_OK;
 }
 
 static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
@@ -109,6 +111,9 @@ static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
     r->cpu = drape_clock_thread_seconds() - r->start;
     r->wall = drape_clock_seconds() - wall;
     snprintf(r->message, sizeof r->message, "%s", r->status ? drape_context_message(ctx) : "");
+    if (r->over_budget)
+        snprintf(r->message, sizeof r->message, "t=%.9g: its budget of %.4g s of CPU time was used up",
+                 drape_sim_time(sim), r->request->seconds);
     if (r->request->record)
         lab_trace_add(r->request->record, drape_sim_positions(sim));
     return r->cancelled ? drape_fail(ctx, DRAPE_E_STOPPED, "interrupted") : DRAPE_OK;
@@ -205,7 +210,8 @@ drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **re
             status = run_once(ctx, sim, &r);
         r.cpu = least = fmin(least, r.cpu);
         repeat = i < request->repeats && !r.status && r.cpu < SHORT;
-        if (!status && !repeat && !(*result = describe(&r, sim)))
+        repeat = repeat && !r.late;
+        if (!status && !repeat && !r.late && !(*result = describe(&r, sim)))
             status = drape_fail(ctx, DRAPE_E_MEMORY, "no memory for a result");
         drape_sim_destroy(&sim);
     }

@@ -10,14 +10,15 @@
 
 /* A case to simulate, and the measurements to make. */
 typedef struct lab_request {
-    const drape_lab_def *def;    /* scene, settings of all cases, cancel */
-    const json_t *settings;      /* {pointer: value} of the case; NULL: none */
-    const lab_trace *reference;  /* NULL or no frames: nothing to compare with */
-    const lab_probe *probe;      /* NULL or no points: nowhere */
-    lab_trace *record;           /* its frames and, last, its end; NULL: not recorded. Made here, in: */
-    drape_arena *arena;          /* of the record */
-    double seconds;              /* CPU: a run that takes more is stopped */
-    int repeats;                 /* the least CPU time of so many counts */
+    const drape_lab_def *def;   /* scene, settings of all cases, cancel */
+    const json_t *settings;     /* {pointer: value} of the case; NULL: none */
+    const lab_trace *reference; /* NULL or no frames: nothing to compare with */
+    const lab_probe *probe;     /* NULL or no points: nowhere */
+    lab_trace *record;          /* its frames and, last, its end; NULL: not recorded. Made here, in: */
+    drape_arena *arena;         /* of the record */
+    double seconds;             /* CPU: a run that takes more is stopped */
+    double deadline; /* [s] of the wall clock: a run that is not done by then is abandoned; 0: none */
+    int repeats;     /* the least CPU time of so many counts */
     const atomic_bool *given_up; /* another thread failed; NULL: there is none */
 } lab_request;
 
@@ -30,7 +31,8 @@ drape_status lab_load(drape_context *ctx, const lab_request *request, drape_mode
 drape_status lab_try(drape_context *ctx, const drape_lab_def *def, const json_t *settings);
 
 /* Runs it. *result: what was measured, to be freed by the caller; a simulation that stops is a result.
- * Errors: those of loading, DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
+ * NULL: the deadline passed before it was done. Errors: those of loading, DRAPE_E_MEMORY, DRAPE_E_STOPPED
+ * (cancelled). */
 drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **result);
 
 #endif

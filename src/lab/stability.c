@@ -1,11 +1,14 @@
 /*
- * stability: maps. Values of the scene over two or three axes, every point with every integrator asked for:
- * the outcome is one of six, each with a colour. Where the first or second axis is the step of an explicit
- * integrator, its stability limit, as estimated at the start of each run, is drawn over the map.
+ * stability: maps. Values of the scene over one to three axes, every point with every integrator asked
+ * for: the outcome is one of a few, each with a colour. Over a single axis all integrators share one
+ * figure, a row each. Where the first or second axis is the step of an explicit integrator, its
+ * stability limit, as estimated at the start of each run, is drawn over the map.
  */
 #include "base/param.h"
+#include "lab/figure.h"
 #include "lab/run.h"
 #include "lab/text.h"
+#include "sim/warnings.h"
 
 #include <math.h>
 #include <string.h>
@@ -138,8 +141,8 @@ static drape_status read_axes(lab *l, const char *const *texts, space *s)
 static drape_status read_space(lab *l, space *s)
 {
     const drape_lab_def *def = l->def;
-    if (def->axis_count < 2 || def->axis_count > MAX_AXES)
-        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "a map has 2 or 3 axes; %zu are given", def->axis_count);
+    if (def->axis_count < 1 || def->axis_count > MAX_AXES)
+        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "a map has 1 to 3 axes; %zu are given", def->axis_count);
     *s = (space){.count = (int)def->axis_count};
     drape_status status = read_axes(l, def->axes, s);
     for (int a = 0; !status && a < s->count; a++)
@@ -255,60 +258,55 @@ static drape_status plan(lab *l)
 
 /* ---- Verdicts ---- */
 
-typedef enum verdict { CLEAN, REJECTIONS, STRAINED, STOPPED, EXPLODED, LATE, VERDICTS } verdict;
+typedef enum verdict { CLEAN, FEW, SOME, MANY, SHORT, STRAINED, STOPPED, EXPLODED, LATE, VERDICTS } verdict;
 
+#define TEXT(x)   #x
+#define NUMBER(x) TEXT(x)
+
+/* Without rejections, and with ever more of them: shades of one blue. */
 static const struct {
     const char *name;
     int colour;
 } verdicts[VERDICTS] = {
-    [CLEAN] = {"clean", 0x1a7f5a},
-    [REJECTIONS] = {"with rejections", 0}, /* a scale */
-    [STRAINED] = {"unphysical strain", 0xb07cc6},
-    [STOPPED] = {"stopped", 0xf0a03c},
-    [EXPLODED] = {"exploded", 0xc0392b},
-    [LATE] = {"over budget", 0xb9bec6},
+    [CLEAN] = {"none rejected", LAB_BLUE},
+    [FEW] = {"up to 1/100 rejected", 0x4c9ccb},
+    [SOME] = {"up to 1/10 rejected", 0x93c4e2},
+    [MANY] = {"over 1/10 rejected", 0xd3e6f3},
+    [SHORT] = {"fewer than " NUMBER(DRAPE_FEW_STEPS) " steps", LAB_YELLOW},
+    [STRAINED] = {"unphysical strain", LAB_PURPLE},
+    [STOPPED] = {"stopped", LAB_ORANGE},
+    [EXPLODED] = {"exploded", LAB_RED},
+    [LATE] = {"over budget", LAB_DARK},
 };
 
 static verdict judge(const lab *l, const json_t *result)
 {
     const drape_integrator_ops *integrator = lab_find_integrator(lab_tag_text(result, "integrator"));
+    const double accepted = lab_number(result, "accepted");
+    const double share = lab_number(result, "rejected") / fmax(1, accepted);
     if (strcmp(lab_text(result, "status"), "over_budget") == 0)
         return LATE;
     if (!lab_is_good(result)) /* explicit integrators stop because waves grow */
         return integrator && integrator->stability ? EXPLODED : STOPPED;
     if (lab_number(result, "strain_max") > lab_number(l->arguments, "strain_limit"))
         return STRAINED;
-    return lab_number(result, "rejected") > 0 ? REJECTIONS : CLEAN;
+    if (accepted < DRAPE_FEW_STEPS) /* what grows has no time to */
+        return SHORT;
+    return share <= 0 ? CLEAN : share <= 0.01 ? FEW : share <= 0.1 ? SOME : MANY;
 }
 
-/* From green to sand, by the logarithm of the rejected steps per accepted one, 1e-3 to 1. */
-static int colour_of_share(double share)
-{
-    const double fewest = 1e-3, most = 1, pale = fmin(1, fmax(0, log(share / fewest) / log(most / fewest)));
-    const int from[] = {0x4f, 0xa9, 0x7c}, to[] = {0xe4, 0xe0, 0xa8};
-    int colour = 0;
-    for (int k = 0; k < 3; k++)
-        colour = colour << 8 | (int)lround(from[k] + pale * (to[k] - from[k]));
-    return colour;
-}
+/* ---- Figures ---- */
 
-static int colour_of(const lab *l, const json_t *result)
-{
-    const verdict v = judge(l, result);
-    return v == REJECTIONS
-               ? colour_of_share(lab_number(result, "rejected") / fmax(1, lab_number(result, "accepted")))
-               : verdicts[v].colour;
-}
-
-/* ---- Pictures ---- */
-
-/* A map: an integrator, and an index on the third axis. */
+/* What one figure shows: the cells of an integrator, at an index on the third axis, or those of all
+ * integrators over a single axis. */
 typedef struct map {
     const lab *l;
     const space *s;
     size_t first; /* case */
     int third;
-    FILE *out;
+    bool seen[VERDICTS];
+    int limits; /* drawn so far */
+    lab_figure f;
 } map;
 
 /* Whether a cell is on the map; its indices. */
@@ -318,44 +316,22 @@ static bool is_on(const map *m, size_t cell, int *index)
     return m->s->count < MAX_AXES || index[2] == m->third;
 }
 
-static void write_cells(const map *m)
+/* A row of cells, in which neighbours of one colour are one box. first: its first case. */
+static void write_row(map *m, size_t first, double bottom, double top)
 {
-    const axis *x = &m->s->axes[0], *y = &m->s->axes[1];
-    fprintf(m->out, "$cells << EOD\n");
-    for (size_t cell = 0; cell < m->s->cells; cell++) {
-        int index[MAX_AXES];
-        double left, right, bottom, top;
-        if (!is_on(m, cell, index))
-            continue;
-        cell_bounds(x, index[0], &left, &right);
-        cell_bounds(y, index[1], &bottom, &top);
-        fprintf(m->out, "%.9g %.9g %.9g %.9g %.9g %.9g %d\n", axis_value(x, index[0]),
-                axis_value(y, index[1]), left, right, bottom, top,
-                colour_of(m->l, m->l->results[m->first + cell]));
+    const axis *x = &m->s->axes[0];
+    double left, right, from = 0;
+    for (int i = 0; i < x->count; i++) {
+        const verdict v = judge(m->l, m->l->results[first + (size_t)i]);
+        const bool begins = i == 0 || v != judge(m->l, m->l->results[first + (size_t)i - 1]);
+        const bool ends = i + 1 == x->count || v != judge(m->l, m->l->results[first + (size_t)i + 1]);
+        cell_bounds(x, i, &left, &right);
+        from = begins ? left : from;
+        m->seen[v] = true;
+        if (ends)
+            fprintf(m->f.script, "%.9g %.9g %.9g %.9g %.9g %.9g %d\n", from, bottom, from, right, bottom, top,
+                    verdicts[v].colour);
     }
-    fprintf(m->out, "EOD\n");
-}
-
-/* The stability limit of the step along the other axis. false: there is none. */
-static bool write_limit(const map *m)
-{
-    const axis *axes = m->s->axes;
-    const int step = strcmp(axes[0].pointer, "/integrator/dt") == 0   ? 0
-                     : strcmp(axes[1].pointer, "/integrator/dt") == 0 ? 1
-                                                                      : -1;
-    bool any = false;
-    fprintf(m->out, "$limit << EOD\n");
-    for (size_t cell = 0; step >= 0 && cell < m->s->cells; cell++) {
-        int index[MAX_AXES];
-        const double limit = lab_number(m->l->results[m->first + cell], "explicit_limit_s");
-        if (!is_on(m, cell, index) || index[step] != 0 || isnan(limit))
-            continue;
-        const double other = axis_value(&axes[1 - step], index[1 - step]);
-        fprintf(m->out, "%.9g %.9g\n", step == 0 ? limit : other, step == 0 ? other : limit);
-        any = true;
-    }
-    fprintf(m->out, "EOD\n");
-    return any;
 }
 
 static const char *axis_name(const axis *a)
@@ -363,69 +339,126 @@ static const char *axis_name(const axis *a)
     return strrchr(a->pointer, '/') + 1;
 }
 
-/* Range, scale and label, as "young_modulus [Pa]", of gnuplot's axis of that name. */
-static void write_axis(const axis *a, const char *name, FILE *out)
+/* Range, scale and label, as "young_modulus [Pa]". */
+static void set_axis(const axis *a, lab_axis *out)
 {
     double ends[4];
     const char *unit = lab_unit(a->pointer);
     cell_bounds(a, 0, &ends[0], &ends[1]);
     cell_bounds(a, a->count - 1, &ends[2], &ends[3]);
-    fprintf(out, "set %srange [%.9g:%.9g]\n", name, fmin(fmin(ends[0], ends[1]), fmin(ends[2], ends[3])),
-            fmax(fmax(ends[0], ends[1]), fmax(ends[2], ends[3])));
-    fprintf(out, *unit ? "set %slabel '%.100s [%s]' noenhanced\n" : "set %slabel '%.100s' noenhanced\n", name,
-            axis_name(a), unit);
-    if (a->log)
-        fprintf(out, "set logscale %s\nset format %s '10^{%%T}'\n", name, name);
+    out->from = fmin(fmin(ends[0], ends[1]), fmin(ends[2], ends[3]));
+    out->to = fmax(fmax(ends[0], ends[1]), fmax(ends[2], ends[3]));
+    out->log = a->log;
+    snprintf(out->label, sizeof out->label, *unit ? "%.80s [%s]" : "%.80s", axis_name(a), unit);
 }
 
-static void write_swatch(FILE *out, int colour, const char *title)
+/* A black line on a white one is seen on every colour. */
+static void draw_limit(map *m, int block)
 {
-    fprintf(out, ", NaN with points pt 5 ps 1.5 lc rgb '#%06x' title '%s'", colour, title);
+    lab_figure_curve(&m->f, block, (lab_style){LAB_WHITE, 1, 0}, NULL);
+    lab_figure_curve(&m->f, block, (lab_style){LAB_BLACK, 2, 0},
+                     m->limits++ ? NULL : "explicit limit 2/omega");
 }
 
-/* A swatch for each verdict; for rejections the scale, where the integrator has some. */
-static void write_legend(const map *m)
+/* The index of the axis that is the step; -1: none is. */
+static int step_axis(const space *s)
 {
-    static const struct {
-        double share;
-        const char *title;
-    } scale[] = {{1e-3, "1 rejected in 1 000 steps"}, {1e-2, "1 in 100"}, {1e-1, "1 in 10"}, {1, "1 a step"}};
-    bool rejections = false;
-    for (size_t cell = 0; cell < m->s->cells && !rejections; cell++)
-        rejections = judge(m->l, m->l->results[m->first + cell]) == REJECTIONS;
+    for (int a = 0; a < s->count; a++)
+        if (strcmp(s->axes[a].pointer, "/integrator/dt") == 0)
+            return a;
+    return -1;
+}
+
+/* The stability limit of the step, where one of the two axes is the step, along the other. */
+static void add_limit(map *m)
+{
+    const axis *axes = m->s->axes;
+    const int step = step_axis(m->s);
+    bool any = false;
+    if (step < 0 || step > 1)
+        return;
+    const int block = lab_figure_data(&m->f);
+    for (size_t cell = 0; cell < m->s->cells; cell++) {
+        int index[MAX_AXES];
+        const double limit = lab_number(m->l->results[m->first + cell], "explicit_limit_s");
+        if (!is_on(m, cell, index) || index[step] != 0 || isnan(limit))
+            continue;
+        const double other = axis_value(&axes[1 - step], index[1 - step]);
+        fprintf(m->f.script, "%.9g %.9g\n", step == 0 ? limit : other, step == 0 ? other : limit);
+        any = true;
+    }
+    lab_figure_data_end(&m->f);
+    if (any)
+        draw_limit(m, block);
+}
+
+/* A swatch for each verdict that is on the figure. */
+static drape_status end_map(lab *l, map *m, const char *caption)
+{
     for (int v = 0; v < VERDICTS; v++)
-        if (v != REJECTIONS)
-            write_swatch(m->out, verdicts[v].colour, verdicts[v].name);
-    for (size_t i = 0; rejections && i < sizeof scale / sizeof *scale; i++)
-        write_swatch(m->out, colour_of_share(scale[i].share), scale[i].title);
+        if (m->seen[v])
+            lab_figure_swatch(&m->f, verdicts[v].colour, verdicts[v].name);
+    return lab_figure_end(l, &m->f, caption);
 }
 
-static drape_status draw(lab *l, const space *s, size_t first, int third)
+static drape_status draw_map(lab *l, const space *s, size_t first, int third)
 {
     const char *integrator = lab_tag_text(l->results[first], "integrator");
-    char name[96], title[320];
-    lab_plot plot;
+    const axis *y = &s->axes[1];
+    char name[96];
+    map m = {.l = l, .s = s, .first = first, .third = third};
     snprintf(name, sizeof name, s->count == MAX_AXES ? "map_%s_%d" : "map_%s", integrator, third);
-    if (s->count == MAX_AXES)
-        snprintf(title, sizeof title, "%s, %.100s = %.4g %s", integrator, axis_name(&s->axes[2]),
-                 axis_value(&s->axes[2], third), lab_unit(s->axes[2].pointer));
-    else
-        snprintf(title, sizeof title, "%s", integrator);
-    drape_status status = lab_plot_begin(l, &plot, name, 620, 470);
+    drape_status status = lab_figure_begin(l, &m.f, name);
     if (status)
         return status;
-    const map m = {l, s, first, third, plot.script};
-    fprintf(m.out, "set title '%s' noenhanced\nset key below\nset style fill solid 1 noborder\n", title);
-    write_axis(&s->axes[0], "x", m.out);
-    write_axis(&s->axes[1], "y", m.out);
-    write_cells(&m);
-    const bool limited = write_limit(&m);
-    fprintf(m.out, "plot $cells using 1:2:3:4:5:6:7 with boxxyerror lc rgb variable notitle");
-    write_legend(&m);
-    if (limited)
-        fprintf(m.out, ", $limit with lines lw 2.5 lc rgb '#000000' title 'explicit limit 2/omega'");
-    fprintf(m.out, "\n");
-    return lab_plot_end(l, &plot, true, title);
+    snprintf(m.f.title, sizeof m.f.title, s->count == MAX_AXES ? "%s, %.80s = %.4g %s" : "%s", integrator,
+             axis_name(&s->axes[s->count - 1]), axis_value(&s->axes[s->count - 1], third),
+             lab_unit(s->axes[s->count - 1].pointer));
+    set_axis(&s->axes[0], &m.f.axes[0]);
+    set_axis(y, &m.f.axes[1]);
+    const int block = lab_figure_data(&m.f);
+    for (int row = 0; row < y->count; row++) {
+        double bottom, top;
+        cell_bounds(y, row, &bottom, &top);
+        write_row(&m, first + (size_t)s->axes[0].count * (size_t)(row + third * y->count), bottom, top);
+    }
+    lab_figure_data_end(&m.f);
+    lab_figure_boxes(&m.f, block);
+    add_limit(&m);
+    return end_map(l, &m, m.f.title);
+}
+
+/* All integrators over a single axis, a row each, the first on top. */
+static drape_status draw_rows(lab *l, const space *s)
+{
+    const size_t rows = l->count / s->cells;
+    map m = {.l = l, .s = s};
+    const char **names = drape_arena_take(&l->arena, rows, sizeof *names);
+    drape_status status = names ? lab_figure_begin(l, &m.f, "map") : DRAPE_E_MEMORY;
+    if (status)
+        return status;
+    set_axis(&s->axes[0], &m.f.axes[0]);
+    m.f.axes[1] = (lab_axis){.from = -0.5, .to = (double)rows - 0.5, .names = names, .name_count = (int)rows};
+    m.f.plot_height = 6.0 * (double)rows;
+    const int block = lab_figure_data(&m.f);
+    for (size_t k = 0; k < rows; k++) {
+        names[rows - 1 - k] = lab_tag_text(l->results[k * s->cells], "integrator");
+        const double y = (double)(rows - 1 - k);
+        write_row(&m, k * s->cells, y - 0.45, y + 0.45);
+    }
+    lab_figure_data_end(&m.f);
+    lab_figure_boxes(&m.f, block);
+    for (size_t k = 0; k < rows && step_axis(s) == 0; k++) {
+        const double limit = lab_number(l->results[k * s->cells], "explicit_limit_s"),
+                     y = (double)(rows - 1 - k);
+        if (isnan(limit))
+            continue;
+        const int line = lab_figure_data(&m.f);
+        fprintf(m.f.script, "%.9g %.9g\n%.9g %.9g\n", limit, y - 0.45, limit, y + 0.45);
+        lab_figure_data_end(&m.f);
+        draw_limit(&m, line);
+    }
+    return end_map(l, &m, "what happened to each integrator");
 }
 
 /* A summary and the maps of each integrator. The axes are those of experiment.json: a merge has no def. */
@@ -434,8 +467,8 @@ static drape_status report(lab *l)
     const json_t *axes = json_object_get(l->arguments, "axes");
     space s = {.count = (int)json_array_size(axes)};
     const char *texts[MAX_AXES];
-    if (s.count < 2 || s.count > MAX_AXES)
-        return drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: a map has 2 or 3 axes");
+    if (s.count < 1 || s.count > MAX_AXES)
+        return drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: a map has 1 to 3 axes");
     for (int a = 0; a < s.count; a++) {
         const char *text = json_string_value(json_array_get(axes, (size_t)a));
         texts[a] = text ? text : "";
@@ -453,15 +486,17 @@ static drape_status report(lab *l)
                 comma = ",";
             }
         fprintf(l->summary, "\n");
-        lab_page_heading(l, integrator);
-        for (int third = 0; third < (s.count == MAX_AXES ? s.axes[2].count : 1) && !status; third++)
-            status = draw(l, &s, first, third);
+        if (s.count > 1)
+            lab_page_heading(l, integrator);
+        for (int third = 0; s.count > 1 && third < (s.count == MAX_AXES ? s.axes[2].count : 1) && !status;
+             third++)
+            status = draw_map(l, &s, first, third);
     }
-    return status;
+    return !status && s.count == 1 ? draw_rows(l, &s) : status;
 }
 
 const lab_experiment_ops lab_experiment_stability = {
-    .entry = {.name = "stability", .summary = "maps of what happens over two or three values of the scene"},
+    .entry = {.name = "stability", .summary = "maps of what happens over one to three values of the scene"},
     .plan = plan,
     .report = report,
 };

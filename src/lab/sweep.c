@@ -98,7 +98,9 @@ typedef struct sweep {
     drape_file file;
     pthread_mutex_t lock;
     atomic_bool given_up;
-    size_t next;         /* the first case that no thread has taken yet */
+    size_t *order;       /* (l->count) the cases, those of low rank first; in l->arena */
+    size_t next;         /* in that order, the first case that no thread has taken yet */
+    double deadline;     /* [s] wall: when the budget is used up; 0: never */
     int64_t done, total; /* of this shard */
     int64_t before;      /* done when it began */
     double start;        /* [s] wall */
@@ -119,16 +121,36 @@ static void stop(sweep *s, drape_status status)
     atomic_store(&s->given_up, true);
 }
 
-/* Takes the next case that has no result. Returns l->count if there is none, or a thread failed. */
+static drape_status put_in_order(sweep *s)
+{
+    const lab *l = s->l;
+    size_t done = 0;
+    s->order = drape_arena_take(&s->l->arena, l->count, sizeof *s->order);
+    if (!s->order)
+        return DRAPE_E_MEMORY;
+    for (json_int_t rank = 0; done < l->count; rank++)
+        for (size_t i = 0; i < l->count; i++)
+            if (json_integer_value(json_object_get(json_array_get(l->cases, i), "rank")) == rank)
+                s->order[done++] = i;
+    return DRAPE_OK;
+}
+
+static bool is_late(const sweep *s)
+{
+    return s->deadline > 0 && drape_clock_seconds() > s->deadline;
+}
+
+/* Takes the next case that has no result. Returns l->count if there is none, the budget is used up, or a
+ * thread failed. */
 static size_t take_case(sweep *s)
 {
     lab *l = s->l;
     pthread_mutex_lock(&s->lock);
-    while (s->next < l->count && (!is_ours(l, s->next) || l->results[s->next]))
+    while (s->next < l->count && (!is_ours(l, s->order[s->next]) || l->results[s->order[s->next]]))
         s->next++;
-    const size_t mine = s->status ? l->count : s->next++;
+    const size_t mine = s->status || s->next >= l->count || is_late(s) ? l->count : s->order[s->next++];
     pthread_mutex_unlock(&s->lock);
-    return mine < l->count ? mine : l->count;
+    return mine;
 }
 
 /* Completes a result, saves it as a line and reports progress. Under the lock. */
@@ -172,13 +194,15 @@ static void *work(void *user)
                                      .reference = &l->reference,
                                      .probe = &l->probe,
                                      .seconds = def->case_seconds,
+                                     .deadline = s->deadline,
                                      .repeats = l->experiment->compares_costs ? def->repeats : 1,
                                      .given_up = &s->given_up};
         drape_status status = lab_run(ctx, &request, &result);
         pthread_mutex_lock(&s->lock);
-        if (!status)
+        if (!status && result)
             keep(s, i, result);
-        else if (status != DRAPE_E_STOPPED || !s->status) /* else given up for an earlier failure */
+        else if (status &&
+                 (status != DRAPE_E_STOPPED || !s->status)) /* else given up for an earlier failure */
             stop(s, drape_fail(l->ctx, status, "%s", drape_context_message(ctx)));
         pthread_mutex_unlock(&s->lock);
     }
@@ -201,6 +225,10 @@ drape_status lab_sweep(lab *l)
     pthread_t threads[256];
     int started = 0;
     sweep s = {.l = l, .start = drape_clock_seconds()};
+    s.deadline = l->def->budget_seconds > 0 ? l->start + l->def->budget_seconds : 0;
+    s.status = put_in_order(&s);
+    if (s.status)
+        return s.status;
     lab_cases_name(l, name);
     pthread_mutex_init(&s.lock, NULL);
     atomic_init(&s.given_up, false);

@@ -5,15 +5,9 @@
 #include "io/export.h"
 
 #include <errno.h>
-#include <fcntl.h>
-#include <spawn.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-extern char **environ;
 
 /* ---- Files ---- */
 
@@ -151,7 +145,7 @@ static void put_base64(FILE *out, const unsigned char *data, size_t size)
     }
 }
 
-static drape_status put_picture(lab *l, const char *name, const char *caption)
+drape_status lab_page_figure(lab *l, const char *name, const char *caption)
 {
     char file[128], *data;
     size_t size;
@@ -173,7 +167,8 @@ static drape_status put_picture(lab *l, const char *name, const char *caption)
 static const char style[] =
     "body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#1b1e23;"
     "background:#fff}h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}"
-    "figure{margin:1rem 0}figure img{max-width:100%;height:auto}figcaption{font-size:.85rem;color:#555}"
+    "figure{margin:1rem 0}figure "
+    "img{width:min(100%,36rem);height:auto}figcaption{font-size:.85rem;color:#555}"
     ".summary p{margin:.3rem 0}table{border-collapse:collapse;font-size:.8rem;display:block;overflow-x:auto}"
     "td,th{padding:.15rem .6rem;text-align:right;border-bottom:1px solid #e3e5e8;white-space:nowrap}"
     "td:first-child,th:first-child{text-align:left}code,pre{font-size:.8rem}"
@@ -218,84 +213,4 @@ drape_status lab_write_page(lab *l, const char *title)
                                       : lab_write_text(l, "report.html", text, size);
     free(text);
     return status;
-}
-
-/* ---- Pictures ---- */
-
-/* Runs a program and waits for it; returns its exit code, -1 where it did not run. Its standard output goes
- * to `to`; its messages are discarded. */
-static int run_program(char *const *arguments, int to)
-{
-    posix_spawn_file_actions_t actions;
-    pid_t child;
-    int code = -1;
-    if (posix_spawn_file_actions_init(&actions))
-        return -1;
-    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", 0, 0);
-    posix_spawn_file_actions_adddup2(&actions, to, 1);
-    posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", 1, 0);
-    bool started = posix_spawnp(&child, arguments[0], &actions, NULL, arguments, environ) == 0;
-    posix_spawn_file_actions_destroy(&actions);
-    if (!started)
-        return -1;
-    while (waitpid(child, &code, 0) < 0)
-        if (errno != EINTR)
-            return -1;
-    return WIFEXITED(code) ? WEXITSTATUS(code) : -1;
-}
-
-drape_status lab_plot_begin(lab *l, lab_plot *plot, const char *name, int width, int height)
-{
-    *plot = (lab_plot){.text = NULL};
-    snprintf(plot->name, sizeof plot->name, "%s", name);
-    plot->script = open_memstream(&plot->text, &plot->size);
-    if (!plot->script)
-        return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a picture");
-    fprintf(plot->script,
-            "set terminal svg size %d,%d dynamic font 'sans-serif,13' background '#ffffff' name '%s'\n"
-            "# gnuplot %s.gp > %s.svg\n",
-            width, height, name, name, name);
-    return DRAPE_OK;
-}
-
-/* gnuplot writes into a file without a name, which then becomes NAME.svg: it opens nothing in the folder. */
-static drape_status draw(lab *l, const lab_plot *plot, const char *script, bool *drawn)
-{
-    char file[128], *const arguments[] = {(char[]){"gnuplot"}, (char *)script, NULL};
-    FILE *picture = tmpfile();
-    struct stat info;
-    char *text = NULL;
-    drape_status status = DRAPE_OK;
-    snprintf(file, sizeof file, "%s.svg", plot->name);
-    *drawn = picture && run_program(arguments, fileno(picture)) == 0 && fstat(fileno(picture), &info) == 0;
-    if (*drawn) {
-        const size_t size = (size_t)info.st_size;
-        text = drape_alloc(l->ctx, size, 1);
-        status = !text ? DRAPE_E_MEMORY
-                 : pread(fileno(picture), text, size, 0) != (ssize_t)size
-                     ? drape_file_fail(l->ctx, "read", file, EIO)
-                     : lab_write_text(l, file, text, size);
-        drape_free(l->ctx, text);
-    }
-    if (picture)
-        fclose(picture);
-    return status;
-}
-
-drape_status lab_plot_end(lab *l, lab_plot *plot, bool draws, const char *caption)
-{
-    char file[128], path[4096];
-    bool drawn = false;
-    snprintf(file, sizeof file, "%s.gp", plot->name);
-    snprintf(path, sizeof path, "%s/%s", l->folder, file);
-    fclose(plot->script);
-    drape_status status = draws ? lab_write_text(l, file, plot->text, plot->size) : DRAPE_OK;
-    free(plot->text);
-    if (status || !draws)
-        return status;
-    status = draw(l, plot, path, &drawn);
-    if (status || drawn)
-        return status ? status : put_picture(l, plot->name, caption);
-    fprintf(l->summary, "gnuplot is missing or failed on %s: this report has no pictures\n", file);
-    return DRAPE_OK;
 }

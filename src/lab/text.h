@@ -1,4 +1,4 @@
-/* text.h: the files, pictures and page of a report. */
+/* text.h: the files and the page of a report. */
 #ifndef DRAPE_LAB_TEXT_H
 #define DRAPE_LAB_TEXT_H
 
@@ -15,28 +15,15 @@ drape_status lab_read_text(drape_arena *arena, const char *folder, const char *n
 /* results.csv: the columns that any result has, tags first. */
 drape_status lab_write_csv(lab *l);
 
-/* A script for gnuplot while it is written. */
-typedef struct lab_plot {
-    char name[96];
-    FILE *script;
-    char *text;
-    size_t size;
-} lab_plot;
-
-/* Begins the script of a picture in SVG of that size [pixel]; its commands are printed to plot->script.
- * Errors: DRAPE_E_MEMORY. */
-drape_status lab_plot_begin(lab *l, lab_plot *plot, const char *name, int width, int height);
-
-/* Ends the script. draws: keeps it as name.gp in the folder, runs gnuplot on it and adds the picture name.svg
- * with its caption to the page. If gnuplot is missing or fails, only the summary says so. */
-drape_status lab_plot_end(lab *l, lab_plot *plot, bool draws, const char *caption);
-
 /* The unit of a scene's value at a JSON pointer, as "Pa"; "" if it has none, or if it depends on other values
  * of the scene (units.c). */
 const char *lab_unit(const char *pointer);
 
 void lab_page_heading(lab *l, const char *text);
 void lab_page_text(lab *l, const char *text); /* escaped */
+
+/* Adds the figure name.svg of the folder with its caption. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status lab_page_figure(lab *l, const char *name, const char *caption);
 
 /* report.html of the summary and the body. */
 drape_status lab_write_page(lab *l, const char *title);

@@ -5,6 +5,7 @@
  */
 #include "base/param.h"
 #include "control/control.h"
+#include "lab/figure.h"
 #include "lab/reference.h"
 #include "lab/text.h"
 #include "solvers/linear.h"
@@ -16,38 +17,50 @@
 #define BASE_METHOD "be"  /* the usual integrator: others are compared with it */
 #define BASE_DT     (1.0 / 60)
 
-static const double rates[] = {30, 60, 120, 240, 480, 960, 1920}; /* [1/s] */
-static const double rtols[] = {3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6};
-static const double controlled[] = {1e-2, 1e-3, 1e-4};
+/* Values of a knob. If there is a budget, cases of low rank come first: a few points of every integrator,
+ * over all of its range, then the points between, then controllers and linear solvers. */
+typedef struct level {
+    double value;
+    int rank;
+} level;
+
+static const level rates[] = {{30, 3},  {60, 0},  {120, 3}, {240, 1},
+                              {480, 4}, {960, 2}, {1920, 5}}; /* [1/s] */
+static const level rtols[] = {{3e-2, 4}, {1e-2, 2}, {3e-3, 4}, {1e-3, 0},
+                              {3e-4, 4}, {1e-4, 1}, {1e-5, 3}, {1e-6, 5}};
+static const level controlled[] = {{1e-2, 6}, {1e-3, 5}, {1e-4, 7}};
+#define LINEAR_RANK 6
 
 /* ---- The cases ---- */
 
-static drape_status add(lab *l, const char *series, const char *method, const char *knob, double value,
+static drape_status add(lab *l, const char *series, const char *method, const char *knob, level at,
                         json_t *more)
 {
     char pointer[64];
     snprintf(pointer, sizeof pointer, "/%s", knob);
-    json_t *settings = json_pack("{s:s, s:f}", "/integrator/method", method, pointer, value);
+    json_t *settings = json_pack("{s:s, s:f}", "/integrator/method", method, pointer, at.value);
     json_t *tags = json_pack("{s:s, s:s, s:s, s:f}", "series", series, "integrator", method, "knob",
-                             strrchr(knob, '/') + 1, "value", value);
+                             strrchr(knob, '/') + 1, "value", at.value);
     json_object_update(settings, more);
     json_decref(more);
-    return lab_add_case(l, tags, settings, -1);
+    drape_status status = lab_add_case(l, tags, settings, -1);
+    if (!status)
+        lab_rank_case(l, at.rank);
+    return status;
 }
 
 /* Integrators that choose their steps, at every order that they are limited to. */
 static drape_status add_own_steps(lab *l, const drape_integrator_ops *integrator)
 {
-    static const int orders[] = {2, 5};
+    int limits[2];
     drape_status status = DRAPE_OK;
-    const bool ordered =
-        drape_param_find(integrator->entry.params, integrator->entry.param_count, "max_order") >= 0;
-    for (size_t k = 0; k < (ordered ? sizeof orders / sizeof *orders : 1); k++) {
+    const size_t count = lab_order_limits(l, integrator, limits);
+    for (size_t k = 0; k < count; k++) {
         char series[96];
-        snprintf(series, sizeof series, ordered ? "%s, order %d" : "%s", integrator->entry.name, orders[k]);
+        lab_name_series(integrator, limits[k], series, sizeof series);
         for (size_t i = 0; !status && i < sizeof rtols / sizeof *rtols; i++)
             status = add(l, series, integrator->entry.name, "integrator/rtol", rtols[i],
-                         ordered ? json_pack("{s:i}", "/integrator/max_order", orders[k]) : json_object());
+                         limits[k] ? json_pack("{s:i}", "/integrator/max_order", limits[k]) : json_object());
     }
     return status;
 }
@@ -57,8 +70,8 @@ static drape_status add_fixed(lab *l, const drape_integrator_ops *integrator)
 {
     drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < sizeof rates / sizeof *rates; i++)
-        status = add(l, integrator->entry.name, integrator->entry.name, "integrator/dt", 1 / rates[i],
-                     json_object());
+        status = add(l, integrator->entry.name, integrator->entry.name, "integrator/dt",
+                     (level){1 / rates[i].value, rates[i].rank}, json_object());
     for (int c = 0; drape_controllers[c]; c++) {
         const drape_controller_ops *controller = drape_controllers[c];
         char series[96];
@@ -80,7 +93,7 @@ static drape_status add_linear_solvers(lab *l)
     for (int i = 0; !status && drape_linears[i]; i++) {
         char series[96];
         snprintf(series, sizeof series, BASE_METHOD ", linear solver %s", drape_linears[i]->entry.name);
-        status = add(l, series, BASE_METHOD, "integrator/dt", BASE_DT,
+        status = add(l, series, BASE_METHOD, "integrator/dt", (level){BASE_DT, LINEAR_RANK},
                      json_pack("{s:s}", "/integrator/linear_solver", drape_linears[i]->entry.name));
     }
     return status;
@@ -204,6 +217,8 @@ static void report_reference(lab *l)
     for (size_t i = 0; i < l->count; i++) {
         const json_t *r = l->results[i];
         double error = resolved_error(r);
+        if (!r)
+            continue;
         reference = lab_number(r, "reference_error_m");
         smallest = error < smallest ? error : smallest;
         unresolved += lab_is_good(r) && isnan(error);
@@ -211,7 +226,8 @@ static void report_reference(lab *l)
     }
     fprintf(l->summary, "The reference's error is estimated as %.2g m; ", reference);
     if (!isfinite(smallest))
-        fprintf(l->summary, "no error is plotted. ");
+        fprintf(l->summary,
+                "no error is plotted: a shorter --duration, or a larger --budget, may give a better one. ");
     else if (reference > 0)
         fprintf(l->summary, "the smallest error plotted is %.2g m, %.3g times that. ", smallest,
                 smallest / reference);
@@ -223,7 +239,7 @@ static void report_reference(lab *l)
             unresolved, late);
 }
 
-/* ---- Pictures ---- */
+/* ---- Figures ---- */
 
 typedef struct chart {
     const char *file, *x_label, *x_key, *y_label, *y_key;
@@ -236,77 +252,53 @@ static const chart charts[] = {
     {"error_jacobians", "Jacobians", "jacobians", "error at the end, RMS [m]", "error_end_m"},
 };
 
-/* A colour for each integrator, dashes and points for its variants. Okabe & Ito 2008, Color Universal
- * Design. */
-static const char *const colours[] = {"0072B2", "D55E00", "009E73", "CC79A7",
-                                      "E69F00", "56B4E9", "000000", "7F7F7F"};
-
-/* A series of a chart. */
-typedef struct curve {
-    const char *series, *integrator;
-    size_t colour, variant; /* colours run on; variant: of its integrator */
-} curve;
-
-/* The series but those of linear solvers, in order. */
-static size_t list_curves(const lab *l, curve *curves, size_t room)
+/* The points of a series, added to all: x, y in turn. Returns how many are there then. */
+static size_t take_points(const lab *l, const chart *c, const char *series, double *xy, size_t count)
 {
-    size_t count = 0;
-    for (size_t i = 0; i < l->count && count < room; i++) {
-        curve one = {.series = lab_tag_text(l->results[i], "series"),
-                     .integrator = lab_tag_text(l->results[i], "integrator")};
-        bool known = is_linear_case(l->results[i]);
-        for (size_t k = 0; k < count && !known; k++) {
-            known = strcmp(curves[k].series, one.series) == 0;
-            one.variant += strcmp(curves[k].integrator, one.integrator) == 0;
-        }
-        if (known)
+    for (size_t i = 0; i < l->count; i++) {
+        const json_t *r = l->results[i];
+        const double x = lab_number(r, c->x_key), y = lab_number(r, c->y_key);
+        if (strcmp(lab_tag_text(r, "series"), series) != 0 || isnan(resolved_error(r)) || !(x > 0) ||
+            !(y > 0))
             continue;
-        if (count > 0)
-            one.colour =
-                curves[count - 1].colour + (strcmp(curves[count - 1].integrator, one.integrator) != 0);
-        curves[count++] = one;
+        xy[2 * count] = x;
+        xy[2 * count++ + 1] = y;
     }
     return count;
 }
 
+/* The curves are the series but those of linear solvers; those of an integrator stand together. */
 static drape_status draw(lab *l, const chart *c)
 {
-    curve curves[128];
-    bool drawn[128], any = false;
-    lab_plot plot;
-    const size_t count = list_curves(l, curves, 128);
-    drape_status status = lab_plot_begin(l, &plot, c->file, 900, 560);
+    lab_figure f;
+    const char *series = "", *integrator = "";
+    size_t count = 0, variant = 0;
+    double *xy = drape_arena_take(&l->arena, 2 * l->count, sizeof *xy);
+    drape_status status = xy ? lab_figure_begin(l, &f, c->file) : DRAPE_E_MEMORY;
     if (status)
         return status;
-    fprintf(plot.script,
-            "set logscale xy\nset format '10^{%%T}'\nset grid lc rgb '#dddddd'\n"
-            "set key outside right top noenhanced\nset xlabel '%s'\nset ylabel '%s'\n",
-            c->x_label, c->y_label);
-    for (size_t k = 0; k < count; k++) {
-        drawn[k] = false;
-        fprintf(plot.script, "$s%zu << EOD\n", k);
-        for (size_t i = 0; i < l->count; i++) {
-            const json_t *r = l->results[i];
-            const double x = lab_number(r, c->x_key), y = lab_number(r, c->y_key);
-            if (strcmp(lab_tag_text(r, "series"), curves[k].series) != 0 || isnan(resolved_error(r)) ||
-                !(x > 0) || !(y > 0))
-                continue;
-            fprintf(plot.script, "%.9g %.9g\n", x, y);
-            drawn[k] = true;
-        }
-        fprintf(plot.script, "EOD\n");
-    }
-    for (size_t k = 0; k < count; k++) {
-        const curve *one = &curves[k];
-        if (!drawn[k])
+    for (size_t i = 0; i < l->count; i++) {
+        const json_t *one = json_array_get(l->cases, i);
+        if (strcmp(lab_tag_text(one, "series"), series) == 0 || is_linear_case(one))
             continue;
-        fprintf(plot.script, "%s $s%zu with linespoints lw 1.8 lc rgb '#%s' dt %zu pt %zu ps .6 title \"%s\"",
-                any ? "," : "plot", k, colours[one->colour % (sizeof colours / sizeof *colours)],
-                one->variant + 1, 7 - 2 * (one->variant % 3), one->series);
-        any = true;
+        variant = strcmp(lab_tag_text(one, "integrator"), integrator) == 0 ? variant + 1 : 0;
+        series = lab_tag_text(one, "series");
+        integrator = lab_tag_text(one, "integrator");
+        const size_t before = count;
+        count = take_points(l, c, series, xy, count);
+        if (count == before)
+            continue;
+        const int block = lab_figure_data(&f);
+        for (size_t k = before; k < count; k++)
+            fprintf(f.script, "%.9g %.9g\n", xy[2 * k], xy[2 * k + 1]);
+        lab_figure_data_end(&f);
+        lab_figure_curve(&f, block, lab_style_of(integrator, variant), series);
     }
-    fprintf(plot.script, "\n");
-    return lab_plot_end(l, &plot, any, c->y_label); /* logarithmic axes need a point */
+    snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->x_label);
+    snprintf(f.axes[1].label, sizeof f.axes[1].label, "%s", c->y_label);
+    if (count > 0)
+        lab_figure_fit(&f, xy, count, false);
+    return lab_figure_end(l, &f, c->y_label);
 }
 
 /* ---- The table ---- */
@@ -325,6 +317,8 @@ static void write_table(lab *l)
     for (size_t i = 0; i < l->count; i++) {
         const json_t *r = l->results[i];
         char knob[64];
+        if (!r)
+            continue;
         knob_text(r, knob, sizeof knob);
         fputs("<tr><td>", l->page);
         lab_page_text(l, lab_tag_text(r, "series"));
@@ -358,6 +352,7 @@ static drape_status report(lab *l)
 const lab_experiment_ops lab_experiment_tradeoff = {
     .entry = {.name = "tradeoff", .summary = "work against accuracy of every integrator over its settings"},
     .compares_costs = true,
+    .partial = true,
     .plan = plan,
     .check = lab_check_reference,
     .prepare = lab_make_reference,

@@ -130,6 +130,7 @@ function describe() {
   status.classList.toggle('failed', !s || s.status !== 'ok');
   if (!s) notes.push('The run has no summary: it was killed, or is still running.');
   else if (s.message) notes.push(s.message);
+  for (const warning of (s && s.warnings) || []) notes.push(`Warning: ${warning.text}.`);
   if (run.frames.numbers.length < run.frames.all) {
     notes.push(`The page has ${run.frames.numbers.length} of ${run.frames.all} frames, at equal intervals; drape report --megabytes N makes room for more.`);
   }

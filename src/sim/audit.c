@@ -20,6 +20,7 @@
 /* Fraction of the energy available to the run: smaller gains are rounding errors. Not proportional to the
  * step size: small steps gain little each. */
 #define ROUNDED 1e-12
+#define AT_REST 1e-3 /* fraction of the scene's own energy, below which a run is at rest */
 #define QUIET                                                                                                \
     1e-16 /* fraction of the scene's own energy: motion at 1e-8 of the scene's speed is rounding error */
 
@@ -101,6 +102,13 @@ static double scene_energy(const drape_model *m)
     for (int32_t i = 0; i < m->node_count; i++)
         mass += m->mass[i];
     return 0.5 * mass * atol_v * atol_v;
+}
+
+double drape_sim_energy_received(drape_sim *sim)
+{
+    const drape_energy e = drape_sim_energy(sim);
+    const double sum = e.kinetic + e.elastic + e.contact + e.numerical + fmax(e.dissipated, 0);
+    return sum > AT_REST * scene_energy(sim->model) ? sum : 0;
 }
 
 /* The node with the largest kinetic energy. */

@@ -114,6 +114,11 @@ void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *densit
 /* Adds the work of an accepted step to the energy account. */
 void drape_sim_add_work(drape_sim *sim, const drape_step_info *info);
 
+/* The energy [J] that went into the run so far, by gravity, at the start, by pins, colliders, hosts and
+ * wind: all that became of it. Where wind gives more than damping takes, only their difference counts. 0:
+ * so little that it is rounding of a scene at rest. */
+double drape_sim_energy_received(drape_sim *sim);
+
 /* Starts the energy account from the present state. */
 void drape_sim_reset_energy(drape_sim *sim);
 

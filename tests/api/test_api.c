@@ -226,6 +226,9 @@ START_TEST(no_model_has_nothing)
     ck_assert_ptr_null(drape_sim_reason(NULL, 0, &count));
     ck_assert_int_eq(count, 0);
     ck_assert_ptr_null(drape_sim_reason(NULL, 0, NULL));
+    drape_warning warning = {.name = "none"};
+    ck_assert(!drape_sim_warning(NULL, 0, &warning) && strcmp(warning.name, "") == 0);
+    ck_assert(!drape_sim_warning(NULL, 0, NULL));
 }
 END_TEST
 

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 
-from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, scene, write_scene
+from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, scene, without_warnings, write_scene
 
 
 
@@ -260,9 +260,9 @@ def test_failure():
     write_scene(duration=1, integrator={"dt": 0.01, "max_iterations": 1, "tolerance": 1e-12})
     result = drape("run", "scene.json", "--out", "out", "--format", "npy", "--controller", "fixed")
     equal(result.returncode, 1, result.stderr)
-    assert re.fullmatch(r"t=[^\n]+max_iterations[^\n]+\n", result.stderr), result.stderr
+    assert re.fullmatch(r"t=[^\n]+max_iterations[^\n]+\n", without_warnings(result.stderr)), result.stderr
     summary = read_json("out/summary.json")
-    equal((summary["status"], summary["message"] + "\n"), ("e_solver", result.stderr))
+    equal((summary["status"], summary["message"] + "\n"), ("e_solver", without_warnings(result.stderr)))
     equal(summary["steps"]["reasons"], {"max_iterations": 1})
     equal(read_npy("out/positions.npy")[0][0], summary["frames"])
     assert re.search(r"^status +e_solver$", result.stdout, re.M), result.stdout
@@ -284,7 +284,7 @@ def interrupt(signals, *args):
         for one in signals:
             process.send_signal(one)
         out, err = process.communicate(timeout=LIMIT)
-    return process.returncode, out, err
+    return process.returncode, out, without_warnings(err)
 
 
 def test_interrupt():
@@ -324,7 +324,7 @@ def test_lost_output():
         with open("/dev/full", "w", encoding="ascii") as full:
             result = subprocess.run([PROGRAM, *args], stdout=full, stderr=subprocess.PIPE, text=True, timeout=LIMIT)
         equal(result.returncode, 1, " ".join(args))
-        assert re.fullmatch(r"drape: cannot write to the standard output[^\n]*\n", result.stderr), result.stderr
+        assert re.fullmatch(r"drape: cannot write to the standard output[^\n]*\n", without_warnings(result.stderr)), result.stderr
 
 
 def test_closed_output():
@@ -347,7 +347,7 @@ def test_unwritable():
     for args in (["--out", "taken"], ["--summary", "nowhere/s.json"], ["--out", "o", "--summary", "nowhere/s.json"]):
         result = drape("run", "scene.json", *args)
         equal(result.returncode, 1, " ".join(args))
-        assert re.fullmatch(r"[^\n]+\n", result.stderr), result.stderr
+        assert re.fullmatch(r"[^\n]+\n", without_warnings(result.stderr)), result.stderr
     equal(read_json("o/summary.json")["status"], "ok", "the run itself was good")
     result = drape("run", "scene.json", "--out", "taken", "--summary", "s.json")
     equal((result.returncode, read_json("s.json")["status"]), (1, "e_file"))
@@ -364,7 +364,7 @@ def test_full():
     write_scene(duration=5)
     result = limited("run", "scene.json", "--out", "out", "--format", "npy")
     equal(result.returncode, 1, result.stderr)
-    assert re.fullmatch(r"[^\n]+\n", result.stderr), result.stderr
+    assert re.fullmatch(r"[^\n]+\n", without_warnings(result.stderr)), result.stderr
     summary = read_json("out/summary.json")
     equal(summary["status"], "e_file")
     shape, _ = read_npy("out/positions.npy")
@@ -441,7 +441,8 @@ def test_progress():
     assert 1 <= len(drawn) <= 2 + 10 * seconds, (len(drawn), seconds)
     for word in "real time", "ETA", "rejected":
         assert word in shown, shown
-    assert "\x1b" not in shown and re.search(r"\r +\r$", shown), repr(shown)
+    # After it is cleared there is only the warning that backward Euler dissipates this small sheet's energy.
+    assert "\x1b" not in shown and re.search(r"\r +\r(warning: [^\r\n]+\r\n)?$", shown), repr(shown)
 
 
 # ---- info, check, list

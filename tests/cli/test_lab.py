@@ -88,6 +88,60 @@ def test_stability():
     assert "exploded" in page_is_alone("s/report.html")
 
 
+def test_one_axis():
+    """stability over a single axis draws all integrators in one figure, and does not call a run of a few steps stable"""
+    write_scene(duration=0.3)
+    out = good("stability", "scene.json", "--axis", "/integrator/dt=1e-3:3e-1:6log", "--integrators", "be,verlet", "--out", "s")
+    steps = {r["tags"]["/integrator/dt"]: r["accepted"] for r in lines("s").values() if r["tags"]["integrator"] == "be"}
+    few = sum(count < 20 for count in steps.values())
+    assert 0 < few < 6 and 1 in steps.values(), steps
+    assert f"be: {6 - few} none rejected, {few} fewer than 20 steps\n" in out, out
+    assert "fewer than 20 steps" in open("s/map.svg", encoding="utf-8").read()
+    equal(sorted(glob.glob("s/map_*")), [], "maps")
+    page_is_alone("s/report.html")
+
+
+def test_message_over_budget():
+    """a case that takes more than its CPU time says so"""
+    write_scene(duration=1000)
+    out = good("stability", "scene.json", "--axis", "/cloth/0/material/density=100:200:2", "--integrators", "be", "--case-seconds", "0.05", "--out", "s")
+    for result in lines("s").values():
+        equal(result["status"], "over_budget", "status")
+        assert re.fullmatch(r"t=\S+: its budget of 0.05 s of CPU time was used up", result["message"]), result["message"]
+    assert "be: 2 over budget" in out, out
+
+
+def test_budget():
+    """tradeoff runs the telling cases first, names those that its budget leaves out, and continues with them"""
+    write_scene(duration=0.3)
+    command = ["tradeoff", "scene.json", "--integrators", "be,bdf2,verlet", "--repeats", "1", "--out", "t"]
+    cases = 2 * (7 + 3) + (7 + 3) + 6  # of be, bdf2, verlet, and the linear solvers
+    good(*command, "--budget", "none")
+    everything = lines("t")
+    with open("t/cases.jsonl", encoding="utf-8") as file:
+        order = [json.loads(line)["tags"] for line in file]
+    assert len(order) >= cases - 3, order
+    # A point of each integrator, then a second, then a third; linear solvers and controllers last.
+    for k, dt in enumerate((60, 240, 960)):
+        equal([(tags["series"], round(1 / tags["value"])) for tags in order[3 * k:3 * k + 3]], [("be", dt), ("bdf2", dt), ("verlet", dt)], "order")
+    assert all("," in tags["series"] for tags in order[-9:]), order[-9:]
+    # A budget that ends after the reference: the rest is named and the report is made.
+    os.mkdir("b")
+    for name in ("experiment.json", "reference.json", "reference.f64"):
+        shutil.copy("t/" + name, "b/" + name)
+    with open("t/cases.jsonl", encoding="utf-8") as file, open("b/cases.jsonl", "w", encoding="utf-8") as part:
+        part.writelines(file.readlines()[:9])
+    out = good(*command[:-1], "b", "--budget", "1e-7")
+    left = len(everything) - 9
+    assert f"9 of {len(everything)} cases done" in out and f"{left} of {len(everything)} cases were left out, as the budget of 1e-07 minutes" in out, out
+    assert "be (4 of 7), be, error control (3 of 3)" in out and "report    b/report.html" in out, out
+    assert "were left out" in page_is_alone("b/report.html")
+    equal(len(lines("b")), 9, "cases that ran")
+    good(*command[:-1], "b", "--budget", "none")
+    equal(lines("b"), everything, "results after the rest has run")
+    refused("tradeoff", "scene.json", "--budget", "0", "--out", "n", says="--budget \"0\": must be minutes, above 0, or none")
+
+
 def test_ignored_axis():
     """an integrator that ignores an axis runs once along it"""
     write_scene()
@@ -106,6 +160,11 @@ def test_converge():
     for integrator, order in (("be", 1), ("bdf2", 2), ("trbdf2", 2)):
         assert abs(float(orders[integrator]) - order) < 0.1, out
     page_is_alone("c/report.html")
+    # A line is fitted through runs of one limit of the order of ida only.
+    out = good("converge", "scene.json", "--integrators", "ida", "--levels", "5", "--out", "ida")
+    equal(re.findall(r"^(ida.*): order", out, re.M), ["ida, order 2", "ida, order 5"], "series")
+    out = good("converge", "scene.json", "--integrators", "ida", "--levels", "4", "--set", "/integrator/max_order=3", "--out", "three")
+    equal(re.findall(r"^(ida.*): order", out, re.M), ["ida"], "series at an order that the user chose")
     # Unless they are fixed, verlet takes as many substeps as its stability limit needs, and dt does not refine them.
     out = good("converge", "scene.json", "--integrators", "verlet", "--levels", "4", "--out", "v")
     assert "verlet: no order, as it chooses its own substeps" in out, out
@@ -306,7 +365,7 @@ def test_wrong_words():
     """wrong axes, integrators, shards, folders: one line each, nothing written"""
     write_scene()
     two = ["--axis", "/integrator/dt=1e-3:1e-2:2log"]
-    refused("stability", "scene.json", "--out", "s", says="2 or 3 axes")
+    refused("stability", "scene.json", "--out", "s", says="1 to 3 axes")
     for axis, says in (("dt=1:2:3", "a pointer is needed"), ("/integrator/dt=1:2", "three numbers"), ("/integrator/dt=1:2:3lin", "only log may follow the count"),
                        ("/integrator/dt=0:2:3log", "positive"), ("/integrator/dt=1:1:3", "different"), ("/integrator/dt=1:2:1", "2 to 1024")):
         refused("stability", "scene.json", *two, "--axis", axis, "--out", "s", says=says)
@@ -388,8 +447,8 @@ def test_map_is_labelled():
     good("stability", "scene.json", *AXES, "--integrators", "be,verlet", "--out", "s")
     with open("s/map_verlet.gp", encoding="utf-8") as file:
         script = file.read()
-    assert "set xlabel 'dt [s]'" in script and "set ylabel 'young_modulus [Pa]'" in script, script
-    assert "1 in 100" not in script, "a scale of rejections on a map without any"
+    assert "set label 'dt [s]'" in script and "set label 'young_modulus [Pa]'" in script, script
+    assert "1/10" not in script, "rejections in the legend of a map without any"
     # The lines are changed to have rejections: the report is made from the lines alone.
     with open("s/cases.jsonl", encoding="utf-8") as file:
         text = file.read()
@@ -399,8 +458,10 @@ def test_map_is_labelled():
     good("stability", "scene.json", *AXES, "--integrators", "be,verlet", "--out", "s")
     with open("s/map_be.gp", encoding="utf-8") as file:
         script = file.read()
-    for title in ("1 rejected in 1 000 steps", "1 in 100", "1 in 10", "1 a step"):
-        assert f"title '{title}'" in script, title
+    # 3 rejected in 100 steps; those of 10 steps and of 1 are too short.
+    for text, there in (("none rejected", False), ("up to 1/100 rejected", False), ("up to 1/10 rejected", True), ("over 1/10 rejected", False),
+                        ("fewer than 20 steps", True)):
+        equal(f"set label '{text}'" in script, there, text)
 
 
 def test_over_budget():

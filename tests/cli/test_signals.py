@@ -13,7 +13,7 @@ import signal
 import subprocess
 import time
 
-from program import PROGRAM, Skip, drape, equal, good, read_json, read_npy, read_steps, run_tests, write_scene
+from program import PROGRAM, Skip, drape, equal, good, read_json, read_npy, read_steps, run_tests, without_warnings, write_scene
 
 LIMIT = 120  # [s] that a child may take to end
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
@@ -54,7 +54,7 @@ def struck(delay, one, *args, **options):
         except subprocess.TimeoutExpired:
             child.kill()
             raise
-    return child.returncode, out, err
+    return child.returncode, out, without_warnings(err)
 
 
 def check_files(folder, what):

@@ -1,0 +1,92 @@
+/*
+ * figure.h: the figures of the experiments, as a column of a paper: 84 mm wide, text of 7 pt and more,
+ * as SVG and as PDF with its font embedded. gnuplot draws them; where text stands is computed here,
+ * from the widths of its characters, so that legends and labels touch nothing.
+ *
+ * Colours are those of Okabe and Ito, Color Universal Design (2008), which people with any form of
+ * colour blindness tell apart. An integrator has the same colour and marker in every figure.
+ */
+#ifndef DRAPE_LAB_FIGURE_H
+#define DRAPE_LAB_FIGURE_H
+
+#include "lab/lab.h"
+
+#define LAB_MAX_ENTRIES 64
+
+/* Colours that are not those of an integrator. */
+#define LAB_BLACK  0x000000
+#define LAB_WHITE  0xffffff
+#define LAB_GREY   0x999999
+#define LAB_DARK   0x4d4d4d
+#define LAB_BLUE   0x0072b2
+#define LAB_YELLOW 0xf0e442
+#define LAB_ORANGE 0xe69f00
+#define LAB_RED    0xd55e00
+#define LAB_PURPLE 0xcc79a7
+
+typedef struct lab_style {
+    int colour;
+    int dash;  /* 1: solid */
+    int point; /* a marker of gnuplot's; 0: none */
+} lab_style;
+
+/* The style of an integrator. Its variants, numbered from 0, have its colour, other dashes and open
+ * markers. */
+lab_style lab_style_of(const char *integrator, size_t variant);
+
+/* An axis. Names replace the numbers, one for each integer from 0. */
+typedef struct lab_axis {
+    char label[128];
+    double from, to; /* its ends */
+    bool log;
+    const char *const *names; /* NULL: numbers */
+    int name_count;
+} lab_axis;
+
+typedef struct lab_entry {
+    char text[96];
+    lab_style style;
+    bool swatch; /* an area; otherwise a line with a marker */
+} lab_entry;
+
+/* A figure while it is made. */
+typedef struct lab_figure {
+    char name[96];
+    char title[160]; /* "": none */
+    lab_axis axes[2];
+    double plot_height;     /* [mm] of the frame; default 52 */
+    FILE *script;           /* data: between lab_figure_data and lab_figure_data_end a point a line */
+    FILE *plot;             /* the elements of the plot */
+    char *text, *plot_text; /* what was written to them */
+    size_t size, plot_size;
+    int blocks, elements;
+    lab_entry legend[LAB_MAX_ENTRIES];
+    int entries;
+} lab_figure;
+
+/* Begins the figure of that name, whose axes the caller sets. Errors: DRAPE_E_MEMORY. */
+drape_status lab_figure_begin(lab *l, lab_figure *f, const char *name);
+
+/* Begins and ends a block of data, which is printed to f->script; returns its number. */
+int lab_figure_data(lab_figure *f);
+void lab_figure_data_end(lab_figure *f);
+
+/* Points (x, y) of a block, joined by lines. text: in the legend; NULL: not there. */
+void lab_figure_curve(lab_figure *f, int block, lab_style style, const char *text);
+
+/* Boxes of a block: x y left right bottom top colour. */
+void lab_figure_boxes(lab_figure *f, int block);
+
+/* A swatch in the legend. */
+void lab_figure_swatch(lab_figure *f, int colour, const char *text);
+
+/* Widens logarithmic axes, on which the curves end, by a margin; slopes: makes room below the curves
+ * (points: x, y in turn) and draws reference lines of orders 1 and 2 there. */
+void lab_figure_fit(lab_figure *f, const double *points, size_t count, bool slopes);
+
+/* Writes name.gp, has gnuplot make name.svg and name.pdf, and adds the figure with its caption to the
+ * page. Without an element there is no figure. If gnuplot is missing or fails, only the summary says so.
+ * Frees the memory. */
+drape_status lab_figure_end(lab *l, lab_figure *f, const char *caption);
+
+#endif

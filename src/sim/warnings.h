@@ -1,0 +1,7 @@
+/* warnings.h: what drape_sim_warning looks for. */
+#ifndef DRAPE_SIM_WARNINGS_H
+#define DRAPE_SIM_WARNINGS_H
+
+#define DRAPE_FEW_STEPS 20 /* a run of fewer steps shows neither whether it is stable nor how it moves */
+
+#endif

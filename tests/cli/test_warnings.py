@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""The warnings of a run: on stderr, a line each, in summary.json, and in the report. See program.py and src/sim/warnings.c."""
+import re
+import sys
+
+from program import SOURCES, drape, equal, good, read_json, run_tests, scene, write_scene
+
+FINE = {"duration": 0.3, "integrator": {"dt": 0.01}}  # 30 steps
+
+
+def warnings(*args, code=0):
+    """{name: text} in the summary, after checking that stderr says the same."""
+    result = drape("run", *args, "--summary", "s.json")
+    equal(result.returncode, code, result.stderr)
+    found = read_json("s.json")["warnings"]
+    printed = re.findall(r"^warning: (.+)$", result.stderr, re.M)
+    equal(sorted(printed), sorted(one["text"] for one in found), "stderr and summary")
+    names = {one["name"]: one["text"] for one in found}
+    equal(len(names), len(found), f"a warning is given once: {found}")
+    return names
+
+
+def test_none():
+    """example scenes and a scene of the tests that are fine have no warning"""
+    write_scene(**FINE)
+    equal(warnings("scene.json"), {}, "the scene of the tests")
+    for name in ("incline", "hung_sheet"):
+        equal(warnings(f"{SOURCES}/examples/scenes/{name}.json", "--duration", "1"), {}, name)
+
+
+def test_no_terms():
+    """a cloth without terms has a warning that names it; user-visible terms of other cloths do not hide it"""
+    write_scene(**FINE, terms=[])
+    assert "/cloth/0: sheet has no \"terms\"" in warnings("scene.json")["no_terms"]
+    whole = scene(**FINE)
+    bare = {**whole["cloth"][0], "name": "bare", "terms": []}
+    write_scene(**FINE, cloth=[whole["cloth"][0], bare])
+    assert "/cloth/1: bare has no \"terms\"" in warnings("scene.json")["no_terms"]
+
+
+def test_few_steps():
+    """a duration of fewer than 20 steps has a warning; 20 steps have none, nor have integrators that choose their steps"""
+    for steps, there in ((19, True), (20, False)):
+        write_scene(duration=steps * 0.01)
+        found = warnings("scene.json")
+        equal(list(found), ["few_steps"] if there else [], f"{steps} steps")
+    assert "0.19 s is only 19 steps of dt = 0.01 s" in warnings("scene.json", "--duration", "0.19")["few_steps"]
+    equal(warnings("scene.json", "--duration", "0.1", "--integrator", "ida"), {}, "ida")
+
+
+def test_dissipation():
+    """an integrator that took more than half of the energy has a warning whose advice helps"""
+    # A sheet that swings by a corner, without damping: within 1 s backward Euler takes most of what gravity gives, at dt = 1/50 s.
+    write_scene(duration=1, integrator={"dt": 0.02}, terms=["stretch.edge", "bend.hinge"], pins=[{"corner": "top-left"}])
+    text = warnings("scene.json")["numerical_dissipation"]
+    energy = read_json("s.json")["energy"]
+    share, taken, received = re.search(r"be dissipated (\d+) % of the energy that went in, (\S+) of (\S+) J", text).groups()
+    # Nothing dissipates but the integrator, the sheet starts at rest and unstrained: what went in is the fall.
+    equal(f"{energy['numerical']:.3g}", taken, "numerical")
+    equal(f"{energy['kinetic'] + energy['elastic'] + energy['numerical']:.3g}", received, "received")
+    assert int(share) > 50, text
+    for advice in (("--dt", "0.002"), ("--integrator", "bdf2"), ("--integrator", "ida"), ("--integrator", "midpoint", "--dt", "0.002")):
+        equal(warnings("scene.json", *advice), {}, advice)
+
+
+def test_at_rest():
+    """a sheet that does not move has no warning about energy"""
+    write_scene(**FINE, gravity=[0, 0, 0])
+    equal(warnings("scene.json"), {}, "at rest")
+
+
+def test_slow_contact():
+    """contact that takes most of the time, and longer than the motion lasts, has a warning; a scene without contact never has it"""
+    path = SOURCES + "/examples/scenes/crumple.json"
+    text = warnings(path, "--duration", "0.25")["slow_contact"]
+    assert re.match(r"contact takes [5-9]\d % of the time of the steps, \S+ s for 0.25 s of motion: \"newton_k\"", text), text
+    wall = read_json("s.json")["wall_s"]
+    assert wall["contact"] > 0.5 * wall["steps"] and wall["contact"] > 0.25, wall
+    write_scene(**FINE)
+    assert "slow_contact" not in warnings("scene.json")
+
+
+def test_report():
+    """the report of a run has its warnings"""
+    write_scene()
+    good("run", "scene.json", "--out", "r")
+    good("report", "r")
+    with open("r/report.html", encoding="utf-8") as file:
+        assert "few_steps" in file.read()
+
+
+if __name__ == "__main__":
+    sys.exit(run_tests(globals()))
