@@ -80,7 +80,7 @@ static double ends_ratio(const lab_axis *a)
 }
 
 /* Powers of ten, at most about six; between them ticks without numbers. If there is at most one, 1, 2 and
- * 5 times such a power, or over less than a factor of 4 all multiples. */
+ * 5 times such a power, or over less than a factor of 10 also 3 times, of 4 all multiples. */
 static void put_log_ticks(const lab_axis *a, FILE *out)
 {
     const int first = (int)floor(log10(a->from)), last = (int)ceil(log10(a->to));
@@ -91,7 +91,8 @@ static void put_log_ticks(const lab_axis *a, FILE *out)
         for (int digit = 1; digit < 10; digit++) {
             const double value = digit * pow(10, k);
             const bool numbered = powers > 1 ? digit == 1 && (k - first) % stride == 0
-                                             : a->to < 4 * a->from || digit == 1 || digit == 2 || digit == 5;
+                                             : a->to < 4 * a->from || (digit == 3 && a->to < 10 * a->from) ||
+                                                   digit == 1 || digit == 2 || digit == 5;
             if (value < a->from * (1 - 1e-9) || value > a->to * (1 + 1e-9))
                 continue;
             if (numbered && powers > 1)
