@@ -401,6 +401,7 @@ START_TEST(the_file_has_the_same_bits)
                hash, g ? drape_status_name(g->status) : "none", g ? g->hash : 0);
     }
     fclose(file);
+    fflush(stdout); /* a failed assertion ends this process without it */
     ck_assert_msg(!compared || (wrong == 0 && lines == table_count),
                   "%d of %d lines of hashes.txt differ, for %d runs; after an intended change of results run "
                   "tools/hashes",
