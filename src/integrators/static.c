@@ -27,7 +27,7 @@ enum { PARAM_MAX_STEPS = DRAPE_NEWTON_PARAM_COUNT, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
     DRAPE_NEWTON_PARAMS,
-    [PARAM_MAX_STEPS] = DRAPE_INTEGER("max_steps", "1", 1000, 1, 1e9,
+    [PARAM_MAX_STEPS] = DRAPE_INTEGER("max_pseudo_steps", "1", 1000, 1, 1e9,
                                       "steps of the flow towards equilibrium before the attempt fails"),
 };
 

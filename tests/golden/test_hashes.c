@@ -279,7 +279,7 @@ static void start(driven *d, const drape_model *model, const moment *from, const
                   int threads, bool each)
 {
     /* Statics ends after some steps of its flow: cloth that falls freely or flutters has no equilibrium. */
-    static const drape_setting some[] = {{.name = "max_steps", .number = 8},
+    static const drape_setting some[] = {{.name = "max_pseudo_steps", .number = 8},
                                          {.name = "on_failure", .text = "accept"}};
     drape_sim_def def;
     *d = (driven){.left = ATTEMPTS, .each = each, .end = from->t + FRAMES / drape_model_frame_rate(model)};
