@@ -34,10 +34,10 @@ static const drape_param params[PARAM_COUNT] = {
 typedef struct static_state {
     drape_implicit common; /* first */
     drape_arena *arena;
-    double *internal; /* of the terms, at the present step in pseudo time */
+    double *internal;               /* of the terms, at the present step in pseudo time */
     double *best_x, *best_internal; /* nodes; internal variables: the step with the least static residual */
     int max_steps;
-    double best;                    /* [N] that residual */
+    double best; /* [N] that residual */
     bool stability_known;
     int64_t unstable_modes;
 } static_state;

@@ -314,8 +314,7 @@ static double largest(const drape_step_equation *e, const double *f)
 static drape_status add_chords(drape_newton *s, const double *d, double *p, const double *minus_f)
 {
     drape_step_equation *e = s->equation;
-    double bound = max_norm_bound(s), before = largest(e, e->f),
-           rate = before / largest(e, minus_f);
+    double bound = max_norm_bound(s), before = largest(e, e->f), rate = before / largest(e, minus_f);
     for (int left = MAX_CHORDS; left > 0 && before > bound && before * pow(rate, left) <= bound; left--) {
         for (size_t i = 0; i < e->dofs; i++)
             s->chord_minus_f[i] = -e->f[i];
@@ -518,8 +517,8 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s)
     drape_system *system = s->equation->system;
     const int64_t n = (int64_t)s->equation->dofs;
     if (drape_sundials_context(&s->sun) || !(s->kin = KINCreate(s->sun)) ||
-        !(s->unknown = N_VMake_Serial(n, s->equation->f, s->sun)) ||
-        !(s->ones = N_VNew_Serial(n, s->sun)) || !(s->weights = N_VNew_Serial(n, s->sun)))
+        !(s->unknown = N_VMake_Serial(n, s->equation->f, s->sun)) || !(s->ones = N_VNew_Serial(n, s->sun)) ||
+        !(s->weights = N_VNew_Serial(n, s->sun)))
         return drape_fail_memory(ctx, (size_t)n * sizeof(double));
     N_VConst(1, s->ones);
     for (int64_t i = 0; i < n; i++)

@@ -98,7 +98,8 @@ static double bound_of(double load, double given, double rounding)
     return fmin(wanted, DRAPE_MAX_LOAD_SHARE * load);
 }
 
-drape_status drape_residual_bound_set(drape_step_equation *e, drape_norm norm, double given, double *tolerance)
+drape_status drape_residual_bound_set(drape_step_equation *e, drape_norm norm, double given,
+                                      double *tolerance)
 {
     const drape_model *m = e->model;
     const double component = drape_residual_component(given, norm, (double)e->dofs);

@@ -81,9 +81,9 @@ void drape_step_equation_make_feasible(drape_step_equation *equation, double *p)
 /* The weighted norm of F. */
 double drape_step_equation_norm(const drape_step_equation *equation, drape_norm norm);
 
-/* The same norm of the rounding errors of F at d, where it was evaluated last and is evaluated again: how much
- * g changes if x and v are shifted by their own rounding errors, and that of the inertia. Forces that cancel
- * count in full. */
+/* The same norm of the rounding errors of F at d, where it was evaluated last and is evaluated again: how
+ * much g changes if x and v are shifted by their own rounding errors, and that of the inertia. Forces that
+ * cancel count in full. */
 double drape_step_equation_rounding(drape_step_equation *equation, const double *d, drape_norm norm);
 
 /* Multiple of DBL_EPSILON within which errors of a computed force are taken as rounding. */

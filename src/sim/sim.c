@@ -86,8 +86,8 @@ static void note_tolerance(const drape_sim *sim)
                  used = tolerance_of(sim);
     if (used < given)
         drape_log(sim->ctx, DRAPE_LOG_WARNING,
-                  "/integrator/tolerance: %.4g N is more than 1 %% of the load of a node: %.4g N is used", given,
-                  used);
+                  "/integrator/tolerance: %.4g N is more than 1 %% of the load of a node: %.4g N is used",
+                  given, used);
 }
 
 static drape_stepping stepping_of(const drape_chosen *chosen)

@@ -231,7 +231,8 @@ static double residual_of(stepper *s, double h, double *history, double *g)
         .x = s->out.x, .v = s->out.v, .internal = s->in.internal, .weight = 1 / h, .history = history};
     drape_system_force(s->system, &point, g);
     for (size_t i = 0; i < s->n; i++) {
-        double f = mass / s->model->mass[i / 3] * (s->model->mass[i / 3] * (s->out.v[i] - s->in.v[i]) / h + g[i]);
+        double f =
+            mass / s->model->mass[i / 3] * (s->model->mass[i / 3] * (s->out.v[i] - s->in.v[i]) / h + g[i]);
         worst = fmax(worst, s->model->pinned[i / 3] ? 0 : fabs(f));
     }
     return worst;

@@ -557,8 +557,8 @@ END_TEST
 
 SUITE("ida", error_falls_with_rtol_in_order_2, error_falls_with_rtol_in_order_5,
       error_falls_with_rtol_over_kinks_of_tracks, atol_x_and_atol_v_are_the_weights,
-      a_scene_far_away_takes_the_same_steps, max_step_is_kept, an_advance_ends_at_its_end, steps_end_at_kinks_and_start_anew,
-      an_advance_that_ends_at_a_kink_starts_anew_too, frames_are_what_a_run_that_stops_there_has,
-      frames_do_not_change_the_steps, one_fault_is_recovered_from, a_fault_that_stays_ends_the_run,
-      too_many_steps_end_the_run, steps_that_a_host_asks_for_are_not_counted,
+      a_scene_far_away_takes_the_same_steps, max_step_is_kept, an_advance_ends_at_its_end,
+      steps_end_at_kinks_and_start_anew, an_advance_that_ends_at_a_kink_starts_anew_too,
+      frames_are_what_a_run_that_stops_there_has, frames_do_not_change_the_steps, one_fault_is_recovered_from,
+      a_fault_that_stays_ends_the_run, too_many_steps_end_the_run, steps_that_a_host_asks_for_are_not_counted,
       an_advance_by_one_ulp_is_no_failure, half_of_the_matrix_does_as_well)
