@@ -79,7 +79,7 @@ static bool advance(drape_inexact_newton *s, double *d)
 static bool is_rounding(drape_step_equation *e, const double *d, drape_solve_report *report)
 {
     const double residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
-    if (residual > drape_step_equation_rounding(e, d, DRAPE_NORM_MAX))
+    if (!(residual <= drape_step_equation_rounding(e, d, DRAPE_NORM_MAX)))
         return false;
     report->reason = drape_reason_name(DRAPE_REASON_ROUNDING);
     return true;

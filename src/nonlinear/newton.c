@@ -135,7 +135,7 @@ static void improve_guess(drape_newton *s, double *d)
 /* ---- Residual ---- */
 
 /* Whether F has stopped falling because it is the rounding error of its forces. */
-static bool is_rounding(drape_newton *s, const double *d)
+static bool is_rounding(drape_newton *s, const double *d, bool *finite)
 {
     drape_step_equation *e = s->equation;
     const double before = s->residual;
@@ -144,7 +144,9 @@ static bool is_rounding(drape_newton *s, const double *d)
         return false;
     const drape_norm norm = (drape_norm)s->values[DRAPE_NEWTON_NORM];
     const double size = drape_step_equation_norm(e, norm);
-    return size <= drape_step_equation_rounding(e, d, norm);
+    const double rounding = drape_step_equation_rounding(e, d, norm);
+    *finite = !isnan(rounding);
+    return size <= rounding;
 }
 
 /* KINSOL must never get a NaN: its norms ignore it, so it would look like convergence. After a line search
@@ -159,7 +161,7 @@ static int residual(N_Vector d_vector, N_Vector f, void *user)
         s->trial_evaluated = false;
         finite = drape_step_equation_evaluate(e, d);
     }
-    if (finite && is_rounding(s, d))
+    if (finite && is_rounding(s, d, &finite))
         N_VConst(0, f);
     else
         memcpy(N_VGetArrayPointer(f), e->f, e->dofs * sizeof *e->f);

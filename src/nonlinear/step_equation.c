@@ -22,7 +22,7 @@ drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, 
     s->g = drape_arena_take(arena, s->nodes, sizeof *s->g);
     s->f = drape_arena_take(arena, s->dofs, sizeof *s->f);
     s->weight = drape_arena_take(arena, s->dofs / 3, sizeof *s->weight);
-    s->probe = drape_arena_take(arena, s->dofs, sizeof *s->probe);
+    s->probe = drape_arena_take(arena, s->nodes, sizeof *s->probe);
     for (size_t i = 0; s->weight && i < s->dofs / 3; i++)
         s->weight[i] = 1;
     if (drape_system_contact(system))
@@ -136,19 +136,19 @@ void drape_step_equation_shift(double *nodes, size_t n)
 double drape_step_equation_rounding(drape_step_equation *s, const double *d, drape_norm norm)
 {
     norms sum = {0};
-    for (size_t i = 0; i < s->dofs; i++)
-        s->probe[i] = s->g[drape_step_equation_at(s, i)];
     drape_step_equation_shift(s->x, s->nodes);
     drape_step_equation_shift(s->v, s->nodes);
-    drape_system_force(s->system, &s->point, s->g);
+    drape_system_force(s->system, &s->point, s->probe);
+    drape_step_equation_begin(s);
+    drape_step_equation_move(s, d);
+    if (!drape_all_finite(s->probe, s->nodes))
+        return NAN;
     for (size_t i = 0; i < s->dofs; i++) {
         size_t at = drape_step_equation_at(s, i);
         double inertia = s->mass_weight * s->model->mass[at / 3] * (fabs(d[i]) + fabs(s->inertia[i]));
-        double error = fabs(s->g[at] - s->probe[i]) + DBL_EPSILON * (inertia + fabs(s->probe[i]));
+        double error = fabs(s->probe[at] - s->g[at]) + DBL_EPSILON * (inertia + fabs(s->g[at]));
         add_entry(&sum, DRAPE_ROUNDINGS * s->weight[i / 3] * error);
     }
-    drape_step_equation_begin(s);
-    drape_step_equation_evaluate(s, d);
     return choose(&sum, norm);
 }
 

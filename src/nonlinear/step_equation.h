@@ -39,7 +39,7 @@ typedef struct drape_step_equation {
     double *f;         /* free DOFs: F [N] */
 
     double *weight;  /* free nodes: of their residual in norms; 1 unless residual_bound.h sets others */
-    double *probe;   /* free DOFs: scratch of drape_step_equation_rounding and _diagnose */
+    double *probe;   /* nodes: scratch of drape_step_equation_rounding and _diagnose */
     double *x_ahead; /* nodes: the end of a step tested for contact; NULL without contact */
     drape_work work;
 } drape_step_equation;
@@ -81,7 +81,7 @@ void drape_step_equation_make_feasible(drape_step_equation *equation, double *p)
 /* The weighted norm of F. */
 double drape_step_equation_norm(const drape_step_equation *equation, drape_norm norm);
 
-/* The same norm of the rounding errors of F at d, where it was evaluated last and is evaluated again: how
+/* The same norm of the rounding errors of F at d, where it was evaluated last: how
  * much g changes if x and v are shifted by their own rounding errors, and that of the inertia. Forces that
  * cancel count in full. */
 double drape_step_equation_rounding(drape_step_equation *equation, const double *d, drape_norm norm);
