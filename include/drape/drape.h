@@ -563,6 +563,9 @@ typedef struct drape_statistics {
     double strain_min, strain_max; /* |e|/L - 1 over all edges and accepted steps */
     bool stability_known;   /* "static" found an equilibrium and the signs of its Hessian's eigenvalues */
     int64_t unstable_modes; /* number of negative eigenvalues: 0 for a stable equilibrium */
+    /* [N] bound on the residual that steps are solved to, for a node of mean mass: the tolerance of the scene
+     * unless the load of the nodes limits it; NAN: the integrator bounds no residual */
+    double tolerance;
 } drape_statistics;
 
 /* Returns a copy of the counts so far. */

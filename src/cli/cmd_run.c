@@ -216,6 +216,8 @@ static void print_newton(const drape_statistics *s)
         "newton    %lld iterations, %.3g an attempt; %lld residuals, %lld Jacobians, %lld factorizations\n",
         (long long)s->newton_iterations, attempts ? (double)s->newton_iterations / (double)attempts : 0.0,
         (long long)s->residuals, (long long)s->jacobians, (long long)s->factorizations);
+    if (!isnan(s->tolerance))
+        printf("tolerance %.4g N on the residual of a node\n", s->tolerance);
 }
 
 static void print_energy(const run *r)

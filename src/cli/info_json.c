@@ -297,6 +297,8 @@ json_t *cli_info_json(const cli_info *info)
     cli_chosen_entries(info->sim, entries);
     for (int i = 0; i < CLI_CHOSEN; i++)
         object = drape_json_with(object, entries[i].title, chosen(&entries[i], &info->sim->chosen));
+    object =
+        drape_json_with(object, "tolerance", drape_json_number(drape_sim_statistics(info->sim).tolerance));
     if (info->has_limit)
         object = drape_json_with(object, "stability", stability(&info->stability));
     object = drape_json_with(object, "terms", terms);

@@ -355,6 +355,9 @@ void cli_info_text(const cli_info *info)
     cli_chosen_entries(info->sim, entries);
     for (int i = 0; i < CLI_CHOSEN; i++)
         print_chosen(&entries[i], &info->sim->chosen);
+    const double tolerance = drape_sim_statistics(info->sim).tolerance;
+    if (!isnan(tolerance))
+        printf("\nsteps are solved to a residual of %.4g N on a node of mean mass\n", tolerance);
     print_stability(info);
     print_terms(info);
     print_costs(info);

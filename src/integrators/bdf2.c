@@ -160,6 +160,7 @@ const drape_integrator_ops drape_integrator_bdf2 = {
     .step = step,
     .restart = restart,
     .residual = drape_implicit_residual,
+    .tolerance = drape_implicit_tolerance,
     .work = drape_implicit_work,
     .archive = archive,
     .bytes = drape_implicit_bytes,

@@ -201,6 +201,11 @@ const double *drape_implicit_residual(const void *state)
     return ((const drape_implicit *)state)->equation.f;
 }
 
+double drape_implicit_tolerance(const void *state)
+{
+    return drape_newton_values(((const drape_implicit *)state)->newton)[DRAPE_NEWTON_TOLERANCE];
+}
+
 void drape_implicit_archive(void *state, drape_archive *a)
 {
     drape_newton_archive(((drape_implicit *)state)->newton, a);

@@ -29,6 +29,7 @@ drape_status drape_implicit_create(drape_arena *arena, drape_system *system, con
                                    void **state);
 void drape_implicit_restart(void *state, const drape_state *from);
 const double *drape_implicit_residual(const void *state);
+double drape_implicit_tolerance(const void *state);
 drape_work drape_implicit_work(const void *state);
 void drape_implicit_archive(void *state, drape_archive *a);
 size_t drape_implicit_bytes(const void *state);

@@ -70,6 +70,8 @@ typedef struct drape_integrator_ops {
     /* F of the free DOFs (3 free_count [N]) that the solver of the last step left. NULL: it solves no
      * equation. */
     const double *(*residual)(const void *state);
+    /* The bound on the weighted norm of F that it uses [N] (nonlinear/residual_bound.h). NULL: none. */
+    double (*tolerance)(const void *state);
     /* The level of effort of a step, if a deadline must be met: from 0, as the parameters say, to efforts -
      * 1, the cheapest. NULL: there is only one level. */
     int efforts;

@@ -11,6 +11,7 @@
  */
 #include "integrators/implicit.h"
 #include "nonlinear/inexact_newton.h"
+#include "nonlinear/residual_bound.h"
 
 #include <math.h>
 #include <string.h>
@@ -31,9 +32,10 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
     [PARAM_ITERATIONS] =
         DRAPE_INTEGER("iterations", "1", 1, 1, 1000, "inexact Newton iterations in each step"),
-    [PARAM_TOLERANCE] = DRAPE_NUMBER("tolerance", "N", 1e-6, DRAPE_ABOVE(0), 1e12,
-                                     "residual of the free nodes, largest component, below which no "
-                                     "iteration is made; not a bound on an accepted state"),
+    [PARAM_TOLERANCE] =
+        DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,
+                     "residual of the free nodes, largest component, below which no iteration is made, at "
+                     "most 1 % of their load; not a bound on an accepted state"),
     [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
                                               "up to so many further iterations while the residual is not "
                                               "below that of the guess; then the step is rejected"),
@@ -83,6 +85,9 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     memcpy(s->values, values, sizeof s->values);
     restart(s, NULL);
     drape_status status = drape_implicit_init(arena, system, &s->common);
+    if (!status)
+        status = drape_residual_bound_set(&s->common.equation, DRAPE_NORM_MAX, values[PARAM_TOLERANCE],
+                                          &s->values[PARAM_TOLERANCE]);
     for (int k = 0; k < 2; k++)
         s->past[k] = drape_arena_take(arena, s->common.equation.nodes, sizeof *s->past[k]);
     if (!status)
@@ -183,6 +188,11 @@ static void archive(void *state, drape_archive *a)
     drape_inexact_newton_archive(s->newton, a);
 }
 
+static double tolerance(const void *state)
+{
+    return ((const newton_k *)state)->values[PARAM_TOLERANCE];
+}
+
 static size_t bytes(const void *state)
 {
     return drape_inexact_newton_bytes(((const newton_k *)state)->newton);
@@ -200,6 +210,7 @@ const drape_integrator_ops drape_integrator_newton_k = {
     .restart = restart,
     .efforts = sizeof efforts / sizeof *efforts,
     .set_effort = set_effort,
+    .tolerance = tolerance,
     .work = work,
     .archive = archive,
     .bytes = bytes,

@@ -16,17 +16,28 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_STEPS  1000 /* of pseudo time */
 #define MAX_FAILS  40   /* in a row */
 #define MIN_FACTOR 0.02 /* of m from one step to the next */
 /* the same, used also while the residual does not fall: then the flow is far from its end */
 #define MAX_FACTOR  0.5
 #define FAIL_FACTOR 10.0 /* of m after a failure */
+#define STALLED     0.5  /* of the residual before: one that falls by less may be rounding */
+
+enum { PARAM_MAX_STEPS = DRAPE_NEWTON_PARAM_COUNT, PARAM_COUNT };
+
+static const drape_param params[PARAM_COUNT] = {
+    DRAPE_NEWTON_PARAMS,
+    [PARAM_MAX_STEPS] = DRAPE_INTEGER("max_pseudo_steps", "1", 1000, 1, 1e9,
+                                      "steps of the flow towards equilibrium before the attempt fails"),
+};
 
 typedef struct static_state {
     drape_implicit common; /* first */
     drape_arena *arena;
-    double *internal; /* of the terms, at the present step in pseudo time */
+    double *internal;               /* of the terms, at the present step in pseudo time */
+    double *best_x, *best_internal; /* nodes; internal variables: the step with the least static residual */
+    int max_steps;
+    double best; /* [N] that residual */
     bool stability_known;
     int64_t unstable_modes;
 } static_state;
@@ -37,10 +48,18 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     if (!s)
         return DRAPE_E_MEMORY;
     s->arena = arena;
+    s->max_steps = (int)values[PARAM_MAX_STEPS];
     drape_status status = drape_implicit_init_newton(arena, system, values, &s->common);
-    s->internal =
-        drape_arena_take(arena, (size_t)drape_system_model(system)->internal_count, sizeof *s->internal);
+    const drape_model *m = drape_system_model(system);
+    s->internal = drape_arena_take(arena, (size_t)m->internal_count, sizeof *s->internal);
+    s->best_internal = drape_arena_take(arena, (size_t)m->internal_count, sizeof *s->best_internal);
+    s->best_x = drape_arena_take(arena, 3 * (size_t)m->node_count, sizeof *s->best_x);
     return status ? status : drape_arena_status(arena);
+}
+
+static drape_norm norm_of(const static_state *s)
+{
+    return (drape_norm)drape_newton_values(s->common.newton)[DRAPE_NEWTON_NORM];
 }
 
 /* Sets the equation of a step in pseudo time from x. Colliders rest, and corrections are too large for
@@ -78,37 +97,49 @@ static drape_status pseudo_step(static_state *s, double mass_weight, drape_state
     return drape_system_begin(e->system, &(drape_state){.t = e->point.t, .x = out->x, .v = e->v_base});
 }
 
-/* The static residual where the equation was evaluated last: the largest component of grad E on the free
- * nodes. */
+/* The static residual: the norm of grad E on the free nodes where the equation was evaluated last, which
+ * replaces F. */
 static double static_residual(const static_state *s)
 {
     const drape_step_equation *e = &s->common.equation;
-    double max = 0;
-    for (size_t i = 0; i < e->dofs; i++)
-        max = fmax(max, fabs(e->g[drape_step_equation_at(e, i)]));
-    return max;
-}
-
-/* After a failure, reports the static residual at the end of the last successful step, not that of the
- * failed one. */
-static void report_residual(static_state *s, const drape_state *out, double tolerance, drape_step_info *info)
-{
-    drape_step_equation *e = &s->common.equation;
-    const drape_point point = {.x = out->x, .v = e->v_base, .internal = s->internal, .t = e->point.t};
-    drape_system_force(e->system, &point, e->g);
     for (size_t i = 0; i < e->dofs; i++)
         e->f[i] = e->g[drape_step_equation_at(e, i)];
-    info->diagnostic = drape_system_diagnose_dof(e->system, e->f, "residual [N]", tolerance);
-    info->residual = info->diagnostic.value;
+    return drape_step_equation_norm(e, norm_of(s));
 }
 
-/* Follows the flow until the static residual is within the tolerance. */
-static drape_status follow(static_state *s, double mass_weight, double tolerance, drape_state *out,
-                           drape_step_info *info)
+static void keep_best(static_state *s, const double *x, double residual)
 {
+    const drape_step_equation *e = &s->common.equation;
+    if (!(residual < s->best))
+        return;
+    s->best = residual;
+    memcpy(s->best_x, x, e->nodes * sizeof *x);
+    memcpy(s->best_internal, s->internal, (size_t)e->model->internal_count * sizeof *s->internal);
+}
+
+/* Goes back to the best step and reports its residual. */
+static void end_at_best(static_state *s, drape_state *out, double tolerance, drape_step_info *info)
+{
+    drape_step_equation *e = &s->common.equation;
+    if (isfinite(s->best)) {
+        memcpy(out->x, s->best_x, e->nodes * sizeof *out->x);
+        memcpy(s->internal, s->best_internal, (size_t)e->model->internal_count * sizeof *s->internal);
+    }
+    const drape_point point = {.x = out->x, .v = e->v_base, .internal = s->internal, .t = e->point.t};
+    drape_system_force(e->system, &point, e->g);
+    info->residual = static_residual(s);
+    info->diagnostic = drape_step_equation_diagnose(e, tolerance);
+}
+
+/* Follows the flow until the static residual is within the tolerance, or is the rounding error of its forces,
+ * below which the flow only wanders. */
+static drape_status follow(static_state *s, double mass_weight, drape_state *out, drape_step_info *info)
+{
+    const double tolerance = drape_implicit_tolerance(s);
     double last = NAN;
     int fails = 0;
-    for (int k = 0; k < MAX_STEPS && fails < MAX_FAILS; k++) {
+    s->best = INFINITY;
+    for (int k = 0; k < s->max_steps && fails < MAX_FAILS; k++) {
         drape_status status = pseudo_step(s, mass_weight, out, info);
         if (status < 0)
             return status;
@@ -118,17 +149,30 @@ static drape_status follow(static_state *s, double mass_weight, double tolerance
             continue;
         }
         fails = 0;
+        info->tolerance = tolerance;
         info->residual = static_residual(s);
+        keep_best(s, out->x, info->residual);
+        info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
         if (info->residual <= tolerance)
             return DRAPE_OK;
+        const bool falls = isnan(last) || info->residual < STALLED * last;
+        const double rounding =
+            falls ? 0 : drape_step_equation_rounding(&s->common.equation, s->common.d, norm_of(s));
+        if (info->residual <= rounding) {
+            end_at_best(s, out, rounding, info);
+            info->reason = drape_reason_name(DRAPE_REASON_ROUNDING);
+            info->tolerance = rounding;
+            return DRAPE_OK;
+        }
         if (!isnan(last))
             mass_weight *= fmin(MAX_FACTOR, fmax(MIN_FACTOR, info->residual / last));
         last = info->residual;
     }
     if (fails == 0)
         info->reason = drape_reason_name(DRAPE_REASON_STALLED);
-    report_residual(s, out, tolerance, info);
-    return DRAPE_E_SOLVER;
+    info->tolerance = tolerance;
+    end_at_best(s, out, tolerance, info);
+    return info->lenient && isfinite(s->best) ? DRAPE_RETRY_NONLINEAR : DRAPE_E_SOLVER;
 }
 
 static drape_status judge_stability(static_state *s, const drape_state *out)
@@ -151,21 +195,20 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     const drape_step_equation *e = &s->common.equation;
     const size_t internal_bytes = (size_t)e->model->internal_count * sizeof *s->internal;
     const double *values = drape_newton_values(s->common.newton);
-    double dt = values[DRAPE_NEWTON_DT], tolerance = values[DRAPE_NEWTON_TOLERANCE];
+    const double dt = values[DRAPE_NEWTON_DT];
     info->h = h;
+    info->lenient = values[DRAPE_NEWTON_ON_FAILURE] == DRAPE_NEWTON_FAILURE_ACCEPT;
     drape_implicit_base(&s->common, in, out->t, 1);
     memcpy(out->x, e->x_base, e->nodes * sizeof *out->x);
     memset(out->v, 0, e->nodes * sizeof *out->v);
     memcpy(s->internal, in->internal, internal_bytes);
-    drape_status status = follow(s, 1 / (dt * dt), tolerance, out, info);
-    info->tolerance = tolerance;
-    info->usable = false;
-    if (status)
+    drape_status status = follow(s, 1 / (dt * dt), out, info);
+    info->usable = status > 0;
+    if (status < 0)
         return status;
     memcpy(out->internal, s->internal, internal_bytes);
     info->committed = true;
-    info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
-    return judge_stability(s, out);
+    return status ? status : judge_stability(s, out);
 }
 
 static drape_work work(const void *state)
@@ -190,13 +233,14 @@ const drape_integrator_ops drape_integrator_static = {
               .summary =
                   "equilibrium by Newton with pseudo-transient continuation; reports whether it is stable",
               .reference = "Kelley & Keyes 1998, Convergence analysis of pseudo-transient continuation",
-              DRAPE_PARAMS(drape_newton_params)},
+              DRAPE_PARAMS(params)},
     .order = 0,
     .create = create,
     .own_steps = true,
     .steady_state = true,
     .step = step,
     .restart = drape_implicit_restart,
+    .tolerance = drape_implicit_tolerance,
     .work = work,
     .archive = archive,
     .bytes = drape_implicit_bytes,

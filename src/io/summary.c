@@ -167,6 +167,7 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     object = drape_json_with(object, "time", drape_json_number(drape_sim_time(sim)));
     object = drape_json_with(object, "steps", steps(sim, &s));
     object = drape_json_with(object, "newton", newton(&s));
+    object = drape_json_with(object, "tolerance", drape_json_number(s.tolerance));
     object = drape_json_with(object, "wall_s", wall(def, &s));
     object = drape_json_with(object, "energy", energy(sim));
     object = drape_json_with(object, "strain", strain(&s));

@@ -75,6 +75,16 @@ static bool advance(drape_inexact_newton *s, double *d)
     return false;
 }
 
+/* A residual that does not fall may be the rounding error of its forces. */
+static bool is_rounding(drape_step_equation *e, const double *d, drape_solve_report *report)
+{
+    const double residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
+    if (!(residual <= drape_step_equation_rounding(e, d, DRAPE_NORM_MAX)))
+        return false;
+    report->reason = drape_reason_name(DRAPE_REASON_ROUNDING);
+    return true;
+}
+
 static drape_status iterate(drape_inexact_newton *s, const drape_inexact_settings *settings, double *d,
                             drape_solve_report *report)
 {
@@ -89,6 +99,8 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;
         report->reason = drape_reason_name(converged ? DRAPE_REASON_CONVERGED : DRAPE_REASON_ITERATIONS);
         if (converged || (i >= settings->iterations && drape_step_equation_dot(e, e->f, e->f) < first))
+            return DRAPE_OK;
+        if (i >= settings->iterations && is_rounding(e, d, report))
             return DRAPE_OK;
         if (i >= settings->iterations + settings->rescue_iterations) {
             report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
@@ -113,7 +125,7 @@ drape_status drape_inexact_newton_solve(drape_inexact_newton *s, const drape_ine
     *report = (drape_solve_report){.tolerance = NAN}; /* the residual is reported but not bounded */
     drape_status status = iterate(s, settings, d, report);
     report->residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
-    drape_step_equation_diagnose(e, settings->tolerance, report);
+    report->diagnostic = drape_step_equation_diagnose(e, settings->tolerance);
     if (status == DRAPE_RETRY_NONFINITE) {
         report->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
         return drape_step_equation_find_cause(e, status, report);

@@ -32,6 +32,7 @@
 
 #include "base/finite.h"
 #include "base/reason.h"
+#include "nonlinear/residual_bound.h"
 #include "nonlinear/stress_predictor.h"
 #include "solvers/sun_linear.h"
 #include "solvers/sundials_memory.h"
@@ -59,6 +60,7 @@
 #define SHARE_GROWTH   4    /* factor from one share tried to the next */
 #define MAX_PREDICTION 8    /* corrections in a solve, after which stress is no longer predicted */
 #define MAX_CHORDS     2    /* chord steps for each correction */
+#define STALLED        0.5  /* of the residual before: if no more is gained, it may be rounding */
 
 struct drape_newton {
     drape_step_equation *equation;
@@ -67,6 +69,7 @@ struct drape_newton {
     SUNContext sun;
     void *kin;
     N_Vector unknown, ones; /* unknown wraps the caller's d during a solve */
+    N_Vector weights;       /* of the components of F in its norm */
     drape_sun_linear *linear;
     drape_stress_predictor predictor; /* if it searches */
     double *trial;                    /* free DOFs: where the line search was last; NULL unless it searches */
@@ -79,6 +82,7 @@ struct drape_newton {
 
     /* Kept between the iterations of one solve. */
     int corrections;
+    double residual;       /* weighted, largest component, at the last iterate that KINSOL evaluated */
     double positive_share; /* of the positive parts, requested for the present matrix; after a line search,
                               for the next one; with `project` every matrix has all of them */
     bool trial_evaluated;  /* the last evaluation was at `trial`, and F is finite there */
@@ -93,14 +97,12 @@ static int return_status(drape_newton *s, drape_status status)
     return status;
 }
 
-/* KINSOL compares the largest component of F with this bound, which implies the tolerance in the requested
- * norm. */
+/* KINSOL compares the largest weighted component of F with this bound, which implies the tolerance in the
+ * requested norm. */
 static double max_norm_bound(const drape_newton *s)
 {
-    double tolerance = s->values[DRAPE_NEWTON_TOLERANCE], n = (double)s->equation->dofs;
-    if (s->values[DRAPE_NEWTON_NORM] == DRAPE_NORM_L1)
-        return tolerance / n;
-    return s->values[DRAPE_NEWTON_NORM] == DRAPE_NORM_L2 ? tolerance / sqrt(n) : tolerance;
+    return drape_residual_component(s->values[DRAPE_NEWTON_TOLERANCE],
+                                    (drape_norm)s->values[DRAPE_NEWTON_NORM], (double)s->equation->dofs);
 }
 
 /* ---- Guess ---- */
@@ -110,6 +112,7 @@ static void begin(drape_newton *s)
     drape_step_equation *e = s->equation;
     drape_step_equation_begin(e);
     s->corrections = 0;
+    s->residual = INFINITY;
     s->positive_share = 0;
     s->trial_evaluated = false;
     s->failure = DRAPE_OK;
@@ -135,8 +138,23 @@ static void improve_guess(drape_newton *s, double *d)
 
 /* ---- Residual ---- */
 
+/* Whether F has stopped falling because it is the rounding error of its forces. */
+static bool is_rounding(drape_newton *s, const double *d, bool *finite)
+{
+    drape_step_equation *e = s->equation;
+    const double before = s->residual;
+    s->residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
+    if (s->residual <= max_norm_bound(s) || !(s->residual > STALLED * before) || s->positive_share > 0)
+        return false;
+    const drape_norm norm = (drape_norm)s->values[DRAPE_NEWTON_NORM];
+    const double size = drape_step_equation_norm(e, norm);
+    const double rounding = drape_step_equation_rounding(e, d, norm);
+    *finite = !isnan(rounding);
+    return size <= rounding;
+}
+
 /* KINSOL must never get a NaN: its norms ignore it, so it would look like convergence. After a line search
- * F is known already. */
+ * F is known already. An F that is only rounding is given to KINSOL as 0, which ends its loop. */
 static int residual(N_Vector d_vector, N_Vector f, void *user)
 {
     drape_newton *s = user;
@@ -147,7 +165,10 @@ static int residual(N_Vector d_vector, N_Vector f, void *user)
         s->trial_evaluated = false;
         finite = drape_step_equation_evaluate(e, d);
     }
-    memcpy(N_VGetArrayPointer(f), e->f, e->dofs * sizeof *e->f);
+    if (finite && is_rounding(s, d, &finite))
+        N_VConst(0, f);
+    else
+        memcpy(N_VGetArrayPointer(f), e->f, e->dofs * sizeof *e->f);
     return drape_system_status(e->system) ? -1 : finite ? 0 : 1;
 }
 
@@ -284,11 +305,11 @@ static double search_along(drape_newton *s, const double *d, const double *p, do
     return low > 0 ? low : a;
 }
 
-static double largest(const double *f, size_t n)
+static double largest(const drape_step_equation *e, const double *f)
 {
     double max = 0;
-    for (size_t i = 0; i < n; i++)
-        max = fmax(max, fabs(f[i]));
+    for (size_t i = 0; i < e->dofs; i++)
+        max = fmax(max, e->weight[i / 3] * fabs(f[i]));
     return max;
 }
 
@@ -299,8 +320,7 @@ static double largest(const double *f, size_t n)
 static drape_status add_chords(drape_newton *s, const double *d, double *p, const double *minus_f)
 {
     drape_step_equation *e = s->equation;
-    double bound = max_norm_bound(s), before = largest(e->f, e->dofs),
-           rate = before / largest(minus_f, e->dofs);
+    double bound = max_norm_bound(s), before = largest(e, e->f), rate = before / largest(e, minus_f);
     for (int left = MAX_CHORDS; left > 0 && before > bound && before * drape_pow(rate, left) <= bound;
          left--) {
         for (size_t i = 0; i < e->dofs; i++)
@@ -311,7 +331,7 @@ static drape_status add_chords(drape_newton *s, const double *d, double *p, cons
         for (size_t i = 0; i < e->dofs; i++)
             s->trial[i] = d[i] + (p[i] + s->chord[i]);
         s->trial_evaluated = drape_step_equation_evaluate(e, s->trial);
-        double after = s->trial_evaluated ? largest(e->f, e->dofs) : INFINITY;
+        double after = s->trial_evaluated ? largest(e, e->f) : INFINITY;
         if (!(after < before)) {
             s->trial_evaluated = false;
             return DRAPE_OK;
@@ -409,7 +429,7 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     bool finite = !status || drape_step_equation_evaluate(e, d);
     report->tolerance = tolerance;
     report->residual = finite ? drape_step_equation_norm(e, norm) : NAN;
-    drape_step_equation_diagnose(e, tolerance, report);
+    report->diagnostic = drape_step_equation_diagnose(e, tolerance);
     if (report->residual <= tolerance) {
         report->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
         return DRAPE_OK;
@@ -468,7 +488,7 @@ drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *
     N_VSetArrayPointer(d, s->unknown);
     int strategy =
         s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_LINE_SEARCH ? KIN_LINESEARCH : KIN_NONE;
-    return conclude(s, KINSol(s->kin, s->unknown, strategy, s->ones, s->ones), d, report);
+    return conclude(s, KINSol(s->kin, s->unknown, strategy, s->ones, s->weights), d, report);
 }
 
 /* ---- Creation and destruction ---- */
@@ -505,9 +525,12 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s)
     drape_system *system = s->equation->system;
     const int64_t n = (int64_t)s->equation->dofs;
     if (drape_sundials_context(&s->sun) || !(s->kin = KINCreate(s->sun)) ||
-        !(s->unknown = N_VMake_Serial(n, s->equation->f, s->sun)) || !(s->ones = N_VNew_Serial(n, s->sun)))
+        !(s->unknown = N_VMake_Serial(n, s->equation->f, s->sun)) || !(s->ones = N_VNew_Serial(n, s->sun)) ||
+        !(s->weights = N_VNew_Serial(n, s->sun)))
         return drape_fail_memory(ctx, (size_t)n * sizeof(double));
     N_VConst(1, s->ones);
+    for (int64_t i = 0; i < n; i++)
+        N_VGetArrayPointer(s->weights)[i] = s->equation->weight[i / 3];
     if (n == 0)
         return DRAPE_OK;
     drape_status status =
@@ -536,7 +559,11 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
     if (s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_AUTO)
         s->values[DRAPE_NEWTON_GLOBALIZATION] = DRAPE_NEWTON_GLOBAL_WORK;
     s->searches = s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_WORK;
-    drape_status status = s->searches ? create_search(arena, s) : DRAPE_OK;
+    drape_status status =
+        drape_residual_bound_set(equation, (drape_norm)values[DRAPE_NEWTON_NORM],
+                                 values[DRAPE_NEWTON_TOLERANCE], &s->values[DRAPE_NEWTON_TOLERANCE]);
+    if (!status && s->searches)
+        status = create_search(arena, s);
     return status ? status : create_solver(arena, s);
 }
 
@@ -552,6 +579,8 @@ void drape_newton_destroy(drape_newton **newton)
         N_VDestroy(s->unknown);
     if (s->ones)
         N_VDestroy(s->ones);
+    if (s->weights)
+        N_VDestroy(s->weights);
     if (s->sun)
         SUNContext_Free(&s->sun);
     *newton = NULL;
@@ -614,7 +643,7 @@ drape_work drape_newton_work(const drape_newton *s)
     return work;
 }
 
-#define KINSOL_VECTORS 7 /* six of its own, and the weights */
+#define KINSOL_VECTORS 8 /* six of its own, and two of weights */
 
 size_t drape_newton_bytes(const drape_newton *s)
 {

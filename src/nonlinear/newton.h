@@ -36,13 +36,17 @@ extern const char *const drape_newton_predictors[];
 /* The list of an integrator without parameters of its own. */
 extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
 
+/* The default of tolerance, which residual_bound.h derives. */
+#define DRAPE_TOLERANCE_WORDS "3e-4 of the load of each node"
+
 /* The beginning of the list of an integrator with further parameters, the first of which has the index
  * DRAPE_NEWTON_PARAM_COUNT. Each parameter is one value, so these are also the indices of the values. */
 #define DRAPE_NEWTON_PARAMS                                                                                  \
     [DRAPE_NEWTON_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),              \
     [DRAPE_NEWTON_TOLERANCE] =                                                                               \
-        DRAPE_NUMBER("tolerance", "N", 1e-6, DRAPE_ABOVE(0), 1e12,                                           \
-                     "bound on the residual of the free nodes of an accepted state, measured by norm"),      \
+        DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,           \
+                     "bound on the residual of the free nodes of an accepted state, measured by norm; at "   \
+                     "most 1 % of their load"),                                                              \
     [DRAPE_NEWTON_NORM] =                                                                                    \
         DRAPE_CHOICE("norm", DRAPE_NORM_MAX, drape_newton_norms,                                             \
                      "norm of the residual: largest component, sum, or root of the sum of squares"),         \
@@ -102,7 +106,7 @@ drape_status drape_newton_solve(drape_newton *newton, double *d, drape_solve_rep
 drape_status drape_newton_matrix(drape_newton *newton, const drape_point *point, double mass_weight,
                                  const drape_pattern **pattern, const double **values);
 
-/* The parameter values it was made with, in the order of drape_newton_params. */
+/* The parameter values it was made with, in the order of drape_newton_params; the tolerance as it is used. */
 const double *drape_newton_values(const drape_newton *newton);
 
 /* From now on the factors belong to another equation, so modified Newton must not reuse them. */

@@ -7,9 +7,6 @@
 #include <math.h>
 #include <string.h>
 
-/* rounding errors of each term of a residual: its own, that of its product, that of the sum */
-#define ROUNDINGS 4
-
 drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, drape_step_equation *s)
 {
     const drape_model *model = drape_system_model(system);
@@ -24,6 +21,10 @@ drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, 
     s->v = drape_arena_take(arena, s->nodes, sizeof *s->v);
     s->g = drape_arena_take(arena, s->nodes, sizeof *s->g);
     s->f = drape_arena_take(arena, s->dofs, sizeof *s->f);
+    s->weight = drape_arena_take(arena, s->dofs / 3, sizeof *s->weight);
+    s->probe = drape_arena_take(arena, s->nodes, sizeof *s->probe);
+    for (size_t i = 0; s->weight && i < s->dofs / 3; i++)
+        s->weight[i] = 1;
     if (drape_system_contact(system))
         s->x_ahead = drape_arena_take(arena, s->nodes, sizeof *s->x_ahead);
     s->point = (drape_point){.x = s->x, .v = s->v};
@@ -112,26 +113,50 @@ double drape_step_equation_norm(const drape_step_equation *s, drape_norm norm)
 {
     norms sum = {0};
     for (size_t i = 0; i < s->dofs; i++)
-        add_entry(&sum, s->f[i]);
+        add_entry(&sum, s->weight[i / 3] * s->f[i]);
     return choose(&sum, norm);
 }
 
+void drape_step_equation_shift(double *nodes, size_t n)
+{
+    for (size_t i = 0; i < n; i += 3) {
+        const double size = fmax(fabs(nodes[i]), fmax(fabs(nodes[i + 1]), fabs(nodes[i + 2])));
+        for (size_t k = i; k < i + 3; k++) {
+            /* signs without a pattern that a mesh could have: bits of the multiples of the golden ratio */
+            const bool up = (uint32_t)k * 2654435769u >> 31;
+            nodes[k] += up ? DBL_EPSILON * size : -DBL_EPSILON * size;
+        }
+    }
+}
+
 /* The rounding error of a term is some DBL_EPSILON times the term. At small h the inertia of a node in
- * flight, M |v|/h, is more than 1e16 times a tight tolerance, and halving h doubles it. */
-double drape_step_equation_rounding(const drape_step_equation *s, const double *d, drape_norm norm)
+ * flight, M |v|/h, is more than 1e16 times a tight tolerance, and halving h doubles it. Internal forces have
+ * that of their stiffness times the positions, which is far above that of their sum in a stiff sheet at
+ * rest. */
+double drape_step_equation_rounding(drape_step_equation *s, const double *d, drape_norm norm)
 {
     norms sum = {0};
+    drape_step_equation_shift(s->x, s->nodes);
+    drape_step_equation_shift(s->v, s->nodes);
+    drape_system_force(s->system, &s->point, s->probe);
+    drape_step_equation_begin(s);
+    drape_step_equation_move(s, d);
+    if (!drape_all_finite(s->probe, s->nodes))
+        return NAN;
     for (size_t i = 0; i < s->dofs; i++) {
         size_t at = drape_step_equation_at(s, i);
         double inertia = s->mass_weight * s->model->mass[at / 3] * (fabs(d[i]) + fabs(s->inertia[i]));
-        add_entry(&sum, ROUNDINGS * DBL_EPSILON * (inertia + fabs(s->g[at])));
+        double error = fabs(s->probe[at] - s->g[at]) + DBL_EPSILON * (inertia + fabs(s->g[at]));
+        add_entry(&sum, DRAPE_ROUNDINGS * s->weight[i / 3] * error);
     }
     return choose(&sum, norm);
 }
 
-void drape_step_equation_diagnose(const drape_step_equation *s, double tolerance, drape_solve_report *report)
+drape_diagnostic drape_step_equation_diagnose(const drape_step_equation *s, double tolerance)
 {
-    report->diagnostic = drape_system_diagnose_dof(s->system, s->f, "residual [N]", tolerance);
+    for (size_t i = 0; i < s->dofs; i++)
+        s->probe[i] = s->weight[i / 3] * s->f[i];
+    return drape_system_diagnose_dof(s->system, s->probe, "residual [N]", tolerance);
 }
 
 drape_status drape_step_equation_find_cause(const drape_step_equation *s, drape_status status,

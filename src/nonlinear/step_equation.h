@@ -38,6 +38,8 @@ typedef struct drape_step_equation {
     double *x, *v, *g; /* nodes: g(x, v) [N] */
     double *f;         /* free DOFs: F [N] */
 
+    double *weight;  /* free nodes: of their residual in norms; 1 unless residual_bound.h sets others */
+    double *probe;   /* nodes: scratch of drape_step_equation_rounding and _diagnose */
     double *x_ahead; /* nodes: the end of a step tested for contact; NULL without contact */
     drape_work work;
 } drape_step_equation;
@@ -76,13 +78,22 @@ void drape_step_equation_jacobian(drape_step_equation *equation, const double *s
 /* Shortens a step p from the last point to its largest feasible fraction. */
 void drape_step_equation_make_feasible(drape_step_equation *equation, double *p);
 
-/* The norm of F; a bound on the norm of its rounding errors at d. */
+/* The weighted norm of F. */
 double drape_step_equation_norm(const drape_step_equation *equation, drape_norm norm);
-double drape_step_equation_rounding(const drape_step_equation *equation, const double *d, drape_norm norm);
 
-/* Reports the free node with the largest residual. */
-void drape_step_equation_diagnose(const drape_step_equation *equation, double tolerance,
-                                  drape_solve_report *report);
+/* The same norm of the rounding errors of F at d, where it was evaluated last: how
+ * much g changes if x and v are shifted by their own rounding errors, and that of the inertia. Forces that
+ * cancel count in full. */
+double drape_step_equation_rounding(drape_step_equation *equation, const double *d, drape_norm norm);
+
+/* Multiple of DBL_EPSILON within which errors of a computed force are taken as rounding. */
+#define DRAPE_ROUNDINGS 4
+
+/* Changes each number of n, three a node, by DBL_EPSILON times the largest of its node, up or down. */
+void drape_step_equation_shift(double *nodes, size_t n);
+
+/* Describes the free node with the largest weighted residual. */
+drape_diagnostic drape_step_equation_diagnose(const drape_step_equation *equation, double tolerance);
 
 /* For numbers that are not finite: returns DRAPE_RETRY_DEGENERATE and reports the element that collapsed,
  * if there is one; otherwise returns status. */

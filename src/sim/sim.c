@@ -74,6 +74,22 @@ static drape_status create_integrator(drape_sim *sim)
     return status;
 }
 
+static double tolerance_of(const drape_sim *sim)
+{
+    const drape_integrator_ops *integrator = sim->chosen.integrator;
+    return integrator->tolerance ? integrator->tolerance(sim->integrator) : NAN;
+}
+
+static void note_tolerance(const drape_sim *sim)
+{
+    const double given = drape_chosen_integrator_value(&sim->chosen, "tolerance", NAN),
+                 used = tolerance_of(sim);
+    if (used < given)
+        drape_log(sim->ctx, DRAPE_LOG_WARNING,
+                  "/integrator/tolerance: %.4g N is more than 1 %% of the load of a node: %.4g N is used",
+                  given, used);
+}
+
 static drape_stepping stepping_of(const drape_chosen *chosen)
 {
     if (chosen->integrator->own_steps)
@@ -115,6 +131,7 @@ static drape_status start_sim(drape_sim *sim, int threads)
         status = drape_check_cancel(sim->ctx);
     if (status)
         return status;
+    note_tolerance(sim);
     drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
                         drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
     sim->max_attempts = drape_chosen_controller_value(&sim->chosen, "max_attempts", INFINITY);
@@ -233,6 +250,7 @@ drape_statistics drape_sim_statistics(const drape_sim *sim)
     s.residuals = work.residuals;
     s.stability_known = work.stability_known;
     s.unstable_modes = work.unstable_modes;
+    s.tolerance = tolerance_of(sim);
     s.wall_residual = work.residual_seconds;
     s.wall_jacobian = work.jacobian_seconds;
     s.wall_factor = work.factor_seconds;

@@ -466,7 +466,9 @@ def test_info():
     equal(terms["damp.kelvin_voigt"]["acts_on"], 54)
     equal(terms["gravity"]["nonzeros"], 0)
     equal(terms["bend.hinge"]["nonzeros"], found["nnz"])
-    assert found["integrator"]["parameters"]["tolerance"] == {"value": 1e-6, "unit": "N", "default": True}
+    assert found["integrator"]["parameters"]["tolerance"] == {"value": "3e-4 of the load of each node", "unit": "N", "default": True}
+    weight = 9.81 * found["cloths"][0]["mass"] / found["nodes"]
+    assert 1e-4 < found["tolerance"] / weight < 1e-3 # 3e-4 of the load of a free node
     assert found["integrator"]["parameters"]["dt"]["default"] is False
     assert found["iteration"]["factored"] and found["iteration"]["factor_s"] > 0
     equal(found["bytes"]["total"], sum(v for k, v in found["bytes"].items() if k not in ("total", "a_node")))

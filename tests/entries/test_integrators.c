@@ -217,10 +217,13 @@ END_TEST
 
 /* ---- What a step reports ---- */
 
-/* The residual of backward Euler at out, from the states only: M (v1 - v0)/h + g(x1, v1) over free nodes. */
+/* The residual of backward Euler at out, from the states only: M (v1 - v0)/h + g(x1, v1) over free nodes, for
+ * the mean of their masses, to which bounds that follow the load are proportional. */
 static double residual_of(stepper *s, double h, double *history, double *g)
 {
-    double worst = 0;
+    double worst = 0, mass = 0;
+    for (size_t i = 0; i < s->n; i += 3)
+        mass += s->model->pinned[i / 3] ? 0 : s->model->mass[i / 3] / s->model->free_count;
     drape_system_measures(s->system, &(drape_point){.x = s->in.x, .internal = s->in.internal}, history);
     for (int64_t i = 0; i < s->model->measure_count; i++)
         history[i] /= -h;
@@ -228,7 +231,8 @@ static double residual_of(stepper *s, double h, double *history, double *g)
         .x = s->out.x, .v = s->out.v, .internal = s->in.internal, .weight = 1 / h, .history = history};
     drape_system_force(s->system, &point, g);
     for (size_t i = 0; i < s->n; i++) {
-        double f = s->model->mass[i / 3] * (s->out.v[i] - s->in.v[i]) / h + g[i];
+        double f =
+            mass / s->model->mass[i / 3] * (s->model->mass[i / 3] * (s->out.v[i] - s->in.v[i]) / h + g[i]);
         worst = fmax(worst, s->model->pinned[i / 3] ? 0 : fabs(f));
     }
     return worst;
@@ -255,7 +259,6 @@ static void check_residual(const drape_integrator_ops *ops, const double *values
         }
         double actual = residual_of(&s, h, history, g);
         ck_assert_str_eq(info.reason, "converged");
-        ck_assert_double_eq(info.tolerance, values[param_of(ops, "tolerance")]);
         ck_assert_double_le(info.residual, info.tolerance);
         ck_assert_msg(actual <= info.residual + 1e-11, "%s, %s: step %d has a residual of %g, not %g",
                       ops->entry.name, what, k, actual, info.residual);

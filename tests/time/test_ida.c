@@ -213,6 +213,18 @@ START_TEST(max_step_is_kept)
 }
 END_TEST
 
+/* Two thousand steps of 1e-4 s end within their rounding errors of 0.2 s, but not there. */
+START_TEST(an_advance_ends_at_its_end)
+{
+    scene s = sheet(HUNG, 1e-2, ", 'max_step': 1e-4");
+    for (double end = 0.2; end < 0.4; end += 0.1) {
+        scene_advance(&s, end);
+        ck_assert_double_eq(drape_sim_time(s.sim), end);
+    }
+    scene_close(&s);
+}
+END_TEST
+
 /* A step ends at every key within it, to the last bit, and the next one starts small: IDA has no history
  * there. Its first step is at most a thousandth of the time left, or 1/2 over the norm of the rates; here
  * less than a fifth of the step before. */
@@ -545,8 +557,8 @@ END_TEST
 
 SUITE("ida", error_falls_with_rtol_in_order_2, error_falls_with_rtol_in_order_5,
       error_falls_with_rtol_over_kinks_of_tracks, atol_x_and_atol_v_are_the_weights,
-      a_scene_far_away_takes_the_same_steps, max_step_is_kept, steps_end_at_kinks_and_start_anew,
-      an_advance_that_ends_at_a_kink_starts_anew_too, frames_are_what_a_run_that_stops_there_has,
-      frames_do_not_change_the_steps, one_fault_is_recovered_from, a_fault_that_stays_ends_the_run,
-      too_many_steps_end_the_run, steps_that_a_host_asks_for_are_not_counted,
+      a_scene_far_away_takes_the_same_steps, max_step_is_kept, an_advance_ends_at_its_end,
+      steps_end_at_kinks_and_start_anew, an_advance_that_ends_at_a_kink_starts_anew_too,
+      frames_are_what_a_run_that_stops_there_has, frames_do_not_change_the_steps, one_fault_is_recovered_from,
+      a_fault_that_stays_ends_the_run, too_many_steps_end_the_run, steps_that_a_host_asks_for_are_not_counted,
       an_advance_by_one_ulp_is_no_failure, half_of_the_matrix_does_as_well)

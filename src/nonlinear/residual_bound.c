@@ -1,0 +1,123 @@
+/* residual_bound.c: see residual_bound.h. */
+#include "nonlinear/residual_bound.h"
+
+#include "base/vec3.h"
+
+#include <math.h>
+#include <string.h>
+
+/* A mean load below this multiple of the rounding error of the forces is not one. */
+#define ABOVE_ROUNDING 100
+
+/* ---- The forces at the start ---- */
+
+typedef struct start {
+    double load;     /* [N] sum over the free nodes of |g| */
+    double rounding; /* [N] largest rounding error of a component of g */
+} start;
+
+/* Of the terms alone: contact needs a step to compare with. */
+static void add_terms(drape_system *system, const drape_state *at, double *g)
+{
+    const drape_model *m = drape_system_model(system);
+    const drape_point point = {.x = at->x, .v = at->v, .internal = at->internal};
+    memset(g, 0, 3 * (size_t)m->node_count * sizeof *g);
+    for (int32_t i = 0; i < m->term_count; i++)
+        drape_system_term(system, i, &point, NULL, g, NULL);
+}
+
+static drape_status measure_start(drape_system *system, start *out)
+{
+    const drape_model *m = drape_system_model(system);
+    const size_t n = 3 * (size_t)m->node_count;
+    drape_arena arena = drape_arena_of(m->ctx);
+    drape_state state;
+    double *g = drape_arena_take(&arena, n, sizeof *g), *shifted = drape_arena_take(&arena, n, sizeof *g);
+    drape_status status = drape_state_create(&arena, m, &state);
+    if (!status)
+        status = drape_arena_status(&arena);
+    *out = (start){0};
+    if (!status) {
+        add_terms(system, &state, g);
+        drape_step_equation_shift(state.x, n);
+        drape_step_equation_shift(state.v, n);
+        add_terms(system, &state, shifted);
+        for (int32_t f = 0; f < m->free_count; f++) {
+            const size_t at = 3 * (size_t)m->node_of_free[f];
+            out->load += vec3_norm(g + at);
+            for (size_t k = at; k < at + 3; k++)
+                out->rounding = fmax(out->rounding, DRAPE_ROUNDINGS * fabs(shifted[k] - g[k]));
+        }
+    }
+    drape_arena_free(&arena);
+    return status;
+}
+
+/* ---- The load of a node ---- */
+
+static double least_bending(const drape_model *m)
+{
+    double least = INFINITY;
+    for (int32_t c = 0; c < m->cloth_count; c++) {
+        const drape_material *s = &m->cloths[c].material;
+        double d = isnan(s->bending_warp) ? s->flexural_rigidity : fmin(s->bending_warp, s->bending_weft);
+        if (d > 0)
+            least = fmin(least, d / (s->areal_density * m->length * m->length * m->length));
+    }
+    return least;
+}
+
+static double acceleration_of(const drape_model *m, const start *at, double mass)
+{
+    const double gravity = vec3_norm(m->gravity);
+    if (gravity > 0)
+        return gravity;
+    double a = fmin(m->length, least_bending(m)); /* over (1 s)^2 */
+    if (at->load > ABOVE_ROUNDING * at->rounding * m->free_count)
+        a = fmin(a, at->load / mass);
+    return a;
+}
+
+/* ---- Bounds ---- */
+
+/* What a bound on each component is in a norm over n of them, if all are at the bound. */
+static double in_norm(double component, drape_norm norm, double n)
+{
+    return norm == DRAPE_NORM_L1 ? component * n : norm == DRAPE_NORM_L2 ? component * sqrt(n) : component;
+}
+
+double drape_residual_component(double bound, drape_norm norm, double n)
+{
+    return norm == DRAPE_NORM_L1 ? bound / n : norm == DRAPE_NORM_L2 ? bound / sqrt(n) : bound;
+}
+
+/* given: of a component; NAN: none */
+static double bound_of(double load, double given, double rounding)
+{
+    double wanted = isnan(given) ? fmax(DRAPE_LOAD_SHARE * load, rounding) : given;
+    return fmin(wanted, DRAPE_MAX_LOAD_SHARE * load);
+}
+
+drape_status drape_residual_bound_set(drape_step_equation *e, drape_norm norm, double given,
+                                      double *tolerance)
+{
+    const drape_model *m = e->model;
+    const double component = drape_residual_component(given, norm, (double)e->dofs);
+    double mass = 0;
+    start at;
+    *tolerance = given;
+    if (e->dofs == 0)
+        return DRAPE_OK;
+    drape_status status = measure_start(e->system, &at);
+    if (status)
+        return status;
+    for (int32_t f = 0; f < m->free_count; f++)
+        mass += m->mass[m->node_of_free[f]];
+    const double a = acceleration_of(m, &at, mass);
+    const double mean = bound_of(a * mass / m->free_count, component, at.rounding);
+    for (int32_t f = 0; f < m->free_count; f++)
+        e->weight[f] = mean / bound_of(a * m->mass[m->node_of_free[f]], component, at.rounding);
+    if (mean != component)
+        *tolerance = in_norm(mean, norm, (double)e->dofs);
+    return DRAPE_OK;
+}

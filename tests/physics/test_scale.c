@@ -1,0 +1,257 @@
+/*
+ * test_scale.c: cloth of any size and weight moves as it should, by default settings: sheets that fall
+ * freely, and clamped strips that sag, from 1 mm to 100 m and from 1e-4 to 10 kg/m2, by every integrator.
+ *
+ * Scenes are similar: lengths are in units of the size L, times of sqrt(L/g), and the stiffnesses follow the
+ * weight. So each number below is the same for all of them up to rounding, unless an absolute constant acts.
+ */
+#include "integrators/integrator.h"
+#include "support/scene.h"
+
+#define G 9.81
+
+static const double sizes[] = {1e-3, 1e-2, 1, 100}, densities[] = {1e-4, 1e-2, 10};
+#define COUNT(a) ((int)(sizeof(a) / sizeof *(a)))
+
+/* ---- Free fall ---- */
+
+#define STEPS 20
+
+/* Backward Euler falls g h^2 k (k + 1)/2 in k steps, its variant with k iterations the same, bdf2, whose
+ * first step is backward Euler, 3/8 g h^2 more than g t^2/2 less what its next steps take back. */
+static double mean_fall(const scene *s)
+{
+    const double *x = drape_sim_positions(s->sim), *rest = drape_model_rest_positions(s->model);
+    double sum = 0;
+    for (int32_t i = 0; i < s->model->node_count; i++)
+        sum += rest[3 * i + 1] - x[3 * i + 1];
+    return sum / s->model->node_count;
+}
+
+/* newton_k reduces residuals in proportion to its step and means steps near 1/60 s (linear_tolerance), so its
+ * step is never longer. */
+static void fall(const drape_integrator_ops *method, double size, double density)
+{
+    const double t = sqrt(size / G), longest = strcmp(method->entry.name, "newton_k") == 0 ? 1. / 60 : 1,
+                 steps = fmax(STEPS, ceil(t / longest)), h = t / steps, thickness = 1e-3 * size;
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 4, 'edge_length': %.17g},"
+        "'material': {'young_modulus': %.17g, 'thickness': %.17g, 'areal_density': %.17g},"
+        "'terms': ['stretch.edge', 'bend.hinge']}], 'gravity': [0, %.17g, 0],"
+        "'integrator': {'method': '%s', 'dt': %.17g}, 'duration': %.17g}",
+        size / 4, 1e3 * density * G * size / thickness, thickness, density, -G, method->entry.name, h, t);
+    scene_advance(&s, t);
+    const double fallen = mean_fall(&s), exact = size / 2;
+    const double discrete = method->order == 1 ? exact * (1 + 1 / steps) : exact;
+    ck_assert_msg(s.unconverged == 0 && fabs(fallen / discrete - 1) < 0.01,
+                  "%s, %g m, %g kg/m2: fell %g m, not %g m", method->entry.name, size, density, fallen,
+                  discrete);
+    ck_assert_msg(fabs(fallen / exact - 1) < 0.01 + (method->order == 1 ? 1 / steps : 0),
+                  "%s, %g m, %g kg/m2: fell %g m, g t^2/2 = %g m", method->entry.name, size, density, fallen,
+                  exact);
+    scene_close(&s);
+}
+
+START_TEST(free_sheets_fall)
+{
+    for (int m = 0; drape_integrators[m]; m++)
+        for (int i = 0; i < COUNT(sizes) && !drape_integrators[m]->steady_state; i++)
+            for (int k = 0; k < COUNT(densities); k++)
+                fall(drape_integrators[m], sizes[i], densities[k]);
+}
+END_TEST
+
+/* ---- The handkerchief ---- */
+
+START_TEST(a_fine_handkerchief_falls)
+{
+    const double t = 0.1, h = 0.01;
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 100, 'rows': 100, 'width': 0.1,"
+        "'height': 0.1}, 'material': {'young_modulus': 1e6, 'thickness': 2e-4, 'areal_density': 0.05},"
+        "'terms': ['stretch.edge', 'bend.hinge']}], 'integrator': {'method': 'newton_k', 'dt': %g},"
+        "'duration': 1}",
+        h);
+    scene_advance(&s, t);
+    ck_assert_msg(fabs(mean_fall(&s) / (G * t * (t + h) / 2) - 1) < 0.01, "fell %g m", mean_fall(&s));
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Clamped strips ---- */
+
+/* Sag of the tip over the length of an elastica with weight w L^3/D = 3 that is clamped horizontally: from
+ * th'' = -3 (1 - s) cos th, th(0) = th'(1) = 0, by the classical Runge-Kutta method and shooting, 2 000
+ * steps. */
+#define LOAD 3.0
+#define SAG  0.3396483639528495
+
+static double strip_sag(const scene *s, double size)
+{
+    const double *x = drape_sim_positions(s->sim), *rest = drape_model_rest_positions(s->model);
+    double low = 0, high = -INFINITY, sum = 0;
+    int count = 0;
+    for (int32_t i = 0; i < s->model->node_count; i++) {
+        low = fmin(low, rest[3 * i]);
+        high = fmax(high, rest[3 * i]);
+    }
+    for (int32_t i = 0; i < s->model->node_count; i++)
+        if (rest[3 * i] > high - 1e-6 * size) {
+            sum += rest[3 * i + 1] - x[3 * i + 1];
+            count++;
+        }
+    return sum / count / size;
+}
+
+/* rate: of a viscous drag [1/s]. */
+static scene open_strip(double size, double density, double thinness, double rate, const char *integrator)
+{
+    const double thickness = thinness * size, d = density * G * size * size * size / LOAD;
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 20, 'rows': 3, 'width': %.17g,"
+        "'height': %.17g, 'orientation': 'horizontal'}, 'material': {'young_modulus': %.17g,"
+        "'poisson_ratio': 0, 'thickness': %.17g, 'areal_density': %.17g},"
+        "'terms': ['stretch.cst', 'bend.midedge', {'type': 'drag.viscous', 'coefficient': %.17g}], 'pins': "
+        "[{'edge': 'left', 'clamp': true}]}],"
+        "'gravity': [0, %.17g, 0], 'integrator': {%s}, 'duration': 1}",
+        size, 0.2 * size, 12 * d / (thickness * thickness * thickness), thickness, density, rate * density,
+        -G, integrator);
+}
+
+/* The mesh of 20 x 3 nodes has a tip 0.24 % below the elastica's. */
+START_TEST(strips_sag_in_equilibrium)
+{
+    for (int i = 0; i < COUNT(sizes); i++)
+        for (int k = 0; k < COUNT(densities); k++) {
+            scene s = open_strip(sizes[i], densities[k], 1e-3, 0, "'method': 'static'");
+            scene_advance(&s, 1);
+            const double sag = strip_sag(&s, sizes[i]);
+            ck_assert_msg(fabs(sag / SAG - 1) < 0.01, "%g m, %g kg/m2: sags %g of its length, not %g",
+                          sizes[i], densities[k], sag, SAG);
+            scene_close(&s);
+        }
+}
+END_TEST
+
+/* A strip that is released level, with a drag that damps its slowest mode, w = 3.516 sqrt(D/(s L^4)) = 2.03
+ * sqrt(g/L), critically: after 8 sqrt(L/g) exp(-16) of the motion is left. Its
+ * thickness is a twentieth of its length, so that it stretches by D/(E h L^2) = 2e-4 of it at most. */
+#define DRAG 4.06
+#define REST 8
+
+static void sag(const drape_integrator_ops *method, double size, double density)
+{
+    char integrator[100];
+    const double unit = sqrt(size / G);
+    snprintf(integrator, sizeof integrator, "'method': '%s', 'dt': %.17g", method->entry.name, unit / 5);
+    scene s = open_strip(size, density, 0.05, DRAG / unit, integrator);
+    scene_advance(&s, REST * unit);
+    const double found = strip_sag(&s, size);
+    ck_assert_msg(s.unconverged == 0 && fabs(found / SAG - 1) < 0.01,
+                  "%s, %g m, %g kg/m2: sags %g of its length, not %g", method->entry.name, size, density,
+                  found, SAG);
+    scene_close(&s);
+}
+
+/* At the corners of the range, by the methods that solve steps to a tolerance. The work of newton_k is
+ * bounded instead, and steps of a fifth of the unit are too long for it. An explicit method has no
+ * tolerance, and needs 2e4 steps. */
+START_TEST(strips_come_to_rest)
+{
+    for (int m = 0; drape_integrators[m]; m++)
+        for (int i = 0; i < COUNT(sizes); i += COUNT(sizes) - 1)
+            for (int k = 0; k < COUNT(densities); k += COUNT(densities) - 1) {
+                const drape_integrator_ops *method = drape_integrators[m];
+                if (!method->steady_state && !method->efforts && !method->stability)
+                    sag(method, sizes[i], densities[k]);
+            }
+}
+END_TEST
+
+/* ---- Residuals and loads ---- */
+
+/* The largest residual of an accepted step. */
+static drape_status note_residual(void *user, const drape_event *event)
+{
+    double *share = user;
+    if (event->kind == DRAPE_EVENT_ATTEMPT && event->attempt->accepted)
+        *share = fmax(*share, event->attempt->residual);
+    return DRAPE_OK;
+}
+
+/* A tolerance in newtons that is far above the weight of the cloth is limited to 1 % of it: a tenth of a gram
+ * sags although 1 N is tolerated. The strip's rounding error is some 1e-10 of its load, so every step
+ * converges. */
+START_TEST(no_tolerance_hides_the_load)
+{
+    for (int m = 0; drape_integrators[m]; m++) {
+        const drape_integrator_ops *method = drape_integrators[m];
+        char integrator[100];
+        double largest = 0, mass = 0;
+        if (!method->tolerance || method->efforts)
+            continue;
+        snprintf(integrator, sizeof integrator, "'method': '%s', 'tolerance': 1", method->entry.name);
+        scene s = open_strip(0.1, 0.05, 0.05, 40, integrator);
+        for (int32_t i = 0; i < s.model->free_count; i++)
+            mass += s.model->mass[s.model->node_of_free[i]] / s.model->free_count;
+        ck_assert_int_eq(drape_sim_observe(s.sim, note_residual, &largest), DRAPE_OK);
+        scene_advance(&s, 1);
+        const double tolerance = drape_sim_statistics(s.sim).tolerance, sag = strip_sag(&s, 0.1);
+        ck_assert_double_eq_tol(tolerance, 0.01 * mass * G, 1e-12 * mass * G);
+        ck_assert_double_le(largest, tolerance);
+        /* the share of the load that is left without a reaction, and the 0.24 % of the mesh */
+        ck_assert_msg(fabs(sag / SAG - 1) < 0.01 + 0.003, "%s: sags %g", method->entry.name, sag);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* A tolerance below the rounding error of the forces in a stiff strip, E h = 1e6 N/m: they cancel at rest,
+ * and steps are accepted as soon as no iteration can gain, instead of being halved until the run stops. The
+ * error is at most some 40 roundings of E h times 0.6 m, 40 x 1.1e-16 x 6e5 N. */
+START_TEST(rounding_of_stiff_strips_is_accepted)
+{
+    static const char *const methods[] = {"be", "trbdf2", "static"};
+    for (int m = 0; m < COUNT(methods); m++) {
+        double largest = 0;
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 12, 'edge_length': 0.05},"
+            "'material': {'young_modulus': 1e9, 'thickness': 1e-3, 'areal_density': 0.2},"
+            "'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'nodes': [0, 1]}]}],"
+            "'integrator': {'method': '%s', 'dt': 0.01, 'tolerance': 1e-13}, 'duration': 1}",
+            methods[m]);
+        ck_assert_int_eq(drape_sim_observe(s.sim, note_residual, &largest), DRAPE_OK);
+        scene_watch(&s);
+        scene_advance(&s, 0.2);
+        ck_assert_msg(s.rejected == 0 && largest > 1e-13 && largest < 3e-9, "%s: %ld rejected, residual %g N",
+                      methods[m], s.rejected, largest);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* An equilibrium that is not reached: with on_failure accept, the best state of the flow, which is not called
+ * converged. */
+START_TEST(statics_end_at_their_best)
+{
+    double last = INFINITY;
+    for (int steps = 1; steps <= 4; steps++) {
+        char integrator[120];
+        double residual = 0;
+        snprintf(integrator, sizeof integrator,
+                 "'method': 'static', 'max_pseudo_steps': %d, 'on_failure': 'accept'", steps);
+        scene s = open_strip(0.1, 0.05, 1e-3, 0, integrator);
+        ck_assert_int_eq(drape_sim_observe(s.sim, note_residual, &residual), DRAPE_OK);
+        scene_watch(&s);
+        scene_advance(&s, 1);
+        ck_assert_int_eq(s.unconverged, 1);
+        ck_assert_double_gt(residual, drape_sim_statistics(s.sim).tolerance);
+        ck_assert_double_le(residual, last);
+        last = residual;
+        scene_close(&s);
+    }
+}
+END_TEST
+
+SUITE("scale", free_sheets_fall, a_fine_handkerchief_falls, strips_sag_in_equilibrium, strips_come_to_rest,
+      no_tolerance_hides_the_load, rounding_of_stiff_strips_is_accepted, statics_end_at_their_best)
