@@ -71,6 +71,8 @@ static int version(int argc, char **argv)
 {
     (void)argc, (void)argv;
     printf("drape %s\n", drape_version());
+    printf("licence of libdrape: " DRAPE_LIBRARY_LICENCE "\n");
+    printf("licence of the program: " DRAPE_PROGRAM_LICENCE "\n");
     return CLI_DONE;
 }
 
