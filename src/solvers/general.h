@@ -3,8 +3,9 @@
  * matrix is scaled, factored, and the backward error of each solution is bounded. Its memory is taken for the
  * first such matrix, because most scenes have none.
  *
- * Pivots are chosen within a diagonal tile, so rounding errors may grow without bound. On matrices of cloth
- * they do not; where a solution misses the bound, a matrix of moderate size is factored by KLU as well.
+ * Pivots are chosen within a diagonal tile, so rounding errors may grow without bound. On the matrices of
+ * cloth in docs/speed.md they do not; where a solution misses the bound, a matrix of moderate size is
+ * factored by KLU as well.
  */
 #ifndef DRAPE_SOLVERS_GENERAL_H
 #define DRAPE_SOLVERS_GENERAL_H
