@@ -3,8 +3,7 @@
  * and analysis, once per sparsity pattern), the first factorization, a later one, a solve. Square sheets of 1
  * m hung by two corners, dt 1/60 s, with three matrices each: a slightly deformed sheet, positive definite;
  * the same with friction on a plane under each node, not symmetric; a compressed sheet, indefinite. Times are
- * the least of the repeats. The size thresholds of the solver `auto` come from the first matrix, those of the
- * fallbacks from the other two.
+ * the least of the repeats. The size thresholds of the solver `auto` come from the first matrix.
  */
 #include "bench.h"
 #include "solvers/linear.h"

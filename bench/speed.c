@@ -44,7 +44,6 @@ typedef struct method {
 
 static const method be = {"be", "be", {{NULL, 0, NULL}}, 1}, be_two = {"be", "be", {{NULL, 0, NULL}}, 2},
                     be_klu = {"be klu", "be", {{"linear_solver", 0, "klu"}}, 1},
-                    be_cholmod = {"be cholmod", "be", {{"linear_solver", 0, "cholmod"}}, 1},
                     be_dense = {"be dense", "be", {{"linear_solver", 0, "dense"}}, 1},
                     be_pcg = {"be pcg",
                               "be",
@@ -66,11 +65,11 @@ typedef struct bench_group {
 
 static const bench_group groups[] = {
     {"dep", DEP, 0.6, {5, 9, 13, 17, 23, 41, 50}, {&be}, false},
-    {"dep_linear", DEP, 0.6, {23}, {&be, &be_klu, &be_cholmod}, false},
+    {"dep_linear", DEP, 0.6, {23}, {&be, &be_klu}, false},
     {"dep_dense", DEP, 0.03, {23}, {&be, &be_dense}, false},
     {"fall", SHEET, 2, {23, 50, 100}, {&be}, false},
-    {"linear", SHEET, 0.1, {50}, {&be, &be_cholmod, &be_klu}, false},
-    {"growth", SHEET, 0.1, {5, 10, 25, 50, 100, 160, 226, 320}, {&be, &be_cholmod}, false},
+    {"linear", SHEET, 0.1, {50}, {&be, &be_klu}, false},
+    {"growth", SHEET, 0.1, {5, 10, 25, 50, 100, 160, 226, 320}, {&be}, false},
     {"threads", SHEET, 0.25, {100}, {&be, &be_two}, false},
     {"levels", SHEET, 2, {5, 12, 23, 50, 100}, {&newton_1, &newton_2, &newton_3, &be_pcg, &be}, true},
     {"levels_growth", SHEET, 0.5, {50, 100, 160, 226, 320}, {&newton_1, &newton_2, &newton_3}, false},

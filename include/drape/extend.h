@@ -58,6 +58,8 @@ typedef struct drape_param {
     bool uniform;               /* VECTOR: a single number may stand for three equal ones */
     const char *numbers;        /* VECTOR: the names of the three numbers, "[k11, k22, k12]"; NULL: [x, y,
                                    z] */
+    const char *const *aliases; /* CHOICE: pairs of a former name and the choice that it stands for,
+                                   NULL-terminated; NULL: none. A warning is logged where one is given */
 } drape_param;
 
 /* A number: name, unit, default, range and help. For C only, as C++17 has no designated initialisers:

@@ -138,6 +138,11 @@ void drape_system_watch(drape_system *system, const atomic_bool *cancel)
     system->cancel = cancel;
 }
 
+const atomic_bool *const *drape_system_cancel_flag(const drape_system *system)
+{
+    return &system->cancel;
+}
+
 bool drape_system_cancelled(drape_system *system)
 {
     bool cancelled = system->cancel && atomic_load(system->cancel);

@@ -74,6 +74,8 @@ void drape_system_add_loads(const drape_system *system, const double *x, double 
  * once. */
 void drape_system_watch(drape_system *system, const atomic_bool *cancel);
 bool drape_system_cancelled(drape_system *system);
+/* Where the address of that flag is; valid as long as the system. */
+const atomic_bool *const *drape_system_cancel_flag(const drape_system *system);
 
 /* From now on the system contains the forces of contact, if the model has any. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_add_contact(drape_system *system);

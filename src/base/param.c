@@ -264,9 +264,23 @@ static drape_status vector_value(drape_context *ctx, const char *pointer, const 
     return DRAPE_OK;
 }
 
+/* The choice that a former name stands for, which is logged; otherwise the text itself. */
+static const char *present_name(drape_context *ctx, const char *pointer, const drape_param *param,
+                                const char *text)
+{
+    for (const char *const *alias = param->aliases; alias && alias[0]; alias += 2)
+        if (strcmp(alias[0], text) == 0) {
+            drape_log(ctx, DRAPE_LOG_WARNING, "%s: \"%s\" is a former name; \"%s\" is used", pointer, text,
+                      alias[1]);
+            return alias[1];
+        }
+    return text;
+}
+
 static drape_status text_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                const char *text, double *value)
 {
+    text = present_name(ctx, pointer, param, text);
     const bool yes = strcmp(text, "true") == 0, boolean = yes || strcmp(text, "false") == 0;
     char given[80], takes[RANGE_SIZE];
     size_t count = 0;

@@ -77,6 +77,8 @@ static int version(int argc, char **argv)
     char why[320];
     const bool reproducible = drape_reproducible(why, sizeof why);
     printf("drape %s\nreproducible: %s%s\n", drape_version(), reproducible ? "yes" : "no: ", why);
+    printf("licence of libdrape: " DRAPE_LIBRARY_LICENCE "\n");
+    printf("licence of the program: " DRAPE_PROGRAM_LICENCE "\n");
     return CLI_DONE;
 }
 

@@ -7,6 +7,7 @@
 #include "model/scene.h"
 
 #include <stdio.h>
+#include <string.h>
 
 /* Compiling a scene does not check the formats: only writers of frames know them. */
 static drape_status check_formats(const cli_scene *s)
@@ -44,11 +45,23 @@ static bool interrupted(void *user)
     return cli_interrupted();
 }
 
+/* A warning that follows itself, as when a scene is read for several purposes, is printed once. */
+static void print_warning(void *user, drape_log_level level, const char *message)
+{
+    static char last[400];
+    (void)user;
+    if (level != DRAPE_LOG_WARNING || strncmp(message, last, sizeof last - 1) == 0)
+        return;
+    snprintf(last, sizeof last, "%s", message);
+    fprintf(stderr, "warning: %s\n", message);
+}
+
 drape_status cli_context_create(drape_context **out)
 {
     drape_context_def def;
     drape_context_def_init(&def, sizeof def);
     def.cancel = interrupted;
+    def.log = print_warning;
     return drape_context_create(&def, out);
 }
 

@@ -86,7 +86,8 @@ static const drape_param params[PARAM_COUNT] = {
         DRAPE_INTEGER("max_steps", "1/s", 100000, 1, 1e9,
                       "largest number of steps within one second of simulated time, not counting those "
                       "that end an advance; one more ends the run"),
-    [PARAM_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver"),
+    [PARAM_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver",
+                                         .aliases = drape_linears_aliases),
     [PARAM_MATRIX] = DRAPE_CHOICE(
         "matrix", MATRIX_AUTO, matrix_choices,
         "matrix of Newton's corrections; symmetric: the symmetric part of the exact one, which differs from "
@@ -639,7 +640,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     if (!status && s->n > 0)
         status = drape_sun_linear_create(arena, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
                                          drape_system_pattern(s->system), drape_system_pool(s->system),
-                                         &s->linear);
+                                         drape_system_cancel_flag(s->system), &s->linear);
     if (status || s->n == 0)
         return status;
     s->linear->owner = s;

@@ -185,7 +185,8 @@ static drape_status judge_stability(static_state *s, const drape_state *out)
         return DRAPE_OK;
     drape_status status = drape_newton_matrix(s->common.newton, &point, 0, &pattern, &values);
     return status ? status
-                  : drape_inertia(s->arena->ctx, pattern, values, &s->unstable_modes, &s->stability_known);
+                  : drape_inertia(s->arena->ctx, pattern, values, drape_system_cancel_flag(e->system),
+                                  &s->unstable_modes, &s->stability_known);
 }
 
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,

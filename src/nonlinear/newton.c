@@ -225,6 +225,8 @@ static drape_status factor_matrix(drape_newton *s, bool definite)
     drape_status status = drape_sun_linear_factor(s->linear, definite);
     s->factored = !status;
     s->factored_mass_weight = s->equation->mass_weight;
+    if (status == DRAPE_E_STOPPED)
+        drape_system_cancelled(s->equation->system); /* so that the step ends as cancelled */
     return status;
 }
 
@@ -535,7 +537,8 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s)
         return DRAPE_OK;
     drape_status status =
         drape_sun_linear_create(arena, s->sun, drape_linears[(int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]],
-                                drape_system_pattern(system), drape_system_pool(system), &s->linear);
+                                drape_system_pattern(system), drape_system_pool(system),
+                                drape_system_cancel_flag(system), &s->linear);
     if (status)
         return status;
     s->linear->tolerance = s->values[DRAPE_NEWTON_LINEAR_TOLERANCE];

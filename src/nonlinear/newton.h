@@ -71,7 +71,8 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
     [DRAPE_NEWTON_PROJECT] =                                                                                 \
         DRAPE_BOOLEAN("project", false, "project the Hessian of every element to positive semidefinite"),    \
     [DRAPE_NEWTON_LINEAR_SOLVER] =                                                                           \
-        DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver"),                    \
+        DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver",                     \
+                     .aliases = drape_linears_aliases),                                                      \
     [DRAPE_NEWTON_LINEAR_TOLERANCE] =                                                                        \
         DRAPE_NUMBER("linear_tolerance", "1", 1e-3, 1e-14, DRAPE_BELOW(1),                                   \
                      "relative residual that iterative linear solvers leave in a correction")

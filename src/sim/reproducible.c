@@ -40,9 +40,6 @@ bool drape_reproducible(char *why, size_t size)
          "arithmetic is not that of IEEE 754 without contraction, rounding to nearest, as with -ffast-math"},
         {FLT_EVAL_METHOD != 0, "the compiler computes with more digits than a double has"},
         {!drape_sundials_power_is_ours(), "SUNDIALS takes powers from the C library (-Dsundials=shared)"},
-#ifdef DRAPE_BLAS
-        {true, "the linear solvers cholmod and umfpack use BLAS, whose bits depend on the processor"},
-#endif
     };
     size_t used = 0;
     why[0] = 0;

@@ -7,13 +7,13 @@
  */
 #define _XOPEN_SOURCE 700 /* initstate */
 #include "solvers/elimination.h"
-#include "solvers/library_lock.h"
 
 #include <amd.h>
 #include <stdlib.h>
 #include <string.h>
 #ifdef DRAPE_METIS
 #include <metis.h>
+#include <pthread.h>
 #endif
 
 #define DISSECTED 1500 /* block columns; below, nested dissection gives no less fill-in than minimum degree */
@@ -34,6 +34,8 @@ typedef struct maker {
 /* [bytes] the size of the state that rand() starts with, so that it gives the same numbers */
 #define RAND_STATE 128
 
+static pthread_mutex_t metis_mutex = PTHREAD_MUTEX_INITIALIZER; /* of the whole process, as rand() is */
+
 /*
  * METIS seeds rand() and draws its cuts from it. rand() belongs to the whole process: two concurrent calls
  * would take each other's numbers and so find another order, with other bits in the results, and the host's
@@ -43,12 +45,12 @@ typedef struct maker {
 static int dissect_locked(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
 {
     char own[RAND_STATE];
-    drape_library_lock();
+    pthread_mutex_lock(&metis_mutex);
     char *before = initstate(1, own, sizeof own);
     const int code = METIS_NodeND(n, start, other, NULL, options, m->e->order, m->e->place);
     if (before)
         setstate(before);
-    drape_library_unlock();
+    pthread_mutex_unlock(&metis_mutex);
     return code;
 }
 

@@ -1,10 +1,12 @@
 /* fallback.c: see fallback.h. */
 #include "solvers/fallback.h"
 
+extern const drape_linear_ops drape_linear_multifrontal;
+
 drape_fallback drape_fallback_of(drape_arena *arena, const drape_pattern *pattern)
 {
     return (drape_fallback){
-        .ops = drape_linear_general(pattern->n), .pattern = pattern, .arena = drape_arena_within(arena)};
+        .ops = &drape_linear_multifrontal, .pattern = pattern, .arena = drape_arena_within(arena)};
 }
 
 void drape_fallback_destroy(drape_fallback *f)
@@ -13,11 +15,29 @@ void drape_fallback_destroy(drape_fallback *f)
     drape_arena_free(&f->arena);
 }
 
+void drape_fallback_use_threads(drape_fallback *f, drape_pool *pool)
+{
+    f->pool = pool;
+    if (f->solver)
+        f->ops->use_threads(f->solver, pool);
+}
+
+void drape_fallback_watch(drape_fallback *f, const atomic_bool *const *cancel)
+{
+    f->cancel = cancel;
+    if (f->solver)
+        f->ops->watch(f->solver, cancel);
+}
+
 static drape_status create(drape_fallback *f)
 {
     drape_status status = f->ops->create(&f->arena, f->pattern, &f->solver);
-    if (status)
+    if (status) {
         drape_fallback_destroy(f);
+        return status;
+    }
+    f->ops->use_threads(f->solver, f->pool);
+    f->ops->watch(f->solver, f->cancel);
     return status;
 }
 

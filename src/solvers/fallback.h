@@ -1,7 +1,6 @@
 /*
- * fallback.h: the general solver to which a solver for symmetric positive definite matrices passes all
- * other matrices, unchanged: the fastest one for the size. It is created for the first such matrix, because
- * most scenes have none and its analysis would take up to half of the time of create.
+ * fallback.h: the direct solver `multifrontal`, to which an iterative solver passes the matrices that it
+ * cannot solve, unchanged. It is created for the first such matrix, because most scenes have none.
  */
 #ifndef DRAPE_SOLVERS_FALLBACK_H
 #define DRAPE_SOLVERS_FALLBACK_H
@@ -13,13 +12,17 @@ typedef struct drape_fallback {
     const drape_pattern *pattern;
     drape_arena arena; /* holds the solver */
     void *solver;      /* NULL before the first such matrix */
-    bool active;       /* the last matrix was factored here */
-    int64_t count;     /* matrices passed to it */
+    drape_pool *pool;  /* of the solver, as in drape_linear_ops, and its flag */
+    const atomic_bool *const *cancel;
+    bool active;   /* the last matrix was factored here */
+    int64_t count; /* matrices passed to it */
 } drape_fallback;
 
 /* The arena must stay at its address. Takes no memory. */
 drape_fallback drape_fallback_of(drape_arena *arena, const drape_pattern *pattern);
 void drape_fallback_destroy(drape_fallback *fallback);
+void drape_fallback_use_threads(drape_fallback *fallback, drape_pool *pool);
+void drape_fallback_watch(drape_fallback *fallback, const atomic_bool *const *cancel);
 
 /* Errors: those of the solver's create and factor; after one it is not active, and may be called again. */
 drape_status drape_fallback_factor(drape_fallback *fallback, const double *values);

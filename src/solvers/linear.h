@@ -13,6 +13,8 @@
 #include "base/thread_pool.h"
 #include "sparse/pattern.h"
 
+#include <stdatomic.h>
+
 typedef struct drape_linear_ops drape_linear_ops;
 
 /* The choice of a solver and its fallbacks. */
@@ -28,8 +30,6 @@ struct drape_linear_ops {
     /* The smallest number of unknowns for which it was measured to be the fastest solver of a positive
      * definite matrix; `auto` picks by it. 0: it is never the fastest. */
     int64_t best_from;
-    /* The same for a matrix without Cholesky factors: fallbacks are picked by it. */
-    int64_t general_from;
     /* It takes memory from the heap during a factorisation, or at the first matrix that needs it. If false,
      * it takes none from the second factorisation on. */
     bool borrows_heap;
@@ -40,6 +40,9 @@ struct drape_linear_ops {
     /* Sets the threads that it may use from now on; the pool must outlive it. The result does not depend on
      * them. NULL: it uses one thread. */
     void (*use_threads)(void *state, drape_pool *pool);
+    /* Sets where the address of a flag is, or NULL, that ends a factorisation with DRAPE_E_STOPPED when it
+     * becomes true; the place must outlive the solver. NULL: its factorisations cannot be cancelled. */
+    void (*watch)(void *state, const atomic_bool *const *cancel);
     /* Factors the matrix with these values (pattern->nonzeros). DRAPE_OK, or DRAPE_RETRY_LINEAR if it is
      * singular to working precision or not finite. With borrows_heap also DRAPE_E_MEMORY, after which it
      * may be called again. */
@@ -48,7 +51,8 @@ struct drape_linear_ops {
      * callers that then use another matrix. NULL: the solver cannot tell, or factors such a matrix at no
      * extra cost. */
     drape_status (*factor_definite)(void *state, const double *values);
-    /* x = A^-1 b; b is not changed. */
+    /* x = A^-1 b; b is not changed. DRAPE_RETRY_LINEAR if there are no factors, or x is not finite or misses
+     * the solver's bound on its error. */
     drape_status (*solve)(void *state, const double *b, double *x);
     /* The same, but only until the residual, in a norm of the solver's own, falls below `tolerance` times
      * its initial value; *iterations: how many that took. NULL: the solver is direct. */
@@ -70,6 +74,7 @@ struct drape_linear_ops {
 
 extern const drape_linear_ops *const drape_linears[]; /* NULL-ended */
 extern const char *const drape_linears_names[];       /* choices of a parameter, NULL-ended */
+extern const char *const drape_linears_aliases[];     /* its former choices, and what they stand for */
 extern const drape_registry drape_linear_registry;
 
 /* Archives a solver; values as in `archive`, and NULL if the last factor call failed. */
@@ -79,9 +84,7 @@ void drape_linear_archive(const drape_linear_ops *ops, void *state, drape_archiv
 void drape_linear_destroy(const drape_linear_ops *ops, void **state);
 size_t drape_linear_bytes(const drape_linear_ops *ops, const void *state);
 
-/* The solver with the largest best_from, or general_from, that is at most n; if none is, the one with the
- * smallest. */
+/* The solver with the largest best_from that is at most n; if none is, the one with the smallest. */
 const drape_linear_ops *drape_linear_best(int64_t n);
-const drape_linear_ops *drape_linear_general(int64_t n);
 
 #endif

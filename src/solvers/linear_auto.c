@@ -48,6 +48,13 @@ static void use_threads(void *state, drape_pool *pool)
         s->ops->use_threads(s->solver, pool);
 }
 
+static void watch(void *state, const atomic_bool *const *cancel)
+{
+    auto_state *s = state;
+    if (s->ops->watch)
+        s->ops->watch(s->solver, cancel);
+}
+
 static drape_status factor(void *state, const double *values)
 {
     auto_state *s = state;
@@ -100,6 +107,7 @@ const drape_linear_ops drape_linear_auto = {
               .reference = "bench/linears"},
     .create = create,
     .use_threads = use_threads,
+    .watch = watch,
     .factor = factor,
     .factor_definite = factor_definite,
     .solve = solve,

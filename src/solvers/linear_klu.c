@@ -138,7 +138,6 @@ const drape_linear_ops drape_linear_klu = {
               .summary = "sparse LU with AMD ordering; pivots are kept between steps",
               .reference = "Davis & Palamadai Natarajan 2010, Algorithm 907: KLU"},
     .best_from = 1,
-    .general_from = 1,
     .create = create,
     .factor = factor,
     .solve = solve,

@@ -18,7 +18,7 @@
 
 #define EXACT          1e-14 /* relative residual for callers that want all digits */
 #define MAX_ITERATIONS 2000  /* a matrix that needs more goes to the fallback */
-#define SYMMETRY       1e-13 /* as in linear_cholmod.c: rounding error in mirrored entries */
+#define SYMMETRY       1e-13 /* as in linear_multifrontal.c: rounding error in mirrored entries */
 /* of drape_prolong_spacing: the graph of the pattern also couples the nodes opposite an edge, so its paths
  * are shorter by this factor */
 #define HOP 0.67
@@ -264,6 +264,16 @@ static drape_status factor_general(pcg_state *s)
     return status;
 }
 
+static void use_threads(void *state, drape_pool *pool)
+{
+    drape_fallback_use_threads(&((pcg_state *)state)->fallback, pool);
+}
+
+static void watch(void *state, const atomic_bool *const *cancel)
+{
+    drape_fallback_watch(&((pcg_state *)state)->fallback, cancel);
+}
+
 static drape_status factor(void *state, const double *values)
 {
     pcg_state *s = state;
@@ -335,10 +345,12 @@ const drape_linear_ops drape_linear_pcg = {
     .entry = {.name = "pcg",
               .summary =
                   "conjugate gradients with diagonal blocks and a coarse space, no factors of the matrix; a "
-                  "matrix that is not symmetric positive definite goes to umfpack or klu, by size",
+                  "matrix that is not symmetric positive definite goes to multifrontal",
               .reference = "Hestenes & Stiefel 1952; Vanek, Mandel & Brezina 1996"},
     .borrows_heap = true, /* for the solver of the coarse space, and for the fallback */
     .create = create,
+    .use_threads = use_threads,
+    .watch = watch,
     .factor = factor,
     .solve = solve,
     .solve_inexact = solve_inexact,

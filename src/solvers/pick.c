@@ -1,37 +1,28 @@
-/* pick.c: the fastest solver in this build for a number of unknowns, by best_from or general_from; and what
+/* pick.c: the fastest solver in this build for a number of unknowns, by best_from; and what
  * is the same for all solvers when they are archived, destroyed and measured. */
 #include "solvers/linear.h"
 
-static int64_t best_from(const drape_linear_ops *ops)
-{
-    return ops->best_from;
-}
+/* CHOLMOD and UMFPACK served definite and other matrices of scenes that name them. */
+const char *const drape_linears_aliases[] = {"cholmod", "multifrontal", "umfpack", "multifrontal", NULL};
 
-static int64_t general_from(const drape_linear_ops *ops)
+/* Whether a solver is better than the best so far: among those whose size is at most n the largest, otherwise
+ * the smallest. */
+static bool is_better(int64_t from, int64_t best, int64_t n)
 {
-    return ops->general_from;
-}
-
-/* If n is below the smallest size of all solvers, the solver with the smallest. */
-static const drape_linear_ops *pick(int64_t n, int64_t (*from_of)(const drape_linear_ops *ops))
-{
-    const drape_linear_ops *best = NULL;
-    for (int i = 0; drape_linears[i]; i++) {
-        int64_t from = from_of(drape_linears[i]), kept = best ? from_of(best) : 0;
-        if (from > 0 && (!best || (from <= n && from > kept) || kept > n))
-            best = drape_linears[i];
-    }
-    return best;
+    if (from <= 0)
+        return false;
+    if (best <= 0)
+        return true;
+    return best > n ? from < best : from <= n && from > best;
 }
 
 const drape_linear_ops *drape_linear_best(int64_t n)
 {
-    return pick(n, best_from);
-}
-
-const drape_linear_ops *drape_linear_general(int64_t n)
-{
-    return pick(n, general_from);
+    const drape_linear_ops *best = NULL;
+    for (int i = 0; drape_linears[i]; i++)
+        if (is_better(drape_linears[i]->best_from, best ? best->best_from : 0, n))
+            best = drape_linears[i];
+    return best;
 }
 
 void drape_linear_archive(const drape_linear_ops *ops, void *state, drape_archive *a, const double *values)

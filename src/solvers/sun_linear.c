@@ -84,11 +84,14 @@ static drape_status create_state(drape_sun_linear *linear, const drape_pattern *
     drape_status status = linear->ops->create(&linear->arena, pattern, &linear->state);
     if (!status && linear->ops->use_threads)
         linear->ops->use_threads(linear->state, linear->pool);
+    if (!status && linear->ops->watch)
+        linear->ops->watch(linear->state, linear->cancel);
     return status;
 }
 
 drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const drape_linear_ops *ops,
-                                     const drape_pattern *pattern, drape_pool *pool, drape_sun_linear **out)
+                                     const drape_pattern *pattern, drape_pool *pool,
+                                     const atomic_bool *const *cancel, drape_sun_linear **out)
 {
     drape_sun_linear *linear = *out = drape_arena_take(arena, 1, sizeof *linear);
     if (!linear)
@@ -96,6 +99,7 @@ drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const d
     linear->arena = drape_arena_within(arena);
     linear->ops = ops;
     linear->pool = pool;
+    linear->cancel = cancel;
     linear->solver = SUNLinSolNewEmpty(sun);
     linear->matrix = SUNMatNewEmpty(sun);
     drape_status status = linear->solver && linear->matrix

@@ -25,6 +25,7 @@ typedef struct drape_sun_linear {
     SUNLinearSolver solver;
     SUNMatrix matrix;
     drape_pool *pool;                   /* NULL: one thread */
+    const atomic_bool *const *cancel;   /* see drape_linear_ops.watch */
     double tolerance;                   /* relative residual that iterative solvers may leave; 0: none */
     int64_t factorizations, iterations; /* of iterative solvers; of direct ones, solves */
     double factor_seconds, solve_seconds;
@@ -32,7 +33,8 @@ typedef struct drape_sun_linear {
 } drape_sun_linear;
 
 drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const drape_linear_ops *ops,
-                                     const drape_pattern *pattern, drape_pool *pool, drape_sun_linear **out);
+                                     const drape_pattern *pattern, drape_pool *pool,
+                                     const atomic_bool *const *cancel, drape_sun_linear **out);
 
 /* Replaces the pattern: the values are cleared, the solver is created again. Errors: those of create; after
  * one it can only be destroyed, or be given a pattern again. */

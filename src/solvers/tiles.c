@@ -73,6 +73,87 @@ LANES_DISPATCH void drape_tile_divide(int n, const double *tile, const double *i
     }
 }
 
+/* Column by column, from the left: the multipliers above a pivot are zero. */
+LANES_DISPATCH double drape_tile_lu(int n, double *tile, double *inverse, int32_t *pivot)
+{
+    double smallest = INFINITY;
+    for (int j = 0; j < n; j++) {
+        double *column = tile + S * j, multiplier[S] = {0};
+        int k = j;
+        for (int i = j + 1; i < n; i++)
+            k = fabs(column[i]) > fabs(column[k]) ? i : k;
+        pivot[j] = k;
+        for (int p = 0; p < n && k != j; p++) {
+            const double kept = tile[S * p + j];
+            tile[S * p + j] = tile[S * p + k];
+            tile[S * p + k] = kept;
+        }
+        smallest = fabs(column[j]) < smallest ? fabs(column[j]) : smallest;
+        inverse[j] = 1 / column[j];
+        for (int i = j + 1; i < n; i++)
+            column[i] = multiplier[i] = column[i] * inverse[j];
+        const lanes m0 = lanes_load(multiplier), m1 = lanes_load(multiplier + LANES),
+                    m2 = lanes_load(multiplier + 2 * LANES);
+        for (int p = j + 1; p < n; p++) {
+            double *to = tile + S * p;
+            const double u = to[j];
+            lanes_store(to, lanes_load(to) - m0 * u);
+            lanes_store(to + LANES, lanes_load(to + LANES) - m1 * u);
+            lanes_store(to + 2 * LANES, lanes_load(to + 2 * LANES) - m2 * u);
+        }
+    }
+    return smallest;
+}
+
+/* Subtracts columns [begin, end) of a strip, each times its number in column j of the tile, from column j. */
+LANES_INLINE void eliminate_column(const double *tile, int j, int begin, int end, double *strip,
+                                   double factor)
+{
+    double *to = strip + S * j;
+    lanes x0 = lanes_load(to), x1 = lanes_load(to + LANES), x2 = lanes_load(to + 2 * LANES);
+    for (int p = begin; p < end; p++) {
+        const double u = tile[S * j + p];
+        x0 -= lanes_load(strip + S * p) * u;
+        x1 -= lanes_load(strip + S * p + LANES) * u;
+        x2 -= lanes_load(strip + S * p + 2 * LANES) * u;
+    }
+    lanes_store(to, x0 * factor);
+    lanes_store(to + LANES, x1 * factor);
+    lanes_store(to + 2 * LANES, x2 * factor);
+}
+
+LANES_DISPATCH void drape_tile_lu_divide(int n, const double *tile, const double *inverse,
+                                         const int32_t *pivot, double *strip)
+{
+    for (int j = 0; j < n; j++)
+        eliminate_column(tile, j, 0, j, strip, inverse[j]);
+    for (int j = n - 2; j >= 0; j--)
+        eliminate_column(tile, j, j + 1, n, strip, 1);
+    for (int j = n - 1; j >= 0; j--)
+        for (int i = 0; i < S && pivot[j] != j; i++) {
+            const double kept = strip[S * j + i];
+            strip[S * j + i] = strip[S * pivot[j] + i];
+            strip[S * pivot[j] + i] = kept;
+        }
+}
+
+void drape_tile_lu_solve(int n, const double *tile, const double *inverse, const int32_t *pivot, double *x)
+{
+    for (int j = 0; j < n; j++) {
+        const double kept = x[j];
+        x[j] = x[pivot[j]];
+        x[pivot[j]] = kept;
+    }
+    for (int j = 0; j < n; j++)
+        for (int i = j + 1; i < n; i++)
+            x[i] -= tile[S * j + i] * x[j];
+    for (int j = n - 1; j >= 0; j--) {
+        x[j] *= inverse[j];
+        for (int i = 0; i < j; i++)
+            x[i] -= tile[S * j + i] * x[j];
+    }
+}
+
 LANES_DISPATCH void drape_strip_times(int n, const double *strip, const double *x, double *y)
 {
     lanes y0 = lanes_load(y), y1 = lanes_load(y + LANES), y2 = lanes_load(y + 2 * LANES);

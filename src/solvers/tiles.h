@@ -1,5 +1,5 @@
 /*
- * tiles.h: the dense arithmetic of the Cholesky factors of a front. Rows are stored in strips of
+ * tiles.h: the dense arithmetic of the factors of a front. Rows are stored in strips of
  * DRAPE_STRIP: number i of column p of a strip is at [DRAPE_STRIP p + i], so that a strip is read
  * contiguously and is multiplied without a copy. A tile is a strip with as many columns as rows. Unused
  * rows are zero.
@@ -24,6 +24,16 @@ bool drape_tile_factor(int n, double *tile, double *inverse);
 
 /* X = A L^-T in place, for n columns of a strip; L is a factored tile. */
 void drape_tile_divide(int n, const double *tile, const double *inverse, double *strip);
+
+/* Replaces the first n rows and columns of a tile T by its factors L U = P T, with row interchanges: row j
+ * was exchanged with row pivot[j] (n); inverse (n) becomes the inverses of the diagonal of U. Returns the
+ * smallest magnitude on it; if that is 0, there are no factors. */
+double drape_tile_lu(int n, double *tile, double *inverse, int32_t *pivot);
+
+/* X = A T^-1 in place, for n columns of a strip; x (n) = T^-1 x. */
+void drape_tile_lu_divide(int n, const double *tile, const double *inverse, const int32_t *pivot,
+                          double *strip);
+void drape_tile_lu_solve(int n, const double *tile, const double *inverse, const int32_t *pivot, double *x);
 
 /* y (DRAPE_STRIP) -= strip x, over the strip's n columns. */
 void drape_strip_times(int n, const double *strip, const double *x, double *y);

@@ -57,8 +57,7 @@ static void rotate_rows(int n, double *m, int p, int q, double c, double s)
     }
 }
 
-/* Diagonalises a; v receives the eigenvectors as columns. */
-static void diagonalise(int n, double *a, double *v)
+void drape_diagonalise(int n, double *a, double *v)
 {
     double small = 1e-30 * squared_norm(n, a); /* 1e-15 relative to the norm */
     for (int i = 0; i < n * n; i++)
@@ -81,7 +80,7 @@ void drape_project(int n, double *a)
     double d[DRAPE_MAX_ELEMENT_DOFS * DRAPE_MAX_ELEMENT_DOFS],
         v[DRAPE_MAX_ELEMENT_DOFS * DRAPE_MAX_ELEMENT_DOFS];
     memcpy(d, a, (size_t)(n * n) * sizeof *a);
-    diagonalise(n, d, v);
+    drape_diagonalise(n, d, v);
     for (int k = 0; k < n; k++) {
         double negative = d[(n + 1) * k];
         if (!(negative < 0))

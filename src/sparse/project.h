@@ -6,4 +6,7 @@
 /* Replaces a (n x n, symmetric, n <= DRAPE_MAX_ELEMENT_DOFS) by V max(Lambda, 0) V'. */
 void drape_project(int n, double *a);
 
+/* Makes a symmetric matrix of the same sizes diagonal; v (n x n) receives its eigenvectors as columns. */
+void drape_diagonalise(int n, double *a, double *v);
+
 #endif

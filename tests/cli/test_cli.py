@@ -39,7 +39,12 @@ def test_help():
         assert all(len(words) > 8 for _, words in options) and "--help" in [option for option, _ in options], options
         for option, _ in options:  # the parser accepts every option of the help
             assert "there is no option" not in drape(verb, "missing.json", option).stderr, option
-    assert re.fullmatch(r"drape \d+\.\d+\.\d+\nreproducible: (yes|no: \S.*)\n", good("--version"))
+    version = good("--version")
+    assert re.match(r"drape \d+\.\d+\.\d+\nreproducible: (yes|no: \S.*)\n", version), version
+    assert re.search(r"^licence of libdrape: BSD-3-Clause; .*nothing under the GPL$", version, re.M), version
+    linked = subprocess.run(["ldd", PROGRAM], capture_output=True, text=True, check=True).stdout
+    gpl = "licence of the program: GPL-3.0-or-later"
+    assert (gpl in version) == ("libgsl." in linked), version
 
 
 def test_help_needs_no_scene():
@@ -180,6 +185,17 @@ def test_linear_solver_acts():
         good("run", "scene.json", "--integrator", integrator, "--set", "/integrator/linear_solver=klu", "--duration", "0.02")
     for integrator in "be", "ida", "static":
         good("run", "scene.json", "--integrator", integrator, "--linear-solver", "klu", "--duration", "0.02")
+
+
+def test_former_linear_solvers():
+    """scenes that name cholmod or umfpack run with multifrontal and the same results; a line says so"""
+    write_scene()
+    expected = good("run", "scene.json", "--linear-solver", "multifrontal")
+    for name in "cholmod", "umfpack":
+        result = drape("run", "scene.json", "--set", f'/integrator/linear_solver="{name}"')
+        equal(result.returncode, 0, result.stderr)
+        equal(result.stderr, f'warning: /integrator/linear_solver: "{name}" is a former name; "multifrontal" is used\n')
+        equal(result.stdout.splitlines()[:-1], expected.splitlines()[:-1])  # the last line has times
 
 
 def read_summary_without_budget():

@@ -131,8 +131,9 @@ START_TEST(the_counter_counts)
 END_TEST
 
 /* A solver that falls back to another one keeps the analysis and factors of that one from the first fallback
- * on: 25 allocations with klu, once. One leaked allocation per factorization would be at least 49. */
-#define FALLBACK_PIECES 30
+ * on: 37 allocations with multifrontal, once. One leaked allocation per factorization would be at least
+ * 49. */
+#define FALLBACK_PIECES 40
 
 static void check_heap(const drape_linear_ops *linear, int i)
 {

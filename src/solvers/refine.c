@@ -1,0 +1,162 @@
+/* refine.c: see refine.h. */
+#include "solvers/refine.h"
+
+#include <math.h>
+
+/* A sum of about a hundred terms of size 1, as in a row of the matrix of a cloth, is off by 1e-14 at most,
+ * and typically by 1e-15. */
+#define TARGET 1e-14
+/* The two triangles of a matrix that counts as symmetric may differ by this part (linear_multifrontal.c). */
+#define BOUND   1e-13
+#define CYCLES  6
+#define VECTORS 10 /* of a cycle */
+
+drape_status drape_refine_create(drape_arena *arena, const drape_pattern *pattern, drape_refine *w)
+{
+    const size_t n = (size_t)pattern->n;
+    *w = (drape_refine){.pattern = pattern};
+    w->residual = drape_arena_take(arena, n, sizeof *w->residual);
+    w->basis = drape_arena_take(arena, n, (VECTORS + 1) * sizeof *w->basis);
+    w->correction = drape_arena_take(arena, n, VECTORS * sizeof *w->correction);
+    return drape_arena_status(arena);
+}
+
+static double norm(int64_t n, const double *x)
+{
+    double sum = 0;
+    for (int64_t i = 0; i < n; i++)
+        sum += x[i] * x[i];
+    return sqrt(sum);
+}
+
+/* NaN if there is one. */
+static double largest(int64_t n, const double *x)
+{
+    double most = 0;
+    for (int64_t i = 0; i < n; i++)
+        most = fabs(x[i]) <= most ? most : fabs(x[i]);
+    return most;
+}
+
+static double dot(int64_t n, const double *x, const double *y)
+{
+    double sum = 0;
+    for (int64_t i = 0; i < n; i++)
+        sum += x[i] * y[i];
+    return sum;
+}
+
+/* y += factor A x */
+static void add_product(const drape_pattern *p, const double *values, double factor, const double *x,
+                        double *y)
+{
+    for (int32_t j = 0; j < p->block_count; j++) {
+        const double x0 = factor * x[3 * j], x1 = factor * x[3 * j + 1], x2 = factor * x[3 * j + 2];
+        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
+            int64_t stride;
+            const double *a = drape_pattern_at(p, (double *)(uintptr_t)values, j, k, &stride);
+            double *to = y + 3 * (int64_t)p->block_row[k];
+            for (int r = 0; r < 3; r++)
+                to[r] += a[r] * x0 + a[stride + r] * x1 + a[2 * stride + r] * x2;
+        }
+    }
+}
+
+static void find_residual(drape_refine *w, const double *values, const double *b, const double *x)
+{
+    const int64_t n = w->pattern->n;
+    for (int64_t i = 0; i < n; i++)
+        w->residual[i] = b[i];
+    add_product(w->pattern, values, -1, x, w->residual);
+    w->error = largest(n, w->residual) / (largest(n, x) + largest(n, b));
+    if (largest(n, b) == 0 && largest(n, w->residual) == 0)
+        w->error = 0;
+}
+
+/* Makes the last vector of the basis orthogonal to the others and of length 1 (modified Gram-Schmidt); h:
+ * its column of the Hessenberg matrix. */
+static void orthogonalise(const drape_refine *w, int j, double *h)
+{
+    const int64_t n = w->pattern->n;
+    double *v = w->basis + (j + 1) * n;
+    for (int i = 0; i <= j; i++) {
+        const double *u = w->basis + i * n;
+        h[i] = dot(n, u, v);
+        for (int64_t k = 0; k < n; k++)
+            v[k] -= h[i] * u[k];
+    }
+    h[j + 1] = norm(n, v);
+    for (int64_t k = 0; k < n && h[j + 1] > 0; k++)
+        v[k] /= h[j + 1];
+}
+
+/* Applies the earlier rotations to column j of the Hessenberg matrix, and a new one that makes it
+ * triangular. */
+static void rotate(int j, double *h, double *c, double *s, double *g)
+{
+    for (int i = 0; i < j; i++) {
+        const double kept = h[i];
+        h[i] = c[i] * kept + s[i] * h[i + 1];
+        h[i + 1] = c[i] * h[i + 1] - s[i] * kept;
+    }
+    const double length = sqrt(h[j] * h[j] + h[j + 1] * h[j + 1]);
+    c[j] = length > 0 ? h[j] / length : 1;
+    s[j] = length > 0 ? h[j + 1] / length : 0;
+    h[j] = length;
+    g[j + 1] = -s[j] * g[j];
+    g[j] *= c[j];
+}
+
+/* Adds to x the combination of the corrections with the least residual. */
+static void combine(const drape_refine *w, int count, double (*h)[VECTORS + 1], double *g, double *x)
+{
+    const int64_t n = w->pattern->n;
+    for (int j = count - 1; j >= 0; j--) {
+        for (int i = j + 1; i < count; i++)
+            g[j] -= h[i][j] * g[i];
+        g[j] = h[j][j] != 0 ? g[j] / h[j][j] : 0;
+        for (int64_t k = 0; k < n; k++)
+            x[k] += g[j] * w->correction[j * n + k];
+    }
+}
+
+/* One cycle of GMRES: corrects x until the residual is expected to be below `target`. */
+static void correct(drape_refine *w, drape_preconditioner *apply, void *factors, const double *values,
+                    double target, double *x)
+{
+    const int64_t n = w->pattern->n;
+    double h[VECTORS][VECTORS + 1] = {{0}}, c[VECTORS], s[VECTORS], g[VECTORS + 1] = {0};
+    int j = 0;
+    g[0] = norm(n, w->residual);
+    for (int64_t k = 0; k < n; k++)
+        w->basis[k] = w->residual[k] / g[0];
+    while (j < VECTORS && fabs(g[j]) > target) {
+        double *v = w->basis + (j + 1) * n, *z = w->correction + j * n;
+        apply(factors, w->basis + j * n, z);
+        for (int64_t k = 0; k < n; k++)
+            v[k] = 0;
+        add_product(w->pattern, values, 1, z, v);
+        orthogonalise(w, j, h[j]);
+        rotate(j, h[j], c, s, g);
+        j++;
+    }
+    w->iterations += j;
+    combine(w, j, h, g, x);
+}
+
+drape_status drape_refine_solve(drape_refine *w, drape_preconditioner *apply, void *factors,
+                                const double *values, const double *b, double *x)
+{
+    const int64_t n = w->pattern->n;
+    double before = INFINITY;
+    apply(factors, b, x);
+    find_residual(w, values, b, x);
+    w->first_error = w->error;
+    for (int cycle = 0; cycle < CYCLES && w->error > TARGET && w->error < before / 2; cycle++) {
+        const double size = largest(n, x) + largest(n, b);
+        before = w->error;
+        correct(w, apply, factors, values, 0.1 * TARGET * size * sqrt((double)n), x);
+        find_residual(w, values, b, x);
+    }
+    return w->error <= BOUND ? DRAPE_OK : DRAPE_RETRY_LINEAR;
+}

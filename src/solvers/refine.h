@@ -1,0 +1,31 @@
+/*
+ * refine.h: solves A x = b by the factors of a nearby matrix M, and checks the result. The correction of x is
+ * found by GMRES preconditioned by M (Saad 1993, A flexible inner-outer preconditioned GMRES algorithm), of
+ * which one iteration is a step of iterative refinement with the best length. If M differs from A by a matrix
+ * of rank k, k + 1 iterations are enough.
+ */
+#ifndef DRAPE_SOLVERS_REFINE_H
+#define DRAPE_SOLVERS_REFINE_H
+
+#include "sparse/pattern.h"
+
+/* x = M^-1 b. */
+typedef void drape_preconditioner(void *factors, const double *b, double *x);
+
+typedef struct drape_refine {
+    const drape_pattern *pattern;
+    double *residual;           /* (n) */
+    double *basis, *correction; /* (vectors + 1, n) and (vectors, n) */
+    double first_error, error;  /* of the last solve, before and after refinement: see below */
+    int64_t iterations;         /* of all solves together */
+} drape_refine;
+
+/* Errors: DRAPE_E_MEMORY. */
+drape_status drape_refine_create(drape_arena *arena, const drape_pattern *pattern, drape_refine *w);
+
+/* x = A^-1 b for a matrix scaled so that its entries are at most about 1. `error` becomes the backward error
+ * |b - A x| / (|x| + |b|) in the maximum norm. DRAPE_RETRY_LINEAR if it misses the bound of 1e-13. */
+drape_status drape_refine_solve(drape_refine *w, drape_preconditioner *apply, void *factors,
+                                const double *values, const double *b, double *x);
+
+#endif
