@@ -111,7 +111,7 @@ void drape_make_printable(char *text)
 {
     while (*text) {
         const size_t count = unprintable((const unsigned char *)text);
-        memset(text, '?', count);
+        memset(text, *text >= '\t' && *text <= '\r' ? ' ' : '?', count);
         text += count ? count : 1;
     }
 }

@@ -33,9 +33,9 @@ void *drape_alloc(drape_context *ctx, size_t count, size_t size);
 void drape_free(drape_context *ctx, void *memory); /* NULL is allowed */
 char *drape_copy_text(drape_context *ctx, const char *text);
 
-/* Replaces what a terminal would obey instead of show by question marks, as text quoted from files and
- * arguments may contain it: control characters, also those of UTF-8 (U+0080 to U+009F), and marks that
- * change the direction of writing (U+202A to U+202E, U+2066 to U+2069). */
+/* Replaces what a terminal would obey instead of show, as text quoted from files and arguments may contain
+ * it: tabs and ends of lines by spaces; other control characters, also those of UTF-8 (U+0080 to U+009F),
+ * and marks that change the direction of writing (U+202A to U+202E, U+2066 to U+2069) by question marks. */
 void drape_make_printable(char *text);
 
 /* Set the message and return status. drape_fail_at also names the place by its JSON pointer: message

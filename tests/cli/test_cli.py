@@ -194,7 +194,7 @@ def test_former_linear_solvers():
     for name in "cholmod", "umfpack":
         result = drape("run", "scene.json", "--set", f'/integrator/linear_solver="{name}"')
         equal(result.returncode, 0, result.stderr)
-        equal(result.stderr, f'warning: /integrator/linear_solver: "{name}" is a former name; "multifrontal" is used\n')
+        equal(result.stderr.splitlines(True)[0], f'warning: /integrator/linear_solver: "{name}" is a former name; "multifrontal" is used\n')
         equal(result.stdout.splitlines()[:-1], expected.splitlines()[:-1])  # the last line has times
 
 
@@ -397,7 +397,7 @@ def test_closed_pipe():
         os.close(reading)
         result = subprocess.run([PROGRAM, *args], stdout=writing, stderr=subprocess.PIPE, text=True, timeout=LIMIT, check=False)
         os.close(writing)
-        equal((result.returncode, result.stderr), (0, ""), " ".join(args))
+        equal((result.returncode, without_warnings(result.stderr)), (0, ""), " ".join(args))
     equal(read_json("out/summary.json")["status"], "ok", "the run itself")
 
 

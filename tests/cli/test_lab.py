@@ -127,10 +127,11 @@ def test_budget():
     assert all("," in tags["series"] for tags in order[-9:]), order[-9:]
     # A budget that ends after the reference: the rest is named and the report is made.
     os.mkdir("b")
-    for name in ("experiment.json", "reference.json", "reference.f64"):
+    for name in ("manifest.jsonl", "experiment.json", "reference.json", "reference.f64"):
         shutil.copy("t/" + name, "b/" + name)
     with open("t/cases.jsonl", encoding="utf-8") as file, open("b/cases.jsonl", "w", encoding="utf-8") as part:
         part.writelines(file.readlines()[:9])
+    claim("b", "cases.jsonl")
     out = good(*command[:-1], "b", "--budget", "1e-7")
     left = len(everything) - 9
     assert f"9 of {len(everything)} cases done" in out and f"{left} of {len(everything)} cases were left out, as the budget of 1e-07 minutes" in out, out

@@ -27,7 +27,7 @@ typedef struct beginning {
 } beginning;
 
 static const beginning beginnings[] = {
-    {"ball", 0.2, {{COLUMNS, "13"}, {ROWS, "13"}}, .touches = true},
+    {"ball", 0.25, {{COLUMNS, "13"}, {ROWS, "13"}}, .touches = true},
     {"box_edge", 0.4, {{COLUMNS, "11"}, {ROWS, "11"}}, .touches = true},
     {"capstan", 0.3, {{COLUMNS, "31"}, {ROWS, "3"}}, .touches = true},
     {"crumple", 0.4, {{COLUMNS, "11"}, {ROWS, "11"}}, .touches = true},
