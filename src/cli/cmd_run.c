@@ -327,8 +327,7 @@ static void advance(run *r)
     if (r->status)
         return;
     cli_progress_begin(&r->progress, drape_sim_time(r->in.sim), end);
-    if (r->in.sim->chosen.integrator->steady_state) /* its single step may take minutes */
-        cli_signals_cancel(r->in.sim);
+    cli_signals_cancel(r->in.sim);
     drape_status status = r->request->realtime ? cli_realtime_run(&r->realtime, &r->request->command, &r->in)
                                                : drape_sim_advance(r->in.sim, end);
     cli_signals_cancel(NULL);
@@ -477,10 +476,11 @@ const drape_verb drape_verb_run = {
     .entry = {.name = "run", .summary = "simulate a scene; write frames, step log and summary into a folder"},
     .operand = "SCENE",
     .takes_scene = true,
-    .details = "Simulates a scene. Without --out, it prints the results and writes no files.\nCtrl-C ends "
-               "the run after the step in progress (static: during it) and keeps what was written; "
-               "before\nthe first step, nothing is written. A run with --checkpoint-every that was killed "
-               "resumes with --resume,\nand ends with the same results as a run that was not killed.",
+    .details =
+        "Simulates a scene. Without --out, it prints the results and writes no files.\nCtrl-C ends "
+        "the run after the step in progress, or within it after half a second, and keeps what was "
+        "written;\nbefore the first step, nothing is written. A run with --checkpoint-every that was killed "
+        "resumes with --resume,\nand ends with the same results as a run that was not killed.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(run_request),

@@ -9,8 +9,10 @@
 #include <sys/time.h>
 
 #define PERIOD 10000 /* [us]; each of several prints may wait once */
+#define GRACE  50    /* periods in which a step may complete before it is cancelled */
 
 static volatile sig_atomic_t interrupted; /* set by the handler */
+static volatile sig_atomic_t periods;     /* since then */
 static const int caught[] = {SIGINT, SIGTERM, SIGHUP};
 
 static _Atomic(drape_sim *) cancelled;
@@ -23,20 +25,21 @@ static void on_signal(int signal)
     const struct itimerval again = {.it_interval = {.tv_usec = PERIOD}, .it_value = {.tv_usec = PERIOD}};
     (void)signal;
     interrupted = 1;
-    drape_sim_cancel(atomic_load(&cancelled));
     setitimer(ITIMER_REAL, &again, NULL);
 }
 
 static void on_timer(int signal)
 {
     (void)signal;
+    if (periods < GRACE)
+        periods = periods + 1;
+    else
+        drape_sim_cancel(atomic_load(&cancelled));
 }
 
 void cli_signals_cancel(drape_sim *sim)
 {
     atomic_store(&cancelled, sim);
-    if (interrupted)
-        drape_sim_cancel(sim);
 }
 
 /* Also catches signals that were ignored: shells start background jobs of scripts so, and a signal sent to

@@ -13,8 +13,8 @@ void cli_catch_signals(void);
 
 bool cli_interrupted(void);
 
-/* Sets the sim whose step a signal cancels, for runs of a single long step. NULL: none; a step in progress
- * completes. */
+/* Sets the sim whose step in progress is cancelled half a second after a signal, unless it completes before.
+ * NULL: none. */
 void cli_signals_cancel(drape_sim *sim);
 
 /* Prints the line "drape run: interrupted" on stderr. Returns CLI_INTERRUPTED. */

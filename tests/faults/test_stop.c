@@ -120,7 +120,7 @@ START_TEST(a_negative_answer_is_returned_with_its_message)
             .kind = (drape_event_kind)kind, .at = 3, .answer = DRAPE_E_FILE, .message = "the disk\nis full"};
         scene s = open_watched(0.01, 60, &w);
         ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_FILE);
-        ck_assert_str_eq(drape_context_message(s.ctx), "the disk?is full");
+        ck_assert_str_eq(drape_context_message(s.ctx), "the disk is full");
         ck_assert_double_eq_tol(drape_sim_time(s.sim), kind == DRAPE_EVENT_ATTEMPT ? 0.03 : 0.04, 1e-15);
         scene_close(&s);
     }
