@@ -1951,7 +1951,7 @@ START_TEST(messages_are_one_line)
     drape_context_set_message(ctx, "a\nb\tc\x7f %d", 5);
     ck_assert_str_eq(drape_context_message(ctx), "a b c? 5");
     ck_assert_int_eq(drape_model_load(ctx, "no\nsuch\rfile.json", &model), DRAPE_E_FILE);
-    check_message(ctx, "no?such?file.json: cannot read the scene");
+    check_message(ctx, "no such file.json: cannot read the scene");
     ck_assert_int_lt(compile_text(ctx, "{'drape': 1, 'clo\\nth': 1}", &model), 0);
     check_message(ctx, "unknown key");
     ck_assert_int_lt(compile_text(ctx, "{'drape': 1,\n 'cloth': [{]}", &model), 0);
