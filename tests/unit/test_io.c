@@ -1207,8 +1207,9 @@ START_TEST(summary_is_complete)
     const char *path = in_folder(w.out, "summary.json");
     ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &def, NULL, path), DRAPE_OK);
     json_t *json = load_summary(path);
-    check_keys(json,
-               "status message version nodes dofs nnz frames time steps newton wall_s energy strain hash ");
+    check_keys(
+        json,
+        "status message version nodes dofs nnz frames time steps newton wall_s energy strain warnings hash ");
     check_keys(json_object_get(json, "steps"), "accepted rejected unconverged h_min h_max reasons ");
     check_keys(json_object_get(json, "newton"),
                "iterations jacobians factorizations linear_iterations residuals ");
