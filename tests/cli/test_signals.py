@@ -135,7 +135,7 @@ def test_static():
     whole = time.monotonic() - begun
     begun = time.monotonic()
     code, _, err = struck(0.3, signal.SIGINT, "run", "scene.json", "--out", "out")
-    equal((code, err), (130, "t=0: interrupted\n"))
+    equal((code, err), (130, "drape run: t=0: interrupted\n"))
     assert time.monotonic() - begun < whole, (time.monotonic() - begun, whole)
     summary = read_json("out/summary.json")
     equal((summary["status"], summary["steps"]["accepted"]), ("e_stopped", 0))
