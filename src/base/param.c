@@ -8,6 +8,8 @@
 #include <string.h>
 
 #define MAX_WORD   63
+#define MIN_PART   3    /* letters: shorter words are near to a part of too many names */
+#define SHOWN_SIZE 24   /* bytes of a number with 10 digits */
 #define RANGE_SIZE 1024 /* bytes of a range as text: lists of choices are long */
 
 int drape_param_find(const drape_param *params, int param_count, const char *name)
@@ -78,19 +80,70 @@ static size_t edit_distance(const char *a, const char *b)
     return row[nb];
 }
 
+/* The smallest distance of a word from a part of a name: "stretch" and "edge" of "stretch.edge". */
+static size_t distance_from_part(const char *word, const char *name)
+{
+    size_t best = SIZE_MAX;
+    for (const char *part = name;; part++) {
+        const size_t length = strcspn(part, "._");
+        char one[MAX_WORD + 1];
+        snprintf(one, sizeof one, "%.*s", (int)length, part);
+        const size_t distance = edit_distance(word, one);
+        best = distance < best ? distance : best;
+        part += length;
+        if (!*part)
+            return best;
+    }
+}
+
 const char *drape_did_you_mean(const char *word, const char *const *candidates, size_t count)
 {
-    const char *best = NULL;
-    size_t best_distance = 1 + strlen(word) / 3; /* up to a third of the letters may be wrong */
+    const char *best = NULL, *by_part = NULL;
+    /* Up to a third of the letters of a name may be wrong, or a quarter of those of a part of one. */
+    size_t best_distance = 1 + strlen(word) / 3, part_distance = strlen(word) / 4;
     for (size_t i = 0; i < count; i++) {
         size_t distance = edit_distance(word, candidates[i]);
         if (distance <= best_distance && (!best || distance < best_distance)) {
             best = candidates[i];
             best_distance = distance;
         }
+        distance = distance_from_part(word, candidates[i]);
+        if (strlen(word) >= MIN_PART && distance <= part_distance && (!by_part || distance < part_distance)) {
+            by_part = candidates[i];
+            part_distance = distance;
+        }
     }
-    return best;
+    return by_part && (!best || part_distance < best_distance) ? by_part : best;
 }
+
+/* Writes an exponent as people do: "1e+09" -> "1e9", "1e-06" -> "1e-6". */
+static void trim_exponent(char *text)
+{
+    char *exponent = strchr(text, 'e');
+    if (!exponent || !strchr("+-", exponent[1]))
+        return;
+    const char *digits = exponent + 2 + strspn(exponent + 2, "0");
+    memmove(exponent + (exponent[1] == '-' ? 2 : 1), digits, strlen(digits) + 1);
+}
+
+/* The shorter of 1250000 and 1.25e6; numbers below 1e6 have no exponent. */
+static const char *shown(double number, char text[SHOWN_SIZE])
+{
+    char power[SHOWN_SIZE] = "";
+    snprintf(text, SHOWN_SIZE, "%.10g", number);
+    for (int digits = 0; fabs(number) >= 1e6 && digits < 10 && !strchr(text, 'e'); digits++) {
+        snprintf(power, sizeof power, "%.*e", digits, number);
+        if (strtod(power, NULL) == strtod(text, NULL)) {
+            trim_exponent(power);
+            break;
+        }
+    }
+    trim_exponent(text);
+    if (*power && strlen(power) < strlen(text))
+        memcpy(text, power, strlen(power) + 1);
+    return text;
+}
+#define SHOWN(number) shown(number, (char[SHOWN_SIZE]){0})
 
 static void choices_text(const drape_param *param, char *text, size_t size)
 {
@@ -125,8 +178,8 @@ void drape_param_range_text(const drape_param *param, char *text, size_t size)
     case DRAPE_PARAM_INTEGER:
         break;
     }
-    snprintf(text, size, "%s%c%.10g, %.10g%c%s%s", several, param->open_min ? '(' : '[', param->min,
-             param->max, param->open_max ? ')' : ']', *unit ? " " : "", unit);
+    snprintf(text, size, "%s%c%s, %s%c%s%s", several, param->open_min ? '(' : '[', SHOWN(param->min),
+             SHOWN(param->max), param->open_max ? ')' : ']', *unit ? " " : "", unit);
 }
 
 void drape_param_takes_text(const drape_param *param, char *text, size_t size)
@@ -164,11 +217,11 @@ void drape_param_value_text(const drape_param *param, const double *value, char 
         return;
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
-        snprintf(text, size, "%.10g", *value);
+        snprintf(text, size, "%s", SHOWN(*value));
         return;
     case DRAPE_PARAM_VECTOR:
     case DRAPE_PARAM_TURN:
-        snprintf(text, size, "[%.10g, %.10g, %.10g]", value[0], value[1], value[2]);
+        snprintf(text, size, "[%s, %s, %s]", SHOWN(value[0]), SHOWN(value[1]), SHOWN(value[2]));
         return;
     case DRAPE_PARAM_TEXT:
         snprintf(text, size, "a text");
@@ -189,6 +242,7 @@ static drape_status refuse_number(drape_context *ctx, const char *pointer, const
 {
     char given[40];
     drape_number_text(number, given, sizeof given);
+    trim_exponent(given);
     return drape_param_refuse(ctx, pointer, param, given);
 }
 
@@ -317,15 +371,15 @@ drape_status drape_param_unknown(drape_context *ctx, const char *pointer, const 
 {
     char list[RANGE_SIZE] = "";
     size_t used = 0;
-    const char *meant = drape_did_you_mean(name, known, count);
-    if (meant)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown key \"%.60s\"; did you mean \"%s\"?",
-                             name, meant);
     for (size_t i = 0; i < count && used < sizeof list; i++)
-        used +=
-            (size_t)snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "; parameters: ", known[i]);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown key \"%.60s\"%s", name,
-                         count ? list : "; there are no parameters");
+        used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", known[i]);
+    const char *meant = drape_did_you_mean(name, known, count);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown key \"%.60s\"; %s%s%s%s%s", name,
+                         meant ? "did you mean \"" : "", meant ? meant : "", meant ? "\"? " : "",
+                         !count  ? "there are no parameters"
+                         : meant ? "Known: "
+                                 : "known: ",
+                         list);
 }
 
 static drape_status unknown_name(drape_context *ctx, const char *pointer, const drape_param *params,

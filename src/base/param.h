@@ -49,10 +49,10 @@ int drape_param_find(const drape_param *params, int param_count, const char *nam
 
 /* ---- As text ---- */
 
-/* Writes the range of a parameter: "(0, 1e+9] N/m", "[x, y, z], each in [0, 1]" or "one of: a, b". */
+/* Writes the range of a parameter: "(0, 1e9] N/m", "[x, y, z], each in [0, 1]" or "one of: a, b". */
 void drape_param_range_text(const drape_param *param, char *text, size_t size);
 
-/* The same with the kind of number: "a number in (0, 1e+9] N/m". */
+/* The same with the kind of number: "a number in (0, 1e9] N/m". */
 void drape_param_takes_text(const drape_param *param, char *text, size_t size);
 
 /* Writes a value of a parameter: "0.001", "true", "report", "[0, 1, 0]". */

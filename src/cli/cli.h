@@ -104,8 +104,12 @@ int cli_misuse(const char *verb, const char *format, ...) DRAPE_PRINTF(2, 3);
 #define CLI_SHOWN(text) cli_shown((char[256]){0}, text)
 const char *cli_shown(char room[256], const char *text);
 
-/* Prints the message of the context on stderr. Returns the exit code that it is given. */
-int cli_report(drape_context *ctx, int code);
+/* Prints a message of the library on stderr: as it is if it begins with an operand, as
+ * "scene.json:6:26: /cloth/0: text" does, else behind "drape VERB: ". */
+void cli_print_message(const cli_command *command, const char *message);
+
+/* Prints the message of the command's context so. Returns the exit code that it is given. */
+int cli_report(const cli_command *command, int code);
 
 /* ---- Scenes ---- */
 

@@ -58,7 +58,7 @@ static int check(const check_request *request, const cli_scene *in)
         code = print_comparisons(rows, count);
     if (cli_interrupted())
         return cli_report_interrupted(request->command.verb);
-    return done && !print_intersections(in) ? code : cli_report(in->ctx, CLI_FAILED);
+    return done && !print_intersections(in) ? code : cli_report(&request->command, CLI_FAILED);
 }
 
 static int run(const void *command)

@@ -176,7 +176,7 @@ static int run(const void *command)
     if (code == CLI_GO_ON) {
         drape_status status = gather(request->command.arena, &in, &info);
         code = status == DRAPE_E_STOPPED ? cli_report_interrupted(request->command.verb)
-               : status                  ? cli_report(in.ctx, CLI_FAILED)
+               : status                  ? cli_report(&request->command, CLI_FAILED)
                : request->json           ? print_json(&info)
                                          : CLI_DONE;
         if (!status && !request->json)

@@ -25,7 +25,7 @@ static int merge(const void *command)
         drape_lab_merge(request->command.ctx, (const char *const *)request->command.operands,
                         (size_t)request->command.operand_count, request->out, &outcome);
     bool whole = outcome.done == outcome.cases;
-    int code = cli_lab_conclude(request->command.ctx, status, &outcome);
+    int code = cli_lab_conclude(&request->command, status, &outcome);
     return code == CLI_DONE && !whole ? CLI_FAILED : code;
 }
 

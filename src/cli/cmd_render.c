@@ -230,21 +230,13 @@ static int read_request(render *r)
 
 /* ---- Preparing ---- */
 
-static int report(const render *r, int code)
-{
-    if (cli_interrupted())
-        return cli_report_interrupted("render");
-    fprintf(stderr, "drape render: %s\n", drape_context_message(r->ctx));
-    return code;
-}
-
 static int open_sources(render *r)
 {
     const cli_command *command = &r->request->command;
     int code = CLI_GO_ON;
     r->sources = drape_arena_take(command->arena, (size_t)command->operand_count, sizeof *r->sources);
     if (!r->sources)
-        return report(r, CLI_FAILED);
+        return cli_report(&r->request->command, CLI_FAILED);
     for (int i = 0; i < command->operand_count && code == CLI_GO_ON; i++) {
         code = cli_source_open(command, command->operands[i], &r->frames, &r->sources[i]);
         r->source_count++;
@@ -267,7 +259,7 @@ static int open_painter(render *r)
         status = drape_painter_create(r->ctx, &def, &r->painter);
     r->drawn = drape_arena_take(r->request->command.arena, finer * size, 4);
     r->pixels = finer == 1 ? r->drawn : drape_arena_take(r->request->command.arena, size, 4);
-    return status || !r->drawn || !r->pixels ? report(r, CLI_BAD_INPUT) : CLI_GO_ON;
+    return status || !r->drawn || !r->pixels ? cli_report(&r->request->command, CLI_BAD_INPUT) : CLI_GO_ON;
 }
 
 static int fill_sources(render *r)
@@ -314,12 +306,12 @@ static int set_stages(render *r)
     drape_framing framing = drape_framing_begin((float)r->azimuth, (float)r->elevation, aspect);
     r->stages = drape_arena_take(r->request->command.arena, (size_t)r->source_count, sizeof *r->stages);
     if (!r->stages)
-        return report(r, CLI_FAILED);
+        return cli_report(&r->request->command, CLI_FAILED);
     for (int i = 0; i < r->source_count; i++) {
         drape_stage *stage = &r->stages[i];
         const drape_reel *reel = &r->sources[i].reel;
         if (drape_stage_create(r->ctx, r->sources[i].in.model, stage))
-            return report(r, CLI_FAILED);
+            return cli_report(&r->request->command, CLI_FAILED);
         for (size_t k = 0; k < reel->count; k++)
             drape_stage_add(stage, drape_reel_positions(reel, k));
         drape_stage_finish(stage);
@@ -501,7 +493,8 @@ static int open_output(render *r)
         status = check_inputs(r);
     if (!status && folder)
         status = drape_folder_check(r->folder, is_picture, is_picture, NULL);
-    return status ? report(r, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED) : CLI_GO_ON;
+    return status ? cli_report(&r->request->command, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED)
+                  : CLI_GO_ON;
 }
 
 static int make(render *r)
@@ -511,7 +504,7 @@ static int make(render *r)
                           : r->picture ? draw_frames(r, write_picture, NULL)
                                        : make_folder(r);
     if (status)
-        return report(r, CLI_FAILED);
+        return cli_report(&r->request->command, CLI_FAILED);
     if (cli_interrupted() && !r->picture) /* a picture is complete */
         return cli_report_interrupted("render");
     for (int i = 0; i < r->source_count; i++)

@@ -36,7 +36,7 @@ static int run(const void *command)
     if (status == DRAPE_E_STOPPED)
         return cli_report_interrupted(request->command.verb);
     if (status)
-        return cli_report(request->command.ctx, input ? CLI_BAD_INPUT : CLI_FAILED);
+        return cli_report(&request->command, input ? CLI_BAD_INPUT : CLI_FAILED);
     printf("report    %s, %.3g MB, %lld of %lld frames\n", CLI_SHOWN(result.path), (double)result.bytes / 1e6,
            (long long)result.kept, (long long)result.frames);
     return CLI_DONE;

@@ -132,7 +132,7 @@ static int resume(run *r)
     drape_status status = r->request->resume ? restore(r) : DRAPE_OK;
     if (status == DRAPE_E_STOPPED)
         return cli_report_interrupted(r->request->command.verb);
-    return status ? cli_report(r->in.ctx, CLI_BAD_INPUT) : CLI_GO_ON;
+    return status ? cli_report(&r->request->command, CLI_BAD_INPUT) : CLI_GO_ON;
 }
 
 static drape_status check_input(void *user, const char *path, const char *pointer)
@@ -162,7 +162,7 @@ static int check_summary(run *r)
     if (!status)
         status = drape_scene_files(r->in.ctx, r->in.model, request->command.operand, check_input, r);
     if (status)
-        return cli_report(r->in.ctx, CLI_BAD_INPUT);
+        return cli_report(&r->request->command, CLI_BAD_INPUT);
     return check_summary_folder(request);
 }
 
@@ -187,7 +187,7 @@ static int open_output(run *r)
     note(r, status);
     if (status != DRAPE_E_ARGUMENT && r->request->summary)
         write_summary(r, NULL, r->request->summary);
-    fprintf(stderr, "%s\n", r->message);
+    cli_print_message(&r->request->command, r->message);
     return status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED;
 }
 
@@ -376,7 +376,7 @@ static int conclude(run *r)
         print_warnings(r);
     if (!r->status)
         return CLI_DONE;
-    fprintf(stderr, "%s\n", r->message);
+    cli_print_message(&r->request->command, r->message);
     return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
 }
 

@@ -131,10 +131,11 @@ static bool is_scene(const void *user, const char *name)
     return false;
 }
 
-static int write_scenes(drape_context *ctx, const char *path, const drape_reference *only)
+static int write_scenes(const validate_request *request, const drape_reference *only)
 {
+    drape_context *ctx = request->command.ctx;
     drape_folder *folder = NULL;
-    drape_status status = drape_folder_open(ctx, path, false, &folder);
+    drape_status status = drape_folder_open(ctx, request->scenes, false, &folder);
     if (!status)
         status = drape_folder_check(folder, is_scene, NULL, only);
     if (!status)
@@ -144,7 +145,8 @@ static int write_scenes(drape_context *ctx, const char *path, const drape_refere
              !status && (!only || only == drape_references[r]) && i < drape_references[r]->case_count; i++)
             status = write_scene(ctx, folder, drape_references[r], i);
     drape_folder_close(&folder);
-    return !status ? CLI_DONE : cli_report(ctx, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED);
+    return !status ? CLI_DONE
+                   : cli_report(&request->command, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED);
 }
 
 static int find(const char *name, const drape_reference **only)
@@ -227,7 +229,7 @@ static int conclude(const run *r, const validate_request *request, drape_status 
         return CLI_INTERRUPTED;
     }
     if (status)
-        fprintf(stderr, "%s\n", drape_context_message(r->ctx));
+        cli_print_message(&request->command, drape_context_message(r->ctx));
     return status || counts[DRAPE_OUTCOME_FAIL] + counts[DRAPE_OUTCOME_STOPPED] ? CLI_FAILED : CLI_DONE;
 }
 
@@ -250,7 +252,7 @@ static int run_references(drape_context *ctx, const validate_request *request, c
         fflush(stdout);
     }
     const drape_status closed = drape_file_close(&r.file);
-    const int code = status == DRAPE_E_ARGUMENT ? cli_report(ctx, CLI_BAD_INPUT)
+    const int code = status == DRAPE_E_ARGUMENT ? cli_report(&request->command, CLI_BAD_INPUT)
                                                 : conclude(&r, request, status ? status : closed, counts);
     drape_file_destroy(&r.file);
     drape_folder_close(&r.folder);
@@ -270,7 +272,7 @@ static int validate(const validate_request *request, drape_context *ctx)
         return code;
     if (!request->scenes)
         return run_references(ctx, request, only);
-    return write_scenes(ctx, request->scenes, only);
+    return write_scenes(request, only);
 }
 
 static const cli_option options[] = {

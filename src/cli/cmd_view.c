@@ -60,12 +60,6 @@ static const drape_shading *shading_of(const window_view *w)
     return drape_shadings[w->shading];
 }
 
-static int report(const window_view *w, int code)
-{
-    fprintf(stderr, "drape view: %s\n", drape_context_message(w->ctx));
-    return code;
-}
-
 static drape_status make_painter(window_view *w)
 {
     drape_painter_def def = {.width = WIDTH, .height = HEIGHT, .fine = 1};
@@ -541,10 +535,10 @@ static int show(window_view *w)
     if (code != CLI_GO_ON)
         return code;
     if (set_up(w, width, height))
-        return report(w, CLI_BAD_INPUT);
+        return cli_report(&w->request->command, CLI_BAD_INPUT);
     w->v.paused = !w->request->running;
     if (loop(w))
-        return report(w, CLI_FAILED);
+        return cli_report(&w->request->command, CLI_FAILED);
     drape_statistics s = drape_sim_statistics(w->v.in.sim);
     printf("t = %.6g s, %s, dt = %.6g s, %lld steps, %lld rejected, shade %s, stiffness x %.4g, gravity x "
            "%.4g\n",

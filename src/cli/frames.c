@@ -44,14 +44,14 @@ static int open_run(const cli_command *command, cli_source *s)
                    : cli_misuse(command->verb, "%s", drape_context_message(command->ctx));
     drape_free(command->ctx, path);
     if (code == CLI_GO_ON && drape_record_open(command->ctx, s->operand, s->in.model->node_count, &s->run))
-        code = cli_report(command->ctx, CLI_BAD_INPUT);
+        code = cli_report(command, CLI_BAD_INPUT);
     return code;
 }
 
 int cli_source_open(const cli_command *command, const char *operand, const cli_frames_def *def,
                     cli_source *out)
 {
-    *out = (cli_source){.operand = operand};
+    *out = (cli_source){.command = command, .operand = operand};
     make_label(operand, out->label, sizeof out->label);
     int code = cli_is_folder(operand) ? open_run(command, out) : cli_scene_load(command, operand, &out->in);
     if (code != CLI_GO_ON)
@@ -65,7 +65,7 @@ int cli_source_open(const cli_command *command, const char *operand, const cli_f
                           "simulated again: %s/scene.json",
                           def->field->entry.name, operand);
     if (drape_reel_create(command->ctx, (size_t)out->in.model->node_count, def->field, &out->reel))
-        return cli_report(command->ctx, CLI_BAD_INPUT);
+        return cli_report(command, CLI_BAD_INPUT);
     return CLI_GO_ON;
 }
 
@@ -114,8 +114,8 @@ static int read_frames(const cli_frames_def *def, cli_source *s)
         status = read_frame(def, s, i, scratch);
     drape_free(s->in.ctx, scratch);
     if (cli_interrupted())
-        return cli_report_interrupted("render");
-    return status ? cli_report(s->in.ctx, CLI_FAILED) : CLI_GO_ON;
+        return cli_report_interrupted(s->command->verb);
+    return status ? cli_report(s->command, CLI_FAILED) : CLI_GO_ON;
 }
 
 /* ---- From a simulation ---- */
@@ -167,20 +167,19 @@ static int simulate(const cli_frames_def *def, cli_source *s)
         return CLI_GO_ON;
     s->incomplete = status != DRAPE_OK;
     if (cli_interrupted())
-        return status == DRAPE_E_STOPPED ? cli_report(s->in.ctx, CLI_INTERRUPTED)
-                                         : cli_report_interrupted("render");
+        return status == DRAPE_E_STOPPED ? cli_report(s->command, CLI_INTERRUPTED)
+                                         : cli_report_interrupted(s->command->verb);
     if (status)
-        cli_report(s->in.ctx, CLI_FAILED);
+        cli_report(s->command, CLI_FAILED);
     if (status == DRAPE_E_ARGUMENT || status == DRAPE_E_MEMORY)
         return CLI_FAILED;
     t = drape_sim_time(s->in.sim); /* the state at the end is a frame too, unless it is the last one */
     if ((def->one == CLI_LAST_FRAME || (def->one == CLI_ALL_FRAMES && (s->reel.count == 0 || t > w.last))) &&
         keep(&w, t, drape_sim_positions(s->in.sim)))
-        return cli_report(s->in.ctx, CLI_FAILED);
+        return cli_report(s->command, CLI_FAILED);
     if (s->reel.count > 0)
         return CLI_GO_ON;
-    fprintf(stderr, "--frame %d: %s has fewer frames\n", def->one, CLI_SHOWN(s->operand));
-    return CLI_BAD_INPUT;
+    return cli_misuse(s->command->verb, "--frame %d: %s has fewer frames", def->one, s->operand);
 }
 
 int cli_source_fill(const cli_frames_def *def, cli_source *source)

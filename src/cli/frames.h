@@ -20,6 +20,7 @@ enum { CLI_ALL_FRAMES = -1, CLI_LAST_FRAME = -2 };
 bool cli_is_folder(const char *path);
 
 typedef struct cli_source {
+    const cli_command *command;
     const char *operand;
     char label[80]; /* name shown in the picture */
     cli_scene in;

@@ -151,7 +151,7 @@ static void print_ignored(const cli_chosen *entry, const drape_chosen *chosen)
     bool any = false;
     for (size_t i = 0; i < entry->choice->setting_count; i++)
         if (entry->ignores(chosen, entry->choice->settings[i].name)) {
-            printf("%s %s", any ? "," : "  ignored by it:", entry->choice->settings[i].name);
+            printf("%s %s", any ? "," : "  given but not used:", entry->choice->settings[i].name);
             any = true;
         }
     fputs(any ? "\n" : "", stdout);

@@ -116,16 +116,18 @@ static int make_def(const cli_lab_request *request, int default_jobs, double def
     return code;
 }
 
-int cli_lab_conclude(drape_context *ctx, drape_status status, drape_lab_outcome *outcome)
+int cli_lab_conclude(const cli_command *command, drape_status status, drape_lab_outcome *outcome)
 {
     const int code = !status                                      ? CLI_DONE
                      : status == DRAPE_E_STOPPED                  ? CLI_INTERRUPTED
                      : outcome->input && status != DRAPE_E_MEMORY ? CLI_BAD_INPUT
                                                                   : CLI_FAILED;
-    if (status)
-        fprintf(stderr, "%s\n", code == CLI_INTERRUPTED ? "interrupted" : drape_context_message(ctx));
-    else
+    if (!status)
         fputs(outcome->text ? outcome->text : "", stdout);
+    else if (code == CLI_INTERRUPTED)
+        cli_report_interrupted(command->verb);
+    else
+        cli_print_message(command, drape_context_message(command->ctx));
     drape_lab_outcome_free(outcome);
     return code;
 }
@@ -142,7 +144,7 @@ int cli_lab_run(const cli_lab_request *request, int default_jobs, double default
         cli_progress_begin(&progress, 0, 0);
         drape_status status = drape_lab_run(command->ctx, command->verb, &def, &outcome);
         cli_progress_clear(&progress);
-        code = cli_lab_conclude(command->ctx, status, &outcome);
+        code = cli_lab_conclude(command, status, &outcome);
     }
     return code;
 }

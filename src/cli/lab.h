@@ -37,6 +37,6 @@ int cli_lab_run(const cli_lab_request *request, int default_jobs, double default
 
 /* Prints the summary, or the message of a failure, and frees the outcome. Returns the exit code. */
 struct drape_lab_outcome;
-int cli_lab_conclude(drape_context *ctx, drape_status status, struct drape_lab_outcome *outcome);
+int cli_lab_conclude(const cli_command *command, drape_status status, struct drape_lab_outcome *outcome);
 
 #endif

@@ -110,10 +110,8 @@ static int run(int argc, char **argv)
         int (*run)(int argc, char **argv);
     } words[] = {
         {"help", help}, {"--help", help}, {"-h", help}, {"--version", version}, {"version", version}};
-    if (argc < 2) {
-        fputs("drape: which verb? `drape --help` shows all\n", stderr);
-        return CLI_BAD_INPUT;
-    }
+    if (argc < 2)
+        return help(argc, argv);
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (strcmp(argv[1], words[i].word) == 0)
             return words[i].run(argc, argv);

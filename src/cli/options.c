@@ -93,12 +93,26 @@ int cli_misuse(const char *verb, const char *format, ...)
     return CLI_BAD_INPUT;
 }
 
+void cli_print_message(const cli_command *command, const char *message)
+{
+    bool placed = false;
+    for (int i = 0; i < command->operand_count; i++) {
+        const size_t length = strlen(command->operands[i]);
+        placed |= strncmp(message, command->operands[i], length) == 0 &&
+                  (message[length] == ':' || message[length] == '/');
+    }
+    if (placed)
+        fprintf(stderr, "%s\n", message);
+    else
+        cli_misuse(command->verb, "%s", message);
+}
+
 /* What failed because a signal ended its wait is not what is wrong. */
-int cli_report(drape_context *ctx, int code)
+int cli_report(const cli_command *command, int code)
 {
     if (cli_interrupted() && code != CLI_INTERRUPTED)
-        return cli_report_interrupted("");
-    fprintf(stderr, "%s\n", drape_context_message(ctx));
+        return cli_report_interrupted(command->verb);
+    cli_print_message(command, drape_context_message(command->ctx));
     return code;
 }
 
@@ -112,9 +126,9 @@ static int unknown_option(const drape_verb *verb, const option_list *list, const
     snprintf(word, sizeof word, "%.*s", (int)strcspn(given + strspn(given, "-"), "="),
              given + strspn(given, "-"));
     const char *meant = drape_did_you_mean(word, names, list->count + 1);
-    return cli_misuse(verb->entry.name, "there is no option \"%.60s\"%s%s%s; `drape %s --help` shows all",
-                      given, meant ? "; did you mean \"--" : "", meant ? meant : "", meant ? "\"?" : "",
-                      verb->entry.name);
+    return cli_misuse(verb->entry.name, "there is no option \"%.60s\"; `drape %s --help` shows all%s%s%s",
+                      given, verb->entry.name, meant ? "; did you mean \"--" : "", meant ? meant : "",
+                      meant ? "\"?" : "");
 }
 
 /* ---- Values ---- */

@@ -71,7 +71,7 @@ int cli_scene_load(const cli_command *command, const char *path, cli_scene *out)
     drape_status status = load(command, path, out);
     if (cli_interrupted()) /* even if loading did not notice it */
         return cli_report_interrupted(command->verb);
-    return status ? cli_report(command->ctx, CLI_BAD_INPUT) : CLI_GO_ON;
+    return status ? cli_report(command, CLI_BAD_INPUT) : CLI_GO_ON;
 }
 
 void cli_scene_free(cli_scene *scene)

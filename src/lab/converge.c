@@ -199,7 +199,7 @@ static void report_order(const sequence *s, FILE *out)
     fprintf(out, "%s: ", s->series);
     if (s->unrefined)
         fprintf(out, "no order, as it chooses its own substeps and dt does not refine them; "
-                     "--set /integrator/substeps=N fixes them");
+                     "a value of /integrator/substeps fixes them");
     else if (isnan(s->line.slope))
         fprintf(out, "no order, as too few of its refinements moved the end");
     else {
@@ -208,8 +208,8 @@ static void report_order(const sequence *s, FILE *out)
             fprintf(out, " (95 %% confidence %.3g to %.3g)", s->line.low, s->line.high);
         fprintf(out, ", %.3g at the last refinement", local_order(s, s->count - 1));
         if (s->line.low <= 0)
-            fprintf(out, ": not wholly above 0, so the order is not determined; try more --levels, or a "
-                         "shorter --duration, before small differences grow");
+            fprintf(out, ": not wholly above 0, so the order is not determined; try more levels, or a "
+                         "shorter duration, before small differences grow");
     }
     if (s->rejected && strcmp(s->knob, "dt") == 0)
         fprintf(out, "; %lld of its steps were rejected and cut, so dt was not halved everywhere",

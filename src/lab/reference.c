@@ -209,8 +209,9 @@ static drape_status choose(lab *l, const drape_model *model, level *best)
         status = drape_fail(
             l->ctx, DRAPE_E_SOLVER,
             "no reference: neither ida nor trbdf2 completes two levels within %g s of CPU time%s; raise "
-            "--case-seconds%s, or shorten the duration",
-            BUDGET * l->def->case_seconds, budget ? " and the budget" : "", budget ? " and --budget" : "");
+            "case_seconds%s, or shorten the duration",
+            BUDGET * l->def->case_seconds, budget ? " and the budget" : "",
+            budget ? " and budget_seconds" : "");
     else if (!status)
         status = save(l, chosen, true, best);
     if (status && status != DRAPE_E_SOLVER)

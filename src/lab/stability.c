@@ -29,8 +29,8 @@ typedef struct axis {
 
 static drape_status wrong_axis(lab *l, const char *text, const char *why)
 {
-    return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
-                      "--axis \"%.100s\": %s; must be /pointer=from:to:n or ...:nlog", text, why);
+    return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "axis \"%.100s\": %s; must be /pointer=from:to:n or ...:nlog",
+                      text, why);
 }
 
 static drape_status read_axis(lab *l, const char *text, axis *a)
@@ -103,7 +103,7 @@ static drape_status check_integers(lab *l, const axis *a)
         double value = axis_value(a, k);
         if (!(fabs(value) < 1e15) || fabs(value - round(value)) > 1e-9 * fmax(1, fabs(value)))
             return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
-                              "--axis \"%.100s\": its value %d would be %.6g, but must be an integer",
+                              "axis \"%.100s\": its value %d would be %.6g, but must be an integer",
                               a->pointer, k + 1, value);
     }
     return DRAPE_OK;
@@ -142,7 +142,9 @@ static drape_status read_space(lab *l, space *s)
 {
     const drape_lab_def *def = l->def;
     if (def->axis_count < 1 || def->axis_count > MAX_AXES)
-        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "a map has 1 to 3 axes; %zu are given", def->axis_count);
+        return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
+                          "a map has 1 to 3 axes, such as \"/integrator/dt=1e-3:1e-1:9log\"; %zu are given",
+                          def->axis_count);
     *s = (space){.count = (int)def->axis_count};
     drape_status status = read_axes(l, def->axes, s);
     for (int a = 0; !status && a < s->count; a++)
@@ -155,7 +157,7 @@ static drape_status read_space(lab *l, space *s)
     for (int a = 0; a < s->count; a++)
         for (int b = 0; b < a; b++)
             if (strcmp(s->axes[a].pointer, s->axes[b].pointer) == 0)
-                return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "--axis \"%.100s\" is given twice",
+                return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "axis \"%.100s\" is given twice",
                                   s->axes[a].pointer);
     return DRAPE_OK;
 }

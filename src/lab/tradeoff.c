@@ -227,7 +227,7 @@ static void report_reference(lab *l)
     fprintf(l->summary, "The reference's error is estimated as %.2g m; ", reference);
     if (!isfinite(smallest))
         fprintf(l->summary,
-                "no error is plotted: a shorter --duration, or a larger --budget, may give a better one. ");
+                "no error is plotted: a shorter duration, or a larger budget, may give a better one. ");
     else if (reference > 0)
         fprintf(l->summary, "the smallest error plotted is %.2g m, %.3g times that. ", smallest,
                 smallest / reference);

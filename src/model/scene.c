@@ -16,7 +16,8 @@
 #define MAX_FILE   ((size_t)1 << 30)
 #define FIRST_READ ((size_t)1 << 16)
 #define MAX_NAME   300 /* length of a file name in messages */
-#define MAX_SET    80  /* length of a value in messages, in "--set /pointer=value" */
+#define MAX_NUMBER 80  /* length of a number that is set */
+#define MAX_SHOWN  40  /* length of a value that is set, in messages */
 #define LOAD_FLAGS                                                                                           \
     (JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL) /* integers beyond int64 are numbers, too */
 
@@ -24,7 +25,7 @@
 typedef struct override {
     struct override *before;
     char *pointer; /* pointer to the value, with an index in place of an appending "-" */
-    char *shown;   /* "--set /integrator/dt=-1" */
+    char *shown;   /* "set /integrator/dt=-1" */
 } override;
 
 struct drape_scene {
@@ -349,9 +350,9 @@ static drape_status check_pointer(drape_scene *scene, const char *pointer)
  * an exponent. Returns NULL if the text is not a number. */
 static json_t *loose_number(const char *text)
 {
-    char number[MAX_SET + 3];
+    char number[MAX_NUMBER + 3];
     const size_t digits = strspn(text, "+-"), length = strlen(text);
-    if (length > MAX_SET || digits > 1 || strspn(text + digits, "0123456789.eE+-") + digits != length)
+    if (length > MAX_NUMBER || digits > 1 || strspn(text + digits, "0123456789.eE+-") + digits != length)
         return NULL;
     const char *point = strchr(text, '.');
     size_t n = 0;
@@ -478,10 +479,10 @@ static json_t *wrap(const char *rest, json_t *value)
 static drape_status new_override(drape_scene *scene, const char *path, const char *pointer, const char *text,
                                  override **out)
 {
-    char some[MAX_SET + 1], shown[MAX_SET + DRAPE_POINTER_SIZE + 16];
+    char some[MAX_SHOWN + 1], shown[MAX_SHOWN + DRAPE_POINTER_SIZE + 16];
     snprintf(some, sizeof some, "%s", text);
     drape_text_mend_end(some);
-    snprintf(shown, sizeof shown, "--set %s=%s%s", pointer, some, strlen(some) < strlen(text) ? "..." : "");
+    snprintf(shown, sizeof shown, "set %s=%s%s", pointer, some, strlen(some) < strlen(text) ? "..." : "");
     drape_make_printable(shown);
     override *o = drape_arena_take(&scene->kept, 1, sizeof *o);
     if (!o || !(o->pointer = drape_arena_text(&scene->kept, path)) ||
@@ -623,7 +624,7 @@ static void place_of(const drape_scene *scene, const char *pointer, char *place,
     if (!*pointer)
         snprintf(place, size, "%s", scene->name);
     else if (o)
-        snprintf(place, size, "%s", o->shown);
+        snprintf(place, size, "%s: %s", scene->name, o->shown);
     else
         snprintf(place, size, "%s:%zu:%zu", scene->name, line, column);
 }

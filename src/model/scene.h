@@ -16,8 +16,8 @@ drape_status drape_scene_to_def(drape_scene *scene, drape_scene_def *def);
 
 /* Puts the place of the context's last fault before its message: "scene.json:6:26: /cloth/0/pins/1: text"
  * with line and column of the key (for an array element, of the value), or of the nearest ancestor that is in
- * the text; "--set /integrator/dt=-1: /integrator/dt: text" if drape_scene_set gave the value; "scene.json:
- * text" for a fault without a pointer. Repeating it changes nothing. */
+ * the text; "scene.json: set /integrator/dt=-1: /integrator/dt: text" if drape_scene_set gave the value;
+ * "scene.json: text" for a fault without a pointer. Repeating it changes nothing. */
 void drape_scene_locate_fault(drape_scene *scene);
 
 drape_context *drape_scene_context(drape_scene *scene);

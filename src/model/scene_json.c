@@ -115,8 +115,8 @@ static drape_status unknown_key(reader *r, const drape_scene_object *object, con
     const char *meant = drape_did_you_mean(name, known, count);
     drape_pointer_push(&r->at, name);
     if (meant)
-        return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "unknown key %s; did you mean \"%s\"?",
-                             given, meant);
+        return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text,
+                             "unknown key %s; did you mean \"%s\"? Known: %s", given, meant, list);
     if (object->open_with)
         return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "unknown key %s without \"%s\"; known: %s",
                              given, object->open_with, list);

@@ -161,11 +161,12 @@ static drape_status read_status(const drape_sim *sim)
 drape_status drape_sim_reactions(drape_sim *sim, double *forces)
 {
     drape_point point;
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status status = drape_sim_guard(sim, "drape_sim_reactions");
+    if (status)
+        return status;
     if (!forces)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_reactions: the array is NULL");
-    drape_status status = place(sim, &point);
+    status = place(sim, &point);
     if (status)
         return status;
     drape_system_force(sim->system, &point, forces);
@@ -188,11 +189,12 @@ static drape_status check_has_contact(const drape_sim *sim, const char *function
 drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)
 {
     drape_point point;
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status status = drape_sim_guard(sim, "drape_sim_contact_forces");
+    if (status)
+        return status;
     if (!forces)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_contact_forces: the array is NULL");
-    drape_status status = check_has_contact(sim, "drape_sim_contact_forces");
+    status = check_has_contact(sim, "drape_sim_contact_forces");
     if (!status)
         status = place(sim, &point);
     if (status)
@@ -206,11 +208,12 @@ drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)
 drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3])
 {
     drape_point point;
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status status = drape_sim_guard(sim, "drape_sim_collider_force");
+    if (status)
+        return status;
     if (!force)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_force: the array is NULL");
-    drape_status status = check_collider(sim, "drape_sim_collider_force", collider);
+    status = check_collider(sim, "drape_sim_collider_force", collider);
     if (!status)
         status = check_has_contact(sim, "drape_sim_collider_force");
     if (!status)

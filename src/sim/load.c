@@ -33,9 +33,12 @@ drape_status drape_model_create(drape_context *ctx, const drape_scene_def *given
 drape_status drape_scene_compile(drape_scene *scene, drape_model **out)
 {
     drape_scene_def def;
-    if (!scene || !out)
+    if (out)
+        *out = NULL;
+    if (!scene)
         return DRAPE_E_ARGUMENT;
-    *out = NULL;
+    if (!out)
+        return drape_fail(drape_scene_context(scene), DRAPE_E_ARGUMENT, "drape_scene_compile: out is NULL");
     drape_status status = drape_scene_to_def(scene, &def);
     if (!status)
         status = compile(drape_scene_context(scene), &def, out);
@@ -47,9 +50,12 @@ drape_status drape_scene_compile(drape_scene *scene, drape_model **out)
 drape_status drape_model_load(drape_context *ctx, const char *scene_path, drape_model **out)
 {
     drape_scene *scene = NULL;
-    if (!ctx || !out)
+    if (out)
+        *out = NULL;
+    if (!ctx)
         return DRAPE_E_ARGUMENT;
-    *out = NULL;
+    if (!out)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_model_load: out is NULL");
     drape_status status = drape_scene_load(ctx, scene_path, &scene);
     if (!status)
         status = drape_scene_compile(scene, out);

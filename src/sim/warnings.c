@@ -4,13 +4,16 @@
  */
 #include "sim/warnings.h"
 
+#include "colliders/colliders.h"
 #include "sim/sim.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
-#define MOST 0.5 /* of the energy, of the time */
-#define MANY 3.0 /* Newton iterations an attempt */
+#define MOST   0.5  /* of the energy, of the time */
+#define MANY   3.0  /* Newton iterations an attempt */
+#define INSIDE 1e-9 /* [m] a node less deep than this is not inside: contact allows it */
 
 /* A cloth of which nothing but its weight is modelled falls like dust. */
 static bool has_no_terms(drape_sim *sim, char *text, size_t size)
@@ -46,6 +49,46 @@ static bool has_few_steps(drape_sim *sim, char *text, size_t size)
              "a smaller dt",
              sim->model->duration, ceil(steps), dt);
     return true;
+}
+
+/* Whether free nodes at x are inside a collider, of the first of which it then writes the text. A pinned
+ * node may be there on purpose, and faces of which only the middle is inside do not count: some contact is
+ * kept at nodes only. */
+static bool describe_inside(const drape_sim *sim, const double *x, bool start, char *text, size_t size)
+{
+    const drape_model *m = sim->model;
+    for (int32_t c = 0; c < m->collider_count; c++) {
+        drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], 0);
+        const drape_collider_motion motion = drape_sim_collider(sim, c);
+        if (!start)
+            memcpy(pose.displacement, motion.displacement, sizeof pose.displacement);
+        double deepest = 0;
+        int32_t count = 0;
+        for (int32_t f = 0; f < m->free_count; f++) {
+            const double *at = x + 3 * (size_t)m->node_of_free[f];
+            const double depth = -drape_collider_distance(&m->colliders[c], &pose, at, NULL, NULL);
+            count += depth > INSIDE;
+            deepest = fmax(deepest, depth);
+        }
+        if (count == 0)
+            continue;
+        snprintf(text, size, "/colliders/%d: %d free node%s of the cloth %s%s inside %s, up to %.3g m deep%s",
+                 (int)c, (int)count, count == 1 ? "" : "s", start ? "start" : "end", count == 1 ? "s" : "",
+                 m->colliders[c].name, deepest, start ? ": move the cloth or the collider" : "");
+        return true;
+    }
+    return false;
+}
+
+static bool starts_inside(drape_sim *sim, char *text, size_t size)
+{
+    return describe_inside(sim, sim->model->rest, true, text, size);
+}
+
+static bool ends_inside(drape_sim *sim, char *text, size_t size)
+{
+    return sim->statistics.steps_accepted > 0 &&
+           describe_inside(sim, drape_sim_positions(sim), false, text, size);
 }
 
 /* Energy that the integrator took, as a share of all that went in: by gravity, pins, colliders, hosts and
@@ -100,6 +143,8 @@ static const struct {
     bool (*applies)(drape_sim *sim, char *text, size_t size);
 } checks[] = {{"no_terms", has_no_terms},
               {"few_steps", has_few_steps},
+              {"starts_inside", starts_inside},
+              {"ends_inside", ends_inside},
               {"numerical_dissipation", dissipates_most},
               {"slow_contact", is_contact_slow}};
 

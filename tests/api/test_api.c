@@ -186,6 +186,7 @@ START_TEST(null_arguments_are_reported)
     ck_assert_int_eq(drape_scene_set(scene, NULL, "1"), DRAPE_E_ARGUMENT);
     ck_assert_int_eq(drape_scene_set(scene, "/a", NULL), DRAPE_E_ARGUMENT);
     ck_assert_int_eq(drape_scene_compile(scene, NULL), DRAPE_E_ARGUMENT);
+    check_message(ctx, "drape_scene_compile: out is NULL");
     ck_assert_int_eq(drape_model_create(NULL, &def, &model), DRAPE_E_ARGUMENT);
     ck_assert_int_lt(drape_model_create(ctx, NULL, &model), 0);
     ck_assert_int_eq(drape_model_create(ctx, &def, NULL), DRAPE_E_ARGUMENT);

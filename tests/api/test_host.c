@@ -733,6 +733,40 @@ typedef struct job {
     uint64_t hash;
 } job;
 
+/* An observer that reads forces, and what came of it last. */
+typedef struct reader {
+    drape_sim *sim;
+    drape_status status[3];
+} reader;
+
+static drape_status read_forces(void *user, const drape_event *event)
+{
+    reader *r = user;
+    double forces[3 * 64], on[3];
+    (void)event;
+    r->status[0] = drape_sim_reactions(r->sim, forces);
+    r->status[1] = drape_sim_contact_forces(r->sim, forces);
+    r->status[2] = drape_sim_collider_force(r->sim, 0, on);
+    return DRAPE_OK;
+}
+
+/* Within an advance the system is in the middle of a step, so its forces are not those of a state. */
+START_TEST(observers_cannot_read_forces)
+{
+    char ball[256];
+    failing_allocator memory = {0};
+    snprintf(ball, sizeof ball, BALL, "");
+    host h = open_scene(&memory, SHEET, "", "{'edge': 'top'}", "", ball);
+    reader r = {.sim = h.sim};
+    ck_assert_int_le(drape_model_node_count(h.model), 64);
+    good(&h, drape_sim_observe(h.sim, read_forces, &r));
+    good(&h, drape_sim_advance(h.sim, FRAME));
+    for (int i = 0; i < 3; i++)
+        ck_assert_int_eq(r.status[i], DRAPE_E_ARGUMENT);
+    close_scene(&h, &memory);
+}
+END_TEST
+
 /* One sim and the host that drives it. */
 static void *run_job(void *user)
 {
@@ -866,8 +900,9 @@ END_TEST
 
 SUITE("host", pins_go_where_they_are_sent, a_host_is_as_good_as_a_track, velocities_make_a_motion_smooth,
       a_state_takes_moved_pins_along, a_collider_goes_where_it_is_sent, reactions_carry_the_weight,
-      a_push_does_its_work, every_integrator_is_pushed, springs_of_verlet_are_pushed_and_pulled,
-      contact_carries_the_weight, wind_takes_cloth_along, a_steady_wind_is_that_of_the_term,
-      a_field_without_gradient_takes_longer, a_cancelled_advance_can_go_on, a_step_can_be_cancelled,
-      a_signal_and_a_thread_can_cancel, normals_are_of_length_one, a_checkpoint_keeps_what_the_host_moves,
-      hosts_in_threads_share_a_model, a_host_needs_no_memory, wrong_arguments_are_refused)
+      observers_cannot_read_forces, a_push_does_its_work, every_integrator_is_pushed,
+      springs_of_verlet_are_pushed_and_pulled, contact_carries_the_weight, wind_takes_cloth_along,
+      a_steady_wind_is_that_of_the_term, a_field_without_gradient_takes_longer, a_cancelled_advance_can_go_on,
+      a_step_can_be_cancelled, a_signal_and_a_thread_can_cancel, normals_are_of_length_one,
+      a_checkpoint_keeps_what_the_host_moves, hosts_in_threads_share_a_model, a_host_needs_no_memory,
+      wrong_arguments_are_refused)

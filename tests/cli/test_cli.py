@@ -29,6 +29,7 @@ def test_help():
     """help of the program and of every verb is on stdout with exit 0"""
     overview = good("--help")
     equal(good("help"), overview)
+    equal(good(), overview)
     assert {"run", "report", "info", "check", "list", "render", "view"} <= set(verbs()), verbs()
     for verb in verbs():
         text = good(verb, "--help")
@@ -52,10 +53,46 @@ def test_help_needs_no_scene():
     good("run", "--help", "a", "b", "c")
 
 
+# Names of every kind, one letter wrong: arguments, the start of the line, choices, and the suggestion.
+UNKNOWN = (
+    (["rnu"], "drape: ", "validate", "run"),
+    (["list", "integratorz"], "drape list: ", "shadings", "integrator"),
+    (["validate", "catenari"], "drape validate: ", "cantilever", "catenary"),
+    (["render", "scene.json", "--shade", "straim"], "drape render: ", "wireframe", "strain"),
+    (["run", "scene.json", "--dration", "1"], "drape run: ", "`drape run --help` shows all", "--duration"),
+    *(([verb, "scene.json", "--integrators", "newtonk", *more], f"drape {verb}: ", "be, bdf2", "newton_k")
+      for verb, more in (("converge", []), ("tradeoff", []), ("stability", ["--axis", "/integrator/dt=1e-3:1e-2:2"]))),
+    *(([verb, "scene.json", "--integrator", "newtonk"], "scene.json: set /integrator/method=newtonk: /integrator/method: ", "be, bdf2", "newton_k")
+      for verb in ("run", "info", "check", "converge", "tradeoff")),
+    *((["run", "scene.json", *args], f"scene.json: set {pointer}", choices, meant) for args, pointer, choices, meant in (
+        (["--controller", "having"], "/controller/type=having: /controller/type: ", "fixed, halving", "halving"),
+        (["--linear-solver", "kluu"], "/integrator/linear_solver=kluu: /integrator/linear_solver: ", "auto, klu", "klu"),
+        (["--format", "opj"], "/output/formats=[\"opj\"]: /output/formats/0: ", "npy, obj", "obj"),
+        (["--set", "/cloth/0/terms/-=streth"], "/cloth/0/terms/-=streth: /cloth/0/terms/", "stretch.edge, stretch.cst", "stretch.edge"),
+        (["--set", '/colliders/-={"type":"spere"}'], '/colliders/-={"type":"spere"}: /colliders/0/type: ', "plane, sphere", "sphere"),
+        (["--set", "/cloth/0/mesh/grid=squar"], "/cloth/0/mesh/grid=squar: /cloth/0/mesh/grid: ", "equilateral, square", "square"),
+        (["--set", '/cloth/0/mesh={"file":"a.stl"}'], '/cloth/0/mesh={"file":"a.stl"}: /cloth/0/mesh/file: ', ".obj, .ply", None),
+        (["--set", "/cloth/0/material/fabric=denim"], "/cloth/0/material/fabric=denim: /cloth/0/material/fabric: ", "none, feng2022_1", "wang2011_denim"),
+        (["--set", "/integrator/globalization=lin_search"], "/integrator/globalization=lin_search: /integrator/globalization: ", "line_search, none", "line_search"),
+        (["--set", "/integratr/dt=1"], "/integratr/dt=1: /integratr: ", "Known: drape", "integrator"),
+        (["--set", "/integrator/dtt=1"], "/integrator/dtt=1: /integrator/dtt: ", "Known: dt, tolerance", "dt"),
+        (["--set", "/cloth/0/pins/0/corner=top-lef"], "/cloth/0/pins/0/corner=top-lef: /cloth/0/pins/0/corner: ", "top-left, top-right", "top-left"))))
+
+
+def test_unknown_names():
+    """an unknown name of any kind is one line: where, the choices, and the name that was probably meant"""
+    write_scene()
+    for args, start, choices, meant in UNKNOWN:
+        result = drape(*args)
+        line = result.stderr
+        equal((result.returncode, result.stdout, line.count("\n")), (2, "", 1), f"{args}: {line}")
+        assert line.startswith(start) and choices in line, f"{args}: {line}"
+        assert meant is None or f'did you mean "{meant}"?' in line, f"{args}: {line}"
+
+
 def test_wrong_usage():
     """wrong command lines are one line, exit 2, and write nothing"""
     write_scene()
-    refused(says="which verb")
     refused("rnu", says='did you mean "run"?')
     refused("help", "chekc", says='did you mean "check"?')
     refused("run", says="SCENE is missing")
@@ -85,7 +122,7 @@ def test_wrong_scenes():
     refused("run", "missing.json", "--out", "out", says="missing.json")
     write_scene()
     refused("run", "scene.json", "--out", "out", "--set", "/cloth/0/terms/0=stretch.egde", says='did you mean "stretch.edge"?')
-    refused("run", "scene.json", "--out", "out", "--dt", "-1", says="--set /integrator/dt=-1: /integrator/dt: ")
+    refused("run", "scene.json", "--out", "out", "--dt", "-1", says="scene.json: set /integrator/dt=-1: /integrator/dt: ")
     refused("run", "scene.json", "--out", "out", "--dt", "fast", says="/integrator/dt")
     refused("run", "scene.json", "--out", "out", "--integrator", "eb", says="/integrator/method")
     refused("run", "scene.json", "--out", "out", "--controller", "halve", says="/controller/type")
@@ -276,9 +313,9 @@ def test_failure():
     write_scene(duration=1, integrator={"dt": 0.01, "max_iterations": 1, "tolerance": 1e-12})
     result = drape("run", "scene.json", "--out", "out", "--format", "npy", "--controller", "fixed")
     equal(result.returncode, 1, result.stderr)
-    assert re.fullmatch(r"t=[^\n]+max_iterations[^\n]+\n", without_warnings(result.stderr)), result.stderr
+    assert re.fullmatch(r"drape run: t=[^\n]+max_iterations[^\n]+\n", without_warnings(result.stderr)), result.stderr
     summary = read_json("out/summary.json")
-    equal((summary["status"], summary["message"] + "\n"), ("e_solver", without_warnings(result.stderr)))
+    equal((summary["status"], "drape run: " + summary["message"] + "\n"), ("e_solver", without_warnings(result.stderr)))
     equal(summary["steps"]["reasons"], {"max_iterations": 1})
     equal(read_npy("out/positions.npy")[0][0], summary["frames"])
     assert re.search(r"^status +e_solver$", result.stdout, re.M), result.stdout
@@ -310,7 +347,7 @@ def test_interrupt():
         write_scene(duration=1e5)
         code, out, err = interrupt([one], "--format", "npy", "--frame-rate", "100", "--summary", "s.json")
         equal(code, 130, err)
-        assert re.fullmatch(r"t=\S+: interrupted\n", err), err
+        assert re.fullmatch(r"drape run: t=\S+: interrupted\n", err), err
         assert re.search(r"^status +e_stopped$", out, re.M), out
         summary = read_json("out/summary.json")
         equal((summary["status"], read_json("s.json")["status"]), ("e_stopped", "e_stopped"))
@@ -557,7 +594,7 @@ def test_list_of_keys():
     """list shows the keys of a scene, object by object, with the values that each takes; every key of the schema is there"""
     text = good("list", "scene")
     for part in (r"\n  cloth +/cloth/N\n", r"\n  mesh +/cloth/N/mesh; exactly one of grid, file\n", r"\n    duration +simulated time\n"
-                 r" +a number in \(0, 1000000000\] s; required\n", r"one of: top-left, top-right", r"\n    row +a row of a grid, from 0\n +an integer in \[0, 2147483647\]\n"):
+                 r" +a number in \(0, 1e9\] s; required\n", r"one of: top-left, top-right", r"\n    row +a row of a grid, from 0\n +an integer in \[0, 2147483647\]\n"):
         assert re.search(part, text), (part, text)
     equal(re.findall(r"^  (\S+)", good("list", "pin"), re.M), ["pin"])
     assert text == good("list")[:len(text)]

@@ -315,7 +315,7 @@ def test_resume():
             message = child.stderr.read().decode()
             child.wait()
         if end == signal.SIGINT and child.returncode != 0:
-            equal((child.returncode, message), (130, "interrupted\n"), "Ctrl-C")
+            equal((child.returncode, message), (130, f"drape {command[0]}: interrupted\n"), "Ctrl-C")
     there = len(lines_there("part"))
     assert 0 < there, "nothing was kept"
     good(*command, "--out", "part")
@@ -432,7 +432,7 @@ def test_no_reference():
     command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
     result = drape(*command, "--case-seconds", "1e-9")
     equal(result.returncode, 1, "exit code")
-    assert "raise --case-seconds" in result.stderr, result.stderr
+    assert "raise case_seconds" in result.stderr, result.stderr
     assert not os.path.exists("t"), os.listdir("t")
     os.mkdir("t")
     with open("t/mine", "w", encoding="utf-8") as file:

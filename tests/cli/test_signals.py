@@ -136,7 +136,7 @@ def test_static():
     begun = time.monotonic()
     code, _, err = struck(0.3, signal.SIGINT, "run", "scene.json", "--out", "out")
     took = time.monotonic() - begun
-    equal((code, without_warnings(err)), (130, "t=0: interrupted\n"))
+    equal((code, without_warnings(err)), (130, "drape run: t=0: interrupted\n"))
     assert whole > 4 and took < 0.4 * whole, (took, whole)
     summary = read_json("out/summary.json")
     equal((summary["status"], summary["steps"]["accepted"]), ("e_stopped", 0))
@@ -152,7 +152,7 @@ def test_long_step():
     begun = time.monotonic()
     code, _, err = struck(0.5 * step, signal.SIGINT, "run", "scene.json", "--out", "out")
     took = time.monotonic() - begun
-    equal((code, without_warnings(err)), (130, "t=0: interrupted\n"))
+    equal((code, without_warnings(err)), (130, "drape run: t=0: interrupted\n"))
     assert step > 2 and took < 0.9 * step, (took, step)
     equal(read_json("out/summary.json")["status"], "e_stopped")
 

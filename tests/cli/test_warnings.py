@@ -48,6 +48,22 @@ def test_few_steps():
     equal(warnings("scene.json", "--duration", "0.1", "--integrator", "ida"), {}, "ida")
 
 
+def test_inside():
+    """free nodes that start or end inside a collider have a warning that counts them; nodes outside have none"""
+    # The whole sheet, a metre wide at most, is inside a ball of 100 m and never leaves it.
+    ball = {"type": "sphere", "name": "ball", "center": [0, 0, 0], "radius": 100}
+    write_scene(**FINE, colliders=[ball])
+    result = drape("run", "scene.json", "--summary", "s.json")
+    found = {one["name"]: one["text"] for one in read_json("s.json")["warnings"]}
+    free = read_json("s.json")["dofs"] // 3
+    for name, verb in (("starts_inside", "start"), ("ends_inside", "end")):
+        assert f"/colliders/0: {free} free nodes of the cloth {verb} inside ball, up to " in found[name], found
+    # Contact throws a sheet out of such a depth: the run fails, so only what was known before it is printed.
+    assert f"warning: {found['starts_inside']}\n" in result.stderr, result.stderr
+    write_scene(**FINE, colliders=[{**ball, "center": [0, -200, 0]}])
+    equal(warnings("scene.json"), {}, "a ball far below")
+
+
 def test_dissipation():
     """an integrator that took more than half of the energy has a warning whose advice helps"""
     # A sheet that swings by a corner, without damping: within 1 s backward Euler takes most of what gravity gives, at dt = 1/50 s.

@@ -337,13 +337,12 @@ START_TEST(grid_faults)
     def = equilateral(s, 16384, 1);
     assert_refused(&def, "/m/edges: 16384 is not allowed; edges is an integer in [1, 16383]");
     def = equilateral(s, 1, 0);
-    assert_refused(&def, "/m/edge_length: 0 is not allowed; edge_length is a number in (0, 1000000000] m");
+    assert_refused(&def, "/m/edge_length: 0 is not allowed; edge_length is a number in (0, 1e9] m");
     def = equilateral(s, 1, NAN);
-    assert_refused(&def, "/m/edge_length: nan is not allowed; edge_length is a number in (0, 1000000000] m");
+    assert_refused(&def, "/m/edge_length: nan is not allowed; edge_length is a number in (0, 1e9] m");
     def = equilateral(s, 1, 1);
     def.grid.setting_count = 1;
-    assert_refused(&def,
-                   "/m: \"edge_length\" is missing: length of every edge; a number in (0, 1000000000] m");
+    assert_refused(&def, "/m: \"edge_length\" is missing: length of every edge; a number in (0, 1e9] m");
     def = equilateral(s, 3, 5e8);
     assert_refused(&def, "/m: node 3 is at (1.5e+09, 0, 0) m; coordinates must be finite and within 1e+09 m");
     def.grid.type = "equilaterale";

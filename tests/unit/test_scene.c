@@ -452,12 +452,12 @@ static const struct {
     {"{'drape': 1, 'cloth': {}}", "s.json:1:14: /cloth: an object is not allowed; cloth is an array of "
                                   "objects, at least one, at most 1048576"},
     {"{'drape': 1, 'cloth': [{'mesh': {'grid': 'g'}}]}",
-     "s.json:1:1: /duration: \"duration\" is missing: simulated time; a number in (0, 1000000000] s"},
+     "s.json:1:1: /duration: \"duration\" is missing: simulated time; a number in (0, 1e9] s"},
     {"{'drape': 1, 'cloth': [1]}", "s.json:1:24: /cloth/0: 1 is not allowed; an element is an object"},
     {"{'drape': 1, 'cloth': [{}]}",
      "s.json:1:24: /cloth/0/mesh: \"mesh\" is missing: a grid or a file; an object"},
     {"{'drape': 1, 'durration': 1}",
-     "s.json:1:14: /durration: unknown key \"durration\"; did you mean \"duration\"?"},
+     "s.json:1:14: /durration: unknown key \"durration\"; did you mean \"duration\"? Known: <*>"},
     {ROOT("'colliders': 3"),
      "s.json:2:1: /colliders: 3 is not allowed; colliders is an array of objects, at most 4096"},
     {ROOT("'colliders': ['plane']"),
@@ -481,16 +481,16 @@ static const struct {
      "s.json:2:1: /self_contact: 0.01 is not allowed; self_contact is an object"},
     {ROOT("'contact': []"), "s.json:2:1: /contact: an empty array is not allowed; contact is an object"},
     {ROOT("'Gravity': [0, 0, 0]"),
-     "s.json:2:1: /Gravity: unknown key \"Gravity\"; did you mean \"gravity\"?"},
+     "s.json:2:1: /Gravity: unknown key \"Gravity\"; did you mean \"gravity\"? Known: <*>"},
     {ROOT("'output': {'a/b~c': 1}"),
      "s.json:2:12: /output/a~1b~0c: unknown key \"a/b~c\"; known: formats<*>"},
     {ROOT("'': 1"), "s.json:2:1: /: unknown key \"\"; known: drape, <*>"},
     {ROOT("'\xc3\xa9\\n': 1"), "s.json:1:1: /é : unknown key \"é \"; known: drape, <*>"},
     {ROOT("'description': 1"), "s.json:2:1: /description: 1 is not allowed; description is a string"},
     {ROOT("'gravity': 9.81"), "s.json:2:1: /gravity: 9.81 is not allowed; gravity is [x, y, z], each in "
-                              "[-1000000000, 1000000000] m/s2"},
+                              "[-1e9, 1e9] m/s2"},
     {ROOT("'gravity': [0, -9.81]"), "s.json:2:1: /gravity: an array of 2 is not allowed; gravity is [x, y, "
-                                    "z], each in [-1000000000, 1000000000] m/s2"},
+                                    "z], each in [-1e9, 1e9] m/s2"},
     {ROOT("'gravity': [0, '-9.81', 0]"),
      "s.json:2:16: /gravity/1: \"-9.81\" is not allowed; an element is a number"},
     {ROOT("'integrator': 'be'"), "s.json:2:1: /integrator: \"be\" is not allowed; integrator is an object"},
@@ -506,22 +506,22 @@ static const struct {
     {ROOT("'controller': []"),
      "s.json:2:1: /controller: an empty array is not allowed; controller is an object"},
     {"{'drape': 1, 'duration': 0, 'cloth': [{'mesh': {'grid': 'g'}}]}",
-     "s.json:1:14: /duration: 0 is not allowed; duration is a number in (0, 1000000000] s"},
+     "s.json:1:14: /duration: 0 is not allowed; duration is a number in (0, 1e9] s"},
     {"{'drape': 1, 'duration': -0.1, 'cloth': [{'mesh': {'grid': 'g'}}]}",
-     "s.json:1:14: /duration: -0.1 is not allowed; duration is a number in (0, 1000000000] s"},
+     "s.json:1:14: /duration: -0.1 is not allowed; duration is a number in (0, 1e9] s"},
     {"{'drape': 1, 'duration': 1000000001, 'cloth': [{'mesh': {'grid': 'g'}}]}",
-     "s.json:1:14: /duration: 1000000001 is not allowed; duration is a number in (0, 1000000000] s"},
+     "s.json:1:14: /duration: 1000000001 is not allowed; duration is a number in (0, 1e9] s"},
     {"{'drape': 1, 'duration': '5', 'cloth': [{'mesh': {'grid': 'g'}}]}",
-     "s.json:1:14: /duration: \"5\" is not allowed; duration is a number in (0, 1000000000] s"},
+     "s.json:1:14: /duration: \"5\" is not allowed; duration is a number in (0, 1e9] s"},
     {ROOT("'frame_rate': 0"),
-     "s.json:2:1: /frame_rate: 0 is not allowed; frame_rate is a number in (0, 1000000] 1/s"},
+     "s.json:2:1: /frame_rate: 0 is not allowed; frame_rate is a number in (0, 1e6] 1/s"},
     {ROOT("'frame_rate': 1e7"),
-     "s.json:2:1: /frame_rate: 10000000 is not allowed; frame_rate is a number in (0, 1000000] 1/s"},
+     "s.json:2:1: /frame_rate: 10000000 is not allowed; frame_rate is a number in (0, 1e6] 1/s"},
     {ROOT("'frame_rate': true"),
-     "s.json:2:1: /frame_rate: true is not allowed; frame_rate is a number in (0, 1000000] 1/s"},
+     "s.json:2:1: /frame_rate: true is not allowed; frame_rate is a number in (0, 1e6] 1/s"},
     {ROOT("'output': ['npy']"), "s.json:2:1: /output: an array of 1 is not allowed; output is an object"},
     {ROOT("'output': {'format': ['npy']}"),
-     "s.json:2:12: /output/format: unknown key \"format\"; did you mean \"formats\"?"},
+     "s.json:2:12: /output/format: unknown key \"format\"; did you mean \"formats\"? Known: <*>"},
     {ROOT("'output': {'formats': 'npy'}"),
      "s.json:2:12: /output/formats: \"npy\" is not allowed; formats is an array, each a non-empty string"},
     {ROOT("'output': {'formats': ['npy', '']}"),
@@ -531,7 +531,7 @@ static const struct {
     /* cloth */
     {CLOTH("'name': ''"), "s.json:2:1: /cloth/0/name: \"\" is not allowed; name is a non-empty string"},
     {CLOTH("'name': 3"), "s.json:2:1: /cloth/0/name: 3 is not allowed; name is a non-empty string"},
-    {CLOTH("'nam': 'x'"), "s.json:2:1: /cloth/0/nam: unknown key \"nam\"; did you mean \"name\"?"},
+    {CLOTH("'nam': 'x'"), "s.json:2:1: /cloth/0/nam: unknown key \"nam\"; did you mean \"name\"? Known: <*>"},
     {CLOTH("'material': []"),
      "s.json:2:1: /cloth/0/material: an empty array is not allowed; material is an object"},
     {CLOTH("'material': {'density': {}}"),
@@ -551,7 +551,7 @@ static const struct {
      "s.json:2:34: /cloth/0/terms/0/stiffness: null is not allowed; a setting is a number, true, false, a "
      "string or an array of numbers"},
     {CLOTH("'velocity': [1, 2, 3, 4]"), "s.json:2:1: /cloth/0/velocity: an array of 4 is not allowed; "
-                                        "velocity is [x, y, z], each in [-1000000000, 1000000000] m/s"},
+                                        "velocity is [x, y, z], each in [-1e9, 1e9] m/s"},
     {CLOTH("'velocity': [null, 2, 3]"),
      "s.json:2:14: /cloth/0/velocity/0: null is not allowed; an element is a number"},
     {CLOTH("'pins': []}, {'name': 'cloth0', 'mesh': {'grid': 'g'}"),
@@ -564,7 +564,7 @@ static const struct {
     {MESH("{'edges': 22}"),
      "s.json:2:2: /cloth/0/mesh/edges: unknown key \"edges\" without \"grid\"; known: grid, <*>"},
     {MESH("{'gird': 'square', 'rows': 3}"),
-     "s.json:2:2: /cloth/0/mesh/gird: unknown key \"gird\"; did you mean \"grid\"?"},
+     "s.json:2:2: /cloth/0/mesh/gird: unknown key \"gird\"; did you mean \"grid\"? Known: <*>"},
     {MESH("{'grid': 'square', 'file': 'x.obj'}"),
      "s.json:1:40: /cloth/0/mesh: exactly one of grid, file is needed; given: grid, file"},
     {MESH("{'file': 'x.obj', 'rows': 3}"),
@@ -577,7 +577,7 @@ static const struct {
      "s.json:2:15: /cloth/0/mesh/transform: an empty array is not allowed; transform is an object"},
     {MESH("{'grid': 'g', 'transform': {'translation': [0, 0, 0]}}"),
      "s.json:2:29: /cloth/0/mesh/transform/translation: unknown key \"translation\"; did you mean "
-     "\"translate\"?"},
+     "\"translate\"? Known: <*>"},
     {MESH("{'grid': 'g', 'transform': {'translate': 1}}"),
      "s.json:2:29: /cloth/0/mesh/transform/translate: 1 is not allowed; translate is [x, y, z], each in "
      "(-inf, inf) m"},
@@ -604,7 +604,7 @@ static const struct {
     {CLOTH("'pins': [{}]"),
      "s.json:2:10: /cloth/0/pins/0: exactly one of nodes, corner, edge, row, box is needed; given: none"},
     {CLOTH("'pins': [{'node': 1}]"),
-     "s.json:2:11: /cloth/0/pins/0/node: unknown key \"node\"; did you mean \"nodes\"?"},
+     "s.json:2:11: /cloth/0/pins/0/node: unknown key \"node\"; did you mean \"nodes\"? Known: <*>"},
     {CLOTH("'pins': [{'row': 0, 'nodes': [1]}]"), "s.json:2:10: /cloth/0/pins/0: exactly one of nodes, "
                                                   "corner, edge, row, box is needed; given: nodes, row"},
     {CLOTH("'pins': [{'nodes': 1}]"), "s.json:2:11: /cloth/0/pins/0/nodes: 1 is not allowed; nodes is an "
@@ -626,7 +626,7 @@ static const struct {
     {CLOTH("'pins': [{'row': '0'}]"),
      "s.json:2:11: /cloth/0/pins/0/row: \"0\" is not allowed; row is an integer in [0, 2147483647]"},
     {CLOTH("'pins': [{'row': 99999999999999999999}]"),
-     "s.json:2:11: /cloth/0/pins/0/row: 1e+20 is not allowed; row is an integer in [0, 2147483647]"},
+     "s.json:2:11: /cloth/0/pins/0/row: 1e20 is not allowed; row is an integer in [0, 2147483647]"},
     {CLOTH("'pins': [{'corner': 0}]"), "s.json:2:11: /cloth/0/pins/0/corner: 0 is not allowed; corner is one "
                                        "of: top-left, top-right, bottom-left, bottom-right"},
     {CLOTH("'pins': [{'edge': ['top']}]"), "s.json:2:11: /cloth/0/pins/0/edge: an array of 1 is not allowed; "
@@ -661,7 +661,7 @@ static const struct {
      "s.json:2:50: /cloth/0/pins/0/track/1/0: -1 is not allowed; the time of a key is greater than that of "
      "the key before, 1.5"},
     {CLOTH("'pins': [{'row': 0, 'tracks': []}]"),
-     "s.json:2:21: /cloth/0/pins/0/tracks: unknown key \"tracks\"; did you mean \"track\"?"},
+     "s.json:2:21: /cloth/0/pins/0/tracks: unknown key \"tracks\"; did you mean \"track\"? Known: <*>"},
 };
 
 static const char obstacles[] =
@@ -814,7 +814,8 @@ static const struct {
     {"/integrator/dt", "0.5", NULL},
     {"/integrator/method", "verlet", NULL},
     {"/integrator/method", "'verlet'", NULL},
-    {"/output/self", "1", "--set /output/self=1: /output/self: unknown key \"self\"; known: formats<*>"},
+    {"/output/self", "1",
+     "s.json: set /output/self=1: /output/self: unknown key \"self\"; known: formats<*>"},
     {"/cloth/0/pins/-", "{'edge': 'top'}", NULL},
     {"/cloth/0/pins/-/edge", "top", NULL},
     {"/cloth/0/pins", "[]", NULL},
@@ -824,45 +825,46 @@ static const struct {
     {"/controller", "{}", NULL},
     {"", "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g'}}]}", NULL},
     {"/duration", "-1",
-     "--set /duration=-1: /duration: -1 is not allowed; duration is a number in (0, 1000000000] s"},
+     "s.json: set /duration=-1: /duration: -1 is not allowed; duration is a number in (0, 1e9] s"},
     {"/duration", "",
-     "--set /duration=: /duration: \"\" is not allowed; duration is a number in (0, 1000000000] s"},
+     "s.json: set /duration=: /duration: \"\" is not allowed; duration is a number in (0, 1e9] s"},
     {"/duration", "1e999",
-     "--set /duration=1e999: /duration: \"1e999\" is not allowed; duration is a number in (0, 1000000000] s"},
+     "s.json: set /duration=1e999: /duration: \"1e999\" is not allowed; duration is a number in (0, 1e9] s"},
     {"/duration", "-.5",
-     "--set /duration=-.5: /duration: -0.5 is not allowed; duration is a number in (0, 1000000000] s"},
+     "s.json: set /duration=-.5: /duration: -0.5 is not allowed; duration is a number in (0, 1e9] s"},
     {"/duration", "-.",
-     "--set /duration=-.: /duration: \"-.\" is not allowed; duration is a number in (0, 1000000000] s"},
+     "s.json: set /duration=-.: /duration: \"-.\" is not allowed; duration is a number in (0, 1e9] s"},
     {"/duration", "+-1",
-     "--set /duration=+-1: /duration: \"+-1\" is not allowed; duration is a number in (0, 1000000000] s"},
+     "s.json: set /duration=+-1: /duration: \"+-1\" is not allowed; duration is a number in (0, 1e9] s"},
     {"/gravity", "[0, 0]",
-     "--set /gravity=[0, 0]: /gravity: an array of 2 is not allowed; gravity is [x, y, z], each in "
-     "[-1000000000, 1000000000] m/s2"},
+     "s.json: set /gravity=[0, 0]: /gravity: an array of 2 is not allowed; gravity is [x, y, z], each in "
+     "[-1e9, 1e9] m/s2"},
     {"/gravity", "[0, 0",
-     "--set /gravity=[0, 0: /gravity: \"[0, 0\" is not allowed; gravity is [x, y, z], each in [-1000000000, "
-     "1000000000] m/s2"},
+     "s.json: set /gravity=[0, 0: /gravity: \"[0, 0\" is not allowed; gravity is [x, y, z], each in [-1e9, "
+     "1e9] m/s2"},
     {"/gravity/1", "down",
-     "--set /gravity/1=down: /gravity/1: \"down\" is not allowed; an element is a number"},
+     "s.json: set /gravity/1=down: /gravity/1: \"down\" is not allowed; an element is a number"},
     {"/gravity/-", "1",
-     "s.json:12:3: /gravity: an array of 4 is not allowed; gravity is [x, y, z], each in [-1000000000, "
-     "1000000000] m/s2"},
+     "s.json:12:3: /gravity: an array of 4 is not allowed; gravity is [x, y, z], each in [-1e9, "
+     "1e9] m/s2"},
     {"/cloth/0/pins/-", "{'edge': 'top',\n'row': 0}",
-     "--set /cloth/0/pins/-={\"edge\": \"top\", \"row\": 0}: /cloth/0/pins/3: exactly one of nodes, corner, "
+     "s.json: set /cloth/0/pins/-={\"edge\": \"top\",?\"row\": 0}: /cloth/0/pins/3: exactly one of nodes, "
+     "corner, "
      "edge, "
      "row, box is needed; given: edge, row"},
     {"/cloth/0/pins/1/row", "0",
      "s.json:9:35: /cloth/0/pins/1: exactly one of nodes, corner, edge, row, box is "
      "needed; given: corner, row"},
     {"/cloth/0/mesh", "{}",
-     "--set /cloth/0/mesh={}: /cloth/0/mesh: exactly one of grid, file is needed; given: "
+     "s.json: set /cloth/0/mesh={}: /cloth/0/mesh: exactly one of grid, file is needed; given: "
      "none"},
     {"/integrater/dt", "1",
-     "--set /integrater/dt=1: /integrater: unknown key \"integrater\"; did you mean "
-     "\"integrator\"?"},
+     "s.json: set /integrater/dt=1: /integrater: unknown key \"integrater\"; did you mean "
+     "\"integrator\"? Known: <*>"},
     {"/cloth/0/terms/-/beta", "1",
-     "--set /cloth/0/terms/-/beta=1: /cloth/0/terms/3/type: \"type\" is missing: name of a term; a "
+     "s.json: set /cloth/0/terms/-/beta=1: /cloth/0/terms/3/type: \"type\" is missing: name of a term; a "
      "non-empty string"},
-    {"", "{}", "--set ={}: /drape: \"drape\" is missing: version of the scene format; the number 1"},
+    {"", "{}", "s.json: set ={}: /drape: \"drape\" is missing: version of the scene format; the number 1"},
     {"", "3", "the whole scene can only be set to an object"},
     {"integrator", "1", "\"integrator\" is not a JSON pointer, as \"/integrator/dt\" is one"},
     {"/a~2", "1", "\"/a~2\" is not a JSON pointer, as \"/integrator/dt\" is one; in it ~ is written ~0"},
@@ -947,14 +949,15 @@ START_TEST(test_set_order)
     ck_assert_int_eq(drape_scene_set(scene, "/cloth/0/new/0/x/7/y", "1"), DRAPE_E_ARGUMENT);
     ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
     check_matches(message(),
-                  "--set /cloth/0/new/0/x/-=1: /cloth/0/new: unknown key \"new\"; known: name, <*>");
+                  "s.json: set /cloth/0/new/0/x/-=1: /cloth/0/new: unknown key \"new\"; known: name, <*>");
     ck_assert_int_eq(read_quoted(example), DRAPE_OK);
     ck_assert_int_eq(drape_scene_set(scene, "/output/formats/0", "1"), DRAPE_OK);
     ck_assert_int_eq(drape_scene_set(scene, "/output", "{\"formats\": [2]}"), DRAPE_OK);
     ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
-    ck_assert_str_eq(message(),
-                     "--set /output={\"formats\": [2]}: /output/formats/0: 2 is not allowed; an element is "
-                     "a non-empty string");
+    ck_assert_str_eq(
+        message(),
+        "s.json: set /output={\"formats\": [2]}: /output/formats/0: 2 is not allowed; an element is "
+        "a non-empty string");
     char pointer[2 * DRAPE_POINTER_SIZE];
     memset(pointer, '/', sizeof pointer);
     pointer[DRAPE_POINTER_SIZE] = 0;
