@@ -9,8 +9,8 @@ static const cli_option options[] = {
                    "runs of a short case, of which the fastest counts (default 3)", repeats, 100),
     CLI_LAB_OPTION(
         "budget", CLI_TEXT, "MINUTES",
-        "when the time is up, the cases that tell least are left out and named; or none (default 5)", budget,
-        0),
+        "limit of wall-clock time, or none; the least informative cases are left out and named (default 5)",
+        budget, 0),
 };
 
 static int run(const void *request)

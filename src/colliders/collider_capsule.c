@@ -11,7 +11,7 @@ enum { A = 0, B = 3, RADIUS = 6, PARAM_COUNT = 3 }; /* places of the values */
 #define END(name, help) DRAPE_VECTOR(name, "m", DRAPE_REQUIRED, -1e9, 1e9, help)
 
 static const drape_param params[PARAM_COUNT] = {
-    END("a", "center of one of the half balls at the ends"),
+    END("a", "center of one of the hemispheres at the ends"),
     END("b", "center of the other one"),
     DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "radius around the segment from a to b"),
 };
@@ -51,7 +51,7 @@ static double distance(const double *values, const drape_collider_shape *shape, 
 const drape_collider_ops drape_collider_capsule = {
     .struct_size = sizeof(drape_collider_ops),
     .entry = {.name = "capsule",
-              .summary = "a cylinder with half balls at its ends",
+              .summary = "a cylinder with a hemisphere at each end",
               .reference = "Ericson 2005, section 5.1.2: the nearest point of a segment",
               DRAPE_PARAMS(params)},
     .shape = make_shape,

@@ -26,7 +26,7 @@ const drape_controller_ops drape_controller_halving = {
         {.name = "halving",
          .summary =
              "a failed step is rolled back and retried at half the size; the size grows back after successes",
-         .reference = "as DisMech halves unconverged steps, with rollback and filled intervals",
+         .reference = "DisMech halves steps that do not converge, too",
          DRAPE_PARAMS(params)},
     .judge = judge,
 };

@@ -484,13 +484,11 @@ static void archive(void *state, drape_archive *a)
 }
 
 const drape_integrator_ops drape_integrator_verlet = {
-    .entry =
-        {.name = "verlet",
-         .summary =
-             "explicit Verlet steps in substeps, with the contact rules and the strain limit of CS184 and "
-             "Boson; stable below 2/omega",
-         .reference = "Verlet 1967; Provot 1995; CS184 clothsim; Hairer, Lubich & Wanner 2003",
-         DRAPE_PARAMS(params)},
+    .entry = {.name = "verlet",
+              .summary = "explicit Verlet substeps, with the contact rules and the strain limit of CS184 and "
+                         "Boson; stable below 2/omega",
+              .reference = "Verlet 1967; Provot 1995; CS184 clothsim; Hairer, Lubich & Wanner 2003",
+              DRAPE_PARAMS(params)},
     .order = 2,
     .create = create,
     .projects_contact = true,

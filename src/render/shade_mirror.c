@@ -3,7 +3,7 @@
 
 const drape_shading drape_shading_mirror = {
     .entry = {.name = "mirror",
-              .summary = "a mirror of the world around: --environment, or a room with lamps",
+              .summary = "a mirror of its surroundings: --environment, or a room with lamps",
               .reference = "Blinn & Newell 1976"},
     .reads = DRAPE_READS_ENVIRONMENT,
     .source = "vec3 shade(Surface s) {\n"

@@ -2,10 +2,11 @@
 #include "render/shading.h"
 
 const drape_shading drape_shading_refraction = {
-    .entry = {.name = "refraction",
-              .summary =
-                  "glass: what is behind it, bent at the surface, and the world around mirrored at its rim",
-              .reference = "Wyman 2005, with one surface"},
+    .entry =
+        {.name = "refraction",
+         .summary =
+             "glass: what is behind it, refracted at the surface, and the surroundings mirrored at its rim",
+         .reference = "Wyman 2005, with one surface"},
     .reads = DRAPE_READS_ENVIRONMENT | DRAPE_READS_BEHIND,
     .source =
         "// The refracted ray continues for a part of the scene's size and shows the picture behind the\n"

@@ -3,7 +3,7 @@
 
 const drape_shading drape_shading_silk = {
     .entry = {.name = "silk",
-              .summary = "silk satin: smooth threads along u, whose highlight runs across them",
+              .summary = "silk satin: smooth threads, whose highlight runs across them",
               .reference = "Ward 1992; Walter 2005"},
     .source = "// Ward's anisotropic highlight: narrow along the threads' normal plane, wide across.\n"
               "float gloss(vec3 n, vec3 t, vec3 v, vec3 l, float along, float across) {\n"

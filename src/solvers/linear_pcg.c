@@ -345,7 +345,7 @@ const drape_linear_ops drape_linear_pcg = {
     .entry = {.name = "pcg",
               .summary =
                   "conjugate gradients with diagonal blocks and a coarse space, no factors of the matrix; a "
-                  "matrix that is not symmetric positive definite goes to multifrontal",
+                  "matrix that is not symmetric positive definite is given to multifrontal",
               .reference = "Hestenes & Stiefel 1952; Vanek, Mandel & Brezina 1996"},
     .borrows_heap = true, /* for the solver of the coarse space, and for the fallback */
     .create = create,

@@ -24,7 +24,7 @@ const drape_param drape_spring_params[DRAPE_SPRING_PARAM_COUNT] = {
         "multiplies stiffness, so that all kinds can have the same one: 0.2 for the bend springs of CS184"),
     [DRAPE_SPRING_DAMPING] =
         DRAPE_NUMBER("damping", "N s/m", 0, 0, 1e12,
-                     "dashpot of each spring: force over the rate of its length, zero on rigid motion"),
+                     "dashpot of each spring: force per rate of change of its length; zero on rigid motion"),
     [DRAPE_SPRING_GRADIENT] =
         DRAPE_NUMBER("gradient", "1", 0, -1, 1e6,
                      "stiffness times 1 + gradient (1 - row/rows), the mean of both ends: stiffer at row 0"),
