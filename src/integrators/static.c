@@ -158,6 +158,8 @@ static drape_status follow(static_state *s, double mass_weight, drape_state *out
         const bool falls = isnan(last) || info->residual < STALLED * last;
         const double rounding =
             falls ? 0 : drape_step_equation_rounding(&s->common.equation, s->common.d, norm_of(s));
+        if (info->residual <= rounding && rounding > s->common.equation.max_residual)
+            break; /* forces are too inexact here to tell an equilibrium, as of cloth that nothing holds */
         if (info->residual <= rounding) {
             end_at_best(s, out, rounding, info);
             info->reason = drape_reason_name(DRAPE_REASON_ROUNDING);

@@ -115,8 +115,13 @@ drape_status drape_residual_bound_set(drape_step_equation *e, drape_norm norm, d
         mass += m->mass[m->node_of_free[f]];
     const double a = acceleration_of(m, &at, mass);
     const double mean = bound_of(a * mass / m->free_count, component, at.rounding);
-    for (int32_t f = 0; f < m->free_count; f++)
-        e->weight[f] = mean / bound_of(a * m->mass[m->node_of_free[f]], component, at.rounding);
+    double limit = INFINITY;
+    for (int32_t f = 0; f < m->free_count; f++) {
+        const double load = a * m->mass[m->node_of_free[f]];
+        e->weight[f] = mean / bound_of(load, component, at.rounding);
+        limit = fmin(limit, e->weight[f] * DRAPE_MAX_LOAD_SHARE * load);
+    }
+    e->max_residual = in_norm(limit, norm, (double)e->dofs);
     if (mean != component)
         *tolerance = in_norm(mean, norm, (double)e->dofs);
     return DRAPE_OK;

@@ -25,6 +25,7 @@ drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, 
     s->probe = drape_arena_take(arena, s->nodes, sizeof *s->probe);
     for (size_t i = 0; s->weight && i < s->dofs / 3; i++)
         s->weight[i] = 1;
+    s->max_residual = INFINITY;
     if (drape_system_contact(system))
         s->x_ahead = drape_arena_take(arena, s->nodes, sizeof *s->x_ahead);
     s->point = (drape_point){.x = s->x, .v = s->v};

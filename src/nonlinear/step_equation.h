@@ -38,9 +38,11 @@ typedef struct drape_step_equation {
     double *x, *v, *g; /* nodes: g(x, v) [N] */
     double *f;         /* free DOFs: F [N] */
 
-    double *weight;  /* free nodes: of their residual in norms; 1 unless residual_bound.h sets others */
-    double *probe;   /* nodes: scratch of drape_step_equation_rounding and _diagnose */
-    double *x_ahead; /* nodes: the end of a step tested for contact; NULL without contact */
+    double *weight;      /* free nodes: of their residual in norms; 1 unless residual_bound.h sets others */
+    double max_residual; /* a larger norm may ignore the load of a node; INFINITY unless residual_bound.h
+                            sets another */
+    double *probe;       /* nodes: scratch of drape_step_equation_rounding and _diagnose */
+    double *x_ahead;     /* nodes: the end of a step tested for contact; NULL without contact */
     drape_work work;
 } drape_step_equation;
 

@@ -244,7 +244,7 @@ def test_planted():
         put(f"out/frame_{later:06}.obj")
         _, errors = child.communicate(timeout=LIMIT)
     equal(child.returncode, 1, errors)
-    assert re.fullmatch(rf'cannot write "out/frame_{later:06}.obj": a file of that name has appeared that Drape did not write\n', errors), errors
+    assert re.fullmatch(rf'drape run: cannot write "out/frame_{later:06}.obj": a file of that name has appeared that Drape did not write\n', errors), errors
     with open(f"out/frame_{later:06}.obj", encoding="ascii") as file:
         equal(file.read(), "mine\n")
 

@@ -253,5 +253,20 @@ START_TEST(statics_end_at_their_best)
 }
 END_TEST
 
+/* Cloth that nothing holds falls, and has no equilibrium; far from its start all digits of its forces are
+ * lost, which must not be taken for convergence. */
+START_TEST(what_falls_has_no_equilibrium)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 41, 'rows': 5, 'width': 0.01, "
+        "'height': 0.001}, 'material': {'young_modulus': 3.924e8, 'poisson_ratio': 0, "
+        "'thickness': 1e-5, 'areal_density': 0.01}, 'terms': ['stretch.cst', "
+        "'bend.midedge']}], 'duration': 1, 'integrator': {'method': 'static'}}");
+    ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_SOLVER);
+    scene_close(&s);
+}
+END_TEST
+
 SUITE("scale", free_sheets_fall, a_fine_handkerchief_falls, strips_sag_in_equilibrium, strips_come_to_rest,
-      no_tolerance_hides_the_load, rounding_of_stiff_strips_is_accepted, statics_end_at_their_best)
+      no_tolerance_hides_the_load, rounding_of_stiff_strips_is_accepted, statics_end_at_their_best,
+      what_falls_has_no_equilibrium)

@@ -848,7 +848,7 @@ static const struct {
      "s.json:12:3: /gravity: an array of 4 is not allowed; gravity is [x, y, z], each in [-1e9, "
      "1e9] m/s2"},
     {"/cloth/0/pins/-", "{'edge': 'top',\n'row': 0}",
-     "s.json: set /cloth/0/pins/-={\"edge\": \"top\",?\"row\": 0}: /cloth/0/pins/3: exactly one of nodes, "
+     "s.json: set /cloth/0/pins/-={\"edge\": \"top\", \"row\": 0}: /cloth/0/pins/3: exactly one of nodes, "
      "corner, "
      "edge, "
      "row, box is needed; given: edge, row"},
