@@ -578,18 +578,19 @@ DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t 
 
 /* A doubt about a run: what is unusual, and which setting would help. */
 typedef struct drape_warning {
-    const char *name; /* "no_terms", "few_steps", "starts_inside", "ends_inside", "numerical_dissipation" or
-                         "slow_contact" */
+    const char *name; /* "no_terms", "few_steps", "large_mesh", "starts_inside", "ends_inside",
+                         "numerical_dissipation" or "slow_contact" */
     char text[400];   /* one line */
 } drape_warning;
 
 /* The warnings about a sim and its run so far, computed at the call: index 0 is the first that applies.
  * no_terms: nothing but weight is modelled for a cloth. few_steps: the duration of the scene is fewer
- * than 20 steps of dt. starts_inside, ends_inside: free nodes are inside a collider, by more than 1e-9 m, at
- * the start, or after the steps so far; the text describes the first such collider. numerical_dissipation:
- * the integrator took more than half of the energy that went in. slow_contact: contact takes most of the time
- * of the steps, and longer than the motion lasts, and a setting is known to help. Returns false past the
- * last. */
+ * than 20 steps of dt, unless integrator or controller choose their own steps or substeps. large_mesh: a mesh
+ * from a file is more than 20 m across, as one in centimetres is. starts_inside, ends_inside: free nodes are
+ * inside a collider, by more than 1e-9 m, at the start, or after the steps so far; the text describes the
+ * first such collider. numerical_dissipation: the integrator took more than half of the energy that went in.
+ * slow_contact: contact takes most of the time of the steps, and longer than the motion lasts, and a setting
+ * is known to help. Returns false past the last. */
 DRAPE_API bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out);
 
 /* ---- Checkpoints ---- */

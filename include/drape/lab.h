@@ -53,7 +53,8 @@ typedef struct drape_lab_def {
                             1 */
     double
         budget_seconds; /* tradeoff: [s] wall-clock time of the call, after which the cases that are left are
-                              left out, the least telling ones; default 0: none is left out */
+                              left out, the least telling ones; the reference takes at most half; default 0:
+                              none is left out */
     drape_lab_progress *progress; /* NULL: no reports */
     drape_lab_cancel *cancel;     /* NULL: never */
     void *user;                   /* passed to progress and cancel */
@@ -82,8 +83,9 @@ DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
  * writes only experiment.json and cases-1-of-4.jsonl; the merge writes the rest. Existing results of the
  * same experiment are kept as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, an invalid def, a
  * setting that no case uses, a folder that holds another experiment), those of loading the scene,
- * DRAPE_E_FILE, DRAPE_E_SOLVER (the reference could not be computed: the folder is left as it was),
- * DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
+ * DRAPE_E_FILE, DRAPE_E_SOLVER (the reference could not be computed: the folder is left as it was, but for
+ * levels of the reference, with which the same call with a larger budget_seconds continues), DRAPE_E_MEMORY,
+ * DRAPE_E_STOPPED (cancelled). */
 DRAPE_API drape_status drape_lab_run(drape_context *ctx, const char *experiment, const drape_lab_def *def,
                                      drape_lab_outcome *outcome);
 

@@ -297,7 +297,8 @@ static drape_status prepare(lab *l)
     l->input_is_good = !status;
     if (!status && l->experiment->prepare)
         status = l->experiment->prepare(l);
-    if (status && status != DRAPE_E_STOPPED && l->claimed) { /* no case will run: removes the folder */
+    const bool useless = status && status != DRAPE_E_STOPPED && !l->resumable; /* no case will run */
+    if (useless && l->claimed) {
         char message[DRAPE_MESSAGE_SIZE];
         snprintf(message, sizeof message, "%s", drape_context_message(l->ctx));
         drape_folder_remove(l->out, is_about, NULL);

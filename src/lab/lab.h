@@ -56,6 +56,7 @@ struct lab {
     drape_folder *out;  /* the same, open; NULL before its experiment is there */
     bool input_is_good; /* all input has been read and checked: a failure now is of the output folder */
     bool claimed;       /* the folder had no experiment before */
+    bool resumable;     /* what prepare saved is worth keeping although it failed */
     json_t *about;      /* experiment.json; owned, and owns: */
     json_t *cases, *arguments; /* borrowed from it */
     json_t **results;          /* one a case, owned; NULL: not there yet */

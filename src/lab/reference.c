@@ -32,6 +32,9 @@ static const sequence sequences[] = {
 };
 #define SEQUENCES ((int)(sizeof sequences / sizeof *sequences))
 
+/* What ended a sequence before its last level. */
+typedef enum limit { NOTHING, BUDGET_SECONDS, CASE_SECONDS, FAILURE } limit;
+
 /* The last refinement level of a sequence. Every level is saved in the folder; interrupted runs resume. */
 typedef struct level {
     lab_trace trace;
@@ -39,22 +42,24 @@ typedef struct level {
     double knob;
     int count;          /* levels so far; 0: none */
     double took, spent; /* CPU [s] of this level, of all */
+    limit ended_by;
+    char failure[200]; /* the message of a run that failed */
 } level;
 
-/* [s] of the wall clock by which the next level of sequence i has to be done; 0: the experiment has no
- * budget. needed: there is no reference yet, and without one there is no experiment. */
-static double deadline_of(const lab *l, int i, bool needed)
+/* [s] of the wall clock by which sequence i has to be done; 0: the experiment has no budget. */
+static double deadline_of(const lab *l, int i)
 {
     const double budget = l->def->budget_seconds;
-    return budget > 0 ? l->start + (needed ? 1 : SHARE * (i + 1) / SEQUENCES) * budget : 0;
+    return budget > 0 ? l->start + SHARE * (i + 1) / SEQUENCES * budget : 0;
 }
 
-/* Whether the next level, which takes GROWTH times the last one, is expected to end in time. */
-static bool has_time(const lab *l, const level *last, double deadline)
+/* The limit that the next level, which is expected to take GROWTH times the last one, would exceed. */
+static limit next_limit(const lab *l, const level *last, double deadline)
 {
     const double next = GROWTH * last->took;
-    return next < BUDGET * l->def->case_seconds - last->spent &&
-           (deadline <= 0 || drape_clock_seconds() + next < deadline);
+    if (!(next < BUDGET * l->def->case_seconds - last->spent))
+        return CASE_SECONDS;
+    return deadline > 0 && !(drape_clock_seconds() + next < deadline) ? BUDGET_SECONDS : NOTHING;
 }
 
 static json_t *settings_of(const sequence *s, double knob)
@@ -150,9 +155,8 @@ static bool is_sequence(const void *user, const char *name)
 
 /* ---- Runs ---- */
 
-/* Runs and saves the next level. *good: it completed; otherwise *last keeps the level before. */
-static drape_status refine(lab *l, const drape_model *model, const sequence *s, double deadline, level *last,
-                           bool *good)
+/* Runs and saves the next level. If it does not complete, *last keeps the level before, and why. */
+static drape_status refine(lab *l, const drape_model *model, const sequence *s, double deadline, level *last)
 {
     const double knob = last->count ? last->knob * s->ratio : s->first, start = drape_clock_thread_seconds();
     lab_trace trace = {0};
@@ -165,12 +169,17 @@ static drape_status refine(lab *l, const drape_model *model, const sequence *s, 
                                  .deadline = deadline,
                                  .repeats = 1};
     drape_status status = lab_run(l->ctx, &request, &result);
-    *good = !status && lab_is_good(result);
+    const bool good = !status && lab_is_good(result);
+    if (!good) { /* a run that the deadline stopped has no result */
+        const bool over = strcmp(lab_text(result, "status"), "over_budget") == 0;
+        last->ended_by = !result ? BUDGET_SECONDS : over ? CASE_SECONDS : FAILURE;
+        snprintf(last->failure, sizeof last->failure, "%s", lab_text(result, "message"));
+    }
     json_decref(settings);
     json_decref(result);
     last->took = drape_clock_thread_seconds() - start;
     last->spent += last->took;
-    if (!*good) {
+    if (!good) {
         drape_arena_release(&l->arena, trace.x);
         return status;
     }
@@ -183,38 +192,72 @@ static drape_status refine(lab *l, const drape_model *model, const sequence *s, 
     return save(l, s, false, last);
 }
 
-/* Refines each sequence as far as is useful and takes the better one. */
+/* Refines a sequence as far as is useful. */
+static drape_status refine_all(lab *l, const drape_model *model, int i, level *last)
+{
+    const double deadline = deadline_of(l, i);
+    drape_status status = DRAPE_OK;
+    *last = (level){.error = INFINITY};
+    read_saved(l, &sequences[i], last);
+    while (!status && !last->ended_by && last->count < MAX_LEVELS && last->error > BEST * model->length) {
+        last->ended_by = next_limit(l, last, deadline);
+        if (!last->ended_by)
+            status = refine(l, model, &sequences[i], deadline, last);
+    }
+    return status;
+}
+
+/* Sets the message that there is no reference: what ended each sequence, and what helps. */
+static drape_status fail_without(lab *l, const level last[SEQUENCES])
+{
+    bool by[FAILURE + 1] = {false}, kept = false;
+    char why[SEQUENCES * 320] = "", help[160] = "";
+    size_t end = 0;
+    for (int i = 0; i < SEQUENCES; i++) {
+        char reason[240];
+        by[last[i].ended_by] = true;
+        kept |= last[i].count > 0;
+        if (last[i].ended_by == BUDGET_SECONDS)
+            snprintf(reason, sizeof reason, "its share of budget_seconds = %g was used up",
+                     l->def->budget_seconds);
+        else if (last[i].ended_by == CASE_SECONDS)
+            snprintf(reason, sizeof reason, "its CPU time is limited to %g times case_seconds = %g", BUDGET,
+                     l->def->case_seconds);
+        else
+            snprintf(reason, sizeof reason, "%s", last[i].failure);
+        end += (size_t)snprintf(why + end, sizeof why - end, "%s%s completed %d (%s)", i ? ", " : "",
+                                sequences[i].method, last[i].count, reason);
+    }
+    l->resumable = kept && by[BUDGET_SECONDS];
+    if (by[BUDGET_SECONDS] || by[CASE_SECONDS])
+        snprintf(
+            help, sizeof help,
+            ". What helps: a larger %s%s%s, a shorter duration, damping if the sheet is stiff and has none",
+            by[BUDGET_SECONDS] ? "budget_seconds" : "", by[BUDGET_SECONDS] && by[CASE_SECONDS] ? " and " : "",
+            by[CASE_SECONDS] ? "case_seconds" : "");
+    return drape_fail(
+        l->ctx, DRAPE_E_SOLVER, "no reference, which takes two levels of refinement: %s%s%s", why, help,
+        l->resumable ? ". The levels are kept, and a larger budget_seconds continues with them" : "");
+}
+
+/* Refines the sequences and takes the better one. */
 static drape_status choose(lab *l, const drape_model *model, level *best)
 {
     const sequence *chosen = NULL;
-    const bool budget = l->def->budget_seconds > 0;
+    level last[SEQUENCES];
     drape_status status = DRAPE_OK;
     *best = (level){.error = INFINITY};
     for (int i = 0; !status && i < SEQUENCES && !(best->error < GOOD_ENOUGH * model->length); i++) {
-        level last = {.error = INFINITY};
-        bool good = true;
-        read_saved(l, &sequences[i], &last);
-        while (!status && good && last.count < MAX_LEVELS && last.error > BEST * model->length) {
-            const double deadline = deadline_of(l, i, !isfinite(best->error) && last.count < 2);
-            if (!has_time(l, &last, deadline))
-                break;
-            status = refine(l, model, &sequences[i], deadline, &last, &good);
-        }
-        if (!status && last.error < best->error) {
-            *best = last;
+        status = refine_all(l, model, i, &last[i]);
+        if (!status && last[i].error < best->error) {
+            *best = last[i];
             chosen = &sequences[i];
         }
     }
-    if (!status && !chosen)
-        status = drape_fail(
-            l->ctx, DRAPE_E_SOLVER,
-            "no reference: neither ida nor trbdf2 completes two levels within %g s of CPU time%s; raise "
-            "case_seconds%s, or shorten the duration",
-            BUDGET * l->def->case_seconds, budget ? " and the budget" : "",
-            budget ? " and budget_seconds" : "");
-    else if (!status)
-        status = save(l, chosen, true, best);
-    if (status && status != DRAPE_E_SOLVER)
+    if (status)
+        return status;
+    status = chosen ? save(l, chosen, true, best) : fail_without(l, last);
+    if (l->resumable || (status && status != DRAPE_E_SOLVER))
         return status;
     drape_status removed = drape_folder_remove(l->out, is_sequence, l);
     return status ? status : removed;

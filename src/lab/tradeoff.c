@@ -16,9 +16,11 @@
 #define RESOLVED    100.0 /* times the reference's error: smaller errors cannot be distinguished from it */
 #define BASE_METHOD "be"  /* the usual integrator: others are compared with it */
 #define BASE_DT     (1.0 / 60)
+#define FEWEST      3 /* cases of a series that is compared with others */
 
 /* Values of a knob. If there is a budget, cases of low rank come first: a few points of every integrator,
- * over all of its range, then the points between, then controllers and linear solvers. */
+ * over all of its range, then the points between, then controllers and linear solvers. Among cases of equal
+ * rank explicit integrators come last: a stiff sheet makes each of their cases long. */
 typedef struct level {
     double value;
     int rank;
@@ -45,7 +47,7 @@ static drape_status add(lab *l, const char *series, const char *method, const ch
     json_decref(more);
     drape_status status = lab_add_case(l, tags, settings, -1);
     if (!status)
-        lab_rank_case(l, at.rank);
+        lab_rank_case(l, 2 * at.rank + (lab_find_integrator(method)->stability != NULL));
     return status;
 }
 
@@ -108,7 +110,7 @@ static drape_status plan(lab *l)
             continue;
         status = integrator->own_steps ? add_own_steps(l, integrator) : add_fixed(l, integrator);
     }
-    if (!status && lab_wants_integrator(l, BASE_METHOD, true))
+    if (!status && l->def->integrator_count == 0)
         status = add_linear_solvers(l);
     json_object_set_new(l->arguments, "case_seconds", json_real(l->def->case_seconds));
     json_object_set_new(l->arguments, "repeats", json_integer(l->def->repeats));
@@ -129,14 +131,25 @@ static double resolved_error(const json_t *result)
     return lab_is_good(result) && error > RESOLVED * lab_number(result, "reference_error_m") ? error : NAN;
 }
 
-/* The cheapest case whose error is at most that; of one integrator, or NULL of any. NULL: there is none. */
-static const json_t *cheapest(const lab *l, double error, const char *integrator)
+/* Cases of a series that were run. */
+static int count_run(const lab *l, const char *series)
+{
+    int count = 0;
+    for (size_t i = 0; i < l->count; i++)
+        count += strcmp(lab_tag_text(l->results[i], "series"), series) == 0;
+    return count;
+}
+
+/* The cheapest case whose error is at most that; of one series, or NULL of any. Series with
+ * too few cases do not count. NULL: there is none. */
+static const json_t *cheapest(const lab *l, double error, const char *series)
 {
     const json_t *best = NULL;
     for (size_t i = 0; i < l->count; i++) {
         const json_t *r = l->results[i];
         if (is_linear_case(r) || !(resolved_error(r) <= error) ||
-            (integrator && strcmp(lab_tag_text(r, "series"), integrator) != 0))
+            (series && strcmp(lab_tag_text(r, "series"), series) != 0) ||
+            count_run(l, lab_tag_text(r, "series")) < FEWEST)
             continue;
         if (!best || lab_number(r, "cpu_s") < lab_number(best, "cpu_s"))
             best = r;
@@ -168,7 +181,7 @@ static void knob_text(const json_t *result, char *text, size_t size)
  * much". */
 static void report_cheapest(lab *l, double error)
 {
-    bool has_base = false;
+    bool comes_close = false; /* even if that error cannot be distinguished from the reference's */
     const json_t *best = cheapest(l, error, NULL), *base = cheapest(l, error, BASE_METHOD);
     char length[32], knob[64];
     if (!best)
@@ -179,11 +192,12 @@ static void report_cheapest(lab *l, double error)
     fprintf(l->summary, "At %s error the cheapest is %s, %s (%.3g s of CPU)", length,
             lab_tag_text(best, "series"), knob, cost);
     for (size_t i = 0; i < l->count; i++)
-        has_base |= strcmp(lab_tag_text(l->results[i], "series"), BASE_METHOD) == 0;
-    if (best == base || !has_base)
-        fprintf(l->summary, ".\n");
-    else if (base)
+        comes_close |= strcmp(lab_tag_text(l->results[i], "series"), BASE_METHOD) == 0 &&
+                       lab_is_good(l->results[i]) && lab_number(l->results[i], "error_end_m") <= error;
+    if (base && base != best)
         fprintf(l->summary, ", %.2g times cheaper than " BASE_METHOD ".\n", lab_number(base, "cpu_s") / cost);
+    else if (comes_close || count_run(l, BASE_METHOD) < FEWEST)
+        fprintf(l->summary, ".\n");
     else
         fprintf(l->summary, "; " BASE_METHOD " does not come so close in this grid.\n");
 }
@@ -208,6 +222,27 @@ static void report_headline(lab *l)
             BASE_METHOD " with steps of 1/60 s ends %s (root mean square over the nodes) from the converged "
                         "motion, with steps of 1/960 s %s.\n",
             errors[0], errors[1]);
+}
+
+/* Names the series of which too few cases were run; those without any are named among what was left out. */
+static void report_sparse(lab *l)
+{
+    const char *before = "";
+    bool any = false;
+    for (size_t i = 0; i < l->count; i++) {
+        const json_t *one = json_array_get(l->cases, i);
+        const char *series = lab_tag_text(one, "series");
+        const int count = count_run(l, series);
+        if (strcmp(series, before) != 0 && !is_linear_case(one) && count > 0 && count < FEWEST) {
+            if (!any)
+                fprintf(l->summary, "Too few cases for a comparison, which takes %d:", FEWEST);
+            fprintf(l->summary, "%s %s (%d)", any ? "," : "", series, count);
+            any = true;
+        }
+        before = series;
+    }
+    if (any)
+        fprintf(l->summary, ".\n");
 }
 
 static void report_reference(lab *l)
@@ -338,6 +373,7 @@ static drape_status report(lab *l)
 {
     drape_status status = DRAPE_OK;
     report_headline(l);
+    report_sparse(l);
     for (int decade = 0; decade >= -7; decade--)
         if (cheapest(l, pow(10, decade), NULL) &&
             cheapest(l, pow(10, decade), NULL) != cheapest(l, pow(10, decade + 1), NULL))

@@ -85,7 +85,7 @@ static void note_tolerance(const drape_sim *sim)
     const double given = drape_chosen_integrator_value(&sim->chosen, "tolerance", NAN),
                  used = tolerance_of(sim);
     if (used < given)
-        drape_log(sim->ctx, DRAPE_LOG_WARNING,
+        drape_log(sim->ctx, DRAPE_LOG_INFO,
                   "/integrator/tolerance: %.4g N is more than 1 %% of the load of a node: %.4g N is used",
                   given, used);
 }

@@ -56,10 +56,11 @@ static bool factor_tile(const drape_block_lu *f, bool last, int32_t width, doubl
 {
     double kept[DRAPE_TILE];
     double least = f->shift > 0 && !last ? f->shift : ROUNDING;
-    memcpy(kept, tile, sizeof kept);
+    const size_t size = (size_t)(S * width) * sizeof *tile; /* the last tile of a panel ends there */
+    memcpy(kept, tile, size);
     double smallest = drape_tile_lu(width, tile, f->inverse + at, f->pivot + at);
     for (int k = 0; f->shift > 0 && !last && !(smallest > least) && k < SHIFTS; k++) {
-        memcpy(tile, kept, sizeof kept);
+        memcpy(tile, kept, size);
         for (int32_t c = 0; c < width; c++)
             tile[(S + 1) * c] += f->shift * (2 << 2 * k);
         smallest = drape_tile_lu(width, tile, f->inverse + at, f->pivot + at);

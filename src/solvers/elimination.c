@@ -14,6 +14,7 @@
 #ifdef DRAPE_METIS
 #include <metis.h>
 #include <pthread.h>
+#include <signal.h>
 #endif
 
 #define DISSECTED 1500 /* block columns; below, nested dissection gives no less fill-in than minimum degree */
@@ -41,15 +42,29 @@ static pthread_mutex_t metis_mutex = PTHREAD_MUTEX_INITIALIZER; /* of the whole 
  * would take each other's numbers and so find another order, with other bits in the results, and the host's
  * own sequence would restart. So only one thread at a time calls METIS, with a separate state of rand(). A
  * host that calls rand() from another thread meanwhile still disturbs it.
+ *
+ * METIS also installs handlers of SIGTERM and SIGABRT, out of which it jumps back and fails. The thread
+ * blocks both signals meanwhile and then delivers them to the handlers of before.
  */
 static int dissect_locked(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
 {
     char own[RAND_STATE];
+    sigset_t trapped, mask;
+    struct sigaction terminate, abort;
+    sigemptyset(&trapped);
+    sigaddset(&trapped, SIGTERM);
+    sigaddset(&trapped, SIGABRT);
     pthread_mutex_lock(&metis_mutex);
+    pthread_sigmask(SIG_BLOCK, &trapped, &mask);
+    sigaction(SIGTERM, NULL, &terminate);
+    sigaction(SIGABRT, NULL, &abort);
     char *before = initstate(1, own, sizeof own);
     const int code = METIS_NodeND(n, start, other, NULL, options, m->e->order, m->e->place);
     if (before)
         setstate(before);
+    sigaction(SIGTERM, &terminate, NULL);
+    sigaction(SIGABRT, &abort, NULL);
+    pthread_sigmask(SIG_SETMASK, &mask, NULL);
     pthread_mutex_unlock(&metis_mutex);
     return code;
 }

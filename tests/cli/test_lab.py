@@ -114,17 +114,17 @@ def test_message_over_budget():
 def test_budget():
     """tradeoff runs the telling cases first, names those that its budget leaves out, and continues with them"""
     write_scene(duration=0.3)
-    command = ["tradeoff", "scene.json", "--integrators", "be,bdf2,verlet", "--repeats", "1", "--out", "t"]
-    cases = 2 * (7 + 3) + (7 + 3) + 6  # of be, bdf2, verlet, and the linear solvers
+    command = ["tradeoff", "scene.json", "--integrators", "be,verlet,trbdf2", "--repeats", "1", "--out", "t"]
+    cases = 3 * (7 + 3)  # no linear solvers, as integrators are named
     good(*command, "--budget", "none")
     everything = lines("t")
     with open("t/cases.jsonl", encoding="utf-8") as file:
         order = [json.loads(line)["tags"] for line in file]
-    assert len(order) >= cases - 3, order
-    # A point of each integrator, then a second, then a third; linear solvers and controllers last.
+    equal(len(order), cases, "cases")
+    # A point of each integrator, then a second, then a third, explicit ones after the others; controllers last.
     for k, dt in enumerate((60, 240, 960)):
-        equal([(tags["series"], round(1 / tags["value"])) for tags in order[3 * k:3 * k + 3]], [("be", dt), ("bdf2", dt), ("verlet", dt)], "order")
-    assert all("," in tags["series"] for tags in order[-9:]), order[-9:]
+        equal([(tags["series"], round(1 / tags["value"])) for tags in order[3 * k:3 * k + 3]], [("be", dt), ("trbdf2", dt), ("verlet", dt)], "order")
+    assert all("," in tags["series"] for tags in order[-6:]), order[-6:]
     # A budget that ends after the reference: the rest is named and the report is made.
     os.mkdir("b")
     for name in ("manifest.jsonl", "experiment.json", "reference.json", "reference.f64"):
@@ -138,6 +138,14 @@ def test_budget():
     assert "be (4 of 7), be, error control (3 of 3)" in out and "report    b/report.html" in out, out
     assert "were left out" in page_is_alone("b/report.html")
     equal(len(lines("b")), 9, "cases that ran")
+    # After four cases there are two of be, and one of the others: too few to compare.
+    shutil.copytree("b", "few")
+    with open("t/cases.jsonl", encoding="utf-8") as file, open("few/cases.jsonl", "w", encoding="utf-8") as part:
+        part.writelines(file.readlines()[:4])
+    claim("few", "cases.jsonl")
+    out = good(*command[:-1], "few", "--budget", "1e-7")
+    assert "Too few cases for a comparison, which takes 3: be (2), verlet (1), trbdf2 (1).\n" in out, out
+    assert "the cheapest is" not in out and "come so close" not in out, out
     good(*command[:-1], "b", "--budget", "none")
     equal(lines("b"), everything, "results after the rest has run")
     refused("tradeoff", "scene.json", "--budget", "0", "--out", "n", says="--budget \"0\": must be minutes, above 0, or none")
@@ -298,6 +306,34 @@ def test_reference_goes_on():
     assert not glob.glob("t/reference-*"), "what is left of the levels"
 
 
+def test_reference_over_budget():
+    """a budget that ends before there is a reference is named, and the levels so far stay for a larger one"""
+    write_scene()
+    command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
+    result = drape(*command, "--budget", "1e-7")
+    equal(result.returncode, 1, "exit code")
+    assert "larger budget_seconds, a shorter duration" in result.stderr and "case_seconds" not in result.stderr, result.stderr
+    assert not os.path.exists("t"), os.listdir("t")
+    # A folder with one level: the reference of another run becomes the first level of ida.
+    good(*command, "--budget", "none")
+    about = read_json("t/reference.json")
+    about.update(method="ida", error_m=None, levels=1, value=1e-5)
+    with open("t/reference-ida.json", "w", encoding="utf-8") as file:
+        json.dump(about, file)
+    os.rename("t/reference.f64", "t/reference-ida.f64")
+    for name in os.listdir("t"):
+        if name not in ("manifest.jsonl", "reference-ida.json", "reference-ida.f64"):
+            os.remove("t/" + name)
+    for name in ("reference-ida.json", "reference-ida.f64"):
+        claim("t", name)
+    result = drape(*command, "--budget", "1e-7")
+    equal(result.returncode, 1, "exit code")
+    assert "ida completed 1 (its share of budget_seconds" in result.stderr and "The levels are kept" in result.stderr, result.stderr
+    assert os.path.exists("t/reference-ida.json") and os.path.exists("t/experiment.json"), os.listdir("t")
+    good(*command, "--budget", "none")
+    assert read_json("t/reference.json")["levels"] >= 2, "the levels went on"
+
+
 def test_resume():
     """a sweep that is killed or interrupted resumes where it stopped, and ends with the same results"""
     write_scene(duration=1)
@@ -432,7 +468,7 @@ def test_no_reference():
     command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
     result = drape(*command, "--case-seconds", "1e-9")
     equal(result.returncode, 1, "exit code")
-    assert "raise case_seconds" in result.stderr, result.stderr
+    assert "larger case_seconds, a shorter duration" in result.stderr and "budget" not in result.stderr, result.stderr
     assert not os.path.exists("t"), os.listdir("t")
     os.mkdir("t")
     with open("t/mine", "w", encoding="utf-8") as file:
