@@ -648,6 +648,23 @@ drape_status drape_folder_verify(drape_folder *f, const char *name)
                : DRAPE_OK;
 }
 
+drape_status drape_folder_verify_all(drape_folder *f, bool complete, const char *except)
+{
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0, next; i < f->entry_count && !status; i = next) {
+        const char *name = f->entries[i].name;
+        bool growing = false;
+        struct stat info;
+        for (next = i; next < f->entry_count && strcmp(f->entries[next].name, name) == 0; next++)
+            growing |= f->entries[next].growing;
+        const bool there = fstatat(f->fd, name, &info, AT_SYMLINK_NOFOLLOW) == 0;
+        const bool needed = complete && strcmp(name, except) != 0;
+        if (!is_part(f, name) && (complete || !growing) && (there || needed))
+            status = drape_folder_verify(f, name);
+    }
+    return status;
+}
+
 void drape_folder_rehearse(drape_folder *folder, bool on)
 {
     folder->rehearses = on;

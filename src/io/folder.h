@@ -62,6 +62,10 @@ drape_status drape_folder_remove(drape_folder *folder, drape_folder_claim *claim
  * damaged), DRAPE_E_FILE. */
 drape_status drape_folder_verify(drape_folder *folder, const char *name);
 
+/* The same for all files that the manifest describes but those still growing when a process was killed: what
+ * they must be is known elsewhere. complete: no file may be missing but `except`, which is written again. */
+drape_status drape_folder_verify_all(drape_folder *folder, bool complete, const char *except);
+
 /* A folder rehearses while the files of a run that is resumed are checked: what is then overwritten and
  * trimmed is only accounted for, and drape_folder_remove refuses as drape_folder_check does. */
 void drape_folder_rehearse(drape_folder *folder, bool on);

@@ -11,6 +11,7 @@
 #include "io/export.h"
 #include "io/scene_copy.h"
 #include "io/steps.h"
+#include "io/summary.h"
 #include "sim/sim.h"
 
 /* Times closer than this are the same up to rounding: k / frame_rate and a sum of steps. Steps are longer. */
@@ -449,6 +450,8 @@ static drape_status resume_files(drape_recorder *r, drape_archive *a)
     drape_status status = a->status;
     if (!status && r->finished)
         status = drape_archive_end(a);
+    if (!status)
+        status = drape_folder_verify_all(r->folder, r->finished, DRAPE_SUMMARY_NAME);
     if (status || r->finished)
         return status ? status : drape_folder_begin(r->folder, NULL, r);
     for (size_t i = 0; i < r->output_count && !status; i++) {

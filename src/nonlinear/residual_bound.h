@@ -27,9 +27,10 @@
 /* The bound on each of n components that implies a bound on their norm. */
 double drape_residual_component(double bound, drape_norm norm, double n);
 
-/* Derives the bounds for a norm from a tolerance that the scene gave [N], NAN: none. Sets the weights of the
- * equation's norms, mean bound over own bound, its max_residual, and *tolerance [N]: the bound on the weighted
- * norm. A weight of 1, which all nodes have unless the load limits a bound, leaves newtons. Errors: DRAPE_E_MEMORY. */
+/* Derives the bounds for a norm from a tolerance that the scene gave [N], NAN: none. Sets the weights of
+ * the equation's norms, mean bound over own bound, its max_residual, and *tolerance [N]: the bound on the
+ * weighted norm. A weight of 1, which all nodes have unless the load limits a bound, leaves newtons.
+ * Errors: DRAPE_E_MEMORY. */
 drape_status drape_residual_bound_set(drape_step_equation *equation, drape_norm norm, double given,
                                       double *tolerance);
 

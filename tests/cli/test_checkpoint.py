@@ -100,6 +100,25 @@ def test_without_output_formats():
     assert not os.path.exists("out/checkpoint.drape")
 
 
+def test_damaged_when_finished():
+    """--resume of a finished run names a file that was damaged or removed, and changes nothing"""
+    write_scene(duration=0.2)
+    run = ["run", "scene.json", "--out", "out", "--format", "npy,obj", "--checkpoint-every", "2"]
+    good(*run)
+    for name in ("positions.npy", "frame_000003.obj", "steps.csv", "scene.json"):
+        with open(f"out/{name}", "rb") as file:
+            kept = file.read()
+        with open(f"out/{name}", "r+b") as file:
+            file.seek(len(kept) // 2)
+            file.write(b"\0")
+        refused(*run, "--resume", says=name)
+        os.remove(f"out/{name}")
+        refused(*run, "--resume", says=name)
+        with open(f"out/{name}", "wb") as file:
+            file.write(kept)
+        good(*run, "--resume")
+
+
 def test_refused():
     """a checkpoint of another scene, damaged, or beside other files: exit 2, one line, and nothing is touched"""
     write_scene(duration=1, integrator={"dt": 0.0005})
