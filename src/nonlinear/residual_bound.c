@@ -121,7 +121,8 @@ drape_status drape_residual_bound_set(drape_step_equation *e, drape_norm norm, d
         e->weight[f] = mean / bound_of(load, component, at.rounding);
         limit = fmin(limit, e->weight[f] * DRAPE_MAX_LOAD_SHARE * load);
     }
-    e->max_residual = in_norm(limit, norm, (double)e->dofs);
+    if (vec3_norm(m->gravity) > 0) /* else the load is a guess, which the forces may exceed by far */
+        e->max_residual = in_norm(limit, norm, (double)e->dofs);
     if (mean != component)
         *tolerance = in_norm(mean, norm, (double)e->dofs);
     return DRAPE_OK;
