@@ -109,11 +109,13 @@ def test_at_rest():
 def test_slow_contact():
     """contact that takes most of the time, and longer than the motion lasts, has a warning; a scene without contact never has it"""
     path = SOURCES + "/examples/scenes/crumple.json"
-    text = warnings(path, "--duration", "0.25")["slow_contact"]
-    assert re.match(r"contact takes [5-9]\d % of the time of the steps, \S+ s for 0.25 s of motion: it takes less with no \"self_contact\" if layers never meet, "
-                    r"or a coarser mesh; \"newton_k\" takes less time and is far less accurate", text), text
+    found = warnings(path, "--duration", "0.25")
     wall = read_json("s.json")["wall_s"]
-    assert wall["contact"] > 0.5 * wall["steps"] and wall["contact"] > 0.25, wall
+    slow = wall["contact"] > 0.5 * wall["steps"] and wall["contact"] > 0.25  # not with sanitizers, which slow other stages more
+    equal("slow_contact" in found, slow, str(wall))
+    text = found.get("slow_contact", "")
+    assert not slow or re.match(r"contact takes [5-9]\d % of the time of the steps, \S+ s for 0.25 s of motion: it takes less with no \"self_contact\" if layers never meet, "
+                    r"or a coarser mesh; \"newton_k\" takes less time and is far less accurate", text), text
     write_scene(**FINE)
     assert "slow_contact" not in warnings("scene.json")
 
