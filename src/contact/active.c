@@ -118,7 +118,7 @@ static bool add(drape_active_set *set, const drape_active_contact *contact)
     return true;
 }
 
-drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates, double moved,
+drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates, double away,
                                    const drape_configuration *at)
 {
     set->count = 0;
@@ -127,7 +127,7 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
     for (int32_t i = 0; i < candidates->count; i++) {
         const drape_pair *pair = &candidates->pairs[i];
         drape_active_contact contact;
-        if (!drape_candidate_may_fall_below(pair, moved, pair->distance) ||
+        if (!drape_candidate_may_fall_below(pair, away, pair->distance) ||
             !drape_pair_gap(pair, at, candidates->broad->rest, &contact.gap))
             continue;
         contact.pair = *pair;

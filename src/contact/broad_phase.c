@@ -100,10 +100,10 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     share_areas(s);
     const bool met = points > 0 || m->contact.self; /* faces and edges can meet something */
     drape_status status =
-        drape_bvh_build(arena, met ? m->triangle_count : 0, 3, m->triangle, m->rest, &s->faces);
+        drape_path_bvh_build(arena, met ? m->triangle_count : 0, 3, m->triangle, m->rest, &s->faces);
     if (!status)
-        status = drape_bvh_build(arena, met ? m->edge_count : 0, 2, m->edge, m->rest, &s->edges);
-    return status ? status : drape_bvh_build(arena, triangles, 3, s->triangle, s->rest, &s->obstacles);
+        status = drape_path_bvh_build(arena, met ? m->edge_count : 0, 2, m->edge, m->rest, &s->edges);
+    return status ? status : drape_path_bvh_build(arena, triangles, 3, s->triangle, s->rest, &s->obstacles);
 }
 
 /* ---- Constants of a pair ---- */
@@ -138,6 +138,7 @@ static void set_collider(const drape_broad_phase *s, int32_t collider, drape_pai
 typedef struct query {
     drape_broad_phase *broad;
     const double *x, *y;
+    double reach;
     drape_broad_phase_visit *visit;
     void *user;
     drape_pair pair; /* its constants, as far as they depend on this piece alone */
@@ -172,7 +173,7 @@ static void own_edge(void *user, int32_t edge)
     query *q = user;
     const int32_t *e = q->broad->model->edge + 2 * (size_t)edge,
                   *f = q->broad->model->edge + 2 * (size_t)q->piece;
-    if (edge <= q->piece || e[0] == f[0] || e[0] == f[1] || e[1] == f[0] || e[1] == f[1])
+    if (e[0] == f[0] || e[0] == f[1] || e[1] == f[0] || e[1] == f[1])
         return;
     set_nodes(&q->pair, f[0], f[1], e[0], e[1]);
     q->pair.area = 0.5 * (q->broad->edge_area[edge] + q->broad->edge_area[q->piece]);
@@ -207,50 +208,46 @@ static void obstacle_face(void *user, int32_t face)
     report(q);
 }
 
-static double reach_of(const drape_pair *pair, double reach)
+/* Tests a piece against those in a tree with numbers above `after`: its nodes are the `nodes` ones from `node`
+ * on. */
+static void search_tree(query *q, int32_t piece, const int32_t *node, int nodes, int32_t after,
+                        const drape_path_bvh *tree, drape_bvh_visit *visit)
 {
-    return fmax(0, pair->distance + pair->radius + reach);
-}
-
-/* Tests a piece against those in a tree: its nodes are the `nodes` ones from `node` on. */
-static void search_tree(query *q, int32_t piece, const int32_t *node, int nodes, double reach,
-                        const drape_bvh *tree, drape_bvh_visit *visit)
-{
-    const drape_box box = drape_box_of(node, nodes, q->x, q->y, reach_of(&q->pair, reach));
     q->piece = piece;
-    drape_bvh_query(tree, &box, visit, q);
+    drape_path_bvh_query(tree, node, nodes, q->x, q->y, q->pair.distance + q->pair.radius + q->reach, after,
+                         visit, q);
 }
 
-static void search_self(query *q, double reach)
+static void search_self(query *q)
 {
     const drape_broad_phase *s = q->broad;
     q->pair = (drape_pair){
         .kind = DRAPE_PAIR_TRIANGLE, .collider = -1, .distance = 2 * s->model->contact.self_thickness};
     for (int32_t i = 0; i < s->model->node_count; i++) {
         q->pair.area = s->node_area[i];
-        search_tree(q, i, &i, 1, reach, &s->faces, own_face);
+        search_tree(q, i, &i, 1, -1, &s->faces, own_face);
     }
     q->pair.kind = DRAPE_PAIR_SEGMENTS;
     for (int32_t e = 0; e < s->model->edge_count; e++)
-        search_tree(q, e, s->model->edge + 2 * (size_t)e, 2, reach, &s->edges, own_edge);
+        search_tree(q, e, s->model->edge + 2 * (size_t)e, 2, e, &s->edges, own_edge);
 }
 
-static void search_features(query *q, double reach)
+static void search_features(query *q)
 {
     const drape_broad_phase *s = q->broad;
     q->pair = (drape_pair){.kind = DRAPE_PAIR_TRIANGLE};
     for (int32_t i = s->model->node_count; i < s->points; i++) {
         set_collider(s, s->point_collider[i - s->model->node_count], &q->pair);
-        search_tree(q, i, &i, 1, reach, &s->faces, feature_face);
+        search_tree(q, i, &i, 1, -1, &s->faces, feature_face);
     }
     q->pair.kind = DRAPE_PAIR_SEGMENTS;
     for (int32_t i = 0; i < s->segments; i++) {
         set_collider(s, s->segment_collider[i], &q->pair);
-        search_tree(q, i, s->segment + 2 * (size_t)i, 2, reach, &s->edges, feature_edge);
+        search_tree(q, i, s->segment + 2 * (size_t)i, 2, -1, &s->edges, feature_edge);
     }
 }
 
-static void search_obstacles(query *q, double reach)
+static void search_obstacles(query *q)
 {
     const drape_broad_phase *s = q->broad;
     for (int32_t i = 0; s->obstacles.count > 0 && i < s->model->node_count; i++) {
@@ -258,23 +255,23 @@ static void search_obstacles(query *q, double reach)
                                .radius = s->obstacle_radius,
                                .area = s->node_area[i],
                                .distance = s->model->contact.distance};
-        search_tree(q, i, &i, 1, reach, &s->obstacles, obstacle_face);
+        search_tree(q, i, &i, 1, -1, &s->obstacles, obstacle_face);
     }
 }
 
 void drape_broad_phase_pairs(drape_broad_phase *s, const double *x, const double *y, double reach,
                              drape_broad_phase_visit *visit, void *user)
 {
-    query q = {.broad = s, .x = x, .y = y, .visit = visit, .user = user};
+    query q = {.broad = s, .x = x, .y = y, .reach = reach, .visit = visit, .user = user};
     const bool features = s->points > s->model->node_count;
     if (features || s->model->contact.self) {
-        drape_bvh_fit(&s->faces, x, y);
-        drape_bvh_fit(&s->edges, x, y);
+        drape_path_bvh_fit(&s->faces, x, y);
+        drape_path_bvh_fit(&s->edges, x, y);
     }
-    drape_bvh_fit(&s->obstacles, x, y);
+    drape_path_bvh_fit(&s->obstacles, x, y);
     if (s->model->contact.self)
-        search_self(&q, reach);
+        search_self(&q);
     if (features)
-        search_features(&q, reach);
-    search_obstacles(&q, reach);
+        search_features(&q);
+    search_obstacles(&q);
 }

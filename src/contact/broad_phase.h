@@ -7,16 +7,16 @@
 #define DRAPE_CONTACT_BROAD_PHASE_H
 
 #include "contact/pair.h"
-#include "geometry/bvh.h"
+#include "geometry/path_bvh.h"
 
 typedef struct drape_broad_phase {
     const drape_model *model;
-    int32_t points;          /* nodes, and points of colliders */
-    int32_t *point_collider; /* (points - node_count) */
-    double *rest;            /* (points x 3): nodes at rest, points of undisplaced colliders */
-    drape_bvh faces, edges;  /* of the cloths */
-    drape_bvh obstacles;     /* triangles of colliders without a smooth distance */
-    int32_t *segment;        /* (segments x 2) of colliders */
+    int32_t points;              /* nodes, and points of colliders */
+    int32_t *point_collider;     /* (points - node_count) */
+    double *rest;                /* (points x 3): nodes at rest, points of undisplaced colliders */
+    drape_path_bvh faces, edges; /* of the cloths */
+    drape_path_bvh obstacles;    /* triangles of colliders without a smooth distance */
+    int32_t *segment;            /* (segments x 2) of colliders */
     int32_t *segment_collider;
     int32_t segments;
     int32_t *triangle; /* (obstacles.count x 3) of colliders */
@@ -30,9 +30,8 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *mod
 
 /* Calls visit for every pair whose pieces may be within its activation distance plus reach, at x or
  * anywhere on the straight path from x to y (NULL: only at x), in an order that does not depend on the
- * positions. A negative reach shrinks the distance, but not below 0, so that touching pairs are found. Left
- * out are pairs whose nodes are all pinned, and pairs with surfaces, since every free node is paired with
- * all of them. x, y: (points x 3). */
+ * positions. Left out are pairs whose nodes are all pinned, and pairs with surfaces, since every free node is
+ * paired with all of them. x, y: (points x 3). */
 typedef void drape_broad_phase_visit(void *user, const drape_pair *pair);
 void drape_broad_phase_pairs(drape_broad_phase *broad, const double *x, const double *y, double reach,
                              drape_broad_phase_visit *visit, void *user);

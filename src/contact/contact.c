@@ -20,19 +20,13 @@
 
 #include <string.h>
 
-/* The margin is the distance by which points may move before a new search. */
-#define MIN_MARGIN   0.25 /* smallest margin, in mean edges */
-#define MAX_MARGIN   0.4  /* largest margin, in mean edges */
-#define MARGIN_STEPS 1.5  /* margin between these limits, in displacements of the last step */
-/* The lead is the distance by which a search is made ahead of the points. */
-#define LEAD_BEGIN  1.0  /* lead at the beginning of a step, in displacements */
-#define LEAD_WITHIN -0.5 /* lead within a step: half back, as the next trial may start there */
-#define MAX_LEAD    0.8  /* largest lead, as a share of the margin */
+#define MARGIN 0.15 /* by which points may leave the path of a search before a new one, in mean edges */
+#define AHEAD  1.0  /* by which a path is continued, in its length: the next step begins there */
 
 static drape_status take_arrays(drape_arena *arena, drape_contact *c)
 {
     const size_t points = (size_t)c->broad.points, colliders = (size_t)c->model->collider_count;
-    double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start};
+    double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start, &c->ahead};
     drape_collider_pose **const poses[] = {&c->pose, &c->start_pose, &c->path_pose};
     for (size_t i = 0; i < sizeof positions / sizeof *positions; i++)
         *positions[i] = drape_arena_take(arena, points, 3 * sizeof(double));
@@ -58,13 +52,11 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
     *c = (drape_contact){
         .arena = arena, .model = model, .motion = motion, .mean_edge = edges / model->edge_count};
     c->active.arena = arena;
-    c->next_margin = MIN_MARGIN * c->mean_edge;
     drape_status status = drape_broad_phase_create(arena, model, &c->broad);
     if (!status)
         status = drape_candidates_create(arena, &c->broad, &c->step_candidates);
     if (!status)
         status = drape_candidates_create(arena, &c->broad, &c->query_candidates);
-    c->step_candidates.margin = c->query_candidates.margin = c->next_margin;
     if (!status)
         status = take_arrays(arena, c);
     *out = status ? NULL : c;
@@ -142,79 +134,54 @@ static bool move_colliders(drape_contact *c, double t, const double span[2])
 /* ---- Candidates and active set ---- */
 
 const drape_candidates *drape_contact_valid_candidates(const drape_contact *c, const drape_configuration *at,
-                                                       double *moved)
+                                                       double *away)
 {
-    *moved = drape_candidates_moved(&c->step_candidates, at);
-    if (*moved <= c->step_candidates.margin)
+    *away = drape_candidates_distance(&c->step_candidates, at);
+    if (*away <= c->step_candidates.margin)
         return &c->step_candidates;
     if (!c->between_steps)
         return NULL;
-    *moved = drape_candidates_moved(&c->query_candidates, at);
-    return *moved <= c->query_candidates.margin ? &c->query_candidates : NULL;
+    *away = drape_candidates_distance(&c->query_candidates, at);
+    return *away <= c->query_candidates.margin ? &c->query_candidates : NULL;
 }
 
-/* The largest displacement of a node since the beginning of the step; before the first step, from the
- * origin. */
-static double displacement(const drape_contact *c, const double *x)
+const drape_candidates *drape_contact_search(drape_contact *c, const drape_straight_path *path)
 {
-    double largest = 0, d[3];
-    for (size_t i = 0; i < (size_t)c->model->node_count; i++) {
-        vec3_sub(x + 3 * i, c->start + 3 * i, d);
-        largest = fmax(largest, vec3_dot(d, d));
-    }
-    return sqrt(largest);
-}
-
-/* Searches at positions that are extrapolated by `lead`, so that the candidates hold both before and after
- * these. */
-static drape_status search(drape_contact *c, drape_candidates *candidates, double lead)
-{
-    const double start = drape_clock_seconds(), limit = MAX_LEAD * c->next_margin;
-    const double path = lead != 0 && candidates->known ? displacement(c, c->x) : 0;
-    const double share = fabs(lead) * path > limit ? copysign(limit / path, lead) : lead;
-    double *x = candidates->x;
-    memcpy(x, c->x, 3 * (size_t)c->broad.points * sizeof *x);
-    for (size_t i = 0; path > 0 && i < 3 * (size_t)c->model->node_count; i++)
-        x[i] += share * (c->x[i] - c->start[i]);
-    const drape_configuration at = {.model = c->model, .x = x, .pose = c->pose};
-    const drape_status status = drape_candidates_search(candidates, &at, c->next_margin);
+    const double start = drape_clock_seconds();
+    drape_candidates *candidates = c->between_steps ? &c->query_candidates : &c->step_candidates;
+    drape_straight_path longer = *path;
+    longer.end[1].x = c->ahead;
+    for (size_t i = 0; i < 3 * (size_t)c->broad.points; i++)
+        c->ahead[i] = path->end[1].x[i] + AHEAD * (path->end[1].x[i] - path->end[0].x[i]);
+    const drape_status status = drape_candidates_search(candidates, &longer, MARGIN * c->mean_edge);
     c->search_seconds += drape_clock_seconds() - start;
-    return status;
+    return status ? NULL : candidates;
 }
 
-double drape_contact_lead(const drape_contact *c)
-{
-    return c->begun ? LEAD_WITHIN : 0;
-}
-
-drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at, double lead)
+drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)
 {
     const bool moved = move_colliders(c, at->t, at->span);
+    double away = 0;
     fill_velocities(c, at->v, c->v);
-    const bool listed = c->listed == &c->step_candidates || (c->listed && c->between_steps);
-    if (listed && !moved && memcmp(at->x, c->x, 3 * (size_t)c->model->node_count * sizeof *c->x) == 0)
+    if (c->listed && !moved && memcmp(at->x, c->x, 3 * (size_t)c->model->node_count * sizeof *c->x) == 0)
         return DRAPE_OK; /* forces, energy and derivatives are often evaluated at the same point */
-    c->listed = NULL;
     drape_contact_fill(c, at->x, c->pose, c->x);
     const drape_configuration now = drape_contact_configuration(c);
-    const drape_candidates *candidates = drape_contact_valid_candidates(c, &now, &c->moved);
-    drape_status status = DRAPE_OK;
+    const drape_candidates *candidates = drape_contact_valid_candidates(c, &now, &away);
     if (!candidates) {
-        drape_candidates *outdated = c->between_steps ? &c->query_candidates : &c->step_candidates;
-        status = search(c, outdated, c->between_steps ? 0 : lead);
-        c->moved = drape_candidates_moved(outdated, &now);
-        candidates = outdated;
+        candidates = drape_contact_search(c, &(drape_straight_path){{now, now}});
+        away = 0;
     }
-    if (!status)
-        status = drape_active_set_list(&c->active, candidates, c->moved, &now);
-    c->listed = status ? NULL : candidates;
+    const drape_status status =
+        candidates ? drape_active_set_list(&c->active, candidates, away, &now) : DRAPE_E_MEMORY;
+    c->listed = status == DRAPE_OK;
     return status;
 }
 
 drape_status drape_contact_evaluate_at(drape_contact *c, const drape_contact_at *at)
 {
     const double start = drape_clock_seconds();
-    const drape_status status = drape_contact_update(c, at, drape_contact_lead(c));
+    const drape_status status = drape_contact_update(c, at);
     c->seconds += drape_clock_seconds() - start;
     return status;
 }
@@ -264,15 +231,12 @@ void drape_contact_measure_start(drape_contact *c)
     }
 }
 
-/* For fast sheets the search has a larger margin and is made ahead of the motion: once in a step or two
- * instead of at every trial. */
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
-    const double start = drape_clock_seconds(), last = c->step_candidates.known ? displacement(c, x) : 0;
+    const double start = drape_clock_seconds();
     c->between_steps = false;
-    c->next_margin = fmin(fmax(MIN_MARGIN * c->mean_edge, MARGIN_STEPS * last), MAX_MARGIN * c->mean_edge);
     drape_status status =
-        drape_contact_update(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}}, LEAD_BEGIN);
+        drape_contact_update(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}});
     if (!status)
         status = drape_contact_lag(c);
     if (!status) {

@@ -1,0 +1,42 @@
+/*
+ * path_bvh.h: a tree of boxes over edges or triangles that move straight from one configuration to another.
+ * Each branch has four children, which are tested at once, and each child has two boxes, one around each end
+ * of the path. Two convex pieces stay apart on their straight paths if one axis separates them at both ends
+ * with the same piece in front: the difference of any two of their points along that axis is then linear in
+ * the step fraction and positive at both ends. So a motion that pieces have in common brings no pair together.
+ */
+#ifndef DRAPE_GEOMETRY_PATH_BVH_H
+#define DRAPE_GEOMETRY_PATH_BVH_H
+
+#include "base/lanes.h"
+#include "geometry/bvh.h"
+
+typedef struct drape_path_branch {
+    double low[2][3][LANES], high[2][3][LANES]; /* by end, axis and child */
+    int32_t child[LANES];                       /* a later branch; -1 - e: the element e */
+    int32_t last[LANES];                        /* the largest number of an element in each child */
+    int32_t count;                              /* of children */
+} drape_path_branch;
+
+typedef struct drape_path_bvh {
+    int32_t count; /* number of elements */
+    int nodes;     /* nodes per element */
+    const int32_t *node;
+    drape_path_branch *branches;
+    int32_t branch_count;
+} drape_path_bvh;
+
+/* As drape_bvh_build. Errors: DRAPE_E_MEMORY. */
+drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, const int32_t *node,
+                                  const double *x, drape_path_bvh *bvh);
+
+/* Refits the boxes to the paths of the elements from x to y; y NULL: to the elements at x. */
+void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y);
+
+/* Calls visit for every element with a number above `after` whose boxes no axis separates, by more than reach
+ * at both ends, from those of some nodes on their path; y as in the last fit. The order does not depend on
+ * the positions. */
+void drape_path_bvh_query(const drape_path_bvh *bvh, const int32_t *node, int nodes, const double *x,
+                          const double *y, double reach, int32_t after, drape_bvh_visit *visit, void *user);
+
+#endif
