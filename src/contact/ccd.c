@@ -30,9 +30,9 @@ static bool comes_near(const path *p, const drape_pair *pair, double gap)
            drape_pair_step_fraction(pair, p->x, p->y, NEAR * pair->distance / gap, false, 1) < 1;
 }
 
-/* A pair that does not come near limits nothing, so it makes no difference whether it is a candidate. Does not
- * search beyond the step fraction that another pair leaves: if forces throw nodes very far, a pair approaches
- * so slowly relative to its speed that searching each to its own end would take for ever. */
+/* A pair that does not come near limits nothing, so it makes no difference whether it is a candidate. Does
+ * not search beyond the step fraction that another pair leaves: if forces throw nodes very far, a pair
+ * approaches so slowly relative to its speed that searching each to its own end would take for ever. */
 static void follow(void *user, const drape_pair *pair)
 {
     path *p = user;
@@ -60,15 +60,12 @@ static double longest_move(const drape_contact *c, const path *p)
 /* The candidates that are valid on the whole path, and how far it is from theirs: as far as its ends are, at
  * most. Searched if there are none; NULL for a path that is too long, or if there is no memory. */
 static const drape_candidates *candidates_of(drape_contact *c, const drape_straight_path *straight,
-                                             double length, double *away)
+                                             double length, drape_distances *away)
 {
-    const drape_candidates *candidates = drape_contact_valid_candidates(c, &straight->end[0], away);
-    const double to = candidates ? drape_candidates_distance(candidates, &straight->end[1]) : INFINITY;
-    *away = fmax(*away, to);
-    if (candidates && to <= candidates->margin)
+    const drape_candidates *candidates = drape_contact_valid_candidates(c, straight, away);
+    if (candidates || length > MAX_PATH * c->mean_edge)
         return candidates;
-    *away = 0;
-    return length > MAX_PATH * c->mean_edge ? NULL : drape_contact_search(c, straight);
+    return drape_contact_search(c, straight, away);
 }
 
 double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
@@ -78,15 +75,15 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
     const drape_straight_path straight = {
         {{.model = c->model, .x = x, .pose = pose}, {.model = c->model, .x = y, .pose = pose}}};
     path p = {.x = x, .y = y, .keep = keep, .fraction = 1, .core = core};
-    double away;
+    drape_distances away;
+    drape_candidate_cursor cursor = {0};
     const drape_candidates *candidates = candidates_of(c, &straight, longest_move(c, &p), &away);
-    if (candidates) {
-        for (int32_t i = 0; i < candidates->count; i++)
-            if (drape_candidate_may_fall_below(&candidates->pairs[i], away, candidates->pairs[i].distance))
-                follow(&p, &candidates->pairs[i]);
-    } else {
+    const drape_pair *pair;
+    while (candidates && (pair = drape_candidates_next(candidates, &away, &cursor)))
+        follow(&p, pair);
+    if (!candidates) {
         const double start = drape_clock_seconds();
-        drape_candidates_find(&c->broad, &straight, 0, follow, &p);
+        drape_candidates_find(&c->broad, &straight, 0, NULL, follow, &p);
         c->search_seconds += drape_clock_seconds() - start;
     }
     *limiting = p.limiting;

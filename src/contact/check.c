@@ -157,6 +157,8 @@ drape_status drape_contact_check(drape_contact *c, const double *x, double t, co
         status = check_inscribed(c, c->model->triangle, 3, c->model->triangle_count, reason, diagnostic);
     if (!status)
         status = check_path(c, reason, diagnostic);
+    if (!status)
+        status = drape_contact_take_failure(c);
     c->seconds += drape_clock_seconds() - start;
     return status;
 }

@@ -37,13 +37,11 @@ static bool are_finite(const drape_collider_pose *pose, int32_t count)
 static drape_status restore(drape_contact *c)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
-    c->step_candidates.known = c->query_candidates.known = c->listed = false;
+    c->step_candidates.all.known = c->query_candidates.all.known = c->listed = false;
     c->between_steps = c->begun;
     if (!c->begun)
         return DRAPE_OK;
-    const drape_candidates *candidates = drape_contact_search(c, &(drape_straight_path){{start, start}});
-    drape_status status =
-        candidates ? drape_active_set_list(&c->active, candidates, 0, &start) : DRAPE_E_MEMORY;
+    drape_status status = drape_contact_list(c, &start);
     if (!status)
         status = drape_contact_lag(c);
     if (!status)

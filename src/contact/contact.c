@@ -1,8 +1,9 @@
 /*
  * contact.c: see contact.h. The path of a pair of pieces to the Jacobian:
  *
- *     broad_phase.c  pairs whose boxes overlap, searched in trees of boxes (geometry/bvh.h)
- *     candidates.c   those near enough to become active before the next search
+ *     broad_phase.c  pairs that no axis separates on a path, searched in trees of boxes (geometry/path_bvh.h)
+ *     candidates.c   those that can become active near the path; where some points have left it, a patch
+ *     bound.c        cheap lower bounds of a gap, which reject most neighbours
  *     pair.c         narrow phase: closest points, gap, normal and weights of a candidate, evaluated once
  *     active.c       the active set: candidates whose gap is below the activation distance, equal ones merged
  *     force.c        energy, gradient and Hessian of an active contact, by the barrier (barrier.h)
@@ -20,7 +21,7 @@
 
 #include <string.h>
 
-#define MARGIN 0.15 /* by which points may leave the path of a search before a new one, in mean edges */
+#define MARGIN 0.12 /* by which points may leave the path of a search before a new one, in mean edges */
 #define AHEAD  1.0  /* by which a path is continued, in its length: the next step begins there */
 
 static drape_status take_arrays(drape_arena *arena, drape_contact *c)
@@ -54,9 +55,9 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
     c->active.arena = arena;
     drape_status status = drape_broad_phase_create(arena, model, &c->broad);
     if (!status)
-        status = drape_candidates_create(arena, &c->broad, &c->step_candidates);
+        status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->step_candidates);
     if (!status)
-        status = drape_candidates_create(arena, &c->broad, &c->query_candidates);
+        status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->query_candidates);
     if (!status)
         status = take_arrays(arena, c);
     *out = status ? NULL : c;
@@ -133,47 +134,72 @@ static bool move_colliders(drape_contact *c, double t, const double span[2])
 
 /* ---- Candidates and active set ---- */
 
-const drape_candidates *drape_contact_valid_candidates(const drape_contact *c, const drape_configuration *at,
-                                                       double *away)
+static bool are_valid(const drape_candidates *candidates, const drape_straight_path *path,
+                      drape_distances *away)
 {
-    *away = drape_candidates_distance(&c->step_candidates, at);
-    if (*away <= c->step_candidates.margin)
-        return &c->step_candidates;
-    if (!c->between_steps)
-        return NULL;
-    *away = drape_candidates_distance(&c->query_candidates, at);
-    return *away <= c->query_candidates.margin ? &c->query_candidates : NULL;
+    const drape_distances first = drape_candidates_distances(candidates, &path->end[0]);
+    if (!drape_candidates_are_valid(candidates, &first))
+        return false;
+    *away = drape_candidates_distances(candidates, &path->end[1]);
+    away->all = fmax(away->all, first.all);
+    away->patch = fmax(away->patch, first.patch);
+    return drape_candidates_are_valid(candidates, away);
 }
 
-const drape_candidates *drape_contact_search(drape_contact *c, const drape_straight_path *path)
+const drape_candidates *drape_contact_valid_candidates(const drape_contact *c,
+                                                       const drape_straight_path *path, drape_distances *away)
+{
+    if (are_valid(&c->step_candidates, path, away))
+        return &c->step_candidates;
+    return c->between_steps && are_valid(&c->query_candidates, path, away) ? &c->query_candidates : NULL;
+}
+
+const drape_candidates *drape_contact_search(drape_contact *c, const drape_straight_path *path,
+                                             drape_distances *away)
 {
     const double start = drape_clock_seconds();
     drape_candidates *candidates = c->between_steps ? &c->query_candidates : &c->step_candidates;
-    drape_straight_path longer = *path;
-    longer.end[1].x = c->ahead;
     for (size_t i = 0; i < 3 * (size_t)c->broad.points; i++)
         c->ahead[i] = path->end[1].x[i] + AHEAD * (path->end[1].x[i] - path->end[0].x[i]);
-    const drape_status status = drape_candidates_search(candidates, &longer, MARGIN * c->mean_edge);
+    const drape_status status = drape_candidates_search(candidates, path, c->ahead);
+    if (!are_valid(candidates, path, away)) /* positions that are not finite */
+        *away = (drape_distances){INFINITY, INFINITY};
     c->search_seconds += drape_clock_seconds() - start;
+    c->out_of_memory = c->out_of_memory || status != DRAPE_OK;
     return status ? NULL : candidates;
+}
+
+drape_status drape_contact_take_failure(drape_contact *c)
+{
+    const bool failed = c->out_of_memory;
+    c->out_of_memory = false;
+    return failed ? DRAPE_E_MEMORY : DRAPE_OK;
+}
+
+drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
+{
+    const drape_straight_path here = {{*at, *at}};
+    drape_distances away;
+    const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
+    if (!candidates)
+        candidates = drape_contact_search(c, &here, &away);
+    return candidates ? drape_active_set_list(&c->active, candidates, &away, at)
+                      : drape_contact_take_failure(c);
 }
 
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)
 {
     const bool moved = move_colliders(c, at->t, at->span);
-    double away = 0;
     fill_velocities(c, at->v, c->v);
+    if (drape_contact_take_failure(c)) {
+        c->listed = false;
+        return DRAPE_E_MEMORY;
+    }
     if (c->listed && !moved && memcmp(at->x, c->x, 3 * (size_t)c->model->node_count * sizeof *c->x) == 0)
         return DRAPE_OK; /* forces, energy and derivatives are often evaluated at the same point */
     drape_contact_fill(c, at->x, c->pose, c->x);
     const drape_configuration now = drape_contact_configuration(c);
-    const drape_candidates *candidates = drape_contact_valid_candidates(c, &now, &away);
-    if (!candidates) {
-        candidates = drape_contact_search(c, &(drape_straight_path){{now, now}});
-        away = 0;
-    }
-    const drape_status status =
-        candidates ? drape_active_set_list(&c->active, candidates, away, &now) : DRAPE_E_MEMORY;
+    const drape_status status = drape_contact_list(c, &now);
     c->listed = status == DRAPE_OK;
     return status;
 }

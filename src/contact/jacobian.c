@@ -171,7 +171,7 @@ int32_t drape_contact_list_couplings(drape_contact *c, const int32_t **nodes)
     listing list = {.contact = c, .complete = true};
     c->coupling_count = 0;
     drape_candidates_find(&c->broad, &(drape_straight_path){{now, now}}, 0.5 * PATTERN_MARGIN * c->mean_edge,
-                          list_near, &list);
+                          NULL, list_near, &list);
     c->search_seconds += drape_clock_seconds() - start;
     c->seconds += drape_clock_seconds() - start;
     for (int32_t i = 0; i < c->lagged_count; i++) {

@@ -33,7 +33,8 @@ struct drape_contact {
     drape_collider_pose *pose; /* (collider_count) */
     drape_active_set active;   /* at x, if it is listed */
     bool listed;
-    double *ahead; /* (points x 3) the end of the path of a search */
+    bool out_of_memory; /* in a search of collision detection: the next update or check reports it */
+    double *ahead;      /* (points x 3) the end of the path of a search */
 
     bool begun;                      /* a step has begun: */
     double *start;                   /* (points x 3) its beginning */
@@ -65,13 +66,20 @@ drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at);
 drape_status drape_contact_lag(drape_contact *c);
 void drape_contact_measure_start(drape_contact *c);
 
-/* The candidates that are valid at a configuration, and how far that is from their path; NULL: a search is
- * needed. */
-const drape_candidates *drape_contact_valid_candidates(const drape_contact *c, const drape_configuration *at,
-                                                       double *away);
+/* The candidates that are valid on a path, and how far that is from theirs; NULL: a search is needed. */
+const drape_candidates *drape_contact_valid_candidates(const drape_contact *c,
+                                                       const drape_straight_path *path,
+                                                       drape_distances *away);
 
 /* Searches candidates on a path and its continuation. NULL: out of memory. */
-const drape_candidates *drape_contact_search(drape_contact *c, const drape_straight_path *path);
+const drape_candidates *drape_contact_search(drape_contact *c, const drape_straight_path *path,
+                                             drape_distances *away);
+
+/* DRAPE_E_MEMORY, once, if collision detection was out of memory since the last call. */
+drape_status drape_contact_take_failure(drape_contact *c);
+
+/* Lists the active set of a configuration. Errors: DRAPE_E_MEMORY. */
+drape_status drape_contact_list(drape_contact *c, const drape_configuration *at);
 
 /* The constants of a pair. */
 drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair *pair);

@@ -58,36 +58,71 @@ drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, 
         return DRAPE_OK;
     drape_status status = drape_bvh_build(&temporary, count, nodes, node, x, &binary);
     bvh->branches = status ? NULL : drape_arena_take(arena, (size_t)count, sizeof *bvh->branches);
-    if (bvh->branches)
+    bvh->place = status ? NULL : drape_arena_take(arena, (size_t)count, sizeof *bvh->place);
+    const bool complete = bvh->branches && bvh->place;
+    if (complete)
         merge(bvh, &binary, 0);
+    for (int32_t e = 0; complete && e < count; e++)
+        bvh->place[binary.order[e]] = e;
     drape_arena_free(&temporary);
-    return bvh->branches ? DRAPE_OK : DRAPE_E_MEMORY;
+    return complete ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 /* ---- Refitting ---- */
 
-static const drape_box empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-
-/* The box of a child at one end. */
-static drape_box child_box(const drape_path_bvh *bvh, int32_t child, int end, const double *x)
+/* Inline, since most of the time of a query that meets nothing is spent here. */
+static inline drape_box box_of(const int32_t *node, int nodes, const double *x)
 {
-    drape_box box = empty_box;
-    if (child < 0)
-        return drape_box_of(bvh->node + (size_t)(-1 - child) * (size_t)bvh->nodes, bvh->nodes, x, 0);
-    const drape_path_branch *from = &bvh->branches[child];
+    drape_box box;
     for (int k = 0; k < 3; k++)
-        for (int32_t l = 0; l < from->count; l++) {
-            box.low[k] = from->low[end][k][l] < box.low[k] ? from->low[end][k][l] : box.low[k];
-            box.high[k] = from->high[end][k][l] > box.high[k] ? from->high[end][k][l] : box.high[k];
+        box.low[k] = box.high[k] = x[3 * (size_t)node[0] + (size_t)k];
+    for (int a = 1; a < nodes; a++)
+        for (int k = 0; k < 3; k++) {
+            const double at = x[3 * (size_t)node[a] + (size_t)k];
+            box.low[k] = at < box.low[k] ? at : box.low[k];
+            box.high[k] = at > box.high[k] ? at : box.high[k];
         }
     return box;
 }
 
-void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y)
+/* The box of a child at one end. */
+static drape_box child_box(const drape_path_bvh *bvh, int32_t child, int end, const double *x)
+{
+    if (child < 0)
+        return box_of(bvh->node + (size_t)(-1 - child) * (size_t)bvh->nodes, bvh->nodes, x);
+    const drape_path_branch *from = &bvh->branches[child];
+    drape_box box;
+    for (int k = 0; k < 3; k++) {
+        box.low[k] = from->low[end][k][0];
+        box.high[k] = from->high[end][k][0];
+        for (int32_t l = 1; l < from->count; l++) {
+            box.low[k] = from->low[end][k][l] < box.low[k] ? from->low[end][k][l] : box.low[k];
+            box.high[k] = from->high[end][k][l] > box.high[k] ? from->high[end][k][l] : box.high[k];
+        }
+    }
+    return box;
+}
+
+static bool is_marked(const drape_path_bvh *bvh, int32_t child, const bool *marked)
+{
+    const int32_t *node = bvh->node + (size_t)(child < 0 ? -1 - child : 0) * (size_t)bvh->nodes;
+    bool any = !marked;
+    if (child >= 0)
+        for (int32_t l = 0; l < bvh->branches[child].count; l++)
+            any = any || bvh->branches[child].marked[l];
+    for (int a = 0; child < 0 && !any && a < bvh->nodes; a++)
+        any = marked[node[a]];
+    return any;
+}
+
+/* Children are stored after their parent: going backwards refits them first. */
+void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const bool *marked)
 {
     const double *const ends[2] = {x, y};
     for (int32_t i = bvh->branch_count - 1; i >= 0; i--) {
         drape_path_branch *branch = &bvh->branches[i];
+        for (int32_t l = 0; l < branch->count; l++)
+            branch->marked[l] = is_marked(bvh, branch->child[l], marked);
         for (int end = 0; end < 2 && ends[end]; end++)
             for (int32_t l = 0; l < branch->count; l++) {
                 const drape_box box = child_box(bvh, branch->child[l], end, ends[end]);
@@ -103,7 +138,7 @@ void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y)
 
 typedef struct query {
     lanes low[2][3], high[2][3]; /* the same number in all lanes */
-    int32_t after;
+    int32_t after, marked;       /* the least value of marked */
 } query;
 
 /* Which children an axis separates from the query: -1 in their lanes. */
@@ -139,7 +174,8 @@ LANES_INLINE void traverse(const drape_path_bvh *bvh, const query *q, int ends, 
         const lanes_mask apart = find_apart(branch, q, ends);
         for (int l = LANES - 1; l >= 0; l--) { /* writes always, without a branch to mispredict */
             waiting[count] = branch->child[l];
-            count += (apart[l] == 0) & (l < branch->count) & (branch->last[l] > q->after);
+            count += (apart[l] == 0) & (l < branch->count) & (branch->last[l] > q->after) &
+                     (branch->marked[l] >= q->marked);
         }
     }
 }
@@ -156,20 +192,19 @@ LANES_DISPATCH static void traverse_paths(const drape_path_bvh *bvh, const query
     traverse(bvh, q, 2, visit, user);
 }
 
-void drape_path_bvh_query(const drape_path_bvh *bvh, const int32_t *node, int nodes, const double *x,
-                          const double *y, double reach, int32_t after, drape_bvh_visit *visit, void *user)
+void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *from, drape_bvh_visit *visit,
+                          void *user)
 {
-    const double *const ends[2] = {x, y};
-    query q = {.after = after};
+    const double *const ends[2] = {from->x, from->y};
+    query q = {.after = from->after, .marked = from->only_marked};
     for (int end = 0; end < 2 && ends[end]; end++) {
-        const drape_box box = drape_box_of(node, nodes, ends[end], reach);
-        for (int k = 0; k < 3; k++)
-            for (int l = 0; l < LANES; l++) {
-                q.low[end][k][l] = box.low[k];
-                q.high[end][k][l] = box.high[k];
-            }
+        const drape_box box = box_of(from->node, from->nodes, ends[end]);
+        for (int k = 0; k < 3; k++) {
+            q.low[end][k] = box.low[k] - from->reach - (lanes){0};
+            q.high[end][k] = box.high[k] + from->reach - (lanes){0};
+        }
     }
-    if (y)
+    if (from->y)
         traverse_paths(bvh, &q, visit, user);
     else
         traverse_points(bvh, &q, visit, user);

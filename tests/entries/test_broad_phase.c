@@ -8,7 +8,7 @@
 #include "support/scene.h"
 
 #define ROUNDS   160
-#define ROUNDING 1e-14 /* [m] of a gap, some eps of the coordinates: pairs that are one contact have gaps that differ by it */
+#define ROUNDING 1e-14 /* [m] some eps of the coordinates, between the gaps of pairs that are one contact */
 
 typedef struct all_pairs {
     drape_contact *contact; /* which is only read */
@@ -35,11 +35,10 @@ static void note(all_pairs *all, drape_pair_kind kind, int32_t collider, const i
     memcpy(pair.node, first, (size_t)split * sizeof *first);
     memcpy(pair.node + split, second, (size_t)(4 - split) * sizeof *second);
     pair.radius = collider >= 0 ? m->colliders[collider].shape.radius : 0;
-    pair.distance =
-        collider >= 0
-            ? m->contact.distance
-            : fmin(2 * m->contact.self_thickness, 0.5 * drape_pair_gap_value(&pair, &rest));
-    all->list.pairs[all->list.count++] = pair;
+    pair.distance = collider >= 0
+                        ? m->contact.distance
+                        : fmin(2 * m->contact.self_thickness, 0.5 * drape_pair_gap_value(&pair, &rest));
+    all->list.all.pairs[all->list.all.count++] = pair;
 }
 
 static void note_own(all_pairs *all)
@@ -70,18 +69,18 @@ static void note_colliders(all_pairs *all)
             note(all, DRAPE_PAIR_TRIANGLE, b->triangle_collider[t], &i, b->triangle + 3 * t);
         for (int32_t k = 0; k < m->collider_count; k++)
             if (m->colliders[k].ops->smooth)
-                all->list.pairs[all->list.count++] = drape_broad_phase_surface(b, i, k);
+                all->list.all.pairs[all->list.all.count++] = drape_broad_phase_surface(b, i, k);
     }
 }
 
 static all_pairs list_all(drape_arena *arena, drape_contact *contact)
 {
     all_pairs all = {.contact = contact, .list = {.broad = &contact->broad}, .active = {.arena = arena}};
-    all.list.pairs = drape_arena_take(arena, 40000, sizeof *all.list.pairs);
-    ck_assert_ptr_nonnull(all.list.pairs);
+    all.list.all.pairs = drape_arena_take(arena, 40000, sizeof *all.list.all.pairs);
+    ck_assert_ptr_nonnull(all.list.all.pairs);
     note_own(&all);
     note_colliders(&all);
-    ck_assert_int_lt(all.list.count, 40000);
+    ck_assert_int_lt(all.list.all.count, 40000);
     return all;
 }
 
@@ -97,7 +96,7 @@ static void check_active(all_pairs *all, drape_active_contact *found)
 {
     const drape_contact *c = all->contact;
     const drape_configuration now = drape_contact_configuration(c);
-    ck_assert_int_eq(drape_active_set_list(&all->active, &all->list, 0, &now), DRAPE_OK);
+    ck_assert_int_eq(drape_active_set_list(&all->active, &all->list, &(drape_distances){0}, &now), DRAPE_OK);
     ck_assert_int_eq(c->active.count, all->active.count);
     memcpy(found, c->active.contacts, (size_t)c->active.count * sizeof *found);
     qsort(found, (size_t)c->active.count, sizeof *found, by_gap);
@@ -110,14 +109,14 @@ static void check_active(all_pairs *all, drape_active_contact *found)
 static bool check_fraction(const all_pairs *all, const double *x, const double *y, double fraction)
 {
     double least = 1;
-    for (int32_t i = 0; i < all->list.count; i++)
-        if (drape_pair_points(&all->list.pairs[i]) > 1)
-            least = fmin(least, drape_pair_step_fraction(&all->list.pairs[i], x, y, 1e-3, false, least));
+    for (int32_t i = 0; i < all->list.all.count; i++)
+        if (drape_pair_points(&all->list.all.pairs[i]) > 1)
+            least = fmin(least, drape_pair_step_fraction(&all->list.all.pairs[i], x, y, 1e-3, false, least));
     ck_assert_double_le(fraction, least);
     return least < 1;
 }
 
-/* Folds the sheets about a line, moves them as a whole and shakes them. */
+/* Folds the sheets about a line, moves them as a whole and shakes them; or moves only their last nodes. */
 static void move(const drape_model *m, uint64_t *seed, double *x)
 {
     const double size = 0.3 * pow(10, -1.5 - 1.5 * random_number(seed)); /* 1e-3 to 1 edges, or so */
@@ -127,7 +126,8 @@ static void move(const drape_model *m, uint64_t *seed, double *x)
         fold[k] = size * random_number(seed);
         whole[k] = thrown * random_number(seed) - 0.2 * x[k];
     }
-    for (size_t i = 0; i < 3 * (size_t)m->node_count; i += 3) {
+    const int32_t nodes = m->node_count, first = random_number(seed) < 0 ? nodes - nodes / 5 : 0;
+    for (size_t i = 3 * (size_t)first; i < 3 * (size_t)nodes; i += 3) {
         const double along = line[0] * x[i] + line[1] * x[i + 1] + line[2] * x[i + 2];
         for (size_t k = 0; k < 3; k++)
             x[i + k] += whole[k] + fold[k] * along + 0.05 * size * random_number(seed);
@@ -166,7 +166,7 @@ START_TEST(everything_near_is_found)
     const drape_model *m = s.model;
     const size_t n = 3 * (size_t)m->node_count;
     uint64_t seed = 3;
-    int crossing = 0, active = 0;
+    int crossing = 0, active = 0, patches = 0;
     drape_arena arena = drape_arena_of(s.ctx);
     drape_motion *motion = NULL;
     ck_assert_int_eq(drape_motion_create(&arena, m, &motion), DRAPE_OK);
@@ -198,11 +198,13 @@ START_TEST(everything_near_is_found)
         check_active(&all, found);
         compare_forces(c, clean, n, g);
         active += c->active.count;
+        patches += c->step_candidates.patch.known;
         memcpy(x, y, n * sizeof *x);
         drape_arena_free(&other);
     }
-    printf("# %d pairs, %.1f active, %d of %d paths end at a collision\n", (int)all.list.count,
-           (double)active / ROUNDS, crossing, ROUNDS);
+    printf("# %d pairs, %.1f active, %d of %d paths end at a collision, %d with a patch\n",
+           (int)all.list.all.count, (double)active / ROUNDS, crossing, ROUNDS, patches);
+    ck_assert_int_gt(patches, ROUNDS / 10);
     ck_assert_int_gt(active, 5 * ROUNDS);
     ck_assert_int_gt(crossing, ROUNDS / 10);
     drape_arena_free(&arena);

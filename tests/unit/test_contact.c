@@ -295,26 +295,44 @@ static bool stay_together(const drape_box a[2], const drape_box b[2])
     return true;
 }
 
-/* Every element with a number above a limit that no axis separates from the query is found once, also after
- * the positions have changed, and for a tree of one element. */
+static bool is_marked(const bool *marked, const int32_t *edge)
+{
+    return !marked || marked[edge[0]] || marked[edge[1]];
+}
+
+/* Every element with a number above a limit, marked if this is wanted, that no axis separates from the
+ * query is found once, in the order of its place, also after the positions have changed. */
 static void check_tree(drape_arena *arena, int32_t count)
 {
     uint64_t seed = 5;
     double x[300], y[300];
     int32_t edge[400];
+    bool marked[100];
     drape_path_bvh tree;
     fill(&seed, 1, x, 300);
     for (int i = 0; i < 400; i++)
         edge[i] = (int32_t)(fabs(next_number(&seed)) * 99.9);
     ck_assert_int_eq(drape_path_bvh_build(arena, count, 2, edge, x, &tree), DRAPE_OK);
     for (int k = 0; k < 100; k++) {
-        const int32_t node = k, after = k % 3 ? -1 : k;
+        const int32_t node = k;
         const double *const ends[2] = {x, k % 2 ? y : x};
+        const bool *const marks = k % 4 < 2 ? marked : NULL;
+        const drape_path_query query = {.node = &node,
+                                        .nodes = 1,
+                                        .x = x,
+                                        .y = k % 2 ? y : NULL,
+                                        .reach = 0.3,
+                                        .after = k % 3 ? -1 : k,
+                                        .only_marked = marks && k % 4 == 1};
         found f = {.count = 0};
         fill(&seed, 1, x, 300);
         fill(&seed, 1, y, 300);
-        drape_path_bvh_fit(&tree, x, k % 2 ? y : NULL);
-        drape_path_bvh_query(&tree, &node, 1, x, k % 2 ? y : NULL, 0.3, after, note, &f);
+        for (int i = 0; i < 100; i++)
+            marked[i] = next_number(&seed) > 0.8;
+        drape_path_bvh_fit(&tree, x, k % 2 ? y : NULL, marks);
+        drape_path_bvh_query(&tree, &query, note, &f);
+        for (int i = 1; i < f.count; i++)
+            ck_assert_int_lt(tree.place[f.elements[i - 1]], tree.place[f.elements[i]]);
         for (int32_t e = 0; e < count; e++) {
             drape_box own[2], box[2];
             int times = 0;
@@ -324,7 +342,8 @@ static void check_tree(drape_arena *arena, int32_t count)
             }
             for (int i = 0; i < f.count; i++)
                 times += f.elements[i] == e;
-            ck_assert_int_eq(times, e > after && stay_together(own, box));
+            ck_assert_int_eq(times, e > query.after && stay_together(own, box) &&
+                                        (!query.only_marked || is_marked(marks, edge + 2 * e)));
         }
     }
 }
@@ -342,8 +361,8 @@ START_TEST(test_tree)
 }
 END_TEST
 
-/* The bounds are below the distance anywhere on the path, and positive for most pieces that pass each other at
- * a distance. */
+/* The bounds are below the distance anywhere on the path, and positive for most pieces that pass each
+ * other at a distance. */
 START_TEST(test_bounds)
 {
     uint64_t seed = 11;
