@@ -17,6 +17,7 @@
 #define LANES 4
 
 typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
+typedef int64_t lanes_mask __attribute__((vector_size(LANES * sizeof(double)))); /* -1 or 0 in each lane */
 
 #define LANES_INLINE static inline __attribute__((always_inline))
 

@@ -13,8 +13,6 @@
 
 #include "base/lanes.h"
 
-typedef int64_t lanes_mask __attribute__((vector_size(LANES * sizeof(double)))); /* -1 or 0 in each lane */
-
 LANES_INLINE lanes lanes_select(lanes_mask mask, lanes yes, lanes no)
 {
     return (lanes)((mask & (lanes_mask)yes) | (~mask & (lanes_mask)no));

@@ -118,17 +118,17 @@ static bool add(drape_active_set *set, const drape_active_contact *contact)
     return true;
 }
 
-drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates, double moved,
-                                   const drape_configuration *at)
+drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
+                                   const drape_distances *away, const drape_configuration *at)
 {
+    drape_candidate_cursor cursor = {0};
+    const drape_pair *pair;
     set->count = 0;
     if (set->slots)
         memset(set->slots, 0, SLOTS * (size_t)set->room * sizeof *set->slots);
-    for (int32_t i = 0; i < candidates->count; i++) {
-        const drape_pair *pair = &candidates->pairs[i];
+    while ((pair = drape_candidates_next(candidates, away, &cursor))) {
         drape_active_contact contact;
-        if (!drape_candidate_may_fall_below(pair, moved, pair->distance) ||
-            !drape_pair_gap(pair, at, candidates->broad->rest, &contact.gap))
+        if (!drape_pair_gap(pair, at, candidates->broad->rest, &contact.gap))
             continue;
         contact.pair = *pair;
         reduce(&contact);

@@ -20,9 +20,9 @@ typedef struct drape_active_set {
     int32_t *slots; /* (several x room) hash table with the nodes as keys: 1 + index of a contact; 0: free */
 } drape_active_set;
 
-/* Lists the active contacts of a configuration in which no point has moved farther than `moved` from the
- * search of the candidates. Errors: DRAPE_E_MEMORY. */
-drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates, double moved,
-                                   const drape_configuration *at);
+/* Lists the active contacts of a configuration at these distances from the paths of the candidates. Errors:
+ * DRAPE_E_MEMORY. */
+drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
+                                   const drape_distances *away, const drape_configuration *at);
 
 #endif

@@ -88,6 +88,8 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->segment_collider = drape_arena_take(arena, (size_t)s->segments, sizeof *s->segment_collider);
     s->triangle = drape_arena_take(arena, 3 * (size_t)triangles, sizeof *s->triangle);
     s->triangle_collider = drape_arena_take(arena, (size_t)triangles, sizeof *s->triangle_collider);
+    s->near_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near_node);
+    s->near_edge = drape_arena_take(arena, (size_t)m->edge_count, sizeof *s->near_edge);
     s->node_area = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->node_area);
     s->edge_area = drape_arena_take(arena, (size_t)m->edge_count, sizeof *s->edge_area);
     s->face_area = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->face_area);
@@ -100,10 +102,10 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     share_areas(s);
     const bool met = points > 0 || m->contact.self; /* faces and edges can meet something */
     drape_status status =
-        drape_bvh_build(arena, met ? m->triangle_count : 0, 3, m->triangle, m->rest, &s->faces);
+        drape_path_bvh_build(arena, met ? m->triangle_count : 0, 3, m->triangle, m->rest, &s->faces);
     if (!status)
-        status = drape_bvh_build(arena, met ? m->edge_count : 0, 2, m->edge, m->rest, &s->edges);
-    return status ? status : drape_bvh_build(arena, triangles, 3, s->triangle, s->rest, &s->obstacles);
+        status = drape_path_bvh_build(arena, met ? m->edge_count : 0, 2, m->edge, m->rest, &s->edges);
+    return status ? status : drape_path_bvh_build(arena, triangles, 3, s->triangle, s->rest, &s->obstacles);
 }
 
 /* ---- Constants of a pair ---- */
@@ -122,7 +124,8 @@ drape_pair drape_broad_phase_surface(const drape_broad_phase *s, int32_t node, i
                         .node = {node, -1, -1, -1},
                         .collider = collider,
                         .area = s->node_area[node],
-                        .distance = s->model->contact.distance};
+                        .distance = s->model->contact.distance,
+                        .rank = {collider - s->model->collider_count, node}};
 }
 
 static void set_collider(const drape_broad_phase *s, int32_t collider, drape_pair *p)
@@ -134,14 +137,18 @@ static void set_collider(const drape_broad_phase *s, int32_t collider, drape_pai
 
 /* ---- Searching ---- */
 
+/* Stages of a search, after those of the smooth colliders, which have negative numbers. */
+enum { OWN_FACES, OWN_EDGES, FEATURE_FACES, FEATURE_EDGES, OBSTACLES };
+
 /* A piece that is tested against those in a tree. */
 typedef struct query {
     drape_broad_phase *broad;
-    const double *x, *y;
+    const drape_broad_query *want;
     drape_broad_phase_visit *visit;
     void *user;
     drape_pair pair; /* its constants, as far as they depend on this piece alone */
     int32_t piece;   /* number of the point, edge or segment */
+    const drape_path_bvh *tree;
 } query;
 
 static bool is_free(const drape_broad_phase *s, int32_t point)
@@ -149,10 +156,11 @@ static bool is_free(const drape_broad_phase *s, int32_t point)
     return point < s->model->node_count && s->model->free_of_node[point] >= 0;
 }
 
-static void report(query *q)
+static void report(query *q, int32_t element)
 {
     const int32_t *n = q->pair.node;
     const drape_broad_phase *s = q->broad;
+    q->pair.rank[2] = q->tree->place[element];
     if (is_free(s, n[0]) || is_free(s, n[1]) || is_free(s, n[2]) || is_free(s, n[3]))
         q->visit(q->user, &q->pair);
 }
@@ -164,7 +172,7 @@ static void own_face(void *user, int32_t face)
     if (t[0] == q->piece || t[1] == q->piece || t[2] == q->piece)
         return;
     set_nodes(&q->pair, q->piece, t[0], t[1], t[2]);
-    report(q);
+    report(q, face);
 }
 
 static void own_edge(void *user, int32_t edge)
@@ -172,11 +180,11 @@ static void own_edge(void *user, int32_t edge)
     query *q = user;
     const int32_t *e = q->broad->model->edge + 2 * (size_t)edge,
                   *f = q->broad->model->edge + 2 * (size_t)q->piece;
-    if (edge <= q->piece || e[0] == f[0] || e[0] == f[1] || e[1] == f[0] || e[1] == f[1])
+    if (e[0] == f[0] || e[0] == f[1] || e[1] == f[0] || e[1] == f[1])
         return;
     set_nodes(&q->pair, f[0], f[1], e[0], e[1]);
     q->pair.area = 0.5 * (q->broad->edge_area[edge] + q->broad->edge_area[q->piece]);
-    report(q);
+    report(q, edge);
 }
 
 static void feature_face(void *user, int32_t face)
@@ -185,7 +193,7 @@ static void feature_face(void *user, int32_t face)
     const int32_t *t = q->broad->model->triangle + 3 * (size_t)face;
     set_nodes(&q->pair, q->piece, t[0], t[1], t[2]);
     q->pair.area = q->broad->face_area[face];
-    report(q);
+    report(q, face);
 }
 
 static void feature_edge(void *user, int32_t edge)
@@ -195,7 +203,7 @@ static void feature_edge(void *user, int32_t edge)
                   *f = q->broad->segment + 2 * (size_t)q->piece;
     set_nodes(&q->pair, e[0], e[1], f[0], f[1]);
     q->pair.area = q->broad->edge_area[edge];
-    report(q);
+    report(q, edge);
 }
 
 static void obstacle_face(void *user, int32_t face)
@@ -204,77 +212,132 @@ static void obstacle_face(void *user, int32_t face)
     const int32_t *t = q->broad->triangle + 3 * (size_t)face;
     set_collider(q->broad, q->broad->triangle_collider[face], &q->pair);
     set_nodes(&q->pair, q->piece, t[0], t[1], t[2]);
-    report(q);
+    report(q, face);
 }
 
-static double reach_of(const drape_pair *pair, double reach)
+static bool is_marked(const bool *marked, const int32_t *node, int nodes)
 {
-    return fmax(0, pair->distance + pair->radius + reach);
+    for (int a = 0; marked && a < nodes; a++)
+        if (marked[node[a]])
+            return true;
+    return !marked;
 }
 
-/* Tests a piece against those in a tree: its nodes are the `nodes` ones from `node` on. */
-static void search_tree(query *q, int32_t piece, const int32_t *node, int nodes, double reach,
-                        const drape_bvh *tree, drape_bvh_visit *visit)
+/* Tests a piece against those in a tree with numbers above `after`: its nodes are the `nodes` ones from
+ * `node` on. */
+static void search_tree(query *q, int32_t piece, const int32_t *node, int nodes, int32_t after,
+                        const drape_path_bvh *tree, drape_bvh_visit *visit)
 {
-    const drape_box box = drape_box_of(node, nodes, q->x, q->y, reach_of(&q->pair, reach));
-    q->piece = piece;
-    drape_bvh_query(tree, &box, visit, q);
+    const drape_path_query want = {.node = node,
+                                   .nodes = nodes,
+                                   .x = q->want->x,
+                                   .y = q->want->y,
+                                   .reach = q->pair.distance + q->pair.radius + q->want->reach,
+                                   .after = after,
+                                   .only_marked = !is_marked(q->want->marked, node, nodes)};
+    q->piece = q->pair.rank[1] = piece;
+    q->tree = tree;
+    drape_path_bvh_query(tree, &want, visit, q);
 }
 
-static void search_self(query *q, double reach)
+static void note_nodes(void *user, int32_t face)
 {
-    const drape_broad_phase *s = q->broad;
-    q->pair = (drape_pair){
-        .kind = DRAPE_PAIR_TRIANGLE, .collider = -1, .distance = 2 * s->model->contact.self_thickness};
+    drape_broad_phase *s = user;
+    for (int a = 0; a < 3; a++)
+        s->near_node[s->model->triangle[3 * (size_t)face + (size_t)a]] = true;
+}
+
+static void note_edge(void *user, int32_t edge)
+{
+    ((drape_broad_phase *)user)->near_edge[edge] = true;
+}
+
+static void note_near(drape_broad_phase *s, const drape_broad_query *want, double reach,
+                      const drape_path_bvh *tree, drape_bvh_visit *visit)
+{
+    drape_path_query from = {.nodes = tree->nodes, .x = want->x, .y = want->y, .reach = reach, .after = -1};
+    for (int32_t e = 0; e < tree->count; e++) {
+        from.node = tree->node + (size_t)e * (size_t)tree->nodes;
+        if (is_marked(want->marked, from.node, tree->nodes))
+            drape_path_bvh_query(tree, &from, visit, s);
+    }
+}
+
+/* Finds the nodes and edges that may meet a marked face or edge: most meet none. */
+static void find_near(drape_broad_phase *s, const drape_broad_query *want)
+{
+    const double reach = 2 * s->model->contact.self_thickness + want->reach;
+    const bool all = !want->marked;
+    memset(s->near_node, all, (size_t)s->model->node_count * sizeof *s->near_node);
+    memset(s->near_edge, all, (size_t)s->model->edge_count * sizeof *s->near_edge);
+    if (all)
+        return;
+    note_near(s, want, reach, &s->faces, note_nodes);
+    note_near(s, want, reach, &s->edges, note_edge);
+}
+
+static void search_self(query *q)
+{
+    drape_broad_phase *s = q->broad;
+    q->pair = (drape_pair){.kind = DRAPE_PAIR_TRIANGLE,
+                           .collider = -1,
+                           .distance = 2 * s->model->contact.self_thickness,
+                           .rank = {OWN_FACES}};
+    find_near(s, q->want);
     for (int32_t i = 0; i < s->model->node_count; i++) {
         q->pair.area = s->node_area[i];
-        search_tree(q, i, &i, 1, reach, &s->faces, own_face);
+        if (s->near_node[i] || q->want->marked[i])
+            search_tree(q, i, &i, 1, -1, &s->faces, own_face);
     }
     q->pair.kind = DRAPE_PAIR_SEGMENTS;
+    q->pair.rank[0] = OWN_EDGES;
     for (int32_t e = 0; e < s->model->edge_count; e++)
-        search_tree(q, e, s->model->edge + 2 * (size_t)e, 2, reach, &s->edges, own_edge);
+        if (s->near_edge[e]) /* as every marked edge: it meets itself */
+            search_tree(q, e, s->model->edge + 2 * (size_t)e, 2, e, &s->edges, own_edge);
 }
 
-static void search_features(query *q, double reach)
+static void search_features(query *q)
 {
     const drape_broad_phase *s = q->broad;
-    q->pair = (drape_pair){.kind = DRAPE_PAIR_TRIANGLE};
+    q->pair = (drape_pair){.kind = DRAPE_PAIR_TRIANGLE, .rank = {FEATURE_FACES}};
     for (int32_t i = s->model->node_count; i < s->points; i++) {
         set_collider(s, s->point_collider[i - s->model->node_count], &q->pair);
-        search_tree(q, i, &i, 1, reach, &s->faces, feature_face);
+        search_tree(q, i, &i, 1, -1, &s->faces, feature_face);
     }
     q->pair.kind = DRAPE_PAIR_SEGMENTS;
+    q->pair.rank[0] = FEATURE_EDGES;
     for (int32_t i = 0; i < s->segments; i++) {
         set_collider(s, s->segment_collider[i], &q->pair);
-        search_tree(q, i, s->segment + 2 * (size_t)i, 2, reach, &s->edges, feature_edge);
+        search_tree(q, i, s->segment + 2 * (size_t)i, 2, -1, &s->edges, feature_edge);
     }
 }
 
-static void search_obstacles(query *q, double reach)
+static void search_obstacles(query *q)
 {
     const drape_broad_phase *s = q->broad;
     for (int32_t i = 0; s->obstacles.count > 0 && i < s->model->node_count; i++) {
         q->pair = (drape_pair){.kind = DRAPE_PAIR_TRIANGLE,
                                .radius = s->obstacle_radius,
                                .area = s->node_area[i],
-                               .distance = s->model->contact.distance};
-        search_tree(q, i, &i, 1, reach, &s->obstacles, obstacle_face);
+                               .distance = s->model->contact.distance,
+                               .rank = {OBSTACLES}};
+        search_tree(q, i, &i, 1, -1, &s->obstacles, obstacle_face);
     }
 }
 
-void drape_broad_phase_pairs(drape_broad_phase *s, const double *x, const double *y, double reach,
+void drape_broad_phase_pairs(drape_broad_phase *s, const drape_broad_query *want,
                              drape_broad_phase_visit *visit, void *user)
 {
-    query q = {.broad = s, .x = x, .y = y, .visit = visit, .user = user};
+    query q = {.broad = s, .want = want, .visit = visit, .user = user};
     const bool features = s->points > s->model->node_count;
     if (features || s->model->contact.self) {
-        drape_bvh_fit(&s->faces, x, y);
-        drape_bvh_fit(&s->edges, x, y);
+        drape_path_bvh_fit(&s->faces, want->x, want->y, want->marked);
+        drape_path_bvh_fit(&s->edges, want->x, want->y, want->marked);
     }
-    drape_bvh_fit(&s->obstacles, x, y);
+    drape_path_bvh_fit(&s->obstacles, want->x, want->y, want->marked);
     if (s->model->contact.self)
-        search_self(&q, reach);
+        search_self(&q);
     if (features)
-        search_features(&q, reach);
-    search_obstacles(&q, reach);
+        search_features(&q);
+    search_obstacles(&q);
 }

@@ -7,20 +7,21 @@
 #define DRAPE_CONTACT_BROAD_PHASE_H
 
 #include "contact/pair.h"
-#include "geometry/bvh.h"
+#include "geometry/path_bvh.h"
 
 typedef struct drape_broad_phase {
     const drape_model *model;
-    int32_t points;          /* nodes, and points of colliders */
-    int32_t *point_collider; /* (points - node_count) */
-    double *rest;            /* (points x 3): nodes at rest, points of undisplaced colliders */
-    drape_bvh faces, edges;  /* of the cloths */
-    drape_bvh obstacles;     /* triangles of colliders without a smooth distance */
-    int32_t *segment;        /* (segments x 2) of colliders */
+    int32_t points;              /* nodes, and points of colliders */
+    int32_t *point_collider;     /* (points - node_count) */
+    double *rest;                /* (points x 3): nodes at rest, points of undisplaced colliders */
+    drape_path_bvh faces, edges; /* of the cloths */
+    drape_path_bvh obstacles;    /* triangles of colliders without a smooth distance */
+    int32_t *segment;            /* (segments x 2) of colliders */
     int32_t *segment_collider;
     int32_t segments;
     int32_t *triangle; /* (obstacles.count x 3) of colliders */
     int32_t *triangle_collider;
+    bool *near_node, *near_edge; /* of a search of marked pairs: what may meet a marked face or edge */
     double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
     double max_distance;                       /* largest activation distance of any pair [m] */
     double obstacle_radius;                    /* largest radius around the triangles of an obstacle [m] */
@@ -28,13 +29,18 @@ typedef struct drape_broad_phase {
 
 drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *model, drape_broad_phase *out);
 
-/* Calls visit for every pair whose pieces may be within its activation distance plus reach, at x or
- * anywhere on the straight path from x to y (NULL: only at x), in an order that does not depend on the
- * positions. A negative reach shrinks the distance, but not below 0, so that touching pairs are found. Left
- * out are pairs whose nodes are all pinned, and pairs with surfaces, since every free node is paired with
- * all of them. x, y: (points x 3). */
+/* Which pairs are searched: those whose pieces may be within their activation distance plus reach, at x or
+ * anywhere on the straight path from x to y. */
+typedef struct drape_broad_query {
+    const double *x, *y; /* (points x 3); y NULL: only at x */
+    double reach;
+    const bool *marked; /* (points) only pairs with a marked point; NULL: all */
+} drape_broad_query;
+
+/* Calls visit for every such pair, by increasing rank. Left out are pairs whose nodes are all pinned, and
+ * pairs with surfaces, since every free node is paired with all of them. */
 typedef void drape_broad_phase_visit(void *user, const drape_pair *pair);
-void drape_broad_phase_pairs(drape_broad_phase *broad, const double *x, const double *y, double reach,
+void drape_broad_phase_pairs(drape_broad_phase *broad, const drape_broad_query *want,
                              drape_broad_phase_visit *visit, void *user);
 
 /* The pair of a free node and a smooth collider. */

@@ -1,41 +1,71 @@
 /*
- * candidates.h: the candidate pairs, found by the broad phase at some positions and valid until a point
- * moves farther from there than the margin. Their order depends on the pieces alone: sums over the active
- * ones have the same bits wherever the search was made.
+ * candidates.h: the candidate pairs, found by the broad phase along a straight path of all points, and valid
+ * for a configuration if no point is farther than the margin from its place at some step fraction of the
+ * path, the same for all points.
+ *
+ * Where some points have left the path, a patch is searched instead of all: along a new path of all points,
+ * the pairs that have one of these. They replace the pairs of the first search that have one. The rank of
+ * pairs depends on the pieces alone: sums over the active ones, in this order, have the same bits wherever a
+ * search was made.
  */
 #ifndef DRAPE_CONTACT_CANDIDATES_H
 #define DRAPE_CONTACT_CANDIDATES_H
 
 #include "contact/broad_phase.h"
 
+/* All points move straight from one end to the other. */
+typedef struct drape_straight_path {
+    drape_configuration end[2];
+} drape_straight_path;
+
+/* The pairs of one search. */
+typedef struct drape_candidate_set {
+    bool known;                   /* a search was made, and there was memory for everything that it found */
+    double *x[2];                 /* (points x 3) the ends of its path */
+    drape_collider_pose *pose[2]; /* (collider_count) */
+    drape_pair *pairs;            /* (count of room) including those with surfaces, by increasing rank */
+    int32_t count, room;
+} drape_candidate_set;
+
 typedef struct drape_candidates {
     drape_arena *arena;
     drape_broad_phase *broad;
-    bool known;                /* a search was made, and there was memory for everything that it found */
-    double margin;             /* how far points may move from the positions of the search [m] */
-    double *x;                 /* (points x 3) the positions of the search */
-    drape_collider_pose *pose; /* (collider_count) */
-    drape_pair *pairs;         /* (count of room) including those with surfaces */
-    int32_t count, room;
+    double margin; /* how far points may be from the paths [m] */
+    drape_candidate_set all, patch;
+    bool *patched; /* (points) those of the patch; none unless it is known */
 } drape_candidates;
 
 /* arena and broad must outlive the candidates. */
-drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, drape_candidates *out);
+drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, double margin,
+                                     drape_candidates *out);
 
-/* Finds all pairs that can become active while no point is farther than margin from these positions, which
- * may be the candidates' own. Errors: DRAPE_E_MEMORY. */
-drape_status drape_candidates_search(drape_candidates *candidates, const drape_configuration *at,
-                                     double margin);
+/* Calls visit, by increasing rank, for all pairs that can become active while no point is farther than margin
+ * from the path; marked: as in broad_phase.h. */
+void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *path, double margin,
+                           const bool *marked, drape_broad_phase_visit *visit, void *user);
 
-/* The largest distance of a point from its position at the search; INFINITY if there was none, or if a
- * position is not finite. */
-double drape_candidates_moved(const drape_candidates *candidates, const drape_configuration *at);
+/* Makes the candidates valid on the path: between `path` and its continuation to `ahead` (points x 3), by a
+ * patch if few points are away from the first search there. Errors: DRAPE_E_MEMORY. */
+drape_status drape_candidates_search(drape_candidates *candidates, const drape_straight_path *path,
+                                     const double *ahead);
 
-/* Whether the gap of a candidate can fall below `gap` while no point is farther than moved from the
- * positions of the search. */
-static inline bool drape_candidate_may_fall_below(const drape_pair *pair, double moved, double gap)
-{
-    return pair->gap_at_search - 2 * moved < gap;
-}
+/* How far a configuration is from the paths, at most, for pairs of each search. */
+typedef struct drape_distances {
+    double all, patch; /* [m] */
+} drape_distances;
+
+/* The distances of a configuration; INFINITY if there was no search, or if a position is not finite. */
+drape_distances drape_candidates_distances(const drape_candidates *candidates, const drape_configuration *at);
+
+bool drape_candidates_are_valid(const drape_candidates *candidates, const drape_distances *away);
+
+/* A position in the list of candidates. */
+typedef struct drape_candidate_cursor {
+    int32_t all, patch;
+} drape_candidate_cursor;
+
+/* The next candidate by rank whose gap can fall below its activation distance; NULL: there is none. */
+const drape_pair *drape_candidates_next(const drape_candidates *candidates, const drape_distances *away,
+                                        drape_candidate_cursor *cursor);
 
 #endif

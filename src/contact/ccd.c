@@ -4,12 +4,16 @@
 
 #include "base/clock.h"
 #include "base/vec3.h"
+#include "contact/bound.h"
 
 #include <string.h>
 
 #define KEEP_ITERATE 0.5 /* of a gap, kept when a Newton iterate is cut short */
+#define NEAR         0.9 /* of the activation distance: a gap below that is surely found to be below it */
 #define MARCH_SHARE  0.9
 #define MAX_MARCHES  10000 /* maximum number of steps of a node along its path */
+
+#define MAX_PATH 8.0 /* in mean edges: the candidates of a longer path may be too many to keep */
 
 /* A displacement of all points, and the first pair that limits it. */
 typedef struct path {
@@ -19,16 +23,28 @@ typedef struct path {
     drape_pair limiting;
 } path;
 
-/* Does not search beyond the step fraction that another pair leaves: if forces throw nodes very far, a pair
+/* Whether the gap falls below the activation distance on the path; close to that it may be missed. */
+static bool comes_near(const path *p, const drape_pair *pair, double gap)
+{
+    return gap < pair->distance ||
+           drape_pair_step_fraction(pair, p->x, p->y, NEAR * pair->distance / gap, false, 1) < 1;
+}
+
+/* A pair that does not come near limits nothing, so it makes no difference whether it is a candidate. Does
+ * not search beyond the step fraction that another pair leaves: if forces throw nodes very far, a pair
  * approaches so slowly relative to its speed that searching each to its own end would take for ever. */
 static void follow(void *user, const drape_pair *pair)
 {
     path *p = user;
+    const drape_configuration from = {.x = p->x};
+    if (drape_pair_points(pair) == 1 ||
+        drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius)
+        return;
     const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->keep, p->core, p->fraction);
-    if (fraction < p->fraction) {
-        p->fraction = fraction;
-        p->limiting = *pair;
-    }
+    if (fraction >= p->fraction || !comes_near(p, pair, drape_pair_gap_value(pair, &from)))
+        return;
+    p->fraction = fraction;
+    p->limiting = *pair;
 }
 
 static double longest_move(const drape_contact *c, const path *p)
@@ -41,26 +57,33 @@ static double longest_move(const drape_contact *c, const path *p)
     return sqrt(largest);
 }
 
-/* Paths are straight: if both ends are near the last search, all points between them are. Two points
- * approach each other by no more than the sum of their displacements. */
+/* The candidates that are valid on the whole path, and how far it is from theirs: as far as its ends are, at
+ * most. Searched if there are none; NULL for a path that is too long, or if there is no memory. */
+static const drape_candidates *candidates_of(drape_contact *c, const drape_straight_path *straight,
+                                             double length, drape_distances *away)
+{
+    const drape_candidates *candidates = drape_contact_valid_candidates(c, straight, away);
+    if (candidates || length > MAX_PATH * c->mean_edge)
+        return candidates;
+    return drape_contact_search(c, straight, away);
+}
+
 double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
                                    const drape_collider_pose *pose, double keep, bool core,
                                    drape_pair *limiting)
 {
-    const drape_configuration from = {.model = c->model, .x = x, .pose = pose},
-                              to = {.model = c->model, .x = y, .pose = pose};
+    const drape_straight_path straight = {
+        {{.model = c->model, .x = x, .pose = pose}, {.model = c->model, .x = y, .pose = pose}}};
     path p = {.x = x, .y = y, .keep = keep, .fraction = 1, .core = core};
-    double moved;
-    const drape_candidates *candidates = drape_contact_valid_candidates(c, &from, &moved);
-    if (candidates && drape_candidates_moved(candidates, &to) <= candidates->margin) {
-        const double reach = 2 * longest_move(c, &p);
-        for (int32_t i = 0; i < candidates->count; i++)
-            if (drape_pair_points(&candidates->pairs[i]) > 1 &&
-                drape_candidate_may_fall_below(&candidates->pairs[i], moved, reach))
-                follow(&p, &candidates->pairs[i]);
-    } else {
+    drape_distances away;
+    drape_candidate_cursor cursor = {0};
+    const drape_candidates *candidates = candidates_of(c, &straight, longest_move(c, &p), &away);
+    const drape_pair *pair;
+    while (candidates && (pair = drape_candidates_next(candidates, &away, &cursor)))
+        follow(&p, pair);
+    if (!candidates) {
         const double start = drape_clock_seconds();
-        drape_broad_phase_pairs(&c->broad, x, y, -c->broad.max_distance, follow, &p);
+        drape_candidates_find(&c->broad, &straight, 0, NULL, follow, &p);
         c->search_seconds += drape_clock_seconds() - start;
     }
     *limiting = p.limiting;

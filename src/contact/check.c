@@ -146,8 +146,7 @@ drape_status drape_contact_check(drape_contact *c, const double *x, double t, co
                                  drape_diagnostic *diagnostic)
 {
     const double start = drape_clock_seconds();
-    drape_status status =
-        drape_contact_update(c, &(drape_contact_at){.x = x, .t = t, .span = {t, t}}, drape_contact_lead(c));
+    drape_status status = drape_contact_update(c, &(drape_contact_at){.x = x, .t = t, .span = {t, t}});
     if (!status)
         status = check_depth(c, reason, diagnostic);
     if (!status)
@@ -158,6 +157,8 @@ drape_status drape_contact_check(drape_contact *c, const double *x, double t, co
         status = check_inscribed(c, c->model->triangle, 3, c->model->triangle_count, reason, diagnostic);
     if (!status)
         status = check_path(c, reason, diagnostic);
+    if (!status)
+        status = drape_contact_take_failure(c);
     c->seconds += drape_clock_seconds() - start;
     return status;
 }

@@ -1,8 +1,9 @@
 /*
  * contact.c: see contact.h. The path of a pair of pieces to the Jacobian:
  *
- *     broad_phase.c  pairs whose boxes overlap, searched in trees of boxes (geometry/bvh.h)
- *     candidates.c   those near enough to become active before the next search
+ *     broad_phase.c  pairs that no axis separates on a path, searched in trees of boxes (geometry/path_bvh.h)
+ *     candidates.c   those that can become active near the path; where some points have left it, a patch
+ *     bound.c        cheap lower bounds of a gap, which reject most neighbours
  *     pair.c         narrow phase: closest points, gap, normal and weights of a candidate, evaluated once
  *     active.c       the active set: candidates whose gap is below the activation distance, equal ones merged
  *     force.c        energy, gradient and Hessian of an active contact, by the barrier (barrier.h)
@@ -20,19 +21,13 @@
 
 #include <string.h>
 
-/* The margin is the distance by which points may move before a new search. */
-#define MIN_MARGIN   0.25 /* smallest margin, in mean edges */
-#define MAX_MARGIN   0.4  /* largest margin, in mean edges */
-#define MARGIN_STEPS 1.5  /* margin between these limits, in displacements of the last step */
-/* The lead is the distance by which a search is made ahead of the points. */
-#define LEAD_BEGIN  1.0  /* lead at the beginning of a step, in displacements */
-#define LEAD_WITHIN -0.5 /* lead within a step: half back, as the next trial may start there */
-#define MAX_LEAD    0.8  /* largest lead, as a share of the margin */
+#define MARGIN 0.12 /* by which points may leave the path of a search before a new one, in mean edges */
+#define AHEAD  1.0  /* by which a path is continued, in its length: the next step begins there */
 
 static drape_status take_arrays(drape_arena *arena, drape_contact *c)
 {
     const size_t points = (size_t)c->broad.points, colliders = (size_t)c->model->collider_count;
-    double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start};
+    double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start, &c->ahead};
     drape_collider_pose **const poses[] = {&c->pose, &c->start_pose, &c->path_pose};
     for (size_t i = 0; i < sizeof positions / sizeof *positions; i++)
         *positions[i] = drape_arena_take(arena, points, 3 * sizeof(double));
@@ -58,13 +53,11 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
     *c = (drape_contact){
         .arena = arena, .model = model, .motion = motion, .mean_edge = edges / model->edge_count};
     c->active.arena = arena;
-    c->next_margin = MIN_MARGIN * c->mean_edge;
     drape_status status = drape_broad_phase_create(arena, model, &c->broad);
     if (!status)
-        status = drape_candidates_create(arena, &c->broad, &c->step_candidates);
+        status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->step_candidates);
     if (!status)
-        status = drape_candidates_create(arena, &c->broad, &c->query_candidates);
-    c->step_candidates.margin = c->query_candidates.margin = c->next_margin;
+        status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->query_candidates);
     if (!status)
         status = take_arrays(arena, c);
     *out = status ? NULL : c;
@@ -141,80 +134,80 @@ static bool move_colliders(drape_contact *c, double t, const double span[2])
 
 /* ---- Candidates and active set ---- */
 
-const drape_candidates *drape_contact_valid_candidates(const drape_contact *c, const drape_configuration *at,
-                                                       double *moved)
+static bool are_valid(const drape_candidates *candidates, const drape_straight_path *path,
+                      drape_distances *away)
 {
-    *moved = drape_candidates_moved(&c->step_candidates, at);
-    if (*moved <= c->step_candidates.margin)
+    const drape_distances first = drape_candidates_distances(candidates, &path->end[0]);
+    if (!drape_candidates_are_valid(candidates, &first))
+        return false;
+    *away = drape_candidates_distances(candidates, &path->end[1]);
+    away->all = fmax(away->all, first.all);
+    away->patch = fmax(away->patch, first.patch);
+    return drape_candidates_are_valid(candidates, away);
+}
+
+const drape_candidates *drape_contact_valid_candidates(const drape_contact *c,
+                                                       const drape_straight_path *path, drape_distances *away)
+{
+    if (are_valid(&c->step_candidates, path, away))
         return &c->step_candidates;
-    if (!c->between_steps)
-        return NULL;
-    *moved = drape_candidates_moved(&c->query_candidates, at);
-    return *moved <= c->query_candidates.margin ? &c->query_candidates : NULL;
+    return c->between_steps && are_valid(&c->query_candidates, path, away) ? &c->query_candidates : NULL;
 }
 
-/* The largest displacement of a node since the beginning of the step; before the first step, from the
- * origin. */
-static double displacement(const drape_contact *c, const double *x)
+const drape_candidates *drape_contact_search(drape_contact *c, const drape_straight_path *path,
+                                             drape_distances *away)
 {
-    double largest = 0, d[3];
-    for (size_t i = 0; i < (size_t)c->model->node_count; i++) {
-        vec3_sub(x + 3 * i, c->start + 3 * i, d);
-        largest = fmax(largest, vec3_dot(d, d));
-    }
-    return sqrt(largest);
-}
-
-/* Searches at positions that are extrapolated by `lead`, so that the candidates hold both before and after
- * these. */
-static drape_status search(drape_contact *c, drape_candidates *candidates, double lead)
-{
-    const double start = drape_clock_seconds(), limit = MAX_LEAD * c->next_margin;
-    const double path = lead != 0 && candidates->known ? displacement(c, c->x) : 0;
-    const double share = fabs(lead) * path > limit ? copysign(limit / path, lead) : lead;
-    double *x = candidates->x;
-    memcpy(x, c->x, 3 * (size_t)c->broad.points * sizeof *x);
-    for (size_t i = 0; path > 0 && i < 3 * (size_t)c->model->node_count; i++)
-        x[i] += share * (c->x[i] - c->start[i]);
-    const drape_configuration at = {.model = c->model, .x = x, .pose = c->pose};
-    const drape_status status = drape_candidates_search(candidates, &at, c->next_margin);
+    const double start = drape_clock_seconds();
+    drape_candidates *candidates = c->between_steps ? &c->query_candidates : &c->step_candidates;
+    for (size_t i = 0; i < 3 * (size_t)c->broad.points; i++)
+        c->ahead[i] = path->end[1].x[i] + AHEAD * (path->end[1].x[i] - path->end[0].x[i]);
+    const drape_status status = drape_candidates_search(candidates, path, c->ahead);
+    if (!are_valid(candidates, path, away)) /* positions that are not finite */
+        *away = (drape_distances){INFINITY, INFINITY};
     c->search_seconds += drape_clock_seconds() - start;
-    return status;
+    c->out_of_memory = c->out_of_memory || status != DRAPE_OK;
+    return status ? NULL : candidates;
 }
 
-double drape_contact_lead(const drape_contact *c)
+drape_status drape_contact_take_failure(drape_contact *c)
 {
-    return c->begun ? LEAD_WITHIN : 0;
+    const bool failed = c->out_of_memory;
+    c->out_of_memory = false;
+    return failed ? DRAPE_E_MEMORY : DRAPE_OK;
 }
 
-drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at, double lead)
+drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
+{
+    const drape_straight_path here = {{*at, *at}};
+    drape_distances away;
+    const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
+    if (!candidates)
+        candidates = drape_contact_search(c, &here, &away);
+    return candidates ? drape_active_set_list(&c->active, candidates, &away, at)
+                      : drape_contact_take_failure(c);
+}
+
+drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)
 {
     const bool moved = move_colliders(c, at->t, at->span);
     fill_velocities(c, at->v, c->v);
-    const bool listed = c->listed == &c->step_candidates || (c->listed && c->between_steps);
-    if (listed && !moved && memcmp(at->x, c->x, 3 * (size_t)c->model->node_count * sizeof *c->x) == 0)
+    if (drape_contact_take_failure(c)) {
+        c->listed = false;
+        return DRAPE_E_MEMORY;
+    }
+    if (c->listed && !moved && memcmp(at->x, c->x, 3 * (size_t)c->model->node_count * sizeof *c->x) == 0)
         return DRAPE_OK; /* forces, energy and derivatives are often evaluated at the same point */
-    c->listed = NULL;
     drape_contact_fill(c, at->x, c->pose, c->x);
     const drape_configuration now = drape_contact_configuration(c);
-    const drape_candidates *candidates = drape_contact_valid_candidates(c, &now, &c->moved);
-    drape_status status = DRAPE_OK;
-    if (!candidates) {
-        drape_candidates *outdated = c->between_steps ? &c->query_candidates : &c->step_candidates;
-        status = search(c, outdated, c->between_steps ? 0 : lead);
-        c->moved = drape_candidates_moved(outdated, &now);
-        candidates = outdated;
-    }
-    if (!status)
-        status = drape_active_set_list(&c->active, candidates, c->moved, &now);
-    c->listed = status ? NULL : candidates;
+    const drape_status status = drape_contact_list(c, &now);
+    c->listed = status == DRAPE_OK;
     return status;
 }
 
 drape_status drape_contact_evaluate_at(drape_contact *c, const drape_contact_at *at)
 {
     const double start = drape_clock_seconds();
-    const drape_status status = drape_contact_update(c, at, drape_contact_lead(c));
+    const drape_status status = drape_contact_update(c, at);
     c->seconds += drape_clock_seconds() - start;
     return status;
 }
@@ -264,15 +257,12 @@ void drape_contact_measure_start(drape_contact *c)
     }
 }
 
-/* For fast sheets the search has a larger margin and is made ahead of the motion: once in a step or two
- * instead of at every trial. */
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
-    const double start = drape_clock_seconds(), last = c->step_candidates.known ? displacement(c, x) : 0;
+    const double start = drape_clock_seconds();
     c->between_steps = false;
-    c->next_margin = fmin(fmax(MIN_MARGIN * c->mean_edge, MARGIN_STEPS * last), MAX_MARGIN * c->mean_edge);
     drape_status status =
-        drape_contact_update(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}}, LEAD_BEGIN);
+        drape_contact_update(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}});
     if (!status)
         status = drape_contact_lag(c);
     if (!status) {

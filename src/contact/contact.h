@@ -3,9 +3,9 @@
  * continuous collision detection. Contact is a part of the system (assemble/system.h): it is evaluated at
  * points like a term, but which nodes it couples changes as they move.
  *
- * Candidate pairs are searched again when a point has moved farther than the margin of the last search.
- * Which of them are active, and in which order, depends on the positions alone: the result does not depend
- * on when the search was made.
+ * Candidate pairs are searched along straight paths of all points, and again when a point is farther from its
+ * path than a margin. Which of them are active or limit a step, and in which order, depends on the positions
+ * alone: no result depends on when a search was made, or for which path.
  */
 #ifndef DRAPE_CONTACT_CONTACT_H
 #define DRAPE_CONTACT_CONTACT_H
@@ -32,8 +32,8 @@ double drape_contact_search_seconds(const drape_contact *contact); /* part of it
  * the step is compared with it. The arrays are copied. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_begin(drape_contact *contact, const double *x, const double *v, double t);
 
-/* Ends the step. Queries until the next one do not change the candidates of steps, so the bits of steps do
- * not depend on queries. */
+/* Ends the step. Queries until the next one have candidates of their own: the next step can continue with
+ * those of this one. */
 void drape_contact_end(drape_contact *contact);
 
 /* Finds the active contacts at a point, where the functions below then evaluate forces, energy and
@@ -66,7 +66,7 @@ int32_t drape_contact_list_couplings(drape_contact *contact, const int32_t **nod
 /* The list made by the last drape_contact_list_couplings, or read from an archive. */
 int32_t drape_contact_last_couplings(const drape_contact *contact, const int32_t **nodes);
 
-/* Archives the last search of the steps and the beginning of the step, from which everything else follows. */
+/* Archives the beginning of the step, from which everything else follows, and the couplings. */
 void drape_contact_archive(drape_contact *contact, drape_archive *a);
 
 /* The largest step fraction from x to y (node_count x 3) on which no two pieces pass through each other,

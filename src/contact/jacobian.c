@@ -147,27 +147,39 @@ static bool add_coupling(drape_contact *c, const drape_pair *pair, int points)
     return true;
 }
 
-static bool is_near(const drape_contact *c, const drape_pair *pair)
+/* The pairs of cloth that are listed, and whether there was memory for all. */
+typedef struct listing {
+    drape_contact *contact;
+    bool complete;
+} listing;
+
+static void list_near(void *user, const drape_pair *pair)
 {
+    listing *list = user;
+    drape_contact *c = list->contact;
     const drape_configuration now = drape_contact_configuration(c);
-    const double near = pair->distance + PATTERN_MARGIN * c->mean_edge;
-    return drape_candidate_may_fall_below(pair, c->moved, near) && drape_pair_gap_value(pair, &now) < near;
+    if (pair->collider < 0 &&
+        drape_pair_gap_value(pair, &now) < pair->distance + PATTERN_MARGIN * c->mean_edge)
+        list->complete = list->complete && add_coupling(c, pair, 4);
 }
 
+/* Which pairs are near is searched anew: a pattern depends on the positions alone. */
 int32_t drape_contact_list_couplings(drape_contact *c, const int32_t **nodes)
 {
+    const double start = drape_clock_seconds();
+    const drape_configuration now = drape_contact_configuration(c);
+    listing list = {.contact = c, .complete = true};
     c->coupling_count = 0;
-    for (int32_t i = 0; i < c->listed->count; i++) {
-        const drape_pair *pair = &c->listed->pairs[i];
-        if (pair->collider < 0 && is_near(c, pair) && !add_coupling(c, pair, 4))
-            return -1;
-    }
+    drape_candidates_find(&c->broad, &(drape_straight_path){{now, now}}, 0.5 * PATTERN_MARGIN * c->mean_edge,
+                          NULL, list_near, &list);
+    c->search_seconds += drape_clock_seconds() - start;
+    c->seconds += drape_clock_seconds() - start;
     for (int32_t i = 0; i < c->lagged_count; i++) {
         const drape_active_contact *contact = &c->lagged[i].contact;
         if (contact->pair.collider < 0 && !add_coupling(c, &contact->pair, contact->gap.closest.points))
             return -1;
     }
-    return drape_contact_last_couplings(c, nodes);
+    return list.complete ? drape_contact_last_couplings(c, nodes) : -1;
 }
 
 int32_t drape_contact_last_couplings(const drape_contact *c, const int32_t **nodes)

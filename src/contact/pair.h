@@ -23,6 +23,7 @@ typedef struct drape_pair {
     double area;          /* area on which its force acts [m2] */
     double distance;      /* activation distance [m] */
     double gap_at_search; /* of a candidate [m] */
+    int32_t rank[3];      /* by which candidates are sorted: stage of the search, piece, place of the other */
 } drape_pair;
 
 /* All points at one instant. */

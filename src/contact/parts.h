@@ -25,17 +25,16 @@ struct drape_contact {
     double mean_edge;           /* [m] */
     drape_broad_phase broad;
 
-    drape_candidates step_candidates;  /* for steps, whose results depend on no other candidates */
+    drape_candidates step_candidates;
     drape_candidates query_candidates; /* for queries between steps where step_candidates are not valid */
-    double next_margin;                /* of the next search [m] */
     bool between_steps;                /* evaluated for frames, energies or the user, not for a step */
 
-    double *x, *v;                  /* (points x 3) where contact is evaluated */
-    drape_collider_pose *pose;      /* (collider_count) */
-    drape_active_set active;        /* at x */
-    const drape_candidates *listed; /* the candidates that the active set was listed from; NULL: it is not
-                                       valid */
-    double moved;                   /* farthest move of a point from their search [m] */
+    double *x, *v;             /* (points x 3) where contact is evaluated */
+    drape_collider_pose *pose; /* (collider_count) */
+    drape_active_set active;   /* at x, if it is listed */
+    bool listed;
+    bool out_of_memory; /* in a search of collision detection: the next update or check reports it */
+    double *ahead;      /* (points x 3) the end of the path of a search */
 
     bool begun;                      /* a step has begun: */
     double *start;                   /* (points x 3) its beginning */
@@ -60,20 +59,27 @@ void drape_contact_poses(const drape_contact *c, double t, const double span[2],
 void drape_contact_fill(const drape_contact *c, const double *nodes, const drape_collider_pose *pose,
                         double *x);
 
-/* drape_contact_evaluate_at without its timing. A search, if necessary, is made at x + lead (x - start). */
-drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at, double lead);
-
-/* The lead within a step. */
-double drape_contact_lead(const drape_contact *c);
+/* drape_contact_evaluate_at without its timing. */
+drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at);
 
 /* Compute lagged friction and the initial depths from the active set at the beginning of a step. */
 drape_status drape_contact_lag(drape_contact *c);
 void drape_contact_measure_start(drape_contact *c);
 
-/* The candidates that are valid at a configuration, and how far points have moved since their search; NULL:
- * a search is needed. */
-const drape_candidates *drape_contact_valid_candidates(const drape_contact *c, const drape_configuration *at,
-                                                       double *moved);
+/* The candidates that are valid on a path, and how far that is from theirs; NULL: a search is needed. */
+const drape_candidates *drape_contact_valid_candidates(const drape_contact *c,
+                                                       const drape_straight_path *path,
+                                                       drape_distances *away);
+
+/* Searches candidates on a path and its continuation. NULL: out of memory. */
+const drape_candidates *drape_contact_search(drape_contact *c, const drape_straight_path *path,
+                                             drape_distances *away);
+
+/* DRAPE_E_MEMORY, once, if collision detection was out of memory since the last call. */
+drape_status drape_contact_take_failure(drape_contact *c);
+
+/* Lists the active set of a configuration. Errors: DRAPE_E_MEMORY. */
+drape_status drape_contact_list(drape_contact *c, const drape_configuration *at);
 
 /* The constants of a pair. */
 drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair *pair);

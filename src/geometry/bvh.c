@@ -110,21 +110,18 @@ static void include(drape_box *box, const double *x)
     }
 }
 
-static void cover(drape_box *box, const int32_t *node, int nodes, const double *x, const double *y)
+static void cover(drape_box *box, const int32_t *node, int nodes, const double *x)
 {
-    for (int a = 0; a < nodes; a++) {
+    for (int a = 0; a < nodes; a++)
         include(box, x + 3 * (size_t)node[a]);
-        if (y)
-            include(box, y + 3 * (size_t)node[a]);
-    }
 }
 
 static const drape_box empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 
-drape_box drape_box_of(const int32_t *node, int nodes, const double *x, const double *y, double reach)
+drape_box drape_box_of(const int32_t *node, int nodes, const double *x, double reach)
 {
     drape_box box = empty_box;
-    cover(&box, node, nodes, x, y);
+    cover(&box, node, nodes, x);
     for (int k = 0; k < 3; k++) {
         box.low[k] -= reach;
         box.high[k] += reach;
@@ -133,7 +130,7 @@ drape_box drape_box_of(const int32_t *node, int nodes, const double *x, const do
 }
 
 /* Children are stored after their parent: going backwards refits them first. */
-void drape_bvh_fit(drape_bvh *bvh, const double *x, const double *y)
+void drape_bvh_fit(drape_bvh *bvh, const double *x)
 {
     for (int32_t i = bvh->branch_count - 1; i >= 0; i--) {
         drape_bvh_branch *branch = &bvh->branches[i];
@@ -147,7 +144,7 @@ void drape_bvh_fit(drape_bvh *bvh, const double *x, const double *y)
             continue;
         }
         for (int32_t e = branch->first; e < branch->first + branch->count; e++)
-            cover(&branch->box, bvh->node + (size_t)bvh->order[e] * (size_t)bvh->nodes, bvh->nodes, x, y);
+            cover(&branch->box, bvh->node + (size_t)bvh->order[e] * (size_t)bvh->nodes, bvh->nodes, x);
     }
 }
 

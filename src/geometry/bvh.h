@@ -35,11 +35,11 @@ typedef struct drape_bvh {
 drape_status drape_bvh_build(drape_arena *arena, int32_t count, int nodes, const int32_t *node,
                              const double *x, drape_bvh *bvh);
 
-/* Refits the boxes to the elements at x and, if y is not NULL, to their straight paths from x to y. */
-void drape_bvh_fit(drape_bvh *bvh, const double *x, const double *y);
+/* Refits the boxes to the elements at x. */
+void drape_bvh_fit(drape_bvh *bvh, const double *x);
 
-/* Returns the box of some nodes at x, and at y unless it is NULL, enlarged by reach. */
-drape_box drape_box_of(const int32_t *node, int nodes, const double *x, const double *y, double reach);
+/* Returns the box of some nodes at x, enlarged by reach. */
+drape_box drape_box_of(const int32_t *node, int nodes, const double *x, double reach);
 
 /* Calls visit for every element whose leaf overlaps the box. */
 typedef void drape_bvh_visit(void *user, int32_t element);

@@ -73,10 +73,10 @@ drape_status drape_find_intersections(drape_context *ctx, const drape_model *m, 
     *found = (drape_intersections){.edge = {-1, -1}, .triangle = {-1, -1, -1}};
     drape_status status = drape_bvh_build(&arena, m->triangle_count, 3, m->triangle, m->rest, &faces);
     if (!status)
-        drape_bvh_fit(&faces, x, NULL);
+        drape_bvh_fit(&faces, x);
     for (int32_t e = 0; !status && e < m->edge_count; e++) {
         s.edge = m->edge + 2 * (size_t)e;
-        drape_box box = drape_box_of(s.edge, 2, x, NULL, 0);
+        drape_box box = drape_box_of(s.edge, 2, x, 0);
         drape_bvh_query(&faces, &box, try_triangle, &s);
     }
     drape_arena_free(&arena);

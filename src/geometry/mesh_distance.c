@@ -94,7 +94,7 @@ const drape_mesh_distance *drape_mesh_distance_create(drape_arena *arena, const 
     mesh->point_normal = drape_arena_take(arena, (size_t)shape->point_count, 3 * sizeof *mesh->point_normal);
     if (drape_arena_status(arena))
         return NULL;
-    drape_bvh_fit(&mesh->boxes, shape->point, NULL);
+    drape_bvh_fit(&mesh->boxes, shape->point);
     fill_normals(shape, mesh);
     return mesh;
 }

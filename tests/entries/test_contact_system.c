@@ -436,7 +436,7 @@ START_TEST(active_contacts_are_all_pairs)
     double gap;
     ck_assert_int_eq(drape_broad_phase_create(&arena, s.model, &broad), DRAPE_OK);
     pairwise w = {.model = s.model, .broad = &broad, .x = t.at.x};
-    drape_broad_phase_pairs(&broad, t.at.x, NULL, 0, add_energy, &w);
+    drape_broad_phase_pairs(&broad, &(drape_broad_query){.x = t.at.x}, add_energy, &w);
     const double merged = drape_system_contact_energy(t.system, &point);
     const int32_t contacts = drape_contact_active(drape_system_contact(t.system), &gap);
     printf("# %d pairs are %d active contacts: %.17g J, %.17g J\n", w.acting, (int)contacts, w.energy,

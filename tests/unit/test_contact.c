@@ -4,9 +4,10 @@
  * mollifier of nearly parallel edges. Step fractions that are reported as free are free.
  */
 #include "contact/barrier.h"
+#include "contact/bound.h"
 #include "contact/friction.h"
 #include "contact/pair.h"
-#include "geometry/bvh.h"
+#include "geometry/path_bvh.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -284,42 +285,114 @@ static void note(void *user, int32_t element)
     f->elements[f->count++] = element;
 }
 
-/* Every element whose box meets that of the query is found once, also after the positions have changed. */
-START_TEST(test_tree)
+/* Whether no axis separates two boxes by the same side at both ends of their paths. */
+static bool stay_together(const drape_box a[2], const drape_box b[2])
+{
+    for (int k = 0; k < 3; k++)
+        if ((a[0].high[k] < b[0].low[k] && a[1].high[k] < b[1].low[k]) ||
+            (a[0].low[k] > b[0].high[k] && a[1].low[k] > b[1].high[k]))
+            return false;
+    return true;
+}
+
+static bool is_marked(const bool *marked, const int32_t *edge)
+{
+    return !marked || marked[edge[0]] || marked[edge[1]];
+}
+
+/* Every element with a number above a limit, marked if this is wanted, that no axis separates from the
+ * query is found once, in the order of its place, also after the positions have changed. */
+static void check_tree(drape_arena *arena, int32_t count)
 {
     uint64_t seed = 5;
     double x[300], y[300];
     int32_t edge[400];
-    drape_bvh tree;
-    drape_context *ctx = NULL;
+    bool marked[100];
+    drape_path_bvh tree;
     fill(&seed, 1, x, 300);
-    fill(&seed, 1, y, 300);
     for (int i = 0; i < 400; i++)
         edge[i] = (int32_t)(fabs(next_number(&seed)) * 99.9);
-    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    drape_arena arena = drape_arena_of(ctx);
-    ck_assert_int_eq(drape_bvh_build(&arena, 200, 2, edge, x, &tree), DRAPE_OK);
+    ck_assert_int_eq(drape_path_bvh_build(arena, count, 2, edge, x, &tree), DRAPE_OK);
     for (int k = 0; k < 100; k++) {
-        int32_t node = k;
+        const int32_t node = k;
+        const double *const ends[2] = {x, k % 2 ? y : x};
+        const bool *const marks = k % 4 < 2 ? marked : NULL;
+        const drape_path_query query = {.node = &node,
+                                        .nodes = 1,
+                                        .x = x,
+                                        .y = k % 2 ? y : NULL,
+                                        .reach = 0.3,
+                                        .after = k % 3 ? -1 : k,
+                                        .only_marked = marks && k % 4 == 1};
         found f = {.count = 0};
-        drape_box box = drape_box_of(&node, 1, y, NULL, 0.3);
-        drape_bvh_fit(&tree, y, k % 2 ? x : NULL);
-        drape_bvh_query(&tree, &box, note, &f);
-        for (int32_t e = 0; e < 200; e++) {
-            drape_box own = drape_box_of(edge + 2 * e, 2, y, k % 2 ? x : NULL, 0);
-            bool meets = true;
+        fill(&seed, 1, x, 300);
+        fill(&seed, 1, y, 300);
+        for (int i = 0; i < 100; i++)
+            marked[i] = next_number(&seed) > 0.8;
+        drape_path_bvh_fit(&tree, x, k % 2 ? y : NULL, marks);
+        drape_path_bvh_query(&tree, &query, note, &f);
+        for (int i = 1; i < f.count; i++)
+            ck_assert_int_lt(tree.place[f.elements[i - 1]], tree.place[f.elements[i]]);
+        for (int32_t e = 0; e < count; e++) {
+            drape_box own[2], box[2];
             int times = 0;
-            for (int i = 0; i < 3; i++)
-                meets = meets && own.low[i] <= box.high[i] && box.low[i] <= own.high[i];
+            for (int end = 0; end < 2; end++) {
+                own[end] = drape_box_of(edge + 2 * e, 2, ends[end], 0);
+                box[end] = drape_box_of(&node, 1, ends[end], 0.3);
+            }
             for (int i = 0; i < f.count; i++)
                 times += f.elements[i] == e;
-            ck_assert_int_eq(times, meets);
+            ck_assert_int_eq(times, e > query.after && stay_together(own, box) &&
+                                        (!query.only_marked || is_marked(marks, edge + 2 * e)));
         }
     }
+}
+
+START_TEST(test_tree)
+{
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    drape_arena arena = drape_arena_of(ctx);
+    for (int32_t count = 0; count < 8; count++)
+        check_tree(&arena, count);
+    check_tree(&arena, 200);
     drape_arena_free(&arena);
     drape_context_destroy(&ctx);
 }
 END_TEST
 
+/* The bounds are below the distance anywhere on the path, and positive for most pieces that pass each
+ * other at a distance. */
+START_TEST(test_bounds)
+{
+    uint64_t seed = 11;
+    int positive = 0;
+    for (int k = 0; k < 4000; k++) {
+        const drape_pair pair = {
+            .kind = k % 2 ? DRAPE_PAIR_TRIANGLE : DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1};
+        double x[D], y[D], common[3], at[D];
+        fill(&seed, 1, x, D);
+        fill(&seed, 0.3, y, D);
+        fill(&seed, 100, common, 3);
+        x[0] += k % 4 < 2 ? 3 : 0;
+        for (int i = 0; i < D; i++)
+            y[i] += x[i] + common[i % 3];
+        const double bound = drape_bound_by_axes(&pair, x, y), change = drape_bound_change(&pair, x, y);
+        const double start = drape_pair_gap_value(&pair, &(drape_configuration){.x = x});
+        positive += bound > 0;
+        for (int step = 0; step <= 10; step++) {
+            for (int i = 0; i < D; i++)
+                at[i] = x[i] + 0.1 * step * (y[i] - x[i]);
+            const double gap = drape_pair_gap_value(&pair, &(drape_configuration){.x = at});
+            ck_assert_double_ge(gap, bound - 1e-12);
+            ck_assert_double_le(fabs(gap - start), change + 1e-12);
+            if (step == 0)
+                ck_assert_double_le(drape_bound_by_axes(&pair, x, NULL), gap + 1e-12);
+        }
+    }
+    ck_assert_int_gt(positive, 1000);
+}
+END_TEST
+
 SUITE("contact", test_triangle, test_segments, test_parallel, test_mollified_away, test_barrier,
-      test_step_fraction, test_tree)
+      test_step_fraction, test_tree, test_bounds)

@@ -1,0 +1,211 @@
+/* path_bvh.c: see path_bvh.h. */
+#include "geometry/path_bvh.h"
+
+#include <math.h>
+
+/* ---- Building ---- */
+
+/* The children of a branch of the binary tree, each replaced by its own two unless it is a leaf. */
+static int children_of(const drape_bvh *from, int32_t branch, int32_t child[LANES])
+{
+    int count = 0;
+    const int32_t two[2] = {branch + 1, from->branches[branch].second};
+    for (int i = 0; i < 2; i++) {
+        const int32_t second = from->branches[two[i]].second;
+        child[count++] = second > 0 ? two[i] + 1 : two[i];
+        if (second > 0)
+            child[count++] = second;
+    }
+    return count;
+}
+
+static int32_t merge(drape_path_bvh *bvh, const drape_bvh *from, int32_t branch);
+
+/* Makes a branch of the binary tree the child in a lane. Returns its largest element. */
+static int32_t take_child(drape_path_bvh *bvh, drape_path_branch *self, int lane, const drape_bvh *from,
+                          int32_t branch)
+{
+    const bool leaf = from->branches[branch].second == 0;
+    self->child[lane] = leaf ? -1 - from->order[from->branches[branch].first] : bvh->branch_count;
+    self->last[lane] = leaf ? -1 - self->child[lane] : merge(bvh, from, branch);
+    return self->last[lane];
+}
+
+/* Stored in depth-first order: children come after their parent. Returns the largest element below. */
+static int32_t merge(drape_path_bvh *bvh, const drape_bvh *from, int32_t branch)
+{
+    drape_path_branch *self = &bvh->branches[bvh->branch_count++];
+    int32_t child[LANES], last = -1;
+    if (from->branches[branch].second == 0) { /* a tree of one element */
+        self->count = 1;
+        return take_child(bvh, self, 0, from, branch);
+    }
+    self->count = children_of(from, branch, child);
+    for (int i = 0; i < self->count; i++) {
+        const int32_t below = take_child(bvh, self, i, from, child[i]);
+        last = below > last ? below : last;
+    }
+    return last;
+}
+
+drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, const int32_t *node,
+                                  const double *x, drape_path_bvh *bvh)
+{
+    drape_arena temporary = drape_arena_of(arena->ctx);
+    drape_bvh binary;
+    *bvh = (drape_path_bvh){.count = count, .nodes = nodes, .node = node};
+    if (count == 0)
+        return DRAPE_OK;
+    drape_status status = drape_bvh_build(&temporary, count, nodes, node, x, &binary);
+    bvh->branches = status ? NULL : drape_arena_take(arena, (size_t)count, sizeof *bvh->branches);
+    bvh->place = status ? NULL : drape_arena_take(arena, (size_t)count, sizeof *bvh->place);
+    const bool complete = bvh->branches && bvh->place;
+    if (complete)
+        merge(bvh, &binary, 0);
+    for (int32_t e = 0; complete && e < count; e++)
+        bvh->place[binary.order[e]] = e;
+    drape_arena_free(&temporary);
+    return complete ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+/* ---- Refitting ---- */
+
+/* Inline, since most of the time of a query that meets nothing is spent here. */
+static inline drape_box box_of(const int32_t *node, int nodes, const double *x)
+{
+    drape_box box;
+    for (int k = 0; k < 3; k++)
+        box.low[k] = box.high[k] = x[3 * (size_t)node[0] + (size_t)k];
+    for (int a = 1; a < nodes; a++)
+        for (int k = 0; k < 3; k++) {
+            const double at = x[3 * (size_t)node[a] + (size_t)k];
+            box.low[k] = at < box.low[k] ? at : box.low[k];
+            box.high[k] = at > box.high[k] ? at : box.high[k];
+        }
+    return box;
+}
+
+/* The box of a child at one end. */
+static drape_box child_box(const drape_path_bvh *bvh, int32_t child, int end, const double *x)
+{
+    if (child < 0)
+        return box_of(bvh->node + (size_t)(-1 - child) * (size_t)bvh->nodes, bvh->nodes, x);
+    const drape_path_branch *from = &bvh->branches[child];
+    drape_box box;
+    for (int k = 0; k < 3; k++) {
+        box.low[k] = from->low[end][k][0];
+        box.high[k] = from->high[end][k][0];
+        for (int32_t l = 1; l < from->count; l++) {
+            box.low[k] = from->low[end][k][l] < box.low[k] ? from->low[end][k][l] : box.low[k];
+            box.high[k] = from->high[end][k][l] > box.high[k] ? from->high[end][k][l] : box.high[k];
+        }
+    }
+    return box;
+}
+
+static bool is_marked(const drape_path_bvh *bvh, int32_t child, const bool *marked)
+{
+    const int32_t *node = bvh->node + (size_t)(child < 0 ? -1 - child : 0) * (size_t)bvh->nodes;
+    bool any = !marked;
+    if (child >= 0)
+        for (int32_t l = 0; l < bvh->branches[child].count; l++)
+            any = any || bvh->branches[child].marked[l];
+    for (int a = 0; child < 0 && !any && a < bvh->nodes; a++)
+        any = marked[node[a]];
+    return any;
+}
+
+/* Children are stored after their parent: going backwards refits them first. */
+void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const bool *marked)
+{
+    const double *const ends[2] = {x, y};
+    for (int32_t i = bvh->branch_count - 1; i >= 0; i--) {
+        drape_path_branch *branch = &bvh->branches[i];
+        for (int32_t l = 0; l < branch->count; l++)
+            branch->marked[l] = is_marked(bvh, branch->child[l], marked);
+        for (int end = 0; end < 2 && ends[end]; end++)
+            for (int32_t l = 0; l < branch->count; l++) {
+                const drape_box box = child_box(bvh, branch->child[l], end, ends[end]);
+                for (int k = 0; k < 3; k++) {
+                    branch->low[end][k][l] = box.low[k];
+                    branch->high[end][k][l] = box.high[k];
+                }
+            }
+    }
+}
+
+/* ---- Queries ---- */
+
+typedef struct query {
+    lanes low[2][3], high[2][3]; /* the same number in all lanes */
+    int32_t after, marked;       /* the least value of marked */
+} query;
+
+/* Which children an axis separates from the query: -1 in their lanes. */
+LANES_INLINE lanes_mask find_apart(const drape_path_branch *branch, const query *q, int ends)
+{
+    lanes_mask apart = {0};
+    for (int k = 0; k < 3; k++) {
+        lanes_mask above = lanes_load(branch->low[0][k]) > q->high[0][k],
+                   below = lanes_load(branch->high[0][k]) < q->low[0][k];
+        if (ends > 1) {
+            above &= lanes_load(branch->low[1][k]) > q->high[1][k];
+            below &= lanes_load(branch->high[1][k]) < q->low[1][k];
+        }
+        apart |= above | below;
+    }
+    return apart;
+}
+
+LANES_INLINE void traverse(const drape_path_bvh *bvh, const query *q, int ends, drape_bvh_visit *visit,
+                           void *user)
+{
+    int32_t waiting[LANES * DRAPE_BVH_DEPTH];
+    int count = 0;
+    if (bvh->branch_count > 0)
+        waiting[count++] = 0;
+    while (count > 0) {
+        const int32_t self = waiting[--count];
+        if (self < 0) {
+            visit(user, -1 - self);
+            continue;
+        }
+        const drape_path_branch *branch = &bvh->branches[self];
+        const lanes_mask apart = find_apart(branch, q, ends);
+        for (int l = LANES - 1; l >= 0; l--) { /* writes always, without a branch to mispredict */
+            waiting[count] = branch->child[l];
+            count += (apart[l] == 0) & (l < branch->count) & (branch->last[l] > q->after) &
+                     (branch->marked[l] >= q->marked);
+        }
+    }
+}
+
+LANES_DISPATCH static void traverse_points(const drape_path_bvh *bvh, const query *q, drape_bvh_visit *visit,
+                                           void *user)
+{
+    traverse(bvh, q, 1, visit, user);
+}
+
+LANES_DISPATCH static void traverse_paths(const drape_path_bvh *bvh, const query *q, drape_bvh_visit *visit,
+                                          void *user)
+{
+    traverse(bvh, q, 2, visit, user);
+}
+
+void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *from, drape_bvh_visit *visit,
+                          void *user)
+{
+    const double *const ends[2] = {from->x, from->y};
+    query q = {.after = from->after, .marked = from->only_marked};
+    for (int end = 0; end < 2 && ends[end]; end++) {
+        const drape_box box = box_of(from->node, from->nodes, ends[end]);
+        for (int k = 0; k < 3; k++) {
+            q.low[end][k] = box.low[k] - from->reach - (lanes){0};
+            q.high[end][k] = box.high[k] + from->reach - (lanes){0};
+        }
+    }
+    if (from->y)
+        traverse_paths(bvh, &q, visit, user);
+    else
+        traverse_points(bvh, &q, visit, user);
+}

@@ -1,0 +1,55 @@
+/*
+ * path_bvh.h: a tree of boxes over edges or triangles that move straight from one configuration to
+ * another. Each branch has four children, which are tested at once, and each child has two boxes, one
+ * around each end of the path. Two convex pieces stay apart on their straight paths if one axis separates
+ * them at both ends with the same piece in front: the difference of any two of their points along that
+ * axis is then linear in the step fraction and positive at both ends. So a motion that pieces have in
+ * common brings no pair together.
+ */
+#ifndef DRAPE_GEOMETRY_PATH_BVH_H
+#define DRAPE_GEOMETRY_PATH_BVH_H
+
+#include "base/lanes.h"
+#include "geometry/bvh.h"
+
+typedef struct drape_path_branch {
+    double low[2][3][LANES], high[2][3][LANES]; /* by end, axis and child */
+    int32_t child[LANES];                       /* a later branch; -1 - e: the element e */
+    int32_t last[LANES];                        /* the largest number of an element in each child */
+    int32_t marked[LANES];                      /* whether an element in it is marked */
+    int32_t count;                              /* of children */
+} drape_path_branch;
+
+typedef struct drape_path_bvh {
+    int32_t count; /* number of elements */
+    int nodes;     /* nodes per element */
+    const int32_t *node;
+    int32_t *place; /* (count) of each element in the order of queries */
+    drape_path_branch *branches;
+    int32_t branch_count;
+} drape_path_bvh;
+
+/* As drape_bvh_build. Errors: DRAPE_E_MEMORY. */
+drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, const int32_t *node,
+                                  const double *x, drape_path_bvh *bvh);
+
+/* Refits the boxes to the paths of the elements from x to y; y NULL: to the elements at x. Marks elements
+ * with a marked point; NULL: all. */
+void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const bool *marked);
+
+/* What is searched: elements that no axis separates, by more than reach at both ends, from some nodes on
+ * their path. */
+typedef struct drape_path_query {
+    const int32_t *node;
+    int nodes;
+    const double *x, *y; /* y NULL as in the last fit */
+    double reach;
+    int32_t after;    /* only elements with larger numbers */
+    bool only_marked; /* only marked elements */
+} drape_path_query;
+
+/* Calls visit for every such element, in an order that does not depend on the positions. */
+void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *query, drape_bvh_visit *visit,
+                          void *user);
+
+#endif

@@ -1,0 +1,215 @@
+/*
+ * test_broad_phase.c: what contact finds is compared with a search among all pairs, without a tree, on sheets
+ * that are folded, crumpled and thrown at random beside colliders, in steps from far below the margin of a
+ * search to many edges; and with what a contact finds that has no candidates of earlier searches.
+ */
+#include "contact/parts.h"
+#include "entries/models.h"
+#include "support/scene.h"
+
+#define ROUNDS   160
+#define ROUNDING 1e-14 /* [m] some eps of the coordinates, between the gaps of pairs that are one contact */
+
+typedef struct all_pairs {
+    drape_contact *contact; /* which is only read */
+    drape_candidates list;  /* every pair, with its activation distance */
+    drape_active_set active;
+} all_pairs;
+
+static bool share(const int32_t *a, int count, const int32_t *b, int other)
+{
+    for (int i = 0; i < count; i++)
+        for (int j = 0; j < other; j++)
+            if (a[i] == b[j])
+                return true;
+    return false;
+}
+
+static void note(all_pairs *all, drape_pair_kind kind, int32_t collider, const int32_t *first,
+                 const int32_t *second)
+{
+    const drape_model *m = all->contact->model;
+    const drape_configuration rest = {.model = m, .x = all->contact->broad.rest};
+    const int split = kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    drape_pair pair = {.kind = kind, .collider = collider, .area = 1, .gap_at_search = -INFINITY};
+    memcpy(pair.node, first, (size_t)split * sizeof *first);
+    memcpy(pair.node + split, second, (size_t)(4 - split) * sizeof *second);
+    pair.radius = collider >= 0 ? m->colliders[collider].shape.radius : 0;
+    pair.distance = collider >= 0
+                        ? m->contact.distance
+                        : fmin(2 * m->contact.self_thickness, 0.5 * drape_pair_gap_value(&pair, &rest));
+    all->list.all.pairs[all->list.all.count++] = pair;
+}
+
+static void note_own(all_pairs *all)
+{
+    const drape_model *m = all->contact->model;
+    for (int32_t i = 0; i < m->node_count; i++)
+        for (int32_t f = 0; f < m->triangle_count; f++)
+            if (!share(&i, 1, m->triangle + 3 * f, 3))
+                note(all, DRAPE_PAIR_TRIANGLE, -1, &i, m->triangle + 3 * f);
+    for (int32_t e = 0; e < m->edge_count; e++)
+        for (int32_t f = e + 1; f < m->edge_count; f++)
+            if (!share(m->edge + 2 * e, 2, m->edge + 2 * f, 2))
+                note(all, DRAPE_PAIR_SEGMENTS, -1, m->edge + 2 * e, m->edge + 2 * f);
+}
+
+static void note_colliders(all_pairs *all)
+{
+    const drape_model *m = all->contact->model;
+    const drape_broad_phase *b = &all->contact->broad;
+    for (int32_t i = m->node_count; i < b->points; i++)
+        for (int32_t f = 0; f < m->triangle_count; f++)
+            note(all, DRAPE_PAIR_TRIANGLE, b->point_collider[i - m->node_count], &i, m->triangle + 3 * f);
+    for (int32_t s = 0; s < b->segments; s++)
+        for (int32_t e = 0; e < m->edge_count; e++)
+            note(all, DRAPE_PAIR_SEGMENTS, b->segment_collider[s], m->edge + 2 * e, b->segment + 2 * s);
+    for (int32_t i = 0; i < m->node_count; i++) {
+        for (int32_t t = 0; t < b->obstacles.count; t++)
+            note(all, DRAPE_PAIR_TRIANGLE, b->triangle_collider[t], &i, b->triangle + 3 * t);
+        for (int32_t k = 0; k < m->collider_count; k++)
+            if (m->colliders[k].ops->smooth)
+                all->list.all.pairs[all->list.all.count++] = drape_broad_phase_surface(b, i, k);
+    }
+}
+
+static all_pairs list_all(drape_arena *arena, drape_contact *contact)
+{
+    all_pairs all = {.contact = contact, .list = {.broad = &contact->broad}, .active = {.arena = arena}};
+    all.list.all.pairs = drape_arena_take(arena, 40000, sizeof *all.list.all.pairs);
+    ck_assert_ptr_nonnull(all.list.all.pairs);
+    note_own(&all);
+    note_colliders(&all);
+    ck_assert_int_lt(all.list.all.count, 40000);
+    return all;
+}
+
+static int by_gap(const void *a, const void *b)
+{
+    const double x = ((const drape_active_contact *)a)->gap.value,
+                 y = ((const drape_active_contact *)b)->gap.value;
+    return x < y ? -1 : x > y;
+}
+
+/* Every pair below its activation distance is active. Both lists are sorted by gap. */
+static void check_active(all_pairs *all, drape_active_contact *found)
+{
+    const drape_contact *c = all->contact;
+    const drape_configuration now = drape_contact_configuration(c);
+    ck_assert_int_eq(drape_active_set_list(&all->active, &all->list, &(drape_distances){0}, &now), DRAPE_OK);
+    ck_assert_int_eq(c->active.count, all->active.count);
+    memcpy(found, c->active.contacts, (size_t)c->active.count * sizeof *found);
+    qsort(found, (size_t)c->active.count, sizeof *found, by_gap);
+    qsort(all->active.contacts, (size_t)c->active.count, sizeof *found, by_gap);
+    for (int32_t i = 0; i < c->active.count; i++)
+        ck_assert_double_le(fabs(found[i].gap.value - all->active.contacts[i].gap.value), ROUNDING);
+}
+
+/* No pair touches before the fraction that is reported: returns whether one does later. */
+static bool check_fraction(const all_pairs *all, const double *x, const double *y, double fraction)
+{
+    double least = 1;
+    for (int32_t i = 0; i < all->list.all.count; i++)
+        if (drape_pair_points(&all->list.all.pairs[i]) > 1)
+            least = fmin(least, drape_pair_step_fraction(&all->list.all.pairs[i], x, y, 1e-3, false, least));
+    ck_assert_double_le(fraction, least);
+    return least < 1;
+}
+
+/* Folds the sheets about a line, moves them as a whole and shakes them; or moves only their last nodes. */
+static void move(const drape_model *m, uint64_t *seed, double *x)
+{
+    const double size = 0.3 * pow(10, -1.5 - 1.5 * random_number(seed)); /* 1e-3 to 1 edges, or so */
+    double line[3], fold[3], whole[3], thrown = fabs(random_number(seed)) < 0.2 ? 0.5 : size;
+    for (int k = 0; k < 3; k++) {
+        line[k] = 5 * random_number(seed);
+        fold[k] = size * random_number(seed);
+        whole[k] = thrown * random_number(seed) - 0.2 * x[k];
+    }
+    const int32_t nodes = m->node_count, first = random_number(seed) < 0 ? nodes - nodes / 5 : 0;
+    for (size_t i = 3 * (size_t)first; i < 3 * (size_t)nodes; i += 3) {
+        const double along = line[0] * x[i] + line[1] * x[i + 1] + line[2] * x[i + 2];
+        for (size_t k = 0; k < 3; k++)
+            x[i + k] += whole[k] + fold[k] * along + 0.05 * size * random_number(seed);
+    }
+}
+
+static drape_contact *open_contact(drape_arena *arena, const drape_motion *motion)
+{
+    drape_contact *c = NULL;
+    ck_assert_int_eq(drape_contact_create(arena, motion, &c), DRAPE_OK);
+    ck_assert_ptr_nonnull(c);
+    return c;
+}
+
+static void compare_forces(drape_contact *a, drape_contact *b, size_t n, double *g)
+{
+    memset(g, 0, 2 * n * sizeof *g);
+    drape_contact_add_forces(a, true, true, g);
+    drape_contact_add_forces(b, true, true, g + n);
+    ck_assert_int_eq(memcmp(g, g + n, n * sizeof *g), 0);
+}
+
+#define SHEET                                                                                                \
+    "{'mesh': {'grid': 'square', 'columns': 6, 'rows': 5, 'width': 0.3, 'height': 0.25}, 'material': "       \
+    "{'young_modulus': 1e5, 'thickness': 1e-3, 'density': 100}, 'terms': ['stretch.edge']}"
+
+START_TEST(everything_near_is_found)
+{
+    scene s = scene_model(
+        "{'drape': 1, 'cloth': [" SHEET ", " SHEET "], 'self_contact': {'thickness': 1e-2, 'friction': 0.2},"
+        "'contact': {'distance': 1.5e-2}, 'duration': 1, 'colliders': ["
+        "{'type': 'box', 'center': [0.1,0.05,0], 'size': [0.1,0.06,0.1], 'rotate': [0,0,1,20]},"
+        "{'type': 'capsule', 'a': [-0.15,0,0], 'b': [-0.05,0.05,0.1], 'radius': 0.02},"
+        "{'type': 'plane', 'point': [0,-0.2,0], 'normal': [0,1,0]}]%s}",
+        "");
+    const drape_model *m = s.model;
+    const size_t n = 3 * (size_t)m->node_count;
+    uint64_t seed = 3;
+    int crossing = 0, active = 0, patches = 0;
+    drape_arena arena = drape_arena_of(s.ctx);
+    drape_motion *motion = NULL;
+    ck_assert_int_eq(drape_motion_create(&arena, m, &motion), DRAPE_OK);
+    drape_contact *c = open_contact(&arena, motion);
+    all_pairs all = list_all(&arena, c);
+    drape_active_contact *found = drape_arena_take(&arena, 40000, sizeof *found);
+    double *x = drape_arena_take(&arena, n, sizeof *x), *y = drape_arena_take(&arena, n, sizeof *y),
+           *g = drape_arena_take(&arena, 2 * n, sizeof *g);
+    ck_assert(found && x && y && g);
+    memcpy(x, m->rest, n * sizeof *x);
+    for (size_t i = n / 2; i < n; i++)
+        x[i] += i % 3 == 1 ? 0.03 : 0;
+    for (int k = 0; k < ROUNDS; k++) {
+        const drape_contact_at at = {.x = y};
+        drape_arena other = drape_arena_of(s.ctx);
+        drape_contact *fresh = open_contact(&other, motion);
+        memcpy(y, x, n * sizeof *y);
+        move(m, &seed, y);
+        if (k % 5 == 0)
+            ck_assert_int_eq(drape_contact_begin(c, x, NULL, 0), DRAPE_OK);
+        const double fraction = drape_contact_step_fraction(c, x, y, 0);
+        ck_assert(fraction == drape_contact_step_fraction(fresh, x, y, 0));
+        crossing += check_fraction(&all, c->from, c->to, fraction);
+        for (size_t i = 0; i < n; i++)
+            y[i] = x[i] + fraction * (y[i] - x[i]);
+        ck_assert_int_eq(drape_contact_evaluate_at(c, &at), DRAPE_OK);
+        drape_contact *clean = open_contact(&other, motion);
+        ck_assert_int_eq(drape_contact_evaluate_at(clean, &at), DRAPE_OK);
+        check_active(&all, found);
+        compare_forces(c, clean, n, g);
+        active += c->active.count;
+        patches += c->step_candidates.patch.known;
+        memcpy(x, y, n * sizeof *x);
+        drape_arena_free(&other);
+    }
+    printf("# %d pairs, %.1f active, %d of %d paths end at a collision, %d with a patch\n",
+           (int)all.list.all.count, (double)active / ROUNDS, crossing, ROUNDS, patches);
+    ck_assert_int_gt(patches, ROUNDS / 10);
+    ck_assert_int_gt(active, 5 * ROUNDS);
+    ck_assert_int_gt(crossing, ROUNDS / 10);
+    drape_arena_free(&arena);
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("broad_phase", everything_near_is_found)
