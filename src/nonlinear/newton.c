@@ -66,13 +66,16 @@
 #define WORK_FRACTION  0.5  /* a is accepted where |F(d + a p) . p| is at most this fraction of its start */
 #define MAX_TRIALS     8    /* trial points of the line search */
 #define SHORT_STEP     0.5  /* after a shorter step the next matrix is positive semidefinite */
+#define MAX_LENGTH     2    /* of a correction with contact */
 #define SMALL_STEP     0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
 #define MIN_SHARE      1e-3 /* smallest first share of the positive parts; otherwise half of the last one */
 #define SHARE_GROWTH   4    /* factor from one share tried to the next */
 #define MAX_PREDICTION 8    /* corrections in a solve, after which stress is no longer predicted */
 #define CORRECTION     1e-2 /* of |F|: residual left in a correction by the symmetric matrix */
 #define MAX_CHORDS     2    /* chord steps for each correction */
-#define STALLED        0.5  /* of the residual before: if no more is gained, it may be rounding */
+/* The same with contact, whose evaluation takes most of an iteration: one must be enough to end the solve */
+#define MAX_CHORDS_IN_CONTACT 1
+#define STALLED               0.5 /* of the residual before: if no more is gained, it may be rounding */
 
 struct drape_newton {
     drape_step_equation *equation;
@@ -309,8 +312,6 @@ static void predict_stress(drape_newton *s, const double *p)
 static bool is_feasible(drape_newton *s, const double *d, double a, const double *p)
 {
     drape_step_equation *e = s->equation;
-    if (!e->x_ahead)
-        return true;
     drape_step_equation_move(e, d);
     for (size_t i = 0; i < e->dofs; i++)
         s->trial[i] = a * p[i];
@@ -322,8 +323,8 @@ static bool is_feasible(drape_newton *s, const double *d, double a, const double
  * is found by doubling and bisection. This is the line search of Matthies & Strang 1979: it needs no
  * energy, so it applies to friction and damping, too. A matrix with positive parts is far too stiff along
  * unstable directions: its corrections are lengthened until the work is small enough, because otherwise a
- * buckling sheet takes a hundred of them; with contact, only as far as they are feasible. Other corrections
- * are taken whole if they stop short of the minimum. */
+ * buckling sheet takes a hundred of them; with contact at most doubled, and only if that is feasible. Other
+ * corrections are taken whole if they stop short of the minimum. */
 static double search_along(drape_newton *s, const double *d, const double *p, double start)
 {
     drape_step_equation *e = s->equation;
@@ -331,7 +332,7 @@ static double search_along(drape_newton *s, const double *d, const double *p, do
     double low = 0, high = INFINITY, a = 1;
     for (int k = 0; k < MAX_TRIALS; k++) {
         double work;
-        if (a > 1 && !is_feasible(s, d, a, p)) {
+        if (a > 1 && e->x_ahead && !(a <= MAX_LENGTH && is_feasible(s, d, a, p))) {
             s->trial_evaluated = false; /* the last trial may not have been at `low` */
             return low;
         }
@@ -372,8 +373,8 @@ static drape_status add_chords(drape_newton *s, const double *d, double *p, cons
 {
     drape_step_equation *e = s->equation;
     double bound = max_norm_bound(s), before = largest(e, e->f), rate = before / largest(e, minus_f);
-    for (int left = MAX_CHORDS; left > 0 && before > bound && before * drape_pow(rate, left) <= bound;
-         left--) {
+    for (int left = e->x_ahead ? MAX_CHORDS_IN_CONTACT : MAX_CHORDS;
+         left > 0 && before > bound && before * drape_pow(rate, left) <= bound; left--) {
         for (size_t i = 0; i < e->dofs; i++)
             s->chord_minus_f[i] = -e->f[i];
         drape_status status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
