@@ -144,8 +144,8 @@ static bool dissipates_most(drape_sim *sim, char *text, size_t size)
 
 /* Contact that takes most of the time, and longer than the motion lasts, where a setting is known to
  * help. Measured on examples/scenes over 0.4 or 0.5 s: without self-contact, contact of sphere_drape takes a
- * sixth; with 14 x 14 nodes instead of 20 x 20, that of crumple takes a quarter. newton_k takes a third of the
- * time of crumple, half of that of sphere_drape. */
+ * sixth; with 14 x 14 nodes instead of 20 x 20, that of crumple takes a quarter. newton_k takes a third of
+ * the time of crumple, half of that of sphere_drape. */
 static bool is_contact_slow(drape_sim *sim, char *text, size_t size)
 {
     const drape_statistics s = drape_sim_statistics(sim);
