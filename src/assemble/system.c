@@ -368,6 +368,18 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     add_masses(system, mass_weight, values);
 }
 
+bool drape_system_is_symmetric(const drape_system *system)
+{
+    return !system->contact || drape_contact_is_symmetric(system->contact);
+}
+
+void drape_system_symmetrize(drape_system *system, const drape_point *point, double *values)
+{
+    if (evaluate_contact(system, point))
+        drape_contact_fix_friction(system->contact, system->pattern, values);
+    drape_pattern_symmetrize(system->pattern, values);
+}
+
 void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *point, double *h)
 {
     const drape_request want = {

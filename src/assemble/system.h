@@ -119,6 +119,13 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
                            double positive_share, double *values);
 
+/* Whether the Jacobian of contact is symmetric in every state. */
+bool drape_system_is_symmetric(const drape_system *system);
+
+/* Makes the values of drape_system_jacobian at a point, without positive parts, symmetric: takes out how
+ * friction changes with the normal force and the place of contact, and of the rest, what is antisymmetric. */
+void drape_system_symmetrize(drape_system *system, const drape_point *point, double *values);
+
 /* The parts of an approximate Jacobian that is cheaper than J (nonlinear/approx_jacobian.h), term by term.
  *
  * drape_system_pairs, for a term of pairs: the symmetric 3 x 3 block H of each element, xx xy xz yy yz zz,

@@ -56,6 +56,14 @@ double drape_contact_potential(const drape_contact *contact); /* [J] */
 void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velocity_only, bool gauss_newton,
                                 const drape_pattern *pattern, double *values);
 
+/* Whether the derivatives of all contacts are symmetric: those of friction are with lagged normal forces. */
+bool drape_contact_is_symmetric(const drape_contact *contact);
+
+/* Takes out of values, which have drape_contact_add_jacobian without gauss_newton, how friction changes with
+ * the normal force and with the place of contact: what remains is symmetric, and positive semidefinite for
+ * each contact in its tangential plane. */
+void drape_contact_fix_friction(drape_contact *contact, const drape_pattern *pattern, double *values);
+
 /* Whether the pattern has the blocks of all active contacts. */
 bool drape_contact_is_in_pattern(const drape_contact *contact, const drape_pattern *pattern);
 

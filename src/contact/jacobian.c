@@ -104,6 +104,35 @@ void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_o
     c->seconds += drape_clock_seconds() - start;
 }
 
+bool drape_contact_is_symmetric(const drape_contact *c)
+{
+    bool friction = c->model->contact.self && c->model->contact.self_friction > 0;
+    for (int32_t i = 0; i < c->model->collider_count; i++)
+        friction = friction || c->model->colliders[i].friction > 0;
+    return !friction || c->model->contact.lagged;
+}
+
+void drape_contact_fix_friction(drape_contact *c, const drape_pattern *pattern, double *values)
+{
+    const double start = drape_clock_seconds();
+    const drape_configuration now = drape_contact_configuration(c);
+    for (int32_t i = 0; i < c->active.count; i++) {
+        const drape_active_contact *contact = &c->active.contacts[i];
+        const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
+        drape_gap_derivatives derivatives;
+        double v[4][3], h[D * D] = {0};
+        if (!(law.friction > 0) || c->model->contact.lagged)
+            continue;
+        drape_pair_derivatives(&contact->pair, &contact->gap, &now, c->broad.rest, &derivatives);
+        drape_contact_velocities(c, contact, v);
+        drape_friction_add_dgdx(&contact->gap, &derivatives, &law, v, h);
+        for (int k = 0; k < D * D; k++)
+            h[k] = -h[k];
+        add_blocks(c, contact, h, pattern, values);
+    }
+    c->seconds += drape_clock_seconds() - start;
+}
+
 /* ---- The pattern ---- */
 
 /* The blocks of contacts with colliders, the diagonal and the edges of triangles of the cloth, are in every

@@ -4,7 +4,8 @@
  *     guess      the caller's d, shortened to its feasible fraction; d = 0 if it violates a limit
  *     residual   F(d)
  *     jacobian   J(d), in a pattern that includes the contacts there
- *     factor     factors of J; an indefinite J is repaired by a share of the positive parts of its elements
+ *     factor     factors of J or, where contact makes J unsymmetric, of a symmetric matrix near J; an
+ *                indefinite one is repaired by a share of the positive parts of its elements
  *     correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress predicted
  *                for the next J; p shortened or lengthened by line search, completed by chord steps
  *     conclude   what KINSOL's return code means, and F at the final d, in the requested norm
@@ -22,16 +23,25 @@
  * contact nor ask for another matrix, and it measures progress by the sum of squares of F, in which stiff
  * stretching outweighs all other forces.
  *
- * Two parts of `correct` are off in some models. With contact, a correction is neither lengthened nor
- * completed by chord steps: only p itself, up to its feasible fraction, is known to pass through nothing. Nor
- * are there chord steps in a solve without stress prediction (of a model without measures, or of an equation
- * without x_start).
+ * With contact, J can be unsymmetric: friction changes with the normal force. Then the matrix that is
+ * factored is symmetric, J with the normal forces held fixed, and p solves J p = -F to 1e-2 of F by a few
+ * iterations of GMRES with these factors (solvers/refine.h). A factorisation of J would cost four times as
+ * much, and could not tell whether J is indefinite. Where the matrix is repaired, p is that of the repaired
+ * matrix: it is not Newton's direction in any case.
+ *
+ * A sheet that buckles crosses many states with an indefinite J. Once J was indefinite, the next matrices of
+ * the solve are repaired without trying J, until a correction is short.
+ *
+ * With contact, a lengthened correction and each chord step are tested for feasibility, as p is; one that is
+ * not feasible is not made. There are no chord steps in a solve without stress prediction (of a model without
+ * measures, or of an equation without x_start).
  */
 #include "nonlinear/newton.h"
 #include "base/elementary.h"
 
 #include "base/finite.h"
 #include "base/reason.h"
+#include "base/vec3.h"
 #include "nonlinear/residual_bound.h"
 #include "nonlinear/stress_predictor.h"
 #include "solvers/sun_linear.h"
@@ -56,11 +66,16 @@
 #define WORK_FRACTION  0.5  /* a is accepted where |F(d + a p) . p| is at most this fraction of its start */
 #define MAX_TRIALS     8    /* trial points of the line search */
 #define SHORT_STEP     0.5  /* after a shorter step the next matrix is positive semidefinite */
+#define MAX_LENGTH     2    /* of a correction with contact */
+#define SMALL_STEP     0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
 #define MIN_SHARE      1e-3 /* smallest first share of the positive parts; otherwise half of the last one */
 #define SHARE_GROWTH   4    /* factor from one share tried to the next */
 #define MAX_PREDICTION 8    /* corrections in a solve, after which stress is no longer predicted */
+#define CORRECTION     1e-2 /* of |F|: residual left in a correction by the symmetric matrix */
 #define MAX_CHORDS     2    /* chord steps for each correction */
-#define STALLED        0.5  /* of the residual before: if no more is gained, it may be rounding */
+/* The same with contact, whose evaluation takes most of an iteration: one must be enough to end the solve */
+#define MAX_CHORDS_IN_CONTACT 1
+#define STALLED               0.5 /* of the residual before: if no more is gained, it may be rounding */
 
 struct drape_newton {
     drape_step_equation *equation;
@@ -73,6 +88,7 @@ struct drape_newton {
     drape_sun_linear *linear;
     drape_stress_predictor predictor; /* if it searches */
     double *trial;                    /* free DOFs: where the line search was last; NULL unless it searches */
+    double edge;                      /* [m] mean length of an edge */
     double *chord, *chord_minus_f;    /* free DOFs: a chord step and its right-hand side; the same */
 
     /* Kept between solves. */
@@ -85,6 +101,7 @@ struct drape_newton {
     double residual;       /* weighted, largest component, at the last iterate that KINSOL evaluated */
     double positive_share; /* of the positive parts, requested for the present matrix; after a line search,
                               for the next one; with `project` every matrix has all of them */
+    bool indefinite;       /* the exact matrix was at the last iterate where it was tried */
     bool trial_evaluated;  /* the last evaluation was at `trial`, and F is finite there */
     drape_status failure;  /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
 };
@@ -114,6 +131,7 @@ static void begin(drape_newton *s)
     s->corrections = 0;
     s->residual = INFINITY;
     s->positive_share = 0;
+    s->indefinite = false;
     s->trial_evaluated = false;
     s->failure = DRAPE_OK;
     if (!s->searches)
@@ -191,10 +209,12 @@ static double jacobian_clock(const drape_newton *s)
     return drape_system_clock(s->equation->system) - s->linear->factor_seconds;
 }
 
-/* J(d) with a share of the positive parts, into the values of the linear solver. */
+/* J(d) with a share of the positive parts, into the values of the linear solver; if J is unsymmetric, a
+ * symmetric matrix near it, which is corrected for J. */
 static drape_status assemble(drape_newton *s, const double *d, double positive_share)
 {
     drape_step_equation *e = s->equation;
+    const double share = s->values[DRAPE_NEWTON_PROJECT] != 0 ? 1 : positive_share;
     double start = jacobian_clock(s);
     s->trial_evaluated = false;
     s->positive_share = positive_share;
@@ -202,9 +222,12 @@ static drape_status assemble(drape_newton *s, const double *d, double positive_s
     drape_status status = extend_pattern(s, &e->point);
     if (status)
         return status;
-    drape_step_equation_jacobian(e, drape_stress_predictor_stress(&s->predictor),
-                                 s->values[DRAPE_NEWTON_PROJECT] != 0 ? 1 : positive_share,
-                                 s->linear->values);
+    drape_step_equation_jacobian(e, drape_stress_predictor_stress(&s->predictor), share, s->linear->values);
+    drape_sun_linear_forget_exact(s->linear);
+    if (s->linear->near && share == 0) {
+        drape_sun_linear_keep_exact(s->linear);
+        drape_step_equation_symmetrize(e, s->linear->values);
+    }
     e->work.jacobian_seconds += jacobian_clock(s) - start;
     return DRAPE_OK;
 }
@@ -214,7 +237,8 @@ static int jacobian(N_Vector d, N_Vector f, SUNMatrix matrix, void *user, N_Vect
 {
     (void)f, (void)matrix, (void)scratch1, (void)scratch2;
     drape_newton *s = user;
-    return return_status(s, assemble(s, N_VGetArrayPointer(d), s->positive_share));
+    const bool repair = s->searches && s->indefinite && s->positive_share == 0;
+    return return_status(s, assemble(s, N_VGetArrayPointer(d), repair ? s->repair_share : s->positive_share));
 }
 
 /* ---- Factor ---- */
@@ -240,19 +264,22 @@ static drape_status factor_with_share(drape_newton *s, double share)
 
 /* An indefinite matrix gives useless directions. With the whole positive parts they are descent directions,
  * but convergence is slow: the smaller the share that makes the matrix definite, the nearer its direction
- * is to Newton's. The first share tried is half of the one that was needed last. */
+ * is to Newton's. The first share tried is half of the one that was needed last; after an indefinite matrix
+ * in the same solve, that one itself, which `jacobian` has assembled. */
 static int factor(SUNLinearSolver solver, SUNMatrix matrix)
 {
     (void)matrix;
     drape_newton *s = ((drape_sun_linear *)solver->content)->owner;
-    bool repairs = s->searches && s->positive_share == 0;
+    const double first = s->positive_share;
+    const bool repairs = s->searches && first < 1;
     drape_status status = factor_matrix(s, repairs);
     if (status != DRAPE_RETRY_LINEAR || !repairs)
         return return_status(s, status);
-    double share = fmax(s->repair_share / 2, MIN_SHARE);
+    double share = first > 0 ? fmin(1, SHARE_GROWTH * first) : fmax(s->repair_share / 2, MIN_SHARE);
     while ((status = factor_with_share(s, share)) == DRAPE_RETRY_LINEAR && share < 1)
         share = fmin(1, SHARE_GROWTH * share);
     s->repair_share = share;
+    s->indefinite = true;
     return return_status(s, status);
 }
 
@@ -281,20 +308,34 @@ static void predict_stress(drape_newton *s, const double *p)
     e->work.jacobian_seconds += drape_system_clock(e->system) - start;
 }
 
+/* Whether the step a p from d is feasible. */
+static bool is_feasible(drape_newton *s, const double *d, double a, const double *p)
+{
+    drape_step_equation *e = s->equation;
+    drape_step_equation_move(e, d);
+    for (size_t i = 0; i < e->dofs; i++)
+        s->trial[i] = a * p[i];
+    return drape_step_equation_make_feasible(e, s->trial) == 1;
+}
+
 /* The step length a at which p is taken: there the work of the residual along p, F(d + a p) . p, is in
  * magnitude at most a fraction of `start`, its value at a = 0; a positive value lies beyond the minimum. It
  * is found by doubling and bisection. This is the line search of Matthies & Strang 1979: it needs no
  * energy, so it applies to friction and damping, too. A matrix with positive parts is far too stiff along
  * unstable directions: its corrections are lengthened until the work is small enough, because otherwise a
- * buckling sheet takes a hundred of them; but not in models with contact, where only p itself is known to be
- * feasible. Other corrections are taken whole if they stop short of the minimum. */
+ * buckling sheet takes a hundred of them; with contact at most doubled, and only if that is feasible. Other
+ * corrections are taken whole if they stop short of the minimum. */
 static double search_along(drape_newton *s, const double *d, const double *p, double start)
 {
     drape_step_equation *e = s->equation;
-    const bool lengthens = s->positive_share > 0 && !e->x_ahead;
+    const bool lengthens = s->positive_share > 0;
     double low = 0, high = INFINITY, a = 1;
     for (int k = 0; k < MAX_TRIALS; k++) {
         double work;
+        if (a > 1 && e->x_ahead && !(a <= MAX_LENGTH && is_feasible(s, d, a, p))) {
+            s->trial_evaluated = false; /* the last trial may not have been at `low` */
+            return low;
+        }
         s->trial_evaluated = drape_step_equation_try(e, d, a, p, s->trial, &work);
         if (fabs(work) <= -WORK_FRACTION * start || (work < 0 && a == 1 && !lengthens))
             return a;
@@ -305,6 +346,15 @@ static double search_along(drape_newton *s, const double *d, const double *p, do
         a = isinf(high) ? 2 * a : (low + high) / 2;
     }
     return low > 0 ? low : a;
+}
+
+/* The longest displacement of a node in p. */
+static double longest(const drape_step_equation *e, const double *p)
+{
+    double squared = 0;
+    for (size_t i = 0; i < e->dofs; i += 3)
+        squared = fmax(squared, vec3_dot(p + i, p + i));
+    return sqrt(squared);
 }
 
 static double largest(const drape_step_equation *e, const double *f)
@@ -318,17 +368,17 @@ static double largest(const drape_step_equation *e, const double *f)
 /* Chord steps: if p lowered the residual so far that lowering it by the same factor once or twice more
  * would end the solve, the rest is corrected with the factors that gave p, at a tenth of the cost of an
  * iteration. F is known at d + p; minus_f is -F at d. A chord step that does not lower the residual is
- * undone. Chord steps are not tested for contact. */
+ * undone, and one that is not feasible is not made. */
 static drape_status add_chords(drape_newton *s, const double *d, double *p, const double *minus_f)
 {
     drape_step_equation *e = s->equation;
     double bound = max_norm_bound(s), before = largest(e, e->f), rate = before / largest(e, minus_f);
-    for (int left = MAX_CHORDS; left > 0 && before > bound && before * drape_pow(rate, left) <= bound;
-         left--) {
+    for (int left = e->x_ahead ? MAX_CHORDS_IN_CONTACT : MAX_CHORDS;
+         left > 0 && before > bound && before * drape_pow(rate, left) <= bound; left--) {
         for (size_t i = 0; i < e->dofs; i++)
             s->chord_minus_f[i] = -e->f[i];
         drape_status status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
-        if (status)
+        if (status || drape_step_equation_make_feasible(e, s->chord) < 1)
             return status;
         for (size_t i = 0; i < e->dofs; i++)
             s->trial[i] = d[i] + (p[i] + s->chord[i]);
@@ -357,16 +407,16 @@ static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
         status = ensure_descent(s, minus_f, p);
     if (status || !drape_all_finite(p, e->dofs))
         return status;
+    s->indefinite = s->indefinite && longest(e, p) > SMALL_STEP * s->edge;
     drape_step_equation_make_feasible(e, p);
     double start = -drape_step_equation_dot(e, minus_f, p);
     if (!s->searches || start >= 0)
         return DRAPE_OK;
     predict_stress(s, p);
     double a = search_along(s, d, p, start);
-    s->positive_share = a < SHORT_STEP ? 1 : 0;             /* of the next matrix */
-    const bool chords = !e->x_ahead && s->predictor.active; /* not with contact, nor without prediction */
+    s->positive_share = a < SHORT_STEP ? 1 : 0; /* of the next matrix */
     if (a == 1)
-        return chords && s->trial_evaluated ? add_chords(s, d, p, minus_f) : DRAPE_OK;
+        return s->predictor.active && s->trial_evaluated ? add_chords(s, d, p, minus_f) : DRAPE_OK;
     for (size_t i = 0; i < e->dofs; i++)
         p[i] *= a;
     drape_stress_predictor_forget(&s->predictor);
@@ -541,6 +591,9 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s)
                                 drape_system_cancel_flag(system), &s->linear);
     if (status)
         return status;
+    if (s->searches && !drape_system_is_symmetric(system) &&
+        (status = drape_sun_linear_use_near(s->linear, CORRECTION)))
+        return status;
     s->linear->tolerance = s->values[DRAPE_NEWTON_LINEAR_TOLERANCE];
     s->linear->owner = s;
     s->linear->solver->ops->setup = factor;
@@ -558,6 +611,8 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
         return DRAPE_E_MEMORY;
     s->equation = equation;
     s->repair_share = 1;
+    for (int32_t i = 0; i < equation->model->edge_count; i++)
+        s->edge += equation->model->edge_length[i] / equation->model->edge_count;
     memcpy(s->values, values, sizeof s->values);
     if (s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_AUTO)
         s->values[DRAPE_NEWTON_GLOBALIZATION] = DRAPE_NEWTON_GLOBAL_WORK;

@@ -80,18 +80,22 @@ void drape_step_equation_jacobian(drape_step_equation *s, const double *stress, 
     s->work.jacobians++;
 }
 
-void drape_step_equation_make_feasible(drape_step_equation *s, double *p)
+void drape_step_equation_symmetrize(drape_step_equation *s, double *values)
+{
+    drape_system_symmetrize(s->system, &s->point, values);
+}
+
+double drape_step_equation_make_feasible(drape_step_equation *s, double *p)
 {
     if (!s->x_ahead)
-        return;
+        return 1;
     memcpy(s->x_ahead, s->x, s->nodes * sizeof *s->x_ahead);
     for (size_t i = 0; i < s->dofs; i++)
         s->x_ahead[drape_step_equation_at(s, i)] += p[i];
     double fraction = drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t);
-    if (fraction == 1)
-        return;
-    for (size_t i = 0; i < s->dofs; i++)
+    for (size_t i = 0; fraction < 1 && i < s->dofs; i++)
         p[i] *= fraction;
+    return fraction;
 }
 
 typedef struct norms {

@@ -77,8 +77,11 @@ bool drape_step_equation_try(drape_step_equation *equation, const double *d, dou
 void drape_step_equation_jacobian(drape_step_equation *equation, const double *stress, double positive_share,
                                   double *values);
 
-/* Shortens a step p from the last point to its largest feasible fraction. */
-void drape_step_equation_make_feasible(drape_step_equation *equation, double *p);
+/* Makes J at the last point, without positive parts, symmetric: drape_system_symmetrize. */
+void drape_step_equation_symmetrize(drape_step_equation *equation, double *values);
+
+/* Shortens a step p from the last point to its largest feasible fraction, which it returns. */
+double drape_step_equation_make_feasible(drape_step_equation *equation, double *p);
 
 /* The weighted norm of F. */
 double drape_step_equation_norm(const drape_step_equation *equation, drape_norm norm);

@@ -142,35 +142,23 @@ static bool dissipates_most(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
-static bool has_implicit_friction(const drape_model *m)
-{
-    bool any = m->contact.self_friction > 0;
-    for (int32_t c = 0; c < m->collider_count; c++)
-        any |= m->colliders[c].friction > 0;
-    return any && !m->contact.lagged;
-}
-
 /* Contact that takes most of the time, and longer than the motion lasts, where a setting is known to
- * help. Measured on examples/scenes over 0.4 or 0.5 s: lagged friction halves the time of crumple and fold;
- * without self-contact, contact of sphere_drape takes a sixth; with 14 x 14 nodes instead of 20 x 20, that of
- * crumple takes a quarter. newton_k takes a third of the time of crumple, half of that of sphere_drape. */
+ * help. Measured on examples/scenes over 0.4 or 0.5 s: without self-contact, contact of sphere_drape takes a
+ * sixth; with 14 x 14 nodes instead of 20 x 20, that of crumple takes a quarter. newton_k takes a third of
+ * the time of crumple, half of that of sphere_drape. */
 static bool is_contact_slow(drape_sim *sim, char *text, size_t size)
 {
     const drape_statistics s = drape_sim_statistics(sim);
     const double attempts = (double)(s.steps_accepted + s.steps_rejected), motion = drape_sim_time(sim);
-    const bool friction = s.newton_iterations > 0 && has_implicit_friction(sim->model),
-               iterates = (double)s.newton_iterations > MANY * attempts;
-    if (!(s.wall_contact > MOST * s.wall_steps) || !(s.wall_contact > motion) || !(friction || iterates))
+    const bool iterates = (double)s.newton_iterations > MANY * attempts;
+    if (!(s.wall_contact > MOST * s.wall_steps) || !(s.wall_contact > motion) || !iterates)
         return false;
-    snprintf(text, size,
-             "contact takes %.0f %% of the time of the steps, %.3g s for %.3g s of motion: it takes less "
-             "with %s%sa coarser mesh%s",
-             100 * s.wall_contact / s.wall_steps, s.wall_contact, motion,
-             friction ? "\"friction\": \"lagged\" in \"contact\", " : "",
-             sim->model->contact.self ? "no \"self_contact\" if layers never meet, or "
-             : friction               ? "or "
-                                      : "",
-             iterates ? "; \"newton_k\" takes less time and is far less accurate (docs/realtime.md)" : "");
+    snprintf(
+        text, size,
+        "contact takes %.0f %% of the time of the steps, %.3g s for %.3g s of motion: it takes less "
+        "with %sa coarser mesh; \"newton_k\" takes less time and is far less accurate (docs/realtime.md)",
+        100 * s.wall_contact / s.wall_steps, s.wall_contact, motion,
+        sim->model->contact.self ? "no \"self_contact\" if layers never meet, or " : "");
     return true;
 }
 

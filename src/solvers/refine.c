@@ -160,3 +160,14 @@ drape_status drape_refine_solve(drape_refine *w, drape_preconditioner *apply, vo
     }
     return w->error <= BOUND ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
+
+void drape_refine_reduce(drape_refine *w, drape_preconditioner *apply, void *factors, const double *values,
+                         const double *b, double tolerance, double *x)
+{
+    const int64_t n = w->pattern->n;
+    const double target = tolerance * norm(n, b);
+    apply(factors, b, x);
+    find_residual(w, values, b, x);
+    if (norm(n, w->residual) > target)
+        correct(w, apply, factors, values, target, x);
+}

@@ -1,8 +1,8 @@
 /*
- * refine.h: solves A x = b by the factors of a nearby matrix M, and checks the result. The correction of x is
- * found by GMRES preconditioned by M (Saad 1993, A flexible inner-outer preconditioned GMRES algorithm), of
- * which one iteration is a step of iterative refinement with the best length. If M differs from A by a matrix
- * of rank k, k + 1 iterations are enough.
+ * refine.h: solves A x = b by the factors of a nearby matrix M, to rounding errors or to a tolerance. The
+ * correction of x is found by GMRES preconditioned by M (Saad 1993, A flexible inner-outer preconditioned
+ * GMRES algorithm), of which one iteration is a step of iterative refinement with the best length. If M
+ * differs from A by a matrix of rank k, k + 1 iterations are enough.
  */
 #ifndef DRAPE_SOLVERS_REFINE_H
 #define DRAPE_SOLVERS_REFINE_H
@@ -27,5 +27,10 @@ drape_status drape_refine_create(drape_arena *arena, const drape_pattern *patter
  * |b - A x| / (|x| + |b|) in the maximum norm. DRAPE_RETRY_LINEAR if it misses the bound of 1e-13. */
 drape_status drape_refine_solve(drape_refine *w, drape_preconditioner *apply, void *factors,
                                 const double *values, const double *b, double *x);
+
+/* The same until the residual |b - A x| is at most `tolerance` times |b| in the Euclidean norm, or for one
+ * cycle of GMRES, which never makes it larger than that of x = M^-1 b. A need not be scaled. */
+void drape_refine_reduce(drape_refine *w, drape_preconditioner *apply, void *factors, const double *values,
+                         const double *b, double tolerance, double *x);
 
 #endif

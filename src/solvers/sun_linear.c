@@ -4,6 +4,7 @@
 #include "base/clock.h"
 
 #include <nvector/nvector_serial.h>
+#include <string.h>
 
 static SUNMatrix_ID matrix_id(SUNMatrix matrix)
 {
@@ -54,16 +55,39 @@ static int setup(SUNLinearSolver solver, SUNMatrix matrix)
     return drape_sun_linear_factor(solver->content, false);
 }
 
+/* x = M^-1 b with the matrix M that was factored. */
+static drape_status solve_factored(drape_sun_linear *linear, const double *b, double *x)
+{
+    int64_t iterations = 1;
+    drape_status status;
+    if (linear->ops->solve_inexact && linear->tolerance > 0)
+        status = linear->ops->solve_inexact(linear->state, b, x, linear->tolerance, &iterations);
+    else
+        status = linear->ops->solve(linear->state, b, x);
+    linear->iterations += iterations;
+    return status;
+}
+
+/* The first failure of a solve stays in linear->status. */
+static void precondition(void *user, const double *b, double *x)
+{
+    drape_sun_linear *linear = user;
+    if (!linear->status)
+        linear->status = solve_factored(linear, b, x);
+    if (linear->status)
+        memset(x, 0, (size_t)linear->pattern->n * sizeof *x);
+}
+
 drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x)
 {
     double start = drape_clock_seconds();
-    int64_t iterations = 1;
-    if (linear->ops->solve_inexact && linear->tolerance > 0)
-        linear->status = linear->ops->solve_inexact(linear->state, b, x, linear->tolerance, &iterations);
+    linear->status = DRAPE_OK;
+    if (linear->corrects)
+        drape_refine_reduce(&linear->refine, precondition, linear, linear->exact, b,
+                            linear->correction_tolerance, x);
     else
-        linear->status = linear->ops->solve(linear->state, b, x);
+        linear->status = solve_factored(linear, b, x);
     linear->solve_seconds += drape_clock_seconds() - start;
-    linear->iterations += iterations;
     return linear->status;
 }
 
@@ -71,6 +95,13 @@ static int solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector 
 {
     (void)matrix, (void)tolerance;
     return drape_sun_linear_solve(solver->content, N_VGetArrayPointer(b), N_VGetArrayPointer(x));
+}
+
+static drape_status take_near(drape_sun_linear *linear)
+{
+    linear->exact = drape_arena_take(&linear->arena, (size_t)linear->nonzeros, sizeof *linear->exact);
+    return linear->exact ? drape_refine_create(&linear->arena, linear->pattern, &linear->refine)
+                         : DRAPE_E_MEMORY;
 }
 
 /* Takes the pattern's values and creates the solver's state; neither exists yet. */
@@ -81,7 +112,9 @@ static drape_status create_state(drape_sun_linear *linear, const drape_pattern *
     linear->values = drape_arena_take(&linear->arena, (size_t)pattern->nonzeros, sizeof *linear->values);
     if (!linear->values)
         return DRAPE_E_MEMORY;
-    drape_status status = linear->ops->create(&linear->arena, pattern, &linear->state);
+    drape_status status = linear->near ? take_near(linear) : DRAPE_OK;
+    if (!status)
+        status = linear->ops->create(&linear->arena, pattern, &linear->state);
     if (!status && linear->ops->use_threads)
         linear->ops->use_threads(linear->state, linear->pool);
     if (!status && linear->ops->watch)
@@ -120,10 +153,30 @@ drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const d
     return DRAPE_OK;
 }
 
+drape_status drape_sun_linear_use_near(drape_sun_linear *linear, double tolerance)
+{
+    linear->near = true;
+    linear->correction_tolerance = tolerance;
+    return take_near(linear);
+}
+
+void drape_sun_linear_keep_exact(drape_sun_linear *linear)
+{
+    memcpy(linear->exact, linear->values, (size_t)linear->nonzeros * sizeof *linear->exact);
+    linear->corrects = true;
+}
+
+void drape_sun_linear_forget_exact(drape_sun_linear *linear)
+{
+    linear->corrects = false;
+}
+
 drape_status drape_sun_linear_extend_pattern(drape_sun_linear *linear, const drape_pattern *pattern)
 {
     double start = drape_clock_seconds();
     linear->stale = true;
+    linear->corrects = false;
+    linear->exact = NULL;
     drape_linear_destroy(linear->ops, &linear->state);
     drape_arena_free(&linear->arena);
     drape_status status = create_state(linear, pattern);
@@ -151,6 +204,10 @@ void drape_sun_linear_archive(drape_sun_linear *linear, drape_archive *a, bool f
     drape_archive_same(a, "the number of nonzeros", linear->nonzeros);
     if (factors)
         drape_archive_doubles(a, linear->values, (size_t)linear->nonzeros);
+    if (linear->near)
+        drape_archive_bool(a, &linear->corrects);
+    if (factors && linear->corrects)
+        drape_archive_doubles(a, linear->exact, (size_t)linear->nonzeros);
     drape_linear_archive(linear->ops, linear->state, a, factors ? linear->values : NULL);
 }
 

@@ -8,6 +8,7 @@
 #define DRAPE_SOLVERS_SUN_LINEAR_H
 
 #include "solvers/linear.h"
+#include "solvers/refine.h"
 #include "solvers/sundials_compat.h"
 
 #include <sundials/sundials_linearsolver.h>
@@ -21,6 +22,11 @@ typedef struct drape_sun_linear {
     void *owner;    /* for an integrator that reduces its system to this one before solving */
     double *values; /* (nonzeros) where the Jacobian is assembled */
     const drape_pattern *pattern; /* of the values */
+    bool near;     /* the matrix that is factored may be another one than that which is solved with: */
+    bool corrects; /* `values` are near `exact`, and solves are corrected to `correction_tolerance` */
+    double *exact; /* (nonzeros) NULL unless `near` */
+    double correction_tolerance; /* of |b|, left in the residual of a corrected solve */
+    drape_refine refine;         /* the workspace of these solves */
     int64_t nonzeros;
     SUNLinearSolver solver;
     SUNMatrix matrix;
@@ -41,6 +47,17 @@ drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const d
 drape_status drape_sun_linear_extend_pattern(drape_sun_linear *linear, const drape_pattern *pattern);
 /* The same, unless it has this pattern already. */
 drape_status drape_sun_linear_ensure_pattern(drape_sun_linear *linear, const drape_pattern *pattern);
+
+/* From now on A may be solved with by the factors of a nearby matrix: drape_sun_linear_keep_exact. Takes
+ * memory. Errors: DRAPE_E_MEMORY, after which it can only be destroyed. */
+drape_status drape_sun_linear_use_near(drape_sun_linear *linear, double tolerance);
+
+/* The present values are A. The caller changes them into those of a nearby matrix, factors that one, and
+ * solves with A: by GMRES, preconditioned by the factors (refine.h), until the residual is within the
+ * tolerance or a cycle has ended. It lasts until drape_sun_linear_forget_exact. */
+void drape_sun_linear_keep_exact(drape_sun_linear *linear);
+void drape_sun_linear_forget_exact(drape_sun_linear *linear);
+
 void drape_sun_linear_destroy(drape_sun_linear **linear); /* call it before the arena is freed */
 
 /* Bytes that libraries took outside the arena. */

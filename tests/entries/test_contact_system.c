@@ -125,10 +125,48 @@ static double error_of(probe *t, double weight, double time)
     return best;
 }
 
+/* Value (i, j) of a matrix; 0 outside of its pattern. */
+static double value_at(const drape_pattern *p, const double *values, int64_t i, int64_t j)
+{
+    for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
+        if (p->row[k] == i)
+            return values[k];
+    return 0;
+}
+
+/* The matrix that Newton factors in place of J: exactly symmetric; J itself, up to rounding errors, where
+ * contact is declared symmetric, and another one where it is not, for cloth that slides. */
+static void check_symmetrized(probe *t, const char *what, double weight, double time)
+{
+    const drape_point point = {.x = t->at.x,
+                               .v = t->at.v,
+                               .internal = t->at.internal,
+                               .weight = weight,
+                               .t = time,
+                               .span = {time - 0.01, time}};
+    const drape_pattern *p = drape_system_pattern(t->system);
+    double *exact = take(t, (size_t)p->nonzeros), largest = 0, change = 0;
+    drape_system_jacobian(t->system, &point, 0, 0, exact);
+    memcpy(t->values, exact, (size_t)p->nonzeros * sizeof *exact);
+    drape_system_symmetrize(t->system, &point, t->values);
+    for (int64_t j = 0; j < p->n; j++)
+        for (int64_t k = p->column[j]; k < p->column[j + 1]; k++) {
+            ck_assert_msg(t->values[k] == value_at(p, t->values, j, p->row[k]), "%s", what);
+            largest = fmax(largest, fabs(exact[k]));
+            change = fmax(change, fabs(t->values[k] - exact[k]));
+        }
+    if (drape_system_is_symmetric(t->system))
+        ck_assert_msg(change <= 1e-12 * largest, "%s: %g of %g", what, change, largest);
+    else
+        ck_assert_msg(change > 1e-9 * largest, "%s: %g of %g", what, change, largest);
+}
+
 static void check(probe *t, const char *what, double time)
 {
     double gap;
-    const double steps = error_of(t, 100, time), still = error_of(t, 0, time);
+    const double steps = error_of(t, 100, time);
+    check_symmetrized(t, what, 100, time);
+    const double still = error_of(t, 0, time);
     const drape_contact *contact = drape_system_contact(t->system);
     const int32_t active = drape_contact_active(contact, &gap);
     printf("# %.60s: %d active, least gap %.2g m; errors %.2g with w = 100, %.2g with w = 0\n", what,
