@@ -4,6 +4,8 @@
 #include "base/finite.h"
 #include "contact/list.h"
 
+#include <string.h>
+
 static void archive_couplings(drape_contact *c, drape_archive *a)
 {
     int32_t count = c->coupling_count;
@@ -38,20 +40,22 @@ static bool is_valid(const drape_contact *c)
 {
     const size_t n = 3 * (size_t)c->broad.points;
     return drape_all_finite(c->step_candidates.x, n) && drape_all_finite(c->start, n) &&
-           are_finite(c->step_candidates.pose, c->model->collider_count) &&
+           drape_all_finite(c->start_v, n) && are_finite(c->step_candidates.pose, c->model->collider_count) &&
            are_finite(c->start_pose, c->model->collider_count) && c->step_candidates.margin >= 0 &&
            c->step_candidates.margin <= c->model->length && c->next_margin >= 0 &&
            c->next_margin <= c->model->length;
 }
 
 /* The active set at the beginning of the step depends on the positions alone, so a new search finds the
- * same one. */
+ * same one; lagged friction also on the velocities. */
 static drape_status restore_start(drape_contact *c)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
     drape_status status = drape_candidates_search(&c->query_candidates, &start, c->next_margin);
     if (!status)
         status = drape_active_set_list(&c->active, &c->query_candidates, 0, &start);
+    memcpy(c->v, c->start_v, 3 * (size_t)c->broad.points * sizeof *c->v);
+    memcpy(c->pose, c->start_pose, (size_t)c->model->collider_count * sizeof *c->pose);
     if (!status)
         status = drape_contact_lag(c);
     if (!status)
@@ -84,6 +88,7 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     drape_archive_doubles(a, c->step_candidates.x, points);
     drape_archive_bytes(a, c->step_candidates.pose, colliders * sizeof *c->step_candidates.pose);
     drape_archive_doubles(a, c->start, points);
+    drape_archive_doubles(a, c->start_v, points);
     drape_archive_bytes(a, c->start_pose, colliders * sizeof *c->start_pose);
     archive_couplings(c, a);
     drape_archive_double(a, &c->seconds);

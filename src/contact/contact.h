@@ -40,8 +40,9 @@ void drape_contact_end(drape_contact *contact);
  * derivatives. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_evaluate_at(drape_contact *contact, const drape_contact_at *at);
 
-/* Adds the normal forces, friction, or both, to g (node_count x 3). */
-void drape_contact_add_forces(drape_contact *contact, bool normal, bool friction, double *g);
+/* Adds the forces of the energy, the dissipative ones (restitution and friction), or both, to g (node_count x
+ * 3). */
+void drape_contact_add_forces(drape_contact *contact, bool conservative, bool dissipative, double *g);
 
 /* The forces of the last drape_contact_add_forces on each collider (collider_count x 3) [N], with the sign of
  * g. */
@@ -51,8 +52,8 @@ double drape_contact_potential(const drape_contact *contact); /* [J] */
 
 /* Adds dg/dx + weight dg/dv, or dg/dv alone, of pairs of free nodes to values in the pattern, which must
  * have their blocks. gauss_newton: adds a positive semidefinite approximation, the Gauss-Newton part of the
- * Hessians of the energy (contact/force.h), and instead of the derivatives of friction a symmetric upper
- * bound of its dg/dv (contact/friction.h). */
+ * Hessians of the energy (contact/force.h), and instead of the derivatives of restitution and friction
+ * symmetric upper bounds of their dg/dv (contact/restitution.h, contact/friction.h). */
 void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velocity_only, bool gauss_newton,
                                 const drape_pattern *pattern, double *values);
 

@@ -41,20 +41,52 @@ typedef struct request {
     bool velocity_only, gauss_newton;
 } request;
 
-/* Adds weight dg/dv of friction with the normal force lambda. */
-static void add_friction(const drape_contact *c, const request *want, const drape_active_contact *contact,
-                         const drape_contact_law *law, double lambda, double *h)
+/* Adds weight dg/dv of friction with the normal force `force`. */
+static void add_friction(const request *want, const drape_active_contact *contact,
+                         const drape_contact_law *law, double force, double v[4][3], double *h)
 {
     const int d = 3 * contact->gap.closest.points;
-    double v[4][3], g[D], dgdv[D * D];
-    drape_contact_velocities(c, contact, v);
+    double g[D], dgdv[D * D];
     if (want->gauss_newton)
-        drape_friction_bound(&contact->gap, law, lambda, v, dgdv);
+        drape_friction_bound(&contact->gap, law, force, v, dgdv);
     else
-        drape_friction_force(&contact->gap, law, lambda, v, g, dgdv);
+        drape_friction_force(&contact->gap, law, force, v, g, dgdv);
     for (int i = 0; i < d; i++)
         for (int j = 0; j < d; j++)
             h[D * i + j] += want->weight * dgdv[D * i + j];
+}
+
+/* Adds the derivatives of the dissipative part of the normal force and of friction that is not lagged;
+ * derivatives: NULL unless those by x are requested. */
+static void add_dissipative(const drape_contact *c, const request *want, const drape_active_contact *contact,
+                            const drape_contact_law *law, const drape_gap_derivatives *derivatives, double *h)
+{
+    const drape_gap *gap = &contact->gap;
+    const bool friction = law->friction > 0 && !c->model->contact.lagged;
+    drape_normal_derivatives by_x;
+    double v[4][3], change[D];
+    if (!friction && !(law->damping > 0))
+        return;
+    drape_contact_velocities(c, contact, v);
+    const drape_normal normal = drape_normal_at(gap, law, v);
+    if (derivatives)
+        drape_normal_derive(gap, derivatives, law, v, &by_x);
+    if (law->damping > 0)
+        drape_restitution_add_dgdv(gap, &normal,
+                                   want->weight * (want->gauss_newton ? normal.secant : normal.slope), h);
+    if (law->damping > 0 && derivatives)
+        drape_restitution_add_dgdx(gap, derivatives, &normal, &by_x, h);
+    if (!friction)
+        return;
+    add_friction(want, contact, law, drape_normal_force(&normal), v, h);
+    if (want->gauss_newton)
+        return;
+    drape_normal_by_v(gap, &normal, want->weight, change);
+    if (derivatives) {
+        drape_normal_add_by_x(gap, &normal, &by_x, change);
+        drape_friction_add_dgdx(gap, derivatives, law, drape_normal_force(&normal), v, h);
+    }
+    drape_friction_add_normal(gap, law, change, v, h);
 }
 
 /* The derivatives of one active contact, h (12 x 12). */
@@ -63,10 +95,8 @@ static void differentiate(const drape_contact *c, const request *want, const dra
 {
     const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
     const drape_configuration now = drape_contact_configuration(c);
-    const bool friction = law.friction > 0 && !c->model->contact.lagged;
     const bool exact = !want->velocity_only && !want->gauss_newton;
     drape_gap_derivatives derivatives;
-    double v[4][3];
     if (exact) {
         drape_pair_derivatives(&contact->pair, &contact->gap, &now, c->broad.rest, &derivatives);
         drape_contact_hessian(&contact->gap, &derivatives, &law, h);
@@ -75,13 +105,7 @@ static void differentiate(const drape_contact *c, const request *want, const dra
     } else {
         drape_contact_gauss_newton(&contact->gap, &law, h);
     }
-    if (!friction)
-        return;
-    add_friction(c, want, contact, &law, drape_contact_normal_force(&contact->gap, &law), h);
-    if (exact) {
-        drape_contact_velocities(c, contact, v);
-        drape_friction_add_dgdx(&contact->gap, &derivatives, &law, v, h);
-    }
+    add_dissipative(c, want, contact, &law, exact ? &derivatives : NULL, h);
 }
 
 void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_only, bool gauss_newton,
@@ -97,8 +121,10 @@ void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_o
     for (int32_t i = 0; i < c->lagged_count; i++) {
         const drape_lagged *lagged = &c->lagged[i];
         const drape_contact_law law = drape_contact_law_of(c, &lagged->contact.pair);
+        double v[4][3];
         memset(h, 0, sizeof h);
-        add_friction(c, &want, &lagged->contact, &law, lagged->lambda, h);
+        drape_contact_velocities(c, &lagged->contact, v);
+        add_friction(&want, &lagged->contact, &law, lagged->force, v, h);
         add_blocks(c, &lagged->contact, h, pattern, values);
     }
     c->seconds += drape_clock_seconds() - start;
