@@ -50,11 +50,20 @@ const double *drape_contact_on_colliders(const drape_contact *contact);
 
 double drape_contact_potential(const drape_contact *contact); /* [J] */
 
-/* Adds dg/dx + weight dg/dv, or dg/dv alone, of pairs of free nodes to values in the pattern, which must
- * have their blocks. gauss_newton: adds a positive semidefinite approximation, the Gauss-Newton part of the
- * Hessians of the energy (contact/force.h), and instead of the derivatives of restitution and friction
- * symmetric upper bounds of their dg/dv (contact/restitution.h, contact/friction.h). */
-void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velocity_only, bool gauss_newton,
+/* Which derivatives of pairs of free nodes are added. */
+typedef enum drape_contact_derivatives {
+    DRAPE_CONTACT_EXACT,       /* dg/dx + weight dg/dv */
+    DRAPE_CONTACT_SYMMETRIC,   /* the same; in models where no friction is implicit, its symmetric part, which
+                               differs from it only by restitution */
+    DRAPE_CONTACT_VELOCITY,    /* dg/dv */
+    DRAPE_CONTACT_GAUSS_NEWTON /* a positive semidefinite approximation: the Gauss-Newton part of the Hessians
+                                  of the energy (contact/force.h), and symmetric upper bounds of the weight
+                                  dg/dv of restitution and friction (contact/restitution.h,
+                                  contact/friction.h) */
+} drape_contact_derivatives;
+
+/* Adds them to values in the pattern, which must have their blocks. */
+void drape_contact_add_jacobian(drape_contact *contact, double weight, drape_contact_derivatives which,
                                 const drape_pattern *pattern, double *values);
 
 /* Whether the pattern has the blocks of all active contacts. */

@@ -35,10 +35,9 @@ static void add_blocks(const drape_contact *c, const drape_active_contact *conta
         }
 }
 
-/* The requested derivatives: dg/dx + weight dg/dv, or weight dg/dv alone. */
 typedef struct request {
     double weight;
-    bool velocity_only, gauss_newton;
+    drape_contact_derivatives which;
 } request;
 
 /* Adds weight dg/dv of friction with the normal force `force`. */
@@ -47,7 +46,7 @@ static void add_friction(const request *want, const drape_active_contact *contac
 {
     const int d = 3 * contact->gap.closest.points;
     double g[D], dgdv[D * D];
-    if (want->gauss_newton)
+    if (want->which == DRAPE_CONTACT_GAUSS_NEWTON)
         drape_friction_bound(&contact->gap, law, force, v, dgdv);
     else
         drape_friction_force(&contact->gap, law, force, v, g, dgdv);
@@ -72,14 +71,15 @@ static void add_dissipative(const drape_contact *c, const request *want, const d
     if (derivatives)
         drape_normal_derive(gap, derivatives, law, v, &by_x);
     if (law->damping > 0)
-        drape_restitution_add_dgdv(gap, &normal,
-                                   want->weight * (want->gauss_newton ? normal.secant : normal.slope), h);
+        drape_restitution_add_dgdv(
+            gap, &normal,
+            want->weight * (want->which == DRAPE_CONTACT_GAUSS_NEWTON ? normal.secant : normal.slope), h);
     if (law->damping > 0 && derivatives)
         drape_restitution_add_dgdx(gap, derivatives, &normal, &by_x, h);
     if (!friction)
         return;
     add_friction(want, contact, law, drape_normal_force(&normal), v, h);
-    if (want->gauss_newton)
+    if (want->which == DRAPE_CONTACT_GAUSS_NEWTON)
         return;
     drape_normal_by_v(gap, &normal, want->weight, change);
     if (derivatives) {
@@ -89,30 +89,51 @@ static void add_dissipative(const drape_contact *c, const request *want, const d
     drape_friction_add_normal(gap, law, change, v, h);
 }
 
+/* h = (h + h')/2 of so many points */
+static void symmetrize(int points, double *h)
+{
+    for (int i = 0; i < 3 * points; i++)
+        for (int j = 0; j < i; j++)
+            h[D * i + j] = h[D * j + i] = (h[D * i + j] + h[D * j + i]) / 2;
+}
+
 /* The derivatives of one active contact, h (12 x 12). */
 static void differentiate(const drape_contact *c, const request *want, const drape_active_contact *contact,
                           double *h)
 {
     const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
     const drape_configuration now = drape_contact_configuration(c);
-    const bool exact = !want->velocity_only && !want->gauss_newton;
+    const bool by_x = want->which == DRAPE_CONTACT_EXACT || want->which == DRAPE_CONTACT_SYMMETRIC;
     drape_gap_derivatives derivatives;
-    if (exact) {
+    if (by_x) {
         drape_pair_derivatives(&contact->pair, &contact->gap, &now, c->broad.rest, &derivatives);
         drape_contact_hessian(&contact->gap, &derivatives, &law, h);
-    } else if (want->velocity_only) {
+    } else if (want->which == DRAPE_CONTACT_VELOCITY) {
         memset(h, 0, D * 3 * (size_t)contact->gap.closest.points * sizeof *h);
     } else {
         drape_contact_gauss_newton(&contact->gap, &law, h);
     }
-    add_dissipative(c, want, contact, &law, exact ? &derivatives : NULL, h);
+    add_dissipative(c, want, contact, &law, by_x ? &derivatives : NULL, h);
+    if (want->which == DRAPE_CONTACT_SYMMETRIC)
+        symmetrize(contact->gap.closest.points, h);
 }
 
-void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_only, bool gauss_newton,
+/* Whether the friction of some contact follows the normal force within a step, and makes matrices
+ * nonsymmetric. */
+static bool has_implicit_friction(const drape_contact *c)
+{
+    bool any = c->model->contact.self && c->model->contact.self_friction > 0;
+    for (int32_t i = 0; i < c->model->collider_count; i++)
+        any = any || c->model->colliders[i].friction > 0;
+    return any && !c->model->contact.lagged;
+}
+
+void drape_contact_add_jacobian(drape_contact *c, double weight, drape_contact_derivatives which,
                                 const drape_pattern *pattern, double *values)
 {
     const double start = drape_clock_seconds();
-    const request want = {velocity_only ? 1 : weight, velocity_only, gauss_newton};
+    const bool exact = which == DRAPE_CONTACT_SYMMETRIC && has_implicit_friction(c);
+    const request want = {which == DRAPE_CONTACT_VELOCITY ? 1 : weight, exact ? DRAPE_CONTACT_EXACT : which};
     double h[D * D];
     for (int32_t i = 0; i < c->active.count; i++) {
         differentiate(c, &want, &c->active.contacts[i], h);
