@@ -154,7 +154,7 @@ void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_
     /* From here on the forces on colliders, whose work was added above, are their dissipative part. */
     drape_system_dissipation(e->system, &e->point, s->dissipated);
     for (size_t i = 0; i < e->nodes; i++)
-        info->dissipated += (out->t - in->t) * s->dissipated[i] * e->point.v[i];
+        info->dissipated += s->dissipated[i] * (out->x[i] - in->x[i]);
     info->dissipated += drape_implicit_collider_work(s, in->t, out->t);
 }
 

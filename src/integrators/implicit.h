@@ -63,15 +63,16 @@ void drape_implicit_report(const drape_solve_report *report, drape_step_info *in
  * drape_system_force all forces, after drape_system_dissipation their dissipative part. 0 without contact. */
 double drape_implicit_collider_work(const drape_implicit *implicit, double t0, double t1);
 
-/* Adds to info the work over a step of dissipative forces on all nodes, by their power, and of moved pins
- * against g, both where the equation was evaluated last: for methods that evaluate the forces of a step at
- * one point only, that of their equation. The force that accelerates the pinned nodes' own mass does no work
- * on the cloth. */
+/* Adds to info the work over a step of dissipative forces on all nodes, and of moved pins against g, both
+ * where the equation was evaluated last: for methods that evaluate the forces of a step at one point only,
+ * that of their equation. The force that accelerates the pinned nodes' own mass does no work on the cloth. */
 void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out,
                           drape_step_info *info);
 
 /* The same over one stage, from and to positions of all nodes, from t to t + span, by the midpoint rule with
- * the mean velocity: for methods of several stages, or with forces at both ends of a stage. If powers at the
+ * the mean velocity: for methods of several stages, with forces at both ends of a stage, or whose velocity is
+ * not that of the displacement, as an impact within a step makes plain: an approaching pair would dissipate
+ * negative energy on its way out. If powers at the
  * two ends were used, the force of a stiff dashpot at a jump of a pin's velocity would count for a large part
  * of the step. Overwrites the base of the equation and g (nodes). */
 void drape_implicit_audit_stage(drape_implicit *implicit, const double *from, const double *to, double t,
