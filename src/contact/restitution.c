@@ -76,7 +76,8 @@ void drape_restitution_add_dgdv(const drape_gap *gap, const drape_normal *normal
             h[D * i + j] += scale * c[i / 3] * n[i % 3] * c[j / 3] * n[j % 3];
 }
 
-/* With the gap s: d(lambda kappa f ds/dx) = ds/dx (kappa f dlambda + lambda slope du) + lambda kappa f d2s/dx2 */
+/* With the gap s: d(lambda kappa f ds/dx) = ds/dx (kappa f dlambda + lambda slope du) + lambda kappa f
+ * d2s/dx2 */
 void drape_restitution_add_dgdx(const drape_gap *gap, const drape_gap_derivatives *derivatives,
                                 const drape_normal *normal, const drape_normal_derivatives *by_x, double *h)
 {

@@ -5,14 +5,14 @@
  *     f(y) = 2 y - y |y| for |y| < 1,    sign(y) beyond
  * with lambda the force of the barrier (force.h), u the rate of the gap, e the coefficient of restitution and
  * eps the restitution velocity. Damping in proportion to the elastic force is that of Hunt and Crossley 1975
- * ("Coefficient of restitution interpreted as damping in vibroimpact", J. Appl. Mech. 42); f, which is that of
- * friction (friction.h), bounds it:
+ * (Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42); f, which is that
+ * of friction (friction.h), bounds it:
  *   - N >= 0 because kappa <= 1, so a contact never holds pieces together;
  *   - N = lambda at rest, so equilibria do not depend on e;
  *   - the dissipated power kappa f lambda u is at least 0 for either sign of u;
  *   - beyond eps N is 2/(1 + e^2) lambda in approach and e^2 times that in separation, so an impact much
- *     faster than eps returns e^2 of its energy, for every barrier: e is the energetic coefficient of Stronge 1990 ("Rigid
- *     body collisions with friction", Proc. R. Soc. A 431);
+ *     faster than eps returns e^2 of its energy, for every barrier: e is the energetic coefficient of
+ *     Stronge 1990 (Rigid body collisions with friction, Proc. R. Soc. A 431);
  *   - with e = 0 no separation that the barrier drives is faster than eps.
  * The mollifier of nearly parallel edges multiplies lambda; the forces along its own gradient are elastic.
  */

@@ -14,7 +14,8 @@ static const char *const methods[] = {"be", "bdf2", "trbdf2", "midpoint", "ida"}
 #define METHODS (sizeof methods / sizeof *methods)
 
 /* The integral of y / (1 + k f(y)) from 0 to y, f as in contact/restitution.h: m eps^2 of it is the energy
- * that the barrier takes up from an impact at eps y (k > 0), or returns to a rebound at that speed (k < 0). */
+ * that the barrier takes up from an impact at eps y (k > 0), or returns to a rebound at that
+ * speed (k < 0). */
 static double barrier_energy(double k, double y)
 {
     double sum = 0;
@@ -64,7 +65,7 @@ static void advance_patch(scene *s, double v, int count)
     }
 }
 
-/* The force acts mostly in the inner half of the activation distance, for n steps on the way in and out: 100
+/* The force acts mostly in the inner half of the activation distance, for n steps in and out together: 100
  * of methods of second order, which err by a multiple of 1/n^2, and 1600 of be, which errs by a multiple of
  * 1/n. Of a speed 4 and 8 of these are allowed, and twice as much of an energy: that of the sum of energies
  * is what the methods lose or gain themselves. */
