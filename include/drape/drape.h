@@ -189,6 +189,9 @@ typedef struct drape_collider_def {
     const drape_track_key *track; /* displacement from the position that the parameters define; NULL: it does
                                      not move */
     size_t key_count;             /* length of track */
+    double
+        restitution; /* speed of rebound / speed of impact, of cloth on the collider [1], in [0, 1]; default
+                           0 */
 } drape_collider_def;
 
 /* A whole scene. Initialise with drape_scene_def_init. Everything it points to need only live until
@@ -209,7 +212,8 @@ typedef struct drape_scene_def {
                                    working directory */
     const drape_collider_def *colliders; /* at most 4096 */
     size_t collider_count;               /* length of colliders */
-    const drape_setting *self_contact;   /* thickness, friction; NULL: the cloth passes through itself */
+    const drape_setting *self_contact;   /* thickness, friction, restitution; NULL: the cloth passes through
+                                            itself */
     size_t self_contact_count;           /* length of self_contact */
     const drape_setting *contact;        /* distance, stiffness ...; `drape list contact` shows all */
     size_t contact_count;                /* length of contact */

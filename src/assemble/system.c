@@ -362,8 +362,11 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (evaluate_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight, false, positive_share > 0, system->pattern,
-                                   values);
+        drape_contact_add_jacobian(system->contact, point->weight,
+                                   positive_share > 0 ? DRAPE_CONTACT_GAUSS_NEWTON
+                                   : point->symmetric ? DRAPE_CONTACT_SYMMETRIC
+                                                      : DRAPE_CONTACT_EXACT,
+                                   system->pattern, values);
     drape_drag_spring_add_hessian(&system->drag, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
 }
@@ -376,7 +379,7 @@ bool drape_system_is_symmetric(const drape_system *system)
 void drape_system_symmetrize(drape_system *system, const drape_point *point, double *values)
 {
     if (evaluate_contact(system, point))
-        drape_contact_fix_friction(system->contact, system->pattern, values);
+        drape_contact_fix_friction(system->contact, point->weight, system->pattern, values);
     drape_pattern_symmetrize(system->pattern, values);
 }
 
@@ -399,7 +402,8 @@ void drape_system_remainder(drape_system *system, const drape_point *point, doub
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (evaluate_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight, false, true, system->pattern, values);
+        drape_contact_add_jacobian(system->contact, point->weight, DRAPE_CONTACT_GAUSS_NEWTON,
+                                   system->pattern, values);
 }
 
 bool drape_system_has_remainder(const drape_system *system)
@@ -420,7 +424,7 @@ void drape_system_damping(drape_system *system, const drape_point *point, double
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (evaluate_contact(system, point))
-        drape_contact_add_jacobian(system->contact, 0, true, false, system->pattern, values);
+        drape_contact_add_jacobian(system->contact, 0, DRAPE_CONTACT_VELOCITY, system->pattern, values);
 }
 
 /* ---- Energies ---- */
@@ -475,7 +479,8 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
     if (g)
         drape_contact_add_forces(system->contact, true, friction, g);
     if (values)
-        drape_contact_add_jacobian(system->contact, point->weight, false, false, system->pattern, values);
+        drape_contact_add_jacobian(system->contact, point->weight, DRAPE_CONTACT_EXACT, system->pattern,
+                                   values);
 }
 
 void drape_system_term(drape_system *system, int32_t term, const drape_point *point, double *energy,

@@ -46,6 +46,7 @@ static drape_status compile_collider(drape_model *model, size_t i, const drape_s
     snprintf(pointer, sizeof pointer, "/colliders/%zu", i);
     drape_status status = name_collider(model, pointer, def->name, to);
     to->friction = def->friction;
+    to->restitution = def->restitution;
     if (!status)
         status = find_collider(model->ctx, pointer, def->entry.type, &to->ops);
     if (!status)
@@ -72,7 +73,8 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
     }
     model->collider_count = status ? 0 : (int32_t)def->collider_count;
     for (int32_t i = 0; i < model->collider_count; i++)
-        model->has_dissipation = model->has_dissipation || model->colliders[i].friction > 0;
+        model->has_dissipation =
+            model->has_dissipation || model->colliders[i].friction > 0 || model->colliders[i].restitution < 1;
     return status;
 }
 

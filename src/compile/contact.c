@@ -23,12 +23,19 @@ const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
     [DRAPE_CONTACT_FRICTION] = DRAPE_CHOICE("friction", IMPLICIT, frictions,
                                             "implicit: of the normal force at the end of the step; lagged: "
                                             "at its start, which keeps matrices symmetric"),
+    [DRAPE_CONTACT_RESTITUTION_VELOCITY] = DRAPE_NUMBER(
+        "restitution_velocity", "m/s",
+        DRAPE_DERIVED("sqrt(2 gravity distance); without gravity, sqrt(2 L distance) in a second"),
+        DRAPE_ABOVE(0), 1e9,
+        "impacts much faster than this return the share of energy that restitution says"),
 };
 
 const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT] = {
     [DRAPE_SELF_THICKNESS] = DRAPE_NUMBER("thickness", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e3,
                                           "half the distance that layers of cloth are kept apart"),
     [DRAPE_SELF_FRICTION] = DRAPE_NUMBER("friction", "1", 0, 0, 1e3, "Coulomb's mu between layers of cloth"),
+    [DRAPE_SELF_RESTITUTION] =
+        DRAPE_NUMBER("restitution", "1", 0, 0, 1, "speed of rebound / speed of impact, of layers of cloth"),
 };
 
 void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_CONTACT_PARAM_COUNT])
@@ -37,12 +44,14 @@ void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_
     values[DRAPE_CONTACT_STIFFNESS] = contact->stiffness;
     values[DRAPE_CONTACT_FRICTION_VELOCITY] = contact->friction_velocity;
     values[DRAPE_CONTACT_FRICTION] = contact->lagged ? LAGGED : IMPLICIT;
+    values[DRAPE_CONTACT_RESTITUTION_VELOCITY] = contact->restitution_velocity;
 }
 
 void drape_self_contact_values(const drape_contact_def *contact, double values[DRAPE_SELF_PARAM_COUNT])
 {
     values[DRAPE_SELF_THICKNESS] = contact->self_thickness;
     values[DRAPE_SELF_FRICTION] = contact->self_friction;
+    values[DRAPE_SELF_RESTITUTION] = contact->self_restitution;
 }
 
 static double largest_thickness(const drape_model *model)
@@ -82,17 +91,30 @@ static double scene_speed(const drape_model *model)
     return cloth + collider;
 }
 
+/* |g|; without gravity, L / s^2 */
+static double fall_acceleration(const drape_model *model)
+{
+    const double g = norm(model->gravity);
+    return g > 0 ? g : model->length;
+}
+
 /* sigma (2 |g| L + v^2) / d, with sigma the largest areal density and L the size of the scene. Up to the
  * distance zero, the barrier absorbs 6 d of this per area (contact/barrier.h), which is 12 times the energy
  * of the speed v and of a fall over L; cloth with more energy cannot be stopped. The weight of the cloth is
- * at most d / (2 L) of the stiffness, so that at rest it lies at nearly the distance d. Without gravity, L /
- * s^2 replaces |g|. */
+ * at most d / (2 L) of the stiffness, so that at rest it lies at nearly the distance d. */
 static double stiffness_of_fall(const drape_model *model)
 {
-    double sigma = 0, g = norm(model->gravity), v = scene_speed(model);
+    double sigma = 0, v = scene_speed(model);
     for (int32_t c = 0; c < model->cloth_count; c++)
         sigma = fmax(sigma, model->cloths[c].material.areal_density);
-    return sigma * (2 * (g > 0 ? g : model->length) * model->length + v * v) / model->contact.distance;
+    return sigma * (2 * fall_acceleration(model) * model->length + v * v) / model->contact.distance;
+}
+
+/* The speed of a fall over the activation distance d: with restitution 0, cloth rises by at most d above the
+ * height at which it meets a collider, and so by no more than the distance at which it rests. */
+static double speed_of_fall(const drape_model *model, double distance)
+{
+    return sqrt(2 * fall_acceleration(model) * distance);
 }
 
 static drape_status resolve_contact(drape_model *model, const drape_scene_def *def)
@@ -104,11 +126,13 @@ static drape_status resolve_contact(drape_model *model, const drape_scene_def *d
                              def->contact, def->contact_count, values);
     if (status)
         return status;
-    double distance = values[DRAPE_CONTACT_DISTANCE], stiffness = values[DRAPE_CONTACT_STIFFNESS];
+    double distance = values[DRAPE_CONTACT_DISTANCE], stiffness = values[DRAPE_CONTACT_STIFFNESS],
+           rebound = values[DRAPE_CONTACT_RESTITUTION_VELOCITY];
     contact->distance = isnan(distance) ? largest_thickness(model) : distance;
     contact->stiffness = isnan(stiffness) ? stiffness_of_fall(model) : stiffness;
     contact->friction_velocity = values[DRAPE_CONTACT_FRICTION_VELOCITY];
     contact->lagged = values[DRAPE_CONTACT_FRICTION] == LAGGED;
+    contact->restitution_velocity = isnan(rebound) ? speed_of_fall(model, contact->distance) : rebound;
     return DRAPE_OK;
 }
 
@@ -125,7 +149,9 @@ static drape_status resolve_self_contact(drape_model *model, const drape_scene_d
     model->contact.self = true;
     model->contact.self_thickness = values[DRAPE_SELF_THICKNESS];
     model->contact.self_friction = values[DRAPE_SELF_FRICTION];
-    model->has_dissipation = model->has_dissipation || model->contact.self_friction > 0;
+    model->contact.self_restitution = values[DRAPE_SELF_RESTITUTION];
+    model->has_dissipation =
+        model->has_dissipation || model->contact.self_friction > 0 || model->contact.self_restitution < 1;
     return DRAPE_OK;
 }
 

@@ -4,6 +4,8 @@
 #include "base/finite.h"
 #include "contact/list.h"
 
+#include <string.h>
+
 static void archive_couplings(drape_contact *c, drape_archive *a)
 {
     int32_t count = c->coupling_count;
@@ -33,7 +35,8 @@ static bool are_finite(const drape_collider_pose *pose, int32_t count)
     return true;
 }
 
-/* The active set at the beginning of the step depends on the positions alone, whatever the candidates. */
+/* The active set at the beginning of the step depends on the positions alone, whatever the candidates;
+ * lagged friction also on the velocities. */
 static drape_status restore(drape_contact *c)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
@@ -42,6 +45,8 @@ static drape_status restore(drape_contact *c)
     if (!c->begun)
         return DRAPE_OK;
     drape_status status = drape_contact_list(c, &start);
+    memcpy(c->v, c->start_v, 3 * (size_t)c->broad.points * sizeof *c->v);
+    memcpy(c->pose, c->start_pose, (size_t)c->model->collider_count * sizeof *c->pose);
     if (!status)
         status = drape_contact_lag(c);
     if (!status)
@@ -55,13 +60,15 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     drape_archive_mark(a, "contact");
     drape_archive_bool(a, &c->begun);
     drape_archive_doubles(a, c->start, points);
+    drape_archive_doubles(a, c->start_v, points);
     drape_archive_bytes(a, c->start_pose, colliders * sizeof *c->start_pose);
     archive_couplings(c, a);
     drape_archive_double(a, &c->seconds);
     drape_archive_double(a, &c->search_seconds);
     if (!drape_archive_has_read(a))
         return;
-    if (!drape_all_finite(c->start, points) || !are_finite(c->start_pose, c->model->collider_count))
+    if (!drape_all_finite(c->start, points) || !drape_all_finite(c->start_v, points) ||
+        !are_finite(c->start_pose, c->model->collider_count))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has positions that are not finite");
     else
         drape_archive_note(a, restore(c));

@@ -7,6 +7,7 @@
  *     pair.c         narrow phase: closest points, gap, normal and weights of a candidate, evaluated once
  *     active.c       the active set: candidates whose gap is below the activation distance, equal ones merged
  *     force.c        energy, gradient and Hessian of an active contact, by the barrier (barrier.h)
+ *     restitution.c  the dissipative part of its normal force
  *     friction.c     its friction, with the normal force of now or, lagged, of the beginning of the step
  *     jacobian.c     dg/dx + w dg/dv of the active set, block by block into the pattern
  *
@@ -27,7 +28,7 @@
 static drape_status take_arrays(drape_arena *arena, drape_contact *c)
 {
     const size_t points = (size_t)c->broad.points, colliders = (size_t)c->model->collider_count;
-    double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start, &c->ahead};
+    double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start, &c->start_v, &c->ahead};
     drape_collider_pose **const poses[] = {&c->pose, &c->start_pose, &c->path_pose};
     for (size_t i = 0; i < sizeof positions / sizeof *positions; i++)
         *positions[i] = drape_arena_take(arena, points, 3 * sizeof(double));
@@ -224,6 +225,7 @@ int32_t drape_contact_active(const drape_contact *c, double *least_gap)
 
 drape_status drape_contact_lag(drape_contact *c)
 {
+    double v[4][3];
     c->lagged_count = 0;
     if (!c->model->contact.lagged)
         return DRAPE_OK;
@@ -237,8 +239,10 @@ drape_status drape_contact_lag(drape_contact *c)
         if (!lagged)
             return DRAPE_E_MEMORY;
         c->lagged = lagged;
+        drape_contact_velocities(c, contact, v);
+        const drape_normal normal = drape_normal_at(&contact->gap, &law, v);
         c->lagged[c->lagged_count++] =
-            (drape_lagged){.contact = *contact, .lambda = drape_contact_normal_force(&contact->gap, &law)};
+            (drape_lagged){.contact = *contact, .force = drape_normal_force(&normal)};
     }
     return DRAPE_OK;
 }
@@ -257,6 +261,16 @@ void drape_contact_measure_start(drape_contact *c)
     }
 }
 
+/* Colliders have their velocities of time t here, because the size of the step is not known yet. */
+static drape_status lag_at(drape_contact *c, const double *v, double t)
+{
+    for (int32_t i = 0; i < c->model->collider_count; i++)
+        if (drape_motion_moves_collider(c->motion, i))
+            drape_motion_collider_velocity(c->motion, i, t, t, c->pose[i].velocity);
+    fill_velocities(c, v, c->v);
+    return drape_contact_lag(c);
+}
+
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
     const double start = drape_clock_seconds();
@@ -264,11 +278,12 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     drape_status status =
         drape_contact_update(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}});
     if (!status)
-        status = drape_contact_lag(c);
+        status = lag_at(c, v, t);
     if (!status) {
         drape_contact_measure_start(c);
         c->begun = true;
         memcpy(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x);
+        memcpy(c->start_v, c->v, 3 * (size_t)c->broad.points * sizeof *c->v);
         memcpy(c->start_pose, c->pose, (size_t)c->model->collider_count * sizeof *c->pose);
     }
     c->seconds += drape_clock_seconds() - start;

@@ -40,8 +40,9 @@ void drape_contact_end(drape_contact *contact);
  * derivatives. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_evaluate_at(drape_contact *contact, const drape_contact_at *at);
 
-/* Adds the normal forces, friction, or both, to g (node_count x 3). */
-void drape_contact_add_forces(drape_contact *contact, bool normal, bool friction, double *g);
+/* Adds the forces of the energy, the dissipative ones (restitution and friction), or both, to g (node_count x
+ * 3). */
+void drape_contact_add_forces(drape_contact *contact, bool conservative, bool dissipative, double *g);
 
 /* The forces of the last drape_contact_add_forces on each collider (collider_count x 3) [N], with the sign of
  * g. */
@@ -49,20 +50,30 @@ const double *drape_contact_on_colliders(const drape_contact *contact);
 
 double drape_contact_potential(const drape_contact *contact); /* [J] */
 
-/* Adds dg/dx + weight dg/dv, or dg/dv alone, of pairs of free nodes to values in the pattern, which must
- * have their blocks. gauss_newton: adds a positive semidefinite approximation, the Gauss-Newton part of the
- * Hessians of the energy (contact/force.h), and instead of the derivatives of friction a symmetric upper
- * bound of its dg/dv (contact/friction.h). */
-void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velocity_only, bool gauss_newton,
+/* Which derivatives of pairs of free nodes are added. */
+typedef enum drape_contact_derivatives {
+    DRAPE_CONTACT_EXACT,       /* dg/dx + weight dg/dv */
+    DRAPE_CONTACT_SYMMETRIC,   /* the same; in models where no friction is implicit, its symmetric part, which
+                               differs from it only by restitution */
+    DRAPE_CONTACT_VELOCITY,    /* dg/dv */
+    DRAPE_CONTACT_GAUSS_NEWTON /* a positive semidefinite approximation: the Gauss-Newton part of the Hessians
+                                  of the energy (contact/force.h), and symmetric upper bounds of the weight
+                                  dg/dv of restitution and friction (contact/restitution.h,
+                                  contact/friction.h) */
+} drape_contact_derivatives;
+
+/* Adds them to values in the pattern, which must have their blocks. */
+void drape_contact_add_jacobian(drape_contact *contact, double weight, drape_contact_derivatives which,
                                 const drape_pattern *pattern, double *values);
 
-/* Whether the derivatives of all contacts are symmetric: those of friction are with lagged normal forces. */
+/* Whether DRAPE_CONTACT_SYMMETRIC is symmetric: no friction follows the normal force within a step. */
 bool drape_contact_is_symmetric(const drape_contact *contact);
 
-/* Takes out of values, which have drape_contact_add_jacobian without gauss_newton, how friction changes with
- * the normal force and with the place of contact: what remains is symmetric, and positive semidefinite for
- * each contact in its tangential plane. */
-void drape_contact_fix_friction(drape_contact *contact, const drape_pattern *pattern, double *values);
+/* Takes out of values, to which drape_contact_add_jacobian added DRAPE_CONTACT_SYMMETRIC with the same
+ * weight, how friction changes with the normal force and with the place of contact: what remains of friction
+ * is symmetric, and positive semidefinite for each contact in its tangential plane. */
+void drape_contact_fix_friction(drape_contact *contact, double weight, const drape_pattern *pattern,
+                                double *values);
 
 /* Whether the pattern has the blocks of all active contacts. */
 bool drape_contact_is_in_pattern(const drape_contact *contact, const drape_pattern *pattern);

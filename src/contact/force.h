@@ -11,10 +11,12 @@
 
 /* The constants of a contact. */
 typedef struct drape_contact_law {
-    double distance;  /* d [m] */
-    double stiffness; /* K [N] */
-    double friction;  /* mu [1] */
-    double velocity;  /* eps [m/s] */
+    double distance;             /* d [m] */
+    double stiffness;            /* K [N] */
+    double friction;             /* mu [1] */
+    double velocity;             /* eps [m/s] */
+    double damping;              /* kappa of restitution.h [1]; 0: elastic */
+    double restitution_velocity; /* its eps [m/s] */
 } drape_contact_law;
 
 double drape_contact_energy(const drape_gap *gap, const drape_contact_law *law);

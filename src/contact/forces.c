@@ -11,11 +11,14 @@
 drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair *pair)
 {
     const drape_contact_def *def = &c->model->contact;
+    const drape_collider *collider = pair->collider >= 0 ? &c->model->colliders[pair->collider] : NULL;
+    const double e = collider ? collider->restitution : def->self_restitution;
     return (drape_contact_law){.distance = pair->distance,
                                .stiffness = def->stiffness * pair->area * (def->distance / pair->distance),
-                               .friction = pair->collider >= 0 ? c->model->colliders[pair->collider].friction
-                                                               : def->self_friction,
-                               .velocity = def->friction_velocity};
+                               .friction = collider ? collider->friction : def->self_friction,
+                               .velocity = def->friction_velocity,
+                               .damping = (1 - e * e) / (1 + e * e),
+                               .restitution_velocity = def->restitution_velocity};
 }
 
 void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3])
@@ -37,8 +40,8 @@ static void scatter(drape_contact *c, const drape_active_contact *contact, const
         }
 }
 
-static void add_normal(drape_contact *c, const drape_active_contact *contact, const drape_contact_law *law,
-                       double *g)
+static void add_elastic(drape_contact *c, const drape_active_contact *contact, const drape_contact_law *law,
+                        double *g)
 {
     double local[12];
     drape_contact_gradient(&contact->gap, law, local);
@@ -46,31 +49,50 @@ static void add_normal(drape_contact *c, const drape_active_contact *contact, co
 }
 
 static void add_friction(drape_contact *c, const drape_active_contact *contact, const drape_contact_law *law,
-                         double lambda, double *g)
+                         double force, double v[4][3], double *g)
 {
-    double local[12], v[4][3];
-    drape_contact_velocities(c, contact, v);
-    drape_friction_force(&contact->gap, law, lambda, v, local, NULL);
+    double local[12];
+    drape_friction_force(&contact->gap, law, force, v, local, NULL);
     scatter(c, contact, local, g);
 }
 
-void drape_contact_add_forces(drape_contact *c, bool normal, bool friction, double *g)
+/* The dissipative part of the normal force, and friction that is not lagged. */
+static void add_dissipative(drape_contact *c, const drape_active_contact *contact,
+                            const drape_contact_law *law, double *g)
+{
+    const bool friction = law->friction > 0 && !c->model->contact.lagged;
+    double local[12], v[4][3];
+    if (!friction && !(law->damping > 0))
+        return;
+    drape_contact_velocities(c, contact, v);
+    const drape_normal normal = drape_normal_at(&contact->gap, law, v);
+    if (law->damping > 0) {
+        drape_restitution_force(&contact->gap, &normal, local);
+        scatter(c, contact, local, g);
+    }
+    if (friction)
+        add_friction(c, contact, law, drape_normal_force(&normal), v, g);
+}
+
+void drape_contact_add_forces(drape_contact *c, bool conservative, bool dissipative, double *g)
 {
     const double start = drape_clock_seconds();
     memset(c->on_collider, 0, 3 * (size_t)c->model->collider_count * sizeof *c->on_collider);
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
         const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
-        if (normal)
-            add_normal(c, contact, &law, g);
-        if (friction && !c->model->contact.lagged && law.friction > 0)
-            add_friction(c, contact, &law, drape_contact_normal_force(&contact->gap, &law), g);
+        if (conservative)
+            add_elastic(c, contact, &law, g);
+        if (dissipative)
+            add_dissipative(c, contact, &law, g);
     }
-    const int32_t lagged_count = friction ? c->lagged_count : 0;
+    const int32_t lagged_count = dissipative ? c->lagged_count : 0;
     for (int32_t i = 0; i < lagged_count; i++) {
         const drape_lagged *lagged = &c->lagged[i];
         const drape_contact_law law = drape_contact_law_of(c, &lagged->contact.pair);
-        add_friction(c, &lagged->contact, &law, lagged->lambda, g);
+        double v[4][3];
+        drape_contact_velocities(c, &lagged->contact, v);
+        add_friction(c, &lagged->contact, &law, lagged->force, v, g);
     }
     c->seconds += drape_clock_seconds() - start;
 }

@@ -2,7 +2,6 @@
 #include "contact/friction.h"
 
 #include "base/vec3.h"
-#include "contact/barrier.h"
 
 #define D 12
 
@@ -73,22 +72,26 @@ void drape_friction_bound(const drape_gap *gap, const drape_contact_law *law, do
                               ((i % 3 == j % 3) - n[i % 3] * n[j % 3]);
 }
 
-/* With F = a u_t: dg_i = mu (lambda F dc_i + c_i F dlambda + c_i lambda dF), and
+/* With F = a u_t: dg_i = mu (c_i F dlambda + lambda F dc_i + c_i lambda dF), and
  * du_t = P du - (n.u) dn - n (u.dn),  du = sum v_i dc_i. */
+void drape_friction_add_normal(const drape_gap *gap, const drape_contact_law *law, const double *dlambda,
+                               double v[4][3], double *dg)
+{
+    const int d = 3 * gap->closest.points;
+    const slip s = slip_of(gap, law, v);
+    for (int i = 0; i < d; i++)
+        for (int j = 0; j < d; j++)
+            dg[D * i + j] += gap->closest.c[i / 3] * law->friction * s.a * s.tangent[i % 3] * dlambda[j];
+}
+
 void drape_friction_add_dgdx(const drape_gap *gap, const drape_gap_derivatives *derivatives,
-                             const drape_contact_law *law, double v[4][3], double *dgdx)
+                             const drape_contact_law *law, double lambda, double v[4][3], double *dg)
 {
     int d = 3 * gap->closest.points;
     slip s = slip_of(gap, law, v);
-    drape_barrier b = drape_barrier_at(gap->value / law->distance);
-    double m = gap->m, lambda = drape_contact_normal_force(gap, law),
-           normal_speed = vec3_dot(s.u, gap->closest.normal), mu = law->friction;
+    double normal_speed = vec3_dot(s.u, gap->closest.normal), scale = law->friction * lambda;
     for (int j = 0; j < d; j++) {
         double du[3] = {0}, dn[3], df[3];
-        double dlambda =
-            -m * law->stiffness / law->distance * b.ddb * gap->closest.c[j / 3] * gap->closest.normal[j % 3];
-        if (gap->mollified)
-            dlambda -= law->stiffness * b.db * gap->dm[j];
         for (int i = 0; i < gap->closest.points; i++)
             vec3_add_scaled(derivatives->closest.c[i][j], v[i], du);
         for (int k = 0; k < 3; k++)
@@ -98,8 +101,7 @@ void drape_friction_add_dgdx(const drape_gap *gap, const drape_gap_derivatives *
         vec3_add_scaled(-vec3_dot(s.u, dn), gap->closest.normal, du);
         turn(&s, du, df);
         for (int i = 0; i < d; i++)
-            dgdx[D * i + j] +=
-                mu * (lambda * s.a * s.tangent[i % 3] * derivatives->closest.c[i / 3][j] +
-                      gap->closest.c[i / 3] * (dlambda * s.a * s.tangent[i % 3] + lambda * df[i % 3]));
+            dg[D * i + j] += scale * (s.a * s.tangent[i % 3] * derivatives->closest.c[i / 3][j] +
+                                      gap->closest.c[i / 3] * df[i % 3]);
     }
 }

@@ -3,12 +3,12 @@
  * tangential velocity u_t of the closest points (Li et al. 2020, eq. 15 to 17, with velocities instead of
  * displacements over a step):
  *     g_i = c_i mu lambda f(|u_t|/eps) u_t/|u_t|,   f(y) = 2 y - y^2 for y < 1, else 1
- * with the normal force lambda at the same positions or, lagged, at the beginning of the step.
+ * with the normal force lambda at the same point (restitution.h) or, lagged, at the beginning of the step.
  */
 #ifndef DRAPE_CONTACT_FRICTION_H
 #define DRAPE_CONTACT_FRICTION_H
 
-#include "contact/force.h"
+#include "contact/restitution.h"
 
 /* At velocities v of the points: g (12) and, unless it is NULL, dg/dv (12 x 12). dg/dx is zero for fixed
  * lambda, c and normal. */
@@ -21,8 +21,11 @@ void drape_friction_force(const drape_gap *gap, const drape_contact_law *law, do
 void drape_friction_bound(const drape_gap *gap, const drape_contact_law *law, double lambda, double v[4][3],
                           double *dgdv);
 
-/* Adds dg/dx of friction that is not lagged to dgdx (12 x 12): its change with lambda, c and the normal. */
+/* Add to dg (12 x 12), for friction that is not lagged, the derivatives for a change dlambda (12) of the
+ * normal force, and those of c and the normal by x. */
+void drape_friction_add_normal(const drape_gap *gap, const drape_contact_law *law, const double *dlambda,
+                               double v[4][3], double *dg);
 void drape_friction_add_dgdx(const drape_gap *gap, const drape_gap_derivatives *derivatives,
-                             const drape_contact_law *law, double v[4][3], double *dgdx);
+                             const drape_contact_law *law, double lambda, double v[4][3], double *dg);
 
 #endif

@@ -35,26 +35,66 @@ static void add_blocks(const drape_contact *c, const drape_active_contact *conta
         }
 }
 
-/* The requested derivatives: dg/dx + weight dg/dv, or weight dg/dv alone. */
 typedef struct request {
     double weight;
-    bool velocity_only, gauss_newton;
+    drape_contact_derivatives which;
 } request;
 
-/* Adds weight dg/dv of friction with the normal force lambda. */
-static void add_friction(const drape_contact *c, const request *want, const drape_active_contact *contact,
-                         const drape_contact_law *law, double lambda, double *h)
+/* Adds weight dg/dv of friction with the normal force `force`. */
+static void add_friction(const request *want, const drape_active_contact *contact,
+                         const drape_contact_law *law, double force, double v[4][3], double *h)
 {
     const int d = 3 * contact->gap.closest.points;
-    double v[4][3], g[D], dgdv[D * D];
-    drape_contact_velocities(c, contact, v);
-    if (want->gauss_newton)
-        drape_friction_bound(&contact->gap, law, lambda, v, dgdv);
+    double g[D], dgdv[D * D];
+    if (want->which == DRAPE_CONTACT_GAUSS_NEWTON)
+        drape_friction_bound(&contact->gap, law, force, v, dgdv);
     else
-        drape_friction_force(&contact->gap, law, lambda, v, g, dgdv);
+        drape_friction_force(&contact->gap, law, force, v, g, dgdv);
     for (int i = 0; i < d; i++)
         for (int j = 0; j < d; j++)
             h[D * i + j] += want->weight * dgdv[D * i + j];
+}
+
+/* Adds the derivatives of the dissipative part of the normal force and of friction that is not lagged;
+ * derivatives: NULL unless those by x are requested. */
+static void add_dissipative(const drape_contact *c, const request *want, const drape_active_contact *contact,
+                            const drape_contact_law *law, const drape_gap_derivatives *derivatives, double *h)
+{
+    const drape_gap *gap = &contact->gap;
+    const bool friction = law->friction > 0 && !c->model->contact.lagged;
+    drape_normal_derivatives by_x;
+    double v[4][3], change[D];
+    if (!friction && !(law->damping > 0))
+        return;
+    drape_contact_velocities(c, contact, v);
+    const drape_normal normal = drape_normal_at(gap, law, v);
+    if (derivatives)
+        drape_normal_derive(gap, derivatives, law, v, &by_x);
+    if (law->damping > 0)
+        drape_restitution_add_dgdv(
+            gap, &normal,
+            want->weight * (want->which == DRAPE_CONTACT_GAUSS_NEWTON ? normal.secant : normal.slope), h);
+    if (law->damping > 0 && derivatives)
+        drape_restitution_add_dgdx(gap, derivatives, &normal, &by_x, h);
+    if (!friction)
+        return;
+    add_friction(want, contact, law, drape_normal_force(&normal), v, h);
+    if (want->which == DRAPE_CONTACT_GAUSS_NEWTON)
+        return;
+    drape_normal_by_v(gap, &normal, want->weight, change);
+    if (derivatives) {
+        drape_normal_add_by_x(gap, &normal, &by_x, change);
+        drape_friction_add_dgdx(gap, derivatives, law, drape_normal_force(&normal), v, h);
+    }
+    drape_friction_add_normal(gap, law, change, v, h);
+}
+
+/* h = (h + h')/2 of so many points */
+static void symmetrize(int points, double *h)
+{
+    for (int i = 0; i < 3 * points; i++)
+        for (int j = 0; j < i; j++)
+            h[D * i + j] = h[D * j + i] = (h[D * i + j] + h[D * j + i]) / 2;
 }
 
 /* The derivatives of one active contact, h (12 x 12). */
@@ -63,45 +103,19 @@ static void differentiate(const drape_contact *c, const request *want, const dra
 {
     const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
     const drape_configuration now = drape_contact_configuration(c);
-    const bool friction = law.friction > 0 && !c->model->contact.lagged;
-    const bool exact = !want->velocity_only && !want->gauss_newton;
+    const bool by_x = want->which == DRAPE_CONTACT_EXACT || want->which == DRAPE_CONTACT_SYMMETRIC;
     drape_gap_derivatives derivatives;
-    double v[4][3];
-    if (exact) {
+    if (by_x) {
         drape_pair_derivatives(&contact->pair, &contact->gap, &now, c->broad.rest, &derivatives);
         drape_contact_hessian(&contact->gap, &derivatives, &law, h);
-    } else if (want->velocity_only) {
+    } else if (want->which == DRAPE_CONTACT_VELOCITY) {
         memset(h, 0, D * 3 * (size_t)contact->gap.closest.points * sizeof *h);
     } else {
         drape_contact_gauss_newton(&contact->gap, &law, h);
     }
-    if (!friction)
-        return;
-    add_friction(c, want, contact, &law, drape_contact_normal_force(&contact->gap, &law), h);
-    if (exact) {
-        drape_contact_velocities(c, contact, v);
-        drape_friction_add_dgdx(&contact->gap, &derivatives, &law, v, h);
-    }
-}
-
-void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_only, bool gauss_newton,
-                                const drape_pattern *pattern, double *values)
-{
-    const double start = drape_clock_seconds();
-    const request want = {velocity_only ? 1 : weight, velocity_only, gauss_newton};
-    double h[D * D];
-    for (int32_t i = 0; i < c->active.count; i++) {
-        differentiate(c, &want, &c->active.contacts[i], h);
-        add_blocks(c, &c->active.contacts[i], h, pattern, values);
-    }
-    for (int32_t i = 0; i < c->lagged_count; i++) {
-        const drape_lagged *lagged = &c->lagged[i];
-        const drape_contact_law law = drape_contact_law_of(c, &lagged->contact.pair);
-        memset(h, 0, sizeof h);
-        add_friction(c, &want, &lagged->contact, &law, lagged->lambda, h);
-        add_blocks(c, &lagged->contact, h, pattern, values);
-    }
-    c->seconds += drape_clock_seconds() - start;
+    add_dissipative(c, want, contact, &law, by_x ? &derivatives : NULL, h);
+    if (want->which == DRAPE_CONTACT_SYMMETRIC)
+        symmetrize(contact->gap.closest.points, h);
 }
 
 bool drape_contact_is_symmetric(const drape_contact *c)
@@ -112,20 +126,49 @@ bool drape_contact_is_symmetric(const drape_contact *c)
     return !friction || c->model->contact.lagged;
 }
 
-void drape_contact_fix_friction(drape_contact *c, const drape_pattern *pattern, double *values)
+void drape_contact_add_jacobian(drape_contact *c, double weight, drape_contact_derivatives which,
+                                const drape_pattern *pattern, double *values)
+{
+    const double start = drape_clock_seconds();
+    const bool exact = which == DRAPE_CONTACT_SYMMETRIC && !drape_contact_is_symmetric(c);
+    const request want = {which == DRAPE_CONTACT_VELOCITY ? 1 : weight, exact ? DRAPE_CONTACT_EXACT : which};
+    double h[D * D];
+    for (int32_t i = 0; i < c->active.count; i++) {
+        differentiate(c, &want, &c->active.contacts[i], h);
+        add_blocks(c, &c->active.contacts[i], h, pattern, values);
+    }
+    for (int32_t i = 0; i < c->lagged_count; i++) {
+        const drape_lagged *lagged = &c->lagged[i];
+        const drape_contact_law law = drape_contact_law_of(c, &lagged->contact.pair);
+        double v[4][3];
+        memset(h, 0, sizeof h);
+        drape_contact_velocities(c, &lagged->contact, v);
+        add_friction(&want, &lagged->contact, &law, lagged->force, v, h);
+        add_blocks(c, &lagged->contact, h, pattern, values);
+    }
+    c->seconds += drape_clock_seconds() - start;
+}
+
+void drape_contact_fix_friction(drape_contact *c, double weight, const drape_pattern *pattern, double *values)
 {
     const double start = drape_clock_seconds();
     const drape_configuration now = drape_contact_configuration(c);
-    for (int32_t i = 0; i < c->active.count; i++) {
+    for (int32_t i = 0; i < c->active.count && !c->model->contact.lagged; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
         const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
         drape_gap_derivatives derivatives;
-        double v[4][3], h[D * D] = {0};
-        if (!(law.friction > 0) || c->model->contact.lagged)
+        drape_normal_derivatives by_x;
+        double v[4][3], change[D], h[D * D] = {0};
+        if (!(law.friction > 0))
             continue;
         drape_pair_derivatives(&contact->pair, &contact->gap, &now, c->broad.rest, &derivatives);
         drape_contact_velocities(c, contact, v);
-        drape_friction_add_dgdx(&contact->gap, &derivatives, &law, v, h);
+        const drape_normal normal = drape_normal_at(&contact->gap, &law, v);
+        drape_normal_derive(&contact->gap, &derivatives, &law, v, &by_x);
+        drape_normal_by_v(&contact->gap, &normal, weight, change);
+        drape_normal_add_by_x(&contact->gap, &normal, &by_x, change);
+        drape_friction_add_dgdx(&contact->gap, &derivatives, &law, drape_normal_force(&normal), v, h);
+        drape_friction_add_normal(&contact->gap, &law, change, v, h);
         for (int k = 0; k < D * D; k++)
             h[k] = -h[k];
         add_blocks(c, contact, h, pattern, values);

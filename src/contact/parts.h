@@ -9,13 +9,14 @@
 #include "contact/active.h"
 #include "contact/contact.h"
 #include "contact/friction.h"
+#include "contact/restitution.h"
 
 #define DRAPE_KEEP_STEP 1e-3 /* of a gap: coming nearer than that within a step counts as a crossing */
 
 /* A contact and its normal force at the beginning of the step. */
 typedef struct drape_lagged {
     drape_active_contact contact;
-    double lambda; /* [N] */
+    double force; /* [N] */
 } drape_lagged;
 
 struct drape_contact {
@@ -37,7 +38,7 @@ struct drape_contact {
     double *ahead;      /* (points x 3) the end of the path of a search */
 
     bool begun;                      /* a step has begun: */
-    double *start;                   /* (points x 3) its beginning */
+    double *start, *start_v;         /* (points x 3) its beginning */
     drape_collider_pose *start_pose; /* (collider_count) */
     double *start_gaps;   /* (node_count) smallest distance from the surfaces of colliders, at most 0 [m] */
     double start_least;   /* smallest gap of a feature of a collider, at most 0 [m] */

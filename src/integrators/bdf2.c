@@ -114,7 +114,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     memcpy(out->x, e->x, e->nodes * sizeof *out->x);
     memcpy(out->v, e->v, e->nodes * sizeof *out->v);
     remember(s, in, out, h);
-    drape_implicit_audit(&s->common, in, out, info);
+    drape_implicit_audit_stage(&s->common, in->x, out->x, in->t, h, e->probe, info);
     return status;
 }
 

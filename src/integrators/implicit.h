@@ -70,9 +70,11 @@ void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const
                           drape_step_info *info);
 
 /* The same over one stage, from and to positions of all nodes, from t to t + span, by the midpoint rule with
- * the mean velocity: for methods of several stages, or with forces at both ends of a stage. If powers at the
- * two ends were used, the force of a stiff dashpot at a jump of a pin's velocity would count for a large part
- * of the step. Overwrites the base of the equation and g (nodes). */
+ * the mean velocity: for methods of several stages, with forces at both ends of a stage, or whose velocity is
+ * not that of the displacement. In an impact within a step of such a method, a pair may approach by its
+ * velocity and part by its displacement, and would dissipate negative energy. If powers at the two ends were
+ * used, the force of a stiff dashpot at a jump of a pin's velocity would count for a large part of the step.
+ * Overwrites the base of the equation and g (nodes). */
 void drape_implicit_audit_stage(drape_implicit *implicit, const double *from, const double *to, double t,
                                 double span, double *g, drape_step_info *info);
 

@@ -78,19 +78,22 @@ typedef struct drape_collider {
     drape_choice choice; /* the choice of the scene */
     double values[DRAPE_MAX_PARAMS];
     drape_collider_shape shape;
-    double friction;   /* Coulomb's mu [1] */
-    drape_track track; /* displacement from the position that its values define; no keys: it does not move */
+    double friction;    /* Coulomb's mu [1] */
+    double restitution; /* e [1] */
+    drape_track track;  /* displacement from the position that its values define; no keys: it does not move */
 } drape_collider;
 
 /* Resolved parameters of contact. */
 typedef struct drape_contact_def {
-    double distance;          /* activation distance between cloth and collider [m] */
-    double stiffness;         /* scale of the contact pressure [Pa] */
-    double friction_velocity; /* sliding speed below which friction falls to zero [m/s] */
-    bool lagged;              /* friction uses the normal force and direction from the start of the step */
-    bool self;                /* contact of cloth with cloth */
-    double self_thickness;    /* half the distance that layers of cloth keep [m] */
-    double self_friction;     /* mu [1] */
+    double distance;             /* activation distance between cloth and collider [m] */
+    double stiffness;            /* scale of the contact pressure [Pa] */
+    double friction_velocity;    /* sliding speed below which friction falls to zero [m/s] */
+    double restitution_velocity; /* rate of a gap below which less energy than e says is dissipated [m/s] */
+    bool lagged;                 /* friction uses the normal force and direction from the start of the step */
+    bool self;                   /* contact of cloth with cloth */
+    double self_thickness;       /* half the distance that layers of cloth keep [m] */
+    double self_friction;        /* mu [1] */
+    double self_restitution;     /* e [1] */
 } drape_contact_def;
 
 struct drape_model {

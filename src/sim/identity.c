@@ -83,13 +83,15 @@ static uint64_t add_collider(uint64_t hash, const drape_collider *collider)
     hash = add(hash, s->triangle, 3 * (size_t)s->triangle_count * sizeof *s->triangle);
     hash = add_doubles(hash, &s->radius, 1);
     hash = add_doubles(hash, &collider->friction, 1);
+    hash = add_doubles(hash, &collider->restitution, 1);
     return add_track(hash, &collider->track);
 }
 
 static uint64_t add_contact(uint64_t hash, const drape_contact_def *c)
 {
-    const double values[] = {c->distance, c->stiffness,      c->friction_velocity, c->lagged,
-                             c->self,     c->self_thickness, c->self_friction};
+    const double values[] = {
+        c->distance,      c->stiffness,        c->friction_velocity,   c->lagged, c->self, c->self_thickness,
+        c->self_friction, c->self_restitution, c->restitution_velocity};
     return add_doubles(hash, values, sizeof values / sizeof *values);
 }
 

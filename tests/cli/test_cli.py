@@ -672,7 +672,8 @@ def test_info_of_contact():
     assert abs(found["contact"]["stiffness"]["value"] - 2 * 0.2 * 9.81 * 0.19 ** 0.5 / 1e-3) < 1e-6, found["contact"]
     equal((found["contact"]["distance"]["default"], found["contact"]["friction"]["value"]), (True, "implicit"))
     equal(found["self_contact"], {"thickness": {"value": 0.002, "unit": "m", "default": False},
-                                  "friction": {"value": 0, "unit": "1", "default": True}})
+                                  "friction": {"value": 0, "unit": "1", "default": True},
+                                  "restitution": {"value": 0, "unit": "1", "default": True}})
     found = json.loads(good("info", "scene.json", "--json", "--integrator", "verlet"))  # verlet moves nodes instead of applying contact forces
     equal(("contact" in found, list(found["self_contact"])), (False, ["thickness"]))
 

@@ -353,7 +353,7 @@ START_TEST(friction_holds_layers)
             "0.15,"
             " 'transform': {'translate': [0.043, 0.0038, -0.067]}}, 'terms': ['stretch.edge', 'bend.hinge'],"
             " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}}],"
-            " 'gravity': [%g, %g, 0], 'self_contact': {'thickness': 2e-3, 'friction': %g},"
+            " 'gravity': [%g, %g, 0], 'self_contact': {'thickness': 2e-3, 'friction': %g, 'restitution': 1},"
             " 'contact': {'friction': '%s'}, 'integrator': {'dt': 0.01}, 'duration': 1}",
             slope * fall, -fall, mu, i / 2 ? "lagged" : "implicit");
         const int32_t first = 49, count = 25;

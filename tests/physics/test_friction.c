@@ -47,7 +47,8 @@ static scene open_sliding(const sliding *p)
         " 'transform': {'rotate': [0, 0, 1, %.17g]}}, 'velocity': [%.17g, %.17g, 0],"
         " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"
         " 'gravity': [0, %g, 0], 'contact': {'friction_velocity': %g%s},"
-        " 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': [%.17g, %.17g, 0], 'friction': %g%s}],"
+        " 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': [%.17g, %.17g, 0], 'friction': %g,"
+        " 'restitution': 1%s}],"
         " 'integrator': {'method': '%s', 'dt': %g, 'tolerance': %g, 'rtol': %g}, 'duration': 1}",
         WIDTH, HEIGHT, -degrees, p->velocity * c, -p->velocity * s, -GRAVITY, EPS,
         p->contact ? p->contact : "", s, c, p->mu, p->collider ? p->collider : "", p->method, p->dt, TOL,

@@ -51,13 +51,75 @@ static double energy_of(const setting *s)
     return drape_contact_energy(&gap, &s->law);
 }
 
-static void forces_of(const setting *s, double *normal, double *friction)
+/* The force of the energy, the dissipative part of the normal force, friction of the whole normal force, and
+ * that itself. */
+typedef struct forces {
+    double elastic[D], restitution[D], friction[D], normal;
+} forces;
+
+static forces forces_of(const setting *s)
 {
     const drape_gap gap = gap_of(s);
     double v[4][3];
+    forces f = {0};
     memcpy(v, s->v, sizeof v);
-    drape_contact_gradient(&gap, &s->law, normal);
-    drape_friction_force(&gap, &s->law, drape_contact_normal_force(&gap, &s->law), v, friction, NULL);
+    const drape_normal normal = drape_normal_at(&gap, &s->law, v);
+    f.normal = drape_normal_force(&normal);
+    drape_contact_gradient(&gap, &s->law, f.elastic);
+    drape_restitution_force(&gap, &normal, f.restitution);
+    drape_friction_force(&gap, &s->law, f.normal, v, f.friction, NULL);
+    return f;
+}
+
+static forces forces_beside(setting *s, double *coordinate, double by)
+{
+    const double before = *coordinate;
+    *coordinate += by;
+    const forces f = forces_of(s);
+    *coordinate = before;
+    return f;
+}
+
+/* The exact derivatives of these forces by v and by x. */
+typedef struct derivatives {
+    double h[D * D], restitution[2][D * D], friction[2][D * D], normal[2][D];
+} derivatives;
+
+static void derive(const setting *s, derivatives *d)
+{
+    const drape_gap gap = gap_of(s);
+    const drape_configuration at = {.x = s->x};
+    drape_gap_derivatives of_gap;
+    drape_normal_derivatives by_x;
+    double v[4][3], f[D];
+    memset(d, 0, sizeof *d);
+    drape_pair_derivatives(&s->pair, &gap, &at, s->rest, &of_gap);
+    memcpy(v, s->v, sizeof v);
+    const drape_normal normal = drape_normal_at(&gap, &s->law, v);
+    drape_contact_hessian(&gap, &of_gap, &s->law, d->h);
+    drape_normal_derive(&gap, &of_gap, &s->law, v, &by_x);
+    drape_normal_by_v(&gap, &normal, 1, d->normal[0]);
+    drape_normal_add_by_x(&gap, &normal, &by_x, d->normal[1]);
+    drape_restitution_add_dgdv(&gap, &normal, normal.slope, d->restitution[0]);
+    drape_restitution_add_dgdx(&gap, &of_gap, &normal, &by_x, d->restitution[1]);
+    drape_friction_force(&gap, &s->law, drape_normal_force(&normal), v, f, d->friction[0]);
+    drape_friction_add_dgdx(&gap, &of_gap, &s->law, drape_normal_force(&normal), v, d->friction[1]);
+    for (int i = 0; i < 2; i++)
+        drape_friction_add_normal(&gap, &s->law, d->normal[i], v, d->friction[i]);
+}
+
+/* No contact holds its pieces together, and the dissipated power is positive, at any velocity. */
+static void check_dissipation(const setting *s)
+{
+    const forces f = forces_of(s);
+    double power[2] = {0};
+    for (int i = 0; i < D; i++) {
+        power[0] += f.restitution[i] * s->v[i];
+        power[1] += f.friction[i] * s->v[i];
+    }
+    ck_assert_double_ge(f.normal, 0);
+    for (int k = 0; k < 2; k++)
+        ck_assert_double_ge(power[k], -1e-12 * fabs(f.normal));
 }
 
 static double largest(const double *a, int count)
@@ -82,42 +144,42 @@ static void compare(const char *what, const double *exact, const double *differe
 
 static void check_derivatives(setting *s, double e, double limit)
 {
-    const drape_gap gap = gap_of(s);
-    const drape_configuration at = {.x = s->x};
-    drape_gap_derivatives derivatives;
-    double g[D], h[D * D], f[D], dgdv[D * D] = {0}, dgdx[D * D] = {0}, v[4][3];
-    double by_x[D], h_by_x[D * D], f_by_x[D * D], f_by_v[D * D];
-    drape_pair_derivatives(&s->pair, &gap, &at, s->rest, &derivatives);
-    memcpy(v, s->v, sizeof v);
-    drape_contact_gradient(&gap, &s->law, g);
-    drape_contact_hessian(&gap, &derivatives, &s->law, h);
-    drape_friction_force(&gap, &s->law, drape_contact_normal_force(&gap, &s->law), v, f, dgdv);
-    drape_friction_add_dgdx(&gap, &derivatives, &s->law, v, dgdx);
+    derivatives exact;
+    const forces here = forces_of(s);
+    double energy[D], h[D * D], restitution[2][D * D], friction[2][D * D], normal[2][D];
+    derive(s, &exact);
+    check_dissipation(s);
     for (int j = 0; j < D; j++) {
-        double g_[2][D], f_[2][D], energy[2], w_[2][D], unused[D], x = s->x[j], u = s->v[j];
-        for (int side = 0; side < 2; side++) {
-            s->x[j] = x + (side ? e : -e);
-            energy[side] = energy_of(s);
-            forces_of(s, g_[side], f_[side]);
-            s->x[j] = x;
-            s->v[j] = u + (side ? e : -e);
-            forces_of(s, unused, w_[side]);
-            s->v[j] = u;
-        }
-        by_x[j] = (energy[1] - energy[0]) / (2 * e);
-        for (int i = 0; i < D; i++) {
-            h_by_x[D * i + j] = (g_[1][i] - g_[0][i]) / (2 * e);
-            f_by_x[D * i + j] = (f_[1][i] - f_[0][i]) / (2 * e);
-            f_by_v[D * i + j] = (w_[1][i] - w_[0][i]) / (2 * e);
+        const double x = s->x[j];
+        s->x[j] = x + e;
+        energy[j] = energy_of(s);
+        s->x[j] = x - e;
+        energy[j] = (energy[j] - energy_of(s)) / (2 * e);
+        s->x[j] = x;
+        for (int k = 0; k < 2; k++) {
+            double *coordinate = k ? &s->x[j] : &s->v[j];
+            const forces after = forces_beside(s, coordinate, e), before = forces_beside(s, coordinate, -e);
+            normal[k][j] = (after.normal - before.normal) / (2 * e);
+            for (int i = 0; i < D; i++) {
+                restitution[k][D * i + j] = (after.restitution[i] - before.restitution[i]) / (2 * e);
+                friction[k][D * i + j] = (after.friction[i] - before.friction[i]) / (2 * e);
+                if (k)
+                    h[D * i + j] = (after.elastic[i] - before.elastic[i]) / (2 * e);
+            }
         }
     }
-    compare("g", g, by_x, D, limit);
-    compare("h", h, h_by_x, D * D, limit);
-    compare("dfriction/dv", dgdv, f_by_v, D * D, limit);
-    compare("dfriction/dx", dgdx, f_by_x, D * D, limit);
+    compare("g", here.elastic, energy, D, limit);
+    compare("h", exact.h, h, D * D, limit);
+    for (int k = 0; k < 2; k++) {
+        compare(k ? "dN/dx" : "dN/dv", exact.normal[k], normal[k], D, limit);
+        compare(k ? "drestitution/dx" : "drestitution/dv", exact.restitution[k], restitution[k], D * D,
+                limit);
+        compare(k ? "dfriction/dx" : "dfriction/dv", exact.friction[k], friction[k], D * D, limit);
+    }
     for (int i = 0; i < D; i++)
         for (int j = 0; j < i; j++)
-            ck_assert_double_le(fabs(h[D * i + j] - h[D * j + i]), 1e-10 * largest(h, D * D));
+            ck_assert_double_le(fabs(exact.h[D * i + j] - exact.h[D * j + i]),
+                                1e-10 * largest(exact.h, D * D));
 }
 
 /* Which of the weights are 0 identifies the region of the closest points. */
@@ -139,7 +201,12 @@ static void check_kind(drape_pair_kind kind, double speed)
     for (int k = 0; k < 3000; k++) {
         setting s = {
             .pair = {.kind = kind, .node = {0, 1, 2, 3}, .collider = -1, .radius = 0.01, .distance = 0.2},
-            .law = {.distance = 0.2, .stiffness = 3, .friction = 0.4, .velocity = 0.05}};
+            .law = {.distance = 0.2,
+                    .stiffness = 3,
+                    .friction = 0.4,
+                    .velocity = 0.05,
+                    .damping = 0.6,
+                    .restitution_velocity = 0.4}};
         fill(&seed, 0.1, s.x, D);
         fill(&seed, speed, s.v, D);
         fill(&seed, 0.1, s.rest, D);
@@ -184,7 +251,12 @@ START_TEST(test_parallel)
     for (int k = 0; k < 200; k++) {
         setting s = {
             .pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1, .distance = 0.2},
-            .law = {.distance = 0.2, .stiffness = 3, .friction = 0.4, .velocity = 0.05},
+            .law = {.distance = 0.2,
+                    .stiffness = 3,
+                    .friction = 0.4,
+                    .velocity = 0.05,
+                    .damping = 0.6,
+                    .restitution_velocity = 0.4},
             .x = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, -0.001, 0.1, 0.05, 0.001},
             .rest = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, 0, 0.1, 0.05, 0}};
         double noise[D];

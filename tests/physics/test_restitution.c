@@ -1,0 +1,162 @@
+/*
+ * test_restitution.c: the energy of impacts. A patch that falls flat on a floor has one gap, so its rebound
+ * has a closed form for every barrier; all methods return it. What is lost is counted as dissipated, contact
+ * never pulls, and a sheet at rest does not depend on restitution.
+ */
+#include "support/scene.h"
+
+#define DISTANCE 0.01 /* [m] activation distance */
+#define EPS      0.2  /* [m/s] restitution_velocity */
+#define MASS     (0.2 * 0.2 * 0.2)
+#define PARTS    20000 /* of a quadrature */
+
+static const char *const methods[] = {"be", "bdf2", "trbdf2", "midpoint", "ida"};
+#define METHODS (sizeof methods / sizeof *methods)
+
+/* The integral of y / (1 + k f(y)) from 0 to y, f as in contact/restitution.h: m eps^2 of it is the energy
+ * that the barrier takes up from an impact at eps y (k > 0), or returns to a rebound at that
+ * speed (k < 0). */
+static double barrier_energy(double k, double y)
+{
+    double sum = 0;
+    for (int i = 0; i < PARTS; i++) {
+        const double at = (i + 0.5) * y / PARTS;
+        sum += at / (1 + k * (at < 1 ? 2 * at - at * at : 1)) * y / PARTS;
+    }
+    return sum;
+}
+
+/* With one gap s, m u du = N ds: the speed of rebound after an impact at v. */
+static double rebound_of(double e, double v)
+{
+    const double k = (1 - e * e) / (1 + e * e), energy = barrier_energy(k, v / EPS);
+    double low = 0, high = e > 0 ? v / EPS : fmin(1, v / EPS);
+    for (int i = 0; i < 50; i++) {
+        const double y = (low + high) / 2;
+        *(barrier_energy(-k, y) < energy ? &low : &high) = y;
+    }
+    return low * EPS;
+}
+
+/* A patch above a floor, without gravity, thrown down at v, which moves it by `share` of
+ * DISTANCE in a step. */
+static scene open_patch(const char *method, double share, double e, double v)
+{
+    return scene_open(
+        "{'drape': 1, 'gravity': [0,0,0], 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3,"
+        " 'width': 0.2, 'height': 0.2, 'transform': {'translate': [0, 0.0101, 0]}}, 'velocity': [0,%.17g,0],"
+        " 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"
+        " 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': [0,1,0], 'restitution': %.17g}],"
+        " 'contact': {'distance': %g, 'restitution_velocity': %g}, 'integrator': {'method': '%s',"
+        " 'dt': %.17g, 'tolerance': 1e-9, 'rtol': 1e-6}, 'duration': 100}",
+        -v, e, DISTANCE, EPS, method, share * DISTANCE / v);
+}
+
+/* Advances over so many times DISTANCE/20 at the speed v, and looks at the forces after each: a floor without
+ * friction pushes up only. */
+static void advance_patch(scene *s, double v, int count)
+{
+    double f[27];
+    for (int k = 1; k <= count; k++) {
+        scene_advance(s, k * DISTANCE / 20 / v);
+        ck_assert_int_eq(drape_sim_contact_forces(s->sim, f), DRAPE_OK);
+        for (int i = 0; i < 9; i++)
+            ck_assert_double_ge(f[3 * i + 1], 0);
+    }
+}
+
+/* The force acts mostly in the inner half of the activation distance, for n steps in and out together: 100
+ * of methods of second order, which err by a multiple of 1/n^2, and 1600 of be, which errs by a multiple of
+ * 1/n. Of a speed 4 and 8 of these are allowed, and twice as much of an energy: that of the sum of energies
+ * is what the methods lose or gain themselves. */
+START_TEST(patches_rebound_by_their_coefficient)
+{
+    const double coefficients[] = {0, 0.5, 1}, speeds[] = {0.1, 0.5, 2};
+    for (size_t k = 0; k < METHODS; k++)
+        for (int i = 0; i < 9; i++) {
+            const double e = coefficients[i / 3], v = speeds[i % 3], u = rebound_of(e, v);
+            const double own = k == 0 ? 8.0 / 1600 : 4.0 / (100 * 100);
+            scene s = open_patch(methods[k], 1.0 / (k == 0 ? 3200 : 200), e, v);
+            advance_patch(&s, v, (int)(30 * (1 + v / u)));
+            const drape_energy energy = drape_sim_energy(s.sim);
+            const double got = sqrt(2 * energy.kinetic / MASS), all = MASS * v * v / 2;
+            printf("# %s, e = %g: %g m/s rebounds at %.5f of it, law %.5f; dissipated %.4f, numerical %.2g\n",
+                   methods[k], e, v, got / v, u / v, energy.dissipated / all, energy.numerical / all);
+            ck_assert_double_eq(energy.contact, 0);
+            assert_below(fabs(got - u) / v, own);
+            assert_below(fabs(energy.numerical) / all, 2 * own);
+            ck_assert(e == 1 ? energy.dissipated == 0 : energy.dissipated > 0);
+            if (v > 5 * EPS) /* the coefficient itself, up to (1 - e^2) (eps/v)^2 and, of 0, eps/v */
+                assert_below(fabs(got / v - e), e > 0 ? own + (1 - e * e) * EPS * EPS / (v * v) : EPS / v);
+            scene_close(&s);
+        }
+}
+END_TEST
+
+/* A sheet that lies on the floor at rest does so at the same height, to the tolerance of Newton's method
+ * over the weight of a node: equilibria have no velocity. */
+START_TEST(rest_is_the_same)
+{
+    double height[2];
+    for (int k = 0; k < 2; k++) {
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.2,"
+            " 'height': 0.2, 'transform': {'translate': [0, 0.009, 0]}},"
+            " 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200},"
+            " 'terms': ['stretch.edge', 'bend.hinge', {'type': 'drag.viscous', 'coefficient': 10}]}],"
+            " 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': [0,1,0], 'friction': 0.3,"
+            " 'restitution': %d}], 'contact': {'distance': %g},"
+            " 'integrator': {'dt': 0.01, 'tolerance': 1e-12}, 'duration': 10}",
+            k, DISTANCE);
+        scene_advance(&s, 6);
+        height[k] = drape_sim_positions(s.sim)[1];
+        scene_close(&s);
+    }
+    printf("# a sheet at rest: %.12g and %.12g m\n", height[0], height[1]);
+    ck_assert(height[0] > 0.5 * DISTANCE && height[0] < DISTANCE);
+    assert_below(fabs(height[0] - height[1]), 1e-9 * DISTANCE);
+}
+END_TEST
+
+/* A tilted sheet thrown at a floor: methods of second order and ida have one motion after the impact of one
+ * corner, here at 0.1 s, to 1e-3 of its size; be, of first order, is closer with half the step. */
+static void throw_sheet(const char *method, double dt, double rtol, double *x)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 1, 'height': 1,"
+        " 'transform': {'rotate': [0.3, 0.2, 1, 20], 'translate': [0, 0.25, 0]}}, 'velocity': [0.5, -3, 0],"
+        " 'material': {'young_modulus': 1e5, 'thickness': 0.01, 'density': 200}, 'terms': ['stretch.edge',"
+        " 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 0.005}]}], 'colliders': [{'type': 'plane',"
+        " 'point': [0,0,0], 'normal': [0,1,0], 'friction': 0.3}],"
+        " 'integrator': {'method': '%s', 'dt': %.17g, 'rtol': %g}, 'duration': 1}",
+        method, dt, rtol);
+    scene_advance(&s, 0.1);
+    memcpy(x, drape_sim_positions(s.sim), 75 * sizeof *x);
+    scene_close(&s);
+}
+
+static double farthest(const double *x, const double *y)
+{
+    double most = 0;
+    for (int i = 0; i < 75; i++)
+        most = fmax(most, fabs(x[i] - y[i]));
+    return most;
+}
+
+START_TEST(methods_agree_after_an_impact)
+{
+    double x[METHODS][75], coarse[75];
+    for (size_t k = 0; k < METHODS; k++)
+        throw_sheet(methods[k], 1.0 / 8192, 1e-5, x[k]);
+    throw_sheet("be", 1.0 / 4096, 1e-5, coarse);
+    for (size_t k = 1; k < METHODS; k++) {
+        printf("# %s: %.3g m from ida\n", methods[k], farthest(x[k], x[METHODS - 1]));
+        assert_below(farthest(x[k], x[METHODS - 1]), 1e-3);
+    }
+    printf("# be: %.3g m from ida, %.3g m with twice the step\n", farthest(x[0], x[METHODS - 1]),
+           farthest(coarse, x[METHODS - 1]));
+    assert_below(farthest(x[0], x[METHODS - 1]), 0.7 * farthest(coarse, x[METHODS - 1]));
+}
+END_TEST
+
+SUITE("restitution", patches_rebound_by_their_coefficient, rest_is_the_same, methods_agree_after_an_impact)
