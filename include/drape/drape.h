@@ -676,10 +676,12 @@ typedef struct drape_event {
     drape_sim *sim;               /* the sim that the event belongs to */
     const drape_attempt *attempt; /* ATTEMPT only */
     int64_t frame;                /* FRAME: number of the frame, from 0 */
-    double time;                  /* FRAME [s] */
+    double time;                  /* FRAME [s]: frame / frame_rate, up to rounding; see positions */
     const double *positions;  /* FRAME: node_count x 3 [m]; interpolated between the two steps around it by a
-                                 cubic Hermite polynomial or, where that passes through something, linearly,
-                                 or else taken from the nearer step */
+                                 cubic Hermite polynomial or, where that passes through something, on the
+                                 straight line between them, at the nearest free point to the time. If none is
+                                 free, they and the time are those of the later step, also in the other frames
+                                 between the two */
     const double *velocities; /* FRAME: node_count x 3 [m/s]; linear between the two steps around it */
 } drape_event;
 
