@@ -11,7 +11,7 @@
 #include "support/crossings.h"
 #include "support/scene.h"
 
-#define STATES 250 /* accepted states of a run, after which it ends: ida makes thousands */
+#define STATES 1500 /* accepted states of a run, after which it ends: ida makes thousands */
 
 static const char *const methods[] = {"'method': 'be', 'dt': %g",
                                       "'method': 'bdf2', 'dt': %g",
@@ -145,6 +145,7 @@ static void run_all(const char *name, const char *text, double dt)
                method, drape_status_name(status), (long long)p.crossed.states,
                (long long)p.crossed.crossed_states, (long long)p.crossed.crossed_frames,
                (long long)p.crossed.frames, p.crossed.first);
+        fflush(stdout); /* a failed test ends without */
         ck_assert_int_gt(p.crossed.states + (status == DRAPE_E_STEP_TOO_SMALL), 0);
         crossed += found > 0;
         unnamed += status == DRAPE_E_STEP_TOO_SMALL && strstr(message, "(retry_rejected)") &&
