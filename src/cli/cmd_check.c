@@ -189,13 +189,10 @@ const drape_verb drape_verb_check = {
         "SCENE: compares every analytic derivative with central differences at a deformed, rotated, moving\n"
         "state, and counts the edges that pass through triangles at the start. Exit code 0: all derivatives\n"
         "are within their limits.\n"
-        "RUN: the folder of a run. Counts, in each frame, edges of the cloth through its triangles, "
-        "triangles\n"
-        "that reach into a collider, and edges of one through triangles of the other, with each collider "
-        "where\n"
-        "its track has it at the time of the frame. Prints a line for each frame and obstacle with any. "
-        "Exit\n"
-        "code 0: no frame has any.",
+        "RUN, the folder of a run with positions.npy: counts, in each frame, edges of the cloth that pass\n"
+        "through its triangles, triangles that reach into a collider, and edges of either that pass through\n"
+        "triangles of the other, with each collider where its track has it at that time. Prints a line for\n"
+        "each frame and obstacle where there are any. Exit code 0: there are none.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(check_request),
