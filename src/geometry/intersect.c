@@ -1,8 +1,8 @@
 /*
- * intersect.c: see intersect.h. An edge is tested against the triangles whose boxes overlap its box, found in a
- * tree of boxes. The edge p q crosses the plane of a b c if p and q are on different sides of it, and meets
- * the triangle if the line through p and q has a b, b c and c a on the same side: five signs of tetrahedron
- * volumes (equivalent to Moeller & Trumbore 1997).
+ * intersect.c: see intersect.h. An edge is tested against the triangles whose boxes overlap its box, found
+ * in a tree of boxes. The edge p q crosses the plane of a b c if p and q are on different sides of it, and
+ * meets the triangle if the line through p and q has a b, b c and c a on the same side: five signs of
+ * tetrahedron volumes (equivalent to Moeller & Trumbore 1997).
  */
 #include "geometry/intersect.h"
 

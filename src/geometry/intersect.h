@@ -2,9 +2,10 @@
  * intersect.h: finds the edges that pass through triangles: of a cloth with itself, or of cloth and a
  * collider.
  *
- * An edge passes through a triangle if its ends lie strictly on different sides of the triangle's plane, and
- * it meets the triangle, sides and corners included. The signs are exact (geometry/orient.h), so the answer is
- * that for the positions as doubles, however near the parts are; parts that only touch do not count.
+ * An edge passes through a triangle if its ends lie strictly on different sides of the triangle's plane,
+ * and it meets the triangle, sides and corners included. The signs are exact (geometry/orient.h), so the
+ * answer is that for the positions as doubles, however near the parts are; parts that only touch do not
+ * count.
  */
 #ifndef DRAPE_GEOMETRY_INTERSECT_H
 #define DRAPE_GEOMETRY_INTERSECT_H
@@ -20,8 +21,9 @@ typedef struct drape_surface {
 
 drape_surface drape_surface_of(const drape_model *model, const double *x); /* of the cloth */
 
-/* Calls visit for each pair of an edge of `edges` and a triangle of `triangles` that it passes through, edges in
- * their order. If both have the same x, pairs that share a node do not count. Errors: DRAPE_E_MEMORY. */
+/* Calls visit for each pair of an edge of `edges` and a triangle of `triangles` that it passes through,
+ * edges in their order. If both have the same x, pairs that share a node do not count. Errors:
+ * DRAPE_E_MEMORY. */
 typedef void drape_intersection_visit(void *user, int32_t edge, int32_t triangle);
 drape_status drape_intersect(drape_context *ctx, const drape_surface *edges, const drape_surface *triangles,
                              drape_intersection_visit *visit, void *user);

@@ -1,7 +1,7 @@
 /*
- * orient.c: see orient.h. Where rounding may change the sign of the volume in doubles, it is evaluated as an
- * exact sum: 24 products of three coordinates, each of which is a sum of four doubles (Shewchuk 1997, Adaptive
- * Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, sections 2.2 to 2.5).
+ * orient.c: see orient.h. Where rounding may change the sign of the volume in doubles, it is evaluated as
+ * an exact sum: 24 products of three coordinates, each of which is a sum of four doubles (Shewchuk 1997,
+ * Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, sections 2.2 to 2.5).
  */
 #include "geometry/orient.h"
 

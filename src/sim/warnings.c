@@ -82,8 +82,8 @@ static bool has_large_file(drape_sim *sim, char *text, size_t size)
     return false;
 }
 
-/* Free nodes of the cloth inside a collider. A pinned node may be there on purpose, and faces of which only the
- * middle is inside do not count: some contact is kept at nodes only. */
+/* Free nodes of the cloth inside a collider. A pinned node may be there on purpose, and faces of which
+ * only the middle is inside do not count: some contact is kept at nodes only. */
 static int32_t free_nodes_inside(const drape_model *m, int32_t collider, const drape_collider_pose *pose,
                                  const double *x, double *deepest)
 {
@@ -98,8 +98,8 @@ static int32_t free_nodes_inside(const drape_model *m, int32_t collider, const d
     return count;
 }
 
-/* Whether free nodes at x are inside a collider, or it pierces faces of the cloth; writes the text for the first
- * such collider. */
+/* Whether free nodes at x are inside a collider, or it pierces faces of the cloth; writes the text for the
+ * first such collider. */
 static bool describe_inside(const drape_sim *sim, const double *x, bool start, char *text, size_t size)
 {
     const drape_model *m = sim->model;

@@ -1,7 +1,8 @@
 /*
- * test_press.c: cloth that is pressed. Small scenes of the kinds that tools/press draws, by every method with
- * contact: nothing passes through anything, in any accepted state or frame, as counted by support/crossings.h.
- * A run may stop, with a reason and, where contact rejected the last steps, the pieces that were in the way.
+ * test_press.c: cloth that is pressed. Small scenes of the kinds that tools/press draws, by every method
+ * with contact: nothing passes through anything, in any accepted state or frame, as counted by
+ * support/crossings.h. A run may stop, with a reason and, where contact rejected the last steps, the
+ * pieces that met.
  */
 #include <stdio.h>
 #include <unistd.h>
@@ -36,8 +37,9 @@ static scene plate(const char *colliders)
         colliders);
 }
 
-/* A cube of 1 cm with a corner up. 45 degrees about one axis and acos(1/sqrt 3) about another: in one rotation
- * about (1, 0, -1) by acos(1/sqrt 3) the diagonal (1, 1, 1) points up. top: height of the corner. */
+/* A cube of 1 cm with a corner up. 45 degrees about one axis and acos(1/sqrt 3) about another: in one
+ * rotation about (1, 0, -1) by acos(1/sqrt 3) the diagonal (1, 1, 1) points up. top: height of the corner.
+ * */
 static scene plate_and_corner(double top)
 {
     char text[256];
@@ -47,9 +49,9 @@ static scene plate_and_corner(double top)
     return plate(text);
 }
 
-/* The counter, and inside, see a corner as soon as it is through: its three edges, and at a height h above the
- * sheet a depth of h/sqrt 3, the distance of its faces from a point h below it on the diagonal. Sampled points
- * are 0.17 m apart and see nothing. */
+/* The counter, and inside, see a corner as soon as it is through: its three edges, and at a height h above
+ * the sheet a depth of h/sqrt 3, the distance of its faces from a point h below it on the diagonal.
+ * Sampled points are 0.17 m apart and see nothing. */
 START_TEST(a_corner_through_a_face_is_counted)
 {
     static const double heights[] = {-1e-12, 1e-12, 3e-3};
@@ -277,49 +279,25 @@ START_TEST(dropped_at_50_m_per_s)
 }
 END_TEST
 
-#define WALL(x, y, z, a, b, c, to)                                                                           \
-    "{'type': 'plane', 'point': [" x ", " y ", " z "], 'normal': [" a ", " b ", " c                          \
-    "], 'track': [[0, [0, 0, 0]], "                                                                          \
-    "[0.2, [" to "]]]}"
+/* A plane at `at` whose normal leads inwards; it moves by `to` in 0.2 s. */
+#define WALL(at, normal, to)                                                                                 \
+    "{'type': 'plane', 'point': [" at "], 'normal': [" normal "], 'track': [[0, [0, 0, 0]], [0.2, [" to "]]" \
+                                                                                                        "]}"
+#define WALLS                                                                                                \
+    WALL("-0.16, 0, 0", "1, 0, 0", "0.08, 0, 0")                                                             \
+    "," WALL("0.16, 0, 0", "-1, 0, 0", "-0.08, 0, 0") "," WALL(                                              \
+        "0, -0.08, 0", "0, 1, 0",                                                                            \
+        "0, 0.04, 0") "," WALL("0, 0.08, 0", "0, -1, 0",                                                     \
+                               "0, -0.04, 0") "," WALL("0, 0, -0.16", "0, 0, 1",                             \
+                                                       "0, 0, 0.08") "," WALL("0, 0, 0.16", "0, 0, -1",      \
+                                                                              "0, 0, -0.08")
 
 START_TEST(in_a_shrinking_box)
 {
-    run_all(
-        "shrinking",
-        "'cloth': [{" SQUARE(
-            "0") ", " SOFT
-                 "}], 'self_contact': {'thickness': 1e-3}, 'colliders': [" WALL("-0.16", "0", "0", "1", "0", "0", "0.08, 0, 0") ", " WALL(
-                     "0.16", "0", "0", "-1", "0", "0",
-                     "-0.08, 0, 0") ", " WALL("0", "-0.08", "0", "0", "1", "0",
-                                              "0, 0.04, 0") ", " WALL("0", "0.08", "0", "0", "-1", "0",
-                                                                      "0, -0.04, 0") ", " WALL("0", "0",
-                                                                                               "-0.16", "0",
-                                                                                               "0", "1",
-                                                                                               "0, 0, "
-                                                                                               "0.08") ","
-                                                                                                       " " WALL(
-                                                                                                           "0",
-                                                                                                           "0",
-                                                                                                           "0"
-                                                                                                           "."
-                                                                                                           "1"
-                                                                                                           "6",
-                                                                                                           "0",
-                                                                                                           "0",
-                                                                                                           "-"
-                                                                                                           "1",
-                                                                                                           "0"
-                                                                                                           ","
-                                                                                                           " "
-                                                                                                           "0"
-                                                                                                           ","
-                                                                                                           " "
-                                                                                                           "-"
-                                                                                                           "0"
-                                                                                                           "."
-                                                                                                           "0"
-                                                                                                           "8") "]",
-        1.0 / 60);
+    run_all("shrinking",
+            "'cloth': [{" SQUARE("0") ", " SOFT "}], 'self_contact': {'thickness': 1e-3}, "
+                                      "'colliders': [" WALLS "]",
+            1.0 / 60);
 }
 END_TEST
 
@@ -390,8 +368,8 @@ static drape_status note_times(void *user, const drape_event *event)
     return watch(&w->press, event);
 }
 
-/* A ball goes through the sheet and back within one step, so a step sees it at rest; at the time of the frames
- * between no state of the cloth is free of it, and they show the state at the end of the step. */
+/* A ball goes through the sheet and back within one step, so a step sees it at rest; at the time of the
+ * frames between no state of the cloth is free of it, and they show the state at the end of the step. */
 START_TEST(frames_without_room_show_the_end_of_the_step)
 {
     times w = {.rate = 1000, .last = 0, .press = {.accepted = INT64_MIN}};

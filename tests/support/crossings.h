@@ -1,9 +1,9 @@
 /*
- * crossings.h: counts what contact must not let happen, by code of its own: edges of cloth through triangles
- * of cloth, edges of cloth through triangles of colliders, edges and axes of colliders through triangles of
- * cloth, and nodes and points of faces inside a collider. It shares nothing with the library but the mesh, the
- * poses and the distance of a point from a collider, which entries/colliders compares with brute force. Parts
- * of cloth whose nodes are all pinned do not count: they follow their tracks.
+ * crossings.h: counts what contact must not let happen, by code of its own: edges of cloth through
+ * triangles of cloth, edges of cloth through triangles of colliders, edges and axes of colliders through
+ * triangles of cloth, and nodes and points of faces inside a collider. It shares nothing with the library
+ * but the mesh, the poses and the distance of a point from a collider, which entries/colliders compares
+ * with brute force. Parts of cloth whose nodes are all pinned do not count: they follow their tracks.
  */
 #ifndef DRAPE_TESTS_CROSSINGS_H
 #define DRAPE_TESTS_CROSSINGS_H

@@ -144,9 +144,9 @@ START_TEST(a_flat_sheet_has_none)
 }
 END_TEST
 
-/* Points of a grid of steps of 2^-12 around (1, 1, 1) 2^20, far beyond what doubles resolve in a volume: d = a +
- * i (b - a) + j (c - a) lies in the plane exactly, and one step along z beside it on the side of the normal's z.
- * All sums are integers below 2^52 steps, so the points are exact. */
+/* Points of a grid of steps of 2^-12 around (1, 1, 1) 2^20, far beyond what doubles resolve in a volume: d
+ * = a + i (b - a) + j (c - a) lies in the plane exactly, and one step along z beside it on the side of the
+ * normal's z. All sums are integers below 2^52 steps, so the points are exact. */
 START_TEST(signs_are_exact)
 {
     const double step = 1.0 / 4096, origin = 1048576;
@@ -184,8 +184,8 @@ static void count_visits(void *user, int32_t edge, int32_t triangle)
     ++*(int64_t *)user;
 }
 
-/* An edge through the common side of two triangles passes through both, from either side; one that ends on the
- * plane passes through none. */
+/* An edge through the common side of two triangles passes through both, from either side; one that ends on
+ * the plane passes through none. */
 START_TEST(sides_belong_to_triangles)
 {
     const double x[] = {0, 0, 0, 1, 0, 0, 1, 0, 1, 0, 0, 1, 0.5, -1, 0.5, 0.5, 1, 0.5, 0.5, 0, 0.5};
