@@ -282,7 +282,7 @@ END_TEST
 /* A plane at `at` whose normal leads inwards; it moves by `to` in 0.2 s. */
 #define WALL(at, normal, to)                                                                                 \
     "{'type': 'plane', 'point': [" at "], 'normal': [" normal "], 'track': [[0, [0, 0, 0]], [0.2, [" to "]]" \
-                                                                                                        "]}"
+    "]}"
 #define WALLS                                                                                                \
     WALL("-0.16, 0, 0", "1, 0, 0", "0.08, 0, 0")                                                             \
     "," WALL("0.16, 0, 0", "-1, 0, 0", "-0.08, 0, 0") "," WALL(                                              \

@@ -3,7 +3,8 @@
  * triangles of cloth, edges of cloth through triangles of colliders, edges and axes of colliders through
  * triangles of cloth, and nodes and points of faces inside a collider. It shares nothing with the library
  * but the mesh, the poses and the distance of a point from a collider, which entries/colliders compares
- * with brute force. Parts of cloth whose nodes are all pinned do not count: they follow their tracks.
+ * with brute force. Parts of cloth whose nodes are all pinned do not count, nor do those with a
+ * pinned node inside the collider: pins follow their tracks, wherever these lead.
  */
 #ifndef DRAPE_TESTS_CROSSINGS_H
 #define DRAPE_TESTS_CROSSINGS_H
@@ -78,6 +79,7 @@ typedef struct crossings_set {
     int32_t count;
     int nodes;
     const uint8_t *pinned; /* of the nodes; NULL: none is free */
+    const uint8_t *caught; /* pinned nodes inside the collider; NULL: none */
 } crossings_set;
 
 typedef struct crossings_box {
@@ -116,10 +118,14 @@ static inline bool crossings_meet(const crossings_box *a, const crossings_box *b
 
 static inline bool crossings_free(const crossings_set *set, int32_t element)
 {
-    for (int a = 0; set->pinned && a < set->nodes; a++)
-        if (!set->pinned[set->node[element * set->nodes + a]])
-            return true;
-    return false;
+    bool free = false;
+    for (int a = 0; set->pinned && a < set->nodes; a++) {
+        const int32_t node = set->node[element * set->nodes + a];
+        if (set->caught && set->caught[node])
+            return false;
+        free = free || !set->pinned[node];
+    }
+    return free;
 }
 
 static inline bool crossings_apply(const crossings_set *edges, int32_t e, const crossings_set *faces,
@@ -259,16 +265,25 @@ static inline void crossings_depths(const drape_collider *collider, const drape_
  * without self-contact. */
 static inline crossings crossings_count(const drape_model *m, const double *x, double t)
 {
-    const crossings_set edges = {x, m->edge, m->edge_count, 2, m->pinned},
-                        faces = {x, m->triangle, m->triangle_count, 3, m->pinned};
+    crossings_set edges = {x, m->edge, m->edge_count, 2, m->pinned, NULL},
+                  faces = {x, m->triangle, m->triangle_count, 3, m->pinned, NULL};
     crossings found = {0};
     if (m->contact.self)
         found.cloth = crossings_between(&edges, &faces, "cloth in cloth", found.first);
+    uint8_t *caught = malloc((size_t)m->node_count);
+    if (!caught)
+        abort();
+    edges.caught = faces.caught = caught;
     for (int32_t k = 0; k < m->collider_count; k++) {
-        const drape_collider_pose pose = drape_collider_pose_at(&m->colliders[k], t);
-        crossings_collider(&m->colliders[k], &pose, &edges, &faces, &found);
-        crossings_depths(&m->colliders[k], &pose, &faces, &found);
+        const drape_collider *collider = &m->colliders[k];
+        const drape_collider_pose pose = drape_collider_pose_at(collider, t);
+        for (int32_t i = 0; i < m->node_count; i++)
+            caught[i] =
+                m->pinned[i] && drape_collider_distance(collider, &pose, x + 3 * (size_t)i, NULL, NULL) < 0;
+        crossings_collider(collider, &pose, &edges, &faces, &found);
+        crossings_depths(collider, &pose, &faces, &found);
     }
+    free(caught);
     return found;
 }
 
