@@ -9,6 +9,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdbool.h>
 
 #define ROUNDINGS 8           /* of the volume in doubles, relative to the product of the lengths */
 #define SPLITTER  134217729.0 /* 2^27 + 1: splits a double into two halves of its digits */
@@ -31,7 +32,7 @@ static void two_product(double a, double b, double *high, double *low)
     *high = product;
 }
 
-/* A sum of doubles whose digits do not overlap, the smallest first: the last that is not 0 has its sign. */
+/* A sum of doubles that are not 0 and whose digits do not overlap, the smallest first: the last has its sign. */
 typedef struct expansion {
     double part[TERMS];
     int count;
@@ -39,14 +40,23 @@ typedef struct expansion {
 
 static void add(expansion *sum, double term)
 {
-    for (int i = 0; i < sum->count; i++)
-        two_sum(term, sum->part[i], &term, &sum->part[i]);
-    sum->part[sum->count++] = term;
+    int kept = 0;
+    for (int i = 0; i < sum->count; i++) {
+        double low;
+        two_sum(term, sum->part[i], &term, &low);
+        if (low != 0)
+            sum->part[kept++] = low;
+    }
+    if (term != 0)
+        sum->part[kept++] = term;
+    sum->count = kept;
 }
 
 static void add_product(expansion *sum, double a, double b, double c)
 {
     double high, low, part[2];
+    if (a == 0 || b == 0 || c == 0)
+        return;
     two_product(a, b, &high, &low);
     two_product(low, c, &part[0], &part[1]);
     add(sum, part[1]);
@@ -66,18 +76,35 @@ static void add_triple(expansion *sum, double sign, const double *p, const doubl
     }
 }
 
-/* (b - a) . ((c - a) x (d - a)) = b . (c x d) - a . (c x d) + a . (b x d) - a . (b x c) */
-static int orient_exactly(const double *a, const double *b, const double *c, const double *d)
+static int sign_of(const expansion *sum)
+{
+    return sum->count == 0 ? 0 : sum->part[sum->count - 1] > 0 ? 1 : -1;
+}
+
+/* Whether the differences x - y are exact. */
+static bool are_exact(const double *x, const double *y)
+{
+    double high, low[3];
+    for (int k = 0; k < 3; k++)
+        two_sum(x[k], -y[k], &high, &low[k]);
+    return low[0] == 0 && low[1] == 0 && low[2] == 0;
+}
+
+/* Without rounding of u = b - a, v = c - a, w = d - a the volume is u . (v x w); in general it is b . (c x d) -
+ * a . (c x d) + a . (b x d) - a . (b x c). */
+static int orient_exactly(const double *a, const double *b, const double *c, const double *d, const double *u,
+                          const double *v, const double *w)
 {
     expansion sum = {.count = 0};
+    if (are_exact(b, a) && are_exact(c, a) && are_exact(d, a)) {
+        add_triple(&sum, 1, u, v, w);
+        return sign_of(&sum);
+    }
     add_triple(&sum, 1, b, c, d);
     add_triple(&sum, -1, a, c, d);
     add_triple(&sum, 1, a, b, d);
     add_triple(&sum, -1, a, b, c);
-    for (int i = sum.count - 1; i >= 0; i--)
-        if (sum.part[i] != 0)
-            return sum.part[i] > 0 ? 1 : -1;
-    return 0;
+    return sign_of(&sum);
 }
 
 int drape_orient(const double *a, const double *b, const double *c, const double *d)
@@ -90,5 +117,5 @@ int drape_orient(const double *a, const double *b, const double *c, const double
     const double volume = vec3_dot(n, w);
     if (fabs(volume) > ROUNDINGS * DBL_EPSILON * vec3_norm(u) * vec3_norm(v) * vec3_norm(w))
         return volume > 0 ? 1 : -1;
-    return orient_exactly(a, b, c, d);
+    return orient_exactly(a, b, c, d, u, v, w);
 }

@@ -99,6 +99,8 @@ static bool side_crosses(const search *s, int32_t a, int32_t b)
 static bool is_pierced(const search *s, int32_t triangle)
 {
     const int32_t *node = s->model->triangle + 3 * (size_t)triangle;
+    if (s->found->intersections == 0)
+        return false;
     bool crossed = s->pierced[triangle] > 0;
     for (int a = 0; a < 3 && !crossed; a++)
         crossed = side_crosses(s, node[a], node[(a + 1) % 3]);
@@ -135,32 +137,45 @@ static double deepest_between(const search *s, int32_t triangle)
     return depth_at(s, point);
 }
 
-static void count_triangle(search *s, int32_t triangle)
+static search search_of(const drape_model *m, int32_t collider, const drape_collider_pose *pose,
+                        const double *x, drape_inside *found)
 {
-    const int32_t *node = s->model->triangle + 3 * (size_t)triangle;
-    const bool crossed = s->found->intersections > 0 && is_pierced(s, triangle);
-    const double depth = fmax(deepest_sample(s, node), deepest_between(s, triangle));
-    bool pinned = false;
-    for (int a = 0; a < 3; a++)
-        pinned = pinned || s->model->pinned[node[a]];
-    s->found->triangles += crossed || depth > TOUCH;
-    s->found->pierced += crossed && !pinned;
-    s->found->deepest = fmax(s->found->deepest, depth);
+    *found = (drape_inside){.triangles = 0};
+    return (search){.model = m,
+                    .collider = &m->colliders[collider],
+                    .pose = pose,
+                    .cloth = drape_surface_of(m, x),
+                    .found = found};
 }
 
 drape_status drape_find_inside(drape_context *ctx, const drape_model *m, int32_t collider,
                                const drape_collider_pose *pose, const double *x, drape_inside *found)
 {
     drape_arena arena = drape_arena_of(ctx);
-    search s = {.model = m,
-                .collider = &m->colliders[collider],
-                .pose = pose,
-                .cloth = drape_surface_of(m, x),
-                .found = found};
-    *found = (drape_inside){.triangles = 0};
+    search s = search_of(m, collider, pose, x, found);
     drape_status status = intersect(&arena, &s);
-    for (int32_t f = 0; !status && f < m->triangle_count; f++)
-        count_triangle(&s, f);
+    for (int32_t f = 0; !status && f < m->triangle_count; f++) {
+        const double depth = fmax(deepest_sample(&s, m->triangle + 3 * (size_t)f), deepest_between(&s, f));
+        found->triangles += depth > TOUCH || is_pierced(&s, f);
+        found->deepest = fmax(found->deepest, depth);
+    }
+    drape_arena_free(&arena);
+    return status;
+}
+
+drape_status drape_find_pierced(drape_context *ctx, const drape_model *m, int32_t collider,
+                                const drape_collider_pose *pose, const double *x, int32_t *pierced)
+{
+    drape_inside found;
+    drape_arena arena = drape_arena_of(ctx);
+    search s = search_of(m, collider, pose, x, &found);
+    const drape_status status = intersect(&arena, &s);
+    *pierced = 0;
+    for (int32_t f = 0; !status && f < m->triangle_count; f++) {
+        const int32_t *node = m->triangle + 3 * (size_t)f;
+        const bool pinned = m->pinned[node[0]] || m->pinned[node[1]] || m->pinned[node[2]];
+        *pierced += !pinned && is_pierced(&s, f);
+    }
     drape_arena_free(&arena);
     return status;
 }

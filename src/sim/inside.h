@@ -6,7 +6,6 @@
 
 typedef struct drape_inside {
     int32_t triangles; /* of cloth that reach into the collider: a sample is inside, or something crosses */
-    int32_t pierced;   /* those of them without a pinned node that something crosses */
     double deepest;    /* [m] depth of the deepest point found: of samples, and between crossings */
     int64_t intersections; /* edges of one through triangles of the other */
 } drape_inside;
@@ -15,5 +14,10 @@ typedef struct drape_inside {
  * segments of its shape; a round collider has its axis, if it has one. Errors: DRAPE_E_MEMORY. */
 drape_status drape_find_inside(drape_context *ctx, const drape_model *model, int32_t collider,
                                const drape_collider_pose *pose, const double *x, drape_inside *found);
+
+/* Counts the triangles of cloth without a pinned node that an edge of the collider passes through, or with a
+ * side that passes through a triangle of it. Errors: DRAPE_E_MEMORY. */
+drape_status drape_find_pierced(drape_context *ctx, const drape_model *model, int32_t collider,
+                                const drape_collider_pose *pose, const double *x, int32_t *pierced);
 
 #endif

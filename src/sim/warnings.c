@@ -107,7 +107,7 @@ static bool describe_inside(const drape_sim *sim, const double *x, bool start, c
     for (int32_t c = 0; c < m->collider_count; c++) {
         drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], 0);
         const drape_collider_motion motion = drape_sim_collider(sim, c);
-        drape_inside found = {.pierced = 0};
+        int32_t pierced = 0;
         if (!start)
             memcpy(pose.displacement, motion.displacement, sizeof pose.displacement);
         double deepest;
@@ -117,11 +117,11 @@ static bool describe_inside(const drape_sim *sim, const double *x, bool start, c
                      "/colliders/%d: %d free node%s of the cloth %s%s inside %s, up to %.3g m deep%s", (int)c,
                      (int)count, count == 1 ? "" : "s", what, count == 1 ? "s" : "", m->colliders[c].name,
                      deepest, advice);
-        else if (!drape_find_inside(sim->ctx, m, c, &pose, x, &found) && found.pierced > 0)
+        else if (!drape_find_pierced(sim->ctx, m, c, &pose, x, &pierced) && pierced > 0)
             snprintf(text, size, "/colliders/%d: %d triangle%s of the cloth %s%s pierced by %s%s", (int)c,
-                     (int)found.pierced, found.pierced == 1 ? "" : "s", what, found.pierced == 1 ? "s" : "",
+                     (int)pierced, pierced == 1 ? "" : "s", what, pierced == 1 ? "s" : "",
                      m->colliders[c].name, advice);
-        if (count > 0 || found.pierced > 0)
+        if (count > 0 || pierced > 0)
             return true;
     }
     return false;
