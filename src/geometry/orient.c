@@ -32,7 +32,8 @@ static void two_product(double a, double b, double *high, double *low)
     *high = product;
 }
 
-/* A sum of doubles that are not 0 and whose digits do not overlap, the smallest first: the last has its sign. */
+/* A sum of doubles that are not 0 and whose digits do not overlap, the smallest first: the last has the sign
+ * of the sum. */
 typedef struct expansion {
     double part[TERMS];
     int count;
@@ -90,7 +91,7 @@ static bool are_exact(const double *x, const double *y)
     return low[0] == 0 && low[1] == 0 && low[2] == 0;
 }
 
-/* Without rounding of u = b - a, v = c - a, w = d - a the volume is u . (v x w); in general it is b . (c x d) -
+/* If u = b - a, v = c - a and w = d - a are exact, the volume is u . (v x w); in general it is b . (c x d) -
  * a . (c x d) + a . (b x d) - a . (b x c). */
 static int orient_exactly(const double *a, const double *b, const double *c, const double *d, const double *u,
                           const double *v, const double *w)

@@ -36,38 +36,57 @@ static inline int64_t crossings_total(const crossings *c)
 
 /* ---- One edge and one triangle ---- */
 
-/* The sign of the volume of a b c d, or 0 if it is uncertain. Differences of doubles, products and sums each
- * add less than LDBL_EPSILON of their size; there are fewer than 32 of them. */
-static inline int crossings_side(const double *a, const double *b, const double *c, const double *d)
+/* The widest numbers that the compiler has: 113 bits, in software on most processors. */
+#ifdef __SIZEOF_FLOAT128__
+__extension__ typedef __float128 crossings_wide;
+#define CROSSINGS_WIDE_EPSILON 0x1p-112
+#else
+typedef long double crossings_wide;
+#define CROSSINGS_WIDE_EPSILON LDBL_EPSILON
+#endif
+
+/* The sign of the volume of a b c d in numbers of one type, or 0 if it is uncertain. Differences of doubles,
+ * products and sums each add less than the type's epsilon of their size; there are fewer than 32 of them. */
+#define CROSSINGS_SIDE(type, epsilon)                                                                        \
+    type u[3], v[3], w[3], lu = 0, lv = 0, lw = 0;                                                           \
+    for (int k = 0; k < 3; k++) {                                                                            \
+        u[k] = (type)b[k] - a[k];                                                                            \
+        v[k] = (type)c[k] - a[k];                                                                            \
+        w[k] = (type)d[k] - a[k];                                                                            \
+        lu += u[k] < 0 ? -u[k] : u[k];                                                                       \
+        lv += v[k] < 0 ? -v[k] : v[k];                                                                       \
+        lw += w[k] < 0 ? -w[k] : w[k];                                                                       \
+    }                                                                                                        \
+    const type volume = w[0] * (u[1] * v[2] - u[2] * v[1]) + w[1] * (u[2] * v[0] - u[0] * v[2]) +            \
+                        w[2] * (u[0] * v[1] - u[1] * v[0]);                                                  \
+    const type uncertain = 32 * (type)(epsilon)*lu * lv * lw;                                                \
+    return volume > uncertain ? 1 : volume < -uncertain ? -1 : 0;
+
+static inline int crossings_side_wide(const double *a, const double *b, const double *c, const double *d)
 {
-    long double u[3], v[3], w[3], lu = 0, lv = 0, lw = 0;
-    for (int k = 0; k < 3; k++) {
-        u[k] = (long double)b[k] - a[k];
-        v[k] = (long double)c[k] - a[k];
-        w[k] = (long double)d[k] - a[k];
-        lu += fabsl(u[k]);
-        lv += fabsl(v[k]);
-        lw += fabsl(w[k]);
-    }
-    const long double volume = w[0] * (u[1] * v[2] - u[2] * v[1]) + w[1] * (u[2] * v[0] - u[0] * v[2]) +
-                               w[2] * (u[0] * v[1] - u[1] * v[0]);
-    return fabsl(volume) <= 32 * LDBL_EPSILON * lu * lv * lw ? 0 : volume > 0 ? 1 : -1;
+    CROSSINGS_SIDE(crossings_wide, CROSSINGS_WIDE_EPSILON)
 }
 
-/* Whether the ends of p q are on different sides of the plane of a b c, and the line through them does not
- * pass beside the triangle. */
+static inline int crossings_side_fast(const double *a, const double *b, const double *c, const double *d)
+{
+    CROSSINGS_SIDE(long double, LDBL_EPSILON)
+}
+
+static inline int crossings_side(const double *a, const double *b, const double *c, const double *d)
+{
+    const int side = crossings_side_fast(a, b, c, d);
+    return side ? side : crossings_side_wide(a, b, c, d);
+}
+
+/* Whether the ends of p q are on different sides of the plane of a b c, and the line through them passes
+ * through the inside of the triangle. What is uncertain does not count. */
 static inline bool crossings_pierces(const double *p, const double *q, const double *a, const double *b,
                                      const double *c)
 {
     if (crossings_side(a, b, c, p) * crossings_side(a, b, c, q) >= 0)
         return false;
-    const int sides[] = {crossings_side(p, q, a, b), crossings_side(p, q, b, c), crossings_side(p, q, c, a)};
-    bool left = false, right = false;
-    for (int i = 0; i < 3; i++) {
-        left = left || sides[i] < 0;
-        right = right || sides[i] > 0;
-    }
-    return !(left && right);
+    const int side = crossings_side(p, q, a, b);
+    return side && side == crossings_side(p, q, b, c) && side == crossings_side(p, q, c, a);
 }
 
 /* ---- All edges and triangles ---- */
