@@ -495,11 +495,17 @@ DRAPE_API const drape_model *drape_sim_model(const drape_sim *sim);
  * nothing else. */
 DRAPE_API uint64_t drape_sim_hash(const drape_sim *sim);
 
-/* Counts the triangles of the cloth that penetrate a collider by more than 1e-9 m, tested at 28 points of
- * each. collider is its number in the scene, from 0. With implicit integrators and "ida", a triangle that was
- * outside at the start stays outside (docs/contact.md). *deepest, if not NULL, receives the largest depth
- * [m]. Returns -1 if there is no such collider. */
+/* Counts the triangles of the cloth that reach into a collider: one of 28 points of the triangle is deeper
+ * than 1e-9 m, an edge of the collider passes through it, or one of its sides passes through a triangle of
+ * the collider. collider is its number in the scene, from 0. *deepest, if not NULL, receives the largest
+ * depth [m] that was found. Returns -1 if there is no such collider, or memory is out. */
 DRAPE_API int32_t drape_sim_inside(const drape_sim *sim, int32_t collider, double *deepest);
+
+/* Counts the pairs of an edge and a triangle that pass through each other, with exact signs: of the cloth
+ * and a collider, of which either may have the edge, or of the cloth itself if collider is -1. Edges that
+ * only touch, and pairs that share a node, do not count. Returns -1 if there is no such collider, or
+ * memory is out. */
+DRAPE_API int64_t drape_sim_intersections(const drape_sim *sim, int32_t collider);
 
 /* Normals of the nodes (node_count x 3 [1]): the area-weighted mean over the triangles around a node,
  * normalised, with the side outside from which the triangles are counterclockwise; 0 where the mean vanishes.
@@ -588,13 +594,14 @@ typedef struct drape_warning {
 } drape_warning;
 
 /* The warnings about a sim and its run so far, computed at the call: index 0 is the first that applies.
- * no_terms: nothing but weight is modelled for a cloth. few_steps: the duration of the scene is fewer
- * than 20 steps of dt, unless integrator or controller choose their own steps or substeps. large_mesh: a mesh
- * from a file is more than 20 m across, as one in centimetres is. starts_inside, ends_inside: free nodes are
- * inside a collider, by more than 1e-9 m, at the start, or after the steps so far; the text describes the
- * first such collider. numerical_dissipation: the integrator took more than half of the energy that went in.
- * slow_contact: contact takes most of the time of the steps, and longer than the motion lasts, and a setting
- * is known to help. Returns false past the last. */
+ * no_terms: nothing but weight is modelled for a cloth. few_steps: the duration of the scene is fewer than
+ * 20 steps of dt, unless integrator or controller choose their own steps or substeps. large_mesh: a mesh
+ * from a file is more than 20 m across, as one in centimetres is. starts_inside, ends_inside: free nodes
+ * are inside a collider, by more than 1e-9 m, or it pierces triangles without a pinned node, at the start,
+ * or after the steps so far; the text describes the first such collider. numerical_dissipation: the
+ * integrator took more than half of the energy that went in. slow_contact: contact takes most of the time
+ * of the steps, and longer than the motion lasts, and a setting is known to help. Returns false past the
+ * last. */
 DRAPE_API bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out);
 
 /* ---- Checkpoints ---- */
@@ -675,10 +682,12 @@ typedef struct drape_event {
     drape_sim *sim;               /* the sim that the event belongs to */
     const drape_attempt *attempt; /* ATTEMPT only */
     int64_t frame;                /* FRAME: number of the frame, from 0 */
-    double time;                  /* FRAME [s] */
+    double time;                  /* FRAME [s]: frame / frame_rate, up to rounding; see positions */
     const double *positions;  /* FRAME: node_count x 3 [m]; interpolated between the two steps around it by a
-                                 cubic Hermite polynomial or, where that passes through something, linearly,
-                                 or else taken from the nearer step */
+                                 cubic Hermite polynomial or, where that passes through something, on the
+                                 straight line between them, at the nearest free point to the time. If none is
+                                 free, they and the time are those of the later step, also in the other frames
+                                 between the two */
     const double *velocities; /* FRAME: node_count x 3 [m/s]; linear between the two steps around it */
 } drape_event;
 

@@ -7,6 +7,7 @@
 
 #include "base/arena.h"
 #include "base/registry.h"
+#include "io/record.h"
 #include "sim/sim.h"
 
 /* ---- Exit codes ---- */
@@ -129,5 +130,11 @@ typedef struct cli_scene {
  * cli_scene_free in any case. */
 int cli_scene_load(const cli_command *command, const char *path, cli_scene *out);
 void cli_scene_free(cli_scene *scene);
+
+bool cli_is_folder(const char *path);
+
+/* Loads the scene of a finished run from its folder and opens its frames; settings are refused. Returns as
+ * cli_scene_load does. Call cli_scene_free and drape_record_close in any case. */
+int cli_run_load(const cli_command *command, const char *folder, cli_scene *out, drape_record *run);
 
 #endif

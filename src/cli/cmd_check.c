@@ -1,10 +1,13 @@
-/* cmd_check.c: `drape check`: compares every analytic derivative of a scene with differences. */
+/* cmd_check.c: `drape check`: compares every analytic derivative of a scene with differences; or counts what
+ * passes through what in the frames of a run. */
 #include "cli/cli.h"
 #include "cli/signals.h"
 
 #include "assemble/check.h"
 #include "geometry/intersect.h"
+#include "sim/inside.h"
 
+#include <math.h>
 #include <stdio.h>
 
 #define DEFAULT_SEED 1
@@ -61,15 +64,113 @@ static int check(const check_request *request, const cli_scene *in)
     return done && !print_intersections(in) ? code : cli_report(&request->command, CLI_FAILED);
 }
 
-static int run(const void *command)
+/* ---- The frames of a run ---- */
+
+/* What all frames have together. */
+typedef struct tally {
+    const cli_scene *in;
+    int64_t crossed;      /* frames */
+    int64_t worst, count; /* the frame with the largest number of intersections and triangles inside */
+    double deepest;       /* [m] in any frame */
+} tally;
+
+/* Prints where cloth passes through itself. Returns the number of intersections. */
+static drape_status check_cloth(const tally *t, int64_t frame, double time, const double *x, int64_t *sum)
 {
-    const check_request *request = command;
+    drape_intersections found;
+    const drape_status status = drape_find_intersections(t->in->ctx, t->in->model, x, &found);
+    if (status || found.count == 0)
+        return status;
+    *sum += found.count;
+    printf(
+        "frame %lld, t=%.9g: %lld edge-face intersections of the cloth with itself; the first: edge %d %d, "
+        "triangle %d %d %d\n",
+        (long long)frame, time, (long long)found.count, (int)found.edge[0], (int)found.edge[1],
+        (int)found.triangle[0], (int)found.triangle[1], (int)found.triangle[2]);
+    return DRAPE_OK;
+}
+
+static drape_status check_collider(tally *t, int32_t collider, int64_t frame, double time, const double *x,
+                                   int64_t *sum)
+{
+    const drape_collider *c = &t->in->model->colliders[collider];
+    const drape_collider_pose pose = drape_collider_pose_at(c, time);
+    drape_inside found;
+    const drape_status status = drape_find_inside(t->in->ctx, t->in->model, collider, &pose, x, &found);
+    if (status || found.triangles == 0)
+        return status;
+    *sum += found.triangles + found.intersections;
+    t->deepest = fmax(t->deepest, found.deepest);
+    printf(
+        "frame %lld, t=%.9g: %d triangles reach into %s, up to %.3g m deep; %lld edge-face intersections\n",
+        (long long)frame, time, (int)found.triangles, CLI_SHOWN(c->name), found.deepest,
+        (long long)found.intersections);
+    return DRAPE_OK;
+}
+
+static drape_status check_frame(tally *t, const drape_record *run, int64_t frame, double *x)
+{
+    int64_t sum = 0;
+    drape_status status = drape_record_read(run, frame, x);
+    if (!status)
+        status = check_cloth(t, frame, run->times[frame], x, &sum);
+    for (int32_t c = 0; !status && c < t->in->model->collider_count; c++)
+        status = check_collider(t, c, frame, run->times[frame], x, &sum);
+    t->crossed += sum > 0;
+    if (sum > t->count) {
+        t->worst = frame;
+        t->count = sum;
+    }
+    return status;
+}
+
+static int check_frames(const check_request *request, const cli_scene *in, const drape_record *run)
+{
+    tally t = {.in = in};
+    double *x = drape_arena_take(request->command.arena, (size_t)run->nodes, 3 * sizeof *x);
+    drape_status status = x ? DRAPE_OK : DRAPE_E_MEMORY;
+    for (int64_t i = 0; i < run->frames && !status && !cli_interrupted(); i++)
+        status = check_frame(&t, run, i, x);
+    if (cli_interrupted())
+        return cli_report_interrupted(request->command.verb);
+    if (status)
+        return cli_report(&request->command, CLI_FAILED);
+    printf("%lld frames, %lld with intersections", (long long)run->frames, (long long)t.crossed);
+    if (t.crossed > 0)
+        printf("; the most in frame %lld; the deepest point is %.3g m inside a collider", (long long)t.worst,
+               t.deepest);
+    putchar('\n');
+    return t.crossed > 0 ? CLI_FAILED : CLI_DONE;
+}
+
+static int check_run(const check_request *request)
+{
+    cli_scene in = {0};
+    drape_record record = {.positions = -1};
+    int code = request->seed ? cli_misuse("check", "--seed is for a scene, and %s is a finished run",
+                                          CLI_SHOWN(request->command.operand))
+                             : cli_run_load(&request->command, request->command.operand, &in, &record);
+    if (code == CLI_GO_ON)
+        code = check_frames(request, &in, &record);
+    drape_record_close(&record);
+    cli_scene_free(&in);
+    return code;
+}
+
+static int check_scene(const check_request *request)
+{
     cli_scene in;
     int code = cli_scene_load(&request->command, request->command.operand, &in);
     if (code == CLI_GO_ON)
         code = check(request, &in);
     cli_scene_free(&in);
     return code;
+}
+
+static int run(const void *command)
+{
+    const check_request *request = command;
+    return cli_is_folder(request->command.operand) ? check_run(request) : check_scene(request);
 }
 
 static const cli_option options[] = {
@@ -81,13 +182,17 @@ const drape_verb drape_verb_check = {
     .entry =
         {.name = "check",
          .summary =
-             "compare a scene's analytic derivatives with finite differences; count edges through faces"},
-    .operand = "SCENE",
+             "compare a scene's derivatives with finite differences; count intersections in a run's frames"},
+    .operand = "SCENE|RUN",
     .takes_scene = true,
     .details =
-        "Compares every analytic derivative of a scene with central differences at a deformed, rotated,\n"
-        "moving state, and counts the edges that pass through triangles at the start. Exit code 0: all\n"
-        "derivatives are within their limits.",
+        "SCENE: compares every analytic derivative with central differences at a deformed, rotated, moving\n"
+        "state, and counts the edges that pass through triangles at the start. Exit code 0: all derivatives\n"
+        "are within their limits.\n"
+        "RUN, the folder of a run with positions.npy: counts, in each frame, edges of the cloth that pass\n"
+        "through its triangles, triangles that reach into a collider, and edges of either that pass through\n"
+        "triangles of the other, with each collider where its track has it at that time. Prints a line for\n"
+        "each frame and obstacle where there are any. Exit code 0: there are none.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(check_request),

@@ -253,7 +253,7 @@ static void print_wall(const run *r, const drape_statistics *s)
     fputc('\n', stdout);
 }
 
-/* Printed only if cloth reaches into a collider at the end. */
+/* Printed only if cloth reaches into a collider, or passes through itself, at the end. */
 static void print_inside(const run *r)
 {
     double deepest;
@@ -263,6 +263,10 @@ static void print_inside(const run *r)
             printf("inside    %d triangle%s of the cloth reach%s into %s, up to %.3g m deep\n", (int)faces,
                    faces == 1 ? "" : "s", faces == 1 ? "es" : "", CLI_SHOWN(r->in.model->colliders[c].name),
                    deepest);
+    const int64_t edges = drape_sim_intersections(r->in.sim, -1);
+    if (edges > 0)
+        printf("crossed   %lld edge-face intersection%s of the cloth with itself\n", (long long)edges,
+               edges == 1 ? "" : "s");
 }
 
 static void print_results(const run *r)

@@ -8,15 +8,8 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 
 /* ---- Opening ---- */
-
-bool cli_is_folder(const char *path)
-{
-    struct stat info;
-    return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
-}
 
 /* "runs/be/" -> "be", "a/sphere_drape.json" -> "sphere_drape" */
 static void make_label(const char *operand, char *label, size_t size)
@@ -31,29 +24,13 @@ static void make_label(const char *operand, char *label, size_t size)
     snprintf(label, size, "%.*s", (int)(end - begin), begin);
 }
 
-static int open_run(const cli_command *command, cli_source *s)
-{
-    char *path = NULL;
-    if (command->setting_count > 0)
-        return cli_misuse(command->verb,
-                          "--%s changes a simulation, and %s is a finished run; give its scene, which is "
-                          "simulated again: %s/scene.json",
-                          command->settings[0].option, s->operand, s->operand);
-    int code = drape_record_scene(command->ctx, s->operand, &path) == DRAPE_OK
-                   ? cli_scene_load(command, path, &s->in)
-                   : cli_misuse(command->verb, "%s", drape_context_message(command->ctx));
-    drape_free(command->ctx, path);
-    if (code == CLI_GO_ON && drape_record_open(command->ctx, s->operand, s->in.model->node_count, &s->run))
-        code = cli_report(command, CLI_BAD_INPUT);
-    return code;
-}
-
 int cli_source_open(const cli_command *command, const char *operand, const cli_frames_def *def,
                     cli_source *out)
 {
     *out = (cli_source){.command = command, .operand = operand};
     make_label(operand, out->label, sizeof out->label);
-    int code = cli_is_folder(operand) ? open_run(command, out) : cli_scene_load(command, operand, &out->in);
+    int code = cli_is_folder(operand) ? cli_run_load(command, operand, &out->in, &out->run)
+                                      : cli_scene_load(command, operand, &out->in);
     if (code != CLI_GO_ON)
         return code;
     if (out->run.frames > 0 && def->one >= out->run.frames)

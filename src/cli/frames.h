@@ -17,8 +17,6 @@ typedef struct cli_frames_def {
 
 enum { CLI_ALL_FRAMES = -1, CLI_LAST_FRAME = -2 };
 
-bool cli_is_folder(const char *path);
-
 typedef struct cli_source {
     const cli_command *command;
     const char *operand;

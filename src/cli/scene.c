@@ -8,6 +8,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
 /* Compiling a scene does not check the formats: only writers of frames know them. */
 static drape_status check_formats(const cli_scene *s)
@@ -72,6 +73,29 @@ int cli_scene_load(const cli_command *command, const char *path, cli_scene *out)
     if (cli_interrupted()) /* even if loading did not notice it */
         return cli_report_interrupted(command->verb);
     return status ? cli_report(command, CLI_BAD_INPUT) : CLI_GO_ON;
+}
+
+bool cli_is_folder(const char *path)
+{
+    struct stat info;
+    return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
+}
+
+int cli_run_load(const cli_command *command, const char *folder, cli_scene *out, drape_record *run)
+{
+    char *path = NULL;
+    if (command->setting_count > 0)
+        return cli_misuse(command->verb,
+                          "--%s changes a simulation, and %s is a finished run; give its scene, which is "
+                          "simulated again: %s/scene.json",
+                          command->settings[0].option, folder, folder);
+    int code = drape_record_scene(command->ctx, folder, &path) == DRAPE_OK
+                   ? cli_scene_load(command, path, out)
+                   : cli_misuse(command->verb, "%s", drape_context_message(command->ctx));
+    drape_free(command->ctx, path);
+    if (code == CLI_GO_ON && drape_record_open(command->ctx, folder, out->model->node_count, run))
+        code = cli_report(command, CLI_BAD_INPUT);
+    return code;
 }
 
 void cli_scene_free(cli_scene *scene)

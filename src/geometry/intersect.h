@@ -1,16 +1,39 @@
-/* intersect.h: counts the cloth edges that pass through triangles with which they share no node. */
+/*
+ * intersect.h: finds the edges that pass through triangles: of a cloth with itself, or of cloth and a
+ * collider.
+ *
+ * An edge passes through a triangle if its ends lie strictly on different sides of the triangle's plane,
+ * and it meets the triangle, sides and corners included. The signs are exact (geometry/orient.h), so the
+ * answer is that for the positions as doubles, however near the parts are; parts that only touch do not
+ * count.
+ */
 #ifndef DRAPE_GEOMETRY_INTERSECT_H
 #define DRAPE_GEOMETRY_INTERSECT_H
 
 #include "model/model.h"
+
+/* Edges and triangles over positions x (any count x 3) [m], which must be finite. */
+typedef struct drape_surface {
+    const double *x;
+    const int32_t *edge, *triangle; /* (edge_count x 2), (triangle_count x 3) nodes */
+    int32_t edge_count, triangle_count;
+} drape_surface;
+
+drape_surface drape_surface_of(const drape_model *model, const double *x); /* of the cloth */
+
+/* Calls visit for each pair of an edge of `edges` and a triangle of `triangles` that it passes through,
+ * edges in their order. If both have the same x, pairs that share a node do not count. Errors:
+ * DRAPE_E_MEMORY. */
+typedef void drape_intersection_visit(void *user, int32_t edge, int32_t triangle);
+drape_status drape_intersect(drape_context *ctx, const drape_surface *edges, const drape_surface *triangles,
+                             drape_intersection_visit *visit, void *user);
 
 typedef struct drape_intersections {
     int64_t count;
     int32_t edge[2], triangle[3]; /* nodes of the first pair; -1 if there is none */
 } drape_intersections;
 
-/* x (node_count x 3) [m] must be finite. An edge that only touches a triangle does not count: its ends must
- * be on different sides. Errors: DRAPE_E_MEMORY. */
+/* Counts the edges of cloth that pass through triangles of cloth. Errors: DRAPE_E_MEMORY. */
 drape_status drape_find_intersections(drape_context *ctx, const drape_model *model, const double *x,
                                       drape_intersections *found);
 

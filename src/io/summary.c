@@ -5,6 +5,7 @@
 
 #include "io/file.h"
 #include "io/json.h"
+#include "model/model.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -107,27 +108,29 @@ static json_t *realtime(const drape_summary_realtime *r)
     return with_reals(with_counts(json_object(), counts, LENGTH(counts)), times, LENGTH(times));
 }
 
-/* For each collider, if there are any: the number of triangles of the cloth that reach into it, and how
- * deep [m]. */
+/* A count of the sim; null if memory was out. */
+static json_t *found(int64_t count)
+{
+    return count >= 0 ? json_integer((json_int_t)count) : json_null();
+}
+
+/* For each collider, if there are any: the number of triangles of the cloth that reach into it, how deep [m],
+ * and the pairs of edge and triangle that pass through each other; and those pairs of the cloth itself. */
 static json_t *with_inside(json_t *object, const drape_sim *sim)
 {
+    const int32_t colliders = drape_sim_model(sim)->collider_count;
     json_t *list = json_array();
-    double deepest;
-    int32_t triangles;
-    for (int32_t c = 0; (triangles = drape_sim_inside(sim, c, &deepest)) >= 0; c++) {
-        json_t *one = drape_json_with(json_object(), "triangles", json_integer(triangles));
+    for (int32_t c = 0; c < colliders; c++) {
+        double deepest = NAN;
+        json_t *one = drape_json_with(json_object(), "triangles", found(drape_sim_inside(sim, c, &deepest)));
         one = drape_json_with(one, "deepest", drape_json_number(deepest));
-        if (json_array_append_new(list, one)) {
-            json_decref(list);
-            list = NULL; /* then object becomes NULL, too */
-            break;
-        }
+        one = drape_json_with(one, "intersections", found(drape_sim_intersections(sim, c)));
+        list = drape_json_append(list, one);
     }
-    if (list && json_array_size(list) == 0) {
-        json_decref(list);
-        return object;
-    }
-    return drape_json_with(object, "inside", list);
+    if (colliders > 0)
+        object = drape_json_with(object, "inside", json_incref(list));
+    json_decref(list);
+    return drape_json_with(object, "intersections", found(drape_sim_intersections(sim, -1)));
 }
 
 static json_t *warnings(drape_sim *sim)

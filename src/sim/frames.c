@@ -1,8 +1,15 @@
 /*
  * frames.c: frame times are k / frame_rate. No step is shortened for a frame: between the states of a step,
  * positions are the cubic Hermite interpolant of positions and velocities, of fourth order in h for smooth
- * motion. If the interpolated positions pass through a collider or through cloth, positions are
- * interpolated linearly instead, and if those do, too, the nearer of the two states is shown.
+ * motion.
+ *
+ * A frame is written only if its positions, and the straight path to them from the state before the step,
+ * pass the check that steps pass, with the colliders where they are at the time of the frame. If the
+ * interpolant does not, positions on the straight line between the two states are tried, first that of the
+ * time itself and then ever farther from it. That of the time itself may fail, too: the check of a step
+ * takes a collider to move straight, while its track may turn within the step, and large faces may dip
+ * into a round collider between two states that are free of it. If all of them fail, the frame is the
+ * state at the end of the step, at its own time, and so are the other frames of this step.
  */
 #include "sim/sim.h"
 
@@ -10,6 +17,7 @@
 #include <string.h>
 
 #define SAME_TIME 1e-9 /* of the step: a frame nearer than this to a state shows that state */
+#define PARTS     16   /* of the line between two states, on which free positions are searched */
 
 static void hermite(const drape_state *a, const drape_state *b, double t, size_t n, double *x)
 {
@@ -20,11 +28,10 @@ static void hermite(const drape_state *a, const drape_state *b, double t, size_t
         x[i] = h00 * a->x[i] + h10 * h * a->v[i] + h01 * b->x[i] + h11 * h * b->v[i];
 }
 
-static void straight(const drape_state *a, const drape_state *b, double t, size_t n, double *x)
+static void straight(const drape_state *a, const drape_state *b, double share, size_t n, double *x)
 {
-    double s = (t - a->t) / (b->t - a->t);
     for (size_t i = 0; i < n; i++)
-        x[i] = (1 - s) * a->x[i] + s * b->x[i];
+        x[i] = (1 - share) * a->x[i] + share * b->x[i];
 }
 
 /* Interpolates into sim->frame, by the integrator's own dense output if it has one. */
@@ -50,21 +57,20 @@ static drape_status check(drape_sim *sim, double t)
     return drape_system_check_contact(sim->system, sim->frame, t, &reason, &diagnostic);
 }
 
-/* Interpolates into sim->frame without passing through obstacles. */
+/* Interpolates into sim->frame. Returns a status > 0 if no positions passed the check. */
 static drape_status make_frame(drape_sim *sim, const drape_state *before, double t)
 {
     const drape_state *now = drape_sim_state(sim);
-    size_t n = 3 * (size_t)sim->model->node_count;
+    const size_t n = 3 * (size_t)sim->model->node_count;
+    const double share = (t - before->t) / (now->t - before->t);
     interpolate(sim, before, t);
     drape_status status = check(sim, t);
-    if (status > 0) {
-        straight(before, now, t, n, sim->frame);
-        drape_motion_place_pins(drape_system_motion(sim->system), t, sim->frame);
+    for (int i = 0; status > 0 && i <= 2 * PARTS; i++) {
+        const double shift = (double)((i + 1) / 2) / PARTS;
+        straight(before, now, fmin(fmax(i % 2 ? share + shift : share - shift, 0), 1), n, sim->frame);
         status = check(sim, t);
     }
-    if (status > 0)
-        memcpy(sim->frame, t - before->t < now->t - t ? before->x : now->x, n * sizeof *sim->frame);
-    return status < 0 ? status : DRAPE_OK;
+    return status;
 }
 
 /* Interpolates into sim->frame_velocity. This is not the slope of the interpolated positions, which would
@@ -89,12 +95,27 @@ static drape_status emit(drape_sim *sim, double time, const double *x, const dou
     return drape_sim_notify(sim, &event);
 }
 
+/* A frame between the states of the last step; *late: some frame of the step is the state at its end. */
+static drape_status emit_between(drape_sim *sim, const drape_state *before, double time, bool *late)
+{
+    const drape_state *now = drape_sim_state(sim);
+    drape_status status = *late ? DRAPE_RETRY_REJECTED : make_frame(sim, before, time);
+    *late = status > 0;
+    if (status < 0)
+        return status;
+    if (*late)
+        return emit(sim, now->t, now->x, now->v);
+    mix_velocities(sim, before, time);
+    return emit(sim, time, sim->frame, sim->frame_velocity);
+}
+
 drape_status drape_sim_emit_frames(drape_sim *sim)
 {
     const drape_state *before = sim->before >= 0 ? &sim->states[sim->before] : NULL;
     const drape_state *now = drape_sim_state(sim);
     double near = before ? SAME_TIME * (now->t - before->t) : 0;
     drape_status status = DRAPE_OK;
+    bool late = false;
     if (before && sim->chosen.integrator->steady_state)
         return DRAPE_OK;
     if (sim->observer_count == 0) { /* without observers frames are counted but not computed */
@@ -107,12 +128,8 @@ drape_status drape_sim_emit_frames(drape_sim *sim)
             return DRAPE_OK;
         if (!before || time > now->t - near)
             status = emit(sim, now->t, now->x, now->v);
-        else {
-            status = make_frame(sim, before, time);
-            mix_velocities(sim, before, time);
-            if (!status)
-                status = emit(sim, time, sim->frame, sim->frame_velocity);
-        }
+        else
+            status = emit_between(sim, before, time, &late);
     }
     return status;
 }

@@ -5,6 +5,7 @@
 #include "sim/warnings.h"
 
 #include "colliders/colliders.h"
+#include "sim/inside.h"
 #include "sim/sim.h"
 
 #include <math.h>
@@ -81,31 +82,47 @@ static bool has_large_file(drape_sim *sim, char *text, size_t size)
     return false;
 }
 
-/* Whether free nodes at x are inside a collider, of the first of which it then writes the text. A pinned
- * node may be there on purpose, and faces of which only the middle is inside do not count: some contact is
- * kept at nodes only. */
+/* Free nodes of the cloth inside a collider. A pinned node may be there on purpose, and faces of which
+ * only the middle is inside do not count: some contact is kept at nodes only. */
+static int32_t free_nodes_inside(const drape_model *m, int32_t collider, const drape_collider_pose *pose,
+                                 const double *x, double *deepest)
+{
+    int32_t count = 0;
+    *deepest = 0;
+    for (int32_t f = 0; f < m->free_count; f++) {
+        const double *at = x + 3 * (size_t)m->node_of_free[f];
+        const double depth = -drape_collider_distance(&m->colliders[collider], pose, at, NULL, NULL);
+        count += depth > INSIDE;
+        *deepest = fmax(*deepest, depth);
+    }
+    return count;
+}
+
+/* Whether free nodes at x are inside a collider, or it pierces faces of the cloth; writes the text for the
+ * first such collider. */
 static bool describe_inside(const drape_sim *sim, const double *x, bool start, char *text, size_t size)
 {
     const drape_model *m = sim->model;
+    const char *what = start ? "start" : "end", *advice = start ? ": move the cloth or the collider" : "";
     for (int32_t c = 0; c < m->collider_count; c++) {
         drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], 0);
         const drape_collider_motion motion = drape_sim_collider(sim, c);
+        int32_t pierced = 0;
         if (!start)
             memcpy(pose.displacement, motion.displacement, sizeof pose.displacement);
-        double deepest = 0;
-        int32_t count = 0;
-        for (int32_t f = 0; f < m->free_count; f++) {
-            const double *at = x + 3 * (size_t)m->node_of_free[f];
-            const double depth = -drape_collider_distance(&m->colliders[c], &pose, at, NULL, NULL);
-            count += depth > INSIDE;
-            deepest = fmax(deepest, depth);
-        }
-        if (count == 0)
-            continue;
-        snprintf(text, size, "/colliders/%d: %d free node%s of the cloth %s%s inside %s, up to %.3g m deep%s",
-                 (int)c, (int)count, count == 1 ? "" : "s", start ? "start" : "end", count == 1 ? "s" : "",
-                 m->colliders[c].name, deepest, start ? ": move the cloth or the collider" : "");
-        return true;
+        double deepest;
+        const int32_t count = free_nodes_inside(m, c, &pose, x, &deepest);
+        if (count > 0)
+            snprintf(text, size,
+                     "/colliders/%d: %d free node%s of the cloth %s%s inside %s, up to %.3g m deep%s", (int)c,
+                     (int)count, count == 1 ? "" : "s", what, count == 1 ? "s" : "", m->colliders[c].name,
+                     deepest, advice);
+        else if (!drape_find_pierced(sim->ctx, m, c, &pose, x, &pierced) && pierced > 0)
+            snprintf(text, size, "/colliders/%d: %d triangle%s of the cloth %s%s pierced by %s%s", (int)c,
+                     (int)pierced, pierced == 1 ? "" : "s", what, pierced == 1 ? "s" : "",
+                     m->colliders[c].name, advice);
+        if (count > 0 || pierced > 0)
+            return true;
     }
     return false;
 }

@@ -3,6 +3,7 @@
 import csv
 import glob
 import json
+import math
 import os
 import pty
 import re
@@ -556,6 +557,39 @@ def test_check():
         assert re.search(rf"^{word} .* ok$", text, re.M), text
     assert re.search(r"^\d+ passed, 0 failed$", text, re.M), text
     assert good("check", "scene.json", "--seed", "2") != text
+
+
+def test_check_run():
+    """check of a run counts, in each frame, what passes through the cloth, with colliders where they are at that time"""
+    # A sheet of pinned nodes, 0.3 m from the origin towards +x and -z; the corner of a small cube sticks 1 mm through one triangle of it, 0.06 m
+    # across, where no sample of that triangle is; within two frames it goes down by 0.04 m, and is through no longer from the first of these on.
+    cube = {"type": "box", "name": "cube", "center": [0.11, 1e-3 - 0.005 * 3 ** 0.5, -0.105], "size": 0.01,
+            "rotate": [1, 0, -1, math.degrees(math.acos(3 ** -0.5))], "track": [[0, [0, 0, 0]], [0.02, [0, -0.04, 0]]]}
+    grid = {"grid": "square", "columns": 6, "rows": 6, "width": 0.3, "height": 0.3}
+    write_scene(mesh=grid, pins=[{"box": [[-1, -1, -1], [1, 1, 1]]}], colliders=[cube], duration=0.05, frame_rate=100)
+    good("run", "scene.json", "--out", "out", "--format", "npy")
+    result = drape("check", "out")
+    equal(result.returncode, 1, result.stderr)
+    first, last = result.stdout.splitlines()
+    assert re.match(r"frame 0, t=0: 1 triangles reach into cube, up to 0\.000577 m deep; 3 edge-face intersections$", first), first
+    assert last.startswith("6 frames, 1 with intersections; the most in frame 0;"), last
+    equal(read_json("out/summary.json")["inside"][0], {"triangles": 0, "deepest": 0, "intersections": 0}, "at the end")
+    good("run", "scene.json", "--out", "clear", "--format", "npy", "--set", "/colliders/0/center=[0.11, -0.1, -0.105]")
+    equal(good("check", "clear"), "6 frames, 0 with intersections\n", "a cube below")
+    # Two sheets that cross each other.
+    whole = scene(mesh=grid, pins=[{"box": [[-1, -1, -1], [1, 1, 1]]}], duration=0.05, frame_rate=100)
+    turned = {**whole["cloth"][0], "name": "turned", "mesh": {**grid, "transform": {"rotate": [1, 0, 0, 50], "translate": [0.01, -0.093, -0.02]}}}
+    write_scene(cloth=[whole["cloth"][0], turned], duration=0.05, frame_rate=100)
+    text = good("run", "scene.json", "--out", "two", "--format", "npy")
+    count = int(re.search(r"^crossed +(\d+) edge-face intersections of the cloth with itself$", text, re.M).group(1))
+    equal(read_json("two/summary.json")["intersections"], count, "in the summary")
+    result = drape("check", "two")
+    equal(result.returncode, 1, result.stderr)
+    equal(len(re.findall(rf"^frame \d, t=0\.?\d*: {count} edge-face intersections of the cloth with itself; the first: edge ", result.stdout, re.M)), 6, result.stdout)
+    refused("check", "out", "--dt", "0.1", says="finished run")
+    refused("check", "out", "--seed", "3", says="finished run")
+    os.mkdir("empty")
+    refused("check", "empty", says="empty")
 
 
 def test_scene_of_springs():

@@ -70,7 +70,7 @@ def test_tolerance():
 
 
 def test_inside():
-    """free nodes that start or end inside a collider have a warning that counts them; nodes outside have none"""
+    """free nodes inside a collider, and triangles that it pierces, have a warning that counts them; others have none"""
     # The whole sheet, a metre wide at most, is inside a ball of 100 m and never leaves it.
     ball = {"type": "sphere", "name": "ball", "center": [0, 0, 0], "radius": 100}
     write_scene(**FINE, colliders=[ball])
@@ -83,6 +83,12 @@ def test_inside():
     assert f"warning: {found['starts_inside']}\n" in result.stderr, result.stderr
     write_scene(**FINE, colliders=[{**ball, "center": [0, -200, 0]}])
     equal(warnings("scene.json"), {}, "a ball far below")
+    # The corner of a cube of 1 cm through a triangle of 0.1 m, between the nodes.
+    cube = {"type": "box", "name": "cube", "center": [0.37, 1e-3 - 0.005 * 3 ** 0.5, -0.34], "size": 0.01, "rotate": [1, 0, -1, 54.735610317245346]}
+    grid = {"grid": "square", "columns": 8, "rows": 8, "width": 0.7, "height": 0.7}
+    write_scene(**FINE, mesh=grid, pins=[{"corner": "top-left"}], colliders=[cube])
+    found = {one["name"]: one["text"] for one in (drape("run", "scene.json", "--duration", "0.01", "--summary", "s.json"), read_json("s.json"))[1]["warnings"]}
+    equal(found["starts_inside"], "/colliders/0: 1 triangle of the cloth starts pierced by cube: move the cloth or the collider", "pierced")
 
 
 def test_dissipation():

@@ -1,6 +1,7 @@
-/* test_intersect.c: edges that pass through triangles are counted exactly, in whatever cells of the grid
- * they are. */
+/* test_intersect.c: edges that pass through triangles are counted exactly, wherever they are and however near
+ * to a side; signs of volumes are exact. */
 #include "geometry/intersect.h"
+#include "geometry/orient.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -143,4 +144,63 @@ START_TEST(a_flat_sheet_has_none)
 }
 END_TEST
 
-SUITE("intersect", crossing_sheets_are_counted_as_by_all_pairs, sheets_apart_have_none, a_flat_sheet_has_none)
+/* Points of a grid of steps of 2^-12 around (1, 1, 1) 2^20, far beyond what doubles resolve in a volume: d
+ * = a + i (b - a) + j (c - a) lies in the plane exactly, and one step along z beside it on the side of the
+ * normal's z. All sums are integers below 2^52 steps, so the points are exact. */
+START_TEST(signs_are_exact)
+{
+    const double step = 1.0 / 4096, origin = 1048576;
+    uint64_t random = 7;
+    int sides[3] = {0};
+    for (int n = 0; n < 20000; n++) {
+        double p[3][3], d[3], u[3], v[3];
+        for (int k = 0; k < 9; k++) {
+            random = random * UINT64_C(6364136223846793005) + 1;
+            p[k / 3][k % 3] = origin + step * (double)((random >> 33) % 1000);
+        }
+        const double i = (double)(n % 17 - 8), j = (double)(n % 13 - 6);
+        const int beside = n % 3 - 1;
+        for (int k = 0; k < 3; k++) {
+            u[k] = p[1][k] - p[0][k];
+            v[k] = p[2][k] - p[0][k];
+            d[k] = p[0][k] + i * u[k] + j * v[k] + (k == 2 ? beside * step : 0);
+        }
+        const double up = u[0] * v[1] - u[1] * v[0];
+        const int expected = beside * ((up > 0) - (up < 0));
+        ck_assert_int_eq(drape_orient(p[0], p[1], p[2], d), expected);
+        ck_assert_int_eq(drape_orient(p[1], p[0], p[2], d), -expected);
+        ck_assert_int_eq(drape_orient(d, p[1], p[2], p[0]), -expected);
+        sides[expected + 1]++;
+    }
+    for (int k = 0; k < 3; k++)
+        ck_assert_int_gt(sides[k], 5000);
+}
+END_TEST
+
+static void count_visits(void *user, int32_t edge, int32_t triangle)
+{
+    (void)edge;
+    (void)triangle;
+    ++*(int64_t *)user;
+}
+
+/* An edge through the common side of two triangles passes through both, from either side; one that ends on
+ * the plane passes through none. */
+START_TEST(sides_belong_to_triangles)
+{
+    const double x[] = {0, 0, 0, 1, 0, 0, 1, 0, 1, 0, 0, 1, 0.5, -1, 0.5, 0.5, 1, 0.5, 0.5, 0, 0.5};
+    const int32_t triangle[] = {0, 1, 2, 0, 2, 3}, edges[][2] = {{4, 5}, {5, 4}, {4, 6}, {6, 5}};
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    for (int i = 0; i < 4; i++) {
+        int64_t count = 0;
+        const drape_surface surface = {x, edges[i], triangle, 1, 2};
+        ck_assert_int_eq(drape_intersect(ctx, &surface, &surface, count_visits, &count), DRAPE_OK);
+        ck_assert_int_eq(count, i < 2 ? 2 : 0);
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+SUITE("intersect", crossing_sheets_are_counted_as_by_all_pairs, sheets_apart_have_none, a_flat_sheet_has_none,
+      signs_are_exact, sides_belong_to_triangles)

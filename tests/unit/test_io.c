@@ -1208,7 +1208,7 @@ START_TEST(summary_is_complete)
     ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &def, NULL, path), DRAPE_OK);
     json_t *json = load_summary(path);
     check_keys(json, "status message version nodes dofs nnz frames time steps newton tolerance wall_s energy "
-                     "strain warnings hash ");
+                     "strain intersections warnings hash ");
     check_keys(json_object_get(json, "steps"), "accepted rejected unconverged h_min h_max reasons ");
     check_keys(json_object_get(json, "newton"),
                "iterations jacobians factorizations linear_iterations residuals ");

@@ -1,0 +1,23 @@
+/* inside.h: what of the cloth reaches into a collider, at any positions and any pose. */
+#ifndef DRAPE_SIM_INSIDE_H
+#define DRAPE_SIM_INSIDE_H
+
+#include "colliders/colliders.h"
+
+typedef struct drape_inside {
+    int32_t triangles; /* of cloth that reach into the collider: a sample is inside, or something crosses */
+    double deepest;    /* [m] depth of the deepest point found: of samples, and between crossings */
+    int64_t intersections; /* edges of one through triangles of the other */
+} drape_inside;
+
+/* x (node_count x 3) must be finite. Of each triangle 28 points are tested. Edges of the collider are the
+ * segments of its shape; a round collider has its axis, if it has one. Errors: DRAPE_E_MEMORY. */
+drape_status drape_find_inside(drape_context *ctx, const drape_model *model, int32_t collider,
+                               const drape_collider_pose *pose, const double *x, drape_inside *found);
+
+/* Counts the triangles of cloth without a pinned node that an edge of the collider passes through, or with a
+ * side that passes through a triangle of it. Errors: DRAPE_E_MEMORY. */
+drape_status drape_find_pierced(drape_context *ctx, const drape_model *model, int32_t collider,
+                                const drape_collider_pose *pose, const double *x, int32_t *pierced);
+
+#endif
