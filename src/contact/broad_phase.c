@@ -207,16 +207,17 @@ static void obstacle_face(void *user, int32_t face)
     report(q);
 }
 
-static double reach_of(const drape_pair *pair, double reach)
+static double reach_of(const query *q, double reach)
 {
-    return fmax(0, pair->distance + pair->radius + reach);
+    const drape_pair *pair = &q->pair;
+    return pair->radius + fmax(drape_pair_least_gap(pair, q->broad->rounding), pair->distance + reach);
 }
 
 /* Tests a piece against those in a tree: its nodes are the `nodes` ones from `node` on. */
 static void search_tree(query *q, int32_t piece, const int32_t *node, int nodes, double reach,
                         const drape_bvh *tree, drape_bvh_visit *visit)
 {
-    const drape_box box = drape_box_of(node, nodes, q->x, q->y, reach_of(&q->pair, reach));
+    const drape_box box = drape_box_of(node, nodes, q->x, q->y, reach_of(q, reach));
     q->piece = piece;
     drape_bvh_query(tree, &box, visit, q);
 }

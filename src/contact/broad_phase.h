@@ -23,6 +23,7 @@ typedef struct drape_broad_phase {
     int32_t *triangle_collider;
     double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
     double max_distance;                       /* largest activation distance of any pair [m] */
+    double rounding;        /* what rounding can change in a gap, set by who moves the points [m] */
     double obstacle_radius;                    /* largest radius around the triangles of an obstacle [m] */
 } drape_broad_phase;
 
@@ -30,7 +31,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *mod
 
 /* Calls visit for every pair whose pieces may be within its activation distance plus reach, at x or
  * anywhere on the straight path from x to y (NULL: only at x), in an order that does not depend on the
- * positions. A negative reach shrinks the distance, but not below 0, so that touching pairs are found. Left
+ * positions. A negative reach shrinks the distance, but not below the least gap of the pair. Left
  * out are pairs whose nodes are all pinned, and pairs with surfaces, since every free node is paired with
  * all of them. x, y: (points x 3). */
 typedef void drape_broad_phase_visit(void *user, const drape_pair *pair);

@@ -17,17 +17,18 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
 /* A search in progress. */
 typedef struct search {
     drape_candidates *candidates;
-    drape_configuration at, rest;
+    drape_configuration at;
     drape_status status;
 } search;
 
 /* Layers of one sheet that are close together at rest must not be in contact there: their activation
  * distance is at most half of the rest distance. */
-static double activation_distance(const search *s, const drape_pair *pair)
+double drape_candidates_distance(const drape_broad_phase *broad, const drape_pair *pair)
 {
-    if (pair->collider >= 0 || drape_pair_is_apart(pair, &s->rest, 2 * pair->distance))
+    const drape_configuration rest = {.model = broad->model, .x = broad->rest};
+    if (pair->collider >= 0 || drape_pair_is_apart(pair, &rest, 2 * pair->distance))
         return pair->distance;
-    return fmin(pair->distance, 0.5 * drape_pair_gap_value(pair, &s->rest));
+    return fmin(pair->distance, 0.5 * drape_pair_gap_value(pair, &rest));
 }
 
 static void add(drape_candidates *c, const drape_pair *pair, drape_status *status)
@@ -51,7 +52,7 @@ static void consider(void *user, const drape_pair *found)
     pair.gap_at_search = drape_pair_gap_value(&pair, &s->at);
     if (pair.gap_at_search - reach >= pair.distance)
         return;
-    pair.distance = activation_distance(s, &pair);
+    pair.distance = drape_candidates_distance(s->candidates->broad, &pair);
     if (pair.gap_at_search - reach < pair.distance)
         add(s->candidates, &pair, &s->status);
 }
@@ -60,8 +61,7 @@ drape_status drape_candidates_search(drape_candidates *c, const drape_configurat
 {
     const drape_model *m = c->broad->model;
     search s = {.candidates = c,
-                .at = {.model = m, .x = c->x, .pose = c->pose},
-                .rest = {.model = m, .x = c->broad->rest, .pose = c->pose}};
+                .at = {.model = m, .x = c->x, .pose = c->pose}};
     memmove(c->x, at->x, 3 * (size_t)c->broad->points * sizeof *c->x);
     memmove(c->pose, at->pose, (size_t)m->collider_count * sizeof *c->pose);
     c->margin = margin;

@@ -27,6 +27,9 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
 drape_status drape_candidates_search(drape_candidates *candidates, const drape_configuration *at,
                                      double margin);
 
+/* The activation distance [m] of a pair that the broad phase found. */
+double drape_candidates_distance(const drape_broad_phase *broad, const drape_pair *pair);
+
 /* The largest distance of a point from its position at the search; INFINITY if there was none, or if a
  * position is not finite. */
 double drape_candidates_moved(const drape_candidates *candidates, const drape_configuration *at);

@@ -50,13 +50,10 @@ static drape_status restore_start(drape_contact *c)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
     drape_status status = drape_candidates_search(&c->query_candidates, &start, c->next_margin);
+    drape_contact_set_rounding(c, c->start);
     if (!status)
-        status = drape_active_set_list(&c->active, &c->query_candidates, 0, &start);
-    if (!status)
-        status = drape_contact_lag(c);
-    if (!status)
-        drape_contact_measure_start(c);
-    return status;
+        status = drape_active_set_list(&c->active, &c->query_candidates, 0, &start, &c->inside, false);
+    return status ? status : drape_contact_lag(c);
 }
 
 /* Which candidates the steps have, and so which pairs a new pattern would contain, depends on the positions
@@ -85,6 +82,9 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     drape_archive_bytes(a, c->step_candidates.pose, colliders * sizeof *c->step_candidates.pose);
     drape_archive_doubles(a, c->start, points);
     drape_archive_bytes(a, c->start_pose, colliders * sizeof *c->start_pose);
+    drape_inside_archive(&c->inside, a);
+    drape_archive_double(a, &c->press.factor);
+    drape_archive_double(a, &c->press.widest);
     archive_couplings(c, a);
     drape_archive_double(a, &c->seconds);
     drape_archive_double(a, &c->search_seconds);

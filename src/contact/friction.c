@@ -80,7 +80,7 @@ void drape_friction_add_dgdx(const drape_gap *gap, const drape_gap_derivatives *
 {
     int d = 3 * gap->closest.points;
     slip s = slip_of(gap, law, v);
-    drape_barrier b = drape_barrier_at(gap->value / law->distance);
+    drape_barrier b = drape_barrier_at(gap->value / law->distance, law->low);
     double m = gap->m, lambda = drape_contact_normal_force(gap, law),
            normal_speed = vec3_dot(s.u, gap->closest.normal), mu = law->friction;
     for (int j = 0; j < d; j++) {

@@ -61,7 +61,7 @@ static void add_friction(const drape_contact *c, const request *want, const drap
 static void differentiate(const drape_contact *c, const request *want, const drape_active_contact *contact,
                           double *h)
 {
-    const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
+    const drape_contact_law law = drape_contact_law_of(c, contact);
     const drape_configuration now = drape_contact_configuration(c);
     const bool friction = law.friction > 0 && !c->model->contact.lagged;
     const bool exact = !want->velocity_only && !want->gauss_newton;
@@ -96,7 +96,7 @@ void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_o
     }
     for (int32_t i = 0; i < c->lagged_count; i++) {
         const drape_lagged *lagged = &c->lagged[i];
-        const drape_contact_law law = drape_contact_law_of(c, &lagged->contact.pair);
+        const drape_contact_law law = drape_contact_law_of(c, &lagged->contact);
         memset(h, 0, sizeof h);
         add_friction(c, &want, &lagged->contact, &law, lagged->lambda, h);
         add_blocks(c, &lagged->contact, h, pattern, values);

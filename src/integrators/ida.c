@@ -130,7 +130,9 @@ typedef struct ida_state {
     drape_work work;
 
     /* Why callbacks failed in this step; IDA keeps only the sign. */
-    bool nonfinite, crossing; /* the last residual */
+    bool nonfinite, crossing; /* the last residual; if it crossed: */
+    const char *crossing_reason;
+    drape_diagnostic crossing_pair;
     drape_status failure;     /* < 0: the pattern could not be extended */
 } ida_state;
 
@@ -181,7 +183,7 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
         f[s->n + i] = mass_of(s, i) * vp[i] + s->g[node_at(s, i)];
     }
     s->nonfinite = !drape_all_finite(f, 2 * (size_t)s->n);
-    s->crossing = !s->nonfinite && drape_system_crosses(s->system, s->x, t);
+    s->crossing = !s->nonfinite && drape_system_crosses(s->system, s->x, t, &s->crossing_reason, &s->crossing_pair);
     s->work.residuals++;
     s->work.residual_seconds += drape_system_clock(s->system) - start;
     return drape_system_status(s->system) ? -1 : s->nonfinite || s->crossing ? 1 : 0;
@@ -359,6 +361,10 @@ static void diagnose(ida_state *s, drape_step_info *info)
         drape_system_check(s->system, s->x, NULL, s->internal, &info->reason, &info->diagnostic);
         return;
     }
+    if (s->crossing) {
+        info->diagnostic = s->crossing_pair;
+        return;
+    }
     if (IDAGetEstLocalErrors(s->ida, s->between))
         return;
     const double *e = N_VGetArrayPointer(s->between), *w = N_VGetArrayPointer(s->weights);
@@ -481,7 +487,7 @@ static drape_status solve(ida_state *s, double end, double h, double *t, drape_s
     int code = IDASolve(s->ida, end, t, s->y, s->rate, IDA_ONE_STEP);
     drape_status status = status_of(code, s->nonfinite, &info->reason);
     if (status > 0 && s->crossing)
-        info->reason = drape_reason_name(DRAPE_REASON_COLLISION);
+        info->reason = s->crossing_reason;
     if (drape_system_status(s->system))
         status = drape_system_status(s->system);
     if (s->failure < 0 || s->linear->status < 0)

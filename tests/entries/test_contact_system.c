@@ -261,7 +261,7 @@ START_TEST(nan_is_forgotten)
         point.x = t.x;
         drape_system_force(t.system, &point, t.g[1]);
         drape_system_step_fraction(t.system, t.at.x, t.x, 0.01);
-        drape_system_crosses(t.system, t.x, 0.01);
+        drape_system_crosses(t.system, t.x, 0.01, &reason, &diagnostic);
         drape_system_check_contact(t.system, t.x, 0.01, &reason, &diagnostic);
         point.x = t.at.x;
         drape_system_force(t.system, &point, t.g[1]);
@@ -414,7 +414,7 @@ static void add_energy(void *user, const drape_pair *found)
     pair.distance = fmin(pair.distance, 0.5 * drape_pair_gap_value(&pair, &rest));
     if (!drape_pair_gap(&pair, &now, w->broad->rest, &gap))
         return;
-    const drape_contact_law law = {.distance = pair.distance,
+    const drape_contact_law law = {.distance = pair.distance, .low = DRAPE_LEAST_GAP,
                                    .stiffness = w->model->contact.stiffness * pair.area *
                                                 w->model->contact.distance / pair.distance};
     w->energy += drape_contact_energy(&gap, &law);

@@ -1,0 +1,190 @@
+/*
+ * test_least_gap.c: cloth that is pressed against something. No pair of pieces comes nearer than the least gap, so
+ * nothing passes through anything, in any accepted state and on the straight way between two, whatever presses; a
+ * run that cannot keep this stops and names the pair. Crossings are counted here, without the library: an edge passes
+ * through a triangle if its ends are on different sides of the plane and it passes all three sides of the triangle
+ * the same way round. Determinants are computed with 64 bits: their rounding error is far below those of gaps of
+ * 1e-3 activation distances.
+ */
+#include "colliders/colliders.h"
+#include "contact/contact.h"
+#include "support/scene.h"
+
+#include <stdlib.h>
+#include <unistd.h>
+
+static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "newton_k", "ida"};
+#define METHODS (sizeof methods / sizeof *methods)
+
+/* ---- Crossings ---- */
+
+static long double side(const double *a, const double *b, const double *c, const double *d)
+{
+    long double u[3], v[3], w[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = (long double)b[k] - a[k];
+        v[k] = (long double)c[k] - a[k];
+        w[k] = (long double)d[k] - a[k];
+    }
+    return u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) +
+           u[2] * (v[0] * w[1] - v[1] * w[0]);
+}
+
+static bool pierces(const double *p, const double *q, const double *a, const double *b, const double *c)
+{
+    const long double over = side(a, b, c, p), under = side(a, b, c, q);
+    if (over == 0 || under == 0 || (over > 0) == (under > 0))
+        return false;
+    const long double s[3] = {side(p, q, a, b), side(p, q, b, c), side(p, q, c, a)};
+    return (s[0] > 0 && s[1] > 0 && s[2] > 0) || (s[0] < 0 && s[1] < 0 && s[2] < 0);
+}
+
+/* Edges and triangles of cloth (own) or of a collider, with the positions of their points. */
+typedef struct surface {
+    const double *x;
+    const int32_t *edge, *triangle;
+    int32_t edges, triangles;
+} surface;
+
+static int crossings(const surface *a, const surface *b)
+{
+    int count = 0;
+    for (int32_t e = 0; e < a->edges; e++)
+        for (int32_t f = 0; f < b->triangles; f++) {
+            const int32_t *n = a->edge + 2 * (size_t)e, *t = b->triangle + 3 * (size_t)f;
+            bool shared = false;
+            for (int i = 0; i < 6 && a->x == b->x; i++)
+                shared = shared || n[i / 3] == t[i % 3];
+            count += !shared && pierces(a->x + 3 * (size_t)n[0], a->x + 3 * (size_t)n[1],
+                                        b->x + 3 * (size_t)t[0], b->x + 3 * (size_t)t[1],
+                                        b->x + 3 * (size_t)t[2]);
+        }
+    return count;
+}
+
+static int crossings_at(const drape_model *m, const double *x, double t)
+{
+    const surface cloth = {x, m->edge, m->triangle, m->edge_count, m->triangle_count};
+    int count = m->contact.self ? crossings(&cloth, &cloth) : 0;
+    for (int32_t c = 0; c < m->collider_count; c++) {
+        const drape_collider_shape *shape = &m->colliders[c].shape;
+        const drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], t);
+        double corner[3 * 64];
+        ck_assert_int_le(shape->point_count, 64);
+        for (int32_t i = 0; i < 3 * shape->point_count; i++)
+            corner[i] = shape->point[i] + pose.displacement[i % 3];
+        const surface body = {corner, shape->segment, shape->triangle, shape->segment_count,
+                              shape->triangle_count};
+        count += crossings(&cloth, &body) + crossings(&body, &cloth);
+    }
+    return count;
+}
+
+/* ---- Watching ---- */
+
+#define BETWEEN 8 /* states looked at on the way from one accepted state to the next */
+
+typedef struct watch {
+    drape_sim *sim;
+    double *last, *x, t; /* the last accepted state */
+    int crossings, frames_crossed;
+    long steps, rejected;
+    double least_gap; /* [m] */
+} watch;
+
+static drape_status look(void *user, const drape_event *event)
+{
+    watch *w = user;
+    const drape_model *m = w->sim->model;
+    const drape_state *now = drape_sim_state(w->sim);
+    const size_t n = 3 * (size_t)m->node_count;
+    if (event->kind == DRAPE_EVENT_FRAME) {
+        w->frames_crossed += crossings_at(m, event->positions, event->time) > 0;
+        return DRAPE_OK;
+    }
+    w->rejected += !event->attempt->accepted;
+    if (!event->attempt->accepted)
+        return DRAPE_OK;
+    for (int k = 1; k <= BETWEEN; k++) {
+        const double s = (double)k / BETWEEN;
+        for (size_t i = 0; i < n; i++)
+            w->x[i] = k < BETWEEN ? w->last[i] + s * (now->x[i] - w->last[i]) : now->x[i];
+        w->crossings += crossings_at(m, w->x, w->t + s * (now->t - w->t));
+    }
+    double gap;
+    drape_contact_active(drape_system_contact(w->sim->system), &gap);
+    w->least_gap = fmin(w->least_gap, gap);
+    memcpy(w->last, now->x, n * sizeof *w->last);
+    w->t = now->t;
+    w->steps++;
+    return DRAPE_OK;
+}
+
+/* Runs to the end, or until it stops with a message that names a pair. Returns whether it came to the end. */
+static bool press(scene *s, double until, const char *what)
+{
+    const size_t n = 3 * (size_t)s->model->node_count;
+    watch w = {.sim = s->sim, .last = malloc(n * sizeof(double)), .x = malloc(n * sizeof(double)), .least_gap = INFINITY};
+    ck_assert(w.last && w.x);
+    memcpy(w.last, drape_sim_state(s->sim)->x, n * sizeof *w.last);
+    ck_assert_int_eq(drape_sim_observe(s->sim, look, &w), DRAPE_OK);
+    const drape_status status = drape_sim_advance(s->sim, until);
+    const char *message = drape_context_message(s->ctx);
+    printf("# %s: t = %.3g of %g s, %ld steps, %ld rejected, least gap %.2g m, %d crossings, %d frames crossed%s%s\n", what,
+           drape_sim_state(s->sim)->t, until, w.steps, w.rejected, w.least_gap, w.crossings, w.frames_crossed, status ? ": " : "", status ? message : "");
+    ck_assert_msg(w.crossings == 0, "%s: %d crossings", what, w.crossings);
+    ck_assert_msg(w.frames_crossed == 0, "%s: %d frames with crossings", what, w.frames_crossed);
+    if (status) {
+        ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
+    }
+    free(w.last);
+    free(w.x);
+    return status == DRAPE_OK;
+}
+
+static const char tetrahedron[] = "v 0.3 -0.5 0\nv -0.15 -0.5 0.26\nv -0.15 -0.5 -0.26\nv 0.013 0 0.017\n"
+                                  "f 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n";
+
+static void enter_folder(void)
+{
+    char folder[] = "/tmp/drape-press-XXXXXX";
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    ck_assert_int_eq(chdir(folder), 0);
+    FILE *file = fopen("tip.obj", "w");
+    ck_assert_ptr_nonnull(file);
+    fputs(tetrahedron, file);
+    fclose(file);
+}
+
+static void leave_folder(void)
+{
+    char folder[256];
+    unlink("tip.obj");
+    ck_assert_ptr_nonnull(getcwd(folder, sizeof folder));
+    ck_assert_int_eq(chdir("/") + rmdir(folder), 0);
+}
+
+START_TEST(over_a_tip)
+{
+    enter_folder();
+    for (size_t k = 0; k < 3 * METHODS; k++) {
+        const double membrane[] = {3e4, 2e5, 1e6};
+        const bool own = strcmp(methods[k % METHODS], "ida") == 0;
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, 'height': 0.4,"
+            " 'transform': {'translate': [-0.2, 0.01, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, 4, 20, 21, 22, 23, 24],"
+            " 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}],"
+            " 'material': {'young_modulus': %g, 'thickness': 1e-3, 'areal_density': 0.1},"
+            " 'terms': ['stretch.edge', 'bend.hinge']}], 'colliders': [{'type': 'mesh', 'file': 'tip.obj'}],"
+            " 'contact': {'distance': 4e-3}, 'integrator': {'method': '%s' %s}, 'duration': 1, 'frame_rate': 100}",
+            membrane[k / METHODS] / 1e-3, methods[k % METHODS], own ? "" : ", 'dt': 0.01");
+        char what[100];
+        snprintf(what, sizeof what, "over a tip, %g N/m, %s", membrane[k / METHODS], methods[k % METHODS]);
+        press(&s, 1, what);
+        scene_close(&s);
+    }
+    leave_folder();
+}
+END_TEST
+
+SUITE("least_gap", over_a_tip)
