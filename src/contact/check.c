@@ -29,8 +29,13 @@ static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *
     return found;
 }
 
-/* Finds the pair whose gap is below the least one by most. A pair that began below that may not come nearer than
- * it was. */
+/* The gap that a pair may end with. If it began below the least gap it may not come nearer. */
+static double allowed(double least, double before, double rounding)
+{
+    return before < least ? before - rounding : least;
+}
+
+/* Finds the pair whose gap is below what it may end with by most. */
 static drape_status check_gaps(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
@@ -41,7 +46,7 @@ static drape_status check_gaps(drape_contact *c, const char **reason, drape_diag
         double least = drape_pair_least_gap(pair, c->broad.rounding);
         if (gap >= least)
             continue;
-        least = fmin(least, drape_pair_gap_value(pair, &start) - c->broad.rounding);
+        least = allowed(least, drape_pair_gap_value(pair, &start), c->broad.rounding);
         if (gap >= least || least - gap < excess)
             continue;
         excess = least - gap;
@@ -99,7 +104,7 @@ static drape_status check_inscribed(drape_contact *c, const int32_t *node, int n
             if (depth >= least)
                 continue;
             const double before = depth_of(collider, &c->start_pose[k], c->start, n, nodes, INFINITY);
-            const double min_gap = fmin(least, before - c->broad.rounding);
+            const double min_gap = allowed(least, before, c->broad.rounding);
             if (depth >= min_gap)
                 continue;
             const drape_pair pair = {.collider = k, .node = {n[0], n[1], nodes > 2 ? n[2] : -1, -1}};

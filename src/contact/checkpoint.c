@@ -85,6 +85,7 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     drape_inside_archive(&c->inside, a);
     drape_archive_double(a, &c->press.factor);
     drape_archive_double(a, &c->press.widest);
+    drape_archive_double(a, &c->press.t);
     archive_couplings(c, a);
     drape_archive_double(a, &c->seconds);
     drape_archive_double(a, &c->search_seconds);

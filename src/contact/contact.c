@@ -15,6 +15,7 @@
 #include "contact/parts.h"
 
 #include "base/clock.h"
+#include "base/elementary.h"
 #include "base/vec3.h"
 #include "contact/list.h"
 
@@ -38,7 +39,7 @@
 #define SHRUNK     0.5
 #define RELAXED    0.3
 #define RAISE      4.0
-#define FALL       0.9 /* in a step */
+#define HALVED     0.2 /* [s] */
 #define MAX_FACTOR 1e4
 
 static drape_status take_arrays(drape_arena *arena, drape_contact *c)
@@ -303,7 +304,7 @@ static double smallest_gap(const drape_contact *c)
 
 /* Makes contact stiffer where gaps shrink, and softer again. The energy that this adds to present contacts is
  * the work of whoever presses. */
-static void adapt_stiffness(drape_contact *c)
+static void adapt_stiffness(drape_contact *c, double t)
 {
     drape_press *press = &c->press;
     const double gap = smallest_gap(c), before = press->factor;
@@ -312,8 +313,9 @@ static void adapt_stiffness(drape_contact *c)
         press->factor = fmin(RAISE * before, MAX_FACTOR);
         press->widest = gap;
     } else if (gap > RELAXED) {
-        press->factor = fmax(FALL * before, 1);
+        press->factor = fmax(before * drape_pow(0.5, (t - press->t) / HALVED), 1);
     }
+    press->t = t;
     if (press->factor != before)
         press->work += (1 - before / press->factor) * drape_contact_potential(c);
 }
@@ -344,7 +346,7 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     if (!status)
         status = update_inside(c);
     if (!status && !is_retry(c))
-        adapt_stiffness(c);
+        adapt_stiffness(c, t);
     if (!status)
         status = drape_contact_lag(c);
     if (!status) {

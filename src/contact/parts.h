@@ -21,6 +21,7 @@ typedef struct drape_lagged {
 typedef struct drape_press {
     double factor; /* >= 1 */
     double widest; /* the smallest gap of a step, in activation distances: its maximum since the last raise */
+    double t;      /* [s] at the last step */
     double work;   /* [J] that changes have added to the contact energy, until it is taken */
 } drape_press;
 

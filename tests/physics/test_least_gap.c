@@ -112,6 +112,7 @@ static drape_status look(void *user, const drape_event *event)
         w->crossings += crossings_at(m, w->x, w->t + s * (now->t - w->t));
     }
     double gap;
+    drape_system_contact_energy(w->sim->system, &(drape_point){.x = now->x, .v = now->v, .t = now->t});
     drape_contact_active(drape_system_contact(w->sim->system), &gap);
     w->least_gap = fmin(w->least_gap, gap);
     memcpy(w->last, now->x, n * sizeof *w->last);
