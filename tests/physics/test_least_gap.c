@@ -165,22 +165,35 @@ static void leave_folder(void)
     ck_assert_int_eq(chdir("/") + rmdir(folder), 0);
 }
 
+#define MATERIAL "'material': {'young_modulus': %g, 'thickness': 1e-3, 'areal_density': 0.1}"
+#define TERMS    "'terms': ['stretch.edge', 'bend.hinge'"
+
+/* The scene's integrator, with a step of dt unless it chooses its own. */
+static const char *method_of(const char *name, double dt)
+{
+    static char text[100];
+    if (strcmp(name, "ida") == 0)
+        snprintf(text, sizeof text, "'integrator': {'method': 'ida'}");
+    else
+        snprintf(text, sizeof text, "'integrator': {'method': '%s', 'dt': %g}", name, dt);
+    return text;
+}
+
+/* A sheet with 4 x 4 squares, from 3e4 to 1e6 N/m, two sides of which are pulled down over a tip. */
 START_TEST(over_a_tip)
 {
+    const double membranes[] = {3e4, 2e5, 1e6};
     enter_folder();
     for (size_t k = 0; k < 3 * METHODS; k++) {
-        const double membrane[] = {3e4, 2e5, 1e6};
-        const bool own = strcmp(methods[k % METHODS], "ida") == 0;
-        scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, 'height': 0.4,"
-            " 'transform': {'translate': [-0.2, 0.01, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, 4, 20, 21, 22, 23, 24],"
-            " 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}],"
-            " 'material': {'young_modulus': %g, 'thickness': 1e-3, 'areal_density': 0.1},"
-            " 'terms': ['stretch.edge', 'bend.hinge']}], 'colliders': [{'type': 'mesh', 'file': 'tip.obj'}],"
-            " 'contact': {'distance': 4e-3}, 'integrator': {'method': '%s' %s}, 'duration': 1, 'frame_rate': 100}",
-            membrane[k / METHODS] / 1e-3, methods[k % METHODS], own ? "" : ", 'dt': 0.01");
         char what[100];
-        snprintf(what, sizeof what, "over a tip, %g N/m, %s", membrane[k / METHODS], methods[k % METHODS]);
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, "
+            "'height': 0.4, 'transform': {'translate': [-0.2, 0.01, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, 4, 20, 21, "
+            "22, 23, 24], 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS
+            "]}], 'colliders': [{'type': 'mesh', 'file': 'tip.obj'}],"
+            " 'contact': {'distance': 4e-3}, %s, 'duration': 1, 'frame_rate': 100}",
+            membranes[k / METHODS] / 1e-3, method_of(methods[k % METHODS], 0.01));
+        snprintf(what, sizeof what, "over a tip, %g N/m, %s", membranes[k / METHODS], methods[k % METHODS]);
         press(&s, 1, what);
         scene_close(&s);
     }
@@ -188,4 +201,45 @@ START_TEST(over_a_tip)
 }
 END_TEST
 
-SUITE("least_gap", over_a_tip)
+/* A strip whose ends are pulled down over another one, which is held at its ends. */
+START_TEST(strip_across_strip)
+{
+    for (size_t k = 0; k < 2 * METHODS; k++) {
+        const double membrane = k < METHODS ? 1e3 : 1e5;
+        char what[100];
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 3, 'width': 0.4, 'height': 0.08,"
+            " 'transform': {'translate': [-0.2, 0, 0.04]}}, 'pins': [{'nodes': [0, 8, 9, 17, 18, 26]}], " MATERIAL ", " TERMS
+            "]}, {'mesh': {'grid': 'square', 'columns': 3, 'rows': 9, 'width': 0.08, 'height': 0.4,"
+            " 'transform': {'translate': [-0.037, 0.012, 0.203]}}, 'pins': [{'nodes': [0, 1, 2, 24, 25, 26],"
+            " 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS
+            "]}], 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, %s, 'duration': 1, 'frame_rate': 30}",
+            membrane / 1e-3, membrane / 1e-3, method_of(methods[k % METHODS], 0.01));
+        snprintf(what, sizeof what, "strip across strip, %g N/m, %s", membrane, methods[k % METHODS]);
+        press(&s, 1, what);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* A loose sheet that a wind of 30 m/s blows onto one that is held at its corners. */
+START_TEST(blown)
+{
+    for (size_t k = 0; k < METHODS; k++) {
+        char what[100];
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.3, 'height': 0.3,"
+            " 'orientation': 'vertical'}, 'pins': [{'nodes': [0, 4, 20, 24]}], " MATERIAL ", " TERMS
+            "]}, {'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.3, 'height': 0.3,"
+            " 'orientation': 'vertical', 'transform': {'translate': [0.013, 0.017, 0.03]}}, " MATERIAL ", " TERMS
+            ", {'type': 'drag.wind', 'wind': [0, 0, -30]}]}],"
+            " 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, %s, 'duration': 0.15, 'frame_rate': 60}",
+            1e6, 1e6, method_of(methods[k], 0.005));
+        snprintf(what, sizeof what, "blown, %s", methods[k]);
+        press(&s, 0.15, what);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+SUITE("least_gap", over_a_tip, strip_across_strip, blown)
