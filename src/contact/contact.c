@@ -38,7 +38,7 @@
 #define PRESSED    0.05
 #define SHRUNK     0.5
 #define RELAXED    0.3
-#define RAISE      4.0
+#define RAISE      2.0
 #define HALVED     0.2 /* [s] */
 #define MAX_FACTOR 1e4
 
