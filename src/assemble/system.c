@@ -216,6 +216,11 @@ bool drape_system_crosses(drape_system *system, const double *x, double t, const
     return system->contact && drape_contact_crosses(system->contact, x, t, reason, diagnostic);
 }
 
+bool drape_system_nearest(const drape_system *system, drape_diagnostic *diagnostic)
+{
+    return system->contact && drape_contact_nearest(system->contact, diagnostic);
+}
+
 double drape_system_take_contact_work(drape_system *system)
 {
     return system->contact ? drape_contact_take_work(system->contact) : 0;

@@ -184,6 +184,9 @@ bool drape_system_breaks_limit(const drape_system *system, const double *x, cons
 bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,
                           drape_diagnostic *diagnostic);
 
+/* drape_contact_nearest; false without contact. */
+bool drape_system_nearest(const drape_system *system, drape_diagnostic *diagnostic);
+
 /* The energy that changes of the stiffness of contact between steps have added since the last call [J]. */
 double drape_system_take_contact_work(drape_system *system);
 

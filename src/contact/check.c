@@ -168,3 +168,15 @@ drape_status drape_contact_check(drape_contact *c, const double *x, double t, co
     c->seconds += drape_clock_seconds() - start;
     return status;
 }
+
+bool drape_contact_nearest(const drape_contact *c, drape_diagnostic *diagnostic)
+{
+    const drape_near_pair *nearest = NULL;
+    for (int32_t i = 0; i < c->active.near_count; i++)
+        if (!nearest || c->active.near[i].gap < nearest->gap)
+            nearest = &c->active.near[i];
+    if (nearest)
+        *diagnostic = diagnostic_of(c, &nearest->pair, "gap [m]", nearest->gap,
+                                    drape_pair_least_gap(&nearest->pair, c->broad.rounding));
+    return nearest;
+}
