@@ -14,9 +14,10 @@ const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
                      1e3, "activation distance: cloth closer to a collider than this is pushed away"),
     [DRAPE_CONTACT_STIFFNESS] = DRAPE_NUMBER(
         "stiffness", "Pa",
-        DRAPE_DERIVED("the larger of areal density (2 gravity L + v^2) / distance, L the diagonal of the rest "
-                      "bounding box, v the largest speed of cloth, at the start or pinned, plus that of "
-                      "colliders; and E h / 1000 mean edges"),
+        DRAPE_DERIVED(
+            "the larger of areal density (2 gravity L + v^2) / distance, L the diagonal of the rest "
+            "bounding box, v the largest speed of cloth, at the start or pinned, plus that of "
+            "colliders; and E h / 1000 mean edges"),
         DRAPE_ABOVE(0), 1e15, "scale of the contact pressure at that distance"),
     [DRAPE_CONTACT_FRICTION_VELOCITY] =
         DRAPE_NUMBER("friction_velocity", "m/s", 1e-3, DRAPE_ABOVE(0), 1e3,

@@ -131,8 +131,7 @@ static bool note_near(drape_active_set *set, const drape_pair *pair, double gap)
 }
 
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates, double moved,
-                                   const drape_configuration *at, const drape_inside *inside,
-                                   bool all_inside)
+                                   const drape_configuration *at, const drape_inside *inside, bool all_inside)
 {
     const double rounding = candidates->broad->rounding;
     set->count = set->near_count = 0;

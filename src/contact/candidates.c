@@ -60,8 +60,7 @@ static void consider(void *user, const drape_pair *found)
 drape_status drape_candidates_search(drape_candidates *c, const drape_configuration *at, double margin)
 {
     const drape_model *m = c->broad->model;
-    search s = {.candidates = c,
-                .at = {.model = m, .x = c->x, .pose = c->pose}};
+    search s = {.candidates = c, .at = {.model = m, .x = c->x, .pose = c->pose}};
     memmove(c->x, at->x, 3 * (size_t)c->broad->points * sizeof *c->x);
     memmove(c->pose, at->pose, (size_t)m->collider_count * sizeof *c->pose);
     c->margin = margin;

@@ -63,7 +63,8 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
     double moved;
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &from, &moved);
     if (candidates && drape_candidates_moved(candidates, &to) <= candidates->margin) {
-        const double reach = 2 * longest_move(c, &p) + fmax(DRAPE_LEAST_GAP * c->broad.max_distance, keep->rounding);
+        const double reach =
+            2 * longest_move(c, &p) + fmax(DRAPE_LEAST_GAP * c->broad.max_distance, keep->rounding);
         for (int32_t i = 0; i < candidates->count; i++)
             if (drape_pair_points(&candidates->pairs[i]) > 1 &&
                 drape_candidate_may_fall_below(&candidates->pairs[i], moved, reach))

@@ -130,8 +130,7 @@ static drape_status check_path(drape_contact *c, const char **reason, drape_diag
 
 drape_keep drape_contact_keep_step(const drape_contact *c)
 {
-    return (drape_keep){
-        .rounding = c->broad.rounding, .least = KEEP_PATH, .below = KEEP_PATH, .core = true};
+    return (drape_keep){.rounding = c->broad.rounding, .least = KEEP_PATH, .below = KEEP_PATH, .core = true};
 }
 
 static drape_status update_at(drape_contact *c, const double *x, double t)
@@ -144,8 +143,8 @@ bool drape_contact_crosses(drape_contact *c, const double *x, double t, const ch
                            drape_diagnostic *diagnostic)
 {
     const double start = drape_clock_seconds();
-    const bool crosses = update_at(c, x, t) || check_gaps(c, reason, diagnostic) ||
-                         check_path(c, reason, diagnostic);
+    const bool crosses =
+        update_at(c, x, t) || check_gaps(c, reason, diagnostic) || check_path(c, reason, diagnostic);
     c->seconds += drape_clock_seconds() - start;
     return crosses;
 }

@@ -286,8 +286,8 @@ void drape_contact_set_rounding(drape_contact *c, const double *x)
 static drape_status update_inside(drape_contact *c)
 {
     drape_status status = DRAPE_OK;
-    const bool added = drape_inside_update(&c->inside, c->active.near, c->active.near_count,
-                                           c->broad.rounding, &status);
+    const bool added =
+        drape_inside_update(&c->inside, c->active.near, c->active.near_count, c->broad.rounding, &status);
     return added ? drape_contact_list(c, c->listed) : status;
 }
 

@@ -14,13 +14,12 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
     const drape_contact_def *def = &c->model->contact;
     const drape_pair *pair = &contact->pair;
     const double least = drape_pair_least_gap(pair, c->broad.rounding) / pair->distance;
-    return (drape_contact_law){.distance = pair->distance,
-                               .low = contact->gentle ? DRAPE_BARRIER_GENTLE : fmin(least, DRAPE_BARRIER_GENTLE),
-                               .stiffness = c->press.factor * def->stiffness * pair->area *
-                                            (def->distance / pair->distance),
-                               .friction = pair->collider >= 0 ? c->model->colliders[pair->collider].friction
-                                                               : def->self_friction,
-                               .velocity = def->friction_velocity};
+    return (drape_contact_law){
+        .distance = pair->distance,
+        .low = contact->gentle ? DRAPE_BARRIER_GENTLE : fmin(least, DRAPE_BARRIER_GENTLE),
+        .stiffness = c->press.factor * def->stiffness * pair->area * (def->distance / pair->distance),
+        .friction = pair->collider >= 0 ? c->model->colliders[pair->collider].friction : def->self_friction,
+        .velocity = def->friction_velocity};
 }
 
 void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3])

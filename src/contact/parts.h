@@ -47,7 +47,7 @@ struct drape_contact {
     bool begun;                      /* a step has begun: */
     double *start;                   /* (points x 3) its beginning */
     drape_collider_pose *start_pose; /* (collider_count) */
-    drape_inside inside;  /* at its beginning */
+    drape_inside inside;             /* at its beginning */
     drape_press press;
     drape_lagged *lagged; /* (lagged_count of lagged_room) lagged friction */
     int32_t lagged_count, lagged_room;

@@ -68,7 +68,7 @@ enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
 #define GAIN 0.02
 /* Fraction of the time: steps whose sum ends this near to the end of an advance end there. What is left is
  * the sum's rounding error, which the schedule does not step over. */
-#define LANDED           (1e3 * DBL_EPSILON)
+#define LANDED (1e3 * DBL_EPSILON)
 /* Of the time in which the scene moves by its size. What comes too near crosses the least gap of contact, 1e-3 of a
  * thickness, in longer steps at any speed that it can have, so steps as short as this, one after the other, lead
  * nowhere. A few may start IDA. */
@@ -141,7 +141,7 @@ typedef struct ida_state {
     bool crossed;             /* some residual; the last that did: */
     const char *crossing_reason;
     drape_diagnostic crossing_pair;
-    drape_status failure;     /* < 0: the pattern could not be extended */
+    drape_status failure; /* < 0: the pattern could not be extended */
 } ida_state;
 
 /* ---- Between vectors and nodes ---- */
@@ -191,7 +191,8 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
         f[s->n + i] = mass_of(s, i) * vp[i] + s->g[node_at(s, i)];
     }
     s->nonfinite = !drape_all_finite(f, 2 * (size_t)s->n);
-    s->crossing = !s->nonfinite && drape_system_crosses(s->system, s->x, t, &s->crossing_reason, &s->crossing_pair);
+    s->crossing =
+        !s->nonfinite && drape_system_crosses(s->system, s->x, t, &s->crossing_reason, &s->crossing_pair);
     s->crossed |= s->crossing;
     s->work.residuals++;
     s->work.residual_seconds += drape_system_clock(s->system) - start;

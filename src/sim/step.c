@@ -247,12 +247,13 @@ drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
         return DRAPE_OK;
     describe_diagnostic(sim->model, &last->diagnostic, diagnostic, sizeof diagnostic);
     describe_nearest(sim, last, nearest, sizeof nearest);
-    return drape_fail(
-        sim->ctx, DRAPE_E_STEP_TOO_SMALL,
-        "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64
-        " attempts since t=%.9g advanced less than one dt, %.4g s; the controller's max_attempts is %.15g%s%s",
-        drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status), last->iterations,
-        s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic, nearest);
+    return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
+                      "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64
+                      " attempts since t=%.9g advanced less than one dt, %.4g s; the controller's "
+                      "max_attempts is %.15g%s%s",
+                      drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status),
+                      last->iterations, s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic,
+                      nearest);
 }
 
 /* ---- One step, and an advance ---- */

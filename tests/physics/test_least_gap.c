@@ -33,6 +33,10 @@ static long double side(const double *a, const double *b, const double *c, const
 
 static bool pierces(const double *p, const double *q, const double *a, const double *b, const double *c)
 {
+    for (int k = 0; k < 3; k++)
+        if (fmax(p[k], q[k]) < fmin(fmin(a[k], b[k]), c[k]) ||
+            fmin(p[k], q[k]) > fmax(fmax(a[k], b[k]), c[k]))
+            return false;
     const long double over = side(a, b, c, p), under = side(a, b, c, q);
     if (over == 0 || under == 0 || (over > 0) == (under > 0))
         return false;
@@ -56,9 +60,9 @@ static int crossings(const surface *a, const surface *b)
             bool shared = false;
             for (int i = 0; i < 6 && a->x == b->x; i++)
                 shared = shared || n[i / 3] == t[i % 3];
-            count += !shared && pierces(a->x + 3 * (size_t)n[0], a->x + 3 * (size_t)n[1],
-                                        b->x + 3 * (size_t)t[0], b->x + 3 * (size_t)t[1],
-                                        b->x + 3 * (size_t)t[2]);
+            count +=
+                !shared && pierces(a->x + 3 * (size_t)n[0], a->x + 3 * (size_t)n[1], b->x + 3 * (size_t)t[0],
+                                   b->x + 3 * (size_t)t[1], b->x + 3 * (size_t)t[2]);
         }
     return count;
 }
@@ -126,19 +130,25 @@ static drape_status look(void *user, const drape_event *event)
 static bool press(scene *s, double until, const char *what)
 {
     const size_t n = 3 * (size_t)s->model->node_count;
-    watch w = {.sim = s->sim, .last = malloc(n * sizeof(double)), .x = malloc(n * sizeof(double)), .least_gap = INFINITY};
+    watch w = {.sim = s->sim,
+               .last = malloc(n * sizeof(double)),
+               .x = malloc(n * sizeof(double)),
+               .least_gap = INFINITY};
     ck_assert(w.last && w.x);
     memcpy(w.last, drape_sim_state(s->sim)->x, n * sizeof *w.last);
     ck_assert_int_eq(drape_sim_observe(s->sim, look, &w), DRAPE_OK);
     const drape_status status = drape_sim_advance(s->sim, until);
     const char *message = drape_context_message(s->ctx);
-    printf("# %s: t = %.3g of %g s, %ld steps, %ld rejected, least gap %.2g m, %d crossings, %d frames crossed%s%s\n", what,
-           drape_sim_state(s->sim)->t, until, w.steps, w.rejected, w.least_gap, w.crossings, w.frames_crossed, status ? ": " : "", status ? message : "");
+    printf("# %s: t = %.3g of %g s, %ld steps, %ld rejected, least gap %.2g m, %d crossings, %d frames "
+           "crossed%s%s\n",
+           what, drape_sim_state(s->sim)->t, until, w.steps, w.rejected, w.least_gap, w.crossings,
+           w.frames_crossed, status ? ": " : "", status ? message : "");
     ck_assert_msg(w.crossings == 0, "%s: %d crossings", what, w.crossings);
     ck_assert_msg(w.frames_crossed == 0, "%s: %d frames with crossings", what, w.frames_crossed);
     if (status) {
         ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
-        ck_assert_msg(strstr(message, "collider") || strstr(message, "self_contact"), "%s: %s", what, message);
+        ck_assert_msg(strstr(message, "collider") || strstr(message, "self_contact"), "%s: %s", what,
+                      message);
     }
     free(w.last);
     free(w.x);
@@ -190,7 +200,8 @@ START_TEST(over_a_tip)
         char what[100];
         scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, "
-            "'height': 0.4, 'transform': {'translate': [-0.2, 0.01, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, 4, 20, 21, "
+            "'height': 0.4, 'transform': {'translate': [-0.2, 0.01, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, "
+            "4, 20, 21, "
             "22, 23, 24], 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS
             "]}], 'colliders': [{'type': 'mesh', 'file': 'tip.obj'}],"
             " 'contact': {'distance': 4e-3}, %s, 'duration': 1, 'frame_rate': 100}",
@@ -210,12 +221,15 @@ START_TEST(strip_across_strip)
         const double membrane = k < METHODS ? 1e3 : 1e5;
         char what[100];
         scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 3, 'width': 0.4, 'height': 0.08,"
-            " 'transform': {'translate': [-0.2, 0, 0.04]}}, 'pins': [{'nodes': [0, 8, 9, 17, 18, 26]}], " MATERIAL ", " TERMS
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 3, 'width': 0.4, "
+            "'height': 0.08,"
+            " 'transform': {'translate': [-0.2, 0, 0.04]}}, 'pins': [{'nodes': [0, 8, 9, 17, 18, "
+            "26]}], " MATERIAL ", " TERMS
             "]}, {'mesh': {'grid': 'square', 'columns': 3, 'rows': 9, 'width': 0.08, 'height': 0.4,"
             " 'transform': {'translate': [-0.037, 0.012, 0.203]}}, 'pins': [{'nodes': [0, 1, 2, 24, 25, 26],"
             " 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS
-            "]}], 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, %s, 'duration': 1, 'frame_rate': 30}",
+            "]}], 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, %s, 'duration': 1, "
+            "'frame_rate': 30}",
             membrane / 1e-3, membrane / 1e-3, method_of(methods[k % METHODS], 0.01));
         snprintf(what, sizeof what, "strip across strip, %g N/m, %s", membrane, methods[k % METHODS]);
         press(&s, 1, what);
@@ -230,12 +244,14 @@ START_TEST(blown)
     for (size_t k = 0; k < METHODS; k++) {
         char what[100];
         scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.3, 'height': 0.3,"
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.3, "
+            "'height': 0.3,"
             " 'orientation': 'vertical'}, 'pins': [{'nodes': [0, 4, 20, 24]}], " MATERIAL ", " TERMS
             "]}, {'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.3, 'height': 0.3,"
-            " 'orientation': 'vertical', 'transform': {'translate': [0.013, 0.017, 0.03]}}, " MATERIAL ", " TERMS
-            ", {'type': 'drag.wind', 'wind': [0, 0, -30]}]}],"
-            " 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, %s, 'duration': 0.15, 'frame_rate': 60}",
+            " 'orientation': 'vertical', 'transform': {'translate': [0.013, 0.017, 0.03]}}, " MATERIAL
+            ", " TERMS ", {'type': 'drag.wind', 'wind': [0, 0, -30]}]}],"
+            " 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, %s, 'duration': 0.15, "
+            "'frame_rate': 60}",
             1e6, 1e6, method_of(methods[k], 0.005));
         snprintf(what, sizeof what, "blown, %s", methods[k]);
         press(&s, 0.15, what);
@@ -250,10 +266,12 @@ START_TEST(between_two_boards)
     for (size_t k = 0; k < METHODS; k++) {
         char what[100];
         scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, 'width': 0.2, 'height': 0.2,"
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, 'width': 0.2, "
+            "'height': 0.2,"
             " 'transform': {'translate': [-0.1, 0.005, 0.1]}}, " MATERIAL ", " TERMS "]}], 'colliders': ["
             " {'type': 'box', 'center': [0, -0.1, 0], 'size': [0.5, 0.2, 0.5]},"
-            " {'type': 'box', 'center': [0, 0.11, 0], 'size': [0.5, 0.2, 0.5], 'track': [[0, [0,0,0]], [0.2, [0,-0.01,0]]]}],"
+            " {'type': 'box', 'center': [0, 0.11, 0], 'size': [0.5, 0.2, 0.5], 'track': [[0, [0,0,0]], [0.2, "
+            "[0,-0.01,0]]]}],"
             " 'contact': {'distance': 4e-3}, 'gravity': [0, 0, 0], %s, 'duration': 0.2, 'frame_rate': 100}",
             1e6, method_of(methods[k], 0.01));
         snprintf(what, sizeof what, "between two boards, %s", methods[k]);
@@ -269,12 +287,14 @@ END_TEST
 START_TEST(stiffening_is_work)
 {
     enter_folder();
-    scene s = scene_open(
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, 'height': 0.4,"
-        " 'transform': {'translate': [-0.2, 0.01, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, 4, 20, 21, 22, 23, 24],"
-        " 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS
-        "]}], 'colliders': [{'type': 'mesh', 'file': 'tip.obj'}], 'contact': {'distance': 4e-3}, %s, 'duration': 1}",
-        2e8, method_of("be", 0.01));
+    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, "
+                         "'width': 0.4, 'height': 0.4,"
+                         " 'transform': {'translate': [-0.2, 0.01, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, "
+                         "4, 20, 21, 22, 23, 24],"
+                         " 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS
+                         "]}], 'colliders': [{'type': 'mesh', 'file': 'tip.obj'}], 'contact': {'distance': "
+                         "4e-3}, %s, 'duration': 1}",
+                         2e8, method_of("be", 0.01));
     const struct drape_contact *contact = drape_system_contact(s.sim->system);
     double fall = 0, added = 0, factor = 1;
     int raised = 0;
@@ -300,12 +320,14 @@ END_TEST
  * here less than a twentieth. Then no pair is inside any more. */
 START_TEST(what_begins_inside_is_pushed_out_gently)
 {
-    scene s = scene_open(
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, 'width': 0.2, 'height': 0.2,"
-        " 'transform': {'translate': [-0.1, -4e-3, 0.1]}}, " MATERIAL ", 'terms': ['stretch.edge']}], 'colliders': ["
-        " {'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0]}], 'contact': {'distance': 4e-3, 'stiffness': 10},"
-        " 'gravity': [0, 0, 0], %s, 'duration': 1}",
-        1e6, method_of("midpoint", 2e-4));
+    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
+                         "'width': 0.2, 'height': 0.2,"
+                         " 'transform': {'translate': [-0.1, -4e-3, 0.1]}}, " MATERIAL
+                         ", 'terms': ['stretch.edge']}], 'colliders': ["
+                         " {'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0]}], 'contact': "
+                         "{'distance': 4e-3, 'stiffness': 10},"
+                         " 'gravity': [0, 0, 0], %s, 'duration': 1}",
+                         1e6, method_of("midpoint", 2e-4));
     const struct drape_contact *contact = drape_system_contact(s.sim->system);
     const double stored = 10 * 0.04 * 4e-3 * drape_barrier_at(-1, DRAPE_BARRIER_GENTLE).b;
     double height = -4e-3;
@@ -351,8 +373,10 @@ START_TEST(a_checkpoint_keeps_it)
         scene s[2];
         for (int k = 0; k < 2; k++)
             s[k] = scene_open(
-                "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, 'height': 0.4,"
-                " 'transform': {'translate': [-0.2, %g, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, 4, 20, 21, 22, 23, 24],"
+                "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, "
+                "'height': 0.4,"
+                " 'transform': {'translate': [-0.2, %g, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, 4, 20, 21, "
+                "22, 23, 24],"
                 " 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS "]}], 'colliders': ["
                 " {'type': 'mesh', 'file': 'tip.obj'}], 'contact': {'distance': 4e-3}, %s, 'duration': 1}",
                 inside ? 2e-6 : 0.01, 2e8, method_of("be", 0.01));
@@ -374,5 +398,75 @@ START_TEST(a_checkpoint_keeps_it)
 }
 END_TEST
 
-SUITE("least_gap", over_a_tip, strip_across_strip, blown, between_two_boards, stiffening_is_work,
+#define AROUND 10
+#define ALONG  9
+#define RADIUS 0.1
+
+/* A tube whose nodes are numbered ring by ring, in tube.obj. */
+static void write_tube(void)
+{
+    FILE *file = fopen("tube.obj", "w");
+    ck_assert_ptr_nonnull(file);
+    for (int j = 0; j < ALONG; j++)
+        for (int i = 0; i < AROUND; i++) {
+            const double angle = 2 * acos(-1.0) * (i + 0.5 * (j % 2)) / AROUND;
+            fprintf(file, "v %.17g %.17g %.17g\n", 0.05 * j, RADIUS * cos(angle), RADIUS * sin(angle));
+        }
+    for (int j = 0; j + 1 < ALONG; j++)
+        for (int i = 0; i < AROUND; i++) {
+            const int a = j * AROUND + i + 1, b = j * AROUND + (i + 1) % AROUND + 1, c = a + AROUND,
+                      d = b + AROUND;
+            if (j % 2)
+                fprintf(file, "f %d %d %d\nf %d %d %d\n", a, b, d, a, d, c);
+            else
+                fprintf(file, "f %d %d %d\nf %d %d %d\n", a, b, c, b, d, c);
+        }
+    fclose(file);
+}
+
+/* The pins of both ends, each node on a track of its own: the ends turn against each other by `degrees` each. */
+static const char *wringing(double degrees)
+{
+    static char text[6000];
+    size_t used = 0;
+    for (int end = 0; end < 2; end++)
+        for (int i = 0; i < AROUND; i++) {
+            const double angle = 2 * acos(-1.0) * i / AROUND, y = RADIUS * cos(angle),
+                         z = RADIUS * sin(angle);
+            used += (size_t)snprintf(text + used, sizeof text - used, "%s{'nodes': [%d], 'track': [",
+                                     used ? ", " : "", end ? (ALONG - 1) * AROUND + i : i);
+            for (int k = 0; k <= 8; k++) {
+                const double to = angle + (end ? -1 : 1) * degrees * acos(-1.0) / 180 * k / 8;
+                used += (size_t)snprintf(text + used, sizeof text - used, "%s[%g,[0,%.4f,%.4f]]",
+                                         k ? "," : "", 0.2 * k, RADIUS * cos(to) - y, RADIUS * sin(to) - z);
+            }
+            used += (size_t)snprintf(text + used, sizeof text - used, "]}");
+            ck_assert_uint_lt(used, sizeof text);
+        }
+    return text;
+}
+
+/* A tube that is wrung by 2 x 270 degrees, without gravity, so that inertia alone would make contact too soft. */
+START_TEST(wrung)
+{
+    static const char *const some[] = {"be", "newton_k"};
+    enter_folder();
+    write_tube();
+    for (int k = 0; k < 2; k++) {
+        char what[100];
+        scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'file': 'tube.obj'}, 'pins': [%s], " MATERIAL
+                             ", " TERMS "]}], 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': "
+                                        "4e-3}, 'gravity': [0, 0, 0], %s,"
+                             " 'duration': 1.6, 'frame_rate': 30}",
+                             wringing(270), 1e6, method_of(some[k], 0.02));
+        snprintf(what, sizeof what, "wrung, %s", some[k]);
+        press(&s, 1.6, what);
+        scene_close(&s);
+    }
+    unlink("tube.obj");
+    leave_folder();
+}
+END_TEST
+
+SUITE("least_gap", over_a_tip, strip_across_strip, blown, between_two_boards, wrung, stiffening_is_work,
       what_begins_inside_is_pushed_out_gently, a_checkpoint_keeps_it)

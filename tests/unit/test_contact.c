@@ -138,7 +138,8 @@ static void check_kind(drape_pair_kind kind, double speed)
     for (int k = 0; k < 3000; k++) {
         setting s = {
             .pair = {.kind = kind, .node = {0, 1, 2, 3}, .collider = -1, .radius = 0.01, .distance = 0.2},
-            .law = {.distance = 0.2, .low = DRAPE_LEAST_GAP, .stiffness = 3, .friction = 0.4, .velocity = 0.05}};
+            .law = {
+                .distance = 0.2, .low = DRAPE_LEAST_GAP, .stiffness = 3, .friction = 0.4, .velocity = 0.05}};
         fill(&seed, 0.1, s.x, D);
         fill(&seed, speed, s.v, D);
         fill(&seed, 0.1, s.rest, D);
@@ -183,7 +184,8 @@ START_TEST(test_parallel)
     for (int k = 0; k < 200; k++) {
         setting s = {
             .pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1, .distance = 0.2},
-            .law = {.distance = 0.2, .low = DRAPE_LEAST_GAP, .stiffness = 3, .friction = 0.4, .velocity = 0.05},
+            .law =
+                {.distance = 0.2, .low = DRAPE_LEAST_GAP, .stiffness = 3, .friction = 0.4, .velocity = 0.05},
             .x = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, -0.001, 0.1, 0.05, 0.001},
             .rest = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, 0, 0.1, 0.05, 0}};
         double noise[D];
@@ -238,9 +240,11 @@ START_TEST(test_barrier)
 {
     check_barrier(DRAPE_BARRIER_GENTLE);
     check_barrier(DRAPE_LEAST_GAP);
-    ck_assert_double_eq_tol(drape_barrier_at(DRAPE_LEAST_GAP, DRAPE_LEAST_GAP).db * DRAPE_LEAST_GAP, -1, 0.02);
+    ck_assert_double_eq_tol(drape_barrier_at(DRAPE_LEAST_GAP, DRAPE_LEAST_GAP).db * DRAPE_LEAST_GAP, -1,
+                            0.02);
     for (double s = DRAPE_BARRIER_GENTLE; s < 1; s += 1e-2) {
-        ck_assert_double_eq(drape_barrier_at(s, DRAPE_LEAST_GAP).b, drape_barrier_at(s, DRAPE_BARRIER_GENTLE).b);
+        ck_assert_double_eq(drape_barrier_at(s, DRAPE_LEAST_GAP).b,
+                            drape_barrier_at(s, DRAPE_BARRIER_GENTLE).b);
         ck_assert_double_eq(drape_barrier_at(s, DRAPE_LEAST_GAP).db,
                             drape_barrier_at(s, DRAPE_BARRIER_GENTLE).db);
     }
