@@ -179,8 +179,8 @@ drape_status drape_system_check(const drape_system *system, const double *x, con
 bool drape_system_breaks_limit(const drape_system *system, const double *x, const double *before,
                                const double *internal);
 
-/* Whether features come too near at x, or pass through each other on the straight path from the beginning of the
- * step to there; with *reason and *diagnostic filled in if so. */
+/* Whether features come too near at x, or pass through each other on the straight path from the beginning
+ * of the step to there; with *reason and *diagnostic filled in if so. */
 bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,
                           drape_diagnostic *diagnostic);
 

@@ -99,10 +99,10 @@ static double stiffness_of_fall(const drape_model *model)
     return sigma * (2 * (g > 0 ? g : model->length) * model->length + v * v) / model->contact.distance;
 }
 
-/* A face of size a that is strained by e pulls its nodes against what it meets with a force of about E h e a, on an
- * area of about a^2: a pressure E h e / a. At a tenth of the activation distance the pressure of the barrier is 12
- * times its scale (contact/barrier.h), so a scale of ELASTIC E h / a holds a strain of 12 ELASTIC, a per cent, there,
- * and larger ones nearer. */
+/* A face of size a that is strained by e pulls its nodes against what it meets with a force of about E h
+ * e a, on an area of about a^2: a pressure E h e / a. At a tenth of the activation distance the pressure
+ * of the barrier is 12 times its scale (contact/barrier.h), so a scale of ELASTIC E h / a holds a strain
+ * of 12 ELASTIC, a per cent, there, and larger ones nearer. */
 #define ELASTIC 1e-3
 static double stiffness_of_strain(const drape_model *model)
 {

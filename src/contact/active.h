@@ -25,8 +25,8 @@ typedef struct drape_active_set {
 } drape_active_set;
 
 /* Lists the active contacts of a configuration in which no point has moved farther than `moved` from the
- * search of the candidates. Those of pairs inside are gentle; all_inside: those of all pairs below their least
- * gap are, for outside of steps no others are. Errors: DRAPE_E_MEMORY. */
+ * search of the candidates. Those of pairs inside are gentle; all_inside: those of all pairs below their
+ * least gap are, for outside of steps no others are. Errors: DRAPE_E_MEMORY. */
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates, double moved,
                                    const drape_configuration *at, const drape_inside *inside,
                                    bool all_inside);

@@ -1,12 +1,12 @@
 /*
- * barrier.h: the energy of a gap, b(s) with s = gap / activation distance: the logarithmic barrier of Li et
- * al. 2020 (Incremental Potential Contact, eq. 6) scaled to length one,
+ * barrier.h: the energy of a gap, b(s) with s = gap / activation distance: the logarithmic barrier of Li
+ * et al. 2020 (Incremental Potential Contact, eq. 6) scaled to length one,
  *     b = -(s - 1)^2 ln s   for s < 1,  0 beyond,
- * C2 at s = 1. Below s = low it continues as its osculating parabola, also for s < 0, so that it is finite
- * everywhere. For most pairs, low is the least gap that a step may end with (pair.h): the force withstands
- * 1/low times the stiffness there, and the parabola is met only by trial states. For pairs that began below the
- * least gap, low is DRAPE_BARRIER_GENTLE: they are pushed out with a force that is finite in a practical sense,
- * too.
+ * C2 at s = 1. Below s = low it continues as its osculating parabola, also for s < 0, so that it is
+ * finite everywhere. For most pairs, low is the least gap that a step may end with (pair.h): the force
+ * withstands 1/low times the stiffness there, and the parabola is met only by trial states. For pairs
+ * that began below the least gap, low is DRAPE_BARRIER_GENTLE: they are pushed out with a force that is
+ * finite in a practical sense, too.
  */
 #ifndef DRAPE_CONTACT_BARRIER_H
 #define DRAPE_CONTACT_BARRIER_H

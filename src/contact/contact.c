@@ -30,11 +30,11 @@
 #define LEAD_BEGIN  1.0  /* lead at the beginning of a step, in displacements */
 #define LEAD_WITHIN -0.5 /* lead within a step: half back, as the next trial may start there */
 #define MAX_LEAD    0.8  /* largest lead, as a share of the margin */
-/* A gap below this share of the largest coordinate is rounding: closest points and their distance have errors of
- * some hundred units in the last place. */
+/* A gap below this share of the largest coordinate is rounding: closest points and their distance have
+ * errors of some hundred units in the last place. */
 #define ROUNDING (1e4 * DBL_EPSILON)
-/* The stiffness is raised when the smallest gap is small and has shrunk since the last raise, and falls when it is
- * large again. Gaps in activation distances. */
+/* The stiffness is raised when the smallest gap is small and has shrunk since the last raise, and falls
+ * when it is large again. Gaps in activation distances. */
 #define PRESSED    0.05
 #define SHRUNK     0.5
 #define RELAXED    0.3

@@ -27,8 +27,8 @@ typedef struct drape_inside {
 
 bool drape_inside_has(const drape_inside *inside, const drape_pair *pair);
 
-/* Keeps those of its pairs that are among the near ones, for at the others both barriers agree, and adds those
- * that are below their least gap. Returns whether a pair was added; *status: DRAPE_E_MEMORY. */
+/* Keeps those of its pairs that are among the near ones, for at the others both barriers agree, and adds
+ * those that are below their least gap. Returns whether a pair was added; *status: DRAPE_E_MEMORY. */
 bool drape_inside_update(drape_inside *inside, const drape_near_pair *near, int32_t count, double rounding,
                          drape_status *status);
 

@@ -27,9 +27,9 @@ typedef struct drape_pair {
     double gap_at_search; /* of a candidate [m] */
 } drape_pair;
 
-/* The least gap [m] that a pair may have at the end of a step: a share of its activation distance and, if that
- * is larger, of the coordinates, whose rounding would decide on which side a smaller gap is. Cloth that is
- * nearly as close as that at rest may approach to half of its activation distance. */
+/* The least gap [m] that a pair may have at the end of a step: a share of its activation distance and, if
+ * that is larger, of the coordinates, whose rounding would decide on which side a smaller gap is. Cloth
+ * that is nearly as close as that at rest may approach to half of its activation distance. */
 #define DRAPE_LEAST_GAP 1e-3 /* of the activation distance */
 static inline double drape_pair_least_gap(const drape_pair *pair, double rounding)
 {
@@ -75,10 +75,10 @@ bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const
 void drape_pair_derivatives(const drape_pair *pair, const drape_gap *gap, const drape_configuration *at,
                             const double *rest, drape_gap_derivatives *derivatives);
 
-/* Continuous collision detection: the largest step fraction on the straight path from x to y, the same for
- * all points, on which the pair keeps what it must of its gap (additive continuous collision detection, Li et
- * al. 2021, Codimensional IPC, algorithm 1). It does not search beyond `limit`, which it returns at most. A pair
- * whose gap at x is not above rounding has no side to stay on: `limit`. */
+/* Continuous collision detection: the largest step fraction on the straight path from x to y, the same
+ * for all points, on which the pair keeps what it must of its gap (additive continuous collision
+ * detection, Li et al. 2021, Codimensional IPC, algorithm 1). It does not search beyond `limit`, which it
+ * returns at most. A pair whose gap at x is not above rounding has no side to stay on: `limit`. */
 double drape_pair_step_fraction(const drape_pair *pair, const double *x, const double *y,
                                 const drape_keep *keep, double limit);
 

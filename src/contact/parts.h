@@ -97,8 +97,8 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
 /* Velocities of the points of an active contact, relative to the collider if it is a surface. */
 void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3]);
 
-/* The largest step fraction from x to y (points x 3) on which all pairs of features keep what they must of their
- * gaps, and the pair that limits it. Colliders are at pose. */
+/* The largest step fraction from x to y (points x 3) on which all pairs of features keep what they must
+ * of their gaps, and the pair that limits it. Colliders are at pose. */
 double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
                                    const drape_collider_pose *pose, const drape_keep *keep,
                                    drape_pair *limiting);

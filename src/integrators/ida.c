@@ -69,9 +69,9 @@ enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
 /* Fraction of the time: steps whose sum ends this near to the end of an advance end there. What is left is
  * the sum's rounding error, which the schedule does not step over. */
 #define LANDED (1e3 * DBL_EPSILON)
-/* Of the time in which the scene moves by its size. What comes too near crosses the least gap of contact, 1e-3 of a
- * thickness, in longer steps at any speed that it can have, so steps as short as this, one after the other, lead
- * nowhere. A few may start IDA. */
+/* Of the time in which the scene moves by its size. What comes too near crosses the least gap of contact,
+ * 1e-3 of a thickness, in longer steps at any speed that it can have, so steps as short as this, one
+ * after the other, lead nowhere. A few may start IDA. */
 #define LEAST_STEP       1e-10
 #define MAX_TINY         20
 #define MAX_ERROR_FAILS  10 /* error test failures in one step */
@@ -401,7 +401,7 @@ static bool exhausted(ida_state *s, const drape_state *in, drape_step_info *info
     return true;
 }
 
-/* Stops a run whose steps have become so small that it no longer moves, as where nothing can give way. */
+/* Stops a run whose steps have become so small that it no longer moves, as where nothing can yield. */
 static drape_status check_step_size(ida_state *s, double h, bool last, drape_step_info *info)
 {
     s->tiny = h < s->least_step && !last ? s->tiny + 1 : 0;

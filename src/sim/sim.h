@@ -111,8 +111,8 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
  * state. */
 void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *density);
 
-/* Adds the energy that contact gained by becoming stiffer at the beginning of a step, which stays whether or not the
- * step is accepted. */
+/* Adds the energy that contact gained by becoming stiffer at the beginning of a step, which stays whether
+ * or not the step is accepted. */
 void drape_sim_add_contact_work(drape_sim *sim);
 
 /* Adds the work of an accepted step to the energy account. */

@@ -197,7 +197,8 @@ static void describe_diagnostic(const drape_model *model, const drape_diagnostic
                  diagnostic->limit);
 }
 
-/* The pair that may have kept the equations of a step without a solution, unless the diagnostic names an element. */
+/* The pair that may have kept the equations of a step without a solution, unless the diagnostic names an
+ * element. */
 static void describe_nearest(const drape_sim *sim, const drape_attempt *attempt, char *text, size_t size)
 {
     drape_diagnostic nearest;

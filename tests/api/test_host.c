@@ -243,8 +243,8 @@ END_TEST
 
 #define STIFFNESS "'contact': {'stiffness': 2000}, "
 
-/* As with pins: a ball that the host moves from key to key behaves as one on the track. The stiffness is given, because
- * its default depends on the speed of tracks. */
+/* As with pins: a ball that the host moves from key to key behaves as one on the track. The stiffness is
+ * given, because its default depends on the speed of tracks. */
 START_TEST(a_collider_goes_where_it_is_sent)
 {
     static const char *const settings[] = {"'method': 'be', 'dt': 0.0078125, 'tolerance': 1e-9",

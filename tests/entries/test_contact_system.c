@@ -237,8 +237,9 @@ START_TEST(cloth_on_cloth)
 }
 END_TEST
 
-/* Layers that are as near as twice their least gap. Derivatives change over the gap of 8e-6 m there, so with a
- * difference over e = 1e-8 m the truncation error is (e/gap)^2 = 2e-6, the rounding error 1e-16 0.3 / e = 3e-9. */
+/* Layers that are as near as twice their least gap. Derivatives change over the gap of 8e-6 m there, so
+ * with a difference over e = 1e-8 m the truncation error is (e/gap)^2 = 2e-6, the rounding error 1e-16
+ * 0.3 / e = 3e-9. */
 START_TEST(near_the_least_gap)
 {
     for (int k = 0; k < 2; k++) {

@@ -1,10 +1,10 @@
 /*
- * test_least_gap.c: cloth that is pressed against something. No pair of pieces comes nearer than the least gap, so
- * nothing passes through anything, in any accepted state and on the straight way between two, whatever presses; a
- * run that cannot keep this stops and names the pair. Crossings are counted here, without the library: an edge passes
- * through a triangle if its ends are on different sides of the plane and it passes all three sides of the triangle
- * the same way round. Determinants are computed with 64 bits: their rounding error is far below those of gaps of
- * 1e-3 activation distances.
+ * test_least_gap.c: cloth that is pressed against something. No pair of pieces comes nearer than the
+ * least gap, so nothing passes through anything, in any accepted state and on the straight path between
+ * two, whatever presses; a run that cannot keep this stops and names the pair. Crossings are counted
+ * here, without the library: an edge passes through a triangle if its ends are on different sides of the
+ * plane and it passes all three sides of the triangle in the same sense. Determinants are computed with
+ * 64 bits: their rounding error is far below those of gaps of 1e-3 activation distances.
  */
 #include "colliders/colliders.h"
 #include "contact/barrier.h"
@@ -87,7 +87,7 @@ static int crossings_at(const drape_model *m, const double *x, double t)
 
 /* ---- Watching ---- */
 
-#define BETWEEN 8 /* states looked at on the way from one accepted state to the next */
+#define BETWEEN 8 /* states looked at between one accepted state and the next */
 
 typedef struct watch {
     drape_sim *sim;
@@ -126,7 +126,7 @@ static drape_status look(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Runs to the end, or until it stops with a message that names a pair. Returns whether it came to the end. */
+/* Runs to the end, or until it stops with a message that names a pair. Returns whether it reached the end. */
 static bool press(scene *s, double until, const char *what)
 {
     const size_t n = 3 * (size_t)s->model->node_count;
@@ -260,7 +260,8 @@ START_TEST(blown)
 }
 END_TEST
 
-/* Two boards that close upon a sheet completely: nothing can give way, so every method stops and names a pair. */
+/* Two boards that close upon a sheet completely: nothing can yield, so every method stops and names a
+ * pair. */
 START_TEST(between_two_boards)
 {
     for (size_t k = 0; k < METHODS; k++) {
@@ -282,8 +283,9 @@ START_TEST(between_two_boards)
 }
 END_TEST
 
-/* Contact becomes stiffer while the sheet is pulled over the tip. The energy which that adds to present contacts is
- * counted as work: the numerical dissipation of backward Euler never falls by more than a thousandth of it. */
+/* Contact becomes stiffer while the sheet is pulled over the tip. The energy which that adds to present
+ * contacts is counted as work: the numerical dissipation of backward Euler never falls by more than a
+ * thousandth of it. */
 START_TEST(stiffening_is_work)
 {
     enter_folder();
@@ -315,9 +317,9 @@ START_TEST(stiffening_is_work)
 }
 END_TEST
 
-/* A sheet that begins one activation distance deep in the ground is inside: the parabola pushes it out, and it leaves
- * with the energy b(-1) of that. Without gravity and damping, midpoint conserves it up to the change of b over a step,
- * here less than a twentieth. Then no pair is inside any more. */
+/* A sheet that begins one activation distance deep in the ground is inside: the parabola pushes it out,
+ * and it leaves with the energy b(-1) of that. Without gravity and damping, midpoint conserves it up to
+ * the change of b over a step, here less than a twentieth. Then no pair is inside any more. */
 START_TEST(what_begins_inside_is_pushed_out_gently)
 {
     scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
@@ -362,8 +364,8 @@ static drape_status keep(void *user, const void *bytes, size_t size)
     return DRAPE_OK;
 }
 
-/* A run that continues from a checkpoint has the bits of one that did not stop, while contact is stiffer than the
- * scene says, and while cloth is inside. */
+/* A run that continues from a checkpoint has the bits of one that did not stop, while contact is stiffer
+ * than the scene says, and while cloth is inside. */
 START_TEST(a_checkpoint_keeps_it)
 {
     static memory saved;
@@ -424,7 +426,8 @@ static void write_tube(void)
     fclose(file);
 }
 
-/* The pins of both ends, each node on a track of its own: the ends turn against each other by `degrees` each. */
+/* The pins of both ends, each node on a track of its own: the ends turn against each other by `degrees`
+ * each. */
 static const char *wringing(double degrees)
 {
     static char text[6000];
@@ -446,7 +449,8 @@ static const char *wringing(double degrees)
     return text;
 }
 
-/* A tube that is wrung by 2 x 270 degrees, without gravity, so that inertia alone would make contact too soft. */
+/* A tube that is wrung by 2 x 270 degrees, without gravity, so that inertia alone would make contact too
+ * soft. */
 START_TEST(wrung)
 {
     static const char *const some[] = {"be", "newton_k"};
@@ -456,7 +460,7 @@ START_TEST(wrung)
         char what[100];
         scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'file': 'tube.obj'}, 'pins': [%s], " MATERIAL
                              ", " TERMS "]}], 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': "
-                                        "4e-3}, 'gravity': [0, 0, 0], %s,"
+                             "4e-3}, 'gravity': [0, 0, 0], %s,"
                              " 'duration': 1.6, 'frame_rate': 30}",
                              wringing(270), 1e6, method_of(some[k], 0.02));
         snprintf(what, sizeof what, "wrung, %s", some[k]);

@@ -233,9 +233,9 @@ static void check_barrier(double low)
     }
 }
 
-/* At the least gap it withstands 1/DRAPE_LEAST_GAP times its scale: b' = -1/s to a hundredth there, as 2 s ln s and
- * 2 s are. The gentle one agrees with it from DRAPE_BARRIER_GENTLE on, so that a pair that comes out keeps its
- * energy. */
+/* At the least gap it withstands 1/DRAPE_LEAST_GAP times its scale: b' = -1/s to a hundredth there, as 2
+ * s ln s and 2 s are. The gentle one agrees with it from DRAPE_BARRIER_GENTLE on, so that a pair that
+ * comes out keeps its energy. */
 START_TEST(test_barrier)
 {
     check_barrier(DRAPE_BARRIER_GENTLE);
@@ -251,9 +251,10 @@ START_TEST(test_barrier)
 }
 END_TEST
 
-/* On a path that is reported as free, the gap never falls below what must be kept of it. A path that is not free
- * is cut before that, and after most of the rest is gone. Both ways of keeping: a trial state keeps half of what is
- * above the least gap, a step half of the least gap; a pair that begins below it keeps half of its gap. */
+/* On a path that is reported as free, the gap never falls below what must be kept of it. A path that is
+ * not free is cut before that, and after most of the rest is gone. A trial state
+ * keeps half of what is above the least gap, a step half of the least gap; a pair that begins below it
+ * keeps half of its gap. */
 static void check_step_fraction(const drape_keep *keep, double distance)
 {
     uint64_t seed = 11;
