@@ -87,7 +87,7 @@ static int crossings_at(const drape_model *m, const double *x, double t)
 
 /* ---- Watching ---- */
 
-#define BETWEEN 8 /* states looked at between one accepted state and the next */
+#define BETWEEN 4 /* states looked at between one accepted state and the next */
 
 typedef struct watch {
     drape_sim *sim;
@@ -194,9 +194,9 @@ static const char *method_of(const char *name, double dt)
 /* A sheet with 4 x 4 squares, from 3e4 to 1e6 N/m, two sides of which are pulled down over a tip. */
 START_TEST(over_a_tip)
 {
-    const double membranes[] = {3e4, 2e5, 1e6};
+    const double membranes[] = {3e4, 1e6};
     enter_folder();
-    for (size_t k = 0; k < 3 * METHODS; k++) {
+    for (size_t k = 0; k < 2 * METHODS; k++) {
         char what[100];
         scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, "
@@ -449,7 +449,7 @@ static const char *wringing(double degrees)
     return text;
 }
 
-/* A tube that is wrung by 2 x 270 degrees, without gravity, so that inertia alone would make contact too
+/* A tube that is wrung by 2 x 200 degrees, without gravity, so that inertia alone would make contact too
  * soft. */
 START_TEST(wrung)
 {
@@ -462,7 +462,7 @@ START_TEST(wrung)
                              ", " TERMS "]}], 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': "
                              "4e-3}, 'gravity': [0, 0, 0], %s,"
                              " 'duration': 1.6, 'frame_rate': 30}",
-                             wringing(270), 1e6, method_of(some[k], 0.02));
+                             wringing(200), 1e6, method_of(some[k], 0.02));
         snprintf(what, sizeof what, "wrung, %s", some[k]);
         press(&s, 1.6, what);
         scene_close(&s);
