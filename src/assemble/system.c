@@ -210,9 +210,20 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
     return system->contact ? drape_contact_step_fraction(system->contact, x, y, t) : 1;
 }
 
-bool drape_system_crosses(drape_system *system, const double *y, double t)
+bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,
+                          drape_diagnostic *diagnostic)
 {
-    return system->contact && drape_contact_crosses(system->contact, y, t);
+    return system->contact && drape_contact_crosses(system->contact, x, t, reason, diagnostic);
+}
+
+bool drape_system_nearest(const drape_system *system, drape_diagnostic *diagnostic)
+{
+    return system->contact && drape_contact_nearest(system->contact, diagnostic);
+}
+
+double drape_system_take_contact_work(drape_system *system)
+{
+    return system->contact ? drape_contact_take_work(system->contact) : 0;
 }
 
 drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,

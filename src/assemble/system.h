@@ -187,8 +187,16 @@ drape_status drape_system_check(const drape_system *system, const double *x, con
 bool drape_system_breaks_limit(const drape_system *system, const double *x, const double *before,
                                const double *internal);
 
-/* Whether anything passes through anything else on the straight path from the beginning of the step to y. */
-bool drape_system_crosses(drape_system *system, const double *y, double t);
+/* Whether features come too near at x, or pass through each other on the straight path from the beginning
+ * of the step to there; with *reason and *diagnostic filled in if so. */
+bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,
+                          drape_diagnostic *diagnostic);
+
+/* drape_contact_nearest; false without contact. */
+bool drape_system_nearest(const drape_system *system, drape_diagnostic *diagnostic);
+
+/* The energy that changes of the stiffness of contact between steps have added since the last call [J]. */
+double drape_system_take_contact_work(drape_system *system);
 
 /* Searches for a place where a step brought cloth into a collider or through another piece of cloth. x is
  * the new state at time t; the previous one is that of drape_system_begin. Returns DRAPE_OK, or

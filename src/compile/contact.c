@@ -14,8 +14,10 @@ const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
                      1e3, "activation distance: cloth closer to a collider than this is pushed away"),
     [DRAPE_CONTACT_STIFFNESS] = DRAPE_NUMBER(
         "stiffness", "Pa",
-        DRAPE_DERIVED("areal density (2 gravity L + v^2) / distance, L the diagonal of the rest bounding "
-                      "box, v the largest initial speed of cloth plus that of colliders"),
+        DRAPE_DERIVED(
+            "the larger of areal density (2 gravity L + v^2) / distance, L the diagonal of the rest "
+            "bounding box, v the largest speed of cloth, at the start or pinned, plus that of "
+            "colliders; and E h / 1000 mean edges"),
         DRAPE_ABOVE(0), 1e15, "scale of the contact pressure at that distance"),
     [DRAPE_CONTACT_FRICTION_VELOCITY] =
         DRAPE_NUMBER("friction_velocity", "m/s", 1e-3, DRAPE_ABOVE(0), 1e3,
@@ -86,6 +88,8 @@ static double scene_speed(const drape_model *model)
     double cloth = 0, collider = 0;
     for (int32_t c = 0; c < model->cloth_count; c++)
         cloth = fmax(cloth, norm(model->cloths[c].velocity));
+    for (int32_t t = 0; t < model->track_count; t++)
+        cloth = fmax(cloth, track_speed(&model->tracks[t]));
     for (int32_t c = 0; c < model->collider_count; c++)
         collider = fmax(collider, track_speed(&model->colliders[c].track));
     return cloth + collider;
@@ -117,6 +121,24 @@ static double speed_of_fall(const drape_model *model, double distance)
     return sqrt(2 * fall_acceleration(model) * distance);
 }
 
+/* A face of size a that is strained by e pulls its nodes against what it meets with a force of about E h
+ * e a, on an area of about a^2: a pressure E h e / a. At a tenth of the activation distance the pressure
+ * of the barrier is 12 times its scale (contact/barrier.h), so a scale of ELASTIC E h / a holds a strain
+ * of 12 ELASTIC, a per cent, there, and larger ones nearer. */
+#define ELASTIC 1e-3
+static double stiffness_of_strain(const drape_model *model)
+{
+    double membrane = 0, edges = 0;
+    for (int32_t c = 0; c < model->cloth_count; c++) {
+        const drape_cloth *cloth = &model->cloths[c];
+        membrane = fmax(membrane, fmax(cloth->material.membrane_stiffness,
+                                       fmax(cloth->tension.warp, cloth->tension.weft)));
+    }
+    for (int32_t e = 0; e < model->edge_count; e++)
+        edges += model->edge_length[e];
+    return ELASTIC * membrane * model->edge_count / edges;
+}
+
 static drape_status resolve_contact(drape_model *model, const drape_scene_def *def)
 {
     double values[DRAPE_CONTACT_PARAM_COUNT];
@@ -126,10 +148,9 @@ static drape_status resolve_contact(drape_model *model, const drape_scene_def *d
                              def->contact, def->contact_count, values);
     if (status)
         return status;
-    double distance = values[DRAPE_CONTACT_DISTANCE], stiffness = values[DRAPE_CONTACT_STIFFNESS],
-           rebound = values[DRAPE_CONTACT_RESTITUTION_VELOCITY];
+    double distance = values[DRAPE_CONTACT_DISTANCE], rebound = values[DRAPE_CONTACT_RESTITUTION_VELOCITY];
     contact->distance = isnan(distance) ? largest_thickness(model) : distance;
-    contact->stiffness = isnan(stiffness) ? stiffness_of_fall(model) : stiffness;
+    contact->stiffness = values[DRAPE_CONTACT_STIFFNESS];
     contact->friction_velocity = values[DRAPE_CONTACT_FRICTION_VELOCITY];
     contact->lagged = values[DRAPE_CONTACT_FRICTION] == LAGGED;
     contact->restitution_velocity = isnan(rebound) ? speed_of_fall(model, contact->distance) : rebound;
@@ -165,4 +186,12 @@ drape_status drape_compile_contact(drape_model *model, const drape_scene_def *de
     if (!status)
         status = drape_compile_choice(model, &contact, "contact", &model->contact_choice);
     return status ? status : drape_compile_choice(model, &self, "self_contact", &model->self_choice);
+}
+
+drape_status drape_compile_contact_stiffness(drape_model *model, const drape_scene_def *def)
+{
+    (void)def;
+    if (isnan(model->contact.stiffness))
+        model->contact.stiffness = fmax(stiffness_of_fall(model), stiffness_of_strain(model));
+    return DRAPE_OK;
 }

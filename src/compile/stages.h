@@ -27,6 +27,9 @@ drape_status drape_compile_choice(drape_model *model, const drape_entry_def *def
 /* Resolves contact and self-contact, after the materials. */
 drape_status drape_compile_contact(drape_model *model, const drape_scene_def *def);
 
+/* The default of contact's stiffness, after the colliders, whose tracks it depends on. */
+drape_status drape_compile_contact_stiffness(drape_model *model, const drape_scene_def *def);
+
 /* Builds the colliders, after contact. */
 drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def);
 

@@ -1,6 +1,7 @@
 /* active.c: see active.h. */
 #include "contact/active.h"
 
+#include "contact/barrier.h"
 #include "contact/list.h"
 
 #include <string.h>
@@ -59,7 +60,7 @@ static bool is_same(const drape_active_contact *a, const drape_active_contact *b
 {
     int32_t key[3], other[3];
     if (a->pair.collider != b->pair.collider || a->pair.distance != b->pair.distance ||
-        a->gap.closest.points != b->gap.closest.points)
+        a->gap.closest.points != b->gap.closest.points || a->gentle != b->gentle)
         return false;
     key_of(a, key);
     key_of(b, other);
@@ -118,12 +119,25 @@ static bool add(drape_active_set *set, const drape_active_contact *contact)
     return true;
 }
 
-drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
-                                   const drape_distances *away, const drape_configuration *at)
+static bool note_near(drape_active_set *set, const drape_pair *pair, double gap)
 {
+    drape_near_pair *near =
+        drape_list_grow(set->arena, set->near, set->near_count, &set->near_room, sizeof *near);
+    if (!near)
+        return false;
+    set->near = near;
+    set->near[set->near_count++] = (drape_near_pair){.pair = *pair, .gap = gap};
+    return true;
+}
+
+drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
+                                   const drape_distances *away, const drape_configuration *at,
+                                   const drape_inside_pairs *inside, bool all_inside)
+{
+    const double rounding = candidates->broad->rounding;
     drape_candidate_cursor cursor = {0};
     const drape_pair *pair;
-    set->count = 0;
+    set->count = set->near_count = 0;
     if (set->slots)
         memset(set->slots, 0, SLOTS * (size_t)set->room * sizeof *set->slots);
     while ((pair = drape_candidates_next(candidates, away, &cursor))) {
@@ -131,6 +145,13 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
         if (!drape_pair_gap(pair, at, candidates->broad->rest, &contact.gap))
             continue;
         contact.pair = *pair;
+        contact.gentle = false;
+        if (contact.gap.value < DRAPE_BARRIER_GENTLE * pair->distance) {
+            contact.gentle = (all_inside && contact.gap.value < drape_pair_least_gap(pair, rounding)) ||
+                             drape_inside_has(inside, pair);
+            if (!note_near(set, pair, contact.gap.value))
+                return DRAPE_E_MEMORY;
+        }
         reduce(&contact);
         if (!add(set, &contact))
             return DRAPE_E_MEMORY;

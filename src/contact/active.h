@@ -7,10 +7,12 @@
 #define DRAPE_CONTACT_ACTIVE_H
 
 #include "contact/candidates.h"
+#include "contact/inside.h"
 
 typedef struct drape_active_contact {
     drape_pair pair; /* its nodes are the points of the gap; -1 for points that do not exist */
     drape_gap gap;
+    bool gentle; /* its pairs began below the least gap: see barrier.h */
 } drape_active_contact;
 
 typedef struct drape_active_set {
@@ -18,11 +20,15 @@ typedef struct drape_active_set {
     drape_active_contact *contacts; /* (count of room) */
     int32_t count, room;
     int32_t *slots; /* (several x room) hash table with the nodes as keys: 1 + index of a contact; 0: free */
+    drape_near_pair *near; /* (near_count of near_room) pairs, not merged */
+    int32_t near_count, near_room;
 } drape_active_set;
 
-/* Lists the active contacts of a configuration at these distances from the paths of the candidates. Errors:
- * DRAPE_E_MEMORY. */
+/* Lists the active contacts of a configuration at these distances from the paths of the candidates. Those of
+ * pairs inside are gentle; all_inside: those of all pairs below their least gap are, for outside of steps no
+ * others are. Errors: DRAPE_E_MEMORY. */
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
-                                   const drape_distances *away, const drape_configuration *at);
+                                   const drape_distances *away, const drape_configuration *at,
+                                   const drape_inside_pairs *inside, bool all_inside);
 
 #endif

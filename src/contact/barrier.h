@@ -1,18 +1,19 @@
 /*
- * barrier.h: the energy of a gap, b(s) with s = gap / activation distance: the logarithmic barrier of Li et
- * al. 2020 (Incremental Potential Contact, eq. 6) scaled to length one,
+ * barrier.h: the energy of a gap, b(s) with s = gap / activation distance: the logarithmic barrier of Li
+ * et al. 2020 (Incremental Potential Contact, eq. 6) scaled to length one,
  *     b = -(s - 1)^2 ln s   for s < 1,  0 beyond,
- * C2 at s = 1. Below s = DRAPE_BARRIER_LOW it continues as its osculating parabola, also for s < 0. So it is
- * finite everywhere, and a Newton iterate, or a start without a gap, is pushed out again. Small gaps are not
- * rejected: an accepted step may end below DRAPE_BARRIER_LOW, and with a gap below 0 as far as
- * drape_contact_check allows.
+ * C2 at s = 1. Below s = low it continues as its osculating parabola, also for s < 0, so that it is
+ * finite everywhere. For most pairs, low is the least gap that a step may end with (pair.h): the force
+ * withstands 1/low times the stiffness there, and the parabola is met only by trial states. For pairs
+ * that began below the least gap, low is DRAPE_BARRIER_GENTLE: they are pushed out with a force that is
+ * finite in a practical sense, too.
  */
 #ifndef DRAPE_CONTACT_BARRIER_H
 #define DRAPE_CONTACT_BARRIER_H
 
 #include "base/elementary.h"
 
-#define DRAPE_BARRIER_LOW 0.1
+#define DRAPE_BARRIER_GENTLE 0.1
 
 typedef struct drape_barrier {
     double b, db, ddb; /* b, b', b'' */
@@ -26,14 +27,14 @@ static inline drape_barrier drape_barrier_log(double s)
                            .ddb = -2 * log_s - 4 * u / s + u * u / (s * s)};
 }
 
-static inline drape_barrier drape_barrier_at(double s)
+static inline drape_barrier drape_barrier_at(double s, double low)
 {
     if (s >= 1)
         return (drape_barrier){0};
-    if (s >= DRAPE_BARRIER_LOW)
+    if (s >= low)
         return drape_barrier_log(s);
-    drape_barrier at = drape_barrier_log(DRAPE_BARRIER_LOW);
-    double u = s - DRAPE_BARRIER_LOW;
+    drape_barrier at = drape_barrier_log(low);
+    double u = s - low;
     return (drape_barrier){
         .b = at.b + u * (at.db + 0.5 * u * at.ddb), .db = at.db + u * at.ddb, .ddb = at.ddb};
 }

@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-#define KEEP_ITERATE 0.5 /* of a gap, kept when a Newton iterate is cut short */
+#define KEEP_ITERATE 0.5 /* of what a gap has above the least, kept when a Newton iterate is cut short */
 #define NEAR         0.9 /* of the activation distance: a gap below that is surely found to be below it */
 #define MARCH_SHARE  0.9
 #define MAX_MARCHES  10000 /* maximum number of steps of a node along its path */
@@ -18,16 +18,18 @@
 /* A displacement of all points, and the first pair that limits it. */
 typedef struct path {
     const double *x, *y; /* (points x 3) */
-    double keep, fraction;
-    bool core;
+    const drape_keep *keep;
+    double fraction;
     drape_pair limiting;
 } path;
 
 /* Whether the gap falls below the activation distance on the path; close to that it may be missed. */
 static bool comes_near(const path *p, const drape_pair *pair, double gap)
 {
-    return gap < pair->distance ||
-           drape_pair_step_fraction(pair, p->x, p->y, NEAR * pair->distance / gap, false, 1) < 1;
+    const double rounding = p->keep->rounding, least = drape_pair_least_gap(pair, rounding);
+    const drape_keep near = {
+        .rounding = rounding, .least = 1, .above = (NEAR * pair->distance - least) / (gap - least)};
+    return gap < pair->distance || drape_pair_step_fraction(pair, p->x, p->y, &near, 1) < 1;
 }
 
 /* A pair that does not come near limits nothing, so it makes no difference whether it is a candidate. Does
@@ -40,7 +42,7 @@ static void follow(void *user, const drape_pair *pair)
     if (drape_pair_points(pair) == 1 ||
         drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius)
         return;
-    const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->keep, p->core, p->fraction);
+    const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->keep, p->fraction);
     if (fraction >= p->fraction || !comes_near(p, pair, drape_pair_gap_value(pair, &from)))
         return;
     p->fraction = fraction;
@@ -69,12 +71,12 @@ static const drape_candidates *candidates_of(drape_contact *c, const drape_strai
 }
 
 double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
-                                   const drape_collider_pose *pose, double keep, bool core,
+                                   const drape_collider_pose *pose, const drape_keep *keep,
                                    drape_pair *limiting)
 {
     const drape_straight_path straight = {
         {{.model = c->model, .x = x, .pose = pose}, {.model = c->model, .x = y, .pose = pose}}};
-    path p = {.x = x, .y = y, .keep = keep, .fraction = 1, .core = core};
+    path p = {.x = x, .y = y, .keep = keep, .fraction = 1};
     drape_distances away;
     drape_candidate_cursor cursor = {0};
     const drape_candidates *candidates = candidates_of(c, &straight, longest_move(c, &p), &away);
@@ -90,58 +92,58 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
     return p.fraction;
 }
 
-/* The same for a node and a surface, by steps of the length of the distance, with which no path can cross
- * the surface, until keep of the gap is left. Returns 1 if the node starts inside. */
-static double march(const drape_collider *collider, const drape_collider_pose *pose, const double *x,
-                    const double *y, double keep)
+double drape_contact_least_gap(const drape_contact *c)
 {
-    double gap = drape_collider_distance(collider, pose, x, NULL, NULL), min_gap = keep * gap, t = 0, p[3],
-           at[3];
+    const drape_pair pair = {.distance = c->model->contact.distance};
+    return drape_pair_least_gap(&pair, c->broad.rounding);
+}
+
+/* By steps of the length of the distance, with which no path can cross the surface. */
+double drape_contact_march(const drape_contact *c, const drape_collider *collider, const double *x,
+                           const double *y, const drape_keep *keep)
+{
+    double p[3], at[3], t = 0;
+    double gap = collider->ops->distance(collider->values, &collider->shape, x, NULL, NULL);
+    const double least = drape_contact_least_gap(c), end = drape_keep_gap(keep, least, gap);
     vec3_sub(y, x, p);
-    const double length = vec3_norm(p);
-    for (int i = 0; gap > min_gap && length > gap - min_gap && i < MAX_MARCHES; i++) {
-        t += MARCH_SHARE * (gap - min_gap) / length;
+    const double length = vec3_norm(p), slack = (1 - MARCH_SHARE) * fmin(end, gap - end);
+    if (!(gap > keep->rounding) || !(length > gap - end))
+        return 1;
+    for (int i = 0; i < MAX_MARCHES; i++) {
+        t += MARCH_SHARE * (gap - end) / length;
         if (t >= 1)
             return 1;
         memcpy(at, x, sizeof at);
         vec3_add_scaled(t, p, at);
-        gap = drape_collider_distance(collider, pose, at, NULL, NULL);
-        if (gap < min_gap + (1 - MARCH_SHARE) * min_gap)
+        gap = collider->ops->distance(collider->values, &collider->shape, at, NULL, NULL);
+        if (gap <= end + slack)
             return t;
     }
-    return 1;
+    return t;
 }
 
 double drape_contact_step_fraction(drape_contact *c, const double *x, const double *y, double t)
 {
     const double start = drape_clock_seconds(), span[2] = {t, t};
+    const drape_keep keep = {
+        .rounding = c->broad.rounding, .least = 1, .above = KEEP_ITERATE, .below = KEEP_ITERATE};
     drape_pair limiting;
     drape_contact_poses(c, t, span, c->path_pose);
     drape_contact_fill(c, x, c->path_pose, c->from);
     drape_contact_fill(c, y, c->path_pose, c->to);
-    double fraction =
-        drape_contact_free_fraction(c, c->from, c->to, c->path_pose, KEEP_ITERATE, false, &limiting);
+    double fraction = drape_contact_free_fraction(c, c->from, c->to, c->path_pose, &keep, &limiting);
     for (int32_t k = 0; k < c->model->collider_count; k++) {
         const drape_collider *collider = &c->model->colliders[k];
         if (!collider->ops->smooth)
             continue;
         for (int32_t i = 0; i < c->model->free_count; i++) {
             const size_t at = 3 * (size_t)c->model->node_of_free[i];
-            fraction = fmin(fraction, march(collider, &c->path_pose[k], x + at, y + at, KEEP_ITERATE));
+            double a[3], b[3];
+            vec3_sub(x + at, c->path_pose[k].displacement, a);
+            vec3_sub(y + at, c->path_pose[k].displacement, b);
+            fraction = fmin(fraction, drape_contact_march(c, collider, a, b, &keep));
         }
     }
     c->seconds += drape_clock_seconds() - start;
     return fraction;
-}
-
-bool drape_contact_crosses(drape_contact *c, const double *y, double t)
-{
-    const double start = drape_clock_seconds(), span[2] = {t, t};
-    drape_pair limiting;
-    drape_contact_poses(c, t, span, c->path_pose);
-    drape_contact_fill(c, y, c->path_pose, c->to);
-    const double fraction =
-        drape_contact_free_fraction(c, c->start, c->to, c->path_pose, DRAPE_KEEP_STEP, true, &limiting);
-    c->seconds += drape_clock_seconds() - start;
-    return fraction < 1;
 }

@@ -8,8 +8,8 @@
 
 #include <string.h>
 
-#define TOUCH       1e-9  /* [m] a piece may be this deep in a collider */
-#define MAX_MARCHES 10000 /* maximum number of steps of a node along its path */
+#define KEEP_PATH 0.5 /* of the least gap, or of a smaller one at the beginning of the step */
+#define PATH      "fraction of the step before passing through"
 
 static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *pair, const char *what,
                                       double value, double limit)
@@ -29,52 +29,36 @@ static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *
     return found;
 }
 
-/* Finds the active contact whose penetration exceeds its limit most; the penetration before the step is
- * allowed. */
-static drape_status check_depth(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
+/* The gap that a pair may end with. If it began below the least gap it may not come nearer. */
+static double allowed(double least, double before, double rounding)
 {
+    return before < least ? before - rounding : least;
+}
+
+/* Finds the pair whose gap is below what it may end with by most. */
+static drape_status check_gaps(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
+{
+    const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
     double excess = 0;
-    for (int32_t i = 0; i < c->active.count; i++) {
-        const drape_pair *pair = &c->active.contacts[i].pair;
-        const drape_gap *gap = &c->active.contacts[i].gap;
-        if (pair->collider < 0)
+    for (int32_t i = 0; i < c->active.near_count; i++) {
+        const drape_pair *pair = &c->active.near[i].pair;
+        const double gap = c->active.near[i].gap;
+        double least = drape_pair_least_gap(pair, c->broad.rounding);
+        if (gap >= least)
             continue;
-        const double before = gap->closest.points == 1 ? c->start_gaps[pair->node[0]] : c->start_least;
-        const double min_gap = fmin(before, -TOUCH);
-        if (gap->value >= min_gap || min_gap - gap->value < excess)
+        least = allowed(least, drape_pair_gap_value(pair, &start), c->broad.rounding);
+        if (gap >= least || least - gap < excess)
             continue;
-        excess = min_gap - gap->value;
-        *diagnostic = diagnostic_of(c, pair, "gap [m]", gap->value, min_gap);
+        excess = least - gap;
+        *diagnostic = diagnostic_of(c, pair, "gap [m]", gap, least);
     }
     *reason = excess > 0 ? drape_reason_name(DRAPE_REASON_PENETRATION) : *reason;
     return excess > 0 ? DRAPE_RETRY_REJECTED : DRAPE_OK;
 }
 
-/* Whether a node passes through the surface on its straight path although both ends are outside, by steps
- * of the length of the distance, with which no path can cross the surface. x, y: in the collider's own
- * coordinates. */
-static bool dips(const drape_collider *collider, const double *x, const double *y)
-{
-    double p[3], at[3], t = 0,
-                        before = collider->ops->distance(collider->values, &collider->shape, x, NULL, NULL),
-                        after = collider->ops->distance(collider->values, &collider->shape, y, NULL, NULL);
-    vec3_sub(y, x, p);
-    const double length = vec3_norm(p);
-    if (before <= 0 || after <= 0 || length < before + after)
-        return false;
-    for (int i = 0; i < MAX_MARCHES && t < 1; i++) {
-        memcpy(at, x, sizeof at);
-        vec3_add_scaled(t, p, at);
-        double gap = collider->ops->distance(collider->values, &collider->shape, at, NULL, NULL);
-        if (gap < -TOUCH)
-            return true;
-        t += fmax(gap, TOUCH) / length;
-    }
-    return false;
-}
-
 static drape_status check_surfaces(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
 {
+    const drape_keep keep = drape_contact_keep_step(c);
     for (int32_t k = 0; k < c->model->collider_count; k++) {
         if (!c->model->colliders[k].ops->smooth)
             continue;
@@ -83,11 +67,12 @@ static drape_status check_surfaces(drape_contact *c, const char **reason, drape_
             double x[3], y[3];
             vec3_sub(c->start + 3 * (size_t)node, c->start_pose[k].displacement, x);
             vec3_sub(c->x + 3 * (size_t)node, c->pose[k].displacement, y);
-            if (!dips(&c->model->colliders[k], x, y))
+            const double fraction = drape_contact_march(c, &c->model->colliders[k], x, y, &keep);
+            if (fraction >= 1)
                 continue;
             const drape_pair pair = drape_broad_phase_surface(&c->broad, node, k);
             *reason = drape_reason_name(DRAPE_REASON_COLLISION);
-            *diagnostic = diagnostic_of(c, &pair, "node through collider", 1, 0);
+            *diagnostic = diagnostic_of(c, &pair, PATH, fraction, 1);
             return DRAPE_RETRY_REJECTED;
         }
     }
@@ -106,19 +91,20 @@ static double depth_of(const drape_collider *collider, const drape_collider_pose
 }
 
 /* Checks edges or faces of cloth against the curved surfaces of shapes whose features lie inside these
- * surfaces (inscribed). A piece may be as deep as it was before. */
+ * surfaces (inscribed). A piece that began nearer than the least gap, or inside, may not come nearer. */
 static drape_status check_inscribed(drape_contact *c, const int32_t *node, int nodes, int32_t count,
                                     const char **reason, drape_diagnostic *diagnostic)
 {
+    const double least = drape_contact_least_gap(c);
     for (int32_t k = 0; k < c->model->collider_count; k++) {
         const drape_collider *collider = &c->model->colliders[k];
         for (int32_t i = 0; collider->shape.inscribed && i < count; i++) {
             const int32_t *n = node + (size_t)i * (size_t)nodes;
-            const double depth = depth_of(collider, &c->pose[k], c->x, n, nodes, -TOUCH);
-            if (depth >= -TOUCH)
+            const double depth = depth_of(collider, &c->pose[k], c->x, n, nodes, least);
+            if (depth >= least)
                 continue;
             const double before = depth_of(collider, &c->start_pose[k], c->start, n, nodes, INFINITY);
-            const double min_gap = fmin(before, -TOUCH);
+            const double min_gap = allowed(least, before, c->broad.rounding);
             if (depth >= min_gap)
                 continue;
             const drape_pair pair = {.collider = k, .node = {n[0], n[1], nodes > 2 ? n[2] : -1, -1}};
@@ -132,23 +118,44 @@ static drape_status check_inscribed(drape_contact *c, const int32_t *node, int n
 
 static drape_status check_path(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
 {
+    const drape_keep keep = drape_contact_keep_step(c);
     drape_pair limiting;
-    const double fraction =
-        drape_contact_free_fraction(c, c->start, c->x, c->pose, DRAPE_KEEP_STEP, true, &limiting);
+    const double fraction = drape_contact_free_fraction(c, c->start, c->x, c->pose, &keep, &limiting);
     if (fraction >= 1)
         return DRAPE_OK;
     *reason = drape_reason_name(DRAPE_REASON_COLLISION);
-    *diagnostic = diagnostic_of(c, &limiting, "fraction of the step before passing through", fraction, 1);
+    *diagnostic = diagnostic_of(c, &limiting, PATH, fraction, 1);
     return DRAPE_RETRY_REJECTED;
+}
+
+drape_keep drape_contact_keep_step(const drape_contact *c)
+{
+    return (drape_keep){.rounding = c->broad.rounding, .least = KEEP_PATH, .below = KEEP_PATH, .core = true};
+}
+
+static drape_status update_at(drape_contact *c, const double *x, double t)
+{
+    return drape_contact_update(c, &(drape_contact_at){.x = x, .t = t, .span = {t, t}});
+}
+
+bool drape_contact_crosses(drape_contact *c, const double *x, double t, const char **reason,
+                           drape_diagnostic *diagnostic)
+{
+    const double start = drape_clock_seconds();
+    c->out_of_memory = update_at(c, x, t) != DRAPE_OK;
+    const bool crosses =
+        c->out_of_memory || check_gaps(c, reason, diagnostic) || check_path(c, reason, diagnostic);
+    c->seconds += drape_clock_seconds() - start;
+    return crosses;
 }
 
 drape_status drape_contact_check(drape_contact *c, const double *x, double t, const char **reason,
                                  drape_diagnostic *diagnostic)
 {
     const double start = drape_clock_seconds();
-    drape_status status = drape_contact_update(c, &(drape_contact_at){.x = x, .t = t, .span = {t, t}});
+    drape_status status = update_at(c, x, t);
     if (!status)
-        status = check_depth(c, reason, diagnostic);
+        status = check_gaps(c, reason, diagnostic);
     if (!status)
         status = check_surfaces(c, reason, diagnostic);
     if (!status)
@@ -161,4 +168,16 @@ drape_status drape_contact_check(drape_contact *c, const double *x, double t, co
         status = drape_contact_take_failure(c);
     c->seconds += drape_clock_seconds() - start;
     return status;
+}
+
+bool drape_contact_nearest(const drape_contact *c, drape_diagnostic *diagnostic)
+{
+    const drape_near_pair *nearest = NULL;
+    for (int32_t i = 0; i < c->active.near_count; i++)
+        if (!nearest || c->active.near[i].gap < nearest->gap)
+            nearest = &c->active.near[i];
+    if (nearest)
+        *diagnostic = diagnostic_of(c, &nearest->pair, "gap [m]", nearest->gap,
+                                    drape_pair_least_gap(&nearest->pair, c->broad.rounding));
+    return nearest;
 }

@@ -44,14 +44,11 @@ static drape_status restore(drape_contact *c)
     c->between_steps = c->begun;
     if (!c->begun)
         return DRAPE_OK;
+    drape_contact_set_rounding(c, c->start);
     drape_status status = drape_contact_list(c, &start);
     memcpy(c->v, c->start_v, 3 * (size_t)c->broad.points * sizeof *c->v);
     memcpy(c->pose, c->start_pose, (size_t)c->model->collider_count * sizeof *c->pose);
-    if (!status)
-        status = drape_contact_lag(c);
-    if (!status)
-        drape_contact_measure_start(c);
-    return status;
+    return status ? status : drape_contact_lag(c);
 }
 
 void drape_contact_archive(drape_contact *c, drape_archive *a)
@@ -62,6 +59,10 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     drape_archive_doubles(a, c->start, points);
     drape_archive_doubles(a, c->start_v, points);
     drape_archive_bytes(a, c->start_pose, colliders * sizeof *c->start_pose);
+    drape_inside_archive(&c->inside, a);
+    drape_archive_double(a, &c->press.factor);
+    drape_archive_double(a, &c->press.widest);
+    drape_archive_double(a, &c->press.t);
     archive_couplings(c, a);
     drape_archive_double(a, &c->seconds);
     drape_archive_double(a, &c->search_seconds);

@@ -17,13 +17,26 @@
 #include "contact/parts.h"
 
 #include "base/clock.h"
+#include "base/elementary.h"
 #include "base/vec3.h"
 #include "contact/list.h"
 
+#include <float.h>
 #include <string.h>
 
 #define MARGIN 0.12 /* by which points may leave the path of a search before a new one, in mean edges */
 #define AHEAD  1.0  /* by which a path is continued, in its length: the next step begins there */
+/* A gap below this share of the largest coordinate is rounding: closest points and their distance have
+ * errors of some hundred units in the last place. */
+#define ROUNDING (1e4 * DBL_EPSILON)
+/* The stiffness is raised when the smallest gap is small and has shrunk since the last raise, and falls
+ * when it is large again. Gaps in activation distances. */
+#define PRESSED    0.05
+#define SHRUNK     0.5
+#define RELAXED    0.3
+#define RAISE      2.0
+#define HALVED     0.2 /* [s] */
+#define MAX_FACTOR 1e4
 
 static drape_status take_arrays(drape_arena *arena, drape_contact *c)
 {
@@ -34,7 +47,6 @@ static drape_status take_arrays(drape_arena *arena, drape_contact *c)
         *positions[i] = drape_arena_take(arena, points, 3 * sizeof(double));
     for (size_t i = 0; i < sizeof poses / sizeof *poses; i++)
         *poses[i] = drape_arena_take(arena, colliders, sizeof **poses[i]);
-    c->start_gaps = drape_arena_take(arena, (size_t)c->model->node_count, sizeof *c->start_gaps);
     c->on_collider = drape_arena_take(arena, colliders, 3 * sizeof *c->on_collider);
     return drape_arena_status(arena);
 }
@@ -53,7 +65,8 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
         edges += model->edge_length[e];
     *c = (drape_contact){
         .arena = arena, .model = model, .motion = motion, .mean_edge = edges / model->edge_count};
-    c->active.arena = arena;
+    c->active.arena = c->inside.arena = arena;
+    c->press = (drape_press){.factor = 1, .widest = 1};
     drape_status status = drape_broad_phase_create(arena, model, &c->broad);
     if (!status)
         status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->step_candidates);
@@ -61,6 +74,8 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
         status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->query_candidates);
     if (!status)
         status = take_arrays(arena, c);
+    if (!status)
+        drape_contact_set_rounding(c, c->broad.rest);
     *out = status ? NULL : c;
     return status;
 }
@@ -180,11 +195,12 @@ drape_status drape_contact_take_failure(drape_contact *c)
 drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
 {
     const drape_straight_path here = {{*at, *at}};
+    const bool in_step = c->begun && !c->between_steps;
     drape_distances away;
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
     if (!candidates)
         candidates = drape_contact_search(c, &here, &away);
-    return candidates ? drape_active_set_list(&c->active, candidates, &away, at)
+    return candidates ? drape_active_set_list(&c->active, candidates, &away, at, &c->inside, !in_step)
                       : drape_contact_take_failure(c);
 }
 
@@ -231,7 +247,7 @@ drape_status drape_contact_lag(drape_contact *c)
         return DRAPE_OK;
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
-        const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
+        const drape_contact_law law = drape_contact_law_of(c, contact);
         if (!(law.friction > 0))
             continue;
         drape_lagged *lagged =
@@ -247,18 +263,64 @@ drape_status drape_contact_lag(drape_contact *c)
     return DRAPE_OK;
 }
 
-void drape_contact_measure_start(drape_contact *c)
+void drape_contact_set_rounding(drape_contact *c, const double *x)
 {
-    memset(c->start_gaps, 0, (size_t)c->model->node_count * sizeof *c->start_gaps);
-    c->start_least = 0;
+    double largest = 0;
+    for (size_t i = 0; i < 3 * (size_t)c->broad.points; i++)
+        largest = fmax(largest, fabs(x[i]));
+    c->broad.rounding = ROUNDING * largest;
+}
+
+/* Which pairs are inside. A pair that was added has another law, and so are its contacts. */
+static drape_status update_inside(drape_contact *c)
+{
+    drape_status status = DRAPE_OK;
+    const bool added =
+        drape_inside_update(&c->inside, c->active.near, c->active.near_count, c->broad.rounding, &status);
+    const drape_configuration now = drape_contact_configuration(c);
+    return added ? drape_contact_list(c, &now) : status;
+}
+
+static double smallest_gap(const drape_contact *c)
+{
+    double least = 1;
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
-        if (contact->pair.collider < 0)
-            continue;
-        double *least =
-            contact->gap.closest.points == 1 ? &c->start_gaps[contact->pair.node[0]] : &c->start_least;
-        *least = fmin(*least, contact->gap.value);
+        if (!contact->gentle)
+            least = fmin(least, contact->gap.value / contact->pair.distance);
     }
+    return least;
+}
+
+/* Makes contact stiffer where gaps shrink, and softer again. The energy that this adds to present contacts is
+ * the work of whoever presses. */
+static void adapt_stiffness(drape_contact *c, double t)
+{
+    drape_press *press = &c->press;
+    const double gap = smallest_gap(c), before = press->factor;
+    press->widest = fmax(press->widest, gap);
+    if (gap < PRESSED && gap < SHRUNK * press->widest) {
+        press->factor = fmin(RAISE * before, MAX_FACTOR);
+        press->widest = gap;
+    } else if (gap > RELAXED) {
+        press->factor = fmax(before * drape_pow(0.5, (t - press->t) / HALVED), 1);
+    }
+    press->t = t;
+    if (press->factor != before)
+        press->work += (1 - before / press->factor) * drape_contact_potential(c);
+}
+
+double drape_contact_take_work(drape_contact *c)
+{
+    const double work = c->press.work;
+    c->press.work = 0;
+    return work;
+}
+
+/* A step that is tried again begins where it did. */
+static bool is_retry(const drape_contact *c)
+{
+    return c->begun && memcmp(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x) == 0;
 }
 
 /* Colliders have their velocities of time t here, because the size of the step is not known yet. */
@@ -277,10 +339,14 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     c->between_steps = false;
     drape_status status =
         drape_contact_update(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}});
+    drape_contact_set_rounding(c, c->x);
+    if (!status)
+        status = update_inside(c);
+    if (!status && !is_retry(c))
+        adapt_stiffness(c, t);
     if (!status)
         status = lag_at(c, v, t);
     if (!status) {
-        drape_contact_measure_start(c);
         c->begun = true;
         memcpy(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x);
         memcpy(c->start_v, c->v, 3 * (size_t)c->broad.points * sizeof *c->v);

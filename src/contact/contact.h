@@ -50,6 +50,10 @@ const double *drape_contact_on_colliders(const drape_contact *contact);
 
 double drape_contact_potential(const drape_contact *contact); /* [J] */
 
+/* The energy that changes of stiffness at the beginning of steps have added to the potential since the
+ * last call [J]. */
+double drape_contact_take_work(drape_contact *contact);
+
 /* Which derivatives of pairs of free nodes are added. */
 typedef enum drape_contact_derivatives {
     DRAPE_CONTACT_EXACT,       /* dg/dx + weight dg/dv */
@@ -92,15 +96,21 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
  * with a margin; colliders rest in their poses at time t. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t);
 
-/* Whether two pieces pass through each other on the straight path from the beginning of the step to y,
- * while colliders move straight to their poses at time t. */
-bool drape_contact_crosses(drape_contact *contact, const double *y, double t);
+/* Whether a pair of features would be too near at x, as drape_contact_check tests it, or too near on the
+ * straight path from the beginning of the step to there, while colliders move straight to their poses at
+ * time t. */
+bool drape_contact_crosses(drape_contact *contact, const double *x, double t, const char **reason,
+                           drape_diagnostic *diagnostic);
 
-/* Compares the end of a step, x at time t, with its beginning: DRAPE_OK, or DRAPE_RETRY_REJECTED if a piece
- * is deeper in a collider than allowed and than before ("penetration"), or passed through another one on the
- * straight path ("collision"). */
+/* Compares the end of a step, x at time t, with its beginning: DRAPE_OK, or DRAPE_RETRY_REJECTED if a
+ * pair is nearer than the least gap, and than before ("penetration"), or came nearer than half of that on
+ * the straight path ("collision"). */
 drape_status drape_contact_check(drape_contact *contact, const double *x, double t, const char **reason,
                                  drape_diagnostic *diagnostic);
+
+/* The nearest pair at the last point, if one is nearer than a tenth of its activation distance: what
+ * holds a step up whose equations have no solution. */
+bool drape_contact_nearest(const drape_contact *contact, drape_diagnostic *diagnostic);
 
 /* The number of active contacts at the last point, and their smallest gap [m], INFINITY if there are none. */
 int32_t drape_contact_active(const drape_contact *contact, double *least_gap);

@@ -7,17 +7,17 @@
 
 double drape_contact_energy(const drape_gap *gap, const drape_contact_law *law)
 {
-    return gap->m * law->stiffness * law->distance * drape_barrier_at(gap->value / law->distance).b;
+    return gap->m * law->stiffness * law->distance * drape_barrier_at(gap->value / law->distance, law->low).b;
 }
 
 double drape_contact_normal_force(const drape_gap *gap, const drape_contact_law *law)
 {
-    return -gap->m * law->stiffness * drape_barrier_at(gap->value / law->distance).db;
+    return -gap->m * law->stiffness * drape_barrier_at(gap->value / law->distance, law->low).db;
 }
 
 void drape_contact_gradient(const drape_gap *gap, const drape_contact_law *law, double *g)
 {
-    const drape_barrier b = drape_barrier_at(gap->value / law->distance);
+    const drape_barrier b = drape_barrier_at(gap->value / law->distance, law->low);
     const double e = law->stiffness * law->distance * b.b, de = law->stiffness * b.db;
     for (int i = 0; i < 3 * gap->closest.points; i++)
         g[i] = gap->m * de * (gap->closest.c[i / 3] * gap->closest.normal[i % 3]) +
@@ -28,7 +28,7 @@ void drape_contact_hessian(const drape_gap *gap, const drape_gap_derivatives *de
                            const drape_contact_law *law, double *h)
 {
     const int d = 3 * gap->closest.points;
-    const drape_barrier b = drape_barrier_at(gap->value / law->distance);
+    const drape_barrier b = drape_barrier_at(gap->value / law->distance, law->low);
     const double m = gap->m, e = law->stiffness * law->distance * b.b, de = law->stiffness * b.db,
                  dde = law->stiffness / law->distance * b.ddb, *c = gap->closest.c, *n = gap->closest.normal;
     double dgap[D];
@@ -49,7 +49,7 @@ void drape_contact_gauss_newton(const drape_gap *gap, const drape_contact_law *l
 {
     const int d = 3 * gap->closest.points;
     const double second = /* m K/d b'' */
-        gap->m * law->stiffness / law->distance * drape_barrier_at(gap->value / law->distance).ddb;
+        gap->m * law->stiffness / law->distance * drape_barrier_at(gap->value / law->distance, law->low).ddb;
     const double *c = gap->closest.c, *n = gap->closest.normal;
     for (int i = 0; i < d; i++)
         for (int j = 0; j < d; j++)

@@ -12,6 +12,7 @@
 /* The constants of a contact. */
 typedef struct drape_contact_law {
     double distance;             /* d [m] */
+    double low;                  /* of the barrier, in activation distances */
     double stiffness;            /* K [N] */
     double friction;             /* mu [1] */
     double velocity;             /* eps [m/s] */

@@ -3,22 +3,27 @@
 
 #include "base/clock.h"
 #include "base/vec3.h"
+#include "contact/barrier.h"
 
 #include <string.h>
 
 /* The energy of a gap that closes is proportional to K d (force.h). K is proportional to 1/d, so that pairs
  * of equal area absorb the same energy, whatever their activation distance. */
-drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair *pair)
+drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_active_contact *contact)
 {
     const drape_contact_def *def = &c->model->contact;
+    const drape_pair *pair = &contact->pair;
     const drape_collider *collider = pair->collider >= 0 ? &c->model->colliders[pair->collider] : NULL;
-    const double e = collider ? collider->restitution : def->self_restitution;
-    return (drape_contact_law){.distance = pair->distance,
-                               .stiffness = def->stiffness * pair->area * (def->distance / pair->distance),
-                               .friction = collider ? collider->friction : def->self_friction,
-                               .velocity = def->friction_velocity,
-                               .damping = (1 - e * e) / (1 + e * e),
-                               .restitution_velocity = def->restitution_velocity};
+    const double e = collider ? collider->restitution : def->self_restitution,
+                 least = drape_pair_least_gap(pair, c->broad.rounding) / pair->distance;
+    return (drape_contact_law){
+        .distance = pair->distance,
+        .low = contact->gentle ? DRAPE_BARRIER_GENTLE : fmin(least, DRAPE_BARRIER_GENTLE),
+        .stiffness = c->press.factor * def->stiffness * pair->area * (def->distance / pair->distance),
+        .friction = collider ? collider->friction : def->self_friction,
+        .velocity = def->friction_velocity,
+        .damping = (1 - e * e) / (1 + e * e),
+        .restitution_velocity = def->restitution_velocity};
 }
 
 void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3])
@@ -80,7 +85,7 @@ void drape_contact_add_forces(drape_contact *c, bool conservative, bool dissipat
     memset(c->on_collider, 0, 3 * (size_t)c->model->collider_count * sizeof *c->on_collider);
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
-        const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
+        const drape_contact_law law = drape_contact_law_of(c, contact);
         if (conservative)
             add_elastic(c, contact, &law, g);
         if (dissipative)
@@ -89,7 +94,7 @@ void drape_contact_add_forces(drape_contact *c, bool conservative, bool dissipat
     const int32_t lagged_count = dissipative ? c->lagged_count : 0;
     for (int32_t i = 0; i < lagged_count; i++) {
         const drape_lagged *lagged = &c->lagged[i];
-        const drape_contact_law law = drape_contact_law_of(c, &lagged->contact.pair);
+        const drape_contact_law law = drape_contact_law_of(c, &lagged->contact);
         double v[4][3];
         drape_contact_velocities(c, &lagged->contact, v);
         add_friction(c, &lagged->contact, &law, lagged->force, v, g);
@@ -106,7 +111,7 @@ double drape_contact_potential(const drape_contact *c)
 {
     double sum = 0;
     for (int32_t i = 0; i < c->active.count; i++) {
-        const drape_contact_law law = drape_contact_law_of(c, &c->active.contacts[i].pair);
+        const drape_contact_law law = drape_contact_law_of(c, &c->active.contacts[i]);
         sum += drape_contact_energy(&c->active.contacts[i].gap, &law);
     }
     return sum;

@@ -101,7 +101,7 @@ static void symmetrize(int points, double *h)
 static void differentiate(const drape_contact *c, const request *want, const drape_active_contact *contact,
                           double *h)
 {
-    const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
+    const drape_contact_law law = drape_contact_law_of(c, contact);
     const drape_configuration now = drape_contact_configuration(c);
     const bool by_x = want->which == DRAPE_CONTACT_EXACT || want->which == DRAPE_CONTACT_SYMMETRIC;
     drape_gap_derivatives derivatives;
@@ -139,7 +139,7 @@ void drape_contact_add_jacobian(drape_contact *c, double weight, drape_contact_d
     }
     for (int32_t i = 0; i < c->lagged_count; i++) {
         const drape_lagged *lagged = &c->lagged[i];
-        const drape_contact_law law = drape_contact_law_of(c, &lagged->contact.pair);
+        const drape_contact_law law = drape_contact_law_of(c, &lagged->contact);
         double v[4][3];
         memset(h, 0, sizeof h);
         drape_contact_velocities(c, &lagged->contact, v);
@@ -155,7 +155,7 @@ void drape_contact_fix_friction(drape_contact *c, double weight, const drape_pat
     const drape_configuration now = drape_contact_configuration(c);
     for (int32_t i = 0; i < c->active.count && !c->model->contact.lagged; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
-        const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
+        const drape_contact_law law = drape_contact_law_of(c, contact);
         drape_gap_derivatives derivatives;
         drape_normal_derivatives by_x;
         double v[4][3], change[D], h[D * D] = {0};

@@ -190,23 +190,29 @@ static double gap_at(const drape_pair *pair, double x[4][3], double p[4][3], dou
     return closest.distance - radius;
 }
 
-double drape_pair_step_fraction(const drape_pair *pair, const double *from, const double *to, double keep,
-                                bool core, double limit)
+double drape_pair_step_fraction(const drape_pair *pair, const double *from, const double *to,
+                                const drape_keep *keep, double limit)
 {
-    double x[4][3], y[4][3], p[4][3], radius = core ? 0 : pair->radius, t = 0;
+    double x[4][3], y[4][3], p[4][3], radius = pair->radius, t = 0;
     gather(pair, 4, from, x);
     gather(pair, 4, to, y);
     for (int a = 0; a < 4; a++)
         vec3_sub(y[a], x[a], p[a]);
-    double speed = approach_speed(pair->kind, p), gap = gap_at(pair, x, p, 0, radius), least = keep * gap;
-    if (!(speed > 0) || !(gap > (pair->collider >= 0 ? TOUCHING : 0)) || gap > speed)
+    const double speed = approach_speed(pair->kind, p), least = drape_pair_least_gap(pair, keep->rounding);
+    double gap = gap_at(pair, x, p, 0, radius);
+    if (keep->core && gap <= keep->rounding) {
+        gap += radius;
+        radius = 0;
+    }
+    if (!(speed > 0) || !(gap > keep->rounding) || gap - least > speed)
         return limit;
+    const double end = drape_keep_gap(keep, least, gap), slack = (1 - ADVANCE) * fmin(end, gap - end);
     for (int i = 0; i < MAX_ADVANCES; i++) {
-        t += ADVANCE * (gap - least) / speed;
+        t += ADVANCE * (gap - end) / speed;
         if (t >= limit)
             return limit;
         gap = gap_at(pair, x, p, t, radius);
-        if (gap < least + (1 - ADVANCE) * least)
+        if (gap <= end + slack)
             return t;
     }
     return t;

@@ -9,6 +9,8 @@
 #include "colliders/colliders.h"
 #include "contact/gap.h"
 
+#include <math.h>
+
 typedef enum drape_pair_kind {
     DRAPE_PAIR_SURFACE,  /* node 0 and the signed distance of the collider */
     DRAPE_PAIR_TRIANGLE, /* point 0 and triangle 1 2 3 */
@@ -25,6 +27,29 @@ typedef struct drape_pair {
     double gap_at_search; /* of a candidate [m] */
     int32_t rank[3];      /* by which candidates are sorted: stage of the search, piece, place of the other */
 } drape_pair;
+
+/* The least gap [m] that a pair may have at the end of a step: a share of its activation distance and, if
+ * that is larger, of the coordinates, whose rounding would decide on which side a smaller gap is. Cloth
+ * that is nearly as close as that at rest may approach to half of its activation distance. */
+#define DRAPE_LEAST_GAP 1e-3 /* of the activation distance */
+static inline double drape_pair_least_gap(const drape_pair *pair, double rounding)
+{
+    return fmin(fmax(DRAPE_LEAST_GAP * pair->distance, rounding), 0.5 * pair->distance);
+}
+
+/* How much of its gap a pair must keep on a path. */
+typedef struct drape_keep {
+    double rounding; /* [m] what rounding can change in a gap: 0 or a smaller one has no direction */
+    double least;    /* share of the least gap, for a pair that begins above it, */
+    double above;    /* and share of what its gap has more than that */
+    double below;    /* share of the gap of a pair that begins below the least gap */
+    bool core;       /* a pair that begins within its radius keeps its distance instead of its gap */
+} drape_keep;
+
+static inline double drape_keep_gap(const drape_keep *keep, double least, double gap)
+{
+    return gap < least ? keep->below * gap : keep->least * least + keep->above * (gap - least);
+}
 
 /* All points at one instant. */
 typedef struct drape_configuration {
@@ -51,12 +76,11 @@ bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const
 void drape_pair_derivatives(const drape_pair *pair, const drape_gap *gap, const drape_configuration *at,
                             const double *rest, drape_gap_derivatives *derivatives);
 
-/* Continuous collision detection: the largest step fraction on the straight path from x to y, the same for
- * all points, without contact of the pair (additive continuous collision detection, Li et al. 2021,
- * Codimensional IPC, algorithm 1). It stops when `keep` of the initial gap is left. It does not search
- * beyond `limit`, which it returns at most, also for a pair in contact at the start (with a collider:
- * within 1e-9 m of it). core: the radius counts as 0. */
-double drape_pair_step_fraction(const drape_pair *pair, const double *x, const double *y, double keep,
-                                bool core, double limit);
+/* Continuous collision detection: the largest step fraction on the straight path from x to y, the same
+ * for all points, on which the pair keeps what it must of its gap (additive continuous collision
+ * detection, Li et al. 2021, Codimensional IPC, algorithm 1). It does not search beyond `limit`, which it
+ * returns at most. A pair whose gap at x is not above rounding has no side to stay on: `limit`. */
+double drape_pair_step_fraction(const drape_pair *pair, const double *x, const double *y,
+                                const drape_keep *keep, double limit);
 
 #endif

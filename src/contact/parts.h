@@ -11,13 +11,20 @@
 #include "contact/friction.h"
 #include "contact/restitution.h"
 
-#define DRAPE_KEEP_STEP 1e-3 /* of a gap: coming nearer than that within a step counts as a crossing */
-
 /* A contact and its normal force at the beginning of the step. */
 typedef struct drape_lagged {
     drape_active_contact contact;
     double force; /* [N] */
 } drape_lagged;
+
+/* How much stiffer contact is than the scene's stiffness, so that what is pressed hard keeps its distance. It
+ * changes between steps only. */
+typedef struct drape_press {
+    double factor; /* >= 1 */
+    double widest; /* the smallest gap of a step, in activation distances: its maximum since the last raise */
+    double t;      /* [s] at the last step */
+    double work;   /* [J] that changes have added to the contact energy, until it is taken */
+} drape_press;
 
 struct drape_contact {
     drape_arena *arena;
@@ -40,8 +47,8 @@ struct drape_contact {
     bool begun;                      /* a step has begun: */
     double *start, *start_v;         /* (points x 3) its beginning */
     drape_collider_pose *start_pose; /* (collider_count) */
-    double *start_gaps;   /* (node_count) smallest distance from the surfaces of colliders, at most 0 [m] */
-    double start_least;   /* smallest gap of a feature of a collider, at most 0 [m] */
+    drape_inside_pairs inside;       /* at its beginning */
+    drape_press press;
     drape_lagged *lagged; /* (lagged_count of lagged_room) lagged friction */
     int32_t lagged_count, lagged_room;
 
@@ -63,9 +70,15 @@ void drape_contact_fill(const drape_contact *c, const double *nodes, const drape
 /* drape_contact_evaluate_at without its timing. */
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at);
 
-/* Compute lagged friction and the initial depths from the active set at the beginning of a step. */
+/* Computes lagged friction from the active set at the beginning of a step. */
 drape_status drape_contact_lag(drape_contact *c);
-void drape_contact_measure_start(drape_contact *c);
+
+/* Sets what rounding can change in the gaps of these positions (points x 3): all that contact compares gaps
+ * with follows from the beginning of the step. */
+void drape_contact_set_rounding(drape_contact *c, const double *x);
+
+/* What a step must keep of gaps on its path. */
+drape_keep drape_contact_keep_step(const drape_contact *c);
 
 /* The candidates that are valid on a path, and how far that is from theirs; NULL: a search is needed. */
 const drape_candidates *drape_contact_valid_candidates(const drape_contact *c,
@@ -82,17 +95,24 @@ drape_status drape_contact_take_failure(drape_contact *c);
 /* Lists the active set of a configuration. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_list(drape_contact *c, const drape_configuration *at);
 
-/* The constants of a pair. */
-drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair *pair);
+/* The constants of a contact. */
+drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_active_contact *contact);
 
 /* Velocities of the points of an active contact, relative to the collider if it is a surface. */
 void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3]);
 
-/* The largest step fraction from x to y (points x 3) on which all pairs keep `keep` of their gap, and the
- * pair that limits it. Colliders are at pose; core: the radius counts as 0. */
+/* The largest step fraction from x to y (points x 3) on which all pairs of features keep what they must
+ * of their gaps, and the pair that limits it. Colliders are at pose. */
 double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
-                                   const drape_collider_pose *pose, double keep, bool core,
+                                   const drape_collider_pose *pose, const drape_keep *keep,
                                    drape_pair *limiting);
+
+/* The same for the path of a node from x to y in the collider's own coordinates, and its smooth surface. */
+double drape_contact_march(const drape_contact *c, const drape_collider *collider, const double *x,
+                           const double *y, const drape_keep *keep);
+
+/* The least gap [m] between cloth and a collider. */
+double drape_contact_least_gap(const drape_contact *c);
 
 static inline drape_configuration drape_contact_configuration(const drape_contact *c)
 {

@@ -34,7 +34,7 @@ static double second(const drape_gap *gap, const drape_gap_derivatives *derivati
 void drape_normal_derive(const drape_gap *gap, const drape_gap_derivatives *derivatives,
                          const drape_contact_law *law, double v[4][3], drape_normal_derivatives *out)
 {
-    const drape_barrier b = drape_barrier_at(gap->value / law->distance);
+    const drape_barrier b = drape_barrier_at(gap->value / law->distance, law->low);
     const int d = 3 * gap->closest.points;
     for (int j = 0; j < d; j++) {
         out->lambda[j] = -gap->m * law->stiffness / law->distance * b.ddb * gap->closest.c[j / 3] *

@@ -68,7 +68,12 @@ enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
 #define GAIN 0.02
 /* Fraction of the time: steps whose sum ends this near to the end of an advance end there. What is left is
  * the sum's rounding error, which the schedule does not step over. */
-#define LANDED           (1e3 * DBL_EPSILON)
+#define LANDED (1e3 * DBL_EPSILON)
+/* Of the time in which the scene moves by its size. What comes too near crosses the least gap of contact,
+ * 1e-3 of a thickness, in longer steps at any speed that it can have, so steps as short as this, one
+ * after the other, lead nowhere. A few may start IDA. */
+#define LEAST_STEP       1e-10
+#define MAX_TINY         20
 #define MAX_ERROR_FAILS  10 /* error test failures in one step */
 #define MAX_SOLVER_FAILS 10 /* convergence failures in one step */
 
@@ -125,13 +130,18 @@ typedef struct ida_state {
     double from;            /* [s] time at which the last successful step began; NAN: none */
     double powers[2];       /* [W] power of dissipation; power of pins; both at the time reached */
     double second;          /* [s] beginning of the second of simulated time in which steps are counted */
+    double least_step;      /* [s] */
+    int64_t tiny;           /* steps in a row that were shorter than that */
     int64_t steps;          /* attempted in that second, except those that end an advance */
     long counted;           /* Newton iterations of IDA that `work` contains already */
     drape_work work;
 
     /* Why callbacks failed in this step; IDA keeps only the sign. */
     bool nonfinite, crossing; /* the last residual */
-    drape_status failure;     /* < 0: the pattern could not be extended */
+    bool crossed;             /* some residual; the last that did: */
+    const char *crossing_reason;
+    drape_diagnostic crossing_pair;
+    drape_status failure; /* < 0: the pattern could not be extended */
 } ida_state;
 
 /* ---- Between vectors and nodes ---- */
@@ -181,7 +191,9 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
         f[s->n + i] = mass_of(s, i) * vp[i] + s->g[node_at(s, i)];
     }
     s->nonfinite = !drape_all_finite(f, 2 * (size_t)s->n);
-    s->crossing = !s->nonfinite && drape_system_crosses(s->system, s->x, t);
+    s->crossing =
+        !s->nonfinite && drape_system_crosses(s->system, s->x, t, &s->crossing_reason, &s->crossing_pair);
+    s->crossed |= s->crossing;
     s->work.residuals++;
     s->work.residual_seconds += drape_system_clock(s->system) - start;
     return drape_system_status(s->system) ? -1 : s->nonfinite || s->crossing ? 1 : 0;
@@ -359,6 +371,10 @@ static void diagnose(ida_state *s, drape_step_info *info)
         drape_system_check(s->system, s->x, NULL, s->internal, &info->reason, &info->diagnostic);
         return;
     }
+    if (s->crossing) {
+        info->diagnostic = s->crossing_pair;
+        return;
+    }
     if (IDAGetEstLocalErrors(s->ida, s->between))
         return;
     const double *e = N_VGetArrayPointer(s->between), *w = N_VGetArrayPointer(s->weights);
@@ -383,6 +399,18 @@ static bool exhausted(ida_state *s, const drape_state *in, drape_step_info *info
     IDAGetLastStep(s->ida, &info->h);
     diagnose(s, info);
     return true;
+}
+
+/* Stops a run whose steps have become so small that it no longer moves, as where nothing can yield. */
+static drape_status check_step_size(ida_state *s, double h, bool last, drape_step_info *info)
+{
+    s->tiny = h < s->least_step && !last ? s->tiny + 1 : 0;
+    if (s->tiny <= MAX_TINY)
+        return DRAPE_OK;
+    s->tiny = 0;
+    s->crossing = s->crossed;
+    info->reason = s->crossing ? s->crossing_reason : drape_reason_name(DRAPE_REASON_ERROR_TEST);
+    return DRAPE_E_STEP_TOO_SMALL;
 }
 
 /* Consistent initial values need no solve: x' = v, v' = -M^-1 g. */
@@ -476,12 +504,12 @@ static drape_status status_of(int code, bool nonfinite, const char **reason)
 static drape_status solve(ida_state *s, double end, double h, double *t, drape_step_info *info)
 {
     long iterations = 0;
-    s->crossing = s->nonfinite = false;
+    s->crossing = s->crossed = s->nonfinite = false;
     s->failure = DRAPE_OK;
     int code = IDASolve(s->ida, end, t, s->y, s->rate, IDA_ONE_STEP);
     drape_status status = status_of(code, s->nonfinite, &info->reason);
     if (status > 0 && s->crossing)
-        info->reason = drape_reason_name(DRAPE_REASON_COLLISION);
+        info->reason = s->crossing_reason;
     if (drape_system_status(s->system))
         status = drape_system_status(s->system);
     if (s->failure < 0 || s->linear->status < 0)
@@ -514,6 +542,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_status status = prepare(s, in, end, h, &t, info);
     if (!status && s->n > 0)
         status = solve(s, end, h, &t, info);
+    if (!status)
+        status = check_step_size(s, t - in->t, t == s->span[1] || t == end, info);
     if (end - t <= LANDED * fabs(end))
         t = end;
     s->reached = NAN;
@@ -575,8 +605,10 @@ static void create_arrays(ida_state *s)
 /* Derived defaults, and the weights that follow from them. */
 static void set_tolerances(ida_state *s)
 {
-    double rtol = s->values[PARAM_RTOL];
+    double rtol = s->values[PARAM_RTOL], size = NAN, speed = NAN;
     drape_derive_tolerances(s->model, rtol, &s->values[PARAM_ATOL_X], &s->values[PARAM_ATOL_V]);
+    drape_derive_tolerances(s->model, 1, &size, &speed);
+    s->least_step = LEAST_STEP * size / speed;
     if (isnan(s->values[PARAM_MAX_ORDER]))
         s->values[PARAM_MAX_ORDER] = rtol >= TIGHT ? LOOSE_ORDER : TIGHT_ORDER;
     double *w = N_VGetArrayPointer(s->weights);
@@ -709,6 +741,7 @@ static void archive(void *state, drape_archive *a)
     drape_ida_newton_archive(&s->newton, a);
     drape_archive_doubles(a, s->powers, 2);
     drape_archive_double(a, &s->second);
+    drape_archive_int64(a, &s->tiny);
     drape_archive_int64(a, &s->steps);
     drape_archive_int64(a, &counted);
     s->counted = (long)counted;

@@ -6,6 +6,7 @@
 #include "io/file.h"
 #include "io/json.h"
 #include "model/model.h"
+#include "sim/warnings.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -108,10 +109,10 @@ static json_t *realtime(const drape_summary_realtime *r)
     return with_reals(with_counts(json_object(), counts, LENGTH(counts)), times, LENGTH(times));
 }
 
-/* A count of the sim; null if memory was out. */
+/* A count of the sim; NULL, which fails the summary, if memory was out. */
 static json_t *found(int64_t count)
 {
-    return count >= 0 ? json_integer((json_int_t)count) : json_null();
+    return count >= 0 ? json_integer((json_int_t)count) : NULL;
 }
 
 /* For each collider, if there are any: the number of triangles of the cloth that reach into it, how deep [m],
@@ -145,7 +146,10 @@ static json_t *warnings(drape_sim *sim)
             return NULL;
         }
     }
-    return list;
+    if (!drape_sim_take_warning_failure(sim))
+        return list;
+    json_decref(list);
+    return NULL;
 }
 
 static json_t *hash(const drape_sim *sim)

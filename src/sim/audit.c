@@ -190,6 +190,14 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
     return true;
 }
 
+void drape_sim_add_contact_work(drape_sim *sim)
+{
+    const double work = drape_system_take_contact_work(sim->system);
+    sim->audit.pin_work += work;
+    sim->audit.offered += fmax(work, 0);
+    sim->energy.contact += work;
+}
+
 void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
 {
     drape_audit *audit = &sim->audit;

@@ -66,6 +66,7 @@ struct drape_sim {
     drape_realtime_memory realtime;
     drape_energy energy, attempted;     /* of the present state; of the last attempted one */
     bool energy_known, attempted_known; /* whether these two are valid */
+    bool warning_failed;                /* memory was out for a test of drape_sim_warning */
     uint64_t model_hash, choices_hash;  /* identify what a checkpoint belongs to; valid if identity_known */
     bool identity_known;
     /* The members from here on stay in place when a restored sim replaces the others (checkpoint.c). */
@@ -110,6 +111,10 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
 /* drape_sim_energy_density at other positions (node_count x 3), with the internal variables of the present
  * state. */
 void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *density);
+
+/* Adds the energy that contact gained by becoming stiffer at the beginning of a step, which stays whether
+ * or not the step is accepted. */
+void drape_sim_add_contact_work(drape_sim *sim);
 
 /* Adds the work of an accepted step to the energy account. */
 void drape_sim_add_work(drape_sim *sim, const drape_step_info *info);

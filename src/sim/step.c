@@ -51,6 +51,7 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     info->diagnostic =
         (drape_diagnostic){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
+    drape_sim_add_contact_work(sim);
     if (!status)
         status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
     if (status == DRAPE_E_STOPPED)
@@ -183,13 +184,27 @@ static void describe_diagnostic(const drape_model *model, const drape_diagnostic
         used = (size_t)snprintf(text, size, "; %s %d (nodes", diagnostic->term, (int)diagnostic->element);
     else
         used = (size_t)snprintf(text, size, "; worst at (node");
-    const drape_cloth *cloth = &model->cloths[diagnostic->cloth];
-    for (int a = 0; a < 4 && diagnostic->node[a] >= 0 && used < size; a++)
-        used +=
-            (size_t)snprintf(text + used, size - used, " %d", (int)(diagnostic->node[a] - cloth->first_node));
+    for (int a = 0; a < 4 && diagnostic->node[a] >= 0 && used < size; a++) {
+        const int32_t node = diagnostic->node[a], next = a < 3 ? diagnostic->node[a + 1] : -1;
+        const int32_t in = drape_model_cloth_of(model, node);
+        used += (size_t)snprintf(text + used, size - used, " %d", (int)(node - model->cloths[in].first_node));
+        if (used < size && (next < 0 || drape_model_cloth_of(model, next) != in))
+            used += (size_t)snprintf(text + used, size - used, " of %s%s", model->cloths[in].name,
+                                     next < 0 ? "" : ",");
+    }
     if (used < size)
-        snprintf(text + used, size - used, " of %s): %s = %.4g, limit %.4g", cloth->name, diagnostic->what,
-                 diagnostic->value, diagnostic->limit);
+        snprintf(text + used, size - used, "): %s = %.4g, limit %.4g", diagnostic->what, diagnostic->value,
+                 diagnostic->limit);
+}
+
+/* The pair that may have kept the equations of a step without a solution, unless the diagnostic names an
+ * element. */
+static void describe_nearest(const drape_sim *sim, const drape_attempt *attempt, char *text, size_t size)
+{
+    drape_diagnostic nearest;
+    text[0] = 0;
+    if (attempt->diagnostic.element < 0 && drape_system_nearest(sim->system, &nearest))
+        describe_diagnostic(sim->model, &nearest, text, size);
 }
 
 /* Logs what was rejected, and why. */
@@ -205,12 +220,13 @@ static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
-    char diagnostic[400], residual[100] = "", distortion[200] = "";
+    char diagnostic[400], nearest[400], residual[100] = "", distortion[200] = "";
     if (stop == DRAPE_E_MEMORY) /* the allocator set the message */
         return stop;
     if (stop == DRAPE_E_STOPPED)
         return drape_sim_check_cancel(sim);
     describe_diagnostic(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
+    describe_nearest(sim, attempt, nearest, sizeof nearest);
     /* a diagnostic that names only a node may not give the cause, which the distortion may */
     if (attempt->diagnostic.element < 0)
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
@@ -218,25 +234,27 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
     if (!isnan(attempt->tolerance) && !isnan(attempt->residual))
         snprintf(residual, sizeof residual, ", residual %.4g N for a tolerance of %.4g N", attempt->residual,
                  attempt->tolerance);
-    return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s", attempt->t,
+    return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s%s", attempt->t,
                       attempt->h, attempt->reason, drape_status_name(attempt->status), attempt->iterations,
-                      residual, diagnostic, distortion);
+                      residual, diagnostic, nearest, distortion);
 }
 
 /* An integrator that chooses its own steps has no dt, and a limit of its own. */
 drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 {
-    char diagnostic[400];
+    char diagnostic[400], nearest[400];
     const drape_schedule *s = &sim->schedule;
     if (!(s->dt > 0) || (double)s->tries < sim->max_attempts)
         return DRAPE_OK;
     describe_diagnostic(sim->model, &last->diagnostic, diagnostic, sizeof diagnostic);
-    return drape_fail(
-        sim->ctx, DRAPE_E_STEP_TOO_SMALL,
-        "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64
-        " attempts since t=%.9g advanced less than one dt, %.4g s; the controller's max_attempts is %.15g%s",
-        drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status), last->iterations,
-        s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic);
+    describe_nearest(sim, last, nearest, sizeof nearest);
+    return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
+                      "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64
+                      " attempts since t=%.9g advanced less than one dt, %.4g s; the controller's "
+                      "max_attempts is %.15g%s%s",
+                      drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status),
+                      last->iterations, s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic,
+                      nearest);
 }
 
 /* ---- One step, and an advance ---- */

@@ -100,7 +100,7 @@ static int32_t free_nodes_inside(const drape_model *m, int32_t collider, const d
 
 /* Whether free nodes at x are inside a collider, or it pierces faces of the cloth; writes the text for the
  * first such collider. */
-static bool describe_inside(const drape_sim *sim, const double *x, bool start, char *text, size_t size)
+static bool describe_inside(drape_sim *sim, const double *x, bool start, char *text, size_t size)
 {
     const drape_model *m = sim->model;
     const char *what = start ? "start" : "end", *advice = start ? ": move the cloth or the collider" : "";
@@ -117,7 +117,9 @@ static bool describe_inside(const drape_sim *sim, const double *x, bool start, c
                      "/colliders/%d: %d free node%s of the cloth %s%s inside %s, up to %.3g m deep%s", (int)c,
                      (int)count, count == 1 ? "" : "s", what, count == 1 ? "s" : "", m->colliders[c].name,
                      deepest, advice);
-        else if (!drape_find_pierced(sim->ctx, m, c, &pose, x, &pierced) && pierced > 0)
+        else if (drape_find_pierced(sim->ctx, m, c, &pose, x, &pierced))
+            sim->warning_failed = true;
+        else if (pierced > 0)
             snprintf(text, size, "/colliders/%d: %d triangle%s of the cloth %s%s pierced by %s%s", (int)c,
                      (int)pierced, pierced == 1 ? "" : "s", what, pierced == 1 ? "s" : "",
                      m->colliders[c].name, advice);
@@ -186,6 +188,13 @@ static const struct {
               {"large_mesh", has_large_file},   {"starts_inside", starts_inside},
               {"ends_inside", ends_inside},     {"numerical_dissipation", dissipates_most},
               {"slow_contact", is_contact_slow}};
+
+bool drape_sim_take_warning_failure(drape_sim *sim)
+{
+    const bool failed = sim->warning_failed;
+    sim->warning_failed = false;
+    return failed;
+}
 
 bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out)
 {

@@ -4,4 +4,9 @@
 
 #define DRAPE_FEW_STEPS 20 /* a run of fewer steps shows neither whether it is stable nor how it moves */
 
+#include "drape/drape.h"
+
+/* Whether memory was out for a test since the last call, so that a warning may be missing. */
+bool drape_sim_take_warning_failure(drape_sim *sim);
+
 #endif

@@ -5,6 +5,7 @@
  * shows exp(mu angle). The energy audit reports the work of friction and of moving colliders.
  */
 #include "contact/barrier.h"
+#include "contact/pair.h"
 #include "support/scene.h"
 
 #include <unistd.h>
@@ -29,10 +30,10 @@ typedef struct sliding {
 static double resting_gap(const drape_model *m, double g)
 {
     const double wanted = SIGMA * g / m->contact.stiffness;
-    double low = DRAPE_BARRIER_LOW, high = 1;
+    double low = DRAPE_LEAST_GAP, high = 1;
     for (int i = 0; i < 200; i++) {
         const double s = (low + high) / 2;
-        *(-drape_barrier_at(s).db > wanted ? &low : &high) = s;
+        *(-drape_barrier_at(s, DRAPE_LEAST_GAP).db > wanted ? &low : &high) = s;
     }
     return low * m->contact.distance;
 }

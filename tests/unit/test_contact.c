@@ -202,6 +202,7 @@ static void check_kind(drape_pair_kind kind, double speed)
         setting s = {
             .pair = {.kind = kind, .node = {0, 1, 2, 3}, .collider = -1, .radius = 0.01, .distance = 0.2},
             .law = {.distance = 0.2,
+                    .low = DRAPE_LEAST_GAP,
                     .stiffness = 3,
                     .friction = 0.4,
                     .velocity = 0.05,
@@ -252,6 +253,7 @@ START_TEST(test_parallel)
         setting s = {
             .pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1, .distance = 0.2},
             .law = {.distance = 0.2,
+                    .low = DRAPE_LEAST_GAP,
                     .stiffness = 3,
                     .friction = 0.4,
                     .velocity = 0.05,
@@ -278,7 +280,7 @@ END_TEST
 START_TEST(test_mollified_away)
 {
     setting s = {.pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1, .distance = 0.2},
-                 .law = {.distance = 0.2, .stiffness = 3},
+                 .law = {.distance = 0.2, .low = DRAPE_LEAST_GAP, .stiffness = 3},
                  .x = {-0.1, 0, 0, 0.1, 0, 0, -0.08, 0.05, 0, 0.12, 0.05, 0},
                  .rest = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, 0, 0.1, 0.05, 0}};
     ck_assert_double_eq(energy_of(&s), 0);
@@ -286,63 +288,113 @@ START_TEST(test_mollified_away)
 END_TEST
 
 /* The barrier is C2 where it begins and where its parabola takes over, and its force is always repulsive. */
-START_TEST(test_barrier)
+static void check_barrier(double low)
 {
-    const double joints[] = {1, DRAPE_BARRIER_LOW}, e = 1e-9;
+    const double joints[] = {1, low}, e = 1e-9;
     for (int k = 0; k < 2; k++) {
-        drape_barrier a = drape_barrier_at(joints[k] - e), b = drape_barrier_at(joints[k] + e);
-        double third =
-            k ? 2 / pow(DRAPE_BARRIER_LOW, 3) + 4 / pow(DRAPE_BARRIER_LOW, 2) : 8; /* bounds b''' */
+        drape_barrier a = drape_barrier_at(joints[k] - e, low), b = drape_barrier_at(joints[k] + e, low);
+        double third = k ? 2 / pow(low, 3) + 4 / pow(low, 2) : 8; /* bounds b''' */
         ck_assert_double_le(fabs(a.ddb - b.ddb), 2 * e * 4 * third);
         ck_assert_double_le(fabs(a.db - b.db), 2 * e * (fabs(a.ddb) + 1));
         ck_assert_double_le(fabs(a.b - b.b), 2 * e * (fabs(a.db) + 1));
     }
     double last = -INFINITY;
     for (double s = -2; s < 1; s += 1e-3) {
-        ck_assert_double_lt(drape_barrier_at(s).db, 0);
-        ck_assert_double_gt(drape_barrier_at(s).db, last); /* convex */
-        last = drape_barrier_at(s).db;
+        ck_assert_double_lt(drape_barrier_at(s, low).db, 0);
+        ck_assert_double_gt(drape_barrier_at(s, low).db, last); /* convex */
+        last = drape_barrier_at(s, low).db;
+    }
+}
+
+/* At the least gap it withstands 1/DRAPE_LEAST_GAP times its scale: b' = -1/s to a hundredth there, as 2
+ * s ln s and 2 s are. The gentle one agrees with it from DRAPE_BARRIER_GENTLE on, so that a pair that
+ * comes out keeps its energy. */
+START_TEST(test_barrier)
+{
+    check_barrier(DRAPE_BARRIER_GENTLE);
+    check_barrier(DRAPE_LEAST_GAP);
+    ck_assert_double_eq_tol(drape_barrier_at(DRAPE_LEAST_GAP, DRAPE_LEAST_GAP).db * DRAPE_LEAST_GAP, -1,
+                            0.02);
+    for (double s = DRAPE_BARRIER_GENTLE; s < 1; s += 1e-2) {
+        ck_assert_double_eq(drape_barrier_at(s, DRAPE_LEAST_GAP).b,
+                            drape_barrier_at(s, DRAPE_BARRIER_GENTLE).b);
+        ck_assert_double_eq(drape_barrier_at(s, DRAPE_LEAST_GAP).db,
+                            drape_barrier_at(s, DRAPE_BARRIER_GENTLE).db);
     }
 }
 END_TEST
 
-/* On a path that is reported as free, the gap never falls below the share that must remain. A path that is
- * not free is cut before the gap is 0 and after most of it is gone. */
-START_TEST(test_step_fraction)
+/* On a path that is reported as free, the gap never falls below what must be kept of it. A path that is
+ * not free is cut before that, and after most of the rest is gone. A trial state
+ * keeps half of what is above the least gap, a step half of the least gap; a pair that begins below it
+ * keeps half of its gap. */
+static void check_step_fraction(const drape_keep *keep, double distance)
 {
     uint64_t seed = 11;
-    int cut = 0, whole = 0;
+    int cut = 0, whole = 0, below = 0;
     for (int k = 0; k < 2000; k++) {
         drape_pair pair = {.kind = k % 2 ? DRAPE_PAIR_SEGMENTS : DRAPE_PAIR_TRIANGLE,
                            .node = {0, 1, 2, 3},
                            .collider = -1,
+                           .distance = distance,
                            .radius = k % 3 ? 0 : 0.01};
         double x[D], y[D], at[D], smallest = INFINITY;
         const drape_configuration configuration = {.x = at};
         fill(&seed, 0.1, x, D);
         fill(&seed, 0.1, y, D);
         memcpy(at, x, sizeof at);
-        double start = drape_pair_gap_value(&pair, &configuration);
+        const double start = drape_pair_gap_value(&pair, &configuration),
+                     least = drape_pair_least_gap(&pair, keep->rounding);
         if (!(start > 1e-3))
             continue;
-        double fraction = drape_pair_step_fraction(&pair, x, y, 0.1, false, 1);
-        ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, 0.1, false, 0.5 * fraction),
-                            0.5 * fraction);
-        ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, 0.1, false, 0.5 + 0.5 * fraction),
+        const double kept = drape_keep_gap(keep, least, start);
+        double fraction = drape_pair_step_fraction(&pair, x, y, keep, 1);
+        ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, keep, 0.5 * fraction), 0.5 * fraction);
+        ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, keep, 0.5 + 0.5 * fraction),
                             fraction < 1 ? fraction : 1);
         for (int i = 0; i <= 200; i++) {
             for (int j = 0; j < D; j++)
                 at[j] = x[j] + fraction * i / 200 * (y[j] - x[j]);
             smallest = fmin(smallest, drape_pair_gap_value(&pair, &configuration));
         }
-        ck_assert_double_ge(smallest, (0.1 - 1e-9) * start);
         cut += fraction < 1;
         whole += fraction == 1;
-        if (fraction < 1)
-            ck_assert_double_le(drape_pair_gap_value(&pair, &configuration), 0.2 * start);
+        below += fraction < 1 && start < least;
+        if (fraction < 1) {
+            ck_assert_double_ge(smallest, (1 - 1e-9) * kept);
+            ck_assert_double_le(drape_pair_gap_value(&pair, &configuration), 1.2 * kept);
+        } else {
+            ck_assert_double_gt(smallest, 0);
+        }
     }
     ck_assert_int_ge(cut, 50);
     ck_assert_int_ge(whole, 50);
+    ck_assert_int_eq(below > 0, distance > 1);
+}
+
+START_TEST(test_step_fraction)
+{
+    const drape_keep trial = {.rounding = 1e-12, .least = 1, .above = 0.5, .below = 0.5},
+                     step = {.rounding = 1e-12, .least = 0.5, .below = 0.5};
+    check_step_fraction(&trial, 0.2);
+    check_step_fraction(&step, 0.2);
+    check_step_fraction(&step, 10); /* least gap: 1 cm */
+}
+END_TEST
+
+/* A path that ends beyond the other piece is never free, however little the gap is above rounding. */
+START_TEST(test_no_gap_is_exempt)
+{
+    const drape_keep step = {.rounding = 1e-12, .least = 0.5, .below = 0.5};
+    for (int collider = -1; collider < 1; collider++)
+        for (double gap = 1e-2; gap > 2e-12; gap /= 2) {
+            const drape_pair pair = {
+                .kind = DRAPE_PAIR_TRIANGLE, .node = {0, 1, 2, 3}, .collider = collider, .distance = 1e-2};
+            double x[D] = {0.1, gap, 0.1, 0, 0, 0, 1, 0, 0, 0, 0, 1}, y[D];
+            memcpy(y, x, sizeof y);
+            y[1] = -1e-3;
+            ck_assert_double_lt(drape_pair_step_fraction(&pair, x, y, &step, 1), 1);
+        }
 }
 END_TEST
 
@@ -467,4 +519,4 @@ START_TEST(test_bounds)
 END_TEST
 
 SUITE("contact", test_triangle, test_segments, test_parallel, test_mollified_away, test_barrier,
-      test_step_fraction, test_tree, test_bounds)
+      test_step_fraction, test_no_gap_is_exempt, test_tree, test_bounds)

@@ -1,0 +1,477 @@
+/*
+ * test_least_gap.c: cloth that is pressed against something. No pair of pieces comes nearer than the
+ * least gap, so nothing passes through anything, in any accepted state and on the straight path between
+ * two, whatever presses; a run that cannot keep this stops and names the pair. Crossings are counted
+ * here, without the library: an edge passes through a triangle if its ends are on different sides of the
+ * plane and it passes all three sides of the triangle in the same sense. Determinants are computed with
+ * 64 bits: their rounding error is far below those of gaps of 1e-3 activation distances.
+ */
+#include "colliders/colliders.h"
+#include "contact/barrier.h"
+#include "contact/parts.h"
+#include "support/scene.h"
+
+#include <stdlib.h>
+#include <unistd.h>
+
+static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "newton_k", "ida"};
+#define METHODS (sizeof methods / sizeof *methods)
+
+/* ---- Crossings ---- */
+
+static long double side(const double *a, const double *b, const double *c, const double *d)
+{
+    long double u[3], v[3], w[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = (long double)b[k] - a[k];
+        v[k] = (long double)c[k] - a[k];
+        w[k] = (long double)d[k] - a[k];
+    }
+    return u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) +
+           u[2] * (v[0] * w[1] - v[1] * w[0]);
+}
+
+static bool pierces(const double *p, const double *q, const double *a, const double *b, const double *c)
+{
+    for (int k = 0; k < 3; k++)
+        if (fmax(p[k], q[k]) < fmin(fmin(a[k], b[k]), c[k]) ||
+            fmin(p[k], q[k]) > fmax(fmax(a[k], b[k]), c[k]))
+            return false;
+    const long double over = side(a, b, c, p), under = side(a, b, c, q);
+    if (over == 0 || under == 0 || (over > 0) == (under > 0))
+        return false;
+    const long double s[3] = {side(p, q, a, b), side(p, q, b, c), side(p, q, c, a)};
+    return (s[0] > 0 && s[1] > 0 && s[2] > 0) || (s[0] < 0 && s[1] < 0 && s[2] < 0);
+}
+
+/* Edges and triangles of cloth (own) or of a collider, with the positions of their points. */
+typedef struct surface {
+    const double *x;
+    const int32_t *edge, *triangle;
+    int32_t edges, triangles;
+} surface;
+
+static int crossings(const surface *a, const surface *b)
+{
+    int count = 0;
+    for (int32_t e = 0; e < a->edges; e++)
+        for (int32_t f = 0; f < b->triangles; f++) {
+            const int32_t *n = a->edge + 2 * (size_t)e, *t = b->triangle + 3 * (size_t)f;
+            bool shared = false;
+            for (int i = 0; i < 6 && a->x == b->x; i++)
+                shared = shared || n[i / 3] == t[i % 3];
+            count +=
+                !shared && pierces(a->x + 3 * (size_t)n[0], a->x + 3 * (size_t)n[1], b->x + 3 * (size_t)t[0],
+                                   b->x + 3 * (size_t)t[1], b->x + 3 * (size_t)t[2]);
+        }
+    return count;
+}
+
+static int crossings_at(const drape_model *m, const double *x, double t)
+{
+    const surface cloth = {x, m->edge, m->triangle, m->edge_count, m->triangle_count};
+    int count = m->contact.self ? crossings(&cloth, &cloth) : 0;
+    for (int32_t c = 0; c < m->collider_count; c++) {
+        const drape_collider_shape *shape = &m->colliders[c].shape;
+        const drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], t);
+        double corner[3 * 64];
+        ck_assert_int_le(shape->point_count, 64);
+        for (int32_t i = 0; i < 3 * shape->point_count; i++)
+            corner[i] = shape->point[i] + pose.displacement[i % 3];
+        const surface body = {corner, shape->segment, shape->triangle, shape->segment_count,
+                              shape->triangle_count};
+        count += crossings(&cloth, &body) + crossings(&body, &cloth);
+    }
+    return count;
+}
+
+/* ---- Watching ---- */
+
+#define BETWEEN 4 /* states looked at between one accepted state and the next */
+
+typedef struct watch {
+    drape_sim *sim;
+    double *last, *x, t; /* the last accepted state */
+    int crossings, frames_crossed;
+    long steps, rejected;
+    double least_gap; /* [m] */
+} watch;
+
+static drape_status look(void *user, const drape_event *event)
+{
+    watch *w = user;
+    const drape_model *m = w->sim->model;
+    const drape_state *now = drape_sim_state(w->sim);
+    const size_t n = 3 * (size_t)m->node_count;
+    if (event->kind == DRAPE_EVENT_FRAME) {
+        w->frames_crossed += crossings_at(m, event->positions, event->time) > 0;
+        return DRAPE_OK;
+    }
+    w->rejected += !event->attempt->accepted;
+    if (!event->attempt->accepted)
+        return DRAPE_OK;
+    for (int k = 1; k <= BETWEEN; k++) {
+        const double s = (double)k / BETWEEN;
+        for (size_t i = 0; i < n; i++)
+            w->x[i] = k < BETWEEN ? w->last[i] + s * (now->x[i] - w->last[i]) : now->x[i];
+        w->crossings += crossings_at(m, w->x, w->t + s * (now->t - w->t));
+    }
+    double gap;
+    drape_system_contact_energy(w->sim->system, &(drape_point){.x = now->x, .v = now->v, .t = now->t});
+    drape_contact_active(drape_system_contact(w->sim->system), &gap);
+    w->least_gap = fmin(w->least_gap, gap);
+    memcpy(w->last, now->x, n * sizeof *w->last);
+    w->t = now->t;
+    w->steps++;
+    return DRAPE_OK;
+}
+
+/* Runs to the end, or until it stops with a message that names a pair. Returns whether it reached the end. */
+static bool press(scene *s, double until, const char *what)
+{
+    const size_t n = 3 * (size_t)s->model->node_count;
+    watch w = {.sim = s->sim,
+               .last = malloc(n * sizeof(double)),
+               .x = malloc(n * sizeof(double)),
+               .least_gap = INFINITY};
+    ck_assert(w.last && w.x);
+    memcpy(w.last, drape_sim_state(s->sim)->x, n * sizeof *w.last);
+    ck_assert_int_eq(drape_sim_observe(s->sim, look, &w), DRAPE_OK);
+    const drape_status status = drape_sim_advance(s->sim, until);
+    const char *message = drape_context_message(s->ctx);
+    printf("# %s: t = %.3g of %g s, %ld steps, %ld rejected, least gap %.2g m, %d crossings, %d frames "
+           "crossed%s%s\n",
+           what, drape_sim_state(s->sim)->t, until, w.steps, w.rejected, w.least_gap, w.crossings,
+           w.frames_crossed, status ? ": " : "", status ? message : "");
+    ck_assert_msg(w.crossings == 0, "%s: %d crossings", what, w.crossings);
+    ck_assert_msg(w.frames_crossed == 0, "%s: %d frames with crossings", what, w.frames_crossed);
+    if (status) {
+        ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
+        ck_assert_msg(strstr(message, "collider") || strstr(message, "self_contact"), "%s: %s", what,
+                      message);
+    }
+    free(w.last);
+    free(w.x);
+    return status == DRAPE_OK;
+}
+
+static const char tetrahedron[] = "v 0.3 -0.5 0\nv -0.15 -0.5 0.26\nv -0.15 -0.5 -0.26\nv 0.013 0 0.017\n"
+                                  "f 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n";
+
+static void enter_folder(void)
+{
+    char folder[] = "/tmp/drape-press-XXXXXX";
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    ck_assert_int_eq(chdir(folder), 0);
+    FILE *file = fopen("tip.obj", "w");
+    ck_assert_ptr_nonnull(file);
+    fputs(tetrahedron, file);
+    fclose(file);
+}
+
+static void leave_folder(void)
+{
+    char folder[256];
+    unlink("tip.obj");
+    ck_assert_ptr_nonnull(getcwd(folder, sizeof folder));
+    ck_assert_int_eq(chdir("/") + rmdir(folder), 0);
+}
+
+#define MATERIAL "'material': {'young_modulus': %g, 'thickness': 1e-3, 'areal_density': 0.1}"
+#define TERMS    "'terms': ['stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 1e-3}"
+
+/* The scene's integrator, with a step of dt unless it chooses its own. */
+static const char *method_of(const char *name, double dt)
+{
+    static char text[100];
+    if (strcmp(name, "ida") == 0)
+        snprintf(text, sizeof text, "'integrator': {'method': 'ida'}");
+    else
+        snprintf(text, sizeof text, "'integrator': {'method': '%s', 'dt': %g}", name, dt);
+    return text;
+}
+
+/* A sheet with 4 x 4 squares, from 3e4 to 1e6 N/m, two sides of which are pulled down over a tip. */
+START_TEST(over_a_tip)
+{
+    const double membranes[] = {3e4, 1e6};
+    enter_folder();
+    for (size_t k = 0; k < 2 * METHODS; k++) {
+        char what[100];
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, "
+            "'height': 0.4, 'transform': {'translate': [-0.2, 0.01, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, "
+            "4, 20, 21, "
+            "22, 23, 24], 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS
+            "]}], 'colliders': [{'type': 'mesh', 'file': 'tip.obj'}],"
+            " 'contact': {'distance': 4e-3}, %s, 'duration': 1, 'frame_rate': 100}",
+            membranes[k / METHODS] / 1e-3, method_of(methods[k % METHODS], 0.01));
+        snprintf(what, sizeof what, "over a tip, %g N/m, %s", membranes[k / METHODS], methods[k % METHODS]);
+        press(&s, 1, what);
+        scene_close(&s);
+    }
+    leave_folder();
+}
+END_TEST
+
+/* A strip whose ends are pulled down over another one, which is held at its ends. */
+START_TEST(strip_across_strip)
+{
+    for (size_t k = 0; k < 2 * METHODS; k++) {
+        const double membrane = k < METHODS ? 1e3 : 1e5;
+        char what[100];
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 3, 'width': 0.4, "
+            "'height': 0.08,"
+            " 'transform': {'translate': [-0.2, 0, 0.04]}}, 'pins': [{'nodes': [0, 8, 9, 17, 18, "
+            "26]}], " MATERIAL ", " TERMS
+            "]}, {'mesh': {'grid': 'square', 'columns': 3, 'rows': 9, 'width': 0.08, 'height': 0.4,"
+            " 'transform': {'translate': [-0.037, 0.012, 0.203]}}, 'pins': [{'nodes': [0, 1, 2, 24, 25, 26],"
+            " 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS
+            "]}], 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, %s, 'duration': 1, "
+            "'frame_rate': 30}",
+            membrane / 1e-3, membrane / 1e-3, method_of(methods[k % METHODS], 0.01));
+        snprintf(what, sizeof what, "strip across strip, %g N/m, %s", membrane, methods[k % METHODS]);
+        press(&s, 1, what);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* A loose sheet that a wind of 30 m/s blows onto one that is held at its corners. */
+START_TEST(blown)
+{
+    for (size_t k = 0; k < METHODS; k++) {
+        char what[100];
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.3, "
+            "'height': 0.3,"
+            " 'orientation': 'vertical'}, 'pins': [{'nodes': [0, 4, 20, 24]}], " MATERIAL ", " TERMS
+            "]}, {'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.3, 'height': 0.3,"
+            " 'orientation': 'vertical', 'transform': {'translate': [0.013, 0.017, 0.03]}}, " MATERIAL
+            ", " TERMS ", {'type': 'drag.wind', 'wind': [0, 0, -30]}]}],"
+            " 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, %s, 'duration': 0.15, "
+            "'frame_rate': 60}",
+            1e6, 1e6, method_of(methods[k], 0.005));
+        snprintf(what, sizeof what, "blown, %s", methods[k]);
+        press(&s, 0.15, what);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* Two boards that close upon a sheet completely: nothing can yield, so every method stops and names a
+ * pair. */
+START_TEST(between_two_boards)
+{
+    for (size_t k = 0; k < METHODS; k++) {
+        char what[100];
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, 'width': 0.2, "
+            "'height': 0.2,"
+            " 'transform': {'translate': [-0.1, 0.005, 0.1]}}, " MATERIAL ", " TERMS "]}], 'colliders': ["
+            " {'type': 'box', 'center': [0, -0.1, 0], 'size': [0.5, 0.2, 0.5]},"
+            " {'type': 'box', 'center': [0, 0.11, 0], 'size': [0.5, 0.2, 0.5], 'track': [[0, [0,0,0]], [0.2, "
+            "[0,-0.01,0]]]}],"
+            " 'contact': {'distance': 4e-3}, 'gravity': [0, 0, 0], %s, 'duration': 0.2, 'frame_rate': 100}",
+            1e6, method_of(methods[k], 0.01));
+        snprintf(what, sizeof what, "between two boards, %s", methods[k]);
+        ck_assert(!press(&s, 0.2, what));
+        ck_assert_double_lt(drape_sim_state(s.sim)->t, 0.2);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* Contact becomes stiffer while the sheet is pulled over the tip. The energy which that adds to present
+ * contacts is counted as work: the numerical dissipation of backward Euler never falls by more than a
+ * thousandth of it. */
+START_TEST(stiffening_is_work)
+{
+    enter_folder();
+    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, "
+                         "'width': 0.4, 'height': 0.4,"
+                         " 'transform': {'translate': [-0.2, 0.01, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, "
+                         "4, 20, 21, 22, 23, 24],"
+                         " 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS
+                         "]}], 'colliders': [{'type': 'mesh', 'file': 'tip.obj'}], 'contact': {'distance': "
+                         "4e-3}, %s, 'duration': 1}",
+                         2e8, method_of("be", 0.01));
+    const struct drape_contact *contact = drape_system_contact(s.sim->system);
+    double fall = 0, added = 0, factor = 1;
+    int raised = 0;
+    for (int k = 1; k <= 100; k++) {
+        const drape_energy before = drape_sim_energy(s.sim);
+        scene_advance(&s, 0.01 * k);
+        const double now = contact->press.factor;
+        raised += now > factor;
+        added = fmax(added, now > factor ? (now / factor - 1) * before.contact : 0);
+        factor = now;
+        fall = fmax(fall, before.numerical - drape_sim_energy(s.sim).numerical);
+    }
+    printf("# raised %d times, by up to %.3g J\n", raised, added);
+    ck_assert_int_ge(raised, 2);
+    assert_below(fall, 1e-3 * added);
+    scene_close(&s);
+    leave_folder();
+}
+END_TEST
+
+/* A sheet that begins one activation distance deep in the ground is inside: the parabola pushes it out,
+ * and it leaves with the energy b(-1) of that. Without gravity, and with restitution 1, midpoint conserves it up to
+ * the change of b over a step, here less than a twentieth. Then no pair is inside any more. */
+START_TEST(what_begins_inside_is_pushed_out_gently)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
+        "'width': 0.2, 'height': 0.2,"
+        " 'transform': {'translate': [-0.1, -4e-3, 0.1]}}, " MATERIAL
+        ", 'terms': ['stretch.edge']}], 'colliders': ["
+        " {'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'restitution': 1}], 'contact': "
+        "{'distance': 4e-3, 'stiffness': 10},"
+        " 'gravity': [0, 0, 0], %s, 'duration': 1}",
+        1e6, method_of("midpoint", 2e-4));
+    const struct drape_contact *contact = drape_system_contact(s.sim->system);
+    const double stored = 10 * 0.04 * 4e-3 * drape_barrier_at(-1, DRAPE_BARRIER_GENTLE).b;
+    double height = -4e-3;
+    ck_assert_double_eq_tol(drape_sim_energy(s.sim).contact, stored, 1e-9 * stored);
+    for (int k = 1; k <= 100; k++) {
+        scene_advance(&s, 2e-4 * k);
+        double lowest = INFINITY;
+        for (int32_t i = 0; i < s.model->node_count; i++)
+            lowest = fmin(lowest, drape_sim_state(s.sim)->x[3 * (size_t)i + 1]);
+        ck_assert_double_ge(lowest, fmin(height, 4e-6));
+        height = lowest;
+        ck_assert(contact->inside.count == 16 || height > 0);
+    }
+    ck_assert_double_gt(height, 4e-3);
+    ck_assert_int_eq(contact->inside.count, 0);
+    ck_assert_double_eq_tol(drape_sim_energy(s.sim).kinetic, stored, 0.05 * stored);
+    scene_close(&s);
+}
+END_TEST
+
+typedef struct memory {
+    char bytes[1 << 20];
+    size_t size;
+} memory;
+
+static drape_status keep(void *user, const void *bytes, size_t size)
+{
+    memory *m = user;
+    ck_assert_uint_le(m->size + size, sizeof m->bytes);
+    memcpy(m->bytes + m->size, bytes, size);
+    m->size += size;
+    return DRAPE_OK;
+}
+
+/* A run that continues from a checkpoint has the bits of one that did not stop, while contact is stiffer
+ * than the scene says, and while cloth is inside. */
+START_TEST(a_checkpoint_keeps_it)
+{
+    static memory saved;
+    enter_folder();
+    for (int inside = 0; inside < 2; inside++) {
+        uint64_t hash[2];
+        scene s[2];
+        for (int k = 0; k < 2; k++)
+            s[k] = scene_open(
+                "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, "
+                "'height': 0.4,"
+                " 'transform': {'translate': [-0.2, %g, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, 4, 20, 21, "
+                "22, 23, 24],"
+                " 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS "]}], 'colliders': ["
+                " {'type': 'mesh', 'file': 'tip.obj'}], 'contact': {'distance': 4e-3}, %s, 'duration': 1}",
+                inside ? 2e-6 : 0.01, 2e8, method_of("be", 0.01));
+        const double half = inside ? 0.01 : 0.5, end = inside ? 0.1 : 0.7;
+        scene_advance(&s[0], half);
+        const struct drape_contact *contact = drape_system_contact(s[0].sim->system);
+        ck_assert(inside ? contact->inside.count > 0 : contact->press.factor > 1);
+        saved.size = 0;
+        ck_assert_int_eq(drape_sim_save_to(s[0].sim, keep, &saved), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_restore_from(s[1].sim, saved.bytes, saved.size), DRAPE_OK);
+        for (int k = 0; k < 2; k++) {
+            scene_advance(&s[k], end);
+            hash[k] = drape_sim_hash(s[k].sim);
+            scene_close(&s[k]);
+        }
+        ck_assert_uint_eq(hash[0], hash[1]);
+    }
+    leave_folder();
+}
+END_TEST
+
+#define AROUND 10
+#define ALONG  9
+#define RADIUS 0.1
+
+/* A tube whose nodes are numbered ring by ring, in tube.obj. */
+static void write_tube(void)
+{
+    FILE *file = fopen("tube.obj", "w");
+    ck_assert_ptr_nonnull(file);
+    for (int j = 0; j < ALONG; j++)
+        for (int i = 0; i < AROUND; i++) {
+            const double angle = 2 * acos(-1.0) * (i + 0.5 * (j % 2)) / AROUND;
+            fprintf(file, "v %.17g %.17g %.17g\n", 0.05 * j, RADIUS * cos(angle), RADIUS * sin(angle));
+        }
+    for (int j = 0; j + 1 < ALONG; j++)
+        for (int i = 0; i < AROUND; i++) {
+            const int a = j * AROUND + i + 1, b = j * AROUND + (i + 1) % AROUND + 1, c = a + AROUND,
+                      d = b + AROUND;
+            if (j % 2)
+                fprintf(file, "f %d %d %d\nf %d %d %d\n", a, b, d, a, d, c);
+            else
+                fprintf(file, "f %d %d %d\nf %d %d %d\n", a, b, c, b, d, c);
+        }
+    fclose(file);
+}
+
+/* The pins of both ends, each node on a track of its own: the ends turn against each other by `degrees`
+ * each. */
+static const char *wringing(double degrees)
+{
+    static char text[6000];
+    size_t used = 0;
+    for (int end = 0; end < 2; end++)
+        for (int i = 0; i < AROUND; i++) {
+            const double angle = 2 * acos(-1.0) * i / AROUND, y = RADIUS * cos(angle),
+                         z = RADIUS * sin(angle);
+            used += (size_t)snprintf(text + used, sizeof text - used, "%s{'nodes': [%d], 'track': [",
+                                     used ? ", " : "", end ? (ALONG - 1) * AROUND + i : i);
+            for (int k = 0; k <= 8; k++) {
+                const double to = angle + (end ? -1 : 1) * degrees * acos(-1.0) / 180 * k / 8;
+                used += (size_t)snprintf(text + used, sizeof text - used, "%s[%g,[0,%.4f,%.4f]]",
+                                         k ? "," : "", 0.2 * k, RADIUS * cos(to) - y, RADIUS * sin(to) - z);
+            }
+            used += (size_t)snprintf(text + used, sizeof text - used, "]}");
+            ck_assert_uint_lt(used, sizeof text);
+        }
+    return text;
+}
+
+/* A tube that is wrung by 2 x 200 degrees, without gravity, so that inertia alone would make contact too
+ * soft. */
+START_TEST(wrung)
+{
+    static const char *const some[] = {"be", "newton_k"};
+    enter_folder();
+    write_tube();
+    for (int k = 0; k < 2; k++) {
+        char what[100];
+        scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'file': 'tube.obj'}, 'pins': [%s], " MATERIAL
+                             ", " TERMS "]}], 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': "
+                             "4e-3}, 'gravity': [0, 0, 0], %s,"
+                             " 'duration': 1.6, 'frame_rate': 30}",
+                             wringing(200), 1e6, method_of(some[k], 0.02));
+        snprintf(what, sizeof what, "wrung, %s", some[k]);
+        press(&s, 1.6, what);
+        scene_close(&s);
+    }
+    unlink("tube.obj");
+    leave_folder();
+}
+END_TEST
+
+SUITE("least_gap", over_a_tip, strip_across_strip, blown, between_two_boards, wrung, stiffening_is_work,
+      what_begins_inside_is_pushed_out_gently, a_checkpoint_keeps_it)
