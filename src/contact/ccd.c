@@ -17,14 +17,27 @@ typedef struct path {
     double keep, fraction;
     bool core;
     drape_pair limiting;
+    double *of_node; /* (nodes) the smallest fraction of a pair at each node; NULL: not wanted */
+    int32_t nodes;
 } path;
+
+/* The fraction of a pair that limits the displacement, for each of its nodes. */
+static void share(path *p, const drape_pair *pair, double fraction)
+{
+    for (int k = 0; k < 4; k++)
+        if (pair->node[k] < p->nodes)
+            p->of_node[pair->node[k]] = fmin(p->of_node[pair->node[k]], fraction);
+}
 
 /* Does not search beyond the step fraction that another pair leaves: if forces throw nodes very far, a pair
  * approaches so slowly relative to its speed that searching each to its own end would take for ever. */
 static void follow(void *user, const drape_pair *pair)
 {
     path *p = user;
-    const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->keep, p->core, p->fraction);
+    const double limit = p->of_node ? 1 : p->fraction;
+    const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->keep, p->core, limit);
+    if (p->of_node && fraction < 1)
+        share(p, pair, fraction);
     if (fraction < p->fraction) {
         p->fraction = fraction;
         p->limiting = *pair;
@@ -49,7 +62,13 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
 {
     const drape_configuration from = {.model = c->model, .x = x, .pose = pose},
                               to = {.model = c->model, .x = y, .pose = pose};
-    path p = {.x = x, .y = y, .keep = keep, .fraction = 1, .core = core};
+    path p = {.x = x,
+              .y = y,
+              .keep = keep,
+              .fraction = 1,
+              .core = core,
+              .of_node = c->of_node,
+              .nodes = c->model->node_count};
     double moved;
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &from, &moved);
     if (candidates && drape_candidates_moved(candidates, &to) <= candidates->margin) {
@@ -104,11 +123,23 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
             continue;
         for (int32_t i = 0; i < c->model->free_count; i++) {
             const size_t at = 3 * (size_t)c->model->node_of_free[i];
-            fraction = fmin(fraction, march(collider, &c->path_pose[k], x + at, y + at, KEEP_ITERATE));
+            const double own = march(collider, &c->path_pose[k], x + at, y + at, KEEP_ITERATE);
+            fraction = fmin(fraction, own);
+            if (c->of_node)
+                c->of_node[at / 3] = fmin(c->of_node[at / 3], own);
         }
     }
     c->seconds += drape_clock_seconds() - start;
     return fraction;
+}
+
+double drape_contact_node_fractions(drape_contact *c, const double *x, const double *y, double t,
+                                    double *fraction)
+{
+    c->of_node = fraction;
+    const double least = drape_contact_step_fraction(c, x, y, t);
+    c->of_node = NULL;
+    return least;
 }
 
 bool drape_contact_crosses(drape_contact *c, const double *y, double t)

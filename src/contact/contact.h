@@ -73,6 +73,10 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
  * with a margin; colliders rest in their poses at time t. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t);
 
+/* The same, and lowers `fraction` (node_count) at each node to the smallest of its pairs. */
+double drape_contact_node_fractions(drape_contact *contact, const double *x, const double *y, double t,
+                                    double *fraction);
+
 /* Whether two pieces pass through each other on the straight path from the beginning of the step to y,
  * while colliders move straight to their poses at time t. */
 bool drape_contact_crosses(drape_contact *contact, const double *y, double t);

@@ -45,6 +45,7 @@ struct drape_contact {
     drape_lagged *lagged; /* (lagged_count of lagged_room) lagged friction */
     int32_t lagged_count, lagged_room;
 
+    double *of_node;                /* (node_count) while drape_contact_node_fractions runs; else NULL */
     double *from, *to;              /* (points x 3) the ends of a displacement: ccd.c */
     drape_collider_pose *path_pose; /* (collider_count) */
     int32_t *coupling;              /* (coupling_count of coupling_room x 4) */
