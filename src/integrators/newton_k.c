@@ -25,14 +25,14 @@ enum {
     PARAM_LINEAR_TOLERANCE,
     PARAM_LINEAR_ITERATIONS,
     PARAM_COARSE_SPACING,
-    PARAM_MATRIX,
+    PARAM_CORRECTIONS,
     PARAM_COUNT
 };
 
-static const char *const matrices[] = {[DRAPE_INEXACT_AUTO] = "auto",
-                                       [DRAPE_INEXACT_APPROXIMATE] = "approximate",
-                                       [DRAPE_INEXACT_FACTORED] = "factored",
-                                       NULL};
+static const char *const corrections[] = {[DRAPE_INEXACT_AUTO] = "auto",
+                                          [DRAPE_INEXACT_APPROXIMATE] = "conjugate_gradients",
+                                          [DRAPE_INEXACT_FACTORED] = "factors",
+                                          NULL};
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
@@ -56,11 +56,12 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_COARSE_SPACING] =
         DRAPE_INTEGER("coarse_spacing", "1", 0, 0, 100,
                       "edges between the centres of the coarse functions; 0: by the number of nodes"),
-    [PARAM_MATRIX] = DRAPE_CHOICE(
-        "matrix", DRAPE_INEXACT_AUTO, matrices,
-        "approximate: edges and springs, and all other measures by one number for each pair of nodes, solved "
-        "by conjugate gradients; factored: all but the bending of flat cloth exactly, its positive part "
-        "factored; auto: factored for terms that the approximation would hold back, and for stiff cloth"),
+    [PARAM_CORRECTIONS] = DRAPE_CHOICE(
+        "corrections", DRAPE_INEXACT_AUTO, corrections,
+        "conjugate_gradients: a matrix with edges and springs, and one number for each pair of nodes of all "
+        "other measures, is never factored; factors: one with all terms, and such numbers for the bending of "
+        "flat cloth only; auto: factors for terms that the first matrix would hold back, and for stiff "
+        "cloth"),
 };
 
 #define NOMINAL_RATE        60. /* [1/s] linear_tolerance applies to steps of 1/60 s */
@@ -103,8 +104,8 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
         s->past[k] = drape_arena_take(arena, s->common.equation.nodes, sizeof *s->past[k]);
     if (!status)
         status = drape_inexact_newton_create(arena, &s->common.equation,
-                                             (drape_inexact_matrix)values[PARAM_MATRIX], values[PARAM_DT],
-                                             (int)values[PARAM_COARSE_SPACING], &s->newton);
+                                             (drape_inexact_matrix)values[PARAM_CORRECTIONS],
+                                             values[PARAM_DT], (int)values[PARAM_COARSE_SPACING], &s->newton);
     return status ? status : drape_arena_status(arena);
 }
 
