@@ -44,7 +44,8 @@ static const drape_param params[PARAM_COUNT] = {
                      "most 1 % of their load; not a bound on an accepted state"),
     [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
                                               "up to so many further iterations while the residual is not "
-                                              "below that of the guess; then the step is rejected"),
+                                              "below that of the guess, with factors or contact below a "
+                                              "tenth of it; then the step is rejected"),
     [PARAM_EXTRAPOLATION] =
         DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
                      "fraction of the last change of velocity that is added to the guess"),
@@ -60,8 +61,8 @@ static const drape_param params[PARAM_COUNT] = {
         "corrections", DRAPE_INEXACT_AUTO, corrections,
         "conjugate_gradients: a matrix with edges and springs, and one number for each pair of nodes of all "
         "other measures, is never factored; factors: one with all terms, and such numbers for the bending of "
-        "flat cloth only; auto: factors for terms that the first matrix would hold back, and for stiff "
-        "cloth"),
+        "flat cloth only; auto: factors for terms that the first matrix would hold back, for stiff cloth and "
+        "for few nodes"),
 };
 
 #define NOMINAL_RATE        60. /* [1/s] linear_tolerance applies to steps of 1/60 s */

@@ -9,8 +9,10 @@
 
 /* How far a wave of stretching may travel in a step, in sizes of the scene, for conjugate gradients. One
  * iteration with them is .019, .051 and .076 m from the converged step on a sheet of 1 m over which waves
- * travel 0.8, 2.6 and 4.5 times, and .001, .005 and .009 m with factors, for two to three times the time. */
-#define MAX_TRAVEL 1.5
+ * travel 0.8, 2.6 and 4.4 times, and .001, .005 and .009 m with factors, for two to three times the time. */
+#define MAX_TRAVEL 1
+/* Free nodes up to which factors cost no more than conjugate gradients. */
+#define FEW_NODES 200
 
 struct drape_factored_jacobian {
     drape_system *system;
@@ -68,7 +70,7 @@ drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, 
         status = drape_scalar_stiffness_covers(system, flat);
     if (!status)
         status = wave_speed(system, &scratch, &speed);
-    *better = speed * dt > MAX_TRAVEL * m->length;
+    *better = m->free_count <= FEW_NODES || speed * dt > MAX_TRAVEL * m->length;
     for (int32_t t = 0; !status && t < m->term_count; t++)
         *better |= m->terms[t].ops->measure && !m->terms[t].ops->pair && !flat[t];
     drape_arena_free(&scratch);

@@ -20,7 +20,8 @@
 typedef struct drape_factored_jacobian drape_factored_jacobian;
 
 /* *better: whether the model needs this matrix for steps of dt: a term of it is neither a measure of pairs
- * nor flat bending, or its membrane is so stiff that conjugate gradients need many iterations. Errors:
+ * nor flat bending, or its membrane is so stiff that conjugate gradients need many iterations, or it has so
+ * few nodes that factors cost no more. Errors:
  * DRAPE_E_MEMORY. */
 drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, bool *better);
 

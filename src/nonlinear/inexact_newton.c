@@ -16,10 +16,12 @@
 #include <string.h>
 
 /* Fraction of the initial work along a correction that the residual may do beyond the minimum. */
-#define WORK_FRACTION 0.5
-#define MAX_HALVINGS  6 /* halvings of a correction; the last one is taken if F is finite there */
-#define MAX_PREDICTION                                                                                       \
-    8                /* corrections in a solve, after which stress is no longer predicted, as in newton.c */
+#define WORK_FRACTION  0.5
+#define MAX_HALVINGS   6 /* halvings of a correction; the last one is taken if F is finite there */
+#define MAX_PREDICTION 8 /* corrections in a solve, after which stress is not predicted, as in newton.c */
+/* Of the residual of the guess, that may be left with factors or contact: with more, stiff elements and
+ * barriers that are not yet balanced throw cloth back in the next step. */
+#define MAX_LEFT   0.1
 #define MAX_PASSES 3 /* in which a step is shortened node by node, before all of it is */
 
 struct drape_inexact_newton {
@@ -219,12 +221,13 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
     make_guess_feasible(s, d);
     if (!drape_step_equation_evaluate(e, d))
         return DRAPE_RETRY_NONFINITE;
-    const double first = drape_step_equation_dot(e, e->f, e->f);
+    const double fall = s->fraction || s->factored ? MAX_LEFT : 1;
+    const double bound = fall * fall * drape_step_equation_dot(e, e->f, e->f);
     for (int i = 0;; i++) {
         report->iterations = i;
         bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;
         report->reason = drape_reason_name(converged ? DRAPE_REASON_CONVERGED : DRAPE_REASON_ITERATIONS);
-        if (converged || (i >= settings->iterations && drape_step_equation_dot(e, e->f, e->f) < first))
+        if (converged || (i >= settings->iterations && drape_step_equation_dot(e, e->f, e->f) < bound))
             return DRAPE_OK;
         if (i >= settings->iterations && is_rounding(e, d, report))
             return DRAPE_OK;

@@ -5,8 +5,8 @@
  *       than a residual and is never factored as a whole, where conjugate gradients solve with it to a
  *       relative tolerance; or that of factored_jacobian.h, where the first would be too far off,
  *     - a correction is shortened for contact only at the nodes that would meet something.
- * If the residual has not fallen below that of the guess, some more iterations are made; if it still has
- * not, the step is refused. So no step is accepted unchecked.
+ * If the residual has not fallen below that of the guess, with factors or contact below a tenth of it, some
+ * more iterations are made; if it still has not, the step is refused. So no step is accepted unchecked.
  */
 #ifndef DRAPE_NONLINEAR_INEXACT_NEWTON_H
 #define DRAPE_NONLINEAR_INEXACT_NEWTON_H
@@ -35,7 +35,7 @@ drape_status drape_inexact_newton_create(drape_arena *arena, drape_step_equation
 void drape_inexact_newton_destroy(drape_inexact_newton **newton);
 
 /* Iterates from the guess d (free DOFs), and leaves the result in d. DRAPE_OK: the residual there has
- * fallen below that of the guess, or is within the tolerance; the equation was evaluated last at d. The
+ * fallen as said above, or is within the tolerance; the equation was evaluated last at d. The
  * residual is reported without a tolerance. */
 drape_status drape_inexact_newton_solve(drape_inexact_newton *newton, const drape_inexact_settings *settings,
                                         double *d, drape_solve_report *report);
