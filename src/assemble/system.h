@@ -160,7 +160,7 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
  * else, with the colliders in their pose at time t. */
 double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t);
 
-/* The same, and the fraction to which the pieces at each node limit it (node_count); all 1 without contact. */
+/* The same, and the fraction to which the pieces at each node limit it (node_count): 1 without contact. */
 double drape_system_node_fractions(drape_system *system, const double *x, const double *y, double t,
                                    double *fraction);
 

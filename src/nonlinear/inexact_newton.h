@@ -26,9 +26,9 @@ typedef struct drape_inexact_settings {
 /* auto: whichever factored_jacobian.h says. */
 typedef enum { DRAPE_INEXACT_AUTO, DRAPE_INEXACT_APPROXIMATE, DRAPE_INEXACT_FACTORED } drape_inexact_matrix;
 
-/* dt: the nominal step, by which auto chooses. coarse_spacing: see approx_jacobian.h. The equation and the arena must outlive it. Errors:
- * DRAPE_E_MEMORY, DRAPE_E_SOLVER; even then drape_inexact_newton_destroy must be called, to free what the
- * linear solver took. */
+/* dt: the nominal step, by which auto chooses. coarse_spacing: see approx_jacobian.h. The equation and the
+ * arena must outlive it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER; even then drape_inexact_newton_destroy must
+ * be called, to free what the linear solver took. */
 drape_status drape_inexact_newton_create(drape_arena *arena, drape_step_equation *equation,
                                          drape_inexact_matrix matrix, double dt, int coarse_spacing,
                                          drape_inexact_newton **out);

@@ -114,9 +114,10 @@ END_TEST
     "'integrator': {'method': '%s' %s}, 'duration': 0.5}"
 
 /* Measured fabrics fall as they do in the converged step, by .5 m to 1 m. The bounds are those of the soft
- * sheet above for one iteration: 2 % of 1 m. A matrix that resists rotation holds them up by .28 to .73 m, so a
- * wrong matrix fails by a factor of ten. More iterations are nearer, down to what the tolerance of both leaves:
- * 3e-4 of a node's load moves it by 3e-4 g h^2 a step, 1e-6 m, and 30 steps add up to 30^2/2 of that. */
+ * sheet above for one iteration: 2 % of 1 m. A matrix that resists rotation holds them up by .28 to .73 m, so
+ * a wrong matrix fails by a factor of ten. More iterations are nearer, down to what the tolerance of both
+ * leaves: 3e-4 of a node's load moves it by 3e-4 g h^2 a step, 1e-6 m, and 30 steps add up to 30^2/2 of
+ * that. */
 START_TEST(measured_fabrics_fall)
 {
     static const char *const fabrics[] = {"wang2011_denim", "wang2011_tablecloth"};
@@ -164,10 +165,11 @@ START_TEST(stiff_sheets_fall)
 }
 END_TEST
 
-/* A cloth in free fall beside one that lands on a ball: contact of the one must not hold back the other, which
- * falls by g h^2 n (n + 1)/2 in n steps of backward Euler. Conjugate gradients leave 1e-6 of a residual that
- * the forces of the impact dominate, at most 1e3 times the weight: 1e-3 of g h in the velocity of each step, and
- * 30^2/2 x 1e-3 g h^2 = 1.2 mm. If all of a correction were shortened alike, it would stay behind by .16 m. */
+/* A cloth in free fall beside one that lands on a ball: contact of the one must not hold back the other,
+ * which falls by g h^2 n (n + 1)/2 in n steps of backward Euler. The solver leaves at most 1e-6 of a residual
+ * that the forces of the impact dominate, at most 1e3 times the weight: 1e-3 of g h in the velocity of each
+ * step, and 30^2/2 x 1e-3 g h^2 = 1.2 mm. If all of a correction were shortened alike, it would stay behind
+ * by .16 m. */
 START_TEST(contact_holds_back_only_what_it_touches)
 {
     static const char *const cloth =

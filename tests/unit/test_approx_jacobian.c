@@ -316,8 +316,8 @@ END_TEST
 
 /* ---- The factored matrix ---- */
 
-/* Scalars stand for bending of a flat sheet. The gradients of stretching in a triangle lie in its plane, in two
- * directions, and pairs have their own blocks. */
+/* Scalars stand for bending of a flat sheet. The gradients of stretching in a triangle lie in its plane, in
+ * two directions, and pairs have their own blocks. */
 START_TEST(scalars_stand_for_flat_bending_only)
 {
     state q = open_state(7, "'stretch.edge', 'stretch.cst', 'bend.hinge', 'bend.midedge'");
@@ -332,9 +332,9 @@ START_TEST(scalars_stand_for_flat_bending_only)
 }
 END_TEST
 
-/* Stretching in triangles needs it, stretching along edges if waves cross the sheet, here of 1.4 m along the
- * diagonal: sqrt(E h/0.2 kg/m2) = 71 m/s, times a number of order one that depends on the lattice, is about one
- * length in 1/60 s and ten in 1/6 s. */
+/* Stretching in triangles needs it, stretching along edges if waves cross the sheet, of 1.4 m along the
+ * diagonal here: sqrt(E h/0.2 kg/m2) = 71 m/s, times a number near one that depends on the lattice, is 0.8
+ * lengths in 1/60 s and eight in 1/6 s. */
 START_TEST(stiff_membranes_need_factors)
 {
     static const struct {
