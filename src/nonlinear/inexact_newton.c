@@ -23,8 +23,8 @@
  * barriers that are not yet balanced throw cloth back in the next step. */
 #define MAX_LEFT 0.1
 /* Up to so many, the guess is shortened node by node. Four iterations are then .046 m off on a strip set
- * down upright, for .16 of the time of be, instead of .066 m for .39, though .031 instead of .022 m on a ball.
- * Eight are .036 and .035 m off, instead of .039 and .022 m. */
+ * down upright, for .16 of the time of be, instead of .066 m for .39, though .031 instead of .022 m on a
+ * ball. Eight are .036 and .035 m off, instead of .039 and .022 m. */
 #define FEW_ITERATIONS 4
 #define MAX_PASSES     3 /* in which a step is shortened node by node, before all of it is */
 
