@@ -210,6 +210,14 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
     return system->contact ? drape_contact_step_fraction(system->contact, x, y, t) : 1;
 }
 
+double drape_system_node_fractions(drape_system *system, const double *x, const double *y, double t,
+                                   double *fraction)
+{
+    for (int32_t i = 0; i < system->model->node_count; i++)
+        fraction[i] = 1;
+    return system->contact ? drape_contact_node_fractions(system->contact, x, y, t, fraction) : 1;
+}
+
 bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,
                           drape_diagnostic *diagnostic)
 {
@@ -364,11 +372,18 @@ static void add_masses(const drape_system *system, double mass_weight, double *v
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
                            double positive_share, double *values)
 {
+    drape_system_jacobian_without(system, point, mass_weight, positive_share, NULL, values);
+}
+
+void drape_system_jacobian_without(drape_system *system, const drape_point *point, double mass_weight,
+                                   double positive_share, const bool *without, double *values)
+{
     drape_request want = {.point = point,
                           .hessian = true,
                           .conservative = true,
                           .dissipative = true,
-                          .positive_share = positive_share};
+                          .positive_share = positive_share,
+                          .without = without};
     const drape_sums to = into_values(system, values);
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);

@@ -120,6 +120,10 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
                            double positive_share, double *values);
 
+/* The same without the terms marked in `without` (term_count), for callers that add those themselves. */
+void drape_system_jacobian_without(drape_system *system, const drape_point *point, double mass_weight,
+                                   double positive_share, const bool *without, double *values);
+
 /* Whether the Jacobian of contact is symmetric in every state. */
 bool drape_system_is_symmetric(const drape_system *system);
 
@@ -163,6 +167,10 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
 /* The largest fraction of the displacement from nodes x to y along which nothing passes through anything
  * else, with the colliders in their pose at time t. */
 double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t);
+
+/* The same, and the fraction to which the pieces at each node limit it (node_count): 1 without contact. */
+double drape_system_node_fractions(drape_system *system, const double *x, const double *y, double t,
+                                   double *fraction);
 
 /* q of all measures (measure_count). */
 void drape_system_measures(drape_system *system, const drape_point *point, double *q);

@@ -21,7 +21,17 @@ typedef struct path {
     const drape_keep *keep;
     double fraction;
     drape_pair limiting;
+    double *of_node; /* (nodes) the smallest fraction of a pair at each node; NULL: not wanted */
+    int32_t nodes;
 } path;
+
+/* The fraction of a pair that limits the displacement, for each of its nodes. */
+static void share(path *p, const drape_pair *pair, double fraction)
+{
+    for (int k = 0; k < 4; k++)
+        if (pair->node[k] < p->nodes)
+            p->of_node[pair->node[k]] = fmin(p->of_node[pair->node[k]], fraction);
+}
 
 /* Whether the gap falls below the activation distance on the path; close to that it may be missed. */
 static bool comes_near(const path *p, const drape_pair *pair, double gap)
@@ -42,8 +52,13 @@ static void follow(void *user, const drape_pair *pair)
     if (drape_pair_points(pair) == 1 ||
         drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius)
         return;
-    const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->keep, p->fraction);
-    if (fraction >= p->fraction || !comes_near(p, pair, drape_pair_gap_value(pair, &from)))
+    const double limit = p->of_node ? 1 : p->fraction;
+    const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->keep, limit);
+    if (fraction >= limit || !comes_near(p, pair, drape_pair_gap_value(pair, &from)))
+        return;
+    if (p->of_node)
+        share(p, pair, fraction);
+    if (fraction >= p->fraction)
         return;
     p->fraction = fraction;
     p->limiting = *pair;
@@ -76,7 +91,8 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
 {
     const drape_straight_path straight = {
         {{.model = c->model, .x = x, .pose = pose}, {.model = c->model, .x = y, .pose = pose}}};
-    path p = {.x = x, .y = y, .keep = keep, .fraction = 1};
+    path p = {
+        .x = x, .y = y, .keep = keep, .fraction = 1, .of_node = c->of_node, .nodes = c->model->node_count};
     drape_distances away;
     drape_candidate_cursor cursor = {0};
     const drape_candidates *candidates = candidates_of(c, &straight, longest_move(c, &p), &away);
@@ -141,9 +157,21 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
             double a[3], b[3];
             vec3_sub(x + at, c->path_pose[k].displacement, a);
             vec3_sub(y + at, c->path_pose[k].displacement, b);
-            fraction = fmin(fraction, drape_contact_march(c, collider, a, b, &keep));
+            const double own = drape_contact_march(c, collider, a, b, &keep);
+            fraction = fmin(fraction, own);
+            if (c->of_node)
+                c->of_node[at / 3] = fmin(c->of_node[at / 3], own);
         }
     }
     c->seconds += drape_clock_seconds() - start;
     return fraction;
+}
+
+double drape_contact_node_fractions(drape_contact *c, const double *x, const double *y, double t,
+                                    double *fraction)
+{
+    c->of_node = fraction;
+    const double least = drape_contact_step_fraction(c, x, y, t);
+    c->of_node = NULL;
+    return least;
 }

@@ -29,13 +29,14 @@ static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *
     return found;
 }
 
-/* The gap that a pair may end with. If it began below the least gap it may not come nearer. */
+/* The gap that a pair, or piece, may end with. If it began below the least gap it may not come nearer. */
 static double allowed(double least, double before, double rounding)
 {
     return before < least ? before - rounding : least;
 }
 
-/* Finds the pair whose gap is below what it may end with by most. */
+/* Finds the pair whose gap is below what it may end with by most. Where several features of a collider are
+ * inside, pushing one out can push another one in: none may be deeper than the deepest of them was. */
 static drape_status check_gaps(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
@@ -46,7 +47,9 @@ static drape_status check_gaps(drape_contact *c, const char **reason, drape_diag
         double least = drape_pair_least_gap(pair, c->broad.rounding);
         if (gap >= least)
             continue;
-        least = allowed(least, drape_pair_gap_value(pair, &start), c->broad.rounding);
+        const double before = drape_pair_gap_value(pair, &start);
+        if (before < least)
+            least = allowed(least, fmin(before, c->start_least[pair->collider + 1]), c->broad.rounding);
         if (gap >= least || least - gap < excess)
             continue;
         excess = least - gap;

@@ -48,6 +48,8 @@ static drape_status restore(drape_contact *c)
     drape_status status = drape_contact_list(c, &start);
     memcpy(c->v, c->start_v, 3 * (size_t)c->broad.points * sizeof *c->v);
     memcpy(c->pose, c->start_pose, (size_t)c->model->collider_count * sizeof *c->pose);
+    if (!status)
+        drape_contact_measure_start(c);
     return status ? status : drape_contact_lag(c);
 }
 

@@ -47,6 +47,7 @@ static drape_status take_arrays(drape_arena *arena, drape_contact *c)
         *positions[i] = drape_arena_take(arena, points, 3 * sizeof(double));
     for (size_t i = 0; i < sizeof poses / sizeof *poses; i++)
         *poses[i] = drape_arena_take(arena, colliders, sizeof **poses[i]);
+    c->start_least = drape_arena_take(arena, 1 + colliders, sizeof *c->start_least);
     c->on_collider = drape_arena_take(arena, colliders, 3 * sizeof *c->on_collider);
     return drape_arena_status(arena);
 }
@@ -323,6 +324,17 @@ static bool is_retry(const drape_contact *c)
     return c->begun && memcmp(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x) == 0;
 }
 
+void drape_contact_measure_start(drape_contact *c)
+{
+    for (int32_t i = 0; i <= c->model->collider_count; i++)
+        c->start_least[i] = INFINITY;
+    for (int32_t i = 0; i < c->active.near_count; i++) {
+        const drape_near_pair *near = &c->active.near[i];
+        double *least = &c->start_least[near->pair.collider + 1];
+        *least = fmin(*least, near->gap);
+    }
+}
+
 /* Colliders have their velocities of time t here, because the size of the step is not known yet. */
 static drape_status lag_at(drape_contact *c, const double *v, double t)
 {
@@ -347,6 +359,7 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     if (!status)
         status = lag_at(c, v, t);
     if (!status) {
+        drape_contact_measure_start(c);
         c->begun = true;
         memcpy(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x);
         memcpy(c->start_v, c->v, 3 * (size_t)c->broad.points * sizeof *c->v);

@@ -96,6 +96,10 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
  * with a margin; colliders rest in their poses at time t. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t);
 
+/* The same, and lowers `fraction` (node_count) at each node to the smallest of its pairs. */
+double drape_contact_node_fractions(drape_contact *contact, const double *x, const double *y, double t,
+                                    double *fraction);
+
 /* Whether a pair of features would be too near at x, as drape_contact_check tests it, or too near on the
  * straight path from the beginning of the step to there, while colliders move straight to their poses at
  * time t. */

@@ -48,10 +48,13 @@ struct drape_contact {
     double *start, *start_v;         /* (points x 3) its beginning */
     drape_collider_pose *start_pose; /* (collider_count) */
     drape_inside_pairs inside;       /* at its beginning */
+    double *start_least; /* (1 + collider_count) the smallest gap of pairs of cloth with cloth, and
+                                        with each collider, at its beginning [m] */
     drape_press press;
     drape_lagged *lagged; /* (lagged_count of lagged_room) lagged friction */
     int32_t lagged_count, lagged_room;
 
+    double *of_node;                /* (node_count) while drape_contact_node_fractions runs; else NULL */
     double *from, *to;              /* (points x 3) the ends of a displacement: ccd.c */
     drape_collider_pose *path_pose; /* (collider_count) */
     int32_t *coupling;              /* (coupling_count of coupling_room x 4) */
@@ -72,6 +75,9 @@ drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at);
 
 /* Computes lagged friction from the active set at the beginning of a step. */
 drape_status drape_contact_lag(drape_contact *c);
+
+/* Notes the smallest gaps at the beginning of a step, from the near pairs there. */
+void drape_contact_measure_start(drape_contact *c);
 
 /* Sets what rounding can change in the gaps of these positions (points x 3): all that contact compares gaps
  * with follows from the beginning of the step. */

@@ -25,8 +25,14 @@ enum {
     PARAM_LINEAR_TOLERANCE,
     PARAM_LINEAR_ITERATIONS,
     PARAM_COARSE_SPACING,
+    PARAM_CORRECTIONS,
     PARAM_COUNT
 };
+
+static const char *const corrections[] = {[DRAPE_INEXACT_AUTO] = "auto",
+                                          [DRAPE_INEXACT_APPROXIMATE] = "conjugate_gradients",
+                                          [DRAPE_INEXACT_FACTORED] = "factors",
+                                          NULL};
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
@@ -38,7 +44,8 @@ static const drape_param params[PARAM_COUNT] = {
                      "most 1 % of their load; not a bound on an accepted state"),
     [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
                                               "up to so many further iterations while the residual is not "
-                                              "below that of the guess; then the step is rejected"),
+                                              "below that of the guess, with factors or contact below a "
+                                              "tenth of it; then the step is rejected"),
     [PARAM_EXTRAPOLATION] =
         DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
                      "fraction of the last change of velocity that is added to the guess"),
@@ -50,6 +57,12 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_COARSE_SPACING] =
         DRAPE_INTEGER("coarse_spacing", "1", 0, 0, 100,
                       "edges between the centres of the coarse functions; 0: by the number of nodes"),
+    [PARAM_CORRECTIONS] = DRAPE_CHOICE(
+        "corrections", DRAPE_INEXACT_AUTO, corrections,
+        "conjugate_gradients: a matrix with edges and springs, and one number for each pair of nodes of all "
+        "other measures, is never factored; factors: one with all terms, and such numbers for the bending of "
+        "flat cloth only; auto: factors for terms that the first matrix would hold back, for stiff cloth and "
+        "for few nodes"),
 };
 
 #define NOMINAL_RATE        60. /* [1/s] linear_tolerance applies to steps of 1/60 s */
@@ -91,8 +104,9 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     for (int k = 0; k < 2; k++)
         s->past[k] = drape_arena_take(arena, s->common.equation.nodes, sizeof *s->past[k]);
     if (!status)
-        status = drape_inexact_newton_create(arena, &s->common.equation, (int)values[PARAM_COARSE_SPACING],
-                                             &s->newton);
+        status = drape_inexact_newton_create(arena, &s->common.equation,
+                                             (drape_inexact_matrix)values[PARAM_CORRECTIONS],
+                                             values[PARAM_DT], (int)values[PARAM_COARSE_SPACING], &s->newton);
     return status ? status : drape_arena_status(arena);
 }
 

@@ -1,11 +1,12 @@
 /*
  * inexact_newton.h: a fixed number of inexact Newton iterations on a step equation (Dembo, Eisenstat &
  * Steihaug 1982), for steps of bounded cost. In contrast to newton.h
- *     - the matrix is only near the Jacobian (approx_jacobian.h), and costs less than a residual,
- *     - conjugate gradients compute each correction to a relative tolerance,
- *     - the whole matrix is not factored: memory and time grow with the number of nodes.
- * If the residual has not fallen below that of the guess, some more iterations are made; if it still has
- * not, the step is refused. So no step is accepted unchecked.
+ *     - the matrix is only near the Jacobian, and positive: that of approx_jacobian.h, which costs less
+ *       than a residual and is never factored as a whole, where conjugate gradients solve with it to a
+ *       relative tolerance; or that of factored_jacobian.h, where the first would be too far off,
+ *     - a correction is shortened for contact only at the nodes that would meet something.
+ * If the residual has not fallen below that of the guess, with factors or contact below a tenth of it, some
+ * more iterations are made; if it still has not, the step is refused. So no step is accepted unchecked.
  */
 #ifndef DRAPE_NONLINEAR_INEXACT_NEWTON_H
 #define DRAPE_NONLINEAR_INEXACT_NEWTON_H
@@ -22,15 +23,19 @@ typedef struct drape_inexact_settings {
     int max_linear_iterations;
 } drape_inexact_settings;
 
-/* coarse_spacing: see approx_jacobian.h. The equation and the arena must outlive it. Errors:
- * DRAPE_E_MEMORY, DRAPE_E_SOLVER; even then drape_inexact_newton_destroy must be called, to free what the
- * linear solver took. */
+/* auto: whichever factored_jacobian.h says. */
+typedef enum { DRAPE_INEXACT_AUTO, DRAPE_INEXACT_APPROXIMATE, DRAPE_INEXACT_FACTORED } drape_inexact_matrix;
+
+/* dt: the nominal step, by which auto chooses. coarse_spacing: see approx_jacobian.h. The equation and the
+ * arena must outlive it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER; even then drape_inexact_newton_destroy must
+ * be called, to free what the linear solver took. */
 drape_status drape_inexact_newton_create(drape_arena *arena, drape_step_equation *equation,
-                                         int coarse_spacing, drape_inexact_newton **out);
+                                         drape_inexact_matrix matrix, double dt, int coarse_spacing,
+                                         drape_inexact_newton **out);
 void drape_inexact_newton_destroy(drape_inexact_newton **newton);
 
 /* Iterates from the guess d (free DOFs), and leaves the result in d. DRAPE_OK: the residual there has
- * fallen below that of the guess, or is within the tolerance; the equation was evaluated last at d. The
+ * fallen as said above, or is within the tolerance; the equation was evaluated last at d. The
  * residual is reported without a tolerance. */
 drape_status drape_inexact_newton_solve(drape_inexact_newton *newton, const drape_inexact_settings *settings,
                                         double *d, drape_solve_report *report);

@@ -3,15 +3,18 @@
 
 #include <string.h>
 
+/* 1 - |B|^2/(tr B)^2 of a diagonal block that C still stands for: the largest share of a second direction. */
+#define MAX_SPREAD 0.02
+
 /* Adds the Hessians of the measures at rest, with rates weighted by w. Strains are zero there, so these are
  * k_eff dq dq'. */
-static void add_rest_hessians(drape_system *system, const double *internal, const double *at_rest, double w,
-                              double *values)
+static void add_rest_hessians(drape_system *system, const bool *of, const double *internal,
+                              const double *at_rest, double w, double *values)
 {
     const drape_model *m = drape_system_model(system);
     const drape_point point = {.x = m->rest, .v = at_rest, .internal = internal, .weight = w};
     for (int32_t t = 0; t < m->term_count; t++)
-        if (m->terms[t].ops->measure && !m->terms[t].ops->pair)
+        if (of[t])
             drape_system_term(system, t, &point, NULL, NULL, values);
 }
 
@@ -57,7 +60,47 @@ static drape_status pack(drape_arena *arena, double *elastic, double *damped, dr
     return DRAPE_OK;
 }
 
-drape_status drape_scalar_stiffness_build(drape_arena *arena, drape_system *system,
+/* Whether the gradients of the measures at each node are parallel: then each diagonal block has rank one. */
+static bool is_parallel(const drape_pattern *p, double *values)
+{
+    for (int32_t j = 0; j < p->block_count; j++) {
+        int64_t stride;
+        const double *a = drape_pattern_at(p, values, j, p->diagonal[j], &stride);
+        double squares = 0, trace = trace_at(p, values, j, p->diagonal[j]);
+        for (int c = 0; c < 3; c++)
+            for (int r = 0; r < 3; r++)
+                squares += a[c * stride + r] * a[c * stride + r];
+        if (trace * trace - squares > MAX_SPREAD * trace * trace)
+            return false;
+    }
+    return true;
+}
+
+drape_status drape_scalar_stiffness_covers(drape_system *system, bool *covers)
+{
+    const drape_model *m = drape_system_model(system);
+    const size_t n = (size_t)m->pattern.nonzeros;
+    drape_arena scratch = drape_arena_of(m->ctx);
+    drape_state rest;
+    double *values = drape_arena_take(&scratch, n, sizeof *values);
+    drape_status status = drape_state_create(&scratch, m, &rest);
+    if (!status)
+        status = drape_arena_status(&scratch);
+    for (int32_t t = 0; !status && t < m->term_count; t++) {
+        const drape_point point = {.x = m->rest, .v = rest.v, .internal = rest.internal};
+        covers[t] = m->terms[t].ops->measure && !m->terms[t].ops->pair;
+        if (!covers[t])
+            continue;
+        memset(rest.v, 0, 3 * (size_t)m->node_count * sizeof *rest.v);
+        memset(values, 0, n * sizeof *values);
+        drape_system_term(system, t, &point, NULL, NULL, values);
+        covers[t] = is_parallel(&m->pattern, values);
+    }
+    drape_arena_free(&scratch);
+    return status;
+}
+
+drape_status drape_scalar_stiffness_build(drape_arena *arena, drape_system *system, const bool *of,
                                           drape_scalar_stiffness *out)
 {
     const drape_model *m = drape_system_model(system);
@@ -73,9 +116,9 @@ drape_status drape_scalar_stiffness_build(drape_arena *arena, drape_system *syst
         status = drape_state_create(&scratch, m, &rest);
     if (!status) {
         memset(rest.v, 0, 3 * (size_t)m->node_count * sizeof *rest.v);
-        add_rest_hessians(system, rest.internal, rest.v, 0, elastic);
+        add_rest_hessians(system, of, rest.internal, rest.v, 0, elastic);
         if (damped)
-            add_rest_hessians(system, rest.internal, rest.v, 1, damped);
+            add_rest_hessians(system, of, rest.internal, rest.v, 1, damped);
         status = pack(arena, elastic, damped, out);
     }
     drape_arena_free(&scratch);

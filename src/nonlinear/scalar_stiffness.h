@@ -3,8 +3,12 @@
  * Hessian of strain measures for all three coordinates alike: the trace of each 3 x 3 block of the
  * measures' Hessian at rest, k dq dq'. For a hinge it is the stencil on the flat sheet. Since (tr B)^2 <= 3
  * |B|^2, it bounds the Hessian of one measure up to a factor of 3, and exactly if all gradients of the
- * measure are parallel, as those of a hinge are. Measures that depend on the distance of two nodes are left
- * out.
+ * measure are parallel, as those of a hinge are.
+ *
+ * It stands for a term only if the gradients of its measures at each node are parallel at rest, as for
+ * bending of cloth whose rest shape is flat or nearly so. For any other term it would resist rotations: that
+ * of stretching in a triangle resists motion across the sheet, too, with thousands of times the sheet's
+ * inertia, and cloth hardly falls.
  */
 #ifndef DRAPE_NONLINEAR_SCALAR_STIFFNESS_H
 #define DRAPE_NONLINEAR_SCALAR_STIFFNESS_H
@@ -21,8 +25,12 @@ typedef struct drape_scalar_stiffness {
     double weight, mass_weight;         /* w and m_w of the sum; 0: not computed yet */
 } drape_scalar_stiffness;
 
-/* Errors: DRAPE_E_MEMORY. */
-drape_status drape_scalar_stiffness_build(drape_arena *arena, drape_system *system,
+/* covers (term_count): the terms that it can stand for. Measures that depend on the distance of two nodes
+ * are not among them. Errors: DRAPE_E_MEMORY. */
+drape_status drape_scalar_stiffness_covers(drape_system *system, bool *covers);
+
+/* of (term_count): the terms that it stands for. Errors: DRAPE_E_MEMORY. */
+drape_status drape_scalar_stiffness_build(drape_arena *arena, drape_system *system, const bool *of,
                                           drape_scalar_stiffness *out);
 
 /* Computes the sum for these weights. */

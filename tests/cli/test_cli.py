@@ -703,7 +703,7 @@ def test_info_of_contact():
     equal((mesh["parameters"]["file"]["value"], mesh["triangles"]), ("tetrahedron.obj", 4))
     equal(mesh["parameters"]["scale"], {"value": [1, 1, 1], "unit": "1", "default": True})
     # 2 times 0.2 kg/m2 times 9.81 m/s2 times the diagonal of 0.35 m by 3 rows of sqrt(3)/2 0.1 m, over 1e-3 m
-    assert abs(found["contact"]["stiffness"]["value"] - 2 * 0.2 * 9.81 * 0.19 ** 0.5 / 1e-3) < 1e-6, found["contact"]
+    assert abs(found["contact"]["stiffness"]["value"] - 0.2 * (2 * 9.81 * 0.19 ** 0.5 + 0.5 ** 2) / 1e-3) < 1e-6, found["contact"]
     equal((found["contact"]["distance"]["default"], found["contact"]["friction"]["value"]), (True, "implicit"))
     equal(found["self_contact"], {"thickness": {"value": 0.002, "unit": "m", "default": False},
                                   "friction": {"value": 0, "unit": "1", "default": True},

@@ -318,8 +318,8 @@ START_TEST(stiffening_is_work)
 END_TEST
 
 /* A sheet that begins one activation distance deep in the ground is inside: the parabola pushes it out,
- * and it leaves with the energy b(-1) of that. Without gravity, and with restitution 1, midpoint conserves it up to
- * the change of b over a step, here less than a twentieth. Then no pair is inside any more. */
+ * and it leaves with the energy b(-1) of that. Without gravity, and with restitution 1, midpoint conserves
+ * it up to the change of b over a step, here less than a twentieth. Then no pair is inside any more. */
 START_TEST(what_begins_inside_is_pushed_out_gently)
 {
     scene s = scene_open(

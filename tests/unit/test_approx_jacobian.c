@@ -1,6 +1,8 @@
 /* test_approx_jacobian.c: the coarse space, conjugate gradients, and the approximate Jacobian. */
 #include "entries/models.h"
 #include "nonlinear/approx_jacobian.h"
+#include "nonlinear/factored_jacobian.h"
+#include "nonlinear/scalar_stiffness.h"
 #include "solvers/pcg.h"
 #include "solvers/prolong.h"
 #include "support/scene.h"
@@ -312,7 +314,86 @@ START_TEST(it_is_solved_in_few_iterations_at_any_size)
 }
 END_TEST
 
+/* ---- The factored matrix ---- */
+
+/* Scalars stand for bending of a flat sheet. The gradients of stretching in a triangle lie in its plane, in
+ * two directions, and pairs have their own blocks. */
+START_TEST(scalars_stand_for_flat_bending_only)
+{
+    state q = open_state(7, "'stretch.edge', 'stretch.cst', 'bend.hinge', 'bend.midedge'");
+    bool covers[8];
+    ck_assert_int_le(q.s.model->term_count, 8);
+    ck_assert_int_eq(drape_scalar_stiffness_covers(q.system, covers), DRAPE_OK);
+    for (int32_t t = 0; t < q.s.model->term_count; t++) {
+        const char *name = q.s.model->terms[t].ops->entry.name;
+        ck_assert_msg(covers[t] == (strncmp(name, "bend.", 5) == 0), "%s", name);
+    }
+    close_state(&q);
+}
+END_TEST
+
+/* Stretching in triangles needs it, stretching along edges if waves cross the sheet, of 1.4 m along the
+ * diagonal here: sqrt(E h/0.2 kg/m2) = 71 m/s, times a number near one that depends on the lattice, is 0.8
+ * lengths in 1/60 s and eight in 1/6 s. */
+START_TEST(stiff_membranes_need_factors)
+{
+    static const struct {
+        const char *terms;
+        double dt;
+        bool better;
+    } cases[] = {{"'stretch.edge', 'bend.hinge'", 1. / 60, false},
+                 {"'stretch.edge', 'bend.hinge'", 1. / 6, true},
+                 {"'stretch.edge', 'bend.midedge'", 1. / 60, false},
+                 {"'stretch.cst', 'bend.hinge'", 1. / 600, true}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        state q = open_state(16, cases[i].terms); /* not few nodes */
+        bool better;
+        ck_assert_int_eq(drape_factored_jacobian_is_better(q.system, cases[i].dt, &better), DRAPE_OK);
+        ck_assert_msg(better == cases[i].better, "%s at %g s", cases[i].terms, cases[i].dt);
+        close_state(&q);
+    }
+}
+END_TEST
+
+/* Without bending it is m_w M + J+ itself at any state, and A (A^-1 b) = b up to the condition of a stiff
+ * sheet, 1e5, times rounding. */
+START_TEST(factored_matrix_is_the_positive_jacobian)
+{
+    state q = open_state(9, "'stretch.cst'");
+    const drape_model *m = q.s.model;
+    drape_factored_jacobian *jacobian;
+    uint64_t seed = 3;
+    double *b = calloc(q.n, sizeof *b);
+    for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
+        q.at.x[i] = 1.1 * q.at.x[i] + 0.01 * random_number(&seed);
+    for (size_t i = 0; i < q.n; i++)
+        b[i] = random_number(&seed);
+    ck_assert_int_eq(drape_factored_jacobian_create(q.arena, q.system, &jacobian), DRAPE_OK);
+    ck_assert_int_eq(drape_factored_jacobian_update(jacobian, &q.point, 3600, &q.work), DRAPE_OK);
+    ck_assert_int_eq(drape_factored_jacobian_solve(jacobian, b, q.x), DRAPE_OK);
+    const double *a = drape_factored_jacobian_values(jacobian);
+    drape_system_jacobian(q.system, &q.point, 3600, 1, q.values);
+    double largest = 0;
+    for (int64_t k = 0; k < m->pattern.nonzeros; k++)
+        largest = fmax(largest, fabs(q.values[k]));
+    for (int64_t k = 0; k < m->pattern.nonzeros; k++)
+        ck_assert_double_eq_tol(a[k], q.values[k], 1e-14 * largest);
+    for (int64_t c = 0; c < m->pattern.n; c++)
+        for (int64_t k = m->pattern.column[c]; k < m->pattern.column[c + 1]; k++)
+            b[m->pattern.row[k]] -= a[k] * q.x[c];
+    for (size_t i = 0; i < q.n; i++)
+        ck_assert_double_eq_tol(b[i], 0, 1e-9);
+    ck_assert_int_eq(q.work.factorizations, 1);
+    drape_factored_jacobian_destroy(&jacobian);
+    drape_factored_jacobian_destroy(&jacobian);
+    free(b);
+    close_state(&q);
+}
+END_TEST
+
 SUITE("approx_jacobian", coarse_functions_are_a_partition_of_unity, restriction_is_the_transpose,
       nodes_without_neighbours_are_alone, conjugate_gradients_end_with_the_eigenvalues,
       negative_curvature_is_reported, without_bending_it_is_the_positive_jacobian,
-      across_a_flat_sheet_bending_is_exact, it_is_solved_in_few_iterations_at_any_size)
+      across_a_flat_sheet_bending_is_exact, it_is_solved_in_few_iterations_at_any_size,
+      scalars_stand_for_flat_bending_only, stiff_membranes_need_factors,
+      factored_matrix_is_the_positive_jacobian)

@@ -1,0 +1,51 @@
+/*
+ * factored_jacobian.h: a positive semidefinite matrix near the Jacobian of a step equation, with its
+ * factors, for fixed numbers of iterations (inexact_newton.h) where the matrix of approx_jacobian.h is too
+ * far from J or too ill-conditioned:
+ *     A = m_w M + C (x) I + J+
+ * with
+ *     C   bending of flat cloth: one scalar for each pair of nodes, constant (scalar_stiffness.h); a
+ *         hundredth of the time of its Hessians
+ *     J+  the positive semidefinite parts of all other terms and of contact, without approximation
+ * It is symmetric: of friction it has the symmetric part.
+ *
+ * With predicted stress (stress_predictor.h) in J+, one correction from the extrapolated guess is within a
+ * hundredth of the motion of sheets that hang, at any stiffness of the membrane.
+ */
+#ifndef DRAPE_NONLINEAR_FACTORED_JACOBIAN_H
+#define DRAPE_NONLINEAR_FACTORED_JACOBIAN_H
+
+#include "nonlinear/report.h"
+
+typedef struct drape_factored_jacobian drape_factored_jacobian;
+
+/* *better: whether the model needs this matrix for steps of dt: a term of it is neither a measure of pairs
+ * nor flat bending, or its membrane is so stiff that conjugate gradients need many iterations, or it has so
+ * few nodes that factors cost no more. Errors:
+ * DRAPE_E_MEMORY. */
+drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, bool *better);
+
+/* For a system with at least one free node. The arena must outlive it. Errors: DRAPE_E_MEMORY,
+ * DRAPE_E_SOLVER; even then drape_factored_jacobian_destroy must be called, to free what is not in the
+ * arena. */
+drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *system,
+                                            drape_factored_jacobian **out);
+void drape_factored_jacobian_destroy(drape_factored_jacobian **jacobian);
+
+/* Computes the matrix at a point, factors it, and counts the work. A status > 0: it has no factors. Errors:
+ * DRAPE_E_MEMORY, if contact couples new nodes; DRAPE_E_STOPPED. */
+drape_status drape_factored_jacobian_update(drape_factored_jacobian *jacobian, const drape_point *point,
+                                            double mass_weight, drape_work *work);
+
+/* x = A^-1 b (free DOFs). A status > 0: x is not finite. */
+drape_status drape_factored_jacobian_solve(drape_factored_jacobian *jacobian, const double *b, double *x);
+
+/* The matrix of the last update, for tests. */
+const double *drape_factored_jacobian_values(const drape_factored_jacobian *jacobian);
+
+/* Archives what is kept between updates. */
+void drape_factored_jacobian_archive(drape_factored_jacobian *jacobian, drape_archive *a);
+
+size_t drape_factored_jacobian_bytes(const drape_factored_jacobian *jacobian); /* outside of its arena */
+
+#endif
