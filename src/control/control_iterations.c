@@ -1,8 +1,8 @@
 /*
  * iterations: chooses the step by the number of Newton iterations that it takes, as incremental analyses of
  * structures do. A step of buckling or colliding cloth takes about as many iterations as two of half the
- * size: then the smaller ones are more accurate at the same cost. Where cloth moves freely, half the step
- * takes hardly fewer iterations, and steps stay as large as the nominal one.
+ * size: then the smaller ones are more accurate at about the same cost. Where cloth moves freely, half the
+ * step takes hardly fewer iterations, and steps stay as large as the nominal one.
  */
 #include "control/halve.h"
 
@@ -18,7 +18,7 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_LEAST] = DRAPE_INTEGER("least_iterations", "1", 3, 0, 1e6,
                                   "the step after one that took fewer iterations has twice its size"),
     [PARAM_SUBSTEPS] =
-        DRAPE_INTEGER("max_substeps", "1", 8, 1, 1e6,
+        DRAPE_INTEGER("max_substeps", "1", 4, 1, 1e6,
                       "largest number of steps in one dt, except where a step has to be repeated"),
 };
 
