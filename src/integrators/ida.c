@@ -222,7 +222,6 @@ static double jacobian_clock(const ida_state *s)
 static bool choose_symmetric(ida_state *s)
 {
     const bool failed = s->symmetric && s->newton.failed;
-    s->newton.failed = false;
     if (s->values[PARAM_MATRIX] != MATRIX_AUTO)
         return s->values[PARAM_MATRIX] == MATRIX_SYMMETRIC;
     if (failed)
@@ -548,7 +547,7 @@ static void restart(void *state, const drape_state *from)
     (void)from;
     ida_state *s = state;
     s->reached = s->from = NAN;
-    s->newton.strict = s->symmetric = false;
+    s->newton.strict = s->newton.failed = s->symmetric = false;
     s->exact_remaining = 0;
     s->exact_span = 1;
     drape_ida_newton_forget(&s->newton);

@@ -13,6 +13,7 @@
 #define ROUNDING 1e-4 /* of the tolerance: a smaller first correction is rounding; IDA's own */
 #define STRICT   0.1  /* of the tolerance */
 
+/* Of the damped iteration. */
 #define MAX_CORRECTIONS 20
 #define MAX_TRIALS      8   /* of a line search */
 #define WORK_FRACTION   0.5 /* a correction is long enough where the residual's work is this of its start */
@@ -100,8 +101,8 @@ static double work_along(const drape_ida_newton *newton, N_Vector correction)
 }
 
 /* Moves y along the correction, as far as contact allows and as the residual does not push back by more
- * than a share of what it pushed at first. *whole: all of the correction. */
-static int search(drape_ida_newton *newton, N_Vector y, N_Vector correction, bool *whole, void *ida)
+ * than a share of what it pushed at first. */
+static int search(drape_ida_newton *newton, N_Vector y, N_Vector correction, void *ida)
 {
     const double before = work_along(newton, correction);
     double fraction = 1;
@@ -113,7 +114,6 @@ static int search(drape_ida_newton *newton, N_Vector y, N_Vector correction, boo
         double after = code ? INFINITY : work_along(newton, correction);
         if (after <= -WORK_FRACTION * before) {
             N_VScale(1, newton->trial, y);
-            *whole = fraction == 1;
             return 0;
         }
         fraction *= fmax(SHORTEST, fmin(LONGEST, before / (before - after)));
@@ -121,17 +121,17 @@ static int search(drape_ida_newton *newton, N_Vector y, N_Vector correction, boo
     return SUN_NLS_CONV_RECVR;
 }
 
-/* Each correction is searched along; its factors serve for the next one while corrections contract. */
+/* Its factors serve for the next correction while corrections contract. A correction within the bound is the
+ * last one; so is one that would be, by factors that contract: that one is made without a search. */
 static int solve_damped(drape_ida_newton *newton, N_Vector y, N_Vector weights, double max, void *ida)
 {
     N_Vector d = newton->correction, next = newton->next;
-    bool whole;
     int code = begin(newton, y, ida);
     if (!code)
         code = renew(newton, d, ida);
     for (int i = 0; i < MAX_CORRECTIONS && !code; i++) {
         const double size = N_VWrmsNorm(d, weights);
-        if ((code = search(newton, y, d, &whole, ida)) || size <= max)
+        if ((code = search(newton, y, d, ida)) || size <= max)
             return code;
         if ((code = correct(newton, next, ida)))
             return code;
@@ -147,21 +147,22 @@ static int solve_damped(drape_ida_newton *newton, N_Vector y, N_Vector weights, 
     return code ? code : SUN_NLS_CONV_RECVR;
 }
 
-/* SUNDIALS' iteration; where it fails, the damped one instead of its second attempt with new factors. */
+/* SUNDIALS' iteration; where it fails, the damped one. If old factors fail, SUNDIALS makes new ones and tries
+ * again. Without LSetup it does not: where the last new ones failed, the damped iteration comes at once. */
 static int solve(SUNNonlinearSolver solver, N_Vector predicted, N_Vector y, N_Vector weights,
                  sunrealtype tolerance, int call_setup, void *ida)
 {
     SUNNonlinearSolverContent_Newton content = solver->content;
     drape_ida_newton *newton = content->ctest_data;
     const SUNNonlinSolLSetupFn setup = content->LSetup;
-    if (!call_setup)
+    if (!call_setup && newton->failed)
         content->LSetup = NULL;
+    content->jcur = SUNFALSE;
     int code = newton->undamped(solver, predicted, y, weights, tolerance, call_setup, ida);
     content->LSetup = setup;
-    if (code <= 0)
-        return code;
-    newton->failed |= call_setup;
-    return solve_damped(newton, y, weights, bound_of(newton, tolerance), ida);
+    if (content->jcur)
+        newton->failed = code > 0;
+    return code > 0 ? solve_damped(newton, y, weights, bound_of(newton, tolerance), ida) : code;
 }
 
 /* ---- The object ---- */

@@ -33,7 +33,7 @@ typedef struct drape_ida_newton {
     double left; /* error left after a correction relative to the correction's norm: r/(1 - r) for the
                      rate r */
     bool strict; /* a tenth of the tolerance is used: the run has gained energy */
-    bool failed; /* the undamped iteration, with a new matrix; the owner may clear it */
+    bool failed; /* the undamped iteration, with the last new matrix that it had */
     bool bounds; /* the matrix that is requested now is for the damped iteration */
 } drape_ida_newton;
 
