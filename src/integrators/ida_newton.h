@@ -12,9 +12,10 @@
  *
  * IDA does not shorten corrections. It shortens the step instead until none needs to be shortened, and the
  * kinks of friction, where the slip of a node ends, need steps of a microsecond: at such a kink the matrix
- * at one side knows nothing of the other. Where the iteration fails, a damped one begins anew at the prediction. Its
- * corrections are shortened by a line search, and its matrix has an upper bound of that of friction, by
- * which corrections do not overshoot (drape_friction_bound). IDA shortens the step only where this fails, too.
+ * at one side knows nothing of the other. Where the iteration fails with new factors, a damped one begins
+ * anew at the prediction. Its corrections are shortened by a line search, and its matrix has an upper bound
+ * of that of friction, by which corrections do not overshoot (drape_friction_bound). IDA shortens the step
+ * only where this fails, too.
  */
 #ifndef DRAPE_INTEGRATORS_IDA_NEWTON_H
 #define DRAPE_INTEGRATORS_IDA_NEWTON_H
@@ -37,8 +38,8 @@ typedef struct drape_ida_newton {
     bool bounds; /* the matrix that is requested now is for the damped iteration */
 } drape_ida_newton;
 
-/* Replaces IDA's own nonlinear solver. like: any vector of the unknowns (x, v), with F = (x' - v, M v' + g). False: out of memory, or refused
- * by IDA. */
+/* Replaces IDA's own nonlinear solver. like: any vector of the unknowns (x, v), with F = (x' - v, M v' + g).
+ * False: out of memory, or refused by IDA. */
 bool drape_ida_newton_attach(drape_ida_newton *newton, void *ida, N_Vector like, SUNContext sun);
 
 /* To be called after new factors. */
