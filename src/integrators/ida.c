@@ -9,7 +9,7 @@
  * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers. IDA
  * keeps Jacobian and factors while c_j stays near the value that they were computed for; that is most of
  * its advantage over one factorisation for each iteration. ida_newton.h decides when the iteration with old
- * factors has converged.
+ * factors has converged, and damps one that fails.
  *
  * That iteration does not need an exact matrix either. The nonsymmetric parts are those of friction, whose
  * force follows the normal force, and of dashpots of strains that rotate. Both are small beside c_j^2 M and
@@ -118,10 +118,9 @@ typedef struct ida_state {
 
     /* The matrix, kept between steps. */
     double factored_cj;      /* c_j of the factors */
-    bool symmetric;          /* the factors are those of the symmetric part */
+    bool symmetric;          /* the last matrix of the undamped iteration was the symmetric part */
     int64_t exact_remaining; /* exact matrices until the symmetric part is tried again, */
     int64_t exact_span;      /* of this many in a row */
-    int64_t failures;        /* of the iteration with a new matrix, as counted by IDA until the last matrix */
 
     /* Kept between steps. */
     const double *internal; /* of the last accepted state */
@@ -234,10 +233,7 @@ static double jacobian_clock(const ida_state *s)
  * converged. */
 static bool choose_symmetric(ida_state *s)
 {
-    long failures = 0;
-    IDAGetNumNonlinSolvConvFails(s->ida, &failures);
-    const bool failed = s->symmetric && failures > s->failures;
-    s->failures = failures;
+    const bool failed = s->symmetric && s->newton.failed;
     if (s->values[PARAM_MATRIX] != MATRIX_AUTO)
         return s->values[PARAM_MATRIX] == MATRIX_SYMMETRIC;
     if (failed)
@@ -258,12 +254,14 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
     double start = jacobian_clock(s);
     drape_point point = place(s, t, N_VGetArrayPointer(y));
     point.weight = cj;
+    point.bounds = s->newton.bounds;
     s->failure = extend_pattern(s, &point);
     if (s->failure)
         return -1;
     drape_system_jacobian(s->system, &point, cj * cj, 0, s->linear->values);
-    s->symmetric = choose_symmetric(s);
-    if (s->symmetric)
+    if (!s->newton.bounds)
+        s->symmetric = choose_symmetric(s);
+    if (s->newton.bounds || s->symmetric)
         drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
     if (s->damping)
         drape_system_damping(s->system, &point, s->damping);
@@ -427,7 +425,6 @@ static drape_status start(ida_state *s, const drape_state *in, drape_step_info *
     for (int64_t i = 0; i < s->n; i++)
         rate[s->n + i] = -s->g[node_at(s, i)] / mass_of(s, i);
     s->counted = 0;
-    s->failures = 0;
     info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
     if (!drape_all_finite(rate + s->n, (size_t)s->n)) /* IDA would cut its step ten times because of it */
         return DRAPE_RETRY_NONFINITE;
@@ -580,7 +577,7 @@ static void restart(void *state, const drape_state *from)
     (void)from;
     ida_state *s = state;
     s->reached = s->from = NAN;
-    s->newton.strict = s->symmetric = false;
+    s->newton.strict = s->newton.failed = s->symmetric = false;
     s->exact_remaining = 0;
     s->exact_span = 1;
     drape_ida_newton_forget(&s->newton);
@@ -726,7 +723,6 @@ static void archive_factors(ida_state *s, drape_archive *a)
     drape_archive_bool(a, &s->symmetric);
     drape_archive_int64(a, &s->exact_remaining);
     drape_archive_int64(a, &s->exact_span);
-    drape_archive_int64(a, &s->failures);
     if (s->damping && drape_archive_good(a))
         drape_archive_doubles(a, s->damping, (size_t)drape_system_pattern(s->system)->nonzeros);
     drape_sun_linear_archive(s->linear, a, s->factored_cj != 0);
@@ -758,7 +754,7 @@ static size_t bytes(const void *state)
     const ida_state *s = state;
     double max_order = s->values[PARAM_MAX_ORDER];
     size_t order = isnan(max_order) ? TIGHT_ORDER : (size_t)max_order;
-    size_t vectors = 4 + order + 1 + 6; /* allocated here; the history of IDA; its scratch */
+    size_t vectors = 8 + order + 1 + 6; /* allocated here; the history of IDA; its scratch */
     return 2 * (size_t)s->n * vectors * sizeof(double) + (s->linear ? drape_sun_linear_bytes(s->linear) : 0);
 }
 

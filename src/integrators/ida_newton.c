@@ -4,6 +4,7 @@
 
 #include <ida/ida.h>
 #include <math.h>
+#include <string.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 
 #define UNKNOWN  20.0 /* error left after a correction with new factors: a rate of 0.95, as IDA assumes */
@@ -12,6 +13,26 @@
 #define ROUNDING 1e-4 /* of the tolerance: a smaller first correction is rounding; IDA's own */
 #define STRICT   0.1  /* of the tolerance */
 
+/* Of the damped iteration. */
+#define MAX_CORRECTIONS 20
+#define MAX_TRIALS      8   /* of a line search */
+#define WORK_FRACTION   0.5 /* a correction is long enough where the residual's work is this of its start */
+#define SHORTEST        0.1 /* factors between two trials of a line search */
+#define LONGEST         0.5
+#define CHORD_RATE      0.5 /* factors are used again while each correction is at most this of the last one */
+
+static SUNNonlinearSolverContent_Newton content_of(const drape_ida_newton *newton)
+{
+    return newton->solver->content;
+}
+
+static double bound_of(const drape_ida_newton *newton, double tolerance)
+{
+    return newton->strict ? STRICT * tolerance : tolerance;
+}
+
+/* ---- With the factors that are at hand ---- */
+
 static int converged(SUNNonlinearSolver solver, N_Vector y, N_Vector correction, sunrealtype tolerance,
                      N_Vector weights, void *user)
 {
@@ -19,7 +40,7 @@ static int converged(SUNNonlinearSolver solver, N_Vector y, N_Vector correction,
     drape_ida_newton *newton = user;
     int done = 0;
     double norm = N_VWrmsNorm(correction, weights);
-    double max = newton->strict ? STRICT * tolerance : tolerance;
+    double max = bound_of(newton, tolerance);
     if (SUNNonlinSolGetCurIter(solver, &done))
         return -1;
     if (done == 0) {
@@ -36,11 +57,129 @@ static int converged(SUNNonlinearSolver solver, N_Vector y, N_Vector correction,
     return newton->left * norm <= max ? 0 : SUN_NLS_CONTINUE;
 }
 
+/* ---- Damped ---- */
+
+/* correction = -A^-1 F with the present factors, F in newton->residual. */
+static int correct(drape_ida_newton *newton, N_Vector correction, void *ida)
+{
+    N_VScale(-1, newton->residual, correction);
+    content_of(newton)->niters++;
+    return content_of(newton)->LSolve(correction, ida);
+}
+
+/* The same after factoring the matrix at the point of the last residual. */
+static int renew(drape_ida_newton *newton, N_Vector correction, void *ida)
+{
+    newton->bounds = true;
+    int code = content_of(newton)->LSetup(SUNTRUE, &content_of(newton)->jcur, ida);
+    newton->bounds = false;
+    return code ? code : correct(newton, correction, ida);
+}
+
+/* Begins at the predicted x, with v = x': then every correction has dv = c_j dx, and the residual of
+ * M v' + g alone decides how long it should be. */
+static int begin(drape_ida_newton *newton, N_Vector y, void *ida)
+{
+    N_VConst(0, y);
+    int code = content_of(newton)->Sys(y, newton->residual, ida);
+    if (code)
+        return code;
+    const int64_t n = N_VGetLength(y) / 2;
+    memcpy(N_VGetArrayPointer(y) + n, N_VGetArrayPointer(newton->residual), (size_t)n * sizeof(double));
+    return content_of(newton)->Sys(y, newton->residual, ida);
+}
+
+/* Work of the residual of M v' + g along a correction. */
+static double work_along(const drape_ida_newton *newton, N_Vector correction)
+{
+    const int64_t n = N_VGetLength(correction) / 2;
+    const double *f = N_VGetArrayPointer(newton->residual) + n, *dx = N_VGetArrayPointer(correction);
+    double work = 0;
+    for (int64_t i = 0; i < n; i++)
+        work += f[i] * dx[i];
+    return work;
+}
+
+/* Moves y along the correction, as far as contact allows and as the residual does not push back by more
+ * than a share of what it pushed at first. */
+static int search(drape_ida_newton *newton, N_Vector y, N_Vector correction, void *ida)
+{
+    const double before = work_along(newton, correction);
+    double fraction = 1;
+    for (int trial = 0; trial < MAX_TRIALS && before < 0; trial++) {
+        N_VLinearSum(1, y, fraction, correction, newton->trial);
+        int code = content_of(newton)->Sys(newton->trial, newton->residual, ida);
+        if (code < 0)
+            return code;
+        double after = code ? INFINITY : work_along(newton, correction);
+        if (after <= -WORK_FRACTION * before) {
+            N_VScale(1, newton->trial, y);
+            return 0;
+        }
+        fraction *= fmax(SHORTEST, fmin(LONGEST, before / (before - after)));
+    }
+    return SUN_NLS_CONV_RECVR;
+}
+
+/* Its factors serve for the next correction while corrections contract. A correction within the bound is the
+ * last one; so is one that would be, by factors that contract: that one is made without a search. */
+static int solve_damped(drape_ida_newton *newton, N_Vector y, N_Vector weights, double max, void *ida)
+{
+    N_Vector d = newton->correction, next = newton->next;
+    int code = begin(newton, y, ida);
+    if (!code)
+        code = renew(newton, d, ida);
+    for (int i = 0; i < MAX_CORRECTIONS && !code; i++) {
+        const double size = N_VWrmsNorm(d, weights);
+        if ((code = search(newton, y, d, ida)) || size <= max)
+            return code;
+        if ((code = correct(newton, next, ida)))
+            return code;
+        const double left = N_VWrmsNorm(next, weights);
+        if (!(left <= CHORD_RATE * size)) {
+            code = renew(newton, d, ida);
+        } else if (left <= max) {
+            N_VLinearSum(1, y, 1, next, y);
+            return 0;
+        } else
+            N_VScale(1, next, d);
+    }
+    return code ? code : SUN_NLS_CONV_RECVR;
+}
+
+/* SUNDIALS' iteration; where it fails, the damped one. If old factors fail, SUNDIALS makes new ones and tries
+ * again. Without LSetup it does not: where the last new ones failed, the damped iteration comes at once. */
+static int solve(SUNNonlinearSolver solver, N_Vector predicted, N_Vector y, N_Vector weights,
+                 sunrealtype tolerance, int call_setup, void *ida)
+{
+    SUNNonlinearSolverContent_Newton content = solver->content;
+    drape_ida_newton *newton = content->ctest_data;
+    const SUNNonlinSolLSetupFn setup = content->LSetup;
+    if (!call_setup && newton->failed)
+        content->LSetup = NULL;
+    content->jcur = SUNFALSE;
+    int code = newton->undamped(solver, predicted, y, weights, tolerance, call_setup, ida);
+    content->LSetup = setup;
+    if (content->jcur)
+        newton->failed = code > 0;
+    return code > 0 ? solve_damped(newton, y, weights, bound_of(newton, tolerance), ida) : code;
+}
+
+/* ---- The object ---- */
+
 bool drape_ida_newton_attach(drape_ida_newton *newton, void *ida, N_Vector like, SUNContext sun)
 {
     drape_ida_newton_forget(newton);
+    newton->residual = N_VClone(like);
+    newton->correction = N_VClone(like);
+    newton->next = N_VClone(like);
+    newton->trial = N_VClone(like);
     newton->solver = SUNNonlinSol_Newton(like, sun);
-    return newton->solver && !IDASetNonlinearSolver(ida, newton->solver) &&
+    if (!newton->residual || !newton->correction || !newton->next || !newton->trial || !newton->solver)
+        return false;
+    newton->undamped = newton->solver->ops->solve;
+    newton->solver->ops->solve = solve;
+    return !IDASetNonlinearSolver(ida, newton->solver) &&
            !SUNNonlinSolSetConvTestFn(newton->solver, converged, newton);
 }
 
@@ -54,6 +193,7 @@ void drape_ida_newton_archive(drape_ida_newton *newton, drape_archive *a)
     drape_archive_double(a, &newton->first);
     drape_archive_double(a, &newton->left);
     drape_archive_bool(a, &newton->strict);
+    drape_archive_bool(a, &newton->failed);
 }
 
 void drape_ida_newton_free(drape_ida_newton *newton)
@@ -61,4 +201,10 @@ void drape_ida_newton_free(drape_ida_newton *newton)
     if (newton->solver)
         SUNNonlinSolFree(newton->solver);
     newton->solver = NULL;
+    N_Vector *const vectors[] = {&newton->residual, &newton->correction, &newton->next, &newton->trial};
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++) {
+        if (*vectors[i])
+            N_VDestroy(*vectors[i]);
+        *vectors[i] = NULL;
+    }
 }
