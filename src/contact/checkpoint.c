@@ -73,6 +73,8 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     if (!drape_all_finite(c->start, points) || !drape_all_finite(c->start_v, points) ||
         !are_finite(c->start_pose, c->model->collider_count))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has positions that are not finite");
+    else if (!(c->press.factor >= 1 && isfinite(c->press.factor) && isfinite(c->press.t)))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a stiffness of contact below the scene's");
     else
         drape_archive_note(a, restore(c));
 }

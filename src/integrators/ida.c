@@ -740,6 +740,8 @@ static void archive(void *state, drape_archive *a)
     drape_archive_int64(a, &s->tiny);
     drape_archive_int64(a, &s->steps);
     drape_archive_int64(a, &counted);
+    if (a->reading && counted < 0)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a negative number of iterations");
     s->counted = (long)counted;
     drape_work_archive(&s->work, a);
     if (s->n == 0)
