@@ -295,11 +295,11 @@ static double away_of(const drape_candidates *c, const drape_pair *pair, const d
            (away[n[2]] > away[n[3]] ? away[n[2]] : away[n[3]]);
 }
 
-static bool may_become_active(const drape_candidates *c, const drape_pair *pair, const double *away,
-                              double largest)
+static bool may_become_active(const drape_candidates *c, const drape_pair *pair, const double *of,
+                              double largest, double beyond)
 {
-    return pair->gap_at_search - away_of(c, pair, away, largest) <
-           pair->distance + ROUNDING * c->broad->model->length;
+    const double reach = pair->distance + beyond + ROUNDING * c->broad->model->length;
+    return pair->gap_at_search - away_of(c, pair, of, largest) < reach;
 }
 
 static bool is_patched(const drape_candidates *c, const drape_pair *pair)
@@ -324,10 +324,12 @@ const drape_pair *drape_candidates_next(const drape_candidates *c, const drape_d
 {
     const drape_pair *all = c->all.pairs, *patch = c->patch.pairs;
     const int32_t patches = c->patch.known ? c->patch.count : 0;
-    while (at->all < c->all.count && (!may_become_active(c, &all[at->all], away->of_all, away->all) ||
-                                      (c->patch.known && is_patched(c, &all[at->all]))))
+    while (at->all < c->all.count &&
+           (!may_become_active(c, &all[at->all], away->of_all, away->all, away->beyond) ||
+            (c->patch.known && is_patched(c, &all[at->all]))))
         at->all++;
-    while (at->patch < patches && !may_become_active(c, &patch[at->patch], away->of_patch, away->patch))
+    while (at->patch < patches &&
+           !may_become_active(c, &patch[at->patch], away->of_patch, away->patch, away->beyond))
         at->patch++;
     if (at->patch < patches && (at->all >= c->all.count || is_before(&patch[at->patch], &all[at->all])))
         return &patch[at->patch++];

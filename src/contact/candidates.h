@@ -54,6 +54,7 @@ drape_status drape_candidates_search(drape_candidates *candidates, const drape_s
 typedef struct drape_distances {
     double all, patch;               /* [m] at most */
     const double *of_all, *of_patch; /* (points, then colliders) [m] of each; NULL: the largest of all */
+    double beyond;                   /* [m] of the activation distance: so far off may pairs stay, too */
 } drape_distances;
 
 /* The distances of a path, valid until the next call: as far as its ends are, at most. INFINITY if there was no
