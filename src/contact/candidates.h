@@ -57,8 +57,8 @@ typedef struct drape_distances {
     double beyond;                   /* [m] of the activation distance: so far off may pairs stay, too */
 } drape_distances;
 
-/* The distances of a path, valid until the next call: as far as its ends are, at most. INFINITY if there was no
- * search, or if a position is not finite. */
+/* The distances of a path, valid until the next call: as far as its ends are, at most. INFINITY if there was
+ * no search, or if a position is not finite. */
 drape_distances drape_candidates_distances(const drape_candidates *candidates,
                                            const drape_straight_path *path);
 

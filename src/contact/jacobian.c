@@ -8,8 +8,8 @@
 #include <string.h>
 
 #define D 12
-/* of a mean edge: pairs this near to becoming active have their blocks when a pattern is made. Blocks that stay
- * 0 cost more in each factorisation of a pile than the patterns that they save. */
+/* of a mean edge: pairs this near to becoming active have their blocks when a pattern is made. Blocks that
+ * stay 0 cost more in each factorisation of a pile than the patterns that they save. */
 #define PATTERN_MARGIN 0.03
 
 static int32_t free_of(const drape_model *m, int32_t point)

@@ -76,7 +76,8 @@
 /* The same with contact, whose evaluation takes most of an iteration: one must be enough to end the solve */
 #define MAX_CHORDS_IN_CONTACT 1
 #define STALLED               0.5 /* of the residual before: if no more is gained, it may be rounding */
-#define FAR_FROM_ROUNDING     1e3 /* times the last estimate in a solve: a larger residual is not compared anew */
+/* Times the last estimate in a solve: a larger residual is not compared with a new one */
+#define FAR_FROM_ROUNDING 1e3
 
 struct drape_newton {
     drape_step_equation *equation;

@@ -1,5 +1,5 @@
-/* pattern.c: see pattern.h. Neighbours are first counted, then listed with repeats, which are removed while the
- * lists are sorted. */
+/* pattern.c: see pattern.h. Neighbours are first counted, then listed with repeats, which are removed while
+ * the lists are sorted. */
 #include "sparse/pattern.h"
 
 #include <assert.h>
