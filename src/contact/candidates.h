@@ -25,6 +25,7 @@ typedef struct drape_candidate_set {
     drape_collider_pose *pose[2]; /* (collider_count) */
     drape_pair *pairs;            /* (count of room) including those with surfaces, by increasing rank */
     int32_t count, room;
+    double *away; /* (points, then colliders) how far a configuration or a path is from this one [m] */
 } drape_candidate_set;
 
 typedef struct drape_candidates {
@@ -49,13 +50,17 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
 drape_status drape_candidates_search(drape_candidates *candidates, const drape_straight_path *path,
                                      const double *ahead);
 
-/* How far a configuration is from the paths, at most, for pairs of each search. */
+/* How far a straight path is from those of each search. */
 typedef struct drape_distances {
-    double all, patch; /* [m] */
+    double all, patch;               /* [m] at most */
+    const double *of_all, *of_patch; /* (points, then colliders) [m] of each; NULL: the largest of all */
+    double beyond;                   /* [m] of the activation distance: so far off may pairs stay, too */
 } drape_distances;
 
-/* The distances of a configuration; INFINITY if there was no search, or if a position is not finite. */
-drape_distances drape_candidates_distances(const drape_candidates *candidates, const drape_configuration *at);
+/* The distances of a path, valid until the next call: as far as its ends are, at most. INFINITY if there was
+ * no search, or if a position is not finite. */
+drape_distances drape_candidates_distances(const drape_candidates *candidates,
+                                           const drape_straight_path *path);
 
 bool drape_candidates_are_valid(const drape_candidates *candidates, const drape_distances *away);
 

@@ -154,12 +154,7 @@ static bool move_colliders(drape_contact *c, double t, const double span[2])
 static bool are_valid(const drape_candidates *candidates, const drape_straight_path *path,
                       drape_distances *away)
 {
-    const drape_distances first = drape_candidates_distances(candidates, &path->end[0]);
-    if (!drape_candidates_are_valid(candidates, &first))
-        return false;
-    *away = drape_candidates_distances(candidates, &path->end[1]);
-    away->all = fmax(away->all, first.all);
-    away->patch = fmax(away->patch, first.patch);
+    *away = drape_candidates_distances(candidates, path);
     return drape_candidates_are_valid(candidates, away);
 }
 
@@ -180,7 +175,7 @@ const drape_candidates *drape_contact_search(drape_contact *c, const drape_strai
         c->ahead[i] = path->end[1].x[i] + AHEAD * (path->end[1].x[i] - path->end[0].x[i]);
     const drape_status status = drape_candidates_search(candidates, path, c->ahead);
     if (!are_valid(candidates, path, away)) /* positions that are not finite */
-        *away = (drape_distances){INFINITY, INFINITY};
+        *away = (drape_distances){.all = INFINITY, .patch = INFINITY};
     c->search_seconds += drape_clock_seconds() - start;
     c->out_of_memory = c->out_of_memory || status != DRAPE_OK;
     return status ? NULL : candidates;

@@ -8,8 +8,9 @@
 #include <string.h>
 
 #define D 12
-/* of a mean edge: pairs this near to becoming active have their blocks when a pattern is made */
-#define PATTERN_MARGIN 0.25
+/* of a mean edge: pairs this near to becoming active have their blocks when a pattern is made. Blocks that
+ * stay 0 cost more in each factorisation of a pile than the patterns that they save. */
+#define PATTERN_MARGIN 0.03
 
 static int32_t free_of(const drape_model *m, int32_t point)
 {
@@ -230,21 +231,38 @@ static void list_near(void *user, const drape_pair *pair)
     listing *list = user;
     drape_contact *c = list->contact;
     const drape_configuration now = drape_contact_configuration(c);
-    if (pair->collider < 0 &&
-        drape_pair_gap_value(pair, &now) < pair->distance + PATTERN_MARGIN * c->mean_edge)
+    const double reach = pair->distance + PATTERN_MARGIN * c->mean_edge;
+    if (pair->collider < 0 && !drape_pair_is_apart(pair, &now, reach) &&
+        drape_pair_gap_value(pair, &now) < reach)
         list->complete = list->complete && add_coupling(c, pair, 4);
 }
 
-/* Which pairs are near is searched anew: a pattern depends on the positions alone. */
+/* From the candidates if they include all pairs that are near: a pattern depends on the positions alone. */
+static void visit_near(drape_contact *c, listing *list)
+{
+    const double start = drape_clock_seconds(), margin = PATTERN_MARGIN * c->mean_edge;
+    const drape_configuration now = drape_contact_configuration(c);
+    const drape_straight_path here = {{now, now}};
+    drape_distances away;
+    drape_candidate_cursor cursor = {0};
+    const drape_pair *pair;
+    const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
+    if (candidates && fmax(away.all, away.patch) + 0.5 * margin <= candidates->margin) {
+        away.beyond = margin;
+        while ((pair = drape_candidates_next(candidates, &away, &cursor)))
+            list_near(list, pair);
+        return;
+    }
+    drape_candidates_find(&c->broad, &here, 0.5 * margin, NULL, list_near, list);
+    c->search_seconds += drape_clock_seconds() - start;
+}
+
 int32_t drape_contact_list_couplings(drape_contact *c, const int32_t **nodes)
 {
     const double start = drape_clock_seconds();
-    const drape_configuration now = drape_contact_configuration(c);
     listing list = {.contact = c, .complete = true};
     c->coupling_count = 0;
-    drape_candidates_find(&c->broad, &(drape_straight_path){{now, now}}, 0.5 * PATTERN_MARGIN * c->mean_edge,
-                          NULL, list_near, &list);
-    c->search_seconds += drape_clock_seconds() - start;
+    visit_near(c, &list);
     c->seconds += drape_clock_seconds() - start;
     for (int32_t i = 0; i < c->lagged_count; i++) {
         const drape_active_contact *contact = &c->lagged[i].contact;

@@ -76,6 +76,8 @@
 /* The same with contact, whose evaluation takes most of an iteration: one must be enough to end the solve */
 #define MAX_CHORDS_IN_CONTACT 1
 #define STALLED               0.5 /* of the residual before: if no more is gained, it may be rounding */
+/* Times the last estimate in a solve: a larger residual is not compared with a new one */
+#define FAR_FROM_ROUNDING 1e3
 
 struct drape_newton {
     drape_step_equation *equation;
@@ -98,6 +100,7 @@ struct drape_newton {
 
     /* Kept between the iterations of one solve. */
     int corrections;
+    double rounding;       /* of F in its norm, as last estimated; INFINITY: it was not */
     double residual;       /* weighted, largest component, at the last iterate that KINSOL evaluated */
     double positive_share; /* of the positive parts, requested for the present matrix; after a line search,
                               for the next one; with `project` every matrix has all of them */
@@ -129,7 +132,7 @@ static void begin(drape_newton *s)
     drape_step_equation *e = s->equation;
     drape_step_equation_begin(e);
     s->corrections = 0;
-    s->residual = INFINITY;
+    s->residual = s->rounding = INFINITY;
     s->positive_share = 0;
     s->indefinite = false;
     s->trial_evaluated = false;
@@ -166,9 +169,11 @@ static bool is_rounding(drape_newton *s, const double *d, bool *finite)
         return false;
     const drape_norm norm = (drape_norm)s->values[DRAPE_NEWTON_NORM];
     const double size = drape_step_equation_norm(e, norm);
-    const double rounding = drape_step_equation_rounding(e, d, norm);
-    *finite = !isnan(rounding);
-    return size <= rounding;
+    if (size > FAR_FROM_ROUNDING * s->rounding)
+        return false;
+    s->rounding = drape_step_equation_rounding(e, d, norm);
+    *finite = !isnan(s->rounding);
+    return size <= s->rounding;
 }
 
 /* KINSOL must never get a NaN: its norms ignore it, so it would look like convergence. After a line search

@@ -1,9 +1,8 @@
-/* pattern.c: see pattern.h. Neighbours are first counted, then listed with repeats; then each column is
- * sorted and repeats are removed. */
+/* pattern.c: see pattern.h. Neighbours are first counted, then listed with repeats, which are removed while
+ * the lists are sorted. */
 #include "sparse/pattern.h"
 
 #include <assert.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Lists of neighbours, with repeats: entries start[j] ... start[j+1] - 1 of row. */
@@ -61,28 +60,28 @@ static drape_status list_neighbours(drape_arena *scratch, int32_t block_count, c
     return DRAPE_OK;
 }
 
-static int compare_rows(const void *a, const void *b)
+/* Removes repeats from each list, in place, and sorts it: column j goes to the end of the list of each of its
+ * rows, by increasing j, because couplings are symmetric. next[j] becomes the number of remaining entries.
+ * Returns their sum. */
+static drape_status make_unique(drape_arena *scratch, neighbours *list, int32_t block_count, int64_t *total)
 {
-    int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
-    return (x > y) - (x < y);
-}
-
-/* Sorts each list and removes repeats, in place; next[j] becomes the number of remaining entries. Returns
- * their sum. */
-static int64_t make_unique(neighbours *list, int32_t block_count)
-{
-    int64_t total = 0;
-    for (int32_t j = 0; j < block_count; j++) {
-        int32_t *row = list->row + list->start[j];
-        int64_t length = list->start[j + 1] - list->start[j], kept = 0;
-        qsort(row, (size_t)length, sizeof *row, compare_rows);
-        for (int64_t i = 0; i < length; i++)
-            if (i == 0 || row[i] != row[kept - 1])
-                row[kept++] = row[i];
-        list->next[j] = kept;
-        total += kept;
-    }
-    return total;
+    int32_t *sorted = drape_arena_take(scratch, (size_t)list->start[block_count], sizeof *sorted);
+    int32_t *last = drape_arena_take(scratch, (size_t)block_count, sizeof *last); /* 1 + column of each row */
+    if (drape_arena_status(scratch))
+        return DRAPE_E_MEMORY;
+    *total = 0;
+    memset(list->next, 0, (size_t)block_count * sizeof *list->next);
+    for (int32_t j = 0; j < block_count; j++)
+        for (int64_t k = list->start[j]; k < list->start[j + 1]; k++) {
+            const int32_t i = list->row[k];
+            if (last[i] == j + 1)
+                continue;
+            last[i] = j + 1;
+            sorted[list->start[i] + list->next[i]++] = j;
+            ++*total;
+        }
+    list->row = sorted;
+    return DRAPE_OK;
 }
 
 static drape_status allocate(drape_arena *arena, drape_pattern *pattern, int32_t block_count, int64_t blocks)
@@ -133,8 +132,11 @@ drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const 
     memset(pattern, 0, sizeof *pattern);
     drape_status status =
         list_neighbours(&scratch, block_count, block_of_node, couplings, coupling_count, &list);
+    int64_t blocks = 0;
     if (!status)
-        status = allocate(arena, pattern, block_count, make_unique(&list, block_count));
+        status = make_unique(&scratch, &list, block_count, &blocks);
+    if (!status)
+        status = allocate(arena, pattern, block_count, blocks);
     if (!status) {
         fill_blocks(pattern, &list);
         fill_scalars(pattern);
