@@ -29,10 +29,14 @@ static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *
     return found;
 }
 
-/* The gap that a pair may end with. If it began below the least gap it may not come nearer. */
+/* The gap that a pair may end with. If it began below the least gap it may not come nearer, but for rounding,
+ * by which it may not lose its side however many steps there are. */
 static double allowed(double least, double before, double rounding)
 {
-    return before < least ? before - rounding : least;
+    const double lowest = DRAPE_NO_SIDE * rounding;
+    if (before >= least)
+        return least;
+    return drape_gap_has_side(before, rounding) ? fmax(before - lowest, lowest) : before - lowest;
 }
 
 /* Finds the pair whose gap is below what it may end with by most. */

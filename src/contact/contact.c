@@ -263,12 +263,20 @@ drape_status drape_contact_lag(drape_contact *c)
     return DRAPE_OK;
 }
 
+/* Steps by powers of two, so that the least gaps of scenes that move do not change in every step. */
+static double next_power_of_two(double x)
+{
+    int exponent;
+    frexp(x, &exponent);
+    return x > 0 ? ldexp(1, exponent) : 0;
+}
+
 void drape_contact_set_rounding(drape_contact *c, const double *x)
 {
     double largest = 0;
     for (size_t i = 0; i < 3 * (size_t)c->broad.points; i++)
         largest = fmax(largest, fabs(x[i]));
-    c->broad.rounding = ROUNDING * largest;
+    c->broad.rounding = ROUNDING * next_power_of_two(largest);
 }
 
 /* Which pairs are inside. A pair that was added has another law, and so are its contacts. */

@@ -365,6 +365,46 @@ static drape_status keep(void *user, const void *bytes, size_t size)
     return DRAPE_OK;
 }
 
+/* A sheet that begins a few units of rounding above a box, below the least gap, may get nearer in each step by
+ * rounding: not through the surface of the box, however many steps there are. */
+START_TEST(rounding_does_not_add_up)
+{
+    scene s =
+        scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, "
+                   "'width': 0.1, 'height': 0.1, 'transform': {'translate': [-0.05, 0.01, 0.05]}}, " MATERIAL
+                   ", 'terms': ['stretch.edge']}], 'colliders': [{'type': 'box', 'center': [0, -0.1, 0], "
+                   "'size': 0.2}], 'contact': {'distance': 4e-3}, 'duration': 1}",
+                   1e6);
+    drape_state *at = scene_state(&s);
+    const double rounding = drape_system_contact(s.sim->system)->broad.rounding;
+    const size_t n = 3 * (size_t)s.model->node_count;
+    double next[27], lowest = INFINITY;
+    int accepted = 0;
+    ck_assert_uint_eq(n, 27);
+    for (size_t i = 1; i < n; i += 3)
+        at->x[i] = 5 * rounding;
+    for (int k = 0; k < 200; k++) {
+        const char *reason;
+        drape_diagnostic diagnostic;
+        ck_assert_int_eq(drape_system_begin(s.sim->system, at), DRAPE_OK);
+        memcpy(next, at->x, sizeof next);
+        for (size_t i = 1; i < n; i += 3)
+            next[i] -= 0.09 * rounding;
+        if (drape_system_check_contact(s.sim->system, next, at->t, &reason, &diagnostic) == DRAPE_OK) {
+            memcpy(at->x, next, sizeof next);
+            accepted++;
+        }
+        drape_system_end_step(s.sim->system);
+    }
+    for (size_t i = 1; i < n; i += 3)
+        lowest = fmin(lowest, at->x[i]);
+    printf("# %d of 200 steps accepted, the lowest node is at %.3g m\n", accepted, lowest);
+    ck_assert_int_ge(accepted, 10);
+    ck_assert_double_gt(lowest, 0);
+    scene_close(&s);
+}
+END_TEST
+
 /* A run that continues from a checkpoint has the bits of one that did not stop, while contact is stiffer
  * than the scene says, and while cloth is inside. */
 START_TEST(a_checkpoint_keeps_it)
@@ -474,4 +514,4 @@ START_TEST(wrung)
 END_TEST
 
 SUITE("least_gap", over_a_tip, strip_across_strip, blown, between_two_boards, wrung, stiffening_is_work,
-      what_begins_inside_is_pushed_out_gently, a_checkpoint_keeps_it)
+      what_begins_inside_is_pushed_out_gently, rounding_does_not_add_up, a_checkpoint_keeps_it)
