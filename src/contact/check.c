@@ -180,8 +180,16 @@ bool drape_contact_nearest(const drape_contact *c, drape_diagnostic *diagnostic)
     for (int32_t i = 0; i < c->active.near_count; i++)
         if (!nearest || c->active.near[i].gap < nearest->gap)
             nearest = &c->active.near[i];
-    if (nearest)
-        *diagnostic = diagnostic_of(c, &nearest->pair, "gap [m]", nearest->gap,
-                                    drape_pair_least_gap(&nearest->pair, c->broad.rounding));
-    return nearest;
+    const drape_pair *pair = nearest ? &nearest->pair : NULL;
+    double gap = nearest ? nearest->gap : INFINITY;
+    for (int32_t i = 0; !nearest && i < c->active.count; i++) {
+        const drape_active_contact *contact = &c->active.contacts[i];
+        if (contact->gap.value < gap) {
+            pair = &contact->pair;
+            gap = contact->gap.value;
+        }
+    }
+    if (pair)
+        *diagnostic = diagnostic_of(c, pair, "gap [m]", gap, drape_pair_least_gap(pair, c->broad.rounding));
+    return pair;
 }

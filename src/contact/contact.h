@@ -108,8 +108,7 @@ bool drape_contact_crosses(drape_contact *contact, const double *x, double t, co
 drape_status drape_contact_check(drape_contact *contact, const double *x, double t, const char **reason,
                                  drape_diagnostic *diagnostic);
 
-/* The nearest pair at the last point, if one is nearer than a tenth of its activation distance: what
- * holds a step up whose equations have no solution. */
+/* The nearest active pair at the last point: what holds a step up whose equations have no solution. */
 bool drape_contact_nearest(const drape_contact *contact, drape_diagnostic *diagnostic);
 
 /* The number of active contacts at the last point, and their smallest gap [m], INFINITY if there are none. */
