@@ -29,10 +29,12 @@
 /* A gap below this share of the largest coordinate is rounding: closest points and their distance have
  * errors of some hundred units in the last place. */
 #define ROUNDING (1e4 * DBL_EPSILON)
-/* The stiffness is raised when the smallest gap is small and has shrunk since the last raise, and falls
- * when it is large again. Gaps in activation distances. */
+/* The stiffness is raised when the smallest gap is small and has shrunk since the last raise, and in every
+ * attempt that begins where it can hardly shrink any more. It falls when the gap is large again. Gaps in
+ * activation distances. */
 #define PRESSED    0.05
 #define SHRUNK     0.5
+#define LAST       2.0 /* least gaps */
 #define RELAXED    0.3
 #define RAISE      2.0
 #define HALVED     0.2 /* [s] */
@@ -289,25 +291,32 @@ static drape_status update_inside(drape_contact *c)
     return added ? drape_contact_list(c, &now) : status;
 }
 
-static double smallest_gap(const drape_contact *c)
+/* *last: some gap is hardly above its least. */
+static double smallest_gap(const drape_contact *c, bool *last)
 {
     double least = 1;
+    *last = false;
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
-        if (!contact->gentle)
-            least = fmin(least, contact->gap.value / contact->pair.distance);
+        if (contact->gentle)
+            continue;
+        least = fmin(least, contact->gap.value / contact->pair.distance);
+        *last = *last || contact->gap.value < LAST * drape_pair_least_gap(&contact->pair, c->broad.rounding);
     }
     return least;
 }
 
 /* Makes contact stiffer where gaps shrink, and softer again. The energy that this adds to present contacts is
  * the work of whoever presses. */
-static void adapt_stiffness(drape_contact *c, double t)
+static void adapt_stiffness(drape_contact *c, double t, bool retry)
 {
     drape_press *press = &c->press;
-    const double gap = smallest_gap(c), before = press->factor;
+    bool last;
+    const double gap = smallest_gap(c, &last), before = press->factor;
+    if (retry && !last)
+        return;
     press->widest = fmax(press->widest, gap);
-    if (gap < PRESSED && gap < SHRUNK * press->widest) {
+    if (last || (gap < PRESSED && gap < SHRUNK * press->widest)) {
         press->factor = fmin(RAISE * before, MAX_FACTOR);
         press->widest = gap;
     } else if (gap > RELAXED) {
@@ -350,8 +359,8 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     drape_contact_set_rounding(c, c->x);
     if (!status)
         status = update_inside(c);
-    if (!status && !is_retry(c))
-        adapt_stiffness(c, t);
+    if (!status)
+        adapt_stiffness(c, t, is_retry(c));
     if (!status)
         status = lag_at(c, v, t);
     if (!status) {

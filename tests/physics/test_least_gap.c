@@ -365,16 +365,35 @@ static drape_status keep(void *user, const void *bytes, size_t size)
     return DRAPE_OK;
 }
 
+#define ABOVE_A_BOX                                                                                          \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.1, 'height': "   \
+    "0.1, 'transform': {'translate': [-0.05, 0.01, 0.05]}}, " MATERIAL ", 'terms': ['stretch.edge']}], "     \
+    "'colliders': [{'type': 'box', 'center': [0, -0.1, 0], 'size': 0.2}], 'contact': {'distance': 4e-3}, "   \
+    "'duration': 1}"
+
+/* A sheet at 1.5 least gaps above a box: gaps cannot halve any more, and a step from there may be rejected again
+ * and again, so contact becomes twice as stiff with every attempt. */
+START_TEST(stiffness_rises_where_gaps_cannot_shrink)
+{
+    scene s = scene_open(ABOVE_A_BOX, 1e6);
+    drape_state *at = scene_state(&s);
+    const struct drape_contact *contact = drape_system_contact(s.sim->system);
+    for (size_t i = 1; i < 3 * (size_t)s.model->node_count; i += 3)
+        at->x[i] = 1.5 * drape_contact_least_gap(contact);
+    for (int k = 1; k <= 5; k++) {
+        ck_assert_int_eq(drape_system_begin(s.sim->system, at), DRAPE_OK);
+        ck_assert_double_eq(contact->press.factor, 1 << k);
+        drape_system_end_step(s.sim->system);
+    }
+    scene_close(&s);
+}
+END_TEST
+
 /* A sheet that begins a few units of rounding above a box, below the least gap, may get nearer in each step by
  * rounding: not through the surface of the box, however many steps there are. */
 START_TEST(rounding_does_not_add_up)
 {
-    scene s =
-        scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, "
-                   "'width': 0.1, 'height': 0.1, 'transform': {'translate': [-0.05, 0.01, 0.05]}}, " MATERIAL
-                   ", 'terms': ['stretch.edge']}], 'colliders': [{'type': 'box', 'center': [0, -0.1, 0], "
-                   "'size': 0.2}], 'contact': {'distance': 4e-3}, 'duration': 1}",
-                   1e6);
+    scene s = scene_open(ABOVE_A_BOX, 1e6);
     drape_state *at = scene_state(&s);
     const double rounding = drape_system_contact(s.sim->system)->broad.rounding;
     const size_t n = 3 * (size_t)s.model->node_count;
@@ -514,4 +533,5 @@ START_TEST(wrung)
 END_TEST
 
 SUITE("least_gap", over_a_tip, strip_across_strip, blown, between_two_boards, wrung, stiffening_is_work,
-      what_begins_inside_is_pushed_out_gently, rounding_does_not_add_up, a_checkpoint_keeps_it)
+      what_begins_inside_is_pushed_out_gently, rounding_does_not_add_up,
+      stiffness_rises_where_gaps_cannot_shrink, a_checkpoint_keeps_it)
