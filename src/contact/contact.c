@@ -44,7 +44,7 @@ static drape_status take_arrays(drape_arena *arena, drape_contact *c)
 {
     const size_t points = (size_t)c->broad.points, colliders = (size_t)c->model->collider_count;
     double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start, &c->start_v, &c->ahead};
-    drape_collider_pose **const poses[] = {&c->pose, &c->start_pose, &c->path_pose};
+    drape_collider_pose **const poses[] = {&c->pose, &c->start_pose, &c->path_pose, &c->kink_pose};
     for (size_t i = 0; i < sizeof positions / sizeof *positions; i++)
         *positions[i] = drape_arena_take(arena, points, 3 * sizeof(double));
     for (size_t i = 0; i < sizeof poses / sizeof *poses; i++)
@@ -120,7 +120,7 @@ void drape_contact_fill(const drape_contact *c, const double *nodes, const drape
                         double *x)
 {
     const size_t n = (size_t)c->model->node_count;
-    memcpy(x, nodes, 3 * n * sizeof *x);
+    memmove(x, nodes, 3 * n * sizeof *x);
     for (size_t i = n; i < (size_t)c->broad.points; i++)
         for (size_t k = 0; k < 3; k++)
             x[3 * i + k] = c->broad.rest[3 * i + k] + pose[c->broad.point_collider[i - n]].displacement[k];
@@ -365,6 +365,7 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
         status = lag_at(c, v, t);
     if (!status) {
         c->begun = true;
+        c->start_t = t;
         memcpy(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x);
         memcpy(c->start_v, c->v, 3 * (size_t)c->broad.points * sizeof *c->v);
         memcpy(c->start_pose, c->pose, (size_t)c->model->collider_count * sizeof *c->pose);

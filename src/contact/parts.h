@@ -45,7 +45,8 @@ struct drape_contact {
     double *ahead;      /* (points x 3) the end of the path of a search */
 
     bool begun;                      /* a step has begun: */
-    double *start, *start_v;         /* (points x 3) its beginning */
+    double start_t;                  /* [s] its beginning */
+    double *start, *start_v;         /* (points x 3) */
     drape_collider_pose *start_pose; /* (collider_count) */
     drape_inside_pairs inside;       /* at its beginning */
     drape_press press;
@@ -54,6 +55,7 @@ struct drape_contact {
 
     double *from, *to;              /* (points x 3) the ends of a displacement: ccd.c */
     drape_collider_pose *path_pose; /* (collider_count) */
+    drape_collider_pose *kink_pose; /* (collider_count) */
     int32_t *coupling;              /* (coupling_count of coupling_room x 4) */
     int32_t coupling_count, coupling_room;
     double *on_collider; /* (collider_count x 3) [N] */
@@ -63,7 +65,8 @@ struct drape_contact {
 /* The poses of colliders at time t, with their mean velocity over span. pose: (collider_count). */
 void drape_contact_poses(const drape_contact *c, double t, const double span[2], drape_collider_pose *pose);
 
-/* Sets all points: the given nodes, and the points of colliders in their poses. x: (points x 3). */
+/* Sets all points: the given nodes, which may be those of x, and the points of colliders in their poses. x:
+ * (points x 3). */
 void drape_contact_fill(const drape_contact *c, const double *nodes, const drape_collider_pose *pose,
                         double *x);
 
