@@ -414,8 +414,30 @@ START_TEST(frames_without_room_show_the_end_of_the_step)
 }
 END_TEST
 
+/* A ball comes from below and lifts a sheet at rest: the first contact stores energy, all of which is work of the
+ * ball, however small the step is. */
+START_TEST(a_sheet_at_rest_may_be_met)
+{
+    static const char *const some[] = {"be", "bdf2", "midpoint", "trbdf2"};
+    for (int k = 0; k < 4; k++) {
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{" SQUARE(
+                "0") ", " SOFT "}], 'gravity': [0, 0, 0], 'contact': {'distance': 1e-3}, 'colliders': "
+                     "[{'type': 'sphere', "
+                     "'center': [0.01, -0.06, 0.02], 'radius': 0.05, 'track': [[0, [0, 0, 0]], [0.2, [0, "
+                     "0.02, 0]]]}], 'integrator': {'method': '%s', 'dt': 0.0166}, 'duration': 0.12}",
+            some[k]);
+        scene_watch(&s);
+        scene_advance(&s, 0.12);
+        printf("# %s: %ld steps, %ld rejected\n", some[k], s.accepted, s.rejected);
+        ck_assert_int_le(s.rejected, 10);
+        scene_close(&s);
+    }
+}
+END_TEST
+
 SUITE("press", a_corner_through_a_face_is_counted, the_counter_agrees_with_the_library, over_a_tip,
       over_a_blade, over_the_corner_of_a_box, over_a_wire, a_strip_over_a_strip, blown_onto_a_sheet,
       dropped_at_50_m_per_s, in_a_shrinking_box, between_two_bodies,
       frames_are_free_of_a_ball_that_turns_back, a_ball_that_turns_within_a_step_is_felt,
-      frames_without_room_show_the_end_of_the_step)
+      a_sheet_at_rest_may_be_met, frames_without_room_show_the_end_of_the_step)
