@@ -317,9 +317,9 @@ START_TEST(stiffening_is_work)
 }
 END_TEST
 
-/* A sheet that begins one activation distance deep in the ground is inside: the parabola pushes it out,
- * and it leaves with the energy b(-1) of that. Without gravity, and with restitution 1, midpoint conserves it up to
- * the change of b over a step, here less than a twentieth. Then no pair is inside any more. */
+/* A sheet that begins one activation distance deep in the ground is inside: the parabola pushes it out, and
+ * it leaves with the energy b(-1) of that. Without gravity, and with restitution 1, midpoint conserves it up
+ * to the change of b over a step, here less than a twentieth. Then no pair is inside any more. */
 START_TEST(what_begins_inside_is_pushed_out_gently)
 {
     scene s = scene_open(
@@ -371,8 +371,8 @@ static drape_status keep(void *user, const void *bytes, size_t size)
     "'colliders': [{'type': 'box', 'center': [0, -0.1, 0], 'size': 0.2}], 'contact': {'distance': 4e-3}, "   \
     "'duration': 1}"
 
-/* A sheet at 1.5 least gaps above a box: gaps cannot halve any more, and a step from there may be rejected again
- * and again, so contact becomes twice as stiff with every attempt. */
+/* A sheet at 1.5 least gaps above a box: gaps cannot halve any more, and a step from there may be rejected
+ * again and again, so contact becomes twice as stiff with every attempt. */
 START_TEST(stiffness_rises_where_gaps_cannot_shrink)
 {
     scene s = scene_open(ABOVE_A_BOX, 1e6);
@@ -389,8 +389,8 @@ START_TEST(stiffness_rises_where_gaps_cannot_shrink)
 }
 END_TEST
 
-/* A sheet that begins a few units of rounding above a box, below the least gap, may get nearer in each step by
- * rounding: not through the surface of the box, however many steps there are. */
+/* A sheet that begins a few units of rounding above a box, below the least gap, may get nearer in each step
+ * by rounding: not through the surface of the box, however many steps there are. */
 START_TEST(rounding_does_not_add_up)
 {
     scene s = scene_open(ABOVE_A_BOX, 1e6);

@@ -393,9 +393,10 @@ START_TEST(a_ball_that_turns_within_a_step_is_felt)
 }
 END_TEST
 
-/* A host sends the ball through the sheet and back within one step, on a cubic, so a step sees it at rest; at
- * the time of the frames between no state of the cloth is free of it, and they show the state at the end of
- * the step. From rest at 0, with the velocity V after T seconds, the cubic is T V s^2 (s - 1): 4/27 T V high. */
+/* A host sends the ball through the sheet and back within one step, on a cubic, so a step sees it at rest;
+ * at the time of the frames between no state of the cloth is free of it, and they show the state at the end
+ * of the step. From rest at 0, with the velocity V after T seconds, the cubic is T V s^2 (s - 1): 4/27 T V
+ * high. */
 START_TEST(frames_without_room_show_the_end_of_the_step)
 {
     times w = {.rate = 1000, .last = 0, .press = {.accepted = INT64_MIN}};
@@ -414,8 +415,8 @@ START_TEST(frames_without_room_show_the_end_of_the_step)
 }
 END_TEST
 
-/* A ball comes from below and lifts a sheet at rest: the first contact stores energy, all of which is work of the
- * ball, however small the step is. */
+/* A ball comes from below and lifts a sheet at rest: the first contact stores energy, all of which is work
+ * of the ball, however small the step is. */
 START_TEST(a_sheet_at_rest_may_be_met)
 {
     static const char *const some[] = {"be", "bdf2", "midpoint", "trbdf2"};
