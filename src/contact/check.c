@@ -33,10 +33,10 @@ static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *
  * by which it may not lose its side however many steps there are. */
 static double allowed(double least, double before, double rounding)
 {
-    const double lowest = DRAPE_NO_SIDE * rounding;
+    const double nearer = before - rounding;
     if (before >= least)
         return least;
-    return drape_gap_has_side(before, rounding) ? fmax(before - lowest, lowest) : before - lowest;
+    return drape_gap_has_side(before, rounding) ? fmax(nearer, DRAPE_NO_SIDE * rounding) : nearer;
 }
 
 /* Finds the pair whose gap is below what it may end with by most. */
