@@ -123,7 +123,7 @@ double drape_contact_march(const drape_contact *c, const drape_collider *collide
     const double least = drape_contact_least_gap(c), end = drape_keep_gap(keep, least, gap);
     vec3_sub(y, x, p);
     const double length = vec3_norm(p), slack = (1 - MARCH_SHARE) * fmin(end, gap - end);
-    if (!(gap > keep->rounding) || !(length > gap - end))
+    if (!drape_gap_has_side(gap, keep->rounding) || !(length > gap - end))
         return 1;
     for (int i = 0; i < MAX_MARCHES; i++) {
         t += MARCH_SHARE * (gap - end) / length;

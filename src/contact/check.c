@@ -29,14 +29,19 @@ static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *
     return found;
 }
 
-/* The gap that a pair, or piece, may end with. If it began below the least gap it may not come nearer. */
+/* The gap that a pair may end with. If it began below the least gap it may not come nearer, but for rounding,
+ * by which it may not lose its side however many steps there are. */
 static double allowed(double least, double before, double rounding)
 {
-    return before < least ? before - rounding : least;
+    const double nearer = before - rounding;
+    if (before >= least)
+        return least;
+    return drape_gap_has_side(before, rounding) ? fmax(nearer, DRAPE_NO_SIDE * rounding) : nearer;
 }
 
 /* Finds the pair whose gap is below what it may end with by most. Where several features of a collider are
- * inside, pushing one out can push another one in: none may be deeper than the deepest of them was. */
+ * inside (only gaps with a collider can be negative), pushing one out can push another one in: none may be
+ * deeper than the deepest of them was. */
 static drape_status check_gaps(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
@@ -49,7 +54,8 @@ static drape_status check_gaps(drape_contact *c, const char **reason, drape_diag
             continue;
         const double before = drape_pair_gap_value(pair, &start);
         if (before < least)
-            least = allowed(least, fmin(before, c->start_least[pair->collider + 1]), c->broad.rounding);
+            least = allowed(least, before < 0 ? fmin(before, c->start_least[pair->collider]) : before,
+                            c->broad.rounding);
         if (gap >= least || least - gap < excess)
             continue;
         excess = least - gap;
@@ -59,7 +65,13 @@ static drape_status check_gaps(drape_contact *c, const char **reason, drape_diag
     return excess > 0 ? DRAPE_RETRY_REJECTED : DRAPE_OK;
 }
 
-static drape_status check_surfaces(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
+/* Both ends of a piece of the path, on which nodes and colliders move straight. */
+typedef struct piece {
+    drape_configuration from, to;
+} piece;
+
+static drape_status check_surfaces(drape_contact *c, const piece *p, const char **reason,
+                                   drape_diagnostic *diagnostic)
 {
     const drape_keep keep = drape_contact_keep_step(c);
     for (int32_t k = 0; k < c->model->collider_count; k++) {
@@ -68,8 +80,8 @@ static drape_status check_surfaces(drape_contact *c, const char **reason, drape_
         for (int32_t i = 0; i < c->model->free_count; i++) {
             const int32_t node = c->model->node_of_free[i];
             double x[3], y[3];
-            vec3_sub(c->start + 3 * (size_t)node, c->start_pose[k].displacement, x);
-            vec3_sub(c->x + 3 * (size_t)node, c->pose[k].displacement, y);
+            vec3_sub(p->from.x + 3 * (size_t)node, p->from.pose[k].displacement, x);
+            vec3_sub(p->to.x + 3 * (size_t)node, p->to.pose[k].displacement, y);
             const double fraction = drape_contact_march(c, &c->model->colliders[k], x, y, &keep);
             if (fraction >= 1)
                 continue;
@@ -119,16 +131,54 @@ static drape_status check_inscribed(drape_contact *c, const int32_t *node, int n
     return DRAPE_OK;
 }
 
-static drape_status check_path(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
+static drape_status check_features(drape_contact *c, const piece *p, const char **reason,
+                                   drape_diagnostic *diagnostic)
 {
     const drape_keep keep = drape_contact_keep_step(c);
     drape_pair limiting;
-    const double fraction = drape_contact_free_fraction(c, c->start, c->x, c->pose, &keep, &limiting);
+    const double fraction = drape_contact_free_fraction(c, p->from.x, p->to.x, p->to.pose, &keep, &limiting);
     if (fraction >= 1)
         return DRAPE_OK;
     *reason = drape_reason_name(DRAPE_REASON_COLLISION);
     *diagnostic = diagnostic_of(c, &limiting, PATH, fraction, 1);
     return DRAPE_RETRY_REJECTED;
+}
+
+/* The positions on the path at time t: free nodes straight between both ends, pins and colliders where their
+ * tracks are. */
+static void place_on_path(const drape_contact *c, double t, double end, double *x, drape_collider_pose *pose)
+{
+    const double share = (t - c->start_t) / (end - c->start_t), span[2] = {t, t};
+    for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++)
+        x[i] = (1 - share) * c->start[i] + share * c->x[i];
+    drape_motion_place_pins(c->motion, t, x);
+    drape_contact_poses(c, t, span, pose);
+    drape_contact_fill(c, x, pose, x);
+}
+
+/* Checks the path from the beginning of the step to where contact is evaluated, at time t: piece by piece
+ * between the kinks of tracks. */
+static drape_status check_path(drape_contact *c, double t, bool surfaces, const char **reason,
+                               drape_diagnostic *diagnostic)
+{
+    double *const x[] = {c->from, c->to}, at = c->start_t;
+    drape_collider_pose *const pose[] = {c->path_pose, c->kink_pose};
+    piece p = {.to = {.model = c->model, .x = c->start, .pose = c->start_pose}};
+    drape_status status = DRAPE_OK;
+    bool end = false;
+    for (int i = 0; !status && !end; i = !i) {
+        p.from = p.to;
+        at = drape_motion_next_kink(c->motion, at, t);
+        end = !(at < t);
+        if (!end)
+            place_on_path(c, at, t, x[i], pose[i]);
+        p.to =
+            (drape_configuration){.model = c->model, .x = end ? c->x : x[i], .pose = end ? c->pose : pose[i]};
+        status = surfaces ? check_surfaces(c, &p, reason, diagnostic) : DRAPE_OK;
+        if (!status)
+            status = check_features(c, &p, reason, diagnostic);
+    }
+    return status;
 }
 
 drape_keep drape_contact_keep_step(const drape_contact *c)
@@ -147,7 +197,7 @@ bool drape_contact_crosses(drape_contact *c, const double *x, double t, const ch
     const double start = drape_clock_seconds();
     c->out_of_memory = update_at(c, x, t) != DRAPE_OK;
     const bool crosses =
-        c->out_of_memory || check_gaps(c, reason, diagnostic) || check_path(c, reason, diagnostic);
+        c->out_of_memory || check_gaps(c, reason, diagnostic) || check_path(c, t, false, reason, diagnostic);
     c->seconds += drape_clock_seconds() - start;
     return crosses;
 }
@@ -160,13 +210,11 @@ drape_status drape_contact_check(drape_contact *c, const double *x, double t, co
     if (!status)
         status = check_gaps(c, reason, diagnostic);
     if (!status)
-        status = check_surfaces(c, reason, diagnostic);
-    if (!status)
         status = check_inscribed(c, c->model->edge, 2, c->model->edge_count, reason, diagnostic);
     if (!status)
         status = check_inscribed(c, c->model->triangle, 3, c->model->triangle_count, reason, diagnostic);
     if (!status)
-        status = check_path(c, reason, diagnostic);
+        status = check_path(c, t, true, reason, diagnostic);
     if (!status)
         status = drape_contact_take_failure(c);
     c->seconds += drape_clock_seconds() - start;
@@ -179,8 +227,16 @@ bool drape_contact_nearest(const drape_contact *c, drape_diagnostic *diagnostic)
     for (int32_t i = 0; i < c->active.near_count; i++)
         if (!nearest || c->active.near[i].gap < nearest->gap)
             nearest = &c->active.near[i];
-    if (nearest)
-        *diagnostic = diagnostic_of(c, &nearest->pair, "gap [m]", nearest->gap,
-                                    drape_pair_least_gap(&nearest->pair, c->broad.rounding));
-    return nearest;
+    const drape_pair *pair = nearest ? &nearest->pair : NULL;
+    double gap = nearest ? nearest->gap : INFINITY;
+    for (int32_t i = 0; !nearest && i < c->active.count; i++) {
+        const drape_active_contact *contact = &c->active.contacts[i];
+        if (contact->gap.value < gap) {
+            pair = &contact->pair;
+            gap = contact->gap.value;
+        }
+    }
+    if (pair)
+        *diagnostic = diagnostic_of(c, pair, "gap [m]", gap, drape_pair_least_gap(pair, c->broad.rounding));
+    return pair;
 }

@@ -58,6 +58,7 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     const size_t points = 3 * (size_t)c->broad.points, colliders = (size_t)c->model->collider_count;
     drape_archive_mark(a, "contact");
     drape_archive_bool(a, &c->begun);
+    drape_archive_double(a, &c->start_t);
     drape_archive_doubles(a, c->start, points);
     drape_archive_doubles(a, c->start_v, points);
     drape_archive_bytes(a, c->start_pose, colliders * sizeof *c->start_pose);

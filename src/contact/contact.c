@@ -29,10 +29,12 @@
 /* A gap below this share of the largest coordinate is rounding: closest points and their distance have
  * errors of some hundred units in the last place. */
 #define ROUNDING (1e4 * DBL_EPSILON)
-/* The stiffness is raised when the smallest gap is small and has shrunk since the last raise, and falls
- * when it is large again. Gaps in activation distances. */
+/* The stiffness is raised when the smallest gap is small and has shrunk since the last raise, and in every
+ * attempt that begins where it can hardly shrink any more. It falls when the gap is large again. Gaps in
+ * activation distances. */
 #define PRESSED    0.05
 #define SHRUNK     0.5
+#define LAST       2.0 /* least gaps */
 #define RELAXED    0.3
 #define RAISE      2.0
 #define HALVED     0.2 /* [s] */
@@ -42,12 +44,12 @@ static drape_status take_arrays(drape_arena *arena, drape_contact *c)
 {
     const size_t points = (size_t)c->broad.points, colliders = (size_t)c->model->collider_count;
     double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start, &c->start_v, &c->ahead};
-    drape_collider_pose **const poses[] = {&c->pose, &c->start_pose, &c->path_pose};
+    drape_collider_pose **const poses[] = {&c->pose, &c->start_pose, &c->path_pose, &c->kink_pose};
     for (size_t i = 0; i < sizeof positions / sizeof *positions; i++)
         *positions[i] = drape_arena_take(arena, points, 3 * sizeof(double));
     for (size_t i = 0; i < sizeof poses / sizeof *poses; i++)
         *poses[i] = drape_arena_take(arena, colliders, sizeof **poses[i]);
-    c->start_least = drape_arena_take(arena, 1 + colliders, sizeof *c->start_least);
+    c->start_least = drape_arena_take(arena, colliders, sizeof *c->start_least);
     c->on_collider = drape_arena_take(arena, colliders, 3 * sizeof *c->on_collider);
     return drape_arena_status(arena);
 }
@@ -119,7 +121,7 @@ void drape_contact_fill(const drape_contact *c, const double *nodes, const drape
                         double *x)
 {
     const size_t n = (size_t)c->model->node_count;
-    memcpy(x, nodes, 3 * n * sizeof *x);
+    memmove(x, nodes, 3 * n * sizeof *x);
     for (size_t i = n; i < (size_t)c->broad.points; i++)
         for (size_t k = 0; k < 3; k++)
             x[3 * i + k] = c->broad.rest[3 * i + k] + pose[c->broad.point_collider[i - n]].displacement[k];
@@ -259,12 +261,20 @@ drape_status drape_contact_lag(drape_contact *c)
     return DRAPE_OK;
 }
 
+/* Steps by powers of two, so that the least gaps of scenes that move do not change in every step. */
+static double next_power_of_two(double x)
+{
+    int exponent;
+    frexp(x, &exponent);
+    return x > 0 ? ldexp(1, exponent) : 0;
+}
+
 void drape_contact_set_rounding(drape_contact *c, const double *x)
 {
     double largest = 0;
     for (size_t i = 0; i < 3 * (size_t)c->broad.points; i++)
         largest = fmax(largest, fabs(x[i]));
-    c->broad.rounding = ROUNDING * largest;
+    c->broad.rounding = ROUNDING * next_power_of_two(largest);
 }
 
 /* Which pairs are inside. A pair that was added has another law, and so are its contacts. */
@@ -277,25 +287,32 @@ static drape_status update_inside(drape_contact *c)
     return added ? drape_contact_list(c, &now) : status;
 }
 
-static double smallest_gap(const drape_contact *c)
+/* *last: some gap is hardly above its least. */
+static double smallest_gap(const drape_contact *c, bool *last)
 {
     double least = 1;
+    *last = false;
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
-        if (!contact->gentle)
-            least = fmin(least, contact->gap.value / contact->pair.distance);
+        if (contact->gentle)
+            continue;
+        least = fmin(least, contact->gap.value / contact->pair.distance);
+        *last = *last || contact->gap.value < LAST * drape_pair_least_gap(&contact->pair, c->broad.rounding);
     }
     return least;
 }
 
 /* Makes contact stiffer where gaps shrink, and softer again. The energy that this adds to present contacts is
  * the work of whoever presses. */
-static void adapt_stiffness(drape_contact *c, double t)
+static void adapt_stiffness(drape_contact *c, double t, bool retry)
 {
     drape_press *press = &c->press;
-    const double gap = smallest_gap(c), before = press->factor;
+    bool last;
+    const double gap = smallest_gap(c, &last), before = press->factor;
+    if (retry && !last)
+        return;
     press->widest = fmax(press->widest, gap);
-    if (gap < PRESSED && gap < SHRUNK * press->widest) {
+    if (last || (gap < PRESSED && gap < SHRUNK * press->widest)) {
         press->factor = fmin(RAISE * before, MAX_FACTOR);
         press->widest = gap;
     } else if (gap > RELAXED) {
@@ -321,12 +338,11 @@ static bool is_retry(const drape_contact *c)
 
 void drape_contact_measure_start(drape_contact *c)
 {
-    for (int32_t i = 0; i <= c->model->collider_count; i++)
-        c->start_least[i] = INFINITY;
+    memset(c->start_least, 0, (size_t)c->model->collider_count * sizeof *c->start_least);
     for (int32_t i = 0; i < c->active.near_count; i++) {
         const drape_near_pair *near = &c->active.near[i];
-        double *least = &c->start_least[near->pair.collider + 1];
-        *least = fmin(*least, near->gap);
+        if (near->pair.collider >= 0)
+            c->start_least[near->pair.collider] = fmin(c->start_least[near->pair.collider], near->gap);
     }
 }
 
@@ -349,13 +365,14 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     drape_contact_set_rounding(c, c->x);
     if (!status)
         status = update_inside(c);
-    if (!status && !is_retry(c))
-        adapt_stiffness(c, t);
+    if (!status)
+        adapt_stiffness(c, t, is_retry(c));
     if (!status)
         status = lag_at(c, v, t);
     if (!status) {
         drape_contact_measure_start(c);
         c->begun = true;
+        c->start_t = t;
         memcpy(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x);
         memcpy(c->start_v, c->v, 3 * (size_t)c->broad.points * sizeof *c->v);
         memcpy(c->start_pose, c->pose, (size_t)c->model->collider_count * sizeof *c->pose);

@@ -101,19 +101,18 @@ double drape_contact_node_fractions(drape_contact *contact, const double *x, con
                                     double *fraction);
 
 /* Whether a pair of features would be too near at x, as drape_contact_check tests it, or too near on the
- * straight path from the beginning of the step to there, while colliders move straight to their poses at
- * time t. */
+ * path from the beginning of the step to there, while pins and colliders move straight between the kinks of
+ * their motion up to time t. */
 bool drape_contact_crosses(drape_contact *contact, const double *x, double t, const char **reason,
                            drape_diagnostic *diagnostic);
 
 /* Compares the end of a step, x at time t, with its beginning: DRAPE_OK, or DRAPE_RETRY_REJECTED if a
  * pair is nearer than the least gap, and than before ("penetration"), or came nearer than half of that on
- * the straight path ("collision"). */
+ * the path ("collision"). */
 drape_status drape_contact_check(drape_contact *contact, const double *x, double t, const char **reason,
                                  drape_diagnostic *diagnostic);
 
-/* The nearest pair at the last point, if one is nearer than a tenth of its activation distance: what
- * holds a step up whose equations have no solution. */
+/* The nearest active pair at the last point: what holds a step up whose equations have no solution. */
 bool drape_contact_nearest(const drape_contact *contact, drape_diagnostic *diagnostic);
 
 /* The number of active contacts at the last point, and their smallest gap [m], INFINITY if there are none. */

@@ -200,11 +200,11 @@ double drape_pair_step_fraction(const drape_pair *pair, const double *from, cons
         vec3_sub(y[a], x[a], p[a]);
     const double speed = approach_speed(pair->kind, p), least = drape_pair_least_gap(pair, keep->rounding);
     double gap = gap_at(pair, x, p, 0, radius);
-    if (keep->core && gap <= keep->rounding) {
+    if (keep->core && !drape_gap_has_side(gap, keep->rounding)) {
         gap += radius;
         radius = 0;
     }
-    if (!(speed > 0) || !(gap > keep->rounding) || gap - least > speed)
+    if (!(speed > 0) || !drape_gap_has_side(gap, keep->rounding) || gap - least > speed)
         return limit;
     const double end = drape_keep_gap(keep, least, gap), slack = (1 - ADVANCE) * fmin(end, gap - end);
     for (int i = 0; i < MAX_ADVANCES; i++) {

@@ -37,9 +37,18 @@ static inline double drape_pair_least_gap(const drape_pair *pair, double roundin
     return fmin(fmax(DRAPE_LEAST_GAP * pair->distance, rounding), 0.5 * pair->distance);
 }
 
+/* A gap below this share of the rounding has no side that it could be kept on. It is far below the share of
+ * the least gap that is kept on paths, so only pairs that begin there are exempt: not those that were
+ * accepted, even if the rounding has become larger since. */
+#define DRAPE_NO_SIDE 0.1
+static inline bool drape_gap_has_side(double gap, double rounding)
+{
+    return gap >= DRAPE_NO_SIDE * rounding && gap > 0;
+}
+
 /* How much of its gap a pair must keep on a path. */
 typedef struct drape_keep {
-    double rounding; /* [m] what rounding can change in a gap: 0 or a smaller one has no direction */
+    double rounding; /* [m] of gaps */
     double least;    /* share of the least gap, for a pair that begins above it, */
     double above;    /* and share of what its gap has more than that */
     double below;    /* share of the gap of a pair that begins below the least gap */
@@ -79,7 +88,7 @@ void drape_pair_derivatives(const drape_pair *pair, const drape_gap *gap, const 
 /* Continuous collision detection: the largest step fraction on the straight path from x to y, the same
  * for all points, on which the pair keeps what it must of its gap (additive continuous collision
  * detection, Li et al. 2021, Codimensional IPC, algorithm 1). It does not search beyond `limit`, which it
- * returns at most. A pair whose gap at x is not above rounding has no side to stay on: `limit`. */
+ * returns at most. A pair whose gap at x has no side: `limit`. */
 double drape_pair_step_fraction(const drape_pair *pair, const double *x, const double *y,
                                 const drape_keep *keep, double limit);
 

@@ -45,11 +45,12 @@ struct drape_contact {
     double *ahead;      /* (points x 3) the end of the path of a search */
 
     bool begun;                      /* a step has begun: */
-    double *start, *start_v;         /* (points x 3) its beginning */
+    double start_t;                  /* [s] its beginning */
+    double *start, *start_v;         /* (points x 3) */
     drape_collider_pose *start_pose; /* (collider_count) */
     drape_inside_pairs inside;       /* at its beginning */
-    double *start_least; /* (1 + collider_count) the smallest gap of pairs of cloth with cloth, and
-                                        with each collider, at its beginning [m] */
+    double *start_least;             /* (collider_count) the smallest gap with each collider at its beginning,
+                                        at most 0 [m] */
     drape_press press;
     drape_lagged *lagged; /* (lagged_count of lagged_room) lagged friction */
     int32_t lagged_count, lagged_room;
@@ -57,6 +58,7 @@ struct drape_contact {
     double *of_node;                /* (node_count) while drape_contact_node_fractions runs; else NULL */
     double *from, *to;              /* (points x 3) the ends of a displacement: ccd.c */
     drape_collider_pose *path_pose; /* (collider_count) */
+    drape_collider_pose *kink_pose; /* (collider_count) */
     int32_t *coupling;              /* (coupling_count of coupling_room x 4) */
     int32_t coupling_count, coupling_room;
     double *on_collider; /* (collider_count x 3) [N] */
@@ -66,7 +68,8 @@ struct drape_contact {
 /* The poses of colliders at time t, with their mean velocity over span. pose: (collider_count). */
 void drape_contact_poses(const drape_contact *c, double t, const double span[2], drape_collider_pose *pose);
 
-/* Sets all points: the given nodes, and the points of colliders in their poses. x: (points x 3). */
+/* Sets all points: the given nodes, which may be those of x, and the points of colliders in their poses. x:
+ * (points x 3). */
 void drape_contact_fill(const drape_contact *c, const double *nodes, const drape_collider_pose *pose,
                         double *x);
 
@@ -76,7 +79,7 @@ drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at);
 /* Computes lagged friction from the active set at the beginning of a step. */
 drape_status drape_contact_lag(drape_contact *c);
 
-/* Notes the smallest gaps at the beginning of a step, from the near pairs there. */
+/* Notes how deep cloth is in each collider at the beginning of a step, from the near pairs there. */
 void drape_contact_measure_start(drape_contact *c);
 
 /* Sets what rounding can change in the gaps of these positions (points x 3): all that contact compares gaps

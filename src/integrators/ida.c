@@ -406,6 +406,7 @@ static drape_status check_step_size(ida_state *s, double h, bool last, drape_ste
     if (s->tiny <= MAX_TINY)
         return DRAPE_OK;
     s->tiny = 0;
+    info->h = h;
     s->crossing = s->crossed;
     info->reason = s->crossing ? s->crossing_reason : drape_reason_name(DRAPE_REASON_ERROR_TEST);
     return DRAPE_E_STEP_TOO_SMALL;

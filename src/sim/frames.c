@@ -1,15 +1,16 @@
 /*
- * frames.c: frame times are k / frame_rate. No step is shortened for a frame: between the states of a step,
- * positions are the cubic Hermite interpolant of positions and velocities, of fourth order in h for smooth
- * motion.
+ * frames.c: frame times are k / frame_rate. No step is shortened for a frame: between the states of a
+ * step, positions are the cubic Hermite interpolant of positions and velocities, of fourth order in h for
+ * smooth motion.
  *
  * A frame is written only if its positions, and the straight path to them from the state before the step,
  * pass the check that steps pass, with the colliders where they are at the time of the frame. If the
  * interpolant does not, positions on the straight line between the two states are tried, first that of the
  * time itself and then ever farther from it. That of the time itself may fail, too: the check of a step
- * takes a collider to move straight, while its track may turn within the step, and large faces may dip
- * into a round collider between two states that are free of it. If all of them fail, the frame is the
- * state at the end of the step, at its own time, and so are the other frames of this step.
+ * takes a collider to move straight between the kinks of its motion, while a host may send it on a curve,
+ * and large faces may dip into a round collider between two states that are free of it. If all of them
+ * fail, the frame is the state at the end of the step, at its own time, and so are the other frames of
+ * this step.
  */
 #include "sim/sim.h"
 

@@ -317,9 +317,9 @@ START_TEST(stiffening_is_work)
 }
 END_TEST
 
-/* A sheet that begins one activation distance deep in the ground is inside: the parabola pushes it out,
- * and it leaves with the energy b(-1) of that. Without gravity, and with restitution 1, midpoint conserves
- * it up to the change of b over a step, here less than a twentieth. Then no pair is inside any more. */
+/* A sheet that begins one activation distance deep in the ground is inside: the parabola pushes it out, and
+ * it leaves with the energy b(-1) of that. Without gravity, and with restitution 1, midpoint conserves it up
+ * to the change of b over a step, here less than a twentieth. Then no pair is inside any more. */
 START_TEST(what_begins_inside_is_pushed_out_gently)
 {
     scene s = scene_open(
@@ -364,6 +364,65 @@ static drape_status keep(void *user, const void *bytes, size_t size)
     m->size += size;
     return DRAPE_OK;
 }
+
+#define ABOVE_A_BOX                                                                                          \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.1, 'height': "   \
+    "0.1, 'transform': {'translate': [-0.05, 0.01, 0.05]}}, " MATERIAL ", 'terms': ['stretch.edge']}], "     \
+    "'colliders': [{'type': 'box', 'center': [0, -0.1, 0], 'size': 0.2}], 'contact': {'distance': 4e-3}, "   \
+    "'duration': 1}"
+
+/* A sheet at 1.5 least gaps above a box: gaps cannot halve any more, and a step from there may be rejected
+ * again and again, so contact becomes twice as stiff with every attempt. */
+START_TEST(stiffness_rises_where_gaps_cannot_shrink)
+{
+    scene s = scene_open(ABOVE_A_BOX, 1e6);
+    drape_state *at = scene_state(&s);
+    const struct drape_contact *contact = drape_system_contact(s.sim->system);
+    for (size_t i = 1; i < 3 * (size_t)s.model->node_count; i += 3)
+        at->x[i] = 1.5 * drape_contact_least_gap(contact);
+    for (int k = 1; k <= 5; k++) {
+        ck_assert_int_eq(drape_system_begin(s.sim->system, at), DRAPE_OK);
+        ck_assert_double_eq(contact->press.factor, 1 << k);
+        drape_system_end_step(s.sim->system);
+    }
+    scene_close(&s);
+}
+END_TEST
+
+/* A sheet that begins a few units of rounding above a box, below the least gap, may get nearer in each step
+ * by rounding: not through the surface of the box, however many steps there are. */
+START_TEST(rounding_does_not_add_up)
+{
+    scene s = scene_open(ABOVE_A_BOX, 1e6);
+    drape_state *at = scene_state(&s);
+    const double rounding = drape_system_contact(s.sim->system)->broad.rounding;
+    const size_t n = 3 * (size_t)s.model->node_count;
+    double next[27], lowest = INFINITY;
+    int accepted = 0;
+    ck_assert_uint_eq(n, 27);
+    for (size_t i = 1; i < n; i += 3)
+        at->x[i] = 5 * rounding;
+    for (int k = 0; k < 200; k++) {
+        const char *reason;
+        drape_diagnostic diagnostic;
+        ck_assert_int_eq(drape_system_begin(s.sim->system, at), DRAPE_OK);
+        memcpy(next, at->x, sizeof next);
+        for (size_t i = 1; i < n; i += 3)
+            next[i] -= 0.09 * rounding;
+        if (drape_system_check_contact(s.sim->system, next, at->t, &reason, &diagnostic) == DRAPE_OK) {
+            memcpy(at->x, next, sizeof next);
+            accepted++;
+        }
+        drape_system_end_step(s.sim->system);
+    }
+    for (size_t i = 1; i < n; i += 3)
+        lowest = fmin(lowest, at->x[i]);
+    printf("# %d of 200 steps accepted, the lowest node is at %.3g m\n", accepted, lowest);
+    ck_assert_int_ge(accepted, 10);
+    ck_assert_double_gt(lowest, 0);
+    scene_close(&s);
+}
+END_TEST
 
 /* A run that continues from a checkpoint has the bits of one that did not stop, while contact is stiffer
  * than the scene says, and while cloth is inside. */
@@ -474,4 +533,5 @@ START_TEST(wrung)
 END_TEST
 
 SUITE("least_gap", over_a_tip, strip_across_strip, blown, between_two_boards, wrung, stiffening_is_work,
-      what_begins_inside_is_pushed_out_gently, a_checkpoint_keeps_it)
+      what_begins_inside_is_pushed_out_gently, rounding_does_not_add_up,
+      stiffness_rises_where_gaps_cannot_shrink, a_checkpoint_keeps_it)

@@ -382,12 +382,13 @@ START_TEST(test_step_fraction)
 }
 END_TEST
 
-/* A path that ends beyond the other piece is never free, however little the gap is above rounding. */
+/* A path that ends beyond the other piece is never free, however little the gap is, down to a tenth of the
+ * rounding: a pair at the least gap of rounding is not exempt if the rounding becomes larger. */
 START_TEST(test_no_gap_is_exempt)
 {
     const drape_keep step = {.rounding = 1e-12, .least = 0.5, .below = 0.5};
     for (int collider = -1; collider < 1; collider++)
-        for (double gap = 1e-2; gap > 2e-12; gap /= 2) {
+        for (double gap = 1e-2; gap > 1e-13; gap /= 2) {
             const drape_pair pair = {
                 .kind = DRAPE_PAIR_TRIANGLE, .node = {0, 1, 2, 3}, .collider = collider, .distance = 1e-2};
             double x[D] = {0.1, gap, 0.1, 0, 0, 0, 1, 0, 0, 0, 0, 1}, y[D];
