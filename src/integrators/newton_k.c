@@ -45,7 +45,8 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
                                               "up to so many further iterations while the residual is not "
                                               "below that of the guess, with factors or contact below a "
-                                              "tenth of it; then the step is rejected"),
+                                              "tenth of it; a step that then is not below that of "
+                                              "the guess is rejected"),
     [PARAM_EXTRAPOLATION] =
         DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
                      "fraction of the last change of velocity that is added to the guess"),

@@ -321,7 +321,7 @@ static void put_script(const lab_figure *f, FILE *out)
             "# gnuplot %s.gp\nset lmargin at screen %.5f\nset rmargin at screen %.5f\nset bmargin at screen "
             "%.5f\n"
             "set tmargin at screen %.5f\nunset key\nset border 15 lw 0.6\n"
-            "set tics out nomirror scale 0.5,0.25\nset xtics offset 0,0.4\nset ytics offset 0.6,0\n",
+            "set tics out nomirror scale 0.5,0.25\nset xtics offset 0,0.3\nset ytics offset 0.6,0\n",
             f->name, at.left / WIDTH, 1 - RIGHT / WIDTH, at.bottom / at.height, top / at.height);
     put_axis(&f->axes[0], "x", out);
     put_axis(&f->axes[1], "y", out);

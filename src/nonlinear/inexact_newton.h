@@ -6,7 +6,8 @@
  *       relative tolerance; or that of factored_jacobian.h, where the first would be too far off,
  *     - a correction is shortened for contact only at the nodes that would meet something.
  * If the residual has not fallen below that of the guess, with factors or contact below a tenth of it, some
- * more iterations are made; if it still has not, the step is refused. So no step is accepted unchecked.
+ * more iterations are made; if it is then not below that of the guess, the step is refused. So no step is
+ * accepted unchecked.
  */
 #ifndef DRAPE_NONLINEAR_INEXACT_NEWTON_H
 #define DRAPE_NONLINEAR_INEXACT_NEWTON_H
