@@ -9,6 +9,7 @@ import pty
 import re
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -586,6 +587,12 @@ def test_check_run():
     result = drape("check", "two")
     equal(result.returncode, 1, result.stderr)
     equal(len(re.findall(rf"^frame \d, t=0\.?\d*: {count} edge-face intersections of the cloth with itself; the first: edge ", result.stdout, re.M)), 6, result.stdout)
+    with open("clear/positions.npy", "r+b") as file:
+        file.seek(-8, os.SEEK_END)
+        file.write(struct.pack("<d", math.nan))
+    result = drape("check", "clear")
+    equal(result.returncode, 1, result)
+    assert "frame 5 has a position that is not finite" in result.stderr, result
     refused("check", "out", "--dt", "0.1", says="finished run")
     refused("check", "out", "--seed", "3", says="finished run")
     os.mkdir("empty")
