@@ -173,7 +173,7 @@ typedef struct drape_cloth_view {
     const double *edge_length;    /* (edge_count) [m] */
     const int32_t *hinge;         /* (hinge_count x 4) x0 x1: the shared edge, x2 x3: the apices of its two
                              triangles */
-    const int32_t *hinge_edge;    /* (hinge_count) edge number of the hinge */
+    const int32_t *hinge_edge;    /* (hinge_count) edge number of the hinge, ascending */
     const int32_t *triangle_edge; /* (triangle_count x 3) the edge from corner k to corner k + 1 */
     const uint8_t *edge_clamped;  /* (edge_count) 1: a pin keeps the direction of the sheet across the edge */
     const double *node_area;      /* (node_count) lumped: a third of each adjacent triangle [m2] */
@@ -198,6 +198,21 @@ DRAPE_API drape_status drape_term_reserve(drape_term_builder *builder, int32_t e
 DRAPE_API drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t element_count, int nodes,
                                                 int rest_count);
 
+/* For terms with `part`, after the elements: announces part_count parts of part_nodes nodes each, with
+ * rest_count numbers of rest data, and link_count links between elements and parts. Errors: DRAPE_E_MEMORY,
+ * DRAPE_E_ARGUMENT. */
+DRAPE_API drape_status drape_term_reserve_parts(drape_term_builder *builder, int32_t part_count,
+                                                int32_t link_count, int rest_count);
+
+/* Sets part number `part`: its nodes (local to the cloth) and its rest data. */
+DRAPE_API void drape_term_set_part(drape_term_builder *builder, int32_t part, const int32_t *nodes,
+                                   const double *rest);
+
+/* Adds weight times a part to the measure of an element, which must contain the nodes of the part. Elements
+ * are linked in ascending order, and all announced links are made. Parts without a link are left out: the
+ * later ones get smaller numbers. */
+DRAPE_API void drape_term_link(drape_term_builder *builder, int32_t element, int32_t part, double weight);
+
 /* Declares that elements of this cloth are attached to fixed directions in space, so that their forces have a
  * torque. */
 DRAPE_API void drape_term_anchor(drape_term_builder *builder);
@@ -217,7 +232,29 @@ DRAPE_API drape_status drape_term_refuse(drape_term_builder *builder, const char
 /* The maximum number of coordinates of an element. */
 #define DRAPE_MAX_ELEMENT_DOFS (3 * DRAPE_MAX_ELEMENT_NODES)
 
-/* The elements of one term on one cloth; constant after the model is compiled. */
+/* The parts of the elements of one term on one cloth, see `part` in drape_term_ops; constant after the model
+ * is compiled. Link i adds weight[i] times part[i] to the measure of element[i]. Allocated by the library
+ * alone: it may grow at its end. */
+typedef struct drape_parts {
+    int32_t count;             /* number of parts */
+    int nodes;                 /* nodes per part */
+    int rest_count;            /* numbers of rest data per part */
+    const int32_t *node;       /* (count x nodes) node numbers of the whole model */
+    const double *rest;        /* (rest_count x count): item k of part p is rest[k * count + p] */
+    int32_t link_count;        /* number of links */
+    const int32_t *element;    /* (link_count) ascending */
+    const int32_t *part;       /* (link_count) */
+    const double *weight;      /* (link_count) */
+    const uint8_t *place;      /* (link_count x nodes) where the nodes of the part are in the element */
+    const int32_t *first_link; /* (number of elements + 1) an element's links are first_link[e] ...
+                                  first_link[e + 1] - 1 */
+    const int32_t *first_user; /* (count + 1) a part's links are user[first_user[p]] ...
+                                  user[first_user[p + 1] - 1] */
+    const int32_t *user;       /* (link_count) numbers of links */
+} drape_parts;
+
+/* The elements of one term on one cloth; constant after the model is compiled. Allocated by the library
+ * alone: it may grow at its end. */
 typedef struct drape_elements {
     int32_t count;        /* number of elements */
     int nodes;            /* nodes per element */
@@ -225,6 +262,7 @@ typedef struct drape_elements {
     const int32_t *node;  /* (count x nodes) node numbers of the whole model */
     const double *rest;   /* (rest_count x count): item k of element e is rest[k * count + e] */
     const double *params; /* values in the order of the term's parameters */
+    const drape_parts *parts; /* NULL: the term has none */
 } drape_elements;
 
 /* The fault that a check found, for the message of a rejected step. */
@@ -332,6 +370,15 @@ typedef struct drape_term_ops {
     /* The gravity of the scene adds this term to every cloth unless it is zero. A scene must not name the
      * term, which has no required parameters. */
     bool from_scene_gravity;
+
+    /* Optional, beside measure, if measures are linear combinations q = sum weight s of quantities s(x) that
+     * several elements share, such as the angles of hinges. The library then evaluates each part once, and
+     * calls measure only for checks. part writes s (1), ds (3 part_nodes) and dds (3 part_nodes x 3
+     * part_nodes) of a list of DRAPE_LANES parts, laid out as lanes does it. Internal variables belong to
+     * parts: internal is indexed by part, and the ranges of commit and initial are parts. */
+    int part_nodes; /* nodes per part, 1 to DRAPE_MAX_ELEMENT_NODES */
+    void (*part)(const drape_elements *el, const int32_t *part, const double *x, const double *internal,
+                 double *s, double *ds, double *dds);
 } drape_term_ops;
 
 /* Registers a user-defined term, which scenes compiled with this context may then use by name. *ops is
@@ -359,6 +406,13 @@ typedef void drape_measure_lanes(const drape_elements *el, const int32_t *elemen
 DRAPE_API void drape_measure_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                    const double *internal, double *q, double *dq, double *ddq,
                                    drape_measure_lanes *lanes);
+
+/* Implements the function measure of a term by its parts, for a range of any length. */
+typedef void drape_part_lanes(const drape_elements *el, const int32_t *part, const double *x,
+                              const double *internal, double *s, double *ds, double *dds);
+DRAPE_API void drape_part_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                                const double *internal, double *q, double *dq, double *ddq,
+                                drape_part_lanes *part);
 
 /* For terms with pair: the vector d (3 x count) between the two nodes of each element and their distance l
  * (count). */

@@ -11,7 +11,7 @@ _Static_assert(LANES == DRAPE_LANES, "terms with lanes fill one vector");
 
 /* ---- Forces on measures ---- */
 
-static bool has_rates(const drape_term *term)
+bool drape_block_has_rates(const drape_term *term)
 {
     return term->law_count > 0 || term->damping;
 }
@@ -84,10 +84,22 @@ static void weigh(const drape_term *term, const drape_request *want, drape_block
 }
 
 /* Whether the Hessian has the part df/dq' dq (ddq v)', which is not symmetric. */
-static bool is_nonsymmetric(const drape_term *term, const drape_request *want)
+bool drape_block_is_nonsymmetric(const drape_term *term, const drape_request *want)
 {
-    return has_rates(term) && want->dissipative && !want->point->history && !want->velocity &&
+    return drape_block_has_rates(term) && want->dissipative && !want->point->history && !want->velocity &&
            !want->positive_share;
+}
+
+void drape_block_stress(const drape_term *term, const drape_request *want, drape_block *b,
+                        const double *ahead)
+{
+    if (drape_block_has_rates(term) && want->point->history)
+        rates_of_history(term, want, b);
+    sum_stresses(term, want, b);
+    if (want->stress)
+        write_stress(term, want, b, ahead);
+    if (want->hessian)
+        weigh(term, want, b);
 }
 
 /* ---- Measures of pairs ---- */
@@ -158,9 +170,9 @@ static void evaluate_pairs(const drape_term *term, const drape_request *want, dr
     term->ops->pair(&term->elements, b->first, b->count, want->point->x, b->q, compact, b->per_length);
     for (int r = 0; r < 3; r++)
         memcpy(p.d[r], compact + r * b->count, (size_t)b->count * sizeof *compact);
-    if (has_rates(term) && want->point->history)
+    if (drape_block_has_rates(term) && want->point->history)
         rates_of_history(term, want, b);
-    else if (has_rates(term))
+    else if (drape_block_has_rates(term))
         pairs_along(term, want->point->v, b, &p, b->rate);
     sum_stresses(term, want, b);
     if (want->stress)
@@ -175,7 +187,7 @@ static void evaluate_pairs(const drape_term *term, const drape_request *want, dr
         b->per_length[i] = b->of_ddq[i] = b->of_dq[i] = 0, p.d[0][i] = p.d[1][i] = p.d[2][i] = 1;
     weigh(term, want, b);
     pair_blocks(b, &p);
-    if (is_nonsymmetric(term, want))
+    if (drape_block_is_nonsymmetric(term, want))
         add_nonsymmetric_pairs(b, &p);
 }
 
@@ -312,7 +324,7 @@ static void hessians_of_measures(const drape_term *term, const drape_request *wa
     weigh(term, want, b);
     if (term->ops->positive && want->positive_share > 0 && !want->velocity)
         split_hessians(term, want, b);
-    b->mirrored = !is_nonsymmetric(term, want);
+    b->mirrored = !drape_block_is_nonsymmetric(term, want);
     if (want->velocity)
         velocity_hessians(d, b);
     else if (b->mirrored)
@@ -327,9 +339,9 @@ static void evaluate_measures(const drape_term *term, const drape_request *want,
     const int d = 3 * term->elements.nodes;
     b->stride = LANES;
     measure(term, want, b);
-    if (has_rates(term) && want->point->history)
+    if (drape_block_has_rates(term) && want->point->history)
         rates_of_history(term, want, b);
-    else if (has_rates(term))
+    else if (drape_block_has_rates(term))
         measures_along(term, want->point->v, b, b->rate);
     sum_stresses(term, want, b);
     if (want->stress)
@@ -392,7 +404,7 @@ static void project(int d, double share, double *h, double *positive)
 void drape_block_evaluate(const drape_term *term, const drape_request *want, drape_block *b)
 {
     b->pairs = term->ops->pair;
-    b->mirrored = false;
+    b->mirrored = b->flat = false;
     b->stride = 1;
     if (term->ops->pair)
         evaluate_pairs(term, want, b);

@@ -37,6 +37,7 @@ typedef struct drape_request {
 typedef struct drape_block {
     int32_t first, count;
     bool pairs, mirrored;
+    bool flat;  /* all Hessians are 0 and were not written */
     int stride; /* 1, or DRAPE_LANES: elements are interleaved */
     double energy[DRAPE_BLOCK];
     double gradient[DRAPE_BLOCK * DRAPE_MAX_ELEMENT_DOFS];
@@ -60,6 +61,17 @@ static inline size_t drape_block_start(const drape_block *b, int32_t i, int numb
         return (size_t)i * (size_t)numbers;
     return (size_t)(i - i % DRAPE_LANES) * (size_t)numbers + (size_t)(i % DRAPE_LANES);
 }
+
+/* Whether the forces on the measures of a term depend on their rates. */
+bool drape_block_has_rates(const drape_term *term);
+
+/* Whether the Hessian has the part df/dq' dq (ddq v)', which is not symmetric. */
+bool drape_block_is_nonsymmetric(const drape_term *term, const drape_request *want);
+
+/* From b->q and, in continuous time, b->rate: the forces on the measures, their energies, their stresses at
+ * measures changed by `ahead`, and the weights in the Hessian, as wanted. */
+void drape_block_stress(const drape_term *term, const drape_request *want, drape_block *b,
+                        const double *ahead);
 
 /* The caller sets b->first and b->count. */
 void drape_block_evaluate(const drape_term *term, const drape_request *want, drape_block *b);

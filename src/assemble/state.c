@@ -20,7 +20,7 @@ drape_status drape_state_create(drape_arena *arena, const drape_model *model, dr
     for (int32_t i = 0; i < model->term_count; i++) {
         const drape_term *term = &model->terms[i];
         if (term->ops->initial)
-            term->ops->initial(&term->elements, 0, term->elements.count, model->rest,
+            term->ops->initial(&term->elements, 0, drape_term_pieces(term).count, model->rest,
                                state->internal + term->first_internal);
     }
     return DRAPE_OK;
@@ -31,7 +31,7 @@ void drape_state_commit(const drape_model *model, const drape_state *before, dra
     for (int32_t i = 0; i < model->term_count; i++) {
         const drape_term *term = &model->terms[i];
         if (term->ops->commit)
-            term->ops->commit(&term->elements, 0, term->elements.count, after->x,
+            term->ops->commit(&term->elements, 0, drape_term_pieces(term).count, after->x,
                               before->internal + term->first_internal,
                               after->internal + term->first_internal);
     }

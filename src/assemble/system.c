@@ -261,13 +261,12 @@ static drape_status place_terms(drape_system *system)
     drape_arena *arena = &system->extension;
     system->blocks = drape_arena_take(arena, (size_t)model->term_count, sizeof *system->blocks);
     for (int32_t i = 0; system->blocks && i < model->term_count; i++) {
-        if (!drape_term_couples(&model->terms[i]))
+        const drape_term *term = &model->terms[i];
+        if (!drape_term_couples(term))
             continue;
-        const drape_coupling coupling = drape_term_coupling(&model->terms[i]);
-        const size_t places = (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes);
-        system->blocks[i] = drape_arena_take(arena, places, sizeof **system->blocks);
+        system->blocks[i] = drape_arena_take(arena, drape_term_places(term), sizeof **system->blocks);
         if (system->blocks[i])
-            drape_pattern_place(&system->extended, model->free_of_node, &coupling, system->blocks[i]);
+            drape_term_place(term, &system->extended, model->free_of_node, system->blocks[i]);
     }
     return drape_arena_status(arena);
 }
@@ -528,11 +527,8 @@ void drape_system_measures(drape_system *system, const drape_point *point, doubl
 {
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
-        if (!term->ops->measure)
-            continue;
-        const double *internal = term->first_internal >= 0 ? point->internal + term->first_internal : NULL;
-        term->ops->measure(&term->elements, 0, term->elements.count, point->x, internal,
-                           q + term->first_measure, NULL, NULL);
+        if (term->ops->measure)
+            drape_summer_measure(system->summer, term, point, q + term->first_measure);
     }
 }
 

@@ -4,12 +4,10 @@
 
 static drape_status place_term(drape_model *model, drape_term *term)
 {
-    const drape_coupling coupling = drape_term_coupling(term);
-    size_t places = (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes);
-    term->block = drape_arena_take(&model->arena, places, sizeof *term->block);
+    term->block = drape_arena_take(&model->arena, drape_term_places(term), sizeof *term->block);
     if (!term->block)
         return DRAPE_E_MEMORY;
-    drape_pattern_place(&model->pattern, model->free_of_node, &coupling, term->block);
+    drape_term_place(term, &model->pattern, model->free_of_node, term->block);
     return DRAPE_OK;
 }
 

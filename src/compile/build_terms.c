@@ -1,22 +1,11 @@
 /* build_terms.c: finds the terms of each cloth by name, resolves their parameters, has them build their
  * elements, and connects laws to the measures of their cloth. */
-#include "compile/stages.h"
+#include "compile/term_builder.h"
 #include "terms/terms.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-
-struct drape_term_builder {
-    drape_model *model;
-    drape_term *term;
-    const char *pointer;
-    int32_t first_node, node_count;
-    bool reserved; /* the term has announced its elements */
-    int32_t *node; /* the arrays of elements.node and elements.rest, writable; node -1: not set yet */
-    double *rest;
-    bool strayed; /* the term set an element outside the range that it announced */
-};
 
 drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count)
 {
@@ -138,7 +127,7 @@ static drape_status check_elements(drape_term_builder *builder)
             return drape_term_refuse(builder, "element %zu of %s has node %d; the cloth's are 0 to %d",
                                      i / (size_t)el->nodes, builder->term->ops->entry.name,
                                      (int)(el->node[i] - first), (int)(last - first));
-    return DRAPE_OK;
+    return drape_term_finish_parts(builder);
 }
 
 static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_term_ops *ops,
@@ -252,7 +241,7 @@ static void number_elements(drape_model *model, drape_term *term)
 {
     if (term->ops->has_internal) {
         term->first_internal = model->internal_count;
-        model->internal_count += (int64_t)term->elements.count * drape_term_internals(term);
+        model->internal_count += drape_term_internals(term);
     }
     if (term->ops->measure) {
         term->first_measure = model->measure_count;
@@ -313,7 +302,9 @@ static bool well_formed(const drape_term_ops *ops)
         ops->law ? ops->nodes == 0 : ops->nodes >= 1 && ops->nodes <= DRAPE_MAX_ELEMENT_NODES && ops->build;
     bool internal = !ops->has_internal || (ops->commit && ops->initial);
     return ops->entry.name && ops->entry.summary && ops->entry.reference && ops->element_name && kinds == 1 &&
-           sized && internal && (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
+           sized && internal && (!ops->part || (ops->measure && ops->part_nodes >= 1 &&
+                                                ops->part_nodes <= DRAPE_MAX_ELEMENT_NODES)) &&
+           (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
            drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }
 
@@ -339,7 +330,8 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
             "the ops of term \"%s\" are not well formed: name, summary, reference, "
             "element_name, exactly one of measure, "
             "energy, dissipation, law; nodes 1 to %d and build but for a law; commit and "
-            "initial with has_internal; damped with a measure alone, in_medium with a dissipation; "
+            "initial with has_internal; damped with a measure alone, in_medium with a dissipation; part with "
+            "a measure and part_nodes; "
             "at most %d values of parameters, each with name and unit, a choice with choices",
             ops->entry.name ? ops->entry.name : "?", DRAPE_MAX_ELEMENT_NODES, DRAPE_MAX_PARAMS);
     if (drape_registry_find(&drape_term_registry, ctx, ops->entry.name) >= 0)

@@ -7,13 +7,25 @@
 #include "mesh/mesh.h"
 #include "sparse/pattern.h"
 
+/* The patches of a term with parts: runs of consecutive elements with the same nodes. */
+typedef struct drape_patches {
+    int32_t count;  /* 0: the term has no parts */
+    int32_t *first; /* (count + 1) the elements of patch i are first[i] ... first[i + 1] - 1 */
+    int32_t *node;  /* (count x elements.nodes) */
+    uint8_t *used;  /* (count) the nodes from that number on belong to no part */
+    int32_t *coupled; /* (elements.count x elements.nodes) the nodes of the parts of each element, and copies
+                         of one of them */
+} drape_patches;
+
 /* One term on one cloth. */
 typedef struct drape_term {
     const drape_term_ops *ops;
     int32_t cloth;
     double params[DRAPE_MAX_PARAMS];
     drape_elements elements; /* with node numbers of the whole model */
-    int32_t *block; /* (count x nodes x nodes) block of each node pair in the pattern, -1: pinned; NULL: no
+    drape_parts parts;       /* elements.parts points here if the term has parts */
+    drape_patches patches;
+    int32_t *block; /* (drape_term_places) block of each node pair in the pattern, -1: pinned; NULL: no
                        sparsity */
     bool anchored;  /* its elements are attached to fixed directions in space */
     int64_t first_internal;               /* index of its internal variables in a state; -1: none */
@@ -29,16 +41,55 @@ static inline bool drape_term_couples(const drape_term *term)
     return !term->ops->law && !term->ops->linear && term->elements.count > 0;
 }
 
-/* Internal variables per element. */
-static inline int drape_term_internals(const drape_term *term)
+/* The number of the term's internal variables: some for each part or, if it has no parts, each element. */
+static inline int64_t drape_term_internals(const drape_term *term)
 {
-    return term->ops->internal_count > 0 ? term->ops->internal_count : term->ops->has_internal;
+    const int64_t each = term->ops->internal_count > 0 ? term->ops->internal_count : term->ops->has_internal;
+    return each * (term->elements.parts ? term->parts.count : term->elements.count);
 }
 
+/* The nodes that elements couple. */
 static inline drape_coupling drape_term_coupling(const drape_term *term)
 {
-    return (drape_coupling){
-        .count = term->elements.count, .nodes = term->elements.nodes, .node = term->elements.node};
+    const drape_elements *el = &term->elements;
+    return (drape_coupling){.count = el->count,
+                            .nodes = el->nodes,
+                            .node = el->parts ? term->patches.coupled : el->node};
+}
+
+/* The nodes of patches, not all of which are coupled; none without parts. */
+static inline drape_coupling drape_term_patches(const drape_term *term)
+{
+    return (drape_coupling){term->patches.count, term->elements.nodes, term->patches.node};
+}
+
+/* The nodes of what is evaluated one by one: the parts or, if there are none, the elements. */
+static inline drape_coupling drape_term_pieces(const drape_term *term)
+{
+    return term->elements.parts ? (drape_coupling){term->parts.count, term->parts.nodes, term->parts.node}
+                                : drape_term_coupling(term);
+}
+
+/* The number of pairs of nodes of all pieces, followed by those of all patches if there are parts. */
+static inline size_t drape_term_piece_places(const drape_term *term)
+{
+    const drape_coupling c = drape_term_pieces(term);
+    return (size_t)c.count * (size_t)(c.nodes * c.nodes);
+}
+
+static inline size_t drape_term_places(const drape_term *term)
+{
+    const size_t patches = (size_t)term->patches.count * (size_t)(term->elements.nodes * term->elements.nodes);
+    return drape_term_piece_places(term) + patches;
+}
+
+/* Writes the block of each of these pairs in a pattern. */
+static inline void drape_term_place(const drape_term *term, const drape_pattern *pattern,
+                                    const int32_t *free_of_node, int32_t *block)
+{
+    const drape_coupling pieces = drape_term_pieces(term), patches = drape_term_patches(term);
+    drape_pattern_place(pattern, free_of_node, &pieces, block);
+    drape_pattern_place(pattern, free_of_node, &patches, block + drape_term_piece_places(term));
 }
 
 /* An entry chosen by name, with the settings that the scene gave. */

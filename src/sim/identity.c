@@ -68,6 +68,17 @@ static uint64_t add_term(uint64_t hash, const drape_term *term)
     hash = add_doubles(hash, term->params, DRAPE_MAX_PARAMS);
     hash = add(hash, el->node, count * (size_t)el->nodes * sizeof *el->node);
     hash = add_doubles(hash, el->rest, count * (size_t)el->rest_count);
+    if (el->parts) {
+        const drape_parts *p = el->parts;
+        const int64_t counts[] = {p->count, p->nodes, p->rest_count, p->link_count};
+        const size_t links = (size_t)p->link_count;
+        hash = add(hash, counts, sizeof counts);
+        hash = add(hash, p->node, (size_t)p->count * (size_t)p->nodes * sizeof *p->node);
+        hash = add_doubles(hash, p->rest, (size_t)p->count * (size_t)p->rest_count);
+        hash = add(hash, p->element, links * sizeof *p->element);
+        hash = add(hash, p->part, links * sizeof *p->part);
+        hash = add_doubles(hash, p->weight, links);
+    }
     return add_doubles(hash, term->damping, term->damping ? count : 0);
 }
 

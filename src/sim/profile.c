@@ -145,10 +145,9 @@ static double shortest(bench *s, void (*call)(bench *s))
 /* The entries of the Jacobian that a term couples. seen: one mark for each block of the pattern. */
 static int64_t count_nonzeros(const drape_term *term, unsigned char *seen, size_t blocks)
 {
-    const drape_elements *el = &term->elements;
     int64_t count = 0;
     memset(seen, 0, blocks);
-    for (size_t i = 0; term->block && i < (size_t)el->count * (size_t)(el->nodes * el->nodes); i++) {
+    for (size_t i = 0; term->block && i < drape_term_places(term); i++) {
         int32_t block = term->block[i];
         if (block >= 0 && !seen[block]) {
             seen[block] = 1;
@@ -161,13 +160,19 @@ static int64_t count_nonzeros(const drape_term *term, unsigned char *seen, size_
 static size_t term_bytes(const drape_term *term)
 {
     const drape_elements *el = &term->elements;
-    size_t nodes = (size_t)el->nodes,
-           one = nodes * sizeof *el->node + (size_t)el->rest_count * sizeof *el->rest;
+    const drape_parts *p = el->parts;
+    size_t bytes = (size_t)el->count *
+                   ((size_t)el->nodes * sizeof *el->node + (size_t)el->rest_count * sizeof *el->rest);
+    if (p)
+        bytes += (size_t)p->count *
+                     ((size_t)p->nodes * sizeof *p->node + (size_t)p->rest_count * sizeof *p->rest) +
+                 (size_t)p->link_count * (3 * sizeof *p->part + sizeof *p->weight + (size_t)p->nodes) +
+                 (size_t)(term->patches.count + el->count) * (size_t)el->nodes * sizeof *term->patches.node;
     if (term->block)
-        one += nodes * nodes * sizeof *term->block;
+        bytes += drape_term_places(term) * sizeof *term->block;
     if (term->first_internal >= 0)
-        one += 2 * sizeof(double); /* in both states */
-    return (size_t)el->count * one;
+        bytes += 2 * (size_t)drape_term_internals(term) * sizeof(double); /* in both states */
+    return bytes;
 }
 
 static int64_t count_measures(const drape_model *model, int32_t cloth)

@@ -173,6 +173,14 @@ bool drape_pattern_has(const drape_pattern *pattern, int32_t row, int32_t column
     return pattern->block_row[search_column(pattern, row, column)] == row;
 }
 
+static int32_t place_of(const drape_pattern *pattern, int32_t row, int32_t column)
+{
+    if (row < 0 || column < 0)
+        return -1;
+    const int32_t block = search_column(pattern, row, column);
+    return pattern->block_row[block] == row ? block : -1;
+}
+
 void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_node,
                          const drape_coupling *coupling, int32_t *block)
 {
@@ -180,7 +188,7 @@ void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_n
         const int32_t *node = coupling->node + (size_t)e * (size_t)coupling->nodes;
         for (int a = 0; a < coupling->nodes; a++)
             for (int b = 0; b < coupling->nodes; b++)
-                *block++ = drape_pattern_find(pattern, block_of_node[node[a]], block_of_node[node[b]]);
+                *block++ = place_of(pattern, block_of_node[node[a]], block_of_node[node[b]]);
     }
 }
 

@@ -38,7 +38,8 @@ drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const 
 int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column);
 bool drape_pattern_has(const drape_pattern *pattern, int32_t row, int32_t column); /* both must be >= 0 */
 
-/* Writes the block of each pair of nodes of each element, row by row: block (count x nodes x nodes). */
+/* Writes the block of each pair of nodes of each element, row by row: block (count x nodes x nodes); -1 if it
+ * is not in the pattern. */
 void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_node,
                          const drape_coupling *coupling, int32_t *block);
 

@@ -24,13 +24,9 @@
 
 #include "base/lanes_atan2.h"
 
-/* For hinges that are not in lanes: x (count x 12), theta (count), g (count x 12), h (count x 12 x 12,
- * symmetric); g and h may be NULL. count: 1 to LANES. */
-void drape_dihedrals(int count, const double *x, double *theta, double *g, double *h);
-
-/* If x3 is (x0 + x1)/2 plus a constant: adds half of its derivatives to those by x0 and by x1. Afterwards the
- * first 9 numbers of g and the first 9 x 9 of h (12 x 12) are the derivatives by x0, x1 and x2. */
-void drape_dihedral_tie(double *g, double *h);
+/* If x3 of the hinge in a lane is (x0 + x1)/2 plus a constant: makes the derivatives that the functions below
+ * write, ds (12) and dds (12 x 12), those by x0, x1 and x2, with zeros for x3. Either may be NULL. */
+void drape_dihedral_tie(int lane, double *ds, double *dds);
 
 /* angle + 2 pi k for the integer k that brings it nearest to reference; the angle itself if reference is not
  * finite. */

@@ -71,12 +71,13 @@ static int32_t beyond(const drape_cloth_view *cloth, int32_t triangle, int32_t a
 }
 
 /* Adds the apex beyond hinge h: its node, its place in the plane, and whether the hinge is open. */
-static int32_t add_beyond(patch *p, int32_t triangle, int h, int32_t *edge)
+static int32_t add_beyond(patch *p, int32_t triangle, int h)
 {
     const int *local = drape_midedge_hinge[h];
-    int32_t *node = p->out->node;
+    int32_t *node = p->out->node, *edge = &p->out->edge[h];
     const int32_t other = beyond(p->cloth, triangle, node[local[0]], node[local[1]], edge, &node[local[3]]);
     p->open[h] = other >= 0 && !p->cloth->edge_clamped[*edge];
+    p->out->turned[h] = p->cloth->edge_triangle[2 * (size_t)*edge] != triangle;
     if (other < 0)
         return other;
     const double *a = p->cloth->rest + 3 * (size_t)node[local[0]],
@@ -96,12 +97,11 @@ static int32_t add_beyond(patch *p, int32_t triangle, int h, int32_t *edge)
 static void find_neighbours(patch *p)
 {
     for (int i = 0; i < 3; i++) {
-        int32_t edge, outer;
-        p->beyond[i] = add_beyond(p, p->triangle, i, &edge);
-        p->out->clamped[i] = p->cloth->edge_clamped[edge];
+        p->beyond[i] = add_beyond(p, p->triangle, i);
+        p->out->clamped[i] = p->cloth->edge_clamped[p->out->edge[i]];
         p->out->free[i] = p->beyond[i] < 0 && !p->out->clamped[i];
         for (int k = 3 + 2 * i; k < 5 + 2 * i && p->beyond[i] >= 0; k++)
-            add_beyond(p, p->beyond[i], k, &outer);
+            add_beyond(p, p->beyond[i], k);
     }
 }
 
@@ -261,10 +261,8 @@ static void make_squares(patch *p, const double law[9])
     for (int r = 0; r < out->rank; r++) {
         const double *l = out->l + 3 * r;
         out->k[r] *= area;
-        for (int j = 0; j < MIDEDGE_HINGES; j++) {
+        for (int j = 0; j < MIDEDGE_HINGES; j++)
             out->c[r][j] = l[0] * b[3 * j] + l[1] * b[3 * j + 1] + l[2] * b[3 * j + 2];
-            out->wide = out->wide || (j > 2 && out->c[r][j] != 0);
-        }
     }
 }
 
@@ -277,6 +275,8 @@ bool drape_midedge_of(const drape_cloth_view *cloth, int32_t triangle, const dou
     memset(out, 0, sizeof *out);
     for (int k = 0; k < MIDEDGE_NODES; k++)
         out->node[k] = k < 3 ? cloth->triangle[3 * (size_t)triangle + (size_t)k] : -1;
+    for (int h = 0; h < MIDEDGE_HINGES; h++)
+        out->edge[h] = -1;
     for (int k = 0; k < 3; k++)
         corner[k] = cloth->rest + 3 * (size_t)out->node[k];
     if (!drape_orthotropic_frame(values, corner, law, axes, p.flat))

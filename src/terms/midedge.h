@@ -10,15 +10,16 @@
 
 #include "drape/extend.h"
 
-enum { MIDEDGE_NODES = 12, MIDEDGE_NEAR = 6, MIDEDGE_HINGES = 9 };
+enum { MIDEDGE_NODES = 12, MIDEDGE_HINGES = 9 };
 
 /* Local nodes of each hinge: x0 x1 the edge, x2 the inner apex, x3 the outer one. */
 extern const int drape_midedge_hinge[MIDEDGE_HINGES][4];
 
 typedef struct drape_midedge {
     int32_t node[MIDEDGE_NODES]; /* local to the cloth; -1: there is none */
-    bool clamped[3], free[3];    /* own edges: with a fixed normal; on the boundary and not clamped */
-    bool wide;                   /* some c of hinges other than the own is not 0 */
+    int32_t edge[MIDEDGE_HINGES]; /* of each hinge, -1: there is none */
+    bool turned[MIDEDGE_HINGES];  /* the inner triangle of the hinge is the second one beside its edge */
+    bool clamped[3], free[3];     /* own edges: with a fixed normal; on the boundary and not clamped */
     int rank;                    /* number of squares in the energy: 3 less the free edges */
     /* E = 1/2 sum k (q - q0)^2 [J], q = l . K = sum c theta; theta of a clamped edge is the angle to its
      * direction. */

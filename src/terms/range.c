@@ -2,6 +2,7 @@
 #include "terms/terms.h"
 
 #include <math.h>
+#include <string.h>
 
 void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, const double *x, double *e,
                         double *g, double *hess, drape_element_energy *one)
@@ -45,6 +46,53 @@ void drape_measure_range(const drape_elements *el, int32_t first, int32_t count,
             dq[(size_t)i * (size_t)d + (size_t)k] = dq4[DRAPE_LANES * k + l];
         if (ddq)
             take_hessian(d, ddq4 + l, ddq + (size_t)i * (size_t)(d * d));
+    }
+}
+
+/* Adds weight times the derivatives of the part in lane l by its nodes to those of an element. */
+static void add_part(const drape_elements *el, int32_t link, int l, const double *ds, const double *dds,
+                     double *dq, double *ddq)
+{
+    const drape_parts *parts = el->parts;
+    const uint8_t *place = parts->place + (size_t)link * (size_t)parts->nodes;
+    const double weight = parts->weight[link];
+    const int n = 3 * parts->nodes, d = 3 * el->nodes;
+    for (int i = 0; i < n; i++) {
+        const int row = 3 * place[i / 3] + i % 3;
+        if (dq)
+            dq[row] += weight * ds[DRAPE_LANES * i + l];
+        for (int j = 0; ddq && j < n; j++)
+            ddq[d * row + 3 * place[j / 3] + j % 3] +=
+                weight * dds[DRAPE_LANES * (i / 3 >= j / 3 ? n * i + j : n * j + i) + l];
+    }
+}
+
+void drape_part_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                      const double *internal, double *q, double *dq, double *ddq, drape_part_lanes *part)
+{
+    const drape_parts *parts = el->parts;
+    const size_t d = 3 * (size_t)el->nodes;
+    double s[DRAPE_LANES], ds[DRAPE_LANES * DRAPE_MAX_ELEMENT_DOFS],
+        dds[DRAPE_LANES * DRAPE_MAX_ELEMENT_DOFS * DRAPE_MAX_ELEMENT_DOFS];
+    if (dq)
+        memset(dq, 0, (size_t)count * d * sizeof *dq);
+    if (ddq)
+        memset(ddq, 0, (size_t)count * d * d * sizeof *ddq);
+    for (int32_t i = 0; i < count; i++) {
+        const int32_t end = parts->first_link[first + i + 1];
+        q[i] = 0;
+        for (int32_t link = parts->first_link[first + i]; link < end; link += DRAPE_LANES) {
+            int32_t number[DRAPE_LANES];
+            for (int32_t l = 0; l < DRAPE_LANES; l++)
+                number[l] = parts->part[link + l < end ? link + l : end - 1];
+            part(el, number, x, internal, s, dq ? ds : NULL, ddq ? dds : NULL);
+            for (int32_t l = 0; l < DRAPE_LANES && link + l < end; l++) {
+                q[i] += parts->weight[link + l] * s[l];
+                if (dq || ddq)
+                    add_part(el, link + l, l, ds, dds, dq ? dq + (size_t)i * d : NULL,
+                             ddq ? ddq + (size_t)i * d * d : NULL);
+            }
+        }
     }
 }
 

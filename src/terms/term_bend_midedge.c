@@ -3,16 +3,17 @@
  * operator with normals at the middles of its edges (midedge.h), C the law of orthotropic.h.
  *
  * C = sum k l l', so E = 1/2 sum k (q - q0)^2 with q = l . K = sum c theta over at most nine hinges. Each
- * square is an element: three per triangle, less one for each free edge. Elements have 12 nodes, or 6 if no
- * triangle needs hinges other than its own, as on lattices. A hinge whose c is 0 is left out, and its nodes
- * are replaced by the first node.
+ * square is an element: three per triangle, less one for each free edge. A hinge, which up to 24 squares
+ * measure, is a part that they share. The nodes of an element are those of all hinges that the squares of its
+ * triangle measure: six on lattices, otherwise up to twelve, followed by copies of the first.
  *
  * A clamped edge has a direction in space instead of a second triangle: x3 = (x0 + x1)/2 + r with r as at
- * rest.
+ * rest. Such a hinge belongs to one triangle, and its fourth node is a copy of the first.
  *
- * The internal variables are the nine angles in the last accepted state: each angle is taken on the branch
+ * The internal variable of a part is its angle in the last accepted state: each angle is taken on the branch
  * nearest to it.
  */
+#include "base/lanes.h"
 #include "base/reason.h"
 #include "base/vec3.h"
 #include "terms/dihedral.h"
@@ -41,12 +42,9 @@ enum {
     REST_K,
     REST_Q0,
     REST_ALTITUDE, /* smallest of the triangle [m] */
-    REST_C,
-    REST_COUNT = REST_C + MIDEDGE_HINGES,
-    REST_CLAMP =
-        REST_COUNT, /* r of each own edge, 0 if it is not clamped; only if some edge of the cloth is */
-    REST_COUNT_CLAMPED = REST_CLAMP + 9
+    REST_COUNT
 };
+enum { CLAMP_COUNT = 3 }; /* rest data of a part if some edge is clamped: r, 0 if it is not this one */
 
 static const char *const rest_choices[] = {"mesh", "flat", NULL};
 
@@ -67,122 +65,133 @@ static const drape_param params[LIST_COUNT] = {
                      "a step that turns a hinge by more is rejected: near pi its angle is ambiguous"),
 };
 
-/* r of an own edge; false if it is not clamped. */
-static bool clamp_of(const drape_elements *el, int32_t element, int hinge, double r[3])
+/* x3 of the parts that are clamped. Returns the lanes in which they are, as bits. */
+LANES_INLINE int place_clamps(const drape_parts *parts, const int32_t *part, lanes corner[4][3])
 {
-    if (el->rest_count == REST_COUNT || hinge > 2)
-        return false;
-    for (int i = 0; i < 3; i++)
-        r[i] = drape_rest_of(el, REST_CLAMP + 3 * hinge + i, element);
-    return vec3_dot(r, r) > 0;
-}
-
-/* Up to LANES hinges of an element: their numbers, their nodes (3 if clamped, else 4), and their angles with
- * derivatives by these nodes. */
-typedef struct hinges {
-    int count, number[LANES], nodes[LANES];
-    double theta[LANES], g[12 * LANES], h[144 * LANES];
-} hinges;
-
-/* Gathers the corners of a hinge; returns the number of its nodes. */
-static int corners_of(const drape_elements *el, int32_t element, int hinge, const double *x, double at[12])
-{
-    const int32_t *node = el->node + (size_t)element * (size_t)el->nodes;
-    const int *local = drape_midedge_hinge[hinge];
-    double r[3];
-    const int nodes = clamp_of(el, element, hinge, r) ? 3 : 4;
-    for (int a = 0; a < nodes; a++)
-        memcpy(at + 3 * a, x + 3 * (size_t)node[local[a]], 3 * sizeof *at);
-    for (int i = 0; nodes == 3 && i < 3; i++)
-        at[9 + i] = (at[i] + at[3 + i]) / 2 + r[i];
-    return nodes;
-}
-
-/* Measures hinges from number `from` on, leaving out those whose c is 0, with first and second derivatives if
- * wanted; returns the number to continue with. */
-static int measure_hinges(const drape_elements *el, int32_t element, int from, const double *x, bool first,
-                          bool second, hinges *s)
-{
-    double at[12 * LANES];
-    s->count = 0;
-    for (; from < MIDEDGE_HINGES && s->count < LANES; from++) {
-        if (drape_rest_of(el, REST_C + from, element) == 0)
+    int clamped = 0;
+    for (int l = 0; l < LANES; l++) {
+        const double *r = parts->rest + part[l];
+        const size_t next = (size_t)parts->count;
+        if (r[0] == 0 && r[next] == 0 && r[2 * next] == 0)
             continue;
-        s->number[s->count] = from;
-        s->nodes[s->count] = corners_of(el, element, from, x, at + 12 * s->count);
-        s->count++;
+        clamped |= 1 << l;
+        for (int i = 0; i < 3; i++)
+            corner[3][i][l] = (corner[0][i][l] + corner[1][i][l]) / 2 + r[(size_t)i * next];
     }
-    if (s->count > 0)
-        drape_dihedrals(s->count, at, s->theta, first ? s->g : NULL, second ? s->h : NULL);
-    for (int i = 0; i < s->count; i++)
-        if (s->nodes[i] == 3)
-            drape_dihedral_tie(first ? s->g + 12 * i : NULL, second ? s->h + 144 * i : NULL);
-    return from;
+    return clamped;
 }
 
-/* Adds c times the derivatives of hinge i. d: length of a gradient. */
-static void add_hinge(const hinges *s, int i, double c, int d, double *dq, double *ddq)
+LANES_DISPATCH static void measure_angles(const drape_elements *el, const int32_t *part, const double *x,
+                                          const double *internal, double *s, double *ds, double *dds)
 {
-    const int *local = drape_midedge_hinge[s->number[i]];
-    for (int k = 0; dq && k < 3 * s->nodes[i]; k++)
-        dq[3 * local[k / 3] + k % 3] += c * s->g[12 * i + k];
-    for (int k = 0; ddq && k < 3 * s->nodes[i]; k++)
-        for (int j = 0; j < 3 * s->nodes[i]; j++)
-            ddq[d * (3 * local[k / 3] + k % 3) + 3 * local[j / 3] + j % 3] += c * s->h[144 * i + 12 * k + j];
-}
-
-static void measure_one(const drape_elements *el, int32_t element, const double *x, const double *before,
-                        double *q, double *dq, double *ddq)
-{
-    const int d = 3 * el->nodes;
-    hinges s;
-    *q = 0;
-    if (dq)
-        memset(dq, 0, (size_t)d * sizeof *dq);
-    if (ddq)
-        memset(ddq, 0, (size_t)(d * d) * sizeof *ddq);
-    for (int from = 0; from < MIDEDGE_HINGES;) {
-        from = measure_hinges(el, element, from, x, dq != NULL, ddq != NULL, &s);
-        for (int i = 0; i < s.count; i++) {
-            const double c = drape_rest_of(el, REST_C + s.number[i], element);
-            *q += c * drape_nearest_branch(s.theta[i], before[s.number[i]]);
-            add_hinge(&s, i, c, d, dq, ddq);
-        }
+    const drape_parts *parts = el->parts;
+    drape_dihedral_lanes h;
+    lanes corner[4][3];
+    int clamped = 0;
+    for (int a = 0; a < 4; a++) {
+        int32_t node[LANES];
+        for (int l = 0; l < LANES; l++)
+            node[l] = parts->node[4 * (size_t)part[l] + (size_t)a];
+        lanes_gather(x, node, corner[a]);
     }
+    if (parts->rest_count == CLAMP_COUNT)
+        clamped = place_clamps(parts, part, corner);
+    drape_dihedral_measure(corner, &h);
+    for (int l = 0; l < LANES; l++)
+        s[l] = drape_nearest_branch(h.theta[l], internal[part[l]]);
+    if (ds)
+        drape_dihedral_gradient(&h, ds);
+    if (dds)
+        drape_dihedral_hessian(&h, dds);
+    for (int l = 0; clamped && l < LANES; l++)
+        if (clamped >> l & 1)
+            drape_dihedral_tie(l, ds, dds);
 }
 
 static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
                     const double *internal, double *q, double *dq, double *ddq)
 {
-    const size_t d = 3 * (size_t)el->nodes;
-    for (int32_t i = 0; i < count; i++)
-        measure_one(el, first + i, x, internal + MIDEDGE_HINGES * (size_t)(first + i), q + i,
-                    dq ? dq + d * (size_t)i : NULL, ddq ? ddq + d * d * (size_t)i : NULL);
+    drape_part_range(el, first, count, x, internal, q, dq, ddq, measure_angles);
 }
 
 /* ---- Building ---- */
 
-/* Counts elements, their nodes and rest values, and reserves them. */
+/* The sizes of the term on a cloth. */
+typedef struct sizes {
+    int64_t squares, links, parts;
+    int nodes; /* per element */
+} sizes;
+
+/* Whether a hinge of the patch is in one of its squares. */
+static bool is_linked(const drape_midedge *patch, int h)
+{
+    for (int r = 0; r < patch->rank; r++)
+        if (patch->c[r][h] != 0)
+            return true;
+    return false;
+}
+
+/* The nodes of part h: those of the hinge in the order of the first triangle beside its edge, so that they are
+ * the same from all triangles around, or of a clamped one, its edge, its apex and again the first. */
+static void part_nodes(const drape_midedge *patch, int h, int32_t node[4])
+{
+    const int *local = drape_midedge_hinge[h];
+    const int turn = patch->turned[h] && !(h < 3 && patch->clamped[h]);
+    for (int a = 0; a < 4; a++)
+        node[a] = patch->node[local[a ^ turn]];
+    if (h < 3 && patch->clamped[h])
+        node[3] = node[0];
+}
+
+/* The nodes of the squares of a patch, without copies; returns their number. */
+static int gather_nodes(const drape_midedge *patch, int32_t node[MIDEDGE_NODES])
+{
+    int count = 3;
+    memcpy(node, patch->node, 3 * sizeof *node);
+    for (int h = 0; h < MIDEDGE_HINGES; h++) {
+        int32_t of[4];
+        if (!is_linked(patch, h))
+            continue;
+        part_nodes(patch, h, of);
+        for (int a = 0; a < 4; a++) {
+            int b = 0;
+            while (b < count && node[b] != of[a])
+                b++;
+            if (b == count)
+                node[count++] = of[a];
+        }
+    }
+    return count;
+}
+
+/* Counts, and reserves elements and parts: the hinges of the cloth, then the clamped edges of its triangles. */
 static drape_status reserve(const drape_cloth_view *cloth, const double *values, const double law[9],
                             drape_term_builder *builder)
 {
-    int64_t count = 0;
-    bool wide = false, clamped = false;
+    sizes n = {.parts = cloth->hinge_count, .nodes = 3};
     drape_midedge patch;
     for (int32_t t = 0; t < cloth->triangle_count; t++) {
+        int32_t node[MIDEDGE_NODES];
         if (!drape_midedge_of(cloth, t, values, law, &patch))
             return drape_orthotropic_refuse(builder, t);
-        count += patch.rank;
-        wide = wide || patch.wide;
-        clamped = clamped || patch.clamped[0] || patch.clamped[1] || patch.clamped[2];
+        const int nodes = gather_nodes(&patch, node);
+        n.nodes = nodes > n.nodes ? nodes : n.nodes;
+        n.squares += patch.rank;
+        n.parts += patch.clamped[0] + patch.clamped[1] + patch.clamped[2];
+        for (int r = 0; r < patch.rank; r++)
+            for (int h = 0; h < MIDEDGE_HINGES; h++)
+                n.links += patch.c[r][h] != 0;
     }
-    if (count > INT32_MAX)
-        return drape_term_refuse(builder, "the mesh is too large: %.0f elements; at most %d", (double)count,
-                                 INT32_MAX);
+    if (n.links > INT32_MAX || n.parts > INT32_MAX)
+        return drape_term_refuse(builder, "the mesh is too large: %.0f angles in elements; at most %d",
+                                 (double)n.links, INT32_MAX);
+    const bool clamped = n.parts > cloth->hinge_count;
     if (clamped)
         drape_term_anchor(builder);
-    return drape_term_reserve_nodes(builder, (int32_t)count, wide ? MIDEDGE_NODES : MIDEDGE_NEAR,
-                                    clamped ? REST_COUNT_CLAMPED : REST_COUNT);
+    drape_status status = drape_term_reserve_nodes(builder, (int32_t)n.squares, n.nodes, REST_COUNT);
+    return status ? status
+                  : drape_term_reserve_parts(builder, (int32_t)n.parts, (int32_t)n.links,
+                                             clamped ? CLAMP_COUNT : 0);
 }
 
 static double min_altitude(const double *x0, const double *x1, const double *x2)
@@ -195,39 +204,64 @@ static double min_altitude(const double *x0, const double *x1, const double *x2)
     return vec3_norm(n) / sqrt(fmax(vec3_dot(a, a), fmax(vec3_dot(b, b), vec3_dot(c, c))));
 }
 
-/* r of clamped edges: in the plane of the triangle, from the middle of the edge away from it. */
-static void set_clamps(const drape_cloth_view *cloth, const drape_midedge *patch, double *rest)
+/* r of a clamped edge: in the plane of the triangle, from the middle of the edge away from it. */
+static void clamp_of(const drape_cloth_view *cloth, const drape_midedge *patch, int h, double r[3])
 {
-    for (int i = 0; i < 3; i++) {
-        const double *a = cloth->rest + 3 * (size_t)patch->node[i],
-                     *b = cloth->rest + 3 * (size_t)patch->node[(i + 1) % 3];
-        const double *apex = cloth->rest + 3 * (size_t)patch->node[(i + 2) % 3];
-        for (int k = 0; patch->clamped[i] && k < 3; k++)
-            rest[3 * i + k] = (a[k] + b[k]) / 2 - apex[k];
+    const double *a = cloth->rest + 3 * (size_t)patch->node[h],
+                 *b = cloth->rest + 3 * (size_t)patch->node[(h + 1) % 3];
+    const double *apex = cloth->rest + 3 * (size_t)patch->node[(h + 2) % 3];
+    for (int k = 0; k < 3; k++)
+        r[k] = (a[k] + b[k]) / 2 - apex[k];
+}
+
+/* The number of the hinge at an edge, by bisection. */
+static int32_t hinge_at(const drape_cloth_view *cloth, int32_t edge)
+{
+    int32_t low = 0, high = cloth->hinge_count - 1;
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2;
+        if (cloth->hinge_edge[middle] < edge)
+            low = middle + 1;
+        else
+            high = middle;
     }
+    return low;
 }
 
-/* The nodes of the hinges of square r; for the others the first node. */
-static void set_nodes(const drape_midedge *patch, int r, int32_t node[MIDEDGE_NODES])
+/* The angle of a part at rest, by the function that steps use, so that a cloth at rest has no force to the
+ * last bit. */
+static double rest_angle(const drape_cloth_view *cloth, const int32_t node[4], const double r[3])
 {
-    for (int a = 0; a < MIDEDGE_NODES; a++)
-        node[a] = patch->node[a < 3 ? a : 0];
-    for (int h = 0; h < MIDEDGE_HINGES; h++)
-        for (int a = 0; patch->c[r][h] != 0 && a < 4; a++)
-            if (patch->node[drape_midedge_hinge[h][a]] >= 0)
-                node[drape_midedge_hinge[h][a]] = patch->node[drape_midedge_hinge[h][a]];
+    static const int32_t same[LANES] = {0};
+    static const double flat = 0;
+    const drape_parts one = {.count = 1, .nodes = 4, .rest_count = CLAMP_COUNT, .node = node, .rest = r};
+    const drape_elements el = {.parts = &one};
+    double s[LANES];
+    measure_angles(&el, same, cloth->rest, &flat, s, NULL, NULL);
+    return s[0];
 }
 
-/* q at rest, by the function that steps use, so that a cloth at rest has no force to the last bit. */
-static double rest_measure(const drape_cloth_view *cloth, const int32_t *node, const double *rest,
-                           int rest_count)
+/* Sets the parts of a patch: their numbers and angles at rest. clamps: the number of the next clamped one. */
+static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch, int32_t *clamps,
+                      drape_term_builder *builder, int32_t part[MIDEDGE_HINGES], double theta[MIDEDGE_HINGES])
 {
-    static const double flat[MIDEDGE_HINGES] = {0};
-    const drape_elements one = {
-        .count = 1, .nodes = MIDEDGE_NODES, .rest_count = rest_count, .node = node, .rest = rest};
-    double q;
-    measure_one(&one, 0, cloth->rest, flat, &q, NULL, NULL);
-    return q;
+    for (int h = 0; h < MIDEDGE_HINGES; h++) {
+        const bool clamped = h < 3 && patch->clamped[h];
+        int32_t node[4];
+        double r[CLAMP_COUNT] = {0};
+        part[h] = -1;
+        if (clamped)
+            part[h] = (*clamps)++;
+        if (!is_linked(patch, h))
+            continue;
+        part_nodes(patch, h, node);
+        if (clamped)
+            clamp_of(cloth, patch, h, r);
+        else
+            part[h] = hinge_at(cloth, patch->edge[h]);
+        theta[h] = rest_angle(cloth, node, r);
+        drape_term_set_part(builder, part[h], node, r);
+    }
 }
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
@@ -239,25 +273,30 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
                           m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio), m->poisson_ratio,
                           law);
     drape_status status = reserve(cloth, values, law, builder);
-    int32_t element = 0;
+    int32_t element = 0, clamps = cloth->hinge_count;
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
         drape_midedge patch;
+        int32_t part[MIDEDGE_HINGES], node[MIDEDGE_NODES];
+        double theta[MIDEDGE_HINGES];
         drape_midedge_of(cloth, t, values, law, &patch);
-        const int32_t *n = patch.node;
-        for (int r = 0; r < patch.rank; r++) {
+        set_parts(cloth, &patch, &clamps, builder, part, theta);
+        for (int a = gather_nodes(&patch, node); a < MIDEDGE_NODES; a++)
+            node[a] = node[0];
+        for (int r = 0; r < patch.rank; r++, element++) {
             const double *l = patch.l + 3 * r;
-            double rest[REST_COUNT_CLAMPED] = {0};
-            int32_t node[MIDEDGE_NODES];
-            rest[REST_K] = patch.k[r];
-            rest[REST_ALTITUDE] = min_altitude(cloth->rest + 3 * (size_t)n[0], cloth->rest + 3 * (size_t)n[1],
-                                               cloth->rest + 3 * (size_t)n[2]);
-            memcpy(rest + REST_C, patch.c[r], sizeof patch.c[r]);
-            set_clamps(cloth, &patch, rest + REST_CLAMP);
-            set_nodes(&patch, r, node);
-            if (values[PARAM_REST] == REST_MESH)
-                rest[REST_Q0] = rest_measure(cloth, node, rest, REST_COUNT_CLAMPED);
+            double rest[REST_COUNT] = {[REST_K] = patch.k[r]};
+            rest[REST_ALTITUDE] =
+                min_altitude(cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
+                             cloth->rest + 3 * (size_t)node[2]);
+            for (int h = 0; h < MIDEDGE_HINGES; h++) {
+                if (patch.c[r][h] == 0)
+                    continue;
+                drape_term_link(builder, element, part[h], patch.c[r][h]);
+                if (values[PARAM_REST] == REST_MESH)
+                    rest[REST_Q0] += patch.c[r][h] * theta[h];
+            }
             rest[REST_Q0] += l[0] * bend[0] + l[1] * bend[1] + 2 * l[2] * bend[2];
-            drape_term_set(builder, element++, node, rest);
+            drape_term_set(builder, element, node, rest);
         }
     }
     return status;
@@ -265,31 +304,24 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 
 /* ---- Internal variables ---- */
 
-/* The angles on the branches nearest to before; 0 for hinges that are left out. */
-static void update_angles(const drape_elements *el, int32_t element, const double *x, const double *before,
-                          double *after)
+/* The angles on the branches nearest to before; the arrays may be the same. */
+static void commit(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                   const double *before, double *after)
 {
-    hinges s;
-    memset(after, 0, MIDEDGE_HINGES * sizeof *after);
-    for (int from = 0; from < MIDEDGE_HINGES;) {
-        from = measure_hinges(el, element, from, x, false, false, &s);
-        for (int i = 0; i < s.count; i++)
-            after[s.number[i]] = drape_nearest_branch(s.theta[i], before[s.number[i]]);
+    for (int32_t i = first; i < first + count; i += LANES) {
+        int32_t part[LANES];
+        double s[LANES];
+        drape_lanes_elements(i, first + count, part);
+        measure_angles(el, part, x, before, s, NULL, NULL);
+        for (int l = 0; l < LANES; l++)
+            after[part[l]] = s[l];
     }
 }
 
 static void initial(const drape_elements *el, int32_t first, int32_t count, const double *x, double *after)
 {
-    static const double flat[MIDEDGE_HINGES] = {0};
-    for (int32_t e = first; e < first + count; e++)
-        update_angles(el, e, x, flat, after + MIDEDGE_HINGES * (size_t)e);
-}
-
-static void commit(const drape_elements *el, int32_t first, int32_t count, const double *x,
-                   const double *before, double *after)
-{
-    for (int32_t e = first; e < first + count; e++)
-        update_angles(el, e, x, before + MIDEDGE_HINGES * (size_t)e, after + MIDEDGE_HINGES * (size_t)e);
+    memset(after + first, 0, (size_t)count * sizeof *after);
+    commit(el, first, count, x, after, after);
 }
 
 /* ---- Checking ---- */
@@ -301,14 +333,30 @@ static double altitude_ratio(const drape_elements *el, int32_t element, const do
            drape_rest_of(el, REST_ALTITUDE, element);
 }
 
-static double largest_turn(const drape_elements *el, int32_t element, const double *x, const double *before)
+/* The squares of a triangle follow each other. */
+static bool is_of_same_triangle(const drape_elements *el, int32_t element)
 {
-    double after[MIDEDGE_HINGES], turn = 0;
-    update_angles(el, element, x, before, after);
-    for (int k = 0; k < MIDEDGE_HINGES; k++)
-        if (after[k] != 0)
-            turn = fmax(turn, fabs(after[k] - before[k]));
-    return turn;
+    const int32_t *n = el->node + (size_t)element * (size_t)el->nodes;
+    return element > 0 && memcmp(n, n - el->nodes, 3 * sizeof *n) == 0;
+}
+
+static void find_largest_turn(const drape_elements *el, const double *x, const double *internal,
+                              drape_fault *turned)
+{
+    const drape_parts *parts = el->parts;
+    for (int32_t i = 0; i < parts->count; i += LANES) {
+        int32_t part[LANES];
+        double s[LANES];
+        drape_lanes_elements(i, parts->count, part);
+        measure_angles(el, part, x, internal, s, NULL, NULL);
+        for (int l = 0; l < LANES; l++) {
+            const double turn = fabs(s[l] - internal[part[l]]);
+            if (turn > turned->value) {
+                turned->value = turn;
+                turned->element = parts->element[parts->user[parts->first_user[part[l]]]];
+            }
+        }
+    }
 }
 
 /* A collapsed altitude is reported first: the angles of a collapsed triangle are meaningless. */
@@ -320,18 +368,16 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
     drape_fault turned = {drape_reason_name(DRAPE_REASON_HINGE_BRANCH), "turn of a hinge in one step [rad]",
                           -1, 0, el->params[PARAM_MAX_TURN]};
     for (int32_t e = 0; e < el->count; e++) {
-        const double ratio = altitude_ratio(el, e, x),
-                     turn = largest_turn(el, e, x, internal + MIDEDGE_HINGES * (size_t)e);
+        if (is_of_same_triangle(el, e))
+            continue;
+        const double ratio = altitude_ratio(el, e, x);
         if (ratio < low.value &&
             (ratio >= low.limit || !before || drape_fell(ratio, altitude_ratio(el, e, before)))) {
             low.value = ratio;
             low.element = e;
         }
-        if (turn > turned.value) {
-            turned.value = turn;
-            turned.element = e;
-        }
     }
+    find_largest_turn(el, x, internal, &turned);
     *fault = low.value < low.limit ? low : turned;
     return low.value < low.limit || turned.value > turned.limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
 }
@@ -349,9 +395,10 @@ const drape_term_ops drape_term_bend_midedge = {
     .element_name = "square",
     .nodes = MIDEDGE_NODES,
     .has_internal = true,
-    .internal_count = MIDEDGE_HINGES,
+    .part_nodes = 4,
     .build = build,
     .measure = measure,
+    .part = measure_angles,
     .commit = commit,
     .initial = initial,
     .check = check,

@@ -1,0 +1,229 @@
+/* build_parts.c: the parts that the elements of a term share, and the patches of elements with the same
+ * nodes. */
+#include "compile/term_builder.h"
+
+#include <string.h>
+
+/* ---- What a term announces ---- */
+
+drape_status drape_term_reserve_parts(drape_term_builder *builder, int32_t part_count, int32_t link_count,
+                                      int rest_count)
+{
+    drape_parts *p = &builder->term->parts;
+    drape_arena *arena = &builder->model->arena;
+    const drape_term_ops *ops = builder->term->ops;
+    const size_t parts = (size_t)part_count, links = (size_t)link_count, nodes = (size_t)ops->part_nodes;
+    if (!ops->part || !builder->reserved || builder->reserved_parts)
+        return drape_term_refuse(
+            builder, "%s announced parts twice, before its elements, or without the function part",
+            ops->entry.name);
+    if (part_count < 0 || link_count < 0 || rest_count < 0)
+        return drape_term_refuse(builder, "%s announced %d parts with %d numbers of rest data and %d links",
+                                 ops->entry.name, (int)part_count, rest_count, (int)link_count);
+    builder->reserved_parts = true;
+    *p = (drape_parts){
+        .count = part_count, .nodes = ops->part_nodes, .rest_count = rest_count, .link_count = link_count};
+    p->node = builder->part_node = drape_arena_take(arena, parts * nodes, sizeof *builder->part_node);
+    p->rest = builder->part_rest = drape_arena_take(arena, parts * (size_t)rest_count, sizeof(double));
+    p->element = builder->link_element = drape_arena_take(arena, links, sizeof *builder->link_element);
+    p->part = builder->link_part = drape_arena_take(arena, links, sizeof *builder->link_part);
+    p->weight = builder->link_weight = drape_arena_take(arena, links, sizeof *builder->link_weight);
+    for (size_t i = 0; builder->part_node && i < parts * nodes; i++)
+        builder->part_node[i] = -1;
+    builder->term->elements.parts = p;
+    return drape_arena_status(arena);
+}
+
+void drape_term_set_part(drape_term_builder *builder, int32_t part, const int32_t *nodes, const double *rest)
+{
+    const drape_parts *p = &builder->term->parts;
+    if (!builder->part_node || !builder->part_rest || part < 0 || part >= p->count) {
+        builder->strayed = true;
+        return;
+    }
+    for (int a = 0; a < p->nodes; a++)
+        builder->part_node[(size_t)part * (size_t)p->nodes + (size_t)a] = builder->first_node + nodes[a];
+    for (int k = 0; k < p->rest_count; k++)
+        builder->part_rest[(size_t)k * (size_t)p->count + (size_t)part] = rest[k];
+}
+
+void drape_term_link(drape_term_builder *builder, int32_t element, int32_t part, double weight)
+{
+    const drape_term *term = builder->term;
+    const int32_t i = builder->links, last = i > 0 && builder->link_element ? builder->link_element[i - 1] : 0;
+    if (!builder->link_weight || !builder->link_element || !builder->link_part || element < last ||
+        element >= term->elements.count || part < 0 || part >= term->parts.count ||
+        i >= term->parts.link_count) {
+        builder->strayed = true;
+        return;
+    }
+    builder->link_element[i] = element;
+    builder->link_part[i] = part;
+    builder->link_weight[i] = weight;
+    builder->links++;
+}
+
+/* ---- Parts ---- */
+
+/* Leaves out parts without a link. number: (count) scratch. */
+static void drop_unused(drape_term_builder *builder, int32_t *number)
+{
+    drape_parts *p = &builder->term->parts;
+    const size_t nodes = (size_t)p->nodes, before = (size_t)p->count;
+    memset(number, 0, before * sizeof *number);
+    for (int32_t i = 0; i < p->link_count; i++)
+        number[p->part[i]] = 1;
+    p->count = 0;
+    for (size_t from = 0; from < before; from++) {
+        if (number[from] == 0)
+            continue;
+        memmove(builder->part_node + (size_t)p->count * nodes, builder->part_node + from * nodes,
+                nodes * sizeof *builder->part_node);
+        number[from] = p->count++;
+    }
+    for (int32_t i = 0; i < p->link_count; i++)
+        builder->link_part[i] = number[p->part[i]];
+}
+
+/* The rest data of the parts that are left. used: (parts announced) 1 if the part has a link. */
+static void drop_unused_rest(drape_term_builder *builder, const uint8_t *used, size_t before)
+{
+    const drape_parts *p = &builder->term->parts;
+    size_t to = 0;
+    for (size_t i = 0; i < (size_t)p->rest_count * before; i++)
+        if (used[i % before])
+            builder->part_rest[to++] = builder->part_rest[i];
+}
+
+static drape_status leave_out_unused(drape_term_builder *builder, drape_arena *scratch)
+{
+    const drape_parts *p = &builder->term->parts;
+    const size_t before = (size_t)p->count;
+    int32_t *number = drape_arena_take(scratch, before, sizeof *number);
+    uint8_t *used = drape_arena_take(scratch, before, sizeof *used);
+    if (!number || !used)
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < p->link_count; i++)
+        used[p->part[i]] = 1;
+    drop_unused(builder, number);
+    drop_unused_rest(builder, used, before);
+    return DRAPE_OK;
+}
+
+/* The links of each element and of each part. */
+static void index_links(drape_parts *p, int32_t elements, int32_t *first_link, int32_t *first_user,
+                        int32_t *user)
+{
+    memset(first_link, 0, ((size_t)elements + 1) * sizeof *first_link);
+    memset(first_user, 0, ((size_t)p->count + 1) * sizeof *first_user);
+    for (int32_t i = 0; i < p->link_count; i++) {
+        first_link[p->element[i] + 1]++;
+        first_user[p->part[i] + 1]++;
+    }
+    for (int32_t e = 0; e < elements; e++)
+        first_link[e + 1] += first_link[e];
+    for (int32_t k = 0; k < p->count; k++)
+        first_user[k + 1] += first_user[k];
+    for (int32_t i = 0; i < p->link_count; i++)
+        user[first_user[p->part[i]]++] = i;
+    for (int32_t k = p->count; k > 0; k--)
+        first_user[k] = first_user[k - 1];
+    first_user[0] = 0;
+}
+
+/* Where the nodes of the part of link i are in its element; false if the element lacks one. */
+static bool find_places(const drape_elements *el, int32_t i, uint8_t *place)
+{
+    const drape_parts *p = el->parts;
+    const int32_t *node = p->node + (size_t)p->part[i] * (size_t)p->nodes,
+                  *of = el->node + (size_t)p->element[i] * (size_t)el->nodes;
+    for (int a = 0; a < p->nodes; a++) {
+        int b = 0;
+        while (b < el->nodes && of[b] != node[a])
+            b++;
+        if (b == el->nodes)
+            return false;
+        place[a] = (uint8_t)b;
+    }
+    return true;
+}
+
+static drape_status find_links(drape_term_builder *builder)
+{
+    const drape_elements *el = &builder->term->elements;
+    drape_parts *p = &builder->term->parts;
+    drape_arena *arena = &builder->model->arena;
+    const size_t nodes = (size_t)p->nodes;
+    int32_t *first_link = drape_arena_take(arena, (size_t)el->count + 1, sizeof *first_link),
+            *first_user = drape_arena_take(arena, (size_t)p->count + 1, sizeof *first_user),
+            *user = drape_arena_take(arena, (size_t)p->link_count, sizeof *user);
+    uint8_t *place = drape_arena_take(arena, (size_t)p->link_count * nodes, sizeof *place);
+    if (!first_link || !first_user || !user || !place)
+        return DRAPE_E_MEMORY;
+    index_links(p, el->count, first_link, first_user, user);
+    p->first_link = first_link;
+    p->first_user = first_user;
+    p->user = user;
+    p->place = place;
+    for (int32_t i = 0; i < p->link_count; i++)
+        if (!find_places(el, i, place + (size_t)i * nodes))
+            return drape_term_refuse(builder, "element %d of %s lacks a node of its part %d",
+                                     (int)p->element[i], builder->term->ops->entry.name, (int)p->part[i]);
+    return DRAPE_OK;
+}
+
+/* ---- Patches ---- */
+
+static drape_status find_patches(drape_term_builder *builder)
+{
+    drape_term *term = builder->term;
+    const drape_elements *el = &term->elements;
+    const drape_parts *p = &term->parts;
+    drape_patches *patches = &term->patches;
+    drape_arena *arena = &builder->model->arena;
+    const size_t n = (size_t)el->nodes, most = (size_t)el->count;
+    patches->first = drape_arena_take(arena, most + 1, sizeof *patches->first);
+    patches->node = drape_arena_take(arena, most * n, sizeof *patches->node);
+    patches->used = drape_arena_take(arena, most, sizeof *patches->used);
+    patches->coupled = drape_arena_take(arena, most * n, sizeof *patches->coupled);
+    if (!patches->first || !patches->node || !patches->used || !patches->coupled)
+        return DRAPE_E_MEMORY;
+    for (int32_t e = 0; e < el->count; e++) {
+        const int32_t *node = el->node + (size_t)e * n;
+        if (e == 0 || memcmp(node, node - n, n * sizeof *node) != 0) {
+            memcpy(patches->node + (size_t)patches->count * n, node, n * sizeof *node);
+            patches->used[patches->count] = 0;
+            patches->first[patches->count++] = e;
+        }
+        uint8_t *used = &patches->used[patches->count - 1];
+        int32_t *coupled = patches->coupled + (size_t)e * n;
+        const size_t first = (size_t)p->first_link[e] * (size_t)p->nodes,
+                     last = (size_t)p->first_link[e + 1] * (size_t)p->nodes;
+        for (size_t a = 0; a < n; a++)
+            coupled[a] = node[first < last ? p->place[first] : 0];
+        for (size_t k = first; k < last; k++) {
+            coupled[p->place[k]] = node[p->place[k]];
+            if (*used <= p->place[k])
+                *used = (uint8_t)(p->place[k] + 1);
+        }
+    }
+    patches->first[patches->count] = el->count;
+    return DRAPE_OK;
+}
+
+drape_status drape_term_finish_parts(drape_term_builder *builder)
+{
+    const drape_term *term = builder->term;
+    const drape_parts *p = &term->parts;
+    if (!term->ops->part)
+        return DRAPE_OK;
+    if (!builder->reserved_parts || builder->links != p->link_count)
+        return drape_term_refuse(builder, "%s announced %d links and made %d", term->ops->entry.name,
+                                 (int)p->link_count, (int)builder->links);
+    drape_arena scratch = drape_arena_of(builder->model->ctx);
+    drape_status status = leave_out_unused(builder, &scratch);
+    drape_arena_free(&scratch);
+    if (!status)
+        status = find_links(builder);
+    return status ? status : find_patches(builder);
+}
