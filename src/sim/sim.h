@@ -22,6 +22,8 @@ typedef struct drape_audit {
     double offered;              /* energy at the start plus the magnitudes of all work */
     double lowest;               /* lowest energy of gravity so far */
     double best;                 /* largest numerical dissipation so far */
+    double residual_work;        /* of the residuals that unconverged steps left, so far */
+    double best_unexplained;     /* largest numerical dissipation with that work as a source */
 } drape_audit;
 
 #define DRAPE_MAX_EFFORTS 8
@@ -124,7 +126,8 @@ void drape_sim_add_work(drape_sim *sim, const drape_step_info *info);
  * so little that it is rounding of a scene at rest. */
 double drape_sim_energy_received(drape_sim *sim);
 
-/* Starts the energy account from the present state. */
+/* Starts the energy account from the present state. What was available to the run before is still: a state
+ * that is set is no more suspicious than the same state that was reached. */
 void drape_sim_reset_energy(drape_sim *sim);
 
 /* If the present state is badly distorted, a clause for a message that names its most distorted edge or
