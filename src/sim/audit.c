@@ -99,6 +99,24 @@ void drape_sim_reset_energy(drape_sim *sim)
     sim->energy_known = false;
 }
 
+static double sum_of(const drape_energy *e)
+{
+    return e->kinetic + e->elastic + e->gravity + e->contact;
+}
+
+void drape_sim_shift_energy(drape_sim *sim, const drape_energy *before)
+{
+    drape_audit *audit = &sim->audit;
+    sim->energy_known = sim->attempted_known = false;
+    const drape_energy now = drape_sim_energy(sim);
+    const double given = sum_of(&now) - sum_of(before), lifted = now.gravity - before->gravity;
+    audit->start += given;
+    audit->start_gravity += lifted;
+    audit->lowest += lifted;
+    audit->offered += fmax(given - lifted, 0);
+    sim->energy_known = false;
+}
+
 /* The kinetic energy of the scene's mass at the scene's speed: the unit for the rounding errors that may
  * move a sheet at rest. */
 static double scene_energy(const drape_model *m)
@@ -228,6 +246,5 @@ void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
     sim->attempted_known = false;
     audit->lowest = fmin(audit->lowest, sim->attempted.gravity);
     audit->best = fmax(audit->best, sim->attempted.numerical);
-    audit->best_unexplained =
-        fmax(audit->best_unexplained, sim->attempted.numerical + audit->residual_work);
+    audit->best_unexplained = fmax(audit->best_unexplained, sim->attempted.numerical + audit->residual_work);
 }

@@ -57,6 +57,7 @@ struct drape_sim {
     drape_schedule schedule;
     double max_attempts; /* the controller's max_attempts; INFINITY: it has none */
     double frame_rate;
+    double teleport_speed; /* [m/s] above which the host's pins carry their cloth; 0: never */
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
     double *query_scratch;          /* (node_count x 3) for queries between steps */
@@ -129,6 +130,10 @@ double drape_sim_energy_received(drape_sim *sim);
 /* Starts the energy account from the present state. What was available to the run before is still: a state
  * that is set is no more suspicious than the same state that was reached. */
 void drape_sim_reset_energy(drape_sim *sim);
+
+/* Takes all that has changed since the energies `before` as given by the host, who placed cloth elsewhere:
+ * numerical dissipation stays as it was, and what was available to the run still is. */
+void drape_sim_shift_energy(drape_sim *sim, const drape_energy *before);
 
 /* If the present state is badly distorted, a clause for a message that names its most distorted edge or
  * triangle; otherwise "". */
