@@ -22,6 +22,8 @@ typedef struct drape_audit {
     double offered;              /* energy at the start plus the magnitudes of all work */
     double lowest;               /* lowest energy of gravity so far */
     double best;                 /* largest numerical dissipation so far */
+    double residual_work;        /* of the residuals that unconverged steps left, so far */
+    double best_unexplained;     /* largest numerical dissipation with that work as a source */
 } drape_audit;
 
 #define DRAPE_MAX_EFFORTS 8
