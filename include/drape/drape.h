@@ -334,8 +334,11 @@ typedef struct drape_sim_def {
     double dt_min;                            /* [s]; 0: the scene's */
     double frame_rate;                        /* rate of frame events [1/s]; 0: the scene's */
     int threads; /* threads that evaluate elements, 1 to 256; default 1; results do not depend on it */
-    double realtime_step; /* [s] longest step that drape_sim_advance_realtime takes to keep up, and the most
+    double realtime_step;  /* [s] longest step that drape_sim_advance_realtime takes to keep up, and the most
                              time that may be owed; default 0: four times dt */
+    double teleport_speed; /* [m/s] pins and colliders that drape_sim_move_pins and drape_sim_move_collider
+                              send faster are placed where they are sent to, pins with their cloth; default
+                              0: never */
 } drape_sim_def;
 
 /* Fills *def with the defaults. */
@@ -407,7 +410,8 @@ DRAPE_API drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_d
  * variables follow from the positions: a hinge angle is taken on the branch nearest to its present value.
  *
  * The integrator and the controller start anew, as after a kink; steps are counted from t, and the energies
- * dissipated and numerical from 0. Frames continue with the first one at or after t or, if t is the present
+ * dissipated and numerical from 0; the check that energy does not come out of nothing still knows what was
+ * available to the run before. Frames continue with the first one at or after t or, if t is the present
  * time, with the next one that was not reported. Statistics continue. Positions and velocities that come from
  * a sim of the same model at the same time are restored bit for bit, so a one-step integrator continues from
  * them exactly as that sim did, provided that k dt has no rounding error.
@@ -416,6 +420,49 @@ DRAPE_API drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_d
  * may lead out of. Must not be called by an observer. Errors: DRAPE_E_ARGUMENT (NULL, not finite, or a pinned
  * node elsewhere); the sim is then unchanged. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, const double *v);
+
+/* What drape_sim_place moves, and how: x becomes R (x - center) + center + translate. Initialise with
+ * drape_place_def_init, which chooses all cloths and colliders, and no motion. */
+typedef struct drape_place_def {
+    size_t struct_size;       /* set by drape_place_def_init */
+    double rotate[4];         /* R: axis x y z and angle [degrees]; default: no rotation */
+    double center[3];         /* [m] the point that R leaves where it is; default 0 */
+    double translate[3];      /* [m]; default 0 */
+    const int32_t *cloths;    /* cloth_count numbers of cloths, which take their pins along */
+    int32_t cloth_count;      /* length of cloths; default -1: all cloths */
+    const int32_t *colliders; /* collider_count numbers of colliders */
+    int32_t collider_count;   /* length of colliders; default -1: all colliders */
+    bool stop; /* the cloth is at rest afterwards; default false: its velocities turn with it */
+} drape_place_def;
+
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_place_def) as struct_size. */
+DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
+
+/* Places cloth with its pins, and colliders, elsewhere at the present time, by a rigid motion: a character
+ * that is put at another place, a world that is shifted back to the origin. No force comes from it: strains,
+ * elastic energy and internal variables stay as they are, to rounding; nothing is swept on the way. Tracks of
+ * pins and colliders, and paths that the host has set, are moved as a whole and go on from there; so is the
+ * spring of drape_sim_set_drag_spring. Gravity, the wind and drape_sim_push stay, so a rotation about another
+ * axis than that of gravity changes how the cloth hangs. The energy account takes the change of potential
+ * and kinetic energy as given by the host.
+ *
+ * Colliders do not turn: a rotation is refused if one of the colliders is not the same shape afterwards.
+ * Spheres always are; planes, capsules and cylinders are if they turn about their own axis or normal, and the
+ * latter two also if they are turned over. Name the others' cloths and colliders apart, or replace a body
+ * that turns by a cloth whose nodes are all pinned.
+ *
+ * Contact is not checked. Where cloth and colliders move together their contacts stay as they were. Cloth
+ * that is placed into a collider, or a collider into cloth, is like cloth that starts there: it is pushed out
+ * gently over the next steps, and drape_sim_inside counts it. Cloth that is placed across other cloth stays
+ * entangled.
+ *
+ * Integrators and controllers start anew, as after drape_sim_set_state; the time, the steps of the schedule,
+ * frames, statistics, a budget's debt and the energies dissipated and numerical go on. Arrays that the sim
+ * returned before are no longer valid. No memory is allocated unless contact needs more. Must not be called
+ * by an observer. Errors, after which nothing has changed: DRAPE_E_ARGUMENT (NULL, not finite or beyond 1e9
+ * m, an axis of length 0, no such cloth or collider, a collider that cannot turn), DRAPE_E_VERSION
+ * (struct_size). Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_place(drape_sim *sim, const drape_place_def *def);
 
 /* Pulls a free node towards target [m] by a spring of the given stiffness [N/m]. The force stiffness (target
  * - x) is part of the equations of every step from the next one on, and implicit if the integrator is. A call
@@ -452,13 +499,20 @@ DRAPE_API void drape_sim_cancel(drape_sim *sim);
  * Before drape_sim_advance_realtime, seconds is the frame plus what is owed: frame_dt + drape_realtime.debt.
  *
  * The integrator knows the whole path: within any step, and in any frame, pins are exactly on it. A jump in
- * velocity is a kink, at which "ida" starts anew. A node that is listed twice is not detected. Errors:
+ * velocity is a kink, at which "ida" starts anew. A node that is listed twice is not detected.
+ *
+ * Pins that would have to be faster than the def's teleport_speed carry their cloth along instead of tearing
+ * at it: it is first placed, as by drape_sim_place, by the rigid motion that fits all of its pins best, less
+ * the path that they cover in `seconds` at their velocity: the given one, or else that of their motion so
+ * far. From there they move to their positions as usual. The motion of tracks is never taken so. The log has
+ * a line for each. Errors:
  * DRAPE_E_ARGUMENT (no such node, a free node, seconds not in (0, 1e9], or a value that is not finite or
  * beyond 1e9 m or m/s). */
 DRAPE_API drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const int32_t *nodes,
                                            double seconds, const double *positions, const double *velocities);
 
 /* The same for a whole collider: moves it to a displacement [m] from the position that its parameters define.
+ * One that would have to be faster than teleport_speed is placed there, less the path at its velocity.
  * drape_sim_collider returns its present position. */
 DRAPE_API drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double seconds,
                                                const double displacement[3], const double *velocity);

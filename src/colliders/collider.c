@@ -24,6 +24,23 @@ double drape_collider_distance(const drape_collider *collider, const drape_colli
     return collider->ops->distance(collider->values, &collider->shape, own, normal, curvature);
 }
 
+#define SAME_AXIS 1e-9 /* sine of the angle between directions that count as the same */
+
+void drape_turned_point(const double *rotation, const double *x, double *shift)
+{
+    for (int k = 0; k < 3; k++)
+        shift[k] = vec3_dot(rotation + 3 * k, x) - x[k];
+}
+
+bool drape_turned_axis(const double *rotation, const double *axis, bool flip)
+{
+    double turned[3], across[3];
+    for (int k = 0; k < 3; k++)
+        turned[k] = vec3_dot(rotation + 3 * k, axis);
+    vec3_cross(axis, turned, across);
+    return vec3_norm(across) <= SAME_AXIS && (flip || vec3_dot(axis, turned) > 0);
+}
+
 drape_status drape_collider_build(drape_context *ctx, drape_arena *arena, const char *pointer,
                                   const char *folder, double tolerance, drape_collider *collider)
 {

@@ -152,6 +152,15 @@ static double distance(const double *values, const drape_collider_shape *shape, 
     return p.f - values[ROUNDING];
 }
 
+static bool turned(const double *values, const drape_collider_shape *shape, const double *rotation,
+                   double *shift)
+{
+    const axis *c = shape->kept;
+    (void)values;
+    drape_turned_point(rotation, c->middle, shift);
+    return drape_turned_axis(rotation, c->u, true);
+}
+
 const drape_collider_ops drape_collider_cylinder = {
     .struct_size = sizeof(drape_collider_ops),
     .entry =
@@ -163,4 +172,5 @@ const drape_collider_ops drape_collider_cylinder = {
     .shape = make_shape,
     .distance = distance,
     .smooth = true,
+    .turned = turned,
 };

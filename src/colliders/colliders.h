@@ -24,6 +24,14 @@ drape_collider_pose drape_collider_pose_at(const drape_collider *collider, doubl
 double drape_collider_distance(const drape_collider *collider, const drape_collider_pose *pose,
                                const double *x, double *normal, double *curvature);
 
+/* ---- Turning ---- */
+
+/* The shift that turns a point about the origin: rotation x - x. */
+void drape_turned_point(const double *rotation, const double *x, double *shift);
+
+/* Whether a rotation leaves a direction of length 1 as it is, to within 1e-9; flip: or reverses it. */
+bool drape_turned_axis(const double *rotation, const double *axis, bool flip);
+
 /* ---- Compiling a scene ---- */
 
 struct drape_shape_builder {

@@ -149,6 +149,7 @@ void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_
             pin_work += e->g[at] * (out->x[at] - in->x[at]);
         }
     info->pin_work += pin_work + drape_implicit_collider_work(s, in->t, out->t);
+    info->residual_work += fmax(drape_step_equation_dot(e, e->f, s->d), 0);
     if (!s->dissipated)
         return;
     /* From here on the forces on colliders, whose work was added above, are their dissipative part. */

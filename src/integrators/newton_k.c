@@ -7,7 +7,8 @@
  * The guess extrapolates the motion, with a share s of the last change of velocity,
  *     d = h v0 + s h^2 (v0 - v-1)/h0
  * s = 1/2 halves the error of one iteration on a swinging sheet; s = 1 amplifies its own noise and
- * diverges.
+ * diverges. So does h/h0 > 1: where a step was halved and the next is not, what the short step left as noise
+ * would count twice, the longer step would be refused for the energy of it, and so on. h/h0 is 1 at most.
  */
 #include "integrators/implicit.h"
 #include "nonlinear/inexact_newton.h"
@@ -138,7 +139,7 @@ static void guess(newton_k *s, const drape_state *in, double h)
 {
     const drape_step_equation *e = &s->common.equation;
     double before = in->t - s->past_time[1];
-    double share = isnan(before) ? 0 : s->values[PARAM_EXTRAPOLATION] * h * h / before;
+    double share = isnan(before) ? 0 : s->values[PARAM_EXTRAPOLATION] * h * fmin(h / before, 1);
     for (size_t i = 0; i < e->dofs; i++) {
         size_t at = drape_step_equation_at(e, i);
         s->common.d[i] = e->inertia[i] + share * (in->v[at] - s->past[1][at]);

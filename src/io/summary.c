@@ -6,6 +6,7 @@
 #include "io/file.h"
 #include "io/json.h"
 #include "model/model.h"
+#include "sim/inside.h"
 #include "sim/warnings.h"
 
 #include <inttypes.h>
@@ -122,10 +123,12 @@ static json_t *with_inside(json_t *object, const drape_sim *sim)
     const int32_t colliders = drape_sim_model(sim)->collider_count;
     json_t *list = json_array();
     for (int32_t c = 0; c < colliders; c++) {
-        double deepest = NAN;
-        json_t *one = drape_json_with(json_object(), "triangles", found(drape_sim_inside(sim, c, &deepest)));
-        one = drape_json_with(one, "deepest", drape_json_number(deepest));
-        one = drape_json_with(one, "intersections", found(drape_sim_intersections(sim, c)));
+        drape_inside inside;
+        if (drape_sim_find_inside(sim, c, &inside))
+            inside = (drape_inside){.triangles = -1, .deepest = NAN, .intersections = -1};
+        json_t *one = drape_json_with(json_object(), "triangles", found(inside.triangles));
+        one = drape_json_with(one, "deepest", drape_json_number(inside.deepest));
+        one = drape_json_with(one, "intersections", found(inside.intersections));
         list = drape_json_append(list, one);
     }
     if (colliders > 0)

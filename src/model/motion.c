@@ -2,6 +2,7 @@
 #include "model/motion.h"
 
 #include "base/finite.h"
+#include "base/vec3.h"
 #include "model/track.h"
 
 #include <math.h>
@@ -40,6 +41,9 @@ drape_status drape_motion_create(drape_arena *arena, const drape_model *model, d
     motion->pin_path = drape_arena_take(arena, pins, sizeof *motion->pin_path);
     motion->collider_path =
         drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->collider_path);
+    motion->cloth_placed = drape_arena_take(arena, (size_t)model->cloth_count, sizeof *motion->cloth_placed);
+    motion->collider_placed =
+        drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->collider_placed);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     take_tracks(motion);
@@ -77,104 +81,179 @@ static bool rests(const double v[3])
     return v[0] == 0 && v[1] == 0 && v[2] == 0;
 }
 
-/* ---- Tracks and paths ---- */
+/* ---- Placements ---- */
 
-static void displacement_of(const drape_track *track, const drape_path *path, double t, double x[3])
+void drape_placement_turn(const drape_placement *by, const double x[3], double y[3])
 {
-    if (path->given)
-        path_displacement(path, t, x);
-    else if (track && track->key_count > 0)
-        drape_track_displacement(track->keys, track->key_count, t, x);
-    else
-        memset(x, 0, 3 * sizeof *x);
+    const double from[3] = {x[0], x[1], x[2]};
+    for (int k = 0; k < 3; k++)
+        y[k] = vec3_dot(by->turn + 3 * k, from);
 }
 
-static void velocity_of(const drape_track *track, const drape_path *path, double t, double within,
-                        double v[3])
+void drape_placement_move(const drape_placement *by, const double x[3], double y[3])
 {
-    if (path->given)
-        path_velocity(path, t, within, v);
-    else if (track && track->key_count > 0)
-        drape_track_velocity(track->keys, track->key_count, within, v);
-    else
-        memset(v, 0, 3 * sizeof *v);
+    drape_placement_turn(by, x, y);
+    vec3_add_scaled(1, by->shift, y);
+}
+
+/* placed = by after placed */
+static void compose(const drape_placement *by, drape_placement *placed)
+{
+    drape_placement both = *by;
+    both.given = true;
+    if (placed->given) {
+        drape_placement_move(by, placed->shift, both.shift);
+        for (int i = 0; i < 9; i++)
+            both.turn[i] = by->turn[i - i % 3] * placed->turn[i % 3] +
+                           by->turn[i - i % 3 + 1] * placed->turn[i % 3 + 3] +
+                           by->turn[i - i % 3 + 2] * placed->turn[i % 3 + 6];
+    }
+    *placed = both;
+}
+
+static void place_path(const drape_placement *by, drape_path *path)
+{
+    for (int i = 0; path->given && i < 2; i++) {
+        drape_placement_move(by, path->x[i], path->x[i]);
+        drape_placement_turn(by, path->v[i], path->v[i]);
+    }
+}
+
+/* ---- Courses: tracks or paths ---- */
+
+/* The motion of one pin or collider. */
+typedef struct course {
+    const drape_track *track; /* NULL: none */
+    const drape_path *path;
+    const drape_placement *placed;
+    const double *rest; /* of a pin; NULL: displacements are asked for */
+} course;
+
+/* Paths of pins hold positions, not displacements, so that a pin reaches exactly the position that the host
+ * gave. */
+static void position_on(const course *c, double t, double x[3])
+{
+    if (c->path->given) {
+        path_displacement(c->path, t, x);
+        return;
+    }
+    memset(x, 0, 3 * sizeof *x);
+    if (c->track && c->track->key_count > 0)
+        drape_track_displacement(c->track->keys, c->track->key_count, t, x);
+    for (int k = 0; c->rest && k < 3; k++)
+        x[k] = c->rest[k] + x[k];
+    if (c->placed->given)
+        drape_placement_move(c->placed, x, x);
+}
+
+static void velocity_on(const course *c, double t, double within, double v[3])
+{
+    if (c->path->given) {
+        path_velocity(c->path, t, within, v);
+        return;
+    }
+    memset(v, 0, 3 * sizeof *v);
+    if (c->track && c->track->key_count > 0)
+        drape_track_velocity(c->track->keys, c->track->key_count, within, v);
+    if (c->placed->given)
+        drape_placement_turn(c->placed, v, v);
 }
 
 /* The end of a path is a kink unless it comes to rest there; its beginning is one unless it continues
  * smoothly. */
-static double next_kink_of(const drape_track *track, const drape_path *path, double t, double end)
+static double next_kink_of(const course *c, double t, double end)
 {
+    const drape_path *path = c->path;
     for (int i = 0; path->given && i < 2; i++)
         if (path->t[i] > t && path->t[i] < end && !(i == 0 ? path->smooth : rests(path->v[1])))
             end = path->t[i];
-    for (size_t i = 0; !path->given && track && i < track->key_count; i++)
-        if (track->keys[i].time > t && track->keys[i].time < end)
-            end = track->keys[i].time;
+    for (size_t i = 0; !path->given && c->track && i < c->track->key_count; i++)
+        if (c->track->keys[i].time > t && c->track->keys[i].time < end)
+            end = c->track->keys[i].time;
     return end;
 }
 
-static bool at_kink_of(const drape_track *track, const drape_path *path, double t)
+static bool at_kink_of(const course *c, double t)
 {
+    const drape_path *path = c->path;
     if (path->given)
         return (t == path->t[0] && !path->smooth) || (t == path->t[1] && !rests(path->v[1]));
-    for (size_t i = 0; track && i < track->key_count; i++)
-        if (track->keys[i].time == t)
+    for (size_t i = 0; c->track && i < c->track->key_count; i++)
+        if (c->track->keys[i].time == t)
             return true;
     return false;
 }
 
 /* Writes the velocity that leads to the position at t. Returns whether it is known: it is not at a key of a
  * track, nor where the host replaces a path at the moment at which it began. */
-static bool leading_velocity(const drape_track *track, const drape_path *path, double t, double v[3])
+static bool leading_velocity(const course *c, double t, double v[3])
 {
+    const drape_path *path = c->path;
     if (path->given && (t == path->t[0] || t == path->t[1])) {
         memcpy(v, path->v[t == path->t[1]], 3 * sizeof *v);
         return t == path->t[1] || path->smooth;
     }
-    velocity_of(track, path, t, t, v);
-    return path->given || !track || track->key_count == 0;
+    velocity_on(c, t, t, v);
+    return path->given || !c->track || c->track->key_count == 0;
 }
 
-static void send(const drape_track *track, drape_path *path, double t, double span, const double from[3],
-                 const double to[3], const double *v)
+/* The path from the position at t to another one. */
+static drape_path path_to(const course *c, double t, double span, const double to[3], const double *v)
 {
     drape_path next = {.given = true, .t = {t, t + span}};
-    memcpy(next.x[0], from, sizeof next.x[0]);
+    position_on(c, t, next.x[0]);
     memcpy(next.x[1], to, sizeof next.x[1]);
-    next.smooth = leading_velocity(track, path, t, next.v[0]) && v;
+    next.smooth = leading_velocity(c, t, next.v[0]) && v;
     if (v)
         memcpy(next.v[1], v, sizeof next.v[1]);
     for (int k = 0; !v && k < 3; k++)
-        next.v[0][k] = next.v[1][k] = (to[k] - from[k]) / span;
-    *path = next;
+        next.v[0][k] = next.v[1][k] = (to[k] - next.x[0][k]) / span;
+    return next;
 }
 
 /* ---- Pins ---- */
 
-static const drape_track *pin_track(const drape_motion *motion, int32_t i)
+static course pin_course(const drape_motion *motion, int32_t i)
 {
-    return motion->moved_track[i] >= 0 ? &motion->model->tracks[motion->moved_track[i]] : NULL;
-}
-
-/* Paths of pins hold positions, not displacements, so that a pin reaches exactly the position that the host
- * gave. */
-static void place_pin(const drape_motion *motion, int32_t i, double t, double x[3])
-{
-    const double *rest = motion->model->rest + 3 * (size_t)motion->moved_node[i];
-    displacement_of(pin_track(motion, i), &motion->pin_path[i], t, x);
-    for (int k = 0; !motion->pin_path[i].given && k < 3; k++)
-        x[k] = rest[k] + x[k];
+    const drape_model *m = motion->model;
+    const int32_t node = motion->moved_node[i];
+    return (course){.track = motion->moved_track[i] >= 0 ? &m->tracks[motion->moved_track[i]] : NULL,
+                    .path = &motion->pin_path[i],
+                    .placed = &motion->cloth_placed[drape_model_cloth_of(m, node)],
+                    .rest = m->rest + 3 * (size_t)node};
 }
 
 void drape_motion_place_pins(const drape_motion *motion, double t, double *x)
 {
-    for (int32_t i = 0; i < motion->moved_count; i++)
-        place_pin(motion, i, t, x + 3 * (size_t)motion->moved_node[i]);
+    for (int32_t i = 0; i < motion->moved_count; i++) {
+        const course c = pin_course(motion, i);
+        position_on(&c, t, x + 3 * (size_t)motion->moved_node[i]);
+    }
+}
+
+void drape_motion_place_fixed(const drape_motion *motion, int32_t node, double x[3])
+{
+    const drape_path none = {.given = false};
+    const course c = {.path = &none,
+                      .placed = &motion->cloth_placed[drape_model_cloth_of(motion->model, node)],
+                      .rest = motion->model->rest + 3 * (size_t)node};
+    position_on(&c, 0, x);
 }
 
 void drape_motion_pin_velocity(const drape_motion *motion, int32_t i, double t, double within, double v[3])
 {
-    velocity_of(pin_track(motion, i), &motion->pin_path[i], t, within, v);
+    const course c = pin_course(motion, i);
+    velocity_on(&c, t, within, v);
+}
+
+void drape_motion_pin_arrival(const drape_motion *motion, int32_t node, double t, double v[3])
+{
+    memset(v, 0, 3 * sizeof *v);
+    if (motion->place[node] < 0)
+        return;
+    const course c = pin_course(motion, motion->place[node]);
+    if (!leading_velocity(&c, t, v))
+        memset(v, 0, 3 * sizeof *v);
 }
 
 /* Returns the number of a pin among the moved ones, adding it to them if necessary. */
@@ -192,10 +271,17 @@ static int32_t find_place(drape_motion *motion, int32_t node)
 void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double span, const double x[3],
                            const double *v)
 {
-    int32_t i = find_place(motion, node);
-    double from[3];
-    place_pin(motion, i, t, from);
-    send(pin_track(motion, i), &motion->pin_path[i], t, span, from, x, v);
+    const int32_t i = find_place(motion, node);
+    const course c = pin_course(motion, i);
+    motion->pin_path[i] = path_to(&c, t, span, x, v);
+}
+
+void drape_motion_place_cloth(drape_motion *motion, int32_t cloth, const drape_placement *by)
+{
+    compose(by, &motion->cloth_placed[cloth]);
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        if (drape_model_cloth_of(motion->model, motion->moved_node[i]) == cloth)
+            place_path(by, &motion->pin_path[i]);
 }
 
 void drape_motion_hold_pins(drape_motion *motion, const double *x)
@@ -212,29 +298,50 @@ void drape_motion_hold_pins(drape_motion *motion, const double *x)
 
 /* ---- Colliders ---- */
 
+static course collider_course(const drape_motion *motion, int32_t collider)
+{
+    return (course){.track = &motion->model->colliders[collider].track,
+                    .path = &motion->collider_path[collider],
+                    .placed = &motion->collider_placed[collider]};
+}
+
 bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
 {
-    return motion->collider_path[collider].given || motion->model->colliders[collider].track.key_count > 0;
+    const course c = collider_course(motion, collider);
+    return c.path->given || c.placed->given || c.track->key_count > 0;
 }
 
 void drape_motion_collider(const drape_motion *motion, int32_t collider, double t, double displacement[3])
 {
-    displacement_of(&motion->model->colliders[collider].track, &motion->collider_path[collider], t,
-                    displacement);
+    const course c = collider_course(motion, collider);
+    position_on(&c, t, displacement);
 }
 
 void drape_motion_collider_velocity(const drape_motion *motion, int32_t collider, double t, double within,
                                     double v[3])
 {
-    velocity_of(&motion->model->colliders[collider].track, &motion->collider_path[collider], t, within, v);
+    const course c = collider_course(motion, collider);
+    velocity_on(&c, t, within, v);
+}
+
+void drape_motion_collider_arrival(const drape_motion *motion, int32_t collider, double t, double v[3])
+{
+    const course c = collider_course(motion, collider);
+    if (!leading_velocity(&c, t, v))
+        memset(v, 0, 3 * sizeof *v);
 }
 
 void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t, double span,
                                 const double x[3], const double *v)
 {
-    double from[3];
-    drape_motion_collider(motion, collider, t, from);
-    send(&motion->model->colliders[collider].track, &motion->collider_path[collider], t, span, from, x, v);
+    const course c = collider_course(motion, collider);
+    motion->collider_path[collider] = path_to(&c, t, span, x, v);
+}
+
+void drape_motion_place_collider(drape_motion *motion, int32_t collider, const drape_placement *by)
+{
+    compose(by, &motion->collider_placed[collider]);
+    place_path(by, &motion->collider_path[collider]);
 }
 
 /* ---- Checkpoints ---- */
@@ -260,6 +367,18 @@ static void archive_path(drape_path *path, drape_archive *a)
     }
     if (drape_archive_has_read(a) && !is_path(path))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid path");
+}
+
+static void archive_placement(drape_placement *placed, drape_archive *a)
+{
+    drape_archive_bool(a, &placed->given);
+    if (!placed->given || !drape_archive_good(a))
+        return;
+    drape_archive_doubles(a, placed->turn, 9);
+    drape_archive_doubles(a, placed->shift, 3);
+    if (drape_archive_has_read(a) &&
+        !(drape_all_finite(placed->turn, 9) && drape_all_finite(placed->shift, 3)))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a placement that is not finite");
 }
 
 /* Pins with a track come first, in the model's order, then the others in the order in which the host moved
@@ -291,27 +410,39 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
         if (drape_archive_good(a))
             archive_path(&motion->pin_path[i], a);
     }
-    for (int32_t c = 0; c < motion->model->collider_count && drape_archive_good(a); c++)
+    for (int32_t c = 0; c < motion->model->collider_count && drape_archive_good(a); c++) {
         archive_path(&motion->collider_path[c], a);
+        archive_placement(&motion->collider_placed[c], a);
+    }
+    for (int32_t c = 0; c < motion->model->cloth_count && drape_archive_good(a); c++)
+        archive_placement(&motion->cloth_placed[c], a);
 }
 
 /* ---- All pins and colliders ---- */
 
 double drape_motion_next_kink(const drape_motion *motion, double t, double end)
 {
-    for (int32_t i = 0; i < motion->moved_count; i++)
-        end = next_kink_of(pin_track(motion, i), &motion->pin_path[i], t, end);
-    for (int32_t c = 0; c < motion->model->collider_count; c++)
-        end = next_kink_of(&motion->model->colliders[c].track, &motion->collider_path[c], t, end);
+    for (int32_t i = 0; i < motion->moved_count; i++) {
+        const course c = pin_course(motion, i);
+        end = next_kink_of(&c, t, end);
+    }
+    for (int32_t i = 0; i < motion->model->collider_count; i++) {
+        const course c = collider_course(motion, i);
+        end = next_kink_of(&c, t, end);
+    }
     return end;
 }
 
 bool drape_motion_at_kink(const drape_motion *motion, double t)
 {
     bool found = false;
-    for (int32_t i = 0; !found && i < motion->moved_count; i++)
-        found = at_kink_of(pin_track(motion, i), &motion->pin_path[i], t);
-    for (int32_t c = 0; !found && c < motion->model->collider_count; c++)
-        found = at_kink_of(&motion->model->colliders[c].track, &motion->collider_path[c], t);
+    for (int32_t i = 0; !found && i < motion->moved_count; i++) {
+        const course c = pin_course(motion, i);
+        found = at_kink_of(&c, t);
+    }
+    for (int32_t i = 0; !found && i < motion->model->collider_count; i++) {
+        const course c = collider_course(motion, i);
+        found = at_kink_of(&c, t);
+    }
     return found;
 }

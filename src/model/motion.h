@@ -18,14 +18,23 @@ typedef struct drape_path {
     double v[2][3]; /* [m/s] */
 } drape_path;
 
+/* A rigid motion, x -> turn x + shift, by which a host placed cloth or colliders elsewhere. */
+typedef struct drape_placement {
+    bool given;      /* if not, nothing was placed */
+    double turn[9];  /* a rotation, row by row */
+    double shift[3]; /* [m] */
+} drape_placement;
+
 typedef struct drape_motion {
     const drape_model *model;
-    int32_t moved_count;       /* pinned nodes with a track or a path */
-    int32_t *moved_node;       /* (number of pinned nodes) */
-    int32_t *moved_track;      /* (number of pinned nodes) -1: no track */
-    int32_t *place;            /* (node_count) number among the moved nodes, -1: none */
-    drape_path *pin_path;      /* (number of pinned nodes) */
-    drape_path *collider_path; /* (collider_count) */
+    int32_t moved_count;              /* pinned nodes with a track or a path */
+    int32_t *moved_node;              /* (number of pinned nodes) */
+    int32_t *moved_track;             /* (number of pinned nodes) -1: no track */
+    int32_t *place;                   /* (node_count) number among the moved nodes, -1: none */
+    drape_path *pin_path;             /* (number of pinned nodes) */
+    drape_path *collider_path;        /* (collider_count) */
+    drape_placement *cloth_placed;    /* (cloth_count) of rest positions and tracks; paths have it in them */
+    drape_placement *collider_placed; /* (collider_count) of displacements on tracks */
 } drape_motion;
 
 drape_status drape_motion_create(drape_arena *arena, const drape_model *model, drape_motion **out);
@@ -57,6 +66,23 @@ void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double 
                            const double *v);
 void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t, double span,
                                 const double x[3], const double *v);
+
+/* The velocities with which a pinned node and a collider come to where they are at time t; 0 at a key of a
+ * track. */
+void drape_motion_pin_arrival(const drape_motion *motion, int32_t node, double t, double v[3]);
+void drape_motion_collider_arrival(const drape_motion *motion, int32_t collider, double t, double v[3]);
+
+/* Places the pins of a cloth, or a collider, elsewhere: their rest positions, tracks and paths, past and
+ * future, are moved as one. For a collider the placement acts on displacements. */
+void drape_motion_place_cloth(drape_motion *motion, int32_t cloth, const drape_placement *by);
+void drape_motion_place_collider(drape_motion *motion, int32_t collider, const drape_placement *by);
+
+/* y = turn x + shift, and y = turn x; y may be x. */
+void drape_placement_move(const drape_placement *by, const double x[3], double y[3]);
+void drape_placement_turn(const drape_placement *by, const double x[3], double y[3]);
+
+/* The position of a pinned node that neither a track nor a path moves. */
+void drape_motion_place_fixed(const drape_motion *motion, int32_t node, double x[3]);
 
 /* Pins that a host has moved rest from now on at these positions (node_count x 3). */
 void drape_motion_hold_pins(drape_motion *motion, const double *x);

@@ -29,6 +29,12 @@
 #define STEP_GAIN 0.25 /* gained in one step */
 /* gained since numerical dissipation was largest; an integrator may set another limit */
 #define RUN_GAIN 0.1
+/* The same of a solver that stops before it converges, with the work of the residuals that it left: F d in a
+ * step of displacement d, with which a step of backward Euler ends as if F were a force of the host. For a
+ * convex energy that bounds what the step can gain, so such a gain is an error that the next steps take back,
+ * not an instability of the method; but a run that has gained half of what was ever available is running
+ * away, whatever its residuals. */
+#define UNCONVERGED_GAIN 0.5
 
 static double kinetic(const drape_model *model, const double *v)
 {
@@ -82,14 +88,33 @@ void drape_sim_energy_density(drape_sim *sim, double *density)
         drape_sim_energy_density_at(sim, drape_sim_state(sim)->x, density);
 }
 
+static double sum_of(const drape_energy *e)
+{
+    return e->kinetic + e->elastic + e->gravity + e->contact;
+}
+
 void drape_sim_reset_energy(drape_sim *sim)
 {
+    const double known = sim->audit.offered + sim->audit.start_gravity - sim->audit.lowest;
     sim->audit = (drape_audit){0};
     sim->energy_known = false;
-    drape_energy e = drape_sim_energy(sim);
-    sim->audit.start = e.kinetic + e.elastic + e.gravity + e.contact;
-    sim->audit.offered = e.kinetic + fabs(e.elastic) + fabs(e.contact);
+    const drape_energy e = drape_sim_energy(sim);
+    sim->audit.start = sum_of(&e);
+    sim->audit.offered = fmax(known, e.kinetic + fabs(e.elastic) + fabs(e.contact));
     sim->audit.start_gravity = sim->audit.lowest = e.gravity;
+    sim->energy_known = false;
+}
+
+void drape_sim_shift_energy(drape_sim *sim, const drape_energy *before)
+{
+    drape_audit *audit = &sim->audit;
+    sim->energy_known = sim->attempted_known = false;
+    const drape_energy now = drape_sim_energy(sim);
+    const double given = sum_of(&now) - sum_of(before), lifted = now.gravity - before->gravity;
+    audit->start += given;
+    audit->start_gravity += lifted;
+    audit->lowest += lifted;
+    audit->offered += fmax(given - lifted, 0);
     sim->energy_known = false;
 }
 
@@ -172,8 +197,10 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
         measure(sim, out, drape_sim_state(sim)->internal, audit->dissipated + info->dissipated,
                 audit->pin_work + info->pin_work);
     const double max_gain = sim->chosen.integrator->gain > 0 ? sim->chosen.integrator->gain : RUN_GAIN;
-    double quiet = scene_energy(m), gain = e.numerical - attempted.numerical,
-           scale = offered(audit, &attempted, info, quiet), run = audit->best - attempted.numerical;
+    const double quiet = scene_energy(m), gain = e.numerical - attempted.numerical,
+                 scale = offered(audit, &attempted, info, quiet), run = audit->best - attempted.numerical,
+                 unexplained = audit->best_unexplained - attempted.numerical - audit->residual_work -
+                               info->residual_work;
     sim->attempted = attempted;
     sim->attempted_known = true;
     if (m->free_count == 0) /* all motion is prescribed: a gain is only an error in the sum of the pins'
@@ -182,12 +209,16 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
     if (exploded(&e, &attempted, gain, quiet))
         info->diagnostic =
             gain_at(m, out->v, "energy gained / kinetic energy", gain / attempted.kinetic, SHARE);
-    else if (gain > STEP_GAIN * scale)
-        info->diagnostic =
-            gain_at(m, out->v, "energy gained / energy available to the run", gain / scale, STEP_GAIN);
-    else if (gain > ROUNDED * scale && run > max_gain * scale)
+    else if (gain - info->residual_work > STEP_GAIN * scale)
+        info->diagnostic = gain_at(m, out->v, "energy gained / energy available to the run",
+                                   (gain - info->residual_work) / scale, STEP_GAIN);
+    else if (gain > ROUNDED * scale && unexplained > max_gain * scale)
         info->diagnostic = gain_at(m, out->v, "energy gained since its minimum / energy available to the run",
-                                   run / scale, max_gain);
+                                   unexplained / scale, max_gain);
+    else if (gain > ROUNDED * scale && run > fmax(UNCONVERGED_GAIN, max_gain) * scale)
+        info->diagnostic =
+            gain_at(m, out->v, "energy gained by unconverged steps / energy available to the run",
+                    run / scale, UNCONVERGED_GAIN);
     else
         return false;
     return true;
@@ -206,6 +237,7 @@ void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
     drape_audit *audit = &sim->audit;
     audit->dissipated += info->dissipated;
     audit->pin_work += info->pin_work;
+    audit->residual_work += info->residual_work;
     audit->offered += fabs(info->pin_work) + fabs(info->dissipated);
     /* with internal variables, committing the step changes the energy */
     sim->energy_known = sim->attempted_known && sim->model->internal_count == 0;
@@ -215,4 +247,5 @@ void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
     sim->attempted_known = false;
     audit->lowest = fmin(audit->lowest, sim->attempted.gravity);
     audit->best = fmax(audit->best, sim->attempted.numerical);
+    audit->best_unexplained = fmax(audit->best_unexplained, sim->attempted.numerical + audit->residual_work);
 }

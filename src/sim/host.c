@@ -1,7 +1,7 @@
 /* host.c: what a host may change while a sim runs: pins, colliders, forces and the medium; and the forces
  * that it may read. */
 #include "base/finite.h"
-#include "sim/sim.h"
+#include "sim/place.h"
 
 #include <math.h>
 
@@ -57,6 +57,8 @@ drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const int32_t *n
     for (int32_t i = 0; !status && i < count; i++)
         status = check_pin(sim, nodes[i], positions + 3 * (size_t)i,
                            velocities ? velocities + 3 * (size_t)i : NULL);
+    if (!status)
+        status = drape_sim_teleport_pins(sim, count, nodes, seconds, positions, velocities);
     for (int32_t i = 0; !status && i < count; i++)
         drape_motion_send_pin(drape_system_steer(sim->system), nodes[i], drape_sim_state(sim)->t, seconds,
                               positions + 3 * (size_t)i, velocities ? velocities + 3 * (size_t)i : NULL);
@@ -86,6 +88,8 @@ drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double se
         status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                             "drape_sim_move_collider: displacement and velocity must be within %g m and m/s",
                             MAX_DISTANCE);
+    if (!status)
+        status = drape_sim_teleport_collider(sim, collider, seconds, displacement, velocity);
     if (!status)
         drape_motion_send_collider(drape_system_steer(sim->system), collider, drape_sim_state(sim)->t,
                                    seconds, displacement, velocity);

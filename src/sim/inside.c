@@ -182,8 +182,10 @@ drape_status drape_find_pierced(drape_context *ctx, const drape_model *m, int32_
 
 /* ---- The present state ---- */
 
-static drape_status find_now(const drape_sim *sim, int32_t collider, drape_inside *found)
+drape_status drape_sim_find_inside(const drape_sim *sim, int32_t collider, drape_inside *found)
 {
+    if (!sim || collider < 0 || collider >= sim->model->collider_count)
+        return DRAPE_E_ARGUMENT;
     const drape_collider_motion motion = drape_sim_collider(sim, collider);
     drape_collider_pose pose = {{0}, {0}};
     memcpy(pose.displacement, motion.displacement, sizeof pose.displacement);
@@ -193,7 +195,7 @@ static drape_status find_now(const drape_sim *sim, int32_t collider, drape_insid
 int32_t drape_sim_inside(const drape_sim *sim, int32_t collider, double *deepest)
 {
     drape_inside found;
-    if (!sim || collider < 0 || collider >= sim->model->collider_count || find_now(sim, collider, &found))
+    if (drape_sim_find_inside(sim, collider, &found))
         return -1;
     if (deepest)
         *deepest = found.deepest;
@@ -204,10 +206,10 @@ int64_t drape_sim_intersections(const drape_sim *sim, int32_t collider)
 {
     drape_intersections cloth;
     drape_inside found;
-    if (!sim || collider < -1 || collider >= sim->model->collider_count)
+    if (collider != -1)
+        return drape_sim_find_inside(sim, collider, &found) ? -1 : found.intersections;
+    if (!sim)
         return -1;
-    if (collider >= 0)
-        return find_now(sim, collider, &found) ? -1 : found.intersections;
     return drape_find_intersections(sim->ctx, sim->model, drape_sim_positions(sim), &cloth) ? -1
                                                                                             : cloth.count;
 }

@@ -3,6 +3,7 @@
 #define DRAPE_SIM_INSIDE_H
 
 #include "colliders/colliders.h"
+#include "drape/drape.h"
 
 typedef struct drape_inside {
     int32_t triangles; /* of cloth that reach into the collider: a sample is inside, or something crosses */
@@ -19,5 +20,8 @@ drape_status drape_find_inside(drape_context *ctx, const drape_model *model, int
  * side that passes through a triangle of it. Errors: DRAPE_E_MEMORY. */
 drape_status drape_find_pierced(drape_context *ctx, const drape_model *model, int32_t collider,
                                 const drape_collider_pose *pose, const double *x, int32_t *pierced);
+
+/* The same in the present state of a sim. Errors: DRAPE_E_ARGUMENT (no such collider), DRAPE_E_MEMORY. */
+drape_status drape_sim_find_inside(const drape_sim *sim, int32_t collider, drape_inside *found);
 
 #endif

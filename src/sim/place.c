@@ -1,134 +1,231 @@
 /*
- * place.c: a user-defined state. It is built in the state that the next attempt would overwrite, so that a
- * refused one changes nothing; the history that led to the present state is discarded.
+ * place.c: cloth with its pins, and colliders, as a host places them elsewhere by a rigid motion. Nothing is
+ * strained by it, so nothing is left to calm down. The new state is built in the one that the next attempt
+ * would overwrite, so that a refused placement changes nothing.
  */
-#include "base/elementary.h"
-#include "base/finite.h"
-#include "sim/sim.h"
+#include "sim/place.h"
+#include "mesh/mesh.h"
 
 #include <math.h>
 #include <string.h>
 
-#define MAX_SECONDS 1e9 /* [s] the limit of a scene's duration */
-/* of the scene's size: rounding error allowed between the given position of a pinned node and its pin */
-#define PIN_SLIP 1e-9
+#define MAX_DISTANCE 1e9 /* [m] the limit of a track's keys */
 
-static drape_status check_given(const drape_sim *sim, double t, const double *x, const double *v)
+void drape_place_def_init(drape_place_def *def, size_t struct_size)
 {
-    size_t n = 3 * (size_t)sim->model->node_count;
-    if (!x || !v)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_state: there are no %s",
-                          x ? "velocities" : "positions");
-    if (!(t >= 0 && t <= MAX_SECONDS))
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_state: t = %g s; it is 0 to %g s", t,
-                          MAX_SECONDS);
-    for (size_t i = 0; i < 2 * n; i++) {
-        double value = i < n ? x[i] : v[i - n];
-        int32_t node = (int32_t)(i % n / 3), c = drape_model_cloth_of(sim->model, node);
-        if (!isfinite(value))
+    const drape_place_def defaults = {.struct_size = struct_size, .cloth_count = -1, .collider_count = -1};
+    memset(def, 0, struct_size);
+    memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
+}
+
+/* ---- What is placed ---- */
+
+static bool has(const drape_place_list *list, int32_t index)
+{
+    bool found = list->count < 0;
+    for (int32_t i = 0; i < list->count && !found; i++)
+        found = list->items[i] == index;
+    return found;
+}
+
+static drape_status check_list(const drape_sim *sim, const char *what, const drape_place_list *list,
+                               int32_t there)
+{
+    if (list->count > 0 && !list->items)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_place: %d %ss, but no list of them",
+                          (int)list->count, what);
+    for (int32_t i = 0; i < list->count; i++)
+        if (list->items[i] < 0 || list->items[i] >= there)
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_place: %s %d; the model has %d", what,
+                              (int)list->items[i], (int)there);
+    return DRAPE_OK;
+}
+
+static bool turns(const drape_placement *by)
+{
+    bool turned = false;
+    for (int i = 0; i < 9; i++)
+        turned = turned || by->turn[i] != (i % 4 == 0);
+    return turned;
+}
+
+/* The same motion as one of displacements: a collider's own coordinates do not turn. False: the collider
+ * would have to. */
+static bool place_displacement(const drape_sim *sim, int32_t collider, const drape_placement *by,
+                               drape_placement *out)
+{
+    const drape_collider *c = &sim->model->colliders[collider];
+    double shift[3];
+    *out = *by;
+    if (!turns(by))
+        return true;
+    if (!c->ops->turned || !c->ops->turned(c->values, &c->shape, by->turn, shift))
+        return false;
+    for (int k = 0; k < 3; k++)
+        out->shift[k] += shift[k];
+    return true;
+}
+
+static bool is_far(const double *x)
+{
+    return !(fabs(x[0]) <= MAX_DISTANCE && fabs(x[1]) <= MAX_DISTANCE && fabs(x[2]) <= MAX_DISTANCE);
+}
+
+static drape_status check_colliders(const drape_sim *sim, const drape_place_list *colliders,
+                                    const drape_placement *by)
+{
+    for (int32_t c = 0; c < sim->model->collider_count; c++) {
+        const drape_collider *collider = &sim->model->colliders[c];
+        drape_placement own;
+        double at[3];
+        if (!has(colliders, c))
+            continue;
+        if (!place_displacement(sim, c, by, &own))
             return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                              "drape_sim_set_state: %s of node %d of %s is %g; it must be finite",
-                              i < n ? "the position" : "the velocity",
-                              (int)(node - sim->model->cloths[c].first_node), sim->model->cloths[c].name,
-                              value);
+                              "drape_sim_place: %s is a %s, which cannot turn; only spheres, and planes, "
+                              "capsules and cylinders about their axis, look the same afterwards",
+                              collider->name, collider->ops->entry.name);
+        drape_motion_collider(drape_system_motion(sim->system), c, drape_sim_state(sim)->t, at);
+        drape_placement_move(&own, at, at);
+        if (is_far(at))
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_place: %s would be beyond %g m",
+                              collider->name, MAX_DISTANCE);
     }
     return DRAPE_OK;
 }
 
-/* Places pinned nodes where their pins are at the time of the state, and those that the host moves at their
- * given positions. */
-static void place_pinned(const drape_sim *sim, const double *given, drape_state *state)
-{
-    const drape_model *m = sim->model;
-    const drape_motion *motion = drape_system_motion(sim->system);
-    for (int32_t i = 0; i < m->node_count; i++)
-        if (m->pinned[i])
-            memcpy(state->x + 3 * (size_t)i, m->rest + 3 * (size_t)i, 3 * sizeof *state->x);
-    drape_motion_place_pins(motion, state->t, state->x);
-    for (int32_t i = 0; i < motion->moved_count; i++) {
-        size_t at = 3 * (size_t)motion->moved_node[i];
-        if (motion->pin_path[i].given)
-            memcpy(state->x + at, given + at, 3 * sizeof *state->x);
-    }
-}
+/* ---- Placing ---- */
 
-/* Fixed nodes have no velocity, nor have those at rest where the host put them; pinned nodes that move keep
- * the given one until a step sets it to the mean over their displacement. */
-static void stop_fixed(const drape_sim *sim, const double *given, drape_state *state)
+static drape_status place_nodes(const drape_sim *sim, const drape_place_list *cloths,
+                                const drape_placement *by, bool stop, drape_state *to)
 {
     const drape_model *m = sim->model;
-    const drape_motion *motion = drape_system_motion(sim->system);
-    for (int32_t i = 0; i < m->node_count; i++)
-        if (m->pinned[i])
-            memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
-    for (int32_t i = 0; i < motion->moved_count; i++) {
-        size_t at = 3 * (size_t)motion->moved_node[i];
-        if (!motion->pin_path[i].given)
-            memcpy(state->v + at, given + at, 3 * sizeof *state->v);
-    }
-}
-
-static drape_status check_pinned(const drape_sim *sim, const double *given, const drape_state *state)
-{
-    const drape_model *m = sim->model;
-    for (int32_t i = 0; i < m->node_count; i++) {
-        const double *x = given + 3 * (size_t)i, *pin = state->x + 3 * (size_t)i;
-        const drape_cloth *cloth = &m->cloths[drape_model_cloth_of(m, i)];
-        if (m->pinned[i] &&
-            !(drape_hypot(drape_hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= PIN_SLIP * m->length))
-            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                              "drape_sim_set_state: node %d of %s is at (%g %g %g); its pin has it at (%g %g "
-                              "%g) m at t = %g s",
-                              (int)(i - cloth->first_node), cloth->name, x[0], x[1], x[2], pin[0], pin[1],
-                              pin[2], state->t);
+    const drape_state *now = drape_sim_state(sim);
+    const size_t n = 3 * (size_t)m->node_count;
+    to->t = now->t;
+    memcpy(to->x, now->x, n * sizeof *to->x);
+    memcpy(to->v, now->v, n * sizeof *to->v);
+    memcpy(to->internal, now->internal, (size_t)m->internal_count * sizeof *to->internal);
+    for (int32_t c = 0; c < m->cloth_count; c++) {
+        const drape_cloth *cloth = &m->cloths[c];
+        for (int32_t i = 0; has(cloths, c) && i < cloth->mesh.node_count; i++) {
+            double *x = to->x + 3 * (size_t)(cloth->first_node + i),
+                   *v = to->v + 3 * (size_t)(cloth->first_node + i);
+            drape_placement_move(by, x, x);
+            drape_placement_turn(by, v, v);
+            if (stop)
+                memset(v, 0, 3 * sizeof *v);
+            if (is_far(x))
+                return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                                  "drape_sim_place: node %d of %s would be beyond %g m", (int)i, cloth->name,
+                                  MAX_DISTANCE);
+        }
     }
     return DRAPE_OK;
 }
 
-/* The index of the first frame at or after the present time. */
-static int64_t first_frame(const drape_sim *sim)
+/* A spring by which a host drags a node goes with it. */
+static void place_drag_spring(drape_sim *sim, const drape_place_list *cloths, const drape_placement *by)
 {
-    double t = drape_sim_state(sim)->t;
-    int64_t k = (int64_t)floor(t * sim->frame_rate);
-    return (double)k / sim->frame_rate < t ? k + 1 : k;
+    drape_drag_spring spring = *drape_system_drag_spring(sim->system);
+    if (!(spring.stiffness > 0) || !has(cloths, drape_model_cloth_of(sim->model, spring.node)))
+        return;
+    drape_placement_move(by, spring.target, spring.target);
+    drape_system_set_drag_spring(sim->system, &spring);
 }
 
-/* Makes the state a beginning: nothing that led to the previous state counts. */
-static void start_anew(drape_sim *sim, double t_before)
+static void place_motion(drape_sim *sim, const drape_place_list *cloths, const drape_place_list *colliders,
+                         const drape_placement *by)
 {
-    double t = drape_sim_state(sim)->t;
+    drape_motion *motion = drape_system_steer(sim->system);
+    for (int32_t c = 0; c < sim->model->cloth_count; c++)
+        if (has(cloths, c))
+            drape_motion_place_cloth(motion, c, by);
+    for (int32_t c = 0; c < sim->model->collider_count; c++) {
+        drape_placement own;
+        if (has(colliders, c) && place_displacement(sim, c, by, &own))
+            drape_motion_place_collider(motion, c, &own);
+    }
+}
+
+/* What integrators and controllers remember of earlier steps is of another place. */
+static void forget_past(drape_sim *sim)
+{
     sim->before = sim->past[0] = sim->past[1] = -1;
     memset(sim->scratch, 0, sizeof sim->scratch);
     sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
-    drape_sim_leave_realtime(sim);
-    drape_schedule_init(&sim->schedule, sim->schedule.stepping, sim->schedule.dt, t);
-    if (t != t_before) /* otherwise the frame at t may have been emitted already */
-        sim->next_frame = first_frame(sim);
-    drape_sim_reset_energy(sim);
 }
 
-drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, const double *v)
+drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloths,
+                                   const drape_place_list *colliders, const drape_placement *by, bool stop)
 {
-    drape_status guarded = drape_sim_guard(sim, "drape_sim_set_state");
-    if (guarded)
-        return guarded;
-    drape_status status = check_given(sim, t, x, v);
+    drape_state *next = &sim->states[sim->next];
+    drape_status status = check_colliders(sim, colliders, by);
+    if (!status)
+        status = place_nodes(sim, cloths, by, stop, next);
     if (status)
         return status;
-    const drape_model *m = sim->model;
-    drape_state *now = &sim->states[sim->now], *next = &sim->states[sim->next];
-    next->t = t;
-    memcpy(next->x, x, 3 * (size_t)m->node_count * sizeof *x);
-    memcpy(next->v, v, 3 * (size_t)m->node_count * sizeof *v);
-    place_pinned(sim, x, next);
-    stop_fixed(sim, v, next);
-    status = check_pinned(sim, x, next);
-    if (status)
-        return status;
-    drape_motion_hold_pins(drape_system_steer(sim->system), next->x);
-    drape_state_commit(m, now, next);
+    const drape_energy before = drape_sim_energy(sim);
+    place_drag_spring(sim, cloths, by);
+    place_motion(sim, cloths, colliders, by);
     sim->next = sim->now;
     sim->now = (int)(next - sim->states);
-    start_anew(sim, now->t);
+    forget_past(sim);
+    drape_sim_shift_energy(sim, &before);
     return DRAPE_OK;
+}
+
+/* ---- For hosts ---- */
+
+static drape_status read_def(const drape_sim *sim, const drape_place_def *given, drape_place_def *def)
+{
+    drape_place_def_init(def, sizeof *def);
+    if (!given)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_place: the def is NULL");
+    if (given->struct_size == 0 || given->struct_size > sizeof *def)
+        return drape_fail(
+            sim->ctx, DRAPE_E_VERSION,
+            "the place def was not initialised by drape_place_def_init of this version: struct_size %zu",
+            given->struct_size);
+    memcpy(def, given, given->struct_size);
+    if (def->rotate[3] != 0 && def->rotate[0] == 0 && def->rotate[1] == 0 && def->rotate[2] == 0)
+        return drape_fail(
+            sim->ctx, DRAPE_E_ARGUMENT,
+            "drape_sim_place: the axis of a rotation by %g degrees is 0 0 0; it must not be zero",
+            def->rotate[3]);
+    if (!isfinite(def->rotate[3]) || is_far(def->rotate) || is_far(def->center) || is_far(def->translate))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "drape_sim_place: rotation, center and translation must be finite, and within %g",
+                          MAX_DISTANCE);
+    return DRAPE_OK;
+}
+
+/* R (x - c) + c + t. Without a rotation c cancels exactly. */
+static drape_placement placement_of(const drape_place_def *def)
+{
+    drape_placement by = {.given = true};
+    double matrix[3][3], turned[3];
+    drape_rotation_matrix(def->rotate, matrix);
+    memcpy(by.turn, matrix, sizeof by.turn);
+    drape_placement_turn(&by, def->center, turned);
+    for (int k = 0; k < 3; k++)
+        by.shift[k] = def->translate[k] + (def->center[k] - turned[k]);
+    return by;
+}
+
+drape_status drape_sim_place(drape_sim *sim, const drape_place_def *given)
+{
+    drape_place_def def;
+    drape_status status = drape_sim_guard(sim, "drape_sim_place");
+    if (!status)
+        status = read_def(sim, given, &def);
+    if (status)
+        return status;
+    const drape_place_list cloths = {def.cloths, def.cloth_count},
+                           colliders = {def.colliders, def.collider_count};
+    const drape_placement by = placement_of(&def);
+    status = check_list(sim, "cloth", &cloths, sim->model->cloth_count);
+    if (!status)
+        status = check_list(sim, "collider", &colliders, sim->model->collider_count);
+    return status ? status : drape_sim_place_parts(sim, &cloths, &colliders, &by, def.stop);
 }

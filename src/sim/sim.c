@@ -37,6 +37,10 @@ static drape_status read_def(drape_context *ctx, const drape_sim_def *given, dra
     if (!(def->frame_rate >= 0 && def->frame_rate <= 1e6))
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
                           "frame_rate = %g; it is in (0, 1e6] 1/s, or 0 for the scene's", def->frame_rate);
+    if (!(def->teleport_speed >= 0 && def->teleport_speed <= 1e9))
+        return drape_fail(ctx, DRAPE_E_ARGUMENT,
+                          "teleport_speed = %g; it is in (0, 1e9] m/s, or 0 for no limit",
+                          def->teleport_speed);
     return DRAPE_OK;
 }
 
@@ -98,8 +102,8 @@ static drape_stepping stepping_of(const drape_chosen *chosen)
 }
 
 /* Creates a sim with nothing but its arena. */
-static drape_status open_sim(drape_context *ctx, const drape_model *model, double frame_rate,
-                             double longest_asked, drape_sim **out)
+static drape_status open_sim(drape_context *ctx, const drape_model *model, const drape_sim_def *def,
+                             drape_sim **out)
 {
     drape_sim *sim = *out = drape_alloc(ctx, 1, sizeof *sim);
     if (!sim)
@@ -110,8 +114,9 @@ static drape_status open_sim(drape_context *ctx, const drape_model *model, doubl
                        .ctx = ctx,
                        .arena = drape_arena_create(ctx),
                        .model = model,
-                       .realtime = {.longest_asked = longest_asked},
-                       .frame_rate = frame_rate};
+                       .realtime = {.longest_asked = def->realtime_step},
+                       .frame_rate = def->frame_rate > 0 ? def->frame_rate : model->frame_rate,
+                       .teleport_speed = def->teleport_speed};
     return sim->arena ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
@@ -141,8 +146,10 @@ static drape_status start_sim(drape_sim *sim, int threads)
 
 drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out)
 {
-    drape_status status =
-        open_sim(like->ctx, like->model, like->frame_rate, like->realtime.longest_asked, out);
+    const drape_sim_def def = {.frame_rate = like->frame_rate,
+                               .realtime_step = like->realtime.longest_asked,
+                               .teleport_speed = like->teleport_speed};
+    drape_status status = open_sim(like->ctx, like->model, &def, out);
     if (!status) {
         (*out)->chosen = like->chosen;
         status = start_sim(*out, drape_pool_threads(drape_system_pool(like->system)));
@@ -166,8 +173,7 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_sim_create: the model is NULL");
     drape_status status = read_def(ctx, given, &def);
     if (!status)
-        status = open_sim(ctx, model, def.frame_rate > 0 ? def.frame_rate : model->frame_rate,
-                          def.realtime_step, out);
+        status = open_sim(ctx, model, &def, out);
     if (!status)
         status = drape_choose(ctx, model, &def, &(*out)->chosen);
     if (!status)

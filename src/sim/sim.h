@@ -22,6 +22,8 @@ typedef struct drape_audit {
     double offered;              /* energy at the start plus the magnitudes of all work */
     double lowest;               /* lowest energy of gravity so far */
     double best;                 /* largest numerical dissipation so far */
+    double residual_work;        /* of the residuals that unconverged steps left, so far */
+    double best_unexplained;     /* largest numerical dissipation with that work as a source */
 } drape_audit;
 
 #define DRAPE_MAX_EFFORTS 8
@@ -55,6 +57,7 @@ struct drape_sim {
     drape_schedule schedule;
     double max_attempts; /* the controller's max_attempts; INFINITY: it has none */
     double frame_rate;
+    double teleport_speed; /* [m/s] above which the host's pins carry their cloth; 0: never */
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
     double *query_scratch;          /* (node_count x 3) for queries between steps */
@@ -124,8 +127,13 @@ void drape_sim_add_work(drape_sim *sim, const drape_step_info *info);
  * so little that it is rounding of a scene at rest. */
 double drape_sim_energy_received(drape_sim *sim);
 
-/* Starts the energy account from the present state. */
+/* Starts the energy account from the present state. What was available to the run before is still: a state
+ * that is set is no more suspicious than the same state that was reached. */
 void drape_sim_reset_energy(drape_sim *sim);
+
+/* Takes all that has changed since the energies `before` as given by the host, who placed cloth elsewhere:
+ * numerical dissipation stays as it was, and what was available to the run still is. */
+void drape_sim_shift_energy(drape_sim *sim, const drape_energy *before);
 
 /* If the present state is badly distorted, a clause for a message that names its most distorted edge or
  * triangle; otherwise "". */

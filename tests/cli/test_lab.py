@@ -306,14 +306,20 @@ def test_reference_goes_on():
     assert not glob.glob("t/reference-*"), "what is left of the levels"
 
 
+def without_reference(*limit, named, not_named):
+    """a tradeoff that the limit leaves without a reference names what to change, and writes nothing; returns its command"""
+    command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
+    result = drape(*command, *limit)
+    equal(result.returncode, 1, "exit code")
+    assert f"larger {named}, a shorter duration" in result.stderr and not_named not in result.stderr, result.stderr
+    assert not os.path.exists("t"), os.listdir("t")
+    return command
+
+
 def test_reference_over_budget():
     """a budget that ends before there is a reference is named, and the levels so far stay for a larger one"""
     write_scene()
-    command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
-    result = drape(*command, "--budget", "1e-7")
-    equal(result.returncode, 1, "exit code")
-    assert "larger budget_seconds, a shorter duration" in result.stderr and "case_seconds" not in result.stderr, result.stderr
-    assert not os.path.exists("t"), os.listdir("t")
+    command = without_reference("--budget", "1e-7", named="budget_seconds", not_named="case_seconds")
     # A folder with one level: the reference of another run becomes the first level of ida.
     good(*command, "--budget", "none")
     about = read_json("t/reference.json")
@@ -465,11 +471,7 @@ def test_folder_that_cannot_be_made():
 def test_no_reference():
     """a tradeoff whose reference does not complete leaves no folder behind"""
     write_scene()
-    command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
-    result = drape(*command, "--case-seconds", "1e-9")
-    equal(result.returncode, 1, "exit code")
-    assert "larger case_seconds, a shorter duration" in result.stderr and "budget" not in result.stderr, result.stderr
-    assert not os.path.exists("t"), os.listdir("t")
+    command = without_reference("--case-seconds", "1e-9", named="case_seconds", not_named="budget")
     os.mkdir("t")
     with open("t/mine", "w", encoding="utf-8") as file:
         file.write("kept\n")

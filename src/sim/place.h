@@ -1,0 +1,25 @@
+/* place.h: cloth and colliders placed elsewhere by a rigid motion. */
+#ifndef DRAPE_SIM_PLACE_H
+#define DRAPE_SIM_PLACE_H
+
+#include "sim/sim.h"
+
+/* Indices of cloths or colliders; a count of -1 stands for all of them. */
+typedef struct drape_place_list {
+    const int32_t *items;
+    int32_t count;
+} drape_place_list;
+
+/* drape_sim_place of these parts, which exist. Errors: DRAPE_E_ARGUMENT, after which nothing has changed. */
+drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloths,
+                                   const drape_place_list *colliders, const drape_placement *by, bool stop);
+
+/* Before pins, or a collider, are sent on: if they are faster than the sim's teleport_speed, places their
+ * cloth, or the collider, where they are sent to, as drape_sim_move_pins says. Errors: as
+ * drape_sim_place_parts. */
+drape_status drape_sim_teleport_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
+                                     const double *positions, const double *velocities);
+drape_status drape_sim_teleport_collider(drape_sim *sim, int32_t collider, double seconds,
+                                         const double displacement[3], const double *velocity);
+
+#endif

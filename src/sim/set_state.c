@@ -1,0 +1,134 @@
+/*
+ * set_state.c: a user-defined state. It is built in the state that the next attempt would overwrite, so that a
+ * refused one changes nothing; the history that led to the present state is discarded.
+ */
+#include "base/elementary.h"
+#include "base/finite.h"
+#include "sim/sim.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MAX_SECONDS 1e9 /* [s] the limit of a scene's duration */
+/* of the scene's size: rounding error allowed between the given position of a pinned node and its pin */
+#define PIN_SLIP 1e-9
+
+static drape_status check_given(const drape_sim *sim, double t, const double *x, const double *v)
+{
+    size_t n = 3 * (size_t)sim->model->node_count;
+    if (!x || !v)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_state: there are no %s",
+                          x ? "velocities" : "positions");
+    if (!(t >= 0 && t <= MAX_SECONDS))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_state: t = %g s; it is 0 to %g s", t,
+                          MAX_SECONDS);
+    for (size_t i = 0; i < 2 * n; i++) {
+        double value = i < n ? x[i] : v[i - n];
+        int32_t node = (int32_t)(i % n / 3), c = drape_model_cloth_of(sim->model, node);
+        if (!isfinite(value))
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                              "drape_sim_set_state: %s of node %d of %s is %g; it must be finite",
+                              i < n ? "the position" : "the velocity",
+                              (int)(node - sim->model->cloths[c].first_node), sim->model->cloths[c].name,
+                              value);
+    }
+    return DRAPE_OK;
+}
+
+/* Places pinned nodes where their pins are at the time of the state, and those that the host moves at their
+ * given positions. */
+static void place_pinned(const drape_sim *sim, const double *given, drape_state *state)
+{
+    const drape_model *m = sim->model;
+    const drape_motion *motion = drape_system_motion(sim->system);
+    for (int32_t i = 0; i < m->node_count; i++)
+        if (m->pinned[i])
+            drape_motion_place_fixed(motion, i, state->x + 3 * (size_t)i);
+    drape_motion_place_pins(motion, state->t, state->x);
+    for (int32_t i = 0; i < motion->moved_count; i++) {
+        size_t at = 3 * (size_t)motion->moved_node[i];
+        if (motion->pin_path[i].given)
+            memcpy(state->x + at, given + at, 3 * sizeof *state->x);
+    }
+}
+
+/* Fixed nodes have no velocity, nor have those at rest where the host put them; pinned nodes that move keep
+ * the given one until a step sets it to the mean over their displacement. */
+static void stop_fixed(const drape_sim *sim, const double *given, drape_state *state)
+{
+    const drape_model *m = sim->model;
+    const drape_motion *motion = drape_system_motion(sim->system);
+    for (int32_t i = 0; i < m->node_count; i++)
+        if (m->pinned[i])
+            memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
+    for (int32_t i = 0; i < motion->moved_count; i++) {
+        size_t at = 3 * (size_t)motion->moved_node[i];
+        if (!motion->pin_path[i].given)
+            memcpy(state->v + at, given + at, 3 * sizeof *state->v);
+    }
+}
+
+static drape_status check_pinned(const drape_sim *sim, const double *given, const drape_state *state)
+{
+    const drape_model *m = sim->model;
+    for (int32_t i = 0; i < m->node_count; i++) {
+        const double *x = given + 3 * (size_t)i, *pin = state->x + 3 * (size_t)i;
+        const drape_cloth *cloth = &m->cloths[drape_model_cloth_of(m, i)];
+        if (m->pinned[i] &&
+            !(drape_hypot(drape_hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= PIN_SLIP * m->length))
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                              "drape_sim_set_state: node %d of %s is at (%g %g %g); its pin has it at (%g %g "
+                              "%g) m at t = %g s",
+                              (int)(i - cloth->first_node), cloth->name, x[0], x[1], x[2], pin[0], pin[1],
+                              pin[2], state->t);
+    }
+    return DRAPE_OK;
+}
+
+/* The index of the first frame at or after the present time. */
+static int64_t first_frame(const drape_sim *sim)
+{
+    double t = drape_sim_state(sim)->t;
+    int64_t k = (int64_t)floor(t * sim->frame_rate);
+    return (double)k / sim->frame_rate < t ? k + 1 : k;
+}
+
+/* Makes the state a beginning: nothing that led to the previous state counts. */
+static void start_anew(drape_sim *sim, double t_before)
+{
+    double t = drape_sim_state(sim)->t;
+    sim->before = sim->past[0] = sim->past[1] = -1;
+    memset(sim->scratch, 0, sizeof sim->scratch);
+    sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+    drape_sim_leave_realtime(sim);
+    drape_schedule_init(&sim->schedule, sim->schedule.stepping, sim->schedule.dt, t);
+    if (t != t_before) /* otherwise the frame at t may have been emitted already */
+        sim->next_frame = first_frame(sim);
+    drape_sim_reset_energy(sim);
+}
+
+drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, const double *v)
+{
+    drape_status guarded = drape_sim_guard(sim, "drape_sim_set_state");
+    if (guarded)
+        return guarded;
+    drape_status status = check_given(sim, t, x, v);
+    if (status)
+        return status;
+    const drape_model *m = sim->model;
+    drape_state *now = &sim->states[sim->now], *next = &sim->states[sim->next];
+    next->t = t;
+    memcpy(next->x, x, 3 * (size_t)m->node_count * sizeof *x);
+    memcpy(next->v, v, 3 * (size_t)m->node_count * sizeof *v);
+    place_pinned(sim, x, next);
+    stop_fixed(sim, v, next);
+    status = check_pinned(sim, x, next);
+    if (status)
+        return status;
+    drape_motion_hold_pins(drape_system_steer(sim->system), next->x);
+    drape_state_commit(m, now, next);
+    sim->next = sim->now;
+    sim->now = (int)(next - sim->states);
+    start_anew(sim, now->t);
+    return DRAPE_OK;
+}

@@ -1,0 +1,212 @@
+/*
+ * teleport.c: pins and colliders that a host sends faster than teleport_speed. Cloth would be torn after them
+ * for seconds; it is placed with them instead, by the rigid motion that fits its pins best in the sense of
+ * least squares (Horn 1987, Closed-form solution of absolute orientation using unit quaternions, J. Opt. Soc.
+ * Am. A 4, section 4), less the path that they would have covered at their own velocity.
+ */
+#include "base/vec3.h"
+#include "sim/place.h"
+#include "sparse/project.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Pins on a line, or a single one, leave a rotation free: then the smallest one is taken. This share of the
+ * spread of the pins counts against any rotation, and turns it by as much at most [rad]. */
+#define REST 1e-6
+
+static bool exceeds(const drape_sim *sim, const double *from, const double *to, double seconds)
+{
+    double way[3];
+    vec3_sub(to, from, way);
+    return sim->teleport_speed > 0 && vec3_norm(way) > sim->teleport_speed * seconds;
+}
+
+/* ---- The best rigid motion ---- */
+
+/* Of the pins of a cloth: where they are, and where they are to be. */
+typedef struct pins {
+    const drape_model *model;
+    const drape_cloth *cloth;
+    const double *from, *to; /* (node_count x 3) */
+} pins;
+
+static void mean_of(const pins *p, const double *x, double mean[3])
+{
+    int32_t count = 0;
+    memset(mean, 0, 3 * sizeof *mean);
+    for (int32_t i = 0; i < p->cloth->mesh.node_count; i++) {
+        const int32_t node = p->cloth->first_node + i;
+        if (!p->model->pinned[node])
+            continue;
+        count++;
+        vec3_add_scaled(1, x + 3 * (size_t)node, mean);
+    }
+    for (int k = 0; k < 3; k++)
+        mean[k] /= count;
+}
+
+/* S[3 a + b] = sum of (from - its mean)_a (to - its mean)_b; returns the spread of both. */
+static double correlate(const pins *p, const double *from, const double *to, double S[9])
+{
+    double spread = 0;
+    memset(S, 0, 9 * sizeof *S);
+    for (int32_t i = 0; i < p->cloth->mesh.node_count; i++) {
+        const size_t node = (size_t)(p->cloth->first_node + i);
+        double a[3], b[3];
+        if (!p->model->pinned[node])
+            continue;
+        vec3_sub(p->from + 3 * node, from, a);
+        vec3_sub(p->to + 3 * node, to, b);
+        for (int k = 0; k < 9; k++)
+            S[k] += a[k / 3] * b[k % 3];
+        spread += (vec3_dot(a, a) + vec3_dot(b, b)) / 2;
+    }
+    return spread;
+}
+
+/* The unit quaternion q that makes q' N q largest, for Horn's matrix N of the products S. */
+static void best_quaternion(const double S[9], double rest, double q[4])
+{
+    const double xx = S[0], xy = S[1], xz = S[2], yx = S[3], yy = S[4], yz = S[5], zx = S[6], zy = S[7],
+                 zz = S[8];
+    double N[16] = {xx + yy + zz + rest, yz - zy, zx - xz, xy - yx, yz - zy,
+                    xx - yy - zz,        xy + yx, zx + xz, zx - xz, xy + yx,
+                    -xx + yy - zz,       yz + zy, xy - yx, zx + xz, yz + zy,
+                    -xx - yy + zz};
+    double v[16];
+    int best = 0;
+    drape_diagonalise(4, N, v);
+    for (int i = 1; i < 4; i++)
+        best = N[5 * i] > N[5 * best] ? i : best;
+    for (int i = 0; i < 4; i++)
+        q[i] = v[4 * i + best];
+}
+
+static void turn_of(const double q[4], double turn[9])
+{
+    const double w = q[0], x = q[1], y = q[2], z = q[3], n = w * w + x * x + y * y + z * z;
+    const double matrix[9] = {
+        w * w + x * x - y * y - z * z, 2 * (x * y - w * z),           2 * (x * z + w * y),
+        2 * (x * y + w * z),           w * w - x * x + y * y - z * z, 2 * (y * z - w * x),
+        2 * (x * z - w * y),           2 * (y * z + w * x),           w * w - x * x - y * y + z * z};
+    for (int i = 0; i < 9; i++)
+        turn[i] = matrix[i] / n;
+}
+
+static drape_placement fit(const pins *p)
+{
+    drape_placement by = {.given = true, .turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    double from[3], to[3], turned[3], S[9], q[4];
+    mean_of(p, p->from, from);
+    mean_of(p, p->to, to);
+    const double spread = correlate(p, from, to, S);
+    if (spread > 0) {
+        best_quaternion(S, REST * spread, q);
+        turn_of(q, by.turn);
+    }
+    drape_placement_turn(&by, from, turned);
+    vec3_sub(to, turned, by.shift);
+    return by;
+}
+
+/* ---- Pins ---- */
+
+static bool is_in(const drape_cloth *cloth, int32_t node)
+{
+    return node >= cloth->first_node && node < cloth->first_node + cloth->mesh.node_count;
+}
+
+/* Where all nodes with a pin are to be after `seconds`: those that are not sent go on as they would. */
+static const double *targets(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
+                             const double *positions)
+{
+    const drape_state *now = drape_sim_state(sim);
+    double *to = sim->query_scratch;
+    memcpy(to, now->x, 3 * (size_t)sim->model->node_count * sizeof *to);
+    drape_motion_place_pins(drape_system_motion(sim->system), now->t + seconds, to);
+    for (int32_t i = 0; i < count; i++)
+        memcpy(to + 3 * (size_t)nodes[i], positions + 3 * (size_t)i, 3 * sizeof *to);
+    return to;
+}
+
+/* The mean velocity of the sent pins of a cloth: on arrival or, if the host gives none, theirs so far. */
+static void mean_velocity(const drape_sim *sim, const drape_cloth *cloth, int32_t count, const int32_t *nodes,
+                          const double *velocities, const drape_placement *by, double mean[3])
+{
+    int32_t sent = 0;
+    memset(mean, 0, 3 * sizeof *mean);
+    for (int32_t i = 0; i < count; i++) {
+        double v[3];
+        if (!is_in(cloth, nodes[i]))
+            continue;
+        if (velocities)
+            memcpy(v, velocities + 3 * (size_t)i, sizeof v);
+        else
+            drape_motion_pin_arrival(drape_system_motion(sim->system), nodes[i], drape_sim_state(sim)->t, v);
+        if (!velocities)
+            drape_placement_turn(by, v, v);
+        vec3_add_scaled(1, v, mean);
+        sent++;
+    }
+    for (int k = 0; k < 3; k++)
+        mean[k] /= sent;
+}
+
+static bool is_sent_too_fast(const drape_sim *sim, const drape_cloth *cloth, int32_t count,
+                             const int32_t *nodes, double seconds, const double *positions)
+{
+    const double *x = drape_sim_state(sim)->x;
+    bool fast = false;
+    for (int32_t i = 0; i < count && !fast; i++)
+        fast = is_in(cloth, nodes[i]) &&
+               exceeds(sim, x + 3 * (size_t)nodes[i], positions + 3 * (size_t)i, seconds);
+    return fast;
+}
+
+drape_status drape_sim_teleport_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
+                                     const double *positions, const double *velocities)
+{
+    const drape_model *m = sim->model;
+    drape_status status = DRAPE_OK;
+    for (int32_t c = 0; c < m->cloth_count && !status; c++) {
+        const drape_cloth *cloth = &m->cloths[c];
+        double v[3];
+        if (!is_sent_too_fast(sim, cloth, count, nodes, seconds, positions))
+            continue;
+        const pins p = {.model = m,
+                        .cloth = cloth,
+                        .from = drape_sim_state(sim)->x,
+                        .to = targets(sim, count, nodes, seconds, positions)};
+        drape_placement by = fit(&p);
+        mean_velocity(sim, cloth, count, nodes, velocities, &by, v);
+        vec3_add_scaled(-seconds, v, by.shift);
+        drape_log(sim->ctx, DRAPE_LOG_INFO,
+                  "t=%.9g: pins of %s are sent faster than %.4g m/s: it is placed there",
+                  drape_sim_state(sim)->t, cloth->name, sim->teleport_speed);
+        status =
+            drape_sim_place_parts(sim, &(drape_place_list){&c, 1}, &(drape_place_list){NULL, 0}, &by, false);
+    }
+    return status;
+}
+
+/* ---- Colliders ---- */
+
+drape_status drape_sim_teleport_collider(drape_sim *sim, int32_t collider, double seconds,
+                                         const double displacement[3], const double *velocity)
+{
+    const drape_motion *motion = drape_system_motion(sim->system);
+    const double t = drape_sim_state(sim)->t;
+    drape_placement by = {.given = true, .turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    double from[3], v[3];
+    drape_motion_collider(motion, collider, t, from);
+    if (!exceeds(sim, from, displacement, seconds))
+        return DRAPE_OK;
+    drape_motion_collider_arrival(motion, collider, t, v);
+    vec3_sub(displacement, from, by.shift);
+    vec3_add_scaled(-seconds, velocity ? velocity : v, by.shift);
+    drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g: %s is sent faster than %.4g m/s: it is placed there", t,
+              sim->model->colliders[collider].name, sim->teleport_speed);
+    return drape_sim_place_parts(sim, &(drape_place_list){NULL, 0}, &(drape_place_list){&collider, 1}, &by,
+                                 false);
+}
