@@ -2,11 +2,26 @@
 #include "contact/relaxed.h"
 
 #include "base/elementary.h"
+#include "base/vec3.h"
 #include "contact/list.h"
 
 #include <string.h>
 
 #define DOUBLED 0.02 /* [s] in which the pressure on a node that has room doubles, and falls by half */
+
+/* A shape without points may have no end, as a plane; inscribed ones are inside of it. */
+static void bound(const drape_collider_shape *shape, double out[4])
+{
+    double radius = shape->point_count > 0 && !shape->inscribed ? 0 : INFINITY, to[3];
+    memset(out, 0, 3 * sizeof *out);
+    for (int32_t i = 0; i < shape->point_count; i++)
+        vec3_add_scaled(1.0 / shape->point_count, shape->point + 3 * (size_t)i, out);
+    for (int32_t i = 0; i < shape->point_count; i++) {
+        vec3_sub(shape->point + 3 * (size_t)i, out, to);
+        radius = fmax(radius, vec3_norm(to));
+    }
+    out[3] = radius + shape->radius;
+}
 
 drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, drape_relaxed_set *set)
 {
@@ -14,8 +29,12 @@ drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, 
     *set = (drape_relaxed_set){.arena = arena, .model = model};
     set->of_node = drape_arena_take(arena, nodes, sizeof *set->of_node);
     set->normal = drape_arena_take(arena, nodes, 3 * sizeof *set->normal);
-    set->near = drape_arena_take(arena, colliders, sizeof *set->near);
+    set->reach = drape_arena_take(arena, nodes, sizeof *set->reach);
+    set->pins = drape_arena_take(arena, colliders, sizeof *set->pins);
+    set->bound = drape_arena_take(arena, colliders, 4 * sizeof *set->bound);
     set->total = drape_arena_take(arena, colliders + 1, sizeof *set->total);
+    for (size_t i = 0; set->bound && i < colliders; i++)
+        bound(&model->colliders[i].shape, set->bound + 4 * i);
     return drape_arena_status(arena);
 }
 

@@ -72,7 +72,12 @@ static void move_out(const drape_contact *c, int32_t collider, double margin, co
 static bool is_in_the_way(const drape_contact *c, int32_t other, double margin, const double q[3],
                           const double direction[3])
 {
-    double n[3];
+    const double *bound = c->relaxed.bound + 4 * (size_t)other;
+    double n[3], to[3];
+    vec3_sub(q, bound, to);
+    vec3_sub(to, c->pose[other].displacement, to);
+    if (vec3_norm(to) > bound[3] + margin)
+        return false;
     return distance_at(c, other, q, n) < margin * (1 - 1e-6) && vec3_dot(n, direction) < 0;
 }
 
@@ -87,15 +92,46 @@ static drape_status block(drape_contact *c, int32_t collider, const int32_t *nod
     return status;
 }
 
-static drape_status block_pins(drape_contact *c, int32_t collider, const cloth_point *p, double margin,
-                               double t, bool may_relax, int32_t *added)
+/* Around a pin inside a collider there is a way out only beyond its depth, less the cloth between: edge by edge,
+ * from every pin inside, the depth that is left. */
+static void reach_from_pins(const drape_contact *c, int32_t collider, double margin, double *reach)
+{
+    const drape_model *m = c->model;
+    for (int32_t i = 0; i < m->node_count; i++)
+        reach[i] = m->pinned[i] ? margin - distance_at(c, collider, c->x + 3 * (size_t)i, NULL) : 0;
+    for (bool more = true; more;) {
+        more = false;
+        for (int32_t e = 0; e < m->edge_count; e++)
+            for (int k = 0; k < 2; k++) {
+                const int32_t from = m->edge[2 * (size_t)e + (size_t)k], to = m->edge[2 * (size_t)e + (size_t)!k];
+                const double left = reach[from] - m->edge_length[e];
+                if (!(left > 0) || !(left > reach[to]) || m->pinned[to])
+                    continue;
+                reach[to] = left;
+                more = true;
+            }
+    }
+}
+
+static drape_status block_pins(drape_contact *c, int32_t collider, double margin, double t, bool may_relax,
+                               int32_t *added)
 {
     drape_status status = DRAPE_OK;
-    for (int a = 0; !status && a < p->nodes; a++)
-        if (c->model->pinned[p->node[a]] &&
-            distance_at(c, collider, c->x + 3 * (size_t)p->node[a], NULL) < margin)
-            status = block(c, collider, &p->node[a], 1, t, t, may_relax, added);
+    reach_from_pins(c, collider, margin, c->relaxed.reach);
+    for (int32_t i = 0; !status && i < c->model->node_count; i++)
+        if (c->relaxed.reach[i] > 0)
+            status = block(c, collider, &i, 1, t, t, may_relax, added);
     return status;
+}
+
+/* Whether a contact has a pin inside the collider. */
+static bool has_pin_inside(const drape_contact *c, int32_t collider, const cloth_point *p, double margin)
+{
+    bool found = false;
+    for (int a = 0; a < p->nodes; a++)
+        found = found || (c->model->pinned[p->node[a]] &&
+                          distance_at(c, collider, c->x + 3 * (size_t)p->node[a], NULL) < margin);
+    return found;
 }
 
 static drape_status block_between(drape_contact *c, int32_t collider, const cloth_point *p, double margin,
@@ -105,7 +141,7 @@ static drape_status block_between(drape_contact *c, int32_t collider, const clot
     drape_status status = DRAPE_OK;
     move_out(c, collider, margin, p, q, direction);
     for (int32_t other = 0; !status && other < c->model->collider_count; other++) {
-        if (other == collider || !c->relaxed.near[other] || !is_in_the_way(c, other, margin, q, direction))
+        if (other == collider || !is_in_the_way(c, other, margin, q, direction))
             continue;
         status = block(c, collider, p->node, p->nodes, t, t, may_relax, added);
         if (!status)
@@ -134,19 +170,20 @@ drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, 
     for (int32_t i = 0; i < relaxed->count; i++)
         relaxed->nodes[i].blocked = t < relaxed->nodes[i].until;
     drape_model_normals(c->model, c->x, relaxed->normal);
-    memset(relaxed->near, 0, (size_t)c->model->collider_count * sizeof *relaxed->near);
-    for (int32_t i = 0; i < c->active.count; i++)
-        if (c->active.contacts[i].pair.collider >= 0)
-            relaxed->near[c->active.contacts[i].pair.collider] = true;
+    memset(relaxed->pins, 0, (size_t)c->model->collider_count * sizeof *relaxed->pins);
     for (int32_t i = 0; !status && i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
         const double margin = MARGIN * contact->pair.distance;
         if (contact->pair.collider < 0 || !(contact->gap.value < margin))
             continue;
         const cloth_point p = point_of(c, contact);
-        status = block_pins(c, contact->pair.collider, &p, margin, t, may_relax, added);
+        const int32_t collider = contact->pair.collider;
+        if (!relaxed->pins[collider] && has_pin_inside(c, collider, &p, margin)) {
+            relaxed->pins[collider] = true;
+            status = block_pins(c, collider, margin, t, may_relax, added);
+        }
         if (!status)
-            status = block_between(c, contact->pair.collider, &p, margin, t, may_relax, added);
+            status = block_between(c, collider, &p, margin, t, may_relax, added);
     }
     c->listed = c->listed && *added == 0; /* the laws of contacts have changed */
     return status;

@@ -14,7 +14,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#define PATIENCE 3 /* attempts at a step that fail in a row before the pairs that hold it up are relaxed */
+/* Attempts that fail in a row, or halvings of a step, after which the pairs that hold it up are relaxed: impacts
+ * on cloth that has room take some. */
+#define PATIENCE 6
 
 /* ---- Compute and check ---- */
 
@@ -105,7 +107,7 @@ static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status s
 static bool relax(drape_sim *sim, double t1, drape_status status, drape_verdict verdict)
 {
     int32_t added;
-    const bool all = verdict == DRAPE_STOP || sim->failed >= PATIENCE;
+    const bool all = verdict == DRAPE_STOP || sim->failed >= PATIENCE || sim->schedule.level >= PATIENCE;
     return status > 0 && may_relax(sim) && !drape_system_relax(sim->system, t1, all, &added) && added > 0;
 }
 
