@@ -613,7 +613,7 @@ DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t 
 
 /* A doubt about a run: what is unusual, and which setting would help. */
 typedef struct drape_warning {
-    const char *name; /* "no_terms", "few_steps", "large_mesh", "starts_inside", "ends_inside",
+    const char *name; /* "no_terms", "few_steps", "large_mesh", "starts_inside", "ends_inside", "no_room",
                          "numerical_dissipation" or "slow_contact" */
     char text[400];   /* one line */
 } drape_warning;
@@ -623,7 +623,8 @@ typedef struct drape_warning {
  * 20 steps of dt, unless integrator or controller choose their own steps or substeps. large_mesh: a mesh
  * from a file is more than 20 m across, as one in centimetres is. starts_inside, ends_inside: free nodes
  * are inside a collider, by more than 1e-9 m, or it pierces triangles without a pinned node, at the start,
- * or after the steps so far; the text describes the first such collider. numerical_dissipation: the
+ * or after the steps so far; the text describes the first such collider. no_room: bodies
+ * left cloth no room, and it was relaxed there (drape_sim_relaxed). numerical_dissipation: the
  * integrator took more than half of the energy that went in. slow_contact: contact takes most of the time
  * of the steps, and longer than the motion lasts, and a setting is known to help. Returns false past the
  * last. */

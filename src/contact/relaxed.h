@@ -34,11 +34,11 @@ typedef struct drape_relaxed_set {
     const drape_model *model;
     drape_relaxed_node *nodes; /* (count of room) by increasing collider and node */
     int32_t count, room;
-    uint8_t *of_node;           /* (node_count) whether it is among them, for any collider */
-    double *normal;             /* (node_count x 3) scratch */
-    double *reach;              /* (node_count) scratch */
-    bool *pins;                 /* (collider_count) scratch */
-    double *bound;              /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none */
+    uint8_t *of_node; /* (node_count) whether it is among them, for any collider */
+    double *normal;   /* (node_count x 3) scratch */
+    double *reach;    /* (node_count) scratch */
+    bool *pins;       /* (collider_count) scratch */
+    double *bound;    /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none */
     drape_relaxed_total *total; /* (collider_count + 1) the last one: of pinned pieces of cloth */
     double t;                   /* [s] of the last update */
 } drape_relaxed_set;

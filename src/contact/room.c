@@ -103,7 +103,8 @@ static void reach_from_pins(const drape_contact *c, int32_t collider, double mar
         more = false;
         for (int32_t e = 0; e < m->edge_count; e++)
             for (int k = 0; k < 2; k++) {
-                const int32_t from = m->edge[2 * (size_t)e + (size_t)k], to = m->edge[2 * (size_t)e + (size_t)!k];
+                const int32_t from = m->edge[2 * (size_t)e + (size_t)k],
+                              to = m->edge[2 * (size_t)e + (size_t)!k];
                 const double left = reach[from] - m->edge_length[e];
                 if (!(left > 0) || !(left > reach[to]) || m->pinned[to])
                     continue;

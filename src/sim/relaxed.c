@@ -37,6 +37,12 @@ const drape_relaxed_total *drape_sim_relaxed_total(const drape_sim *sim, int32_t
     return set ? &set->total[collider >= 0 ? collider : sim->model->collider_count] : &none;
 }
 
+int32_t drape_sim_relaxed_at(const drape_sim *sim, int32_t collider)
+{
+    const drape_relaxed_set *set = set_of(sim);
+    return set ? drape_relaxed_count(set, collider) : 0;
+}
+
 int32_t drape_sim_relaxed_now(const drape_sim *sim, double *deepest)
 {
     const drape_relaxed_set *set = set_of(sim);

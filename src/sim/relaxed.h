@@ -11,6 +11,9 @@
 const drape_relaxed_total *drape_sim_relaxed_total(const drape_sim *sim, int32_t collider);
 const char *drape_sim_relaxed_name(const drape_sim *sim, int32_t collider);
 
+/* The number of nodes that are relaxed at a collider. */
+int32_t drape_sim_relaxed_at(const drape_sim *sim, int32_t collider);
+
 /* The number of relaxed nodes and the largest depth [m] among them. */
 int32_t drape_sim_relaxed_now(const drape_sim *sim, double *deepest);
 
