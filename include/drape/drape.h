@@ -380,6 +380,8 @@ typedef struct drape_realtime {
     double h;               /* [s] largest accepted step; 0: none was accepted */
     double residual; /* [N] largest residual of the accepted steps, in the norm of the integrator; NaN: the
                         integrator reports none */
+    int32_t relaxed; /* nodes that bodies leave no room: drape_sim_relaxed; 0: all cloth is held */
+    double deepest_relaxed; /* [m] the deepest of them: how far inside its collider */
 } drape_realtime;
 
 /* Advances by one frame within a wall-clock budget, for games, previews and anything else that must show a
@@ -555,6 +557,29 @@ DRAPE_API uint64_t drape_sim_hash(const drape_sim *sim);
  * depth [m] that was found. Returns -1 if there is no such collider, or memory is out. */
 DRAPE_API int32_t drape_sim_inside(const drape_sim *sim, int32_t collider, double *deepest);
 
+/* A node of cloth that bodies leave no room: a collider whose surface does not hold it for the time being. */
+typedef struct drape_relaxed {
+    int32_t collider; /* its number in the scene, from 0; -1: pinned pieces of cloth */
+    const char *name; /* of the collider, "self_contact" for -1; valid as long as the model */
+    int32_t node;     /* of all cloths, from 0 */
+    double
+        depth; /* [m] how far it, or the cloth around it, was inside at the beginning of the last step, >= 0; 0
+                         for pinned pieces of cloth, which have no inside */
+    double deepest; /* [m] the largest depth since it was relaxed */
+    double since;   /* [s] the time at which it was relaxed */
+} drape_relaxed;
+
+/* The nodes that are relaxed: where two bodies close upon cloth, pins lie in a body, or cloth is held back by
+ * what a body presses on, steps have no solution in which nothing passes through anything. With the scene's
+ * contact/no_room "relax", and with "auto" in drape_sim_advance_realtime, the surfaces that have no room for
+ * the cloth then let it in, at some nodes and the faces around them, and push it out by a bounded pressure; the
+ * rest of the cloth goes on as before. Nodes are held again once they have room and are out. drape_sim_inside
+ * counts what is inside meanwhile.
+ *
+ * Returns their number and, if index is from 0 to below that, fills *out unless it is NULL; they are ordered by
+ * collider and node. 0 for a sim without contact. Not during an advance from another thread. */
+DRAPE_API int32_t drape_sim_relaxed(const drape_sim *sim, int32_t index, drape_relaxed *out);
+
 /* Counts the pairs of an edge and a triangle that pass through each other, with exact signs: of the cloth
  * and a collider, of which either may have the edge, or of the cloth itself if collider is -1. Edges that
  * only touch, and pairs that share a node, do not count. Returns -1 if there is no such collider, or
@@ -642,7 +667,7 @@ DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t 
 
 /* A doubt about a run: what is unusual, and which setting would help. */
 typedef struct drape_warning {
-    const char *name; /* "no_terms", "few_steps", "large_mesh", "starts_inside", "ends_inside",
+    const char *name; /* "no_terms", "few_steps", "large_mesh", "starts_inside", "ends_inside", "no_room",
                          "numerical_dissipation" or "slow_contact" */
     char text[400];   /* one line */
 } drape_warning;
@@ -652,7 +677,8 @@ typedef struct drape_warning {
  * 20 steps of dt, unless integrator or controller choose their own steps or substeps. large_mesh: a mesh
  * from a file is more than 20 m across, as one in centimetres is. starts_inside, ends_inside: free nodes
  * are inside a collider, by more than 1e-9 m, or it pierces triangles without a pinned node, at the start,
- * or after the steps so far; the text describes the first such collider. numerical_dissipation: the
+ * or after the steps so far; the text describes the first such collider. no_room: bodies
+ * left cloth no room, and it was relaxed there (drape_sim_relaxed). numerical_dissipation: the
  * integrator took more than half of the energy that went in. slow_contact: contact takes most of the time
  * of the steps, and longer than the motion lasts, and a setting is known to help. Returns false past the
  * last. */

@@ -224,6 +224,18 @@ bool drape_system_crosses(drape_system *system, const double *x, double t, const
     return system->contact && drape_contact_crosses(system->contact, x, t, reason, diagnostic);
 }
 
+void drape_system_expect(drape_system *system, double t1, bool may_relax)
+{
+    if (system->contact)
+        drape_contact_expect(system->contact, t1, may_relax);
+}
+
+drape_status drape_system_relax(drape_system *system, double t1, bool all, int32_t *added)
+{
+    *added = 0;
+    return system->contact ? drape_contact_relax(system->contact, t1, all, added) : DRAPE_OK;
+}
+
 bool drape_system_nearest(const drape_system *system, drape_diagnostic *diagnostic)
 {
     return system->contact && drape_contact_nearest(system->contact, diagnostic);

@@ -7,6 +7,8 @@
 
 enum { IMPLICIT, LAGGED };
 static const char *const frictions[] = {"implicit", "lagged", NULL};
+static const char *const policies[] = {
+    [DRAPE_NO_ROOM_AUTO] = "auto", [DRAPE_NO_ROOM_STOP] = "stop", [DRAPE_NO_ROOM_RELAX] = "relax", NULL};
 
 const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
     [DRAPE_CONTACT_DISTANCE] =
@@ -30,6 +32,11 @@ const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
         DRAPE_DERIVED("sqrt(2 gravity distance); without gravity, sqrt(2 L distance) in a second"),
         DRAPE_ABOVE(0), 1e9,
         "impacts much faster than this return the share of energy that restitution says"),
+    [DRAPE_CONTACT_NO_ROOM] = DRAPE_CHOICE("no_room", DRAPE_NO_ROOM_AUTO, policies,
+                                           "where bodies leave cloth no room, stop: steps fail until the sim "
+                                           "stops; relax: the bodies may enter the "
+                                           "cloth there, which is reported, until there is room again; auto: "
+                                           "relax in advances with a time budget"),
 };
 
 const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT] = {
@@ -47,6 +54,7 @@ void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_
     values[DRAPE_CONTACT_FRICTION_VELOCITY] = contact->friction_velocity;
     values[DRAPE_CONTACT_FRICTION] = contact->lagged ? LAGGED : IMPLICIT;
     values[DRAPE_CONTACT_RESTITUTION_VELOCITY] = contact->restitution_velocity;
+    values[DRAPE_CONTACT_NO_ROOM] = contact->no_room;
 }
 
 void drape_self_contact_values(const drape_contact_def *contact, double values[DRAPE_SELF_PARAM_COUNT])
@@ -139,6 +147,17 @@ static double stiffness_of_strain(const drape_model *model)
     return ELASTIC * membrane * model->edge_count / edges;
 }
 
+/* Cloth that is pinched between bodies is pushed by both of them: their pressures balance across it, and add up
+ * along it, where round bodies squeeze it out. A radius r of a lens between balls of radius R is strained by
+ * about p r^2 / (R E h). With p = ELASTIC E h / a that is ELASTIC r^2 / (R a), one per cent for ten edges; with
+ * p ten times the weight of the cloth, or of what stops it within L, E h would have to be that small. */
+#define WEIGHTS 10
+static double relaxed_pressure(const drape_model *model)
+{
+    const double weight = stiffness_of_fall(model) * model->contact.distance / (2 * model->length);
+    return fmin(model->contact.stiffness, fmax(WEIGHTS * weight, stiffness_of_strain(model)));
+}
+
 static drape_status resolve_contact(drape_model *model, const drape_scene_def *def)
 {
     double values[DRAPE_CONTACT_PARAM_COUNT];
@@ -153,6 +172,7 @@ static drape_status resolve_contact(drape_model *model, const drape_scene_def *d
     contact->stiffness = values[DRAPE_CONTACT_STIFFNESS];
     contact->friction_velocity = values[DRAPE_CONTACT_FRICTION_VELOCITY];
     contact->lagged = values[DRAPE_CONTACT_FRICTION] == LAGGED;
+    contact->no_room = (drape_no_room)values[DRAPE_CONTACT_NO_ROOM];
     contact->restitution_velocity = isnan(rebound) ? speed_of_fall(model, contact->distance) : rebound;
     return DRAPE_OK;
 }
@@ -193,5 +213,6 @@ drape_status drape_compile_contact_stiffness(drape_model *model, const drape_sce
     (void)def;
     if (isnan(model->contact.stiffness))
         model->contact.stiffness = fmax(stiffness_of_fall(model), stiffness_of_strain(model));
+    model->contact.relaxed_pressure = relaxed_pressure(model);
     return DRAPE_OK;
 }

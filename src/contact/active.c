@@ -60,7 +60,7 @@ static bool is_same(const drape_active_contact *a, const drape_active_contact *b
 {
     int32_t key[3], other[3];
     if (a->pair.collider != b->pair.collider || a->pair.distance != b->pair.distance ||
-        a->gap.closest.points != b->gap.closest.points || a->gentle != b->gentle)
+        a->gap.closest.points != b->gap.closest.points || a->gentle != b->gentle || a->relaxed != b->relaxed)
         return false;
     key_of(a, key);
     key_of(b, other);
@@ -104,19 +104,19 @@ static bool grow(drape_active_set *set)
     return true;
 }
 
-static bool add(drape_active_set *set, const drape_active_contact *contact)
+drape_status drape_active_set_add(drape_active_set *set, const drape_active_contact *contact)
 {
     if (!grow(set))
-        return false;
+        return DRAPE_E_MEMORY;
     int32_t *slot = is_shared(contact) ? slot_of(set, contact) : NULL;
     if (slot && *slot > 0) {
         set->contacts[*slot - 1].pair.area += contact->pair.area;
-        return true;
+        return DRAPE_OK;
     }
     if (slot)
         *slot = set->count + 1;
     set->contacts[set->count++] = *contact;
-    return true;
+    return DRAPE_OK;
 }
 
 static bool note_near(drape_active_set *set, const drape_pair *pair, double gap)
@@ -132,7 +132,8 @@ static bool note_near(drape_active_set *set, const drape_pair *pair, double gap)
 
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
                                    const drape_distances *away, const drape_configuration *at,
-                                   const drape_inside_pairs *inside, bool all_inside)
+                                   const drape_inside_pairs *inside, bool all_inside,
+                                   const drape_relaxed_set *relaxed)
 {
     const double rounding = candidates->broad->rounding;
     drape_candidate_cursor cursor = {0};
@@ -146,14 +147,17 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
             continue;
         contact.pair = *pair;
         contact.gentle = false;
-        if (contact.gap.value < DRAPE_BARRIER_GENTLE * pair->distance) {
+        contact.relaxed = drape_relaxed_factor(relaxed, pair);
+        if (contact.relaxed > 0 && pair->collider >= 0 && drape_pair_points(pair) > 1 && !(pair->radius > 0))
+            continue;
+        if (!(contact.relaxed > 0) && contact.gap.value < DRAPE_BARRIER_GENTLE * pair->distance) {
             contact.gentle = (all_inside && contact.gap.value < drape_pair_least_gap(pair, rounding)) ||
                              drape_inside_has(inside, pair);
             if (!note_near(set, pair, contact.gap.value))
                 return DRAPE_E_MEMORY;
         }
         reduce(&contact);
-        if (!add(set, &contact))
+        if (drape_active_set_add(set, &contact))
             return DRAPE_E_MEMORY;
     }
     return DRAPE_OK;

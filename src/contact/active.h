@@ -8,11 +8,13 @@
 
 #include "contact/candidates.h"
 #include "contact/inside.h"
+#include "contact/relaxed.h"
 
 typedef struct drape_active_contact {
     drape_pair pair; /* its nodes are the points of the gap; -1 for points that do not exist */
     drape_gap gap;
-    bool gentle; /* its pairs began below the least gap: see barrier.h */
+    bool gentle;    /* its pairs began below the least gap: see barrier.h */
+    double relaxed; /* factor of the pressure of relaxed pairs (relaxed.h); 0: they are held */
 } drape_active_contact;
 
 typedef struct drape_active_set {
@@ -26,9 +28,14 @@ typedef struct drape_active_set {
 
 /* Lists the active contacts of a configuration at these distances from the paths of the candidates. Those of
  * pairs inside are gentle; all_inside: those of all pairs below their least gap are, for outside of steps no
- * others are. Errors: DRAPE_E_MEMORY. */
+ * others are. Relaxed pairs are not near. Left out are those of a feature without radius, which does not know
+ * on which side the cloth belongs. Errors: DRAPE_E_MEMORY. */
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
                                    const drape_distances *away, const drape_configuration *at,
-                                   const drape_inside_pairs *inside, bool all_inside);
+                                   const drape_inside_pairs *inside, bool all_inside,
+                                   const drape_relaxed_set *relaxed);
+
+/* Adds an active contact. Errors: DRAPE_E_MEMORY. */
+drape_status drape_active_set_add(drape_active_set *set, const drape_active_contact *contact);
 
 #endif

@@ -6,14 +6,18 @@
  * finite everywhere. For most pairs, low is the least gap that a step may end with (pair.h): the force
  * withstands 1/low times the stiffness there, and the parabola is met only by trial states. For pairs
  * that began below the least gap, low is DRAPE_BARRIER_GENTLE: they are pushed out with a force that is
- * finite in a practical sense, too.
+ * finite in a practical sense, too. Pairs that bodies leave no room (relaxed.h) have another law, the bounded
+ * barrier: with y = 1 - s > 0
+ *     b = y^3 / (1 + y)^2,   -b' = (y^3 + 3 y^2) / (1 + y)^3 < 1
+ * also C2 at s = 1 and convex, whose force tends to 1 with depth.
  */
 #ifndef DRAPE_CONTACT_BARRIER_H
 #define DRAPE_CONTACT_BARRIER_H
 
 #include "base/elementary.h"
 
-#define DRAPE_BARRIER_GENTLE 0.1
+#define DRAPE_BARRIER_GENTLE  0.1
+#define DRAPE_BARRIER_BOUNDED -1.0 /* as low: the bounded barrier */
 
 typedef struct drape_barrier {
     double b, db, ddb; /* b, b', b'' */
@@ -27,10 +31,19 @@ static inline drape_barrier drape_barrier_log(double s)
                            .ddb = -2 * log_s - 4 * u / s + u * u / (s * s)};
 }
 
+static inline drape_barrier drape_barrier_bounded(double s)
+{
+    const double y = 1 - s, u = 1 + y;
+    return (drape_barrier){
+        .b = y * y * y / (u * u), .db = -y * y * (y + 3) / (u * u * u), .ddb = 6 * y / (u * u * (u * u))};
+}
+
 static inline drape_barrier drape_barrier_at(double s, double low)
 {
     if (s >= 1)
         return (drape_barrier){0};
+    if (low < 0)
+        return drape_barrier_bounded(s);
     if (s >= low)
         return drape_barrier_log(s);
     drape_barrier at = drape_barrier_log(low);

@@ -23,6 +23,7 @@ typedef struct path {
     drape_pair limiting;
     double *of_node; /* (nodes) the smallest fraction of a pair at each node; NULL: not wanted */
     int32_t nodes;
+    const drape_relaxed_set *relaxed; /* their pairs limit nothing */
 } path;
 
 /* The fraction of a pair that limits the displacement, for each of its nodes. */
@@ -50,7 +51,8 @@ static void follow(void *user, const drape_pair *pair)
     path *p = user;
     const drape_configuration from = {.x = p->x};
     if (drape_pair_points(pair) == 1 ||
-        drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius)
+        drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius ||
+        drape_relaxed_factor(p->relaxed, pair) > 0)
         return;
     const double limit = p->of_node ? 1 : p->fraction;
     const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->keep, limit);
@@ -91,8 +93,13 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
 {
     const drape_straight_path straight = {
         {{.model = c->model, .x = x, .pose = pose}, {.model = c->model, .x = y, .pose = pose}}};
-    path p = {
-        .x = x, .y = y, .keep = keep, .fraction = 1, .of_node = c->of_node, .nodes = c->model->node_count};
+    path p = {.x = x,
+              .y = y,
+              .keep = keep,
+              .fraction = 1,
+              .of_node = c->of_node,
+              .nodes = c->model->node_count,
+              .relaxed = &c->relaxed};
     drape_distances away;
     drape_candidate_cursor cursor = {0};
     const drape_candidates *candidates = candidates_of(c, &straight, longest_move(c, &p), &away);
@@ -153,14 +160,17 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
         if (!collider->ops->smooth)
             continue;
         for (int32_t i = 0; i < c->model->free_count; i++) {
-            const size_t at = 3 * (size_t)c->model->node_of_free[i];
+            const int32_t node = c->model->node_of_free[i];
+            const size_t at = 3 * (size_t)node;
             double a[3], b[3];
+            if (drape_relaxed_has(&c->relaxed, k, &node, 1))
+                continue;
             vec3_sub(x + at, c->path_pose[k].displacement, a);
             vec3_sub(y + at, c->path_pose[k].displacement, b);
             const double own = drape_contact_march(c, collider, a, b, &keep);
             fraction = fmin(fraction, own);
             if (c->of_node)
-                c->of_node[at / 3] = fmin(c->of_node[at / 3], own);
+                c->of_node[node] = fmin(c->of_node[node], own);
         }
     }
     c->seconds += drape_clock_seconds() - start;

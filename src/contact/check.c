@@ -11,6 +11,13 @@
 #define KEEP_PATH 0.5 /* of the least gap, or of a smaller one at the beginning of the step */
 #define PATH      "fraction of the step before passing through"
 
+/* The pair that refuses a step may be the one to relax. */
+static void refuse(drape_contact *c, const drape_pair *pair)
+{
+    c->refused = true;
+    c->refusing = *pair;
+}
+
 static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *pair, const char *what,
                                       double value, double limit)
 {
@@ -59,6 +66,7 @@ static drape_status check_gaps(drape_contact *c, const char **reason, drape_diag
         if (gap >= least || least - gap < excess)
             continue;
         excess = least - gap;
+        refuse(c, pair);
         *diagnostic = diagnostic_of(c, pair, "gap [m]", gap, least);
     }
     *reason = excess > 0 ? drape_reason_name(DRAPE_REASON_PENETRATION) : *reason;
@@ -80,12 +88,15 @@ static drape_status check_surfaces(drape_contact *c, const piece *p, const char 
         for (int32_t i = 0; i < c->model->free_count; i++) {
             const int32_t node = c->model->node_of_free[i];
             double x[3], y[3];
+            if (drape_relaxed_has(&c->relaxed, k, &node, 1))
+                continue;
             vec3_sub(p->from.x + 3 * (size_t)node, p->from.pose[k].displacement, x);
             vec3_sub(p->to.x + 3 * (size_t)node, p->to.pose[k].displacement, y);
             const double fraction = drape_contact_march(c, &c->model->colliders[k], x, y, &keep);
             if (fraction >= 1)
                 continue;
             const drape_pair pair = drape_broad_phase_surface(&c->broad, node, k);
+            refuse(c, &pair);
             *reason = drape_reason_name(DRAPE_REASON_COLLISION);
             *diagnostic = diagnostic_of(c, &pair, PATH, fraction, 1);
             return DRAPE_RETRY_REJECTED;
@@ -116,13 +127,15 @@ static drape_status check_inscribed(drape_contact *c, const int32_t *node, int n
         for (int32_t i = 0; collider->shape.inscribed && i < count; i++) {
             const int32_t *n = node + (size_t)i * (size_t)nodes;
             const double depth = depth_of(collider, &c->pose[k], c->x, n, nodes, least);
-            if (depth >= least)
+            if (depth >= least || drape_relaxed_has(&c->relaxed, k, n, nodes))
                 continue;
             const double before = depth_of(collider, &c->start_pose[k], c->start, n, nodes, INFINITY);
             const double min_gap = allowed(least, before, c->broad.rounding);
             if (depth >= min_gap)
                 continue;
-            const drape_pair pair = {.collider = k, .node = {n[0], n[1], nodes > 2 ? n[2] : -1, -1}};
+            const drape_pair pair = {
+                .kind = DRAPE_PAIR_SEGMENTS, .collider = k, .node = {n[0], n[1], nodes > 2 ? n[2] : -1, -1}};
+            refuse(c, &pair);
             *reason = drape_reason_name(DRAPE_REASON_PENETRATION);
             *diagnostic = diagnostic_of(c, &pair, "gap [m]", depth, min_gap);
             return DRAPE_RETRY_REJECTED;
@@ -139,6 +152,7 @@ static drape_status check_features(drape_contact *c, const piece *p, const char 
     const double fraction = drape_contact_free_fraction(c, p->from.x, p->to.x, p->to.pose, &keep, &limiting);
     if (fraction >= 1)
         return DRAPE_OK;
+    refuse(c, &limiting);
     *reason = drape_reason_name(DRAPE_REASON_COLLISION);
     *diagnostic = diagnostic_of(c, &limiting, PATH, fraction, 1);
     return DRAPE_RETRY_REJECTED;

@@ -63,6 +63,7 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     drape_archive_doubles(a, c->start_v, points);
     drape_archive_bytes(a, c->start_pose, colliders * sizeof *c->start_pose);
     drape_inside_archive(&c->inside, a);
+    drape_relaxed_archive(&c->relaxed, a);
     drape_archive_double(a, &c->press.factor);
     drape_archive_double(a, &c->press.widest);
     drape_archive_double(a, &c->press.t);

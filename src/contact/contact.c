@@ -20,6 +20,7 @@
 #include "base/elementary.h"
 #include "base/vec3.h"
 #include "contact/list.h"
+#include "contact/room.h"
 
 #include <float.h>
 #include <string.h>
@@ -70,6 +71,7 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
         .arena = arena, .model = model, .motion = motion, .mean_edge = edges / model->edge_count};
     c->active.arena = c->inside.arena = arena;
     c->press = (drape_press){.factor = 1, .widest = 1};
+    c->ahead_t = NAN;
     drape_status status = drape_broad_phase_create(arena, model, &c->broad);
     if (!status)
         status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->step_candidates);
@@ -77,6 +79,8 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
         status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->query_candidates);
     if (!status)
         status = take_arrays(arena, c);
+    if (!status)
+        status = drape_relaxed_create(arena, model, &c->relaxed);
     if (!status)
         drape_contact_set_rounding(c, c->broad.rest);
     *out = status ? NULL : c;
@@ -190,6 +194,25 @@ drape_status drape_contact_take_failure(drape_contact *c)
     return failed ? DRAPE_E_MEMORY : DRAPE_OK;
 }
 
+/* Where a collider has no smooth surface, which is paired with every node, that of its relaxed nodes pushes
+ * them out. */
+static drape_status add_surfaces(drape_contact *c, const drape_configuration *at)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; !status && i < c->relaxed.count; i++) {
+        const drape_relaxed_node *node = &c->relaxed.nodes[i];
+        if (node->collider < 0 || c->model->colliders[node->collider].ops->smooth ||
+            c->model->pinned[node->node])
+            continue;
+        drape_active_contact contact = {.pair =
+                                            drape_broad_phase_surface(&c->broad, node->node, node->collider),
+                                        .relaxed = node->factor};
+        if (drape_pair_gap(&contact.pair, at, c->broad.rest, &contact.gap))
+            status = drape_active_set_add(&c->active, &contact);
+    }
+    return status;
+}
+
 drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
 {
     const drape_straight_path here = {{*at, *at}};
@@ -198,8 +221,11 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
     if (!candidates)
         candidates = drape_contact_search(c, &here, &away);
-    return candidates ? drape_active_set_list(&c->active, candidates, &away, at, &c->inside, !in_step)
-                      : drape_contact_take_failure(c);
+    if (!candidates)
+        return drape_contact_take_failure(c);
+    const drape_status status =
+        drape_active_set_list(&c->active, candidates, &away, at, &c->inside, !in_step, &c->relaxed);
+    return status ? status : add_surfaces(c, at);
 }
 
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)
@@ -294,7 +320,7 @@ static double smallest_gap(const drape_contact *c, bool *last)
     *last = false;
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
-        if (contact->gentle)
+        if (contact->gentle || contact->relaxed > 0)
             continue;
         least = fmin(least, contact->gap.value / contact->pair.distance);
         *last = *last || contact->gap.value < LAST * drape_pair_least_gap(&contact->pair, c->broad.rounding);
@@ -356,12 +382,47 @@ static drape_status lag_at(drape_contact *c, const double *v, double t)
     return drape_contact_lag(c);
 }
 
+/* Looks for room at the end of the step, where some cloth has none already, and holds again what has come out.
+ * What the forces do not have any more, or have from now on, is the work of whoever presses. */
+static drape_status update_relaxed(drape_contact *c, const drape_contact_at *at)
+{
+    bool changed = false;
+    int32_t added = 0;
+    if (c->relaxed.count == 0)
+        return DRAPE_OK;
+    const double before = drape_contact_potential(c);
+    drape_status status = drape_room_review(c, at->t, &changed);
+    if (!status && c->ahead_t > at->t)
+        status = drape_room_look_ahead(c, at->x, at->t, c->ahead_t, c->may_relax, &added);
+    c->listed = c->listed && !changed;
+    if (!status)
+        status = drape_contact_update(c, at);
+    if (!status)
+        c->press.work += drape_contact_potential(c) - before;
+    return status;
+}
+
+void drape_contact_expect(drape_contact *c, double t1, bool may_relax)
+{
+    c->ahead_t = t1;
+    c->may_relax = may_relax;
+}
+
+const drape_relaxed_set *drape_contact_relaxed(const drape_contact *c)
+{
+    return &c->relaxed;
+}
+
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
     const double start = drape_clock_seconds();
     c->between_steps = false;
-    drape_status status =
-        drape_contact_update(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}});
+    const drape_contact_at at = {.x = x, .v = v, .t = t, .span = {t, t}};
+    drape_status status = drape_contact_update(c, &at);
+    if (!status)
+        status = update_relaxed(c, &at);
+    c->ahead_t = NAN;
+    c->refused = false;
     drape_contact_set_rounding(c, c->x);
     if (!status)
         status = update_inside(c);

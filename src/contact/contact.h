@@ -28,9 +28,21 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
 double drape_contact_seconds(const drape_contact *contact);        /* spent in all functions of this header */
 double drape_contact_search_seconds(const drape_contact *contact); /* part of it: in the broad phase */
 
+/* Says that the step that begins next ends at t1, and whether cloth that has no room there may be relaxed
+ * (relaxed.h). Without it, no cloth is, and what is relaxed stays so. */
+void drape_contact_expect(drape_contact *contact, double t1, bool may_relax);
+
+/* After a step to t1 that failed: relaxes cloth that has no room, or, if there is none and `all` is set, the pair
+ * that refused the step and those whose gaps are hardly above the least. *added: nodes that are relaxed from now
+ * on; if there are any, the same step may succeed. Errors: DRAPE_E_MEMORY. */
+drape_status drape_contact_relax(drape_contact *contact, double t1, bool all, int32_t *added);
+
 /* Begins a step at the state x, v at time t: lagged friction takes its normal forces here, and the end of
  * the step is compared with it. The arrays are copied. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_begin(drape_contact *contact, const double *x, const double *v, double t);
+
+/* The relaxed nodes, and what became of the cloth so far at each collider (contact/relaxed.h). */
+const struct drape_relaxed_set *drape_contact_relaxed(const drape_contact *contact);
 
 /* Ends the step. Queries until the next one have candidates of their own: the next step can continue with
  * those of this one. */

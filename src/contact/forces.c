@@ -7,6 +7,23 @@
 
 #include <string.h>
 
+#define OUT_SPEED 0.2 /* of the size of the scene in a second: at most so fast is cloth pushed out */
+
+/* Pairs that bodies leave no room: a bounded pressure, and no rebound. */
+static drape_contact_law relaxed_law(const drape_contact *c, const drape_active_contact *contact)
+{
+    const drape_contact_def *def = &c->model->contact;
+    const drape_pair *pair = &contact->pair;
+    return (drape_contact_law){
+        .distance = pair->distance,
+        .low = DRAPE_BARRIER_BOUNDED,
+        .stiffness = contact->relaxed * def->relaxed_pressure * pair->area,
+        .friction = pair->collider >= 0 ? c->model->colliders[pair->collider].friction : def->self_friction,
+        .velocity = def->friction_velocity,
+        .damping = 1,
+        .restitution_velocity = fmax(def->restitution_velocity, OUT_SPEED * c->model->length)};
+}
+
 /* The energy of a gap that closes is proportional to K d (force.h). K is proportional to 1/d, so that pairs
  * of equal area absorb the same energy, whatever their activation distance. */
 drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_active_contact *contact)
@@ -14,6 +31,8 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
     const drape_contact_def *def = &c->model->contact;
     const drape_pair *pair = &contact->pair;
     const drape_collider *collider = pair->collider >= 0 ? &c->model->colliders[pair->collider] : NULL;
+    if (contact->relaxed > 0)
+        return relaxed_law(c, contact);
     const double e = collider ? collider->restitution : def->self_restitution,
                  least = drape_pair_least_gap(pair, c->broad.rounding) / pair->distance;
     return (drape_contact_law){

@@ -52,6 +52,11 @@ struct drape_contact {
     double *start_least;             /* (collider_count) the smallest gap with each collider at its beginning,
                                         at most 0 [m] */
     drape_press press;
+    drape_relaxed_set relaxed;
+    double ahead_t; /* [s] the end of the step that begins next; NAN: unknown. Set before each step */
+    bool may_relax; /* cloth without room there may be relaxed; set with it */
+    bool refused;   /* the last check failed for a pair, since the step began: */
+    drape_pair refusing;
     drape_lagged *lagged; /* (lagged_count of lagged_room) lagged friction */
     int32_t lagged_count, lagged_room;
 

@@ -9,7 +9,7 @@
 #include "geometry/bvh.h"
 #include "geometry/orient.h"
 
-static bool crosses(const double *p, const double *q, const double *a, const double *b, const double *c)
+bool drape_intersect_edge(const double *p, const double *q, const double *a, const double *b, const double *c)
 {
     const int above = drape_orient(a, b, c, p);
     if (above == 0 || above != -drape_orient(a, b, c, q))
@@ -38,8 +38,8 @@ static void try_triangle(void *user, int32_t element)
             return;
         corner[a] = s->triangles->x + 3 * (size_t)triangle[a];
     }
-    if (crosses(s->edges->x + 3 * (size_t)edge[0], s->edges->x + 3 * (size_t)edge[1], corner[0], corner[1],
-                corner[2]))
+    if (drape_intersect_edge(s->edges->x + 3 * (size_t)edge[0], s->edges->x + 3 * (size_t)edge[1], corner[0],
+                             corner[1], corner[2]))
         s->visit(s->user, s->edge, element);
 }
 

@@ -21,6 +21,10 @@ typedef struct drape_surface {
 
 drape_surface drape_surface_of(const drape_model *model, const double *x); /* of the cloth */
 
+/* Whether the edge p q passes through the triangle a b c. */
+bool drape_intersect_edge(const double *p, const double *q, const double *a, const double *b,
+                          const double *c);
+
 /* Calls visit for each pair of an edge of `edges` and a triangle of `triangles` that it passes through,
  * edges in their order. If both have the same x, pairs that share a node do not count. Errors:
  * DRAPE_E_MEMORY. */

@@ -7,6 +7,7 @@
 #include "io/json.h"
 #include "model/model.h"
 #include "sim/inside.h"
+#include "sim/relaxed.h"
 #include "sim/warnings.h"
 
 #include <inttypes.h>
@@ -137,6 +138,27 @@ static json_t *with_inside(json_t *object, const drape_sim *sim)
     return drape_json_with(object, "intersections", found(drape_sim_intersections(sim, -1)));
 }
 
+/* For each collider, and pinned pieces of cloth, that left cloth no room: the number of nodes that are relaxed there,
+ * the most at a time, how deep [m], and when [s]. */
+static json_t *no_room(const drape_sim *sim)
+{
+    json_t *list = json_array();
+    for (int32_t c = -1; c < drape_sim_model(sim)->collider_count; c++) {
+        const drape_relaxed_total *total = drape_sim_relaxed_total(sim, c);
+        const real_item values[] = {{"deepest", total->deepest},
+                                    {"first", total->first},
+                                    {"last", total->last},
+                                    {"seconds", total->seconds}};
+        const count_item counts[] = {{"now", drape_sim_relaxed_at(sim, c)}, {"most", total->most}};
+        if (total->most == 0)
+            continue;
+        json_t *one = drape_json_with(json_object(), "at", drape_json_text(drape_sim_relaxed_name(sim, c)));
+        list = drape_json_append(
+            list, with_reals(with_counts(one, counts, LENGTH(counts)), values, LENGTH(values)));
+    }
+    return list;
+}
+
 static json_t *warnings(drape_sim *sim)
 {
     json_t *list = json_array();
@@ -184,6 +206,7 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     if (s.stability_known)
         object = drape_json_with(object, "equilibrium", stability(&s));
     object = with_inside(object, sim);
+    object = drape_json_with(object, "no_room", no_room(sim));
     object = drape_json_with(object, "warnings", warnings(sim));
     if (def->realtime)
         object = drape_json_with(object, "realtime", realtime(def->realtime));

@@ -135,6 +135,10 @@ typedef struct drape_collider {
 } drape_collider;
 
 /* Resolved parameters of contact. */
+/* What happens where bodies leave cloth no room: steps fail until the sim stops, or the cloth is relaxed, in
+ * advances with a time budget or in all. */
+typedef enum drape_no_room { DRAPE_NO_ROOM_AUTO, DRAPE_NO_ROOM_STOP, DRAPE_NO_ROOM_RELAX } drape_no_room;
+
 typedef struct drape_contact_def {
     double distance;             /* activation distance between cloth and collider [m] */
     double stiffness;            /* scale of the contact pressure [Pa] */
@@ -145,6 +149,8 @@ typedef struct drape_contact_def {
     double self_thickness;       /* half the distance that layers of cloth keep [m] */
     double self_friction;        /* mu [1] */
     double self_restitution;     /* e [1] */
+    drape_no_room no_room;       /* whether cloth that bodies leave no room is relaxed */
+    double relaxed_pressure;     /* with which relaxed cloth is pushed out of them [Pa] */
 } drape_contact_def;
 
 struct drape_model {

@@ -143,8 +143,8 @@ static bool is_next_frame(const drape_sim *sim)
 static void archive_statistics(drape_sim *sim, drape_archive *a)
 {
     drape_statistics *s = &sim->statistics;
-    int64_t *const counts[] = {&s->steps_accepted, &s->steps_rejected, &s->steps_unconverged, &sim->attempts,
-                               &sim->next_frame};
+    int64_t *const counts[] = {&s->steps_accepted, &s->steps_rejected, &s->steps_unconverged,
+                               &sim->attempts,     &sim->failed,       &sim->next_frame};
     double *const numbers[] = {&s->h_min,        &s->h_max,      &s->wall_setup, &s->wall_steps,
                                &s->wall_contact, &s->strain_min, &s->strain_max};
     drape_archive_mark(a, "statistics");

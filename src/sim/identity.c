@@ -100,9 +100,17 @@ static uint64_t add_collider(uint64_t hash, const drape_collider *collider)
 
 static uint64_t add_contact(uint64_t hash, const drape_contact_def *c)
 {
-    const double values[] = {
-        c->distance,      c->stiffness,        c->friction_velocity,   c->lagged, c->self, c->self_thickness,
-        c->self_friction, c->self_restitution, c->restitution_velocity};
+    const double values[] = {c->distance,
+                             c->stiffness,
+                             c->friction_velocity,
+                             c->lagged,
+                             c->self,
+                             c->self_thickness,
+                             c->self_friction,
+                             c->self_restitution,
+                             c->restitution_velocity,
+                             c->no_room,
+                             c->relaxed_pressure};
     return add_doubles(hash, values, sizeof values / sizeof *values);
 }
 

@@ -12,6 +12,7 @@
  */
 #include "base/clock.h"
 #include "base/elementary.h"
+#include "sim/relaxed.h"
 #include "sim/sim.h"
 
 #include <math.h>
@@ -222,6 +223,7 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
         settle(sim, goal, &report);
         report.level = level_name(sim);
         report.effort = sim->realtime.effort;
+        report.relaxed = drape_sim_relaxed_now(sim, &report.deepest_relaxed);
         report.seconds = drape_clock_seconds() - start;
         report.kept = report.seconds <= budget;
     }

@@ -156,6 +156,11 @@ void drape_schedule_accept(drape_schedule *s, double t1, double h_next)
         accept_part(s);
 }
 
+void drape_schedule_repeat(drape_schedule *s)
+{
+    s->tries++;
+}
+
 bool drape_schedule_retry(drape_schedule *s, double h_next)
 {
     s->limit = h_next;

@@ -57,4 +57,7 @@ void drape_schedule_accept(drape_schedule *schedule, double t1, double h_next);
  * returns. */
 bool drape_schedule_retry(drape_schedule *schedule, double h_next);
 
+/* A step was rejected, and the same one is tried again because its equations have changed. */
+void drape_schedule_repeat(drape_schedule *schedule);
+
 #endif

@@ -53,6 +53,8 @@ static drape_status create_states(drape_sim *sim)
     sim->frame = drape_arena_take(sim->arena, n, sizeof *sim->frame);
     sim->frame_velocity = drape_arena_take(sim->arena, n, sizeof *sim->frame_velocity);
     sim->query_scratch = drape_arena_take(sim->arena, n, sizeof *sim->query_scratch);
+    sim->relaxed_logged =
+        drape_arena_take(sim->arena, (size_t)sim->model->collider_count + 1, sizeof *sim->relaxed_logged);
     sim->state_bytes = sizeof *sim + sim->arena->bytes;
     return drape_arena_status(sim->arena);
 }

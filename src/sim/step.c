@@ -6,12 +6,17 @@
 #include "base/clock.h"
 #include "base/finite.h"
 #include "base/reason.h"
+#include "sim/relaxed.h"
 #include "sim/sim.h"
 
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+
+/* Attempts that fail in a row, or halvings of a step, after which the pairs that hold it up are relaxed: impacts
+ * on cloth that has room take some. */
+#define PATIENCE 6
 
 /* ---- Compute and check ---- */
 
@@ -43,6 +48,13 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
                               &info->diagnostic);
 }
 
+/* Whether cloth that bodies leave no room may be relaxed. */
+static bool may_relax(const drape_sim *sim)
+{
+    const drape_no_room policy = sim->model->contact.no_room;
+    return policy == DRAPE_NO_ROOM_RELAX || (policy == DRAPE_NO_ROOM_AUTO && sim->realtime.active);
+}
+
 static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step_info *info)
 {
     drape_state *next = next_state(sim);
@@ -50,6 +62,7 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     sim->attempted_known = false;
     info->diagnostic =
         (drape_diagnostic){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
+    drape_system_expect(sim->system, t1, may_relax(sim));
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
     drape_sim_add_contact_work(sim);
     if (!status)
@@ -87,6 +100,15 @@ static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status s
                            .info = info,
                            .status = status};
     return sim->chosen.controller->judge(sim->chosen.controller_values, trial);
+}
+
+/* For an attempt that failed: relaxes cloth that bodies leave no room at its end and, if the step has failed
+ * several times or is not to be tried again, what holds it up. True: the same step is worth another attempt. */
+static bool relax(drape_sim *sim, double t1, drape_status status, drape_verdict verdict)
+{
+    int32_t added;
+    const bool all = verdict == DRAPE_STOP || sim->failed >= PATIENCE || sim->schedule.level >= PATIENCE;
+    return status > 0 && may_relax(sim) && !drape_system_relax(sim->system, t1, all, &added) && added > 0;
 }
 
 /* ---- Accept and reject ---- */
@@ -129,6 +151,7 @@ static void rotate_states(drape_sim *sim)
 static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
 {
     drape_statistics *s = &sim->statistics;
+    sim->failed = 0;
     if (!info->committed)
         drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
     rotate_states(sim);
@@ -163,6 +186,7 @@ static void reject(drape_sim *sim, const drape_step_info *info)
     if (sim->before == sim->next && !sim->chosen.integrator->steady_state)
         sim->before = -1;
     sim->statistics.steps_rejected++;
+    sim->failed++;
     count_reason(sim, info->reason);
 }
 
@@ -290,13 +314,17 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     double t = drape_sim_state(sim)->t;
     drape_status status = compute_next(sim, t1, h, &info);
     drape_verdict verdict = judge(sim, &info, status, &trial);
+    const bool again = verdict != DRAPE_ACCEPT && relax(sim, t1, status, verdict);
+    verdict = again ? DRAPE_RETRY : verdict;
     bool refused = status == DRAPE_OK && verdict != DRAPE_ACCEPT; /* by the controller alone */
     *stop = verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
     if (verdict == DRAPE_ACCEPT)
         accept(sim, &info, trial.h_next);
     else
         reject(sim, &info);
-    if (verdict == DRAPE_RETRY && !drape_schedule_retry(&sim->schedule, trial.h_next))
+    if (again)
+        drape_schedule_repeat(&sim->schedule);
+    else if (verdict == DRAPE_RETRY && !drape_schedule_retry(&sim->schedule, trial.h_next))
         *stop = DRAPE_E_STEP_TOO_SMALL;
     return record_of(sim, t, &info, refused ? DRAPE_RETRY_REJECTED : status, verdict == DRAPE_ACCEPT);
 }
@@ -318,6 +346,8 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
     log_rejection(sim, attempt);
+    if (attempt->accepted)
+        drape_sim_log_relaxed(sim);
     drape_status notified = notify_attempt(sim, attempt);
     drape_status emitted = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
     if (stop)

@@ -6,6 +6,7 @@
 
 #include "colliders/colliders.h"
 #include "sim/inside.h"
+#include "sim/relaxed.h"
 #include "sim/sim.h"
 
 #include <math.h>
@@ -140,6 +141,33 @@ static bool ends_inside(drape_sim *sim, char *text, size_t size)
            describe_inside(sim, drape_sim_positions(sim), false, text, size);
 }
 
+/* Bodies that left cloth no room were let in: where, how long and how deep. */
+static bool had_no_room(drape_sim *sim, char *text, size_t size)
+{
+    int32_t places = 0, most = -1;
+    for (int32_t c = -1; c < sim->model->collider_count; c++) {
+        const drape_relaxed_total *total = drape_sim_relaxed_total(sim, c);
+        places += total->most > 0;
+        if (total->most > 0 && (places == 1 || total->deepest > drape_sim_relaxed_total(sim, most)->deepest))
+            most = c;
+    }
+    if (places == 0)
+        return false;
+    const drape_relaxed_total *total = drape_sim_relaxed_total(sim, most);
+    double deepest;
+    char more[40] = "";
+    if (places > 1)
+        snprintf(more, sizeof more, ", and at %d other%s", (int)places - 1, places == 2 ? "" : "s");
+    snprintf(text, size,
+             "cloth had no room at %s%s: up to %d node%s of it relaxed there, for %.3g s between %.4g and "
+             "%.4g s, up to "
+             "%.3g m deep; %d now",
+             drape_sim_relaxed_name(sim, most), more, (int)total->most, total->most == 1 ? " was" : "s were",
+             total->seconds, total->first, total->last, total->deepest,
+             (int)drape_sim_relaxed_now(sim, &deepest));
+    return true;
+}
+
 /* Energy that the integrator took, as a share of all that went in: by gravity, pins, colliders, hosts and
  * wind. With dt = 1/60 s over 1 s, be, bdf2 and trbdf2 take 65, 32 and 34 % in four_pins of examples/scenes,
  * 68, 45 and 11 % in sphere_drape. Where cloth is in contact it has met something, and lost energy there. */
@@ -184,9 +212,13 @@ static bool is_contact_slow(drape_sim *sim, char *text, size_t size)
 static const struct {
     const char *name;
     bool (*applies)(drape_sim *sim, char *text, size_t size);
-} checks[] = {{"no_terms", has_no_terms},       {"few_steps", has_few_steps},
-              {"large_mesh", has_large_file},   {"starts_inside", starts_inside},
-              {"ends_inside", ends_inside},     {"numerical_dissipation", dissipates_most},
+} checks[] = {{"no_terms", has_no_terms},
+              {"few_steps", has_few_steps},
+              {"large_mesh", has_large_file},
+              {"starts_inside", starts_inside},
+              {"ends_inside", ends_inside},
+              {"no_room", had_no_room},
+              {"numerical_dissipation", dissipates_most},
               {"slow_contact", is_contact_slow}};
 
 bool drape_sim_take_warning_failure(drape_sim *sim)

@@ -96,9 +96,9 @@ static void check_active(all_pairs *all, drape_active_contact *found)
 {
     const drape_contact *c = all->contact;
     const drape_configuration now = drape_contact_configuration(c);
-    ck_assert_int_eq(
-        drape_active_set_list(&all->active, &all->list, &(drape_distances){0}, &now, &c->inside, false),
-        DRAPE_OK);
+    ck_assert_int_eq(drape_active_set_list(&all->active, &all->list, &(drape_distances){0}, &now, &c->inside,
+                                           false, &c->relaxed),
+                     DRAPE_OK);
     ck_assert_int_eq(c->active.count, all->active.count);
     memcpy(found, c->active.contacts, (size_t)c->active.count * sizeof *found);
     qsort(found, (size_t)c->active.count, sizeof *found, by_gap);

@@ -194,7 +194,7 @@ static int region_of(const setting *s)
 
 /* Random active pairs, until every region has occurred often enough. Derivatives jump where regions meet,
  * so all points of a difference must be in the same region. */
-static void check_kind(drape_pair_kind kind, double speed)
+static void check_kind(drape_pair_kind kind, double speed, double low)
 {
     uint64_t seed = 7 + (uint64_t)kind;
     int met[16] = {0}, tried = 0;
@@ -202,7 +202,7 @@ static void check_kind(drape_pair_kind kind, double speed)
         setting s = {
             .pair = {.kind = kind, .node = {0, 1, 2, 3}, .collider = -1, .radius = 0.01, .distance = 0.2},
             .law = {.distance = 0.2,
-                    .low = DRAPE_LEAST_GAP,
+                    .low = low,
                     .stiffness = 3,
                     .friction = 0.4,
                     .velocity = 0.05,
@@ -233,15 +233,17 @@ static void check_kind(drape_pair_kind kind, double speed)
 
 START_TEST(test_triangle)
 {
-    check_kind(DRAPE_PAIR_TRIANGLE, 1);    /* sliding */
-    check_kind(DRAPE_PAIR_TRIANGLE, 0.01); /* sticking */
+    check_kind(DRAPE_PAIR_TRIANGLE, 1, DRAPE_LEAST_GAP);    /* sliding */
+    check_kind(DRAPE_PAIR_TRIANGLE, 0.01, DRAPE_LEAST_GAP); /* sticking */
+    check_kind(DRAPE_PAIR_TRIANGLE, 1, DRAPE_BARRIER_BOUNDED);
 }
 END_TEST
 
 START_TEST(test_segments)
 {
-    check_kind(DRAPE_PAIR_SEGMENTS, 1);
-    check_kind(DRAPE_PAIR_SEGMENTS, 0.01);
+    check_kind(DRAPE_PAIR_SEGMENTS, 1, DRAPE_LEAST_GAP);
+    check_kind(DRAPE_PAIR_SEGMENTS, 0.01, DRAPE_LEAST_GAP);
+    check_kind(DRAPE_PAIR_SEGMENTS, 1, DRAPE_BARRIER_BOUNDED);
 }
 END_TEST
 
@@ -305,6 +307,23 @@ static void check_barrier(double low)
         last = drape_barrier_at(s, low).db;
     }
 }
+
+/* The bounded one is C2 where it begins: b''' is at most 6. Its force grows with depth, to the scale. */
+START_TEST(test_bounded_barrier)
+{
+    const double e = 1e-9;
+    const drape_barrier at = drape_barrier_at(1 - e, DRAPE_BARRIER_BOUNDED);
+    ck_assert(at.ddb <= 7 * e && -at.db <= 7 * e * e && at.b <= 7 * e * e * e);
+    double last = -1;
+    for (double s = -20; s < 1; s += 1e-3) {
+        const drape_barrier b = drape_barrier_at(s, DRAPE_BARRIER_BOUNDED);
+        ck_assert(b.db < 0 && b.db > last);
+        last = b.db;
+    }
+    /* 1 + b' = (3 y + 1) / (1 + y)^3, the y^2 of the numerator cancel: 3/y^2 of the scale is left */
+    ck_assert_double_eq_tol(-drape_barrier_at(-999, DRAPE_BARRIER_BOUNDED).db, 1, 4e-6);
+}
+END_TEST
 
 /* At the least gap it withstands 1/DRAPE_LEAST_GAP times its scale: b' = -1/s to a hundredth there, as 2
  * s ln s and 2 s are. The gentle one agrees with it from DRAPE_BARRIER_GENTLE on, so that a pair that
@@ -520,4 +539,4 @@ START_TEST(test_bounds)
 END_TEST
 
 SUITE("contact", test_triangle, test_segments, test_parallel, test_mollified_away, test_barrier,
-      test_step_fraction, test_no_gap_is_exempt, test_tree, test_bounds)
+      test_bounded_barrier, test_step_fraction, test_no_gap_is_exempt, test_tree, test_bounds)

@@ -1,0 +1,246 @@
+/* relaxed.c: see relaxed.h. */
+#include "contact/relaxed.h"
+
+#include "base/elementary.h"
+#include "base/vec3.h"
+#include "contact/list.h"
+
+#include <string.h>
+
+#define DOUBLED 0.02 /* [s] in which the pressure on a node that has room doubles, and falls by half */
+
+/* A shape without points may have no end, as a plane; inscribed ones are inside of it. */
+static void bound(const drape_collider_shape *shape, double out[4])
+{
+    double radius = shape->point_count > 0 && !shape->inscribed ? 0 : INFINITY, to[3];
+    memset(out, 0, 3 * sizeof *out);
+    for (int32_t i = 0; i < shape->point_count; i++)
+        vec3_add_scaled(1.0 / shape->point_count, shape->point + 3 * (size_t)i, out);
+    for (int32_t i = 0; i < shape->point_count; i++) {
+        vec3_sub(shape->point + 3 * (size_t)i, out, to);
+        radius = fmax(radius, vec3_norm(to));
+    }
+    out[3] = radius + shape->radius;
+}
+
+drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, drape_relaxed_set *set)
+{
+    const size_t nodes = (size_t)model->node_count, colliders = (size_t)model->collider_count;
+    *set = (drape_relaxed_set){.arena = arena, .model = model};
+    set->of_node = drape_arena_take(arena, nodes, sizeof *set->of_node);
+    set->normal = drape_arena_take(arena, nodes, 3 * sizeof *set->normal);
+    set->reach = drape_arena_take(arena, nodes, sizeof *set->reach);
+    set->pins = drape_arena_take(arena, colliders, sizeof *set->pins);
+    set->bound = drape_arena_take(arena, colliders, 4 * sizeof *set->bound);
+    set->total = drape_arena_take(arena, colliders + 1, sizeof *set->total);
+    for (size_t i = 0; set->bound && i < colliders; i++)
+        bound(&model->colliders[i].shape, set->bound + 4 * i);
+    return drape_arena_status(arena);
+}
+
+/* ---- Queries ---- */
+
+/* The place of the first node that is not before this one. */
+static int32_t place_of(const drape_relaxed_set *set, int32_t collider, int32_t node)
+{
+    int32_t low = 0, high = set->count;
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2;
+        const drape_relaxed_node *at = &set->nodes[middle];
+        if (at->collider < collider || (at->collider == collider && at->node < node))
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+drape_relaxed_node *drape_relaxed_find(const drape_relaxed_set *set, int32_t collider, int32_t node)
+{
+    if (set->count == 0 || node < 0 || node >= set->model->node_count || !set->of_node[node])
+        return NULL;
+    const int32_t at = place_of(set, collider, node);
+    drape_relaxed_node *found = at < set->count ? &set->nodes[at] : NULL;
+    return found && found->collider == collider && found->node == node ? found : NULL;
+}
+
+static double factor_of(const drape_relaxed_set *set, int32_t collider, const int32_t *node, int nodes)
+{
+    double factor = 0;
+    for (int a = 0; a < nodes; a++) {
+        const drape_relaxed_node *found = drape_relaxed_find(set, collider, node[a]);
+        factor = found ? fmax(factor, found->factor) : factor;
+    }
+    return factor;
+}
+
+bool drape_relaxed_has(const drape_relaxed_set *set, int32_t collider, const int32_t *node, int nodes)
+{
+    return set->count > 0 && factor_of(set, collider, node, nodes) > 0;
+}
+
+static bool has_pin(const drape_model *model, const int32_t *node, int nodes)
+{
+    bool found = false;
+    for (int a = 0; a < nodes; a++)
+        found = found || model->pinned[node[a]];
+    return found;
+}
+
+double drape_relaxed_factor(const drape_relaxed_set *set, const drape_pair *pair)
+{
+    if (set->count == 0)
+        return 0;
+    if (pair->collider >= 0)
+        return factor_of(set, pair->collider, pair->node, drape_pair_points(pair));
+    const int split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    const int32_t *one = pair->node, *other = pair->node + split;
+    double factor = has_pin(set->model, other, 4 - split) ? factor_of(set, -1, one, split) : 0;
+    if (has_pin(set->model, one, split))
+        factor = fmax(factor, factor_of(set, -1, other, 4 - split));
+    return factor;
+}
+
+/* ---- Changes ---- */
+
+drape_status drape_relaxed_add(drape_relaxed_set *set, int32_t collider, int32_t node, double t, double until,
+                               int32_t *added)
+{
+    drape_relaxed_node *found = drape_relaxed_find(set, collider, node);
+    if (found) {
+        found->blocked = true;
+        found->until = fmax(found->until, until);
+        return DRAPE_OK;
+    }
+    drape_relaxed_node *nodes =
+        drape_list_grow(set->arena, set->nodes, set->count, &set->room, sizeof *set->nodes);
+    if (!nodes)
+        return DRAPE_E_MEMORY;
+    const int32_t at = place_of(set, collider, node);
+    set->nodes = nodes;
+    memmove(nodes + at + 1, nodes + at, (size_t)(set->count - at) * sizeof *nodes);
+    nodes[at] = (drape_relaxed_node){.collider = collider,
+                                     .node = node,
+                                     .since = t,
+                                     .until = until,
+                                     .gap = INFINITY,
+                                     .factor = 1,
+                                     .blocked = true,
+                                     .fresh = true};
+    set->of_node[node] = 1;
+    set->count++;
+    (*added)++;
+    return DRAPE_OK;
+}
+
+static drape_relaxed_total *total_of(drape_relaxed_set *set, int32_t collider)
+{
+    return &set->total[collider >= 0 ? collider : set->model->collider_count];
+}
+
+int32_t drape_relaxed_count(const drape_relaxed_set *set, int32_t collider)
+{
+    return place_of(set, collider + 1, 0) - place_of(set, collider, 0);
+}
+
+static void add_to_total(drape_relaxed_set *set, int32_t collider, double t)
+{
+    drape_relaxed_total *total = total_of(set, collider);
+    const int32_t first = place_of(set, collider, 0), count = drape_relaxed_count(set, collider);
+    if (count == 0)
+        return;
+    if (total->most == 0)
+        total->first = set->nodes[first].since;
+    for (int32_t i = first; i < first + count; i++)
+        total->deepest = fmax(total->deepest, set->nodes[i].deepest);
+    total->most = count > total->most ? count : total->most;
+    total->seconds += t - fmin(set->t, t);
+    total->last = t;
+}
+
+void drape_relaxed_update(drape_relaxed_set *set, double t, double max_factor)
+{
+    for (int32_t i = 0; i < set->count; i++)
+        set->nodes[i].deepest = fmax(set->nodes[i].deepest, set->nodes[i].depth);
+    if (t == set->t)
+        return;
+    const double step = fmax(t - set->t, 0), change = set->count > 0 ? drape_pow(2, step / DOUBLED) : 1;
+    for (int32_t i = 0; i < set->count; i++) {
+        drape_relaxed_node *node = &set->nodes[i];
+        node->fresh = false;
+        node->factor =
+            fmax(1, fmin(node->blocked ? node->factor / change : node->factor * change, max_factor));
+    }
+    for (int32_t i = -1; set->count > 0 && i < set->model->collider_count; i++)
+        add_to_total(set, i, t);
+    set->t = t;
+}
+
+int32_t drape_relaxed_remove(drape_relaxed_set *set, drape_relaxed_leaves *leaves, void *user)
+{
+    int32_t kept = 0;
+    for (int32_t i = 0; i < set->count; i++)
+        if (leaves(user, &set->nodes[i]))
+            set->of_node[set->nodes[i].node] = 0;
+        else
+            set->nodes[kept++] = set->nodes[i];
+    const int32_t removed = set->count - kept;
+    set->count = kept;
+    for (int32_t i = 0; i < kept; i++) /* a node may be relaxed for another collider still */
+        set->of_node[set->nodes[i].node] = 1;
+    return removed;
+}
+
+/* ---- Checkpoints ---- */
+
+static void archive_node(drape_relaxed_node *node, drape_archive *a)
+{
+    double *const values[] = {&node->since,   &node->until, &node->depth,
+                              &node->deepest, &node->gap,   &node->factor};
+    drape_archive_int32(a, &node->collider);
+    drape_archive_int32(a, &node->node);
+    for (size_t i = 0; i < sizeof values / sizeof *values; i++)
+        drape_archive_double(a, values[i]);
+    drape_archive_bool(a, &node->blocked);
+    drape_archive_bool(a, &node->fresh);
+}
+
+static void archive_totals(drape_relaxed_set *set, drape_archive *a)
+{
+    for (int32_t i = 0; i <= set->model->collider_count; i++) {
+        drape_relaxed_total *total = &set->total[i];
+        drape_archive_int32(a, &total->most);
+        drape_archive_double(a, &total->deepest);
+        drape_archive_double(a, &total->first);
+        drape_archive_double(a, &total->last);
+        drape_archive_double(a, &total->seconds);
+    }
+}
+
+static bool is_node(const drape_relaxed_set *set, const drape_relaxed_node *node)
+{
+    return node->collider >= -1 && node->collider < set->model->collider_count && node->node >= 0 &&
+           node->node < set->model->node_count && node->factor >= 1 && isfinite(node->factor);
+}
+
+void drape_relaxed_archive(drape_relaxed_set *set, drape_archive *a)
+{
+    int32_t count = set->count, added = 0;
+    drape_archive_double(a, &set->t);
+    archive_totals(set, a);
+    drape_archive_int32(a, &count);
+    if (a->reading)
+        set->count = 0;
+    for (int32_t i = 0; i < count && drape_archive_good(a); i++) {
+        drape_relaxed_node node = a->reading ? (drape_relaxed_node){0} : set->nodes[i];
+        archive_node(&node, a);
+        if (!a->reading || !drape_archive_good(a))
+            continue;
+        if (!is_node(set, &node))
+            drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint relaxes a node that is not there");
+        else if (drape_relaxed_add(set, node.collider, node.node, node.since, node.until, &added))
+            drape_archive_note(a, DRAPE_E_MEMORY);
+        else
+            *drape_relaxed_find(set, node.collider, node.node) = node;
+    }
+}

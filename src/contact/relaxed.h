@@ -1,0 +1,76 @@
+/*
+ * relaxed.h: the cloth that bodies leave no room: nodes, each with the collider whose surface does not hold it
+ * for the time being. A pair is relaxed if one of its nodes of cloth is, for its collider. Relaxed pairs have
+ * the bounded barrier (barrier.h), which pushes out with a pressure of no more than the scene's, and are not
+ * checked. A node that has room again is pushed more and more, until its gap is as large as contact allows.
+ */
+#ifndef DRAPE_CONTACT_RELAXED_H
+#define DRAPE_CONTACT_RELAXED_H
+
+#include "base/archive.h"
+#include "contact/pair.h"
+
+typedef struct drape_relaxed_node {
+    int32_t collider; /* -1: pinned pieces of cloth */
+    int32_t node;
+    double since;          /* [s] */
+    double until;          /* [s] it is not held again before this time */
+    double depth, deepest; /* [m] at the beginning of the last step, >= 0; since it was relaxed */
+    double gap;            /* [m] the smallest of its pairs there, INFINITY: none is active */
+    double factor;         /* of the pressure, >= 1 */
+    bool blocked;          /* there was no room for it at the end of the last step that was looked at */
+    bool fresh;            /* no step was accepted since it was relaxed */
+} drape_relaxed_node;
+
+/* What became of the cloth at one collider so far. */
+typedef struct drape_relaxed_total {
+    int32_t most;                /* the largest number of nodes at a time; 0: there were none */
+    double deepest;              /* [m] */
+    double first, last, seconds; /* [s] the first and the last moment, and how long in all */
+} drape_relaxed_total;
+
+typedef struct drape_relaxed_set {
+    drape_arena *arena;
+    const drape_model *model;
+    drape_relaxed_node *nodes; /* (count of room) by increasing collider and node */
+    int32_t count, room;
+    uint8_t *of_node; /* (node_count) whether it is among them, for any collider */
+    double *normal;   /* (node_count x 3) scratch */
+    double *reach;    /* (node_count) scratch */
+    bool *pins;       /* (collider_count) scratch */
+    double *bound;    /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none */
+    drape_relaxed_total *total; /* (collider_count + 1) the last one: of pinned pieces of cloth */
+    double t;                   /* [s] of the last update */
+} drape_relaxed_set;
+
+drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, drape_relaxed_set *out);
+
+/* NULL: the node is held. */
+drape_relaxed_node *drape_relaxed_find(const drape_relaxed_set *set, int32_t collider, int32_t node);
+
+/* The largest factor of the nodes by which a pair is relaxed; 0: it is not. A pair of cloth with cloth is
+ * relaxed if one piece has a relaxed node and the other one a pinned node. */
+double drape_relaxed_factor(const drape_relaxed_set *set, const drape_pair *pair);
+
+/* Whether any of these nodes is relaxed for the collider; -1 stands for no node. */
+bool drape_relaxed_has(const drape_relaxed_set *set, int32_t collider, const int32_t *node, int nodes);
+
+/* Relaxes a node from time t on, at least until `until`, or says that a relaxed one has no room. *added is
+ * raised by 1 if it was not relaxed. Errors: DRAPE_E_MEMORY. */
+drape_status drape_relaxed_add(drape_relaxed_set *set, int32_t collider, int32_t node, double t, double until,
+                               int32_t *added);
+
+/* Time has come to t since the last update, in which nodes had the depths of now: pushes those with room more
+ * and the others less, up to max_factor, and adds to the totals. Nothing if t is that of the last update. */
+void drape_relaxed_update(drape_relaxed_set *set, double t, double max_factor);
+
+/* The number of nodes that are relaxed for a collider. */
+int32_t drape_relaxed_count(const drape_relaxed_set *set, int32_t collider);
+
+/* Removes the nodes for which `leaves` is true. Returns their number. */
+typedef bool drape_relaxed_leaves(void *user, const drape_relaxed_node *node);
+int32_t drape_relaxed_remove(drape_relaxed_set *set, drape_relaxed_leaves *leaves, void *user);
+
+void drape_relaxed_archive(drape_relaxed_set *set, drape_archive *a);
+
+#endif

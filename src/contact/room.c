@@ -1,0 +1,341 @@
+/* room.c: see room.h. */
+#include "contact/room.h"
+
+#include "base/clock.h"
+#include "base/vec3.h"
+#include "contact/barrier.h"
+#include "contact/parts.h"
+#include "geometry/intersect.h"
+
+#include <string.h>
+
+#define MARGIN DRAPE_BARRIER_GENTLE /* of the activation distance, that cloth needs on either side */
+#define ACROSS 0.3 /* cosine: surfaces more upright than this to the cloth are left along their own normal */
+#define PASSES 3   /* to find the way out of a curved surface */
+#define HOLD   0.1 /* [s] cloth is relaxed at least, where no look ahead can say whether there is room */
+
+/* ---- Looking ahead ---- */
+
+/* A point of the cloth in a contact. */
+typedef struct cloth_point {
+    double x[3], normal[3];
+    int32_t node[4], nodes;
+} cloth_point;
+
+static cloth_point point_of(const drape_contact *c, const drape_active_contact *contact)
+{
+    cloth_point p = {.nodes = 0};
+    double sum = 0;
+    for (int a = 0; a < contact->gap.closest.points; a++) {
+        const int32_t node = contact->pair.node[a];
+        const double weight = fabs(contact->gap.closest.c[a]);
+        if (node >= c->model->node_count)
+            continue;
+        p.node[p.nodes++] = node;
+        sum += weight;
+        vec3_add_scaled(weight, c->x + 3 * (size_t)node, p.x);
+        vec3_add_scaled(weight, c->relaxed.normal + 3 * (size_t)node, p.normal);
+    }
+    const double length = vec3_norm(p.normal);
+    for (int k = 0; k < 3; k++) {
+        p.x[k] /= sum;
+        p.normal[k] = length > 0 ? p.normal[k] / length : 0;
+    }
+    return p;
+}
+
+static double distance_at(const drape_contact *c, int32_t collider, const double *x, double *normal)
+{
+    return drape_collider_distance(&c->model->colliders[collider], &c->pose[collider], x, normal, NULL);
+}
+
+/* Moves a point of the cloth out of a collider until its gap is the margin: across the cloth, in which it
+ * cannot go far, or straight out of a surface that the cloth runs into. Returns the direction. */
+static void move_out(const drape_contact *c, int32_t collider, double margin, const cloth_point *p,
+                     double q[3], double direction[3])
+{
+    double n[3], gap = distance_at(c, collider, p->x, n);
+    const double along = vec3_dot(n, p->normal);
+    memcpy(q, p->x, 3 * sizeof *q);
+    for (int k = 0; k < 3; k++)
+        direction[k] = fabs(along) < ACROSS ? n[k] : along < 0 ? -p->normal[k] : p->normal[k];
+    for (int i = 0; i < PASSES && gap < margin; i++) {
+        const double slope = vec3_dot(n, direction);
+        if (!(slope > 0))
+            return;
+        vec3_add_scaled((margin - gap) / slope, direction, q);
+        gap = distance_at(c, collider, q, n);
+    }
+}
+
+/* Whether the way out of one collider leads deeper into another one. */
+static bool is_in_the_way(const drape_contact *c, int32_t other, double margin, const double q[3],
+                          const double direction[3])
+{
+    const double *bound = c->relaxed.bound + 4 * (size_t)other;
+    double n[3], to[3];
+    vec3_sub(q, bound, to);
+    vec3_sub(to, c->pose[other].displacement, to);
+    if (vec3_norm(to) > bound[3] + margin)
+        return false;
+    return distance_at(c, other, q, n) < margin * (1 - 1e-6) && vec3_dot(n, direction) < 0;
+}
+
+/* Says that nodes have no room at a collider. */
+static drape_status block(drape_contact *c, int32_t collider, const int32_t *node, int nodes, double t,
+                          double until, bool may_relax, int32_t *added)
+{
+    drape_status status = DRAPE_OK;
+    for (int a = 0; !status && a < nodes; a++)
+        if (node[a] >= 0 && (may_relax || drape_relaxed_find(&c->relaxed, collider, node[a])))
+            status = drape_relaxed_add(&c->relaxed, collider, node[a], t, until, added);
+    return status;
+}
+
+/* Around a pin inside a collider there is a way out only beyond its depth, less the cloth between: edge by edge,
+ * from every pin inside, the depth that is left. */
+static void reach_from_pins(const drape_contact *c, int32_t collider, double margin, double *reach)
+{
+    const drape_model *m = c->model;
+    for (int32_t i = 0; i < m->node_count; i++)
+        reach[i] = m->pinned[i] ? margin - distance_at(c, collider, c->x + 3 * (size_t)i, NULL) : 0;
+    for (bool more = true; more;) {
+        more = false;
+        for (int32_t e = 0; e < m->edge_count; e++)
+            for (int k = 0; k < 2; k++) {
+                const int32_t from = m->edge[2 * (size_t)e + (size_t)k],
+                              to = m->edge[2 * (size_t)e + (size_t)!k];
+                const double left = reach[from] - m->edge_length[e];
+                if (!(left > 0) || !(left > reach[to]) || m->pinned[to])
+                    continue;
+                reach[to] = left;
+                more = true;
+            }
+    }
+}
+
+static drape_status block_pins(drape_contact *c, int32_t collider, double margin, double t, bool may_relax,
+                               int32_t *added)
+{
+    drape_status status = DRAPE_OK;
+    reach_from_pins(c, collider, margin, c->relaxed.reach);
+    for (int32_t i = 0; !status && i < c->model->node_count; i++)
+        if (c->relaxed.reach[i] > 0)
+            status = block(c, collider, &i, 1, t, t, may_relax, added);
+    return status;
+}
+
+/* Whether a contact has a pin inside the collider. */
+static bool has_pin_inside(const drape_contact *c, int32_t collider, const cloth_point *p, double margin)
+{
+    bool found = false;
+    for (int a = 0; a < p->nodes; a++)
+        found = found || (c->model->pinned[p->node[a]] &&
+                          distance_at(c, collider, c->x + 3 * (size_t)p->node[a], NULL) < margin);
+    return found;
+}
+
+static drape_status block_between(drape_contact *c, int32_t collider, const cloth_point *p, double margin,
+                                  double t, bool may_relax, int32_t *added)
+{
+    double q[3], direction[3];
+    drape_status status = DRAPE_OK;
+    move_out(c, collider, margin, p, q, direction);
+    for (int32_t other = 0; !status && other < c->model->collider_count; other++) {
+        if (other == collider || !is_in_the_way(c, other, margin, q, direction))
+            continue;
+        status = block(c, collider, p->node, p->nodes, t, t, may_relax, added);
+        if (!status)
+            status = block(c, other, p->node, p->nodes, t, t, may_relax, added);
+    }
+    return status;
+}
+
+static drape_status go_to(drape_contact *c, const double *x, double t)
+{
+    return drape_contact_update(c, &(drape_contact_at){.x = x, .t = t, .span = {t, t}});
+}
+
+drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, double t1, bool may_relax,
+                                   int32_t *added)
+{
+    drape_relaxed_set *relaxed = &c->relaxed;
+    const bool between = c->between_steps;
+    memcpy(c->to, x, 3 * (size_t)c->model->node_count * sizeof *x);
+    drape_motion_place_pins(c->motion, t1, c->to);
+    c->between_steps = true; /* with candidates of its own, as the path of the step leads elsewhere */
+    drape_status status = go_to(c, c->to, t1);
+    c->between_steps = between;
+    if (status)
+        return status;
+    for (int32_t i = 0; i < relaxed->count; i++)
+        relaxed->nodes[i].blocked = t < relaxed->nodes[i].until;
+    drape_model_normals(c->model, c->x, relaxed->normal);
+    memset(relaxed->pins, 0, (size_t)c->model->collider_count * sizeof *relaxed->pins);
+    for (int32_t i = 0; !status && i < c->active.count; i++) {
+        const drape_active_contact *contact = &c->active.contacts[i];
+        const double margin = MARGIN * contact->pair.distance;
+        if (contact->pair.collider < 0 || !(contact->gap.value < margin))
+            continue;
+        const cloth_point p = point_of(c, contact);
+        const int32_t collider = contact->pair.collider;
+        if (!relaxed->pins[collider] && has_pin_inside(c, collider, &p, margin)) {
+            relaxed->pins[collider] = true;
+            status = block_pins(c, collider, margin, t, may_relax, added);
+        }
+        if (!status)
+            status = block_between(c, collider, &p, margin, t, may_relax, added);
+    }
+    c->listed = c->listed && *added == 0; /* the laws of contacts have changed */
+    return status;
+}
+
+/* ---- A step that failed ---- */
+
+/* Relaxes what a pair needs to get through: the nodes of its cloth; of cloth and pinned cloth the free nodes of
+ * the piece that meets the other one. */
+static drape_status give_way(drape_contact *c, const drape_pair *pair, double t, int32_t *added)
+{
+    const drape_model *m = c->model;
+    const int points = drape_pair_points(pair), split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    bool pinned[2] = {false, false};
+    for (int a = 0; a < points && pair->collider < 0; a++)
+        pinned[a >= split] = pinned[a >= split] || (pair->node[a] >= 0 && m->pinned[pair->node[a]]);
+    drape_status status = DRAPE_OK;
+    for (int a = 0; !status && a < points; a++) {
+        const int32_t node = pair->node[a];
+        if (node < 0 || node >= m->node_count ||
+            (pair->collider < 0 && (!pinned[a < split] || m->pinned[node])))
+            continue;
+        status = block(c, pair->collider, &node, 1, t, t + HOLD, true, added);
+    }
+    return status;
+}
+
+/* The pair that refused the step, and those that are as near as it before the step. */
+static drape_status relax_blockers(drape_contact *c, int32_t *added)
+{
+    drape_status status = go_to(c, c->start, c->start_t);
+    if (!status && c->refused)
+        status = give_way(c, &c->refusing, c->start_t, added);
+    const int32_t near_count = c->active.near_count;
+    for (int32_t i = 0; !status && i < near_count; i++)
+        status = give_way(c, &c->active.near[i].pair, c->start_t, added);
+    return status;
+}
+
+drape_status drape_contact_relax(drape_contact *c, double t1, bool all, int32_t *added)
+{
+    const double clock = drape_clock_seconds();
+    *added = 0;
+    drape_status status = go_to(c, c->start, c->start_t);
+    const double before = status ? 0 : drape_contact_potential(c);
+    if (!status)
+        status = drape_room_look_ahead(c, c->start, c->start_t, t1, true, added);
+    if (!status && *added == 0 && all)
+        status = relax_blockers(c, added);
+    c->listed = false;
+    if (!status && *added > 0 && !(status = go_to(c, c->start, c->start_t)))
+        c->press.work += drape_contact_potential(c) - before;
+    c->seconds += drape_clock_seconds() - clock;
+    return status;
+}
+
+/* ---- The beginning of a step ---- */
+
+/* Depths and gaps of the relaxed nodes, from the active contacts of their pairs. */
+static void measure(drape_contact *c)
+{
+    drape_relaxed_set *relaxed = &c->relaxed;
+    for (int32_t i = 0; i < relaxed->count; i++) {
+        relaxed->nodes[i].gap = INFINITY;
+        relaxed->nodes[i].depth = 0;
+    }
+    for (int32_t i = 0; i < c->active.count; i++) {
+        const drape_active_contact *contact = &c->active.contacts[i];
+        const drape_pair *pair = &contact->pair;
+        for (int a = 0; contact->relaxed > 0 && a < contact->gap.closest.points; a++) {
+            drape_relaxed_node *node = drape_relaxed_find(relaxed, pair->collider, pair->node[a]);
+            if (node)
+                node->gap = fmin(node->gap, contact->gap.value);
+        }
+    }
+    for (int32_t i = 0; i < relaxed->count; i++) {
+        drape_relaxed_node *node = &relaxed->nodes[i];
+        if (node->collider >= 0 && c->model->pinned[node->node])
+            node->gap = fmin(node->gap, distance_at(c, node->collider, c->x + 3 * (size_t)node->node, NULL));
+        node->depth = fmax(0, -node->gap);
+    }
+}
+
+/* Whether a face of cloth and a piece of a collider pass through each other: two points of an edge, or three of
+ * a triangle. */
+static bool cross(const drape_contact *c, int32_t collider, const int32_t *face, const int32_t *piece,
+                  int points)
+{
+    const double *x[3], *y[3];
+    double at[3][3];
+    bool found = false;
+    for (int a = 0; a < 3; a++)
+        x[a] = c->x + 3 * (size_t)face[a];
+    for (int a = 0; a < points; a++) {
+        memcpy(at[a], c->pose[collider].displacement, sizeof at[a]);
+        vec3_add_scaled(1, c->model->colliders[collider].shape.point + 3 * (size_t)piece[a], at[a]);
+        y[a] = at[a];
+    }
+    if (points == 2)
+        return drape_intersect_edge(y[0], y[1], x[0], x[1], x[2]);
+    for (int a = 0; a < 3; a++)
+        found = found || drape_intersect_edge(x[a], x[(a + 1) % 3], y[0], y[1], y[2]);
+    return found;
+}
+
+/* Features without a radius push to whichever side the cloth is on: a node is out only if none pierces its
+ * faces. */
+static bool is_pierced(const drape_contact *c, const drape_relaxed_node *node)
+{
+    const drape_collider_shape *shape = node->collider >= 0 ? &c->model->colliders[node->collider].shape
+                                                            : &(drape_collider_shape){.radius = 1};
+    bool found = false;
+    for (int32_t f = 0; !(shape->radius > 0) && !found && f < c->model->triangle_count; f++) {
+        const int32_t *n = c->model->triangle + 3 * (size_t)f;
+        if (n[0] != node->node && n[1] != node->node && n[2] != node->node)
+            continue;
+        for (int32_t i = 0; i < shape->segment_count && !found; i++)
+            found = cross(c, node->collider, n, shape->segment + 2 * (size_t)i, 2);
+        for (int32_t i = 0; i < shape->triangle_count && !found; i++)
+            found = cross(c, node->collider, n, shape->triangle + 3 * (size_t)i, 3);
+    }
+    return found;
+}
+
+/* A node is held again where the force that holds it is no more than what pushes it already. */
+static bool is_out(void *user, const drape_relaxed_node *node)
+{
+    const drape_contact *c = user;
+    const drape_contact_def *def = &c->model->contact;
+    const double distance = node->collider >= 0 ? def->distance : 2 * def->self_thickness,
+                 s = node->gap / distance;
+    if (node->blocked || node->fresh || s < DRAPE_BARRIER_GENTLE)
+        return false;
+    const double pressure = -drape_barrier_at(s, DRAPE_BARRIER_GENTLE).db * c->press.factor * def->stiffness;
+    return (pressure <= node->factor * def->relaxed_pressure || c->model->pinned[node->node]) &&
+           !is_pierced(c, node);
+}
+
+/* With this factor the pressure is that of the pairs which are held, at the margin. */
+static double max_factor(const drape_contact *c)
+{
+    const drape_contact_def *def = &c->model->contact;
+    return -drape_barrier_log(MARGIN).db * c->press.factor * def->stiffness / def->relaxed_pressure;
+}
+
+drape_status drape_room_review(drape_contact *c, double t, bool *changed)
+{
+    measure(c);
+    const double before = c->relaxed.t;
+    drape_relaxed_update(&c->relaxed, t, max_factor(c));
+    *changed = c->relaxed.t != before;
+    *changed = drape_relaxed_remove(&c->relaxed, is_out, c) > 0 || *changed;
+    return DRAPE_OK;
+}
