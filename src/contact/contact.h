@@ -93,12 +93,10 @@ int32_t drape_contact_last_couplings(const drape_contact *contact, const int32_t
 void drape_contact_archive(drape_contact *contact, drape_archive *a);
 
 /* The largest step fraction from x to y (node_count x 3) on which no two pieces pass through each other,
- * with a margin; colliders rest in their poses at time t. */
-double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t);
-
-/* The same, and lowers `fraction` (node_count) at each node to the smallest of its pairs. */
-double drape_contact_node_fractions(drape_contact *contact, const double *x, const double *y, double t,
-                                    double *fraction);
+ * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered at
+ * each node to the smallest fraction of its pairs. */
+double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
+                                   double *of_node);
 
 /* Whether a pair of features would be too near at x, as drape_contact_check tests it, or too near on the
  * path from the beginning of the step to there, while pins and colliders move straight between the kinks of

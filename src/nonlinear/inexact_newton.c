@@ -158,7 +158,7 @@ static bool shorten_nodes(drape_inexact_newton *s, double *p)
         memcpy(e->x_ahead, e->x, e->nodes * sizeof *e->x_ahead);
         for (size_t i = 0; i < e->dofs; i++)
             e->x_ahead[drape_step_equation_at(e, i)] += p[i];
-        if (drape_system_node_fractions(e->system, e->x, e->x_ahead, e->point.t, s->fraction) == 1)
+        if (drape_system_step_fraction(e->system, e->x, e->x_ahead, e->point.t, s->fraction) == 1)
             return true;
         for (size_t i = 0; i < e->dofs; i++)
             p[i] *= s->fraction[drape_step_equation_at(e, i) / 3];
