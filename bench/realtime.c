@@ -301,6 +301,13 @@ int main(int argc, char **argv)
     puts("scene    contact  method    frames     p50     p95     p99   worst  missed  dropped strain % "
          "inside mm "
          "crossings attempts rejected errors contact %");
+    if (getenv("CONTACT")) {
+        const variant own = {"own", getenv("CONTACT"), strstr(getenv("CONTACT"), "self_contact")};
+        for (int i = 0; i < SCENES; i++)
+            if (!only || strcmp(only, scenes[i].name) == 0)
+                measure(ctx, &scenes[i], &own, be ? "be" : "newton_k", seconds, csv);
+        return 0;
+    }
     for (int i = 0; i < SCENES; i++)
         for (int k = 0; k < VARIANTS; k++) {
             if (only && strcmp(only, scenes[i].name) != 0)

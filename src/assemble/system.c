@@ -213,6 +213,18 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
     return system->contact ? drape_contact_step_fraction(system->contact, x, y, t, of_node) : 1;
 }
 
+void drape_system_set_contact_step(drape_system *system, double dt)
+{
+    if (system->contact)
+        drape_contact_set_step(system->contact, dt);
+}
+
+void drape_system_sweep(drape_system *system, double t, double *y)
+{
+    if (system->contact)
+        drape_contact_sweep(system->contact, t, y);
+}
+
 bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,
                           drape_diagnostic *diagnostic)
 {

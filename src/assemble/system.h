@@ -171,6 +171,12 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
 double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t,
                                   double *of_node);
 
+/* See contact/contact.h. */
+void drape_system_set_contact_step(drape_system *system, double dt);
+
+/* Moves the free nodes of y, a guess of the end of the step at time t, out of the way of moving colliders. */
+void drape_system_sweep(drape_system *system, double t, double *y);
+
 /* q of all measures (measure_count). */
 void drape_system_measures(drape_system *system, const drape_point *point, double *q);
 

@@ -28,6 +28,10 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
 double drape_contact_seconds(const drape_contact *contact);        /* spent in all functions of this header */
 double drape_contact_search_seconds(const drape_contact *contact); /* part of it: in the broad phase */
 
+/* The nominal step [s], unless the integrator has none: where the scene gives no activation distance, that of
+ * a moving collider grows with its path in such a step. */
+void drape_contact_set_step(drape_contact *contact, double dt);
+
 /* Begins a step at the state x, v at time t: lagged friction takes its normal forces here, and the end of
  * the step is compared with it. The arrays are copied. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_begin(drape_contact *contact, const double *x, const double *v, double t);
@@ -97,6 +101,11 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
  * each node to the smallest fraction of its pairs. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
                                    double *of_node);
+
+/* Moves the free nodes of y (node_count x 3), a guess of the end of the step at time t, out of the way of
+ * moving colliders: a node that one of them would reach on the straight path from the beginning of the step
+ * slides on it from there on. Nodes that begin inside stay. */
+void drape_contact_sweep(drape_contact *contact, double t, double *y);
 
 /* Whether a pair of features would be too near at x, as drape_contact_check tests it, or too near on the
  * path from the beginning of the step to there, while pins and colliders move straight between the kinks of
