@@ -205,17 +205,24 @@ const double *drape_system_on_colliders(const drape_system *system)
     return system->contact ? drape_contact_on_colliders(system->contact) : NULL;
 }
 
-double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t)
+double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t,
+                                  double *of_node)
 {
-    return system->contact ? drape_contact_step_fraction(system->contact, x, y, t) : 1;
+    for (int32_t i = 0; of_node && i < system->model->node_count; i++)
+        of_node[i] = 1;
+    return system->contact ? drape_contact_step_fraction(system->contact, x, y, t, of_node) : 1;
 }
 
-double drape_system_node_fractions(drape_system *system, const double *x, const double *y, double t,
-                                   double *fraction)
+void drape_system_set_contact_step(drape_system *system, double dt)
 {
-    for (int32_t i = 0; i < system->model->node_count; i++)
-        fraction[i] = 1;
-    return system->contact ? drape_contact_node_fractions(system->contact, x, y, t, fraction) : 1;
+    if (system->contact)
+        drape_contact_set_step(system->contact, dt);
+}
+
+void drape_system_sweep(drape_system *system, double t, double *y)
+{
+    if (system->contact)
+        drape_contact_sweep(system->contact, t, y);
 }
 
 bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,

@@ -170,12 +170,16 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
                                double *values);
 
 /* The largest fraction of the displacement from nodes x to y along which nothing passes through anything
- * else, with the colliders in their pose at time t. */
-double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t);
+ * else, with the colliders in their pose at time t. of_node (node_count), unless NULL, receives the fraction
+ * to which the pieces at each node limit it: 1 without contact. */
+double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t,
+                                  double *of_node);
 
-/* The same, and the fraction to which the pieces at each node limit it (node_count): 1 without contact. */
-double drape_system_node_fractions(drape_system *system, const double *x, const double *y, double t,
-                                   double *fraction);
+/* See contact/contact.h. */
+void drape_system_set_contact_step(drape_system *system, double dt);
+
+/* Moves the free nodes of y, a guess of the end of the step at time t, out of the way of moving colliders. */
+void drape_system_sweep(drape_system *system, double t, double *y);
 
 /* q of all measures (measure_count). */
 void drape_system_measures(drape_system *system, const drape_point *point, double *q);

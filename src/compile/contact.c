@@ -168,6 +168,7 @@ static drape_status resolve_contact(drape_model *model, const drape_scene_def *d
     if (status)
         return status;
     double distance = values[DRAPE_CONTACT_DISTANCE], rebound = values[DRAPE_CONTACT_RESTITUTION_VELOCITY];
+    contact->distance_given = !isnan(distance);
     contact->distance = isnan(distance) ? largest_thickness(model) : distance;
     contact->stiffness = values[DRAPE_CONTACT_STIFFNESS];
     contact->friction_velocity = values[DRAPE_CONTACT_FRICTION_VELOCITY];

@@ -77,9 +77,7 @@ static void share_areas(drape_broad_phase *s)
 drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, drape_broad_phase *s)
 {
     int32_t points, triangles;
-    *s = (drape_broad_phase){.model = m, .max_distance = m->collider_count > 0 ? m->contact.distance : 0};
-    if (m->contact.self)
-        s->max_distance = fmax(s->max_distance, 2 * m->contact.self_thickness);
+    *s = (drape_broad_phase){.model = m};
     count_features(m, &points, &s->segments, &triangles);
     s->points = m->node_count + points;
     s->rest = drape_arena_take(arena, 3 * (size_t)s->points, sizeof *s->rest);
@@ -88,6 +86,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->segment_collider = drape_arena_take(arena, (size_t)s->segments, sizeof *s->segment_collider);
     s->triangle = drape_arena_take(arena, 3 * (size_t)triangles, sizeof *s->triangle);
     s->triangle_collider = drape_arena_take(arena, (size_t)triangles, sizeof *s->triangle_collider);
+    s->distance = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->distance);
     s->near_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near_node);
     s->near_edge = drape_arena_take(arena, (size_t)m->edge_count, sizeof *s->near_edge);
     s->node_area = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->node_area);
@@ -95,6 +94,8 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->face_area = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->face_area);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < m->collider_count; i++)
+        s->distance[i] = m->contact.distance;
     for (int32_t i = 0; i < m->collider_count; i++)
         if (!m->colliders[i].ops->smooth)
             s->obstacle_radius = fmax(s->obstacle_radius, m->colliders[i].shape.radius);
@@ -124,7 +125,7 @@ drape_pair drape_broad_phase_surface(const drape_broad_phase *s, int32_t node, i
                         .node = {node, -1, -1, -1},
                         .collider = collider,
                         .area = s->node_area[node],
-                        .distance = s->model->contact.distance,
+                        .distance = s->distance[collider],
                         .rank = {collider - s->model->collider_count, node}};
 }
 
@@ -132,7 +133,7 @@ static void set_collider(const drape_broad_phase *s, int32_t collider, drape_pai
 {
     p->collider = collider;
     p->radius = s->model->colliders[collider].shape.radius;
-    p->distance = s->model->contact.distance;
+    p->distance = s->distance[collider];
 }
 
 /* ---- Searching ---- */
@@ -315,11 +316,14 @@ static void search_features(query *q)
 static void search_obstacles(query *q)
 {
     const drape_broad_phase *s = q->broad;
+    double largest = 0;
+    for (int32_t i = 0; i < s->model->collider_count; i++)
+        largest = fmax(largest, s->distance[i]);
     for (int32_t i = 0; s->obstacles.count > 0 && i < s->model->node_count; i++) {
         q->pair = (drape_pair){.kind = DRAPE_PAIR_TRIANGLE,
                                .radius = s->obstacle_radius,
                                .area = s->node_area[i],
-                               .distance = s->model->contact.distance,
+                               .distance = largest,
                                .rank = {OBSTACLES}};
         search_tree(q, i, &i, 1, -1, &s->obstacles, obstacle_face);
     }

@@ -88,7 +88,7 @@ static const drape_candidates *candidates_of(drape_contact *c, const drape_strai
 }
 
 double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
-                                   const drape_collider_pose *pose, const drape_keep *keep,
+                                   const drape_collider_pose *pose, const drape_keep *keep, double *of_node,
                                    drape_pair *limiting)
 {
     const drape_straight_path straight = {
@@ -97,7 +97,7 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
               .y = y,
               .keep = keep,
               .fraction = 1,
-              .of_node = c->of_node,
+              .of_node = of_node,
               .nodes = c->model->node_count,
               .relaxed = &c->relaxed};
     drape_distances away;
@@ -145,7 +145,8 @@ double drape_contact_march(const drape_contact *c, const drape_collider *collide
     return t;
 }
 
-double drape_contact_step_fraction(drape_contact *c, const double *x, const double *y, double t)
+double drape_contact_step_fraction(drape_contact *c, const double *x, const double *y, double t,
+                                   double *of_node)
 {
     const double start = drape_clock_seconds(), span[2] = {t, t};
     const drape_keep keep = {
@@ -154,7 +155,7 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
     drape_contact_poses(c, t, span, c->path_pose);
     drape_contact_fill(c, x, c->path_pose, c->from);
     drape_contact_fill(c, y, c->path_pose, c->to);
-    double fraction = drape_contact_free_fraction(c, c->from, c->to, c->path_pose, &keep, &limiting);
+    double fraction = drape_contact_free_fraction(c, c->from, c->to, c->path_pose, &keep, of_node, &limiting);
     for (int32_t k = 0; k < c->model->collider_count; k++) {
         const drape_collider *collider = &c->model->colliders[k];
         if (!collider->ops->smooth)
@@ -169,19 +170,10 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
             vec3_sub(y + at, c->path_pose[k].displacement, b);
             const double own = drape_contact_march(c, collider, a, b, &keep);
             fraction = fmin(fraction, own);
-            if (c->of_node)
-                c->of_node[node] = fmin(c->of_node[node], own);
+            if (of_node)
+                of_node[node] = fmin(of_node[node], own);
         }
     }
     c->seconds += drape_clock_seconds() - start;
     return fraction;
-}
-
-double drape_contact_node_fractions(drape_contact *c, const double *x, const double *y, double t,
-                                    double *fraction)
-{
-    c->of_node = fraction;
-    const double least = drape_contact_step_fraction(c, x, y, t);
-    c->of_node = NULL;
-    return least;
 }

@@ -35,12 +35,21 @@ static bool are_finite(const drape_collider_pose *pose, int32_t count)
     return true;
 }
 
+static bool are_distances(const drape_contact *c)
+{
+    for (int32_t i = 0; i < c->model->collider_count; i++)
+        if (!(c->broad.distance[i] >= c->model->contact.distance && isfinite(c->broad.distance[i])))
+            return false;
+    return true;
+}
+
 /* The active set at the beginning of the step depends on the positions alone, whatever the candidates;
  * lagged friction also on the velocities. */
 static drape_status restore(drape_contact *c)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
     c->step_candidates.all.known = c->query_candidates.all.known = c->listed = false;
+    c->step_candidates.patch.known = c->query_candidates.patch.known = false;
     c->between_steps = c->begun;
     if (!c->begun)
         return DRAPE_OK;
@@ -67,6 +76,7 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     drape_archive_double(a, &c->press.factor);
     drape_archive_double(a, &c->press.widest);
     drape_archive_double(a, &c->press.t);
+    drape_archive_doubles(a, c->broad.distance, colliders);
     archive_couplings(c, a);
     drape_archive_double(a, &c->seconds);
     drape_archive_double(a, &c->search_seconds);
@@ -77,6 +87,8 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has positions that are not finite");
     else if (!(c->press.factor >= 1 && isfinite(c->press.factor) && isfinite(c->press.t)))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a stiffness of contact below the scene's");
+    else if (!are_distances(c))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an activation distance below the scene's");
     else
         drape_archive_note(a, restore(c));
 }

@@ -40,6 +40,7 @@
 #define RAISE      2.0
 #define HALVED     0.2 /* [s] */
 #define MAX_FACTOR 1e4
+#define GROWTH     0.5 /* activation distance of a moving collider, in its path in a nominal step */
 
 static drape_status take_arrays(drape_arena *arena, drape_contact *c)
 {
@@ -356,6 +357,56 @@ double drape_contact_take_work(drape_contact *c)
     return work;
 }
 
+void drape_contact_set_step(drape_contact *c, double dt)
+{
+    c->dt = c->model->contact.distance_given ? 0 : dt;
+}
+
+/* How far a collider moves in a nominal step from time t on, relative to the mean motion of the cloth. */
+static double path_of(const drape_contact *c, int32_t collider, double t)
+{
+    const size_t nodes = (size_t)c->model->node_count;
+    double from[3], to[3], mean[3] = {0};
+    if (!drape_motion_moves_collider(c->motion, collider))
+        return 0;
+    drape_motion_collider(c->motion, collider, t, from);
+    drape_motion_collider(c->motion, collider, t + c->dt, to);
+    for (size_t i = 0; i < 3 * nodes; i++)
+        mean[i % 3] += c->v[i];
+    for (size_t k = 0; k < 3; k++)
+        to[k] -= from[k] + c->dt / (double)nodes * mean[k];
+    return vec3_norm(to);
+}
+
+/* Contact with a fast collider over a distance that it crosses in a small part of a step is hard to solve: in a
+ * step it accelerates the cloth all at once. So the activation distance grows to a share of the path of a step,
+ * and falls again to that of the scene when the collider rests. It changes by powers of two, one a step, because
+ * each change needs a search and changes the contact energy: by the work of whoever moves the collider. */
+static drape_status adapt_distances(drape_contact *c, double t, bool retry)
+{
+    const drape_configuration now = drape_contact_configuration(c);
+    const double least = c->model->contact.distance;
+    bool changed = false;
+    for (int32_t i = 0; c->dt > 0 && !retry && i < c->model->collider_count; i++) {
+        double *distance = &c->broad.distance[i];
+        const double wanted = GROWTH * path_of(c, i, t), before = *distance;
+        if (wanted > before)
+            *distance = 2 * before;
+        else if (wanted < 0.25 * before && before > least)
+            *distance = 0.5 * before;
+        changed = changed || *distance != before;
+    }
+    if (!changed)
+        return DRAPE_OK;
+    const double before = drape_contact_potential(c);
+    c->step_candidates.all.known = c->query_candidates.all.known = false;
+    c->step_candidates.patch.known = c->query_candidates.patch.known = false;
+    const drape_status status = drape_contact_list(c, &now);
+    if (!status)
+        c->press.work += drape_contact_potential(c) - before;
+    return status;
+}
+
 /* A step that is tried again begins where it did. */
 static bool is_retry(const drape_contact *c)
 {
@@ -424,10 +475,13 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     c->ahead_t = NAN;
     c->refused = false;
     drape_contact_set_rounding(c, c->x);
+    const bool retry = is_retry(c);
+    if (!status)
+        status = adapt_distances(c, t, retry);
     if (!status)
         status = update_inside(c);
     if (!status)
-        adapt_stiffness(c, t, is_retry(c));
+        adapt_stiffness(c, t, retry);
     if (!status)
         status = lag_at(c, v, t);
     if (!status) {

@@ -36,6 +36,9 @@ void drape_contact_expect(drape_contact *contact, double t1, bool may_relax);
  * that refused the step and those whose gaps are hardly above the least. *added: nodes that are relaxed from now
  * on; if there are any, the same step may succeed. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_relax(drape_contact *contact, double t1, bool all, int32_t *added);
+/* The nominal step [s], unless the integrator has none: where the scene gives no activation distance, that of
+ * a moving collider grows with its path in such a step. */
+void drape_contact_set_step(drape_contact *contact, double dt);
 
 /* Begins a step at the state x, v at time t: lagged friction takes its normal forces here, and the end of
  * the step is compared with it. The arrays are copied. Errors: DRAPE_E_MEMORY. */
@@ -105,12 +108,15 @@ int32_t drape_contact_last_couplings(const drape_contact *contact, const int32_t
 void drape_contact_archive(drape_contact *contact, drape_archive *a);
 
 /* The largest step fraction from x to y (node_count x 3) on which no two pieces pass through each other,
- * with a margin; colliders rest in their poses at time t. */
-double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t);
+ * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered at
+ * each node to the smallest fraction of its pairs. */
+double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
+                                   double *of_node);
 
-/* The same, and lowers `fraction` (node_count) at each node to the smallest of its pairs. */
-double drape_contact_node_fractions(drape_contact *contact, const double *x, const double *y, double t,
-                                    double *fraction);
+/* Moves the free nodes of y (node_count x 3), a guess of the end of the step at time t, out of the way of
+ * moving colliders: a node that one of them would reach on the straight path from the beginning of the step
+ * slides on it from there on. Nodes that begin inside stay. */
+void drape_contact_sweep(drape_contact *contact, double t, double *y);
 
 /* Whether a pair of features would be too near at x, as drape_contact_check tests it, or too near on the
  * path from the beginning of the step to there, while pins and colliders move straight between the kinks of

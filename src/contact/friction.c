@@ -19,13 +19,11 @@ static slip slip_of(const drape_gap *gap, const drape_contact_law *law, double v
     for (int k = 0; k < 3; k++)
         s.tangent[k] = s.u[k] - along * gap->closest.normal[k];
     double speed = vec3_norm(s.tangent), eps = law->velocity;
-    if (speed < eps) {
-        s.a = (2 - speed / eps) / eps;
+    s.a = drape_secant_of_speed(speed, eps);
+    if (speed < eps)
         s.b = speed > 0 ? -1 / (eps * eps * speed) : 0;
-    } else {
-        s.a = 1 / speed;
+    else
         s.b = -1 / (speed * speed * speed);
-    }
     return s;
 }
 

@@ -56,6 +56,21 @@ static void add_friction(const request *want, const drape_active_contact *contac
             h[D * i + j] += want->weight * dgdv[D * i + j];
 }
 
+/* Adds how friction that is not lagged changes with its normal force and, unless derivatives and by_x are
+ * NULL, with the place of contact. */
+static void add_changes_of_friction(const drape_gap *gap, const drape_contact_law *law, double weight,
+                                    const drape_normal *normal, const drape_gap_derivatives *derivatives,
+                                    const drape_normal_derivatives *by_x, double v[4][3], double *h)
+{
+    double change[D];
+    drape_normal_by_v(gap, normal, weight, change);
+    if (derivatives) {
+        drape_normal_add_by_x(gap, normal, by_x, change);
+        drape_friction_add_dgdx(gap, derivatives, law, drape_normal_force(normal), v, h);
+    }
+    drape_friction_add_normal(gap, law, change, v, h);
+}
+
 /* Adds the derivatives of the dissipative part of the normal force and of friction that is not lagged;
  * derivatives: NULL unless those by x are requested. */
 static void add_dissipative(const drape_contact *c, const request *want, const drape_active_contact *contact,
@@ -64,7 +79,7 @@ static void add_dissipative(const drape_contact *c, const request *want, const d
     const drape_gap *gap = &contact->gap;
     const bool friction = law->friction > 0 && !c->model->contact.lagged;
     drape_normal_derivatives by_x;
-    double v[4][3], change[D];
+    double v[4][3];
     if (!friction && !(law->damping > 0))
         return;
     drape_contact_velocities(c, contact, v);
@@ -80,14 +95,9 @@ static void add_dissipative(const drape_contact *c, const request *want, const d
     if (!friction)
         return;
     add_friction(want, contact, law, drape_normal_force(&normal), v, h);
-    if (want->which == DRAPE_CONTACT_GAUSS_NEWTON)
-        return;
-    drape_normal_by_v(gap, &normal, want->weight, change);
-    if (derivatives) {
-        drape_normal_add_by_x(gap, &normal, &by_x, change);
-        drape_friction_add_dgdx(gap, derivatives, law, drape_normal_force(&normal), v, h);
-    }
-    drape_friction_add_normal(gap, law, change, v, h);
+    if (want->which != DRAPE_CONTACT_GAUSS_NEWTON)
+        add_changes_of_friction(gap, law, want->weight, &normal, derivatives, derivatives ? &by_x : NULL, v,
+                                h);
 }
 
 /* h = (h + h')/2 of so many points */
@@ -159,17 +169,14 @@ void drape_contact_fix_friction(drape_contact *c, double weight, const drape_pat
         const drape_contact_law law = drape_contact_law_of(c, contact);
         drape_gap_derivatives derivatives;
         drape_normal_derivatives by_x;
-        double v[4][3], change[D], h[D * D] = {0};
+        double v[4][3], h[D * D] = {0};
         if (!(law.friction > 0))
             continue;
         drape_pair_derivatives(&contact->pair, &contact->gap, &now, c->broad.rest, &derivatives);
         drape_contact_velocities(c, contact, v);
         const drape_normal normal = drape_normal_at(&contact->gap, &law, v);
         drape_normal_derive(&contact->gap, &derivatives, &law, v, &by_x);
-        drape_normal_by_v(&contact->gap, &normal, weight, change);
-        drape_normal_add_by_x(&contact->gap, &normal, &by_x, change);
-        drape_friction_add_dgdx(&contact->gap, &derivatives, &law, drape_normal_force(&normal), v, h);
-        drape_friction_add_normal(&contact->gap, &law, change, v, h);
+        add_changes_of_friction(&contact->gap, &law, weight, &normal, &derivatives, &by_x, v, h);
         for (int k = 0; k < D * D; k++)
             h[k] = -h[k];
         add_blocks(c, contact, h, pattern, values);

@@ -31,6 +31,7 @@ struct drape_contact {
     const drape_model *model;
     const drape_motion *motion; /* of its colliders */
     double mean_edge;           /* [m] */
+    double dt; /* [s] nominal step, by which activation distances grow; 0: they do not */
     drape_broad_phase broad;
 
     drape_candidates step_candidates;
@@ -60,7 +61,6 @@ struct drape_contact {
     drape_lagged *lagged; /* (lagged_count of lagged_room) lagged friction */
     int32_t lagged_count, lagged_room;
 
-    double *of_node;                /* (node_count) while drape_contact_node_fractions runs; else NULL */
     double *from, *to;              /* (points x 3) the ends of a displacement: ccd.c */
     drape_collider_pose *path_pose; /* (collider_count) */
     drape_collider_pose *kink_pose; /* (collider_count) */
@@ -116,9 +116,10 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
 void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3]);
 
 /* The largest step fraction from x to y (points x 3) on which all pairs of features keep what they must
- * of their gaps, and the pair that limits it. Colliders are at pose. */
+ * of their gaps, and the pair that limits it. Colliders are at pose. of_node (node_count), unless NULL, is
+ * lowered at each node to the smallest fraction of its pairs. */
 double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
-                                   const drape_collider_pose *pose, const drape_keep *keep,
+                                   const drape_collider_pose *pose, const drape_keep *keep, double *of_node,
                                    drape_pair *limiting);
 
 /* The same for the path of a node from x to y in the collider's own coordinates, and its smooth surface. */

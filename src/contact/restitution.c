@@ -18,7 +18,7 @@ drape_normal drape_normal_at(const drape_gap *gap, const drape_contact_law *law,
     for (int i = 0; i < gap->closest.points; i++)
         u += gap->closest.c[i] * vec3_dot(gap->closest.normal, v[i]);
     const double speed = fabs(u);
-    normal.secant = kappa * (speed < eps ? (2 - speed / eps) / eps : 1 / speed);
+    normal.secant = kappa * drape_secant_of_speed(speed, eps);
     normal.share = speed < eps ? normal.secant * u : copysign(kappa, u);
     normal.slope = speed < eps ? kappa * 2 * (1 - speed / eps) / eps : 0;
     return normal;

@@ -21,6 +21,12 @@
 
 #include "contact/force.h"
 
+/* f(speed/eps)/speed [s/m], for a speed of at least 0; also that of friction. */
+static inline double drape_secant_of_speed(double speed, double eps)
+{
+    return speed < eps ? (2 - speed / eps) / eps : 1 / speed;
+}
+
 typedef struct drape_normal {
     double lambda; /* [N] */
     double share;  /* kappa f(u/eps), of lambda: it dissipates energy; 0 if e = 1 */

@@ -141,6 +141,7 @@ typedef enum drape_no_room { DRAPE_NO_ROOM_AUTO, DRAPE_NO_ROOM_STOP, DRAPE_NO_RO
 
 typedef struct drape_contact_def {
     double distance;             /* activation distance between cloth and collider [m] */
+    bool distance_given;         /* by the scene */
     double stiffness;            /* scale of the contact pressure [Pa] */
     double friction_velocity;    /* sliding speed below which friction falls to zero [m/s] */
     double restitution_velocity; /* rate of a gap below which less energy than e says is dissipated [m/s] */

@@ -13,6 +13,7 @@
 #include "nonlinear/stress_predictor.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* Fraction of the initial work along a correction that the residual may do beyond the minimum. */
@@ -158,7 +159,7 @@ static bool shorten_nodes(drape_inexact_newton *s, double *p)
         memcpy(e->x_ahead, e->x, e->nodes * sizeof *e->x_ahead);
         for (size_t i = 0; i < e->dofs; i++)
             e->x_ahead[drape_step_equation_at(e, i)] += p[i];
-        if (drape_system_node_fractions(e->system, e->x, e->x_ahead, e->point.t, s->fraction) == 1)
+        if (drape_system_step_fraction(e->system, e->x, e->x_ahead, e->point.t, s->fraction) == 1)
             return true;
         for (size_t i = 0; i < e->dofs; i++)
             p[i] *= s->fraction[drape_step_equation_at(e, i) / 3];
@@ -170,6 +171,17 @@ static bool shorten_nodes(drape_inexact_newton *s, double *p)
  * vanish. It is nearer to the solution nevertheless where few iterations follow. */
 static void make_guess_feasible(drape_inexact_newton *s, int iterations, double *d)
 {
+    if (s->fraction && !getenv("NOSWEEP")) {
+        drape_step_equation *e = s->equation;
+        memcpy(e->x_ahead, e->x, e->nodes * sizeof *e->x_ahead);
+        for (size_t i = 0; i < e->dofs; i++)
+            e->x_ahead[drape_step_equation_at(e, i)] += d[i];
+        drape_system_sweep(e->system, e->point.t, e->x_ahead);
+        for (size_t i = 0; i < e->dofs; i++) {
+            const size_t at = drape_step_equation_at(e, i);
+            d[i] = e->x_ahead[at] - e->x[at];
+        }
+    }
     if (s->fraction && (iterations > FEW_ITERATIONS || !shorten_nodes(s, d)))
         drape_step_equation_make_feasible(s->equation, d);
 }

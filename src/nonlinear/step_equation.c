@@ -93,7 +93,7 @@ double drape_step_equation_make_feasible(drape_step_equation *s, double *p)
     memcpy(s->x_ahead, s->x, s->nodes * sizeof *s->x_ahead);
     for (size_t i = 0; i < s->dofs; i++)
         s->x_ahead[drape_step_equation_at(s, i)] += p[i];
-    double fraction = drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t);
+    double fraction = drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t, NULL);
     for (size_t i = 0; fraction < 1 && i < s->dofs; i++)
         p[i] *= fraction;
     return fraction;

@@ -65,8 +65,13 @@ static drape_status create_system(drape_sim *sim, int threads)
     if (status)
         return status;
     drape_system_watch(sim->system, &sim->cancel);
-    if (!sim->chosen.integrator->projects_contact)
-        return drape_system_add_contact(sim->system);
+    if (!sim->chosen.integrator->projects_contact) {
+        status = drape_system_add_contact(sim->system);
+        if (!status && !sim->chosen.integrator->own_steps)
+            drape_system_set_contact_step(
+                sim->system, drape_chosen_integrator_value(&sim->chosen, "dt", 1 / sim->frame_rate));
+        return status;
+    }
     drape_system_leave_constraints(sim->system);
     return DRAPE_OK;
 }

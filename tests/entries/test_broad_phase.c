@@ -190,8 +190,8 @@ START_TEST(everything_near_is_found)
         move(m, &seed, y);
         if (k % 5 == 0)
             ck_assert_int_eq(drape_contact_begin(c, x, NULL, 0), DRAPE_OK);
-        const double fraction = drape_contact_step_fraction(c, x, y, 0);
-        ck_assert(fraction == drape_contact_step_fraction(fresh, x, y, 0));
+        const double fraction = drape_contact_step_fraction(c, x, y, 0, NULL);
+        ck_assert(fraction == drape_contact_step_fraction(fresh, x, y, 0, NULL));
         crossing += check_fraction(&all, c->from, c->to, fraction);
         for (size_t i = 0; i < n; i++)
             y[i] = x[i] + fraction * (y[i] - x[i]);

@@ -328,7 +328,7 @@ START_TEST(nan_is_forgotten)
         t.x[broken] = broken % 2 ? NAN : INFINITY;
         point.x = t.x;
         drape_system_force(t.system, &point, t.g[1]);
-        drape_system_step_fraction(t.system, t.at.x, t.x, 0.01);
+        drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, NULL);
         drape_system_crosses(t.system, t.x, 0.01, &reason, &diagnostic);
         drape_system_check_contact(t.system, t.x, 0.01, &reason, &diagnostic);
         point.x = t.at.x;

@@ -1,0 +1,321 @@
+/*
+ * realtime: frames of 1/60 s with contact, within a budget. Four scenes, in each of which the cloth is moved as
+ * by a host, frame by frame:
+ *     sphere, capsule  a sheet of 1 m with 50 x 50 nodes hung by two corners, and a body that goes through its
+ *                      place and back at 2 m/s all the time; the budget is a frame
+ *     ball             the same with 30 x 30 nodes and a ball at up to 1.8 m/s; the budget is 4 ms
+ *     capes            three capes of 30 x 30 nodes, each a sim of its own with a third of a frame, pinned to
+ *                      the shoulders of a body of six capsules that walks, turns back and bobs; in a tenth of
+ *                      the frames, drawn at random, the budget is a tenth
+ * The clock of the library is replaced by the CPU time of the process, so that other programs on the machine
+ * do not matter. A frame is missed if its call took longer than its budget; starved ones are not counted.
+ * `strain` is the largest of any edge at the end of a frame, `inside` the depth of cloth in a body,
+ * `crossings` that of edges through triangles of the cloth, each the largest of all frames.
+ *
+ *     realtime [--csv FILE] [--seconds S] [--scene NAME] [--be]
+ *
+ * --be adds the converged steps, which take minutes.
+ */
+#define _GNU_SOURCE
+#include "bench.h"
+
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+
+#define FRAME      (1.0 / 60)
+#define MAX_FRAMES 4000
+#define BODIES     6
+#define CAPES      3
+#define MATERIAL                                                                                             \
+    "'material': {'young_modulus': 968245.8365518542, 'poisson_ratio': 0.3333333333333333, 'thickness': "    \
+    "1.0327955589886444e-3, 'areal_density': 0.2}, 'terms': ['stretch.edge', 'bend.hinge']"
+
+int clock_gettime(clockid_t id, struct timespec *t)
+{
+    return (int)syscall(SYS_clock_gettime, id == CLOCK_MONOTONIC ? CLOCK_PROCESS_CPUTIME_ID : id, t);
+}
+
+/* ---- The scenes ---- */
+
+typedef struct scene scene;
+
+/* Sends the bodies, and pins if they move, to where they are at time t, within `seconds`. */
+typedef drape_status move_bodies(const scene *s, drape_sim *sim, int which, double t, double seconds);
+
+struct scene {
+    const char *name, *text; /* %s: the settings of contact */
+    move_bodies *move;
+    int sims;
+    double seconds, speed; /* [s], [m/s] of the bodies */
+    double budget;         /* [s] of each sim */
+    double starved;        /* share of the frames that have a tenth of the budget */
+};
+
+/* From 0.6 to -0.6 and back at constant speed. */
+static double there_and_back(double path)
+{
+    const double at = fmod(path, 2.4);
+    return at < 1.2 ? 0.6 - at : at - 1.8;
+}
+
+static drape_status sweep(const scene *s, drape_sim *sim, int which, double t, double seconds)
+{
+    const double to[3] = {0, 0, there_and_back(s->speed * t)};
+    (void)which;
+    return drape_sim_move_collider(sim, 0, seconds, to, NULL);
+}
+
+/* At most the speed: a sine. */
+static drape_status swing(const scene *s, drape_sim *sim, int which, double t, double seconds)
+{
+    const double to[3] = {0, 0, 0.5 * cos(2 * s->speed * t)};
+    (void)which;
+    return drape_sim_move_collider(sim, 0, seconds, to, NULL);
+}
+
+/* Walks 2 m there and back in 4 s, with a bob and a sway of each step, legs and arms in opposite phase. */
+static drape_status walk(const scene *s, drape_sim *sim, int which, double t, double seconds)
+{
+    static int32_t pins[30];
+    static double at[90];
+    const double turn = 2 * acos(-1) * t, phase = 0.7 * which;
+    const double body[3] = {0.03 * sin(turn + phase), 0.03 * cos(2 * turn + phase) - 0.03 * cos(phase),
+                            s->speed * (1 - cos(turn / 4 + phase) - 1 + cos(phase)) * 4 / (2 * acos(-1))};
+    const double stride = 0.2 * (sin(turn + phase) - sin(phase));
+    drape_status status = DRAPE_OK;
+    for (int i = 0; i < BODIES && !status; i++) {
+        const double sign = i < 2 ? 0 : i == 2 || i == 5 ? 1 : -1;
+        const double to[3] = {body[0], body[1], body[2] + sign * stride};
+        status = drape_sim_move_collider(sim, i, seconds, to, NULL);
+    }
+    for (int i = 0; i < 30; i++) {
+        pins[i] = i;
+        at[3 * i] = -0.25 + 0.5 * i / 29 + body[0];
+        at[3 * i + 1] = 1.45 + body[1];
+        at[3 * i + 2] = -0.16 + body[2];
+    }
+    return status ? status : drape_sim_move_pins(sim, 30, pins, seconds, at, NULL);
+}
+
+#define HUNG(side)                                                                                           \
+    "'cloth': [{'mesh': {'grid': 'square', 'columns': " #side ", 'rows': " #side                             \
+    ", 'width': 1, 'height': 1, 'orientation': 'vertical', 'transform': {'translate': [-0.5, 0, "            \
+    "0]}}, " MATERIAL ", 'pins': [{'corner': 'top-left'}, {'corner': 'top-right'}]}]"
+
+static const scene scenes[] = {
+    {"sphere",
+     "{'drape': 1, " HUNG(50) ", 'colliders': [{'type': 'sphere', 'center': [0, -0.6, 0], 'radius': 0.2, "
+                              "'friction': 0.3}], %s 'duration': 100}",
+     sweep, 1, 6, 2, FRAME, 0},
+    {"capsule",
+     "{'drape': 1, " HUNG(50) ", 'colliders': [{'type': 'capsule', 'a': [-0.25, -0.6, 0], 'b': [0.25, -0.5, "
+                              "0], 'radius': 0.12, 'friction': 0.3}], %s 'duration': 100}",
+     sweep, 1, 6, 2, FRAME, 0},
+    {"ball",
+     "{'drape': 1, " HUNG(30) ", 'colliders': [{'type': 'sphere', 'center': [0, -0.6, 0], 'radius': 0.2, "
+                              "'friction': 0.3}], %s 'duration': 100}",
+     swing, 1, 6, 1.8, 4e-3, 0},
+    {"capes",
+     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 30, 'rows': 30, 'width': 0.5, 'height': "
+     "1, "
+     "'orientation': 'vertical', 'transform': {'translate': [-0.25, 1.45, -0.16]}}, " MATERIAL
+     ", 'pins': [{'row': 0}]}], 'colliders': ["
+     "{'type': 'capsule', 'a': [0, 0.95, 0], 'b': [0, 1.3, 0], 'radius': 0.13, 'friction': 0.3},"
+     "{'type': 'sphere', 'center': [0, 1.6, 0], 'radius': 0.11, 'friction': 0.3},"
+     "{'type': 'capsule', 'a': [-0.09, 0.1, 0], 'b': [-0.09, 0.85, 0], 'radius': 0.08, 'friction': 0.3},"
+     "{'type': 'capsule', 'a': [0.09, 0.1, 0], 'b': [0.09, 0.85, 0], 'radius': 0.08, 'friction': 0.3},"
+     "{'type': 'capsule', 'a': [-0.24, 0.8, 0], 'b': [-0.2, 1.35, 0], 'radius': 0.05, 'friction': 0.3},"
+     "{'type': 'capsule', 'a': [0.24, 0.8, 0], 'b': [0.2, 1.35, 0], 'radius': 0.05, 'friction': 0.3}], %s "
+     "'duration': 100}",
+     walk, CAPES, 20, 1.5, FRAME / CAPES, 0.1},
+};
+#define SCENES ((int)(sizeof scenes / sizeof *scenes))
+
+typedef struct variant {
+    const char *name, *contact;
+    bool self;
+} variant;
+
+static const variant variants[] = {
+    {"default", "", false},
+    {"30 mm", "'contact': {'distance': 0.03},", false},
+    {"self", "'self_contact': {'thickness': 0.004, 'friction': 0.3},", true},
+};
+#define VARIANTS ((int)(sizeof variants / sizeof *variants))
+
+/* ---- A run ---- */
+
+typedef struct result {
+    double ms[MAX_FRAMES];
+    int frames, missed, starved, errors;
+    double dropped, strain, inside;
+    int64_t crossings, attempts, rejected;
+    double contact; /* share of the time of steps */
+} result;
+
+static double strain_of(const drape_sim *sim)
+{
+    const drape_model *m = sim->model;
+    const double *x = drape_sim_positions(sim);
+    double largest = 0;
+    for (int32_t e = 0; e < m->edge_count; e++) {
+        const double *a = x + 3 * (size_t)m->edge[2 * e], *b = x + 3 * (size_t)m->edge[2 * e + 1];
+        const double d[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+        largest = fmax(largest, sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / m->edge_length[e] - 1);
+    }
+    return largest;
+}
+
+static void examine(const drape_sim *sim, bool self, result *r)
+{
+    r->strain = fmax(r->strain, strain_of(sim));
+    for (int32_t c = 0; c < sim->model->collider_count; c++) {
+        double deepest = 0;
+        if (drape_sim_inside(sim, c, &deepest) > 0)
+            r->inside = fmax(r->inside, deepest);
+    }
+    const int64_t crossings = self ? drape_sim_intersections(sim, -1) : 0;
+    r->crossings = crossings > r->crossings ? crossings : r->crossings;
+}
+
+static double draw(uint64_t *seed)
+{
+    *seed = *seed * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*seed >> 11) / 9007199254740992.0;
+}
+
+static int compare(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void run(drape_context *ctx, const scene *s, const variant *v, const char *integrator, double seconds,
+                result *r)
+{
+    const bool converged = strcmp(integrator, "be") == 0;
+    const drape_setting dt[] = {{"dt", FRAME, NULL}, {NULL, 0, NULL}};
+    drape_model *model = bench_model(ctx, s->text, v->contact);
+    drape_sim *sim[CAPES];
+    double debt[CAPES] = {0};
+    uint64_t seed = 7;
+    *r = (result){.frames = (int)(seconds / FRAME + 0.5)};
+    for (int i = 0; i < s->sims; i++) {
+        sim[i] = bench_sim(ctx, model, integrator, dt, NULL, NULL);
+        if (s->move(s, sim[i], i, 0, 1e-9) || drape_sim_advance(sim[i], 1e-6))
+            bench_fail(ctx, "the start of %s", s->name);
+    }
+    for (int k = 0; k < r->frames; k++) {
+        const bool starved = draw(&seed) < s->starved;
+        r->starved += starved;
+        for (int i = 0; i < s->sims; i++) {
+            drape_realtime report = {0};
+            const double start = drape_clock_seconds();
+            if (s->move(s, sim[i], i, (k + 1) * FRAME, FRAME + debt[i]))
+                bench_fail(ctx, "%s", s->name);
+            const drape_status status =
+                converged
+                    ? drape_sim_advance(sim[i], drape_sim_time(sim[i]) + FRAME)
+                    : drape_sim_advance_realtime(sim[i], FRAME, s->budget * (starved ? 0.1 : 1), &report);
+            r->ms[k] += 1e3 * (drape_clock_seconds() - start);
+            r->errors += status != DRAPE_OK;
+            if (status && r->errors == 1)
+                fprintf(stderr, "%s, %s, t=%g: %s\n", s->name, v->name, drape_sim_time(sim[i]),
+                        drape_context_message(ctx));
+            r->missed += !converged && !starved && !report.kept;
+            debt[i] = report.debt;
+            r->dropped += report.dropped;
+            if (getenv("TRACE"))
+                printf("T %d %d %.2f ms %s e%d n%d r%d h%.4f debt %.4f\n", k, i, 1e3 * report.seconds,
+                       report.level, report.effort, report.attempts, report.rejected, report.h, report.debt);
+            examine(sim[i], v->self, r);
+        }
+    }
+    double steps = 0, contact = 0;
+    for (int i = 0; i < s->sims; i++) {
+        const drape_statistics stats = drape_sim_statistics(sim[i]);
+        steps += stats.wall_steps;
+        contact += stats.wall_contact;
+        r->attempts += stats.steps_accepted + stats.steps_rejected;
+        r->rejected += stats.steps_rejected;
+        int64_t count;
+        for (int k = 0; getenv("TRACE") && drape_sim_reason(sim[i], k, &count); k++)
+            printf("R %s %d\n", drape_sim_reason(sim[i], k, &count), (int)count);
+        drape_sim_destroy(&sim[i]);
+    }
+    r->contact = contact / steps;
+    drape_model_destroy(&model);
+    qsort(r->ms, (size_t)r->frames, sizeof *r->ms, compare);
+}
+
+static double percentile(const result *r, double share)
+{
+    return r->ms[(int)(share * (r->frames - 1) + 0.5)];
+}
+
+static void measure(drape_context *ctx, const scene *s, const variant *v, const char *integrator,
+                    double seconds, FILE *csv)
+{
+    static result r;
+    run(ctx, s, v, integrator, seconds > 0 ? seconds : s->seconds, &r);
+    printf("%-8s %-8s %-9s %6d %7.2f %7.2f %7.2f %7.2f %7d %8.2f %8.1f %8.2f %9lld %8lld %8lld %6d %8.0f\n",
+           s->name, v->name, integrator, r.frames, percentile(&r, 0.5), percentile(&r, 0.95),
+           percentile(&r, 0.99), r.ms[r.frames - 1], r.missed, r.dropped, 100 * r.strain, 1e3 * r.inside,
+           (long long)r.crossings, (long long)r.attempts, (long long)r.rejected, r.errors, 100 * r.contact);
+    fflush(stdout);
+    if (!csv)
+        return;
+    bench_csv_row(csv);
+    fprintf(csv, "%s,%s,%s,%d,%d,%g,%g,%g,%g,%d,%g,%g,%g,%lld,%lld,%lld,%d,%g\n", s->name, v->name,
+            integrator, r.frames, r.starved, percentile(&r, 0.5), percentile(&r, 0.95), percentile(&r, 0.99),
+            r.ms[r.frames - 1], r.missed, r.dropped, 100 * r.strain, 1e3 * r.inside, (long long)r.crossings,
+            (long long)r.attempts, (long long)r.rejected, r.errors, 100 * r.contact);
+}
+
+int main(int argc, char **argv)
+{
+    static const char usage[] = "realtime [--csv FILE] [--seconds S] [--scene NAME] [--be]\n";
+    const char *file = NULL, *only = NULL;
+    double seconds = 0;
+    bool be = false;
+    for (int i = 1; i < argc; i++) {
+        if (strcmp(argv[i], "--csv") == 0 && i + 1 < argc)
+            file = argv[++i];
+        else if (strcmp(argv[i], "--scene") == 0 && i + 1 < argc)
+            only = argv[++i];
+        else if (strcmp(argv[i], "--seconds") == 0 && i + 1 < argc)
+            seconds = atof(argv[++i]);
+        else if (strcmp(argv[i], "--be") == 0)
+            be = true;
+        else
+            return bench_usage(argv[i], usage);
+    }
+    if (!(seconds >= 0 && seconds * 60 < MAX_FRAMES))
+        return bench_usage("", usage);
+    FILE *csv =
+        bench_csv(file, "scene,contact,integrator,frames,starved,p50_ms,p95_ms,p99_ms,worst_ms,missed,"
+                        "dropped_s,strain_percent,inside_mm,crossings,attempts,rejected,errors,"
+                        "contact_percent");
+    drape_context *ctx = bench_context();
+    puts("scene    contact  method    frames     p50     p95     p99   worst  missed  dropped strain % "
+         "inside mm "
+         "crossings attempts rejected errors contact %");
+    if (getenv("CONTACT")) {
+        const variant own = {"own", getenv("CONTACT"), strstr(getenv("CONTACT"), "self_contact")};
+        for (int i = 0; i < SCENES; i++)
+            if (!only || strcmp(only, scenes[i].name) == 0)
+                measure(ctx, &scenes[i], &own, be ? "be" : "newton_k", seconds, csv);
+        return 0;
+    }
+    for (int i = 0; i < SCENES; i++)
+        for (int k = 0; k < VARIANTS; k++) {
+            if (only && strcmp(only, scenes[i].name) != 0)
+                continue;
+            measure(ctx, &scenes[i], &variants[k], "newton_k", seconds, csv);
+            if (be)
+                measure(ctx, &scenes[i], &variants[k], "be", seconds, csv);
+        }
+    drape_context_destroy(&ctx);
+    return csv && fclose(csv) ? 1 : 0;
+}

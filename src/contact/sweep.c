@@ -1,0 +1,91 @@
+/* sweep.c: what a moving collider would sweep over in a step, moved along with it: see contact.h. */
+#include "contact/parts.h"
+
+#include "base/clock.h"
+#include "base/vec3.h"
+
+#include <string.h>
+
+/* Of the activation distance: nodes that a collider reaches are put there. The force that accelerates cloth of
+ * areal density sigma to a speed v within a step h is K b'(y), with K = sigma (2 g L + v^2)/d, so b'(y) = v d/(h
+ * (2 g L + v^2)): y is 0.7 to 1 for what moves by d and less in a step. */
+#define RESTING    0.8
+#define CLOSE      0.05 /* of the activation distance: how far above that a march along the path may end */
+#define MAX_STEPS  50   /* of a march: where it ends the path is free */
+#define MAX_PASSES 2    /* over all colliders: one may push a node towards another */
+
+static double distance_from(const drape_collider *collider, const double *x, double *normal)
+{
+    return collider->ops->distance(collider->values, &collider->shape, x, normal, NULL);
+}
+
+/* Moves a node that goes from x to y, both in the collider's own coordinates, to where it slides on the
+ * collider from the place at which the path comes within a distance of it. Returns whether it does. A node
+ * that begins inside has no side, and stays. */
+static bool slide(const drape_collider *collider, double distance, double rounding, const double *x,
+                  double *y)
+{
+    double p[3], at[3], normal[3], t = 0;
+    double gap = distance_from(collider, x, NULL);
+    const double aim = fmin(gap, RESTING * distance);
+    vec3_sub(y, x, p);
+    const double length = vec3_norm(p);
+    if (!drape_gap_has_side(gap, rounding) || !(length > gap - aim) ||
+        (gap == aim && distance_from(collider, y, NULL) >= aim && length < gap))
+        return false;
+    memcpy(at, x, sizeof at);
+    for (int i = 0; i < MAX_STEPS && gap - aim > CLOSE * distance; i++) {
+        t += (gap - aim) / length;
+        if (t >= 1)
+            return false;
+        memcpy(at, x, sizeof at);
+        vec3_add_scaled(t, p, at);
+        gap = distance_from(collider, at, NULL);
+    }
+    distance_from(collider, at, normal);
+    const double inward = (1 - t) * vec3_dot(p, normal);
+    if (!(inward < 0))
+        return false;
+    vec3_add_scaled(1 - t, p, at);
+    vec3_add_scaled(-inward, normal, at);
+    gap = distance_from(collider, at, normal);
+    if (gap < aim)
+        vec3_add_scaled(aim - gap, normal, at);
+    memcpy(y, at, sizeof at);
+    return true;
+}
+
+/* The box of the points of the start and end... */
+static bool sweep(drape_contact *c, int32_t collider, double *y)
+{
+    const drape_collider *k = &c->model->colliders[collider];
+    const double *from = c->start_pose[collider].displacement, *to = c->path_pose[collider].displacement;
+    bool moved = false;
+    if (memcmp(from, to, 3 * sizeof *from) == 0)
+        return false;
+    for (int32_t i = 0; i < c->model->free_count; i++) {
+        const size_t at = 3 * (size_t)c->model->node_of_free[i];
+        double a[3], b[3];
+        vec3_sub(c->start + at, from, a);
+        vec3_sub(y + at, to, b);
+        if (!slide(k, c->broad.distance[collider], c->broad.rounding, a, b))
+            continue;
+        for (int n = 0; n < 3; n++)
+            y[at + (size_t)n] = b[n] + to[n];
+        moved = true;
+    }
+    return moved;
+}
+
+void drape_contact_sweep(drape_contact *c, double t, double *y)
+{
+    const double start = drape_clock_seconds(), span[2] = {t, t};
+    bool moved = true;
+    drape_contact_poses(c, t, span, c->path_pose);
+    for (int pass = 0; pass < MAX_PASSES && moved; pass++) {
+        moved = false;
+        for (int32_t k = 0; k < c->model->collider_count; k++)
+            moved = sweep(c, k, y) || moved;
+    }
+    c->seconds += drape_clock_seconds() - start;
+}
