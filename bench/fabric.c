@@ -119,8 +119,7 @@ static void run_size(const char *method, int side, int repeats, FILE *csv)
     for (int i = 0; i < 2; i++) {
         result *r = &of[i];
         finish(r);
-        const double ratio = r->cpu / of[0].cpu,
-                     by_jacobian = ratio * (of[0].jacobians / r->jacobians);
+        const double ratio = r->cpu / of[0].cpu, by_jacobian = ratio * (of[0].jacobians / r->jacobians);
         printf("%-9s %6d %-12s %9lld %9.3f %9.3f %9.3f %9.3f %9.3f %9.3f %7.2f %7.2f %6.2f %6.2f\n", method,
                r->nodes, kinds[i].name, r->nonzeros, r->cpu, r->median, r->residual, r->jacobian, r->factor,
                r->solve, r->residuals, r->jacobians, ratio, by_jacobian);

@@ -13,8 +13,8 @@
 /* Results by part and by element, which the sums read. Gradients of a part have DRAPE_LANES numbers a node,
  * the last of which is 0. */
 typedef struct drape_parts_work {
-    double *s, *rate, *ahead; /* (parts) s, ds . v, ds . along */
-    double *ds, *turn;        /* (parts x part nodes x DRAPE_LANES) ds, dds v */
+    double *s, *rate, *ahead;                          /* (parts) s, ds . v, ds . along */
+    double *ds, *turn;                                 /* (parts x part nodes x DRAPE_LANES) ds, dds v */
     double *force, *of_ddq, *of_dq, *by_rate, *energy; /* (elements) as in drape_block */
 } drape_parts_work;
 

@@ -74,8 +74,7 @@ static void hessian(const double w[3], double *ddq)
 /* The same for the elements in lanes: their blocks on and below the diagonal. */
 LANES_INLINE void hessian_lanes(const lanes w[3], double *ddq)
 {
-    const lanes m[3][3] = {
-        {w[0] + 2 * w[1] + w[2]}, {-w[0] - w[1], w[0]}, {-w[1] - w[2], w[1], w[2]}};
+    const lanes m[3][3] = {{w[0] + 2 * w[1] + w[2]}, {-w[0] - w[1], w[0]}, {-w[1] - w[2], w[1], w[2]}};
     for (int a = 0; a < 3; a++)
         for (int b = 0; b <= a; b++)
             for (int i = 0; i < 3; i++)
