@@ -3,7 +3,7 @@
  * released horizontally, hanging by two corners, once with stretch.edge and bend.hinge and once with
  * stretch.cst and bend.midedge, with each method at 1/60 s. The two runs take turns, and the CPU time of a
  * step is the least over the repeats, which compute the same. Newton's method takes other numbers of
- * iterations for the two, as they are stiff in other ways; the ratio of CPU times by Jacobian is that of the
+ * iterations for the two, as their stiffnesses differ; the ratio of CPU times by Jacobian is that of the
  * same work. Parts are wall times of the repeat with the least CPU time.
  *
  *     fabric [--csv FILE] [--repeats N] [--side N] [--method NAME]

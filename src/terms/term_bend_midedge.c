@@ -145,8 +145,8 @@ static int32_t hinge_at(const drape_cloth_view *cloth, int32_t edge)
     return low;
 }
 
-/* The nodes of hinge h of a patch as those of a part: of a clamped one its edge, its apex and again the first.
- * Returns the sign of its angle in the patch, which depends on the orientation of the triangle. */
+/* The nodes of hinge h of a patch as those of a part: of a clamped one its edge, its apex and again the
+ * first. Returns the sign of its angle in the patch, which depends on the orientation of the triangle. */
 static int part_nodes(const drape_cloth_view *cloth, const drape_midedge *patch, int h, int32_t node[4])
 {
     const int *local = drape_midedge_hinge[h];
@@ -181,7 +181,8 @@ static int gather_nodes(const drape_cloth_view *cloth, const drape_midedge *patc
     return count;
 }
 
-/* Counts, and reserves elements and parts: the hinges of the cloth, then the clamped edges of its triangles. */
+/* Counts, and reserves elements and parts: the hinges of the cloth, then the clamped edges of its
+ * triangles. */
 static drape_status reserve(const drape_cloth_view *cloth, const double *values, const double law[9],
                             drape_term_builder *builder)
 {
