@@ -256,12 +256,12 @@ typedef struct drape_parts {
 /* The elements of one term on one cloth; constant after the model is compiled. Allocated by the library
  * alone: it may grow at its end. */
 typedef struct drape_elements {
-    int32_t count;        /* number of elements */
-    int nodes;            /* nodes per element */
-    int rest_count;       /* numbers of rest data per element */
-    const int32_t *node;  /* (count x nodes) node numbers of the whole model */
-    const double *rest;   /* (rest_count x count): item k of element e is rest[k * count + e] */
-    const double *params; /* values in the order of the term's parameters */
+    int32_t count;            /* number of elements */
+    int nodes;                /* nodes per element */
+    int rest_count;           /* numbers of rest data per element */
+    const int32_t *node;      /* (count x nodes) node numbers of the whole model */
+    const double *rest;       /* (rest_count x count): item k of element e is rest[k * count + e] */
+    const double *params;     /* values in the order of the term's parameters */
     const drape_parts *parts; /* NULL: the term has none */
 } drape_elements;
 

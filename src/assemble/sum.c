@@ -20,9 +20,9 @@ struct drape_summer {
     drape_pool *pool; /* the system's; NULL: one thread */
     int threads;
     bool unconstrained;
-    drape_block *blocks; /* (threads) */
-    reach **reaches;     /* (term_count) of the blocks of each term's pieces; NULL: one thread */
-    reach **patches;     /* (term_count) of the blocks of its patches; NULL: one thread */
+    drape_block *blocks;      /* (threads) */
+    reach **reaches;          /* (term_count) of the blocks of each term's pieces; NULL: one thread */
+    reach **patches;          /* (term_count) of the blocks of its patches; NULL: one thread */
     drape_parts_work **parts; /* (term_count) NULL: the term has no parts */
     bool has_parts;
 };

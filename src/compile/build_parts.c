@@ -50,7 +50,8 @@ void drape_term_set_part(drape_term_builder *builder, int32_t part, const int32_
 void drape_term_link(drape_term_builder *builder, int32_t element, int32_t part, double weight)
 {
     const drape_term *term = builder->term;
-    const int32_t i = builder->links, last = i > 0 && builder->link_element ? builder->link_element[i - 1] : 0;
+    const int32_t i = builder->links,
+                  last = i > 0 && builder->link_element ? builder->link_element[i - 1] : 0;
     if (!builder->link_weight || !builder->link_element || !builder->link_part || element < last ||
         element >= term->elements.count || part < 0 || part >= term->parts.count ||
         i >= term->parts.link_count) {

@@ -116,7 +116,9 @@ static drape_status check_elements(drape_term_builder *builder)
                                  ops->entry.name, el->rest_count, needed);
     int32_t first = builder->first_node, last = first + builder->node_count - 1;
     if (builder->strayed)
-        return drape_term_refuse(builder, "%s set an element outside of the %d that it announced",
+        return drape_term_refuse(builder,
+                                 "%s set an element outside of the %d that it announced, or a part or link "
+                                 "outside of those",
                                  ops->entry.name, (int)el->count);
     for (size_t i = 0; i < (size_t)el->count; i++)
         if (el->node[i * (size_t)el->nodes] == -1)
@@ -302,8 +304,9 @@ static bool well_formed(const drape_term_ops *ops)
         ops->law ? ops->nodes == 0 : ops->nodes >= 1 && ops->nodes <= DRAPE_MAX_ELEMENT_NODES && ops->build;
     bool internal = !ops->has_internal || (ops->commit && ops->initial);
     return ops->entry.name && ops->entry.summary && ops->entry.reference && ops->element_name && kinds == 1 &&
-           sized && internal && (!ops->part || (ops->measure && ops->part_nodes >= 1 &&
-                                                ops->part_nodes <= DRAPE_MAX_ELEMENT_NODES)) &&
+           sized && internal &&
+           (!ops->part ||
+            (ops->measure && ops->part_nodes >= 1 && ops->part_nodes <= DRAPE_MAX_ELEMENT_NODES)) &&
            (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
            drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }

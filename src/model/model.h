@@ -9,10 +9,10 @@
 
 /* The patches of a term with parts: runs of consecutive elements with the same nodes. */
 typedef struct drape_patches {
-    int32_t count;  /* 0: the term has no parts */
-    int32_t *first; /* (count + 1) the elements of patch i are first[i] ... first[i + 1] - 1 */
-    int32_t *node;  /* (count x elements.nodes) */
-    uint8_t *used;  /* (count) the nodes from that number on belong to no part */
+    int32_t count;    /* 0: the term has no parts */
+    int32_t *first;   /* (count + 1) the elements of patch i are first[i] ... first[i + 1] - 1 */
+    int32_t *node;    /* (count x elements.nodes) */
+    uint8_t *used;    /* (count) the nodes from that number on belong to no part */
     int32_t *coupled; /* (elements.count x elements.nodes) the nodes of the parts of each element, and copies
                          of one of them */
 } drape_patches;
@@ -52,9 +52,8 @@ static inline int64_t drape_term_internals(const drape_term *term)
 static inline drape_coupling drape_term_coupling(const drape_term *term)
 {
     const drape_elements *el = &term->elements;
-    return (drape_coupling){.count = el->count,
-                            .nodes = el->nodes,
-                            .node = el->parts ? term->patches.coupled : el->node};
+    return (drape_coupling){
+        .count = el->count, .nodes = el->nodes, .node = el->parts ? term->patches.coupled : el->node};
 }
 
 /* The nodes of patches, not all of which are coupled; none without parts. */
@@ -79,7 +78,8 @@ static inline size_t drape_term_piece_places(const drape_term *term)
 
 static inline size_t drape_term_places(const drape_term *term)
 {
-    const size_t patches = (size_t)term->patches.count * (size_t)(term->elements.nodes * term->elements.nodes);
+    const size_t patches =
+        (size_t)term->patches.count * (size_t)(term->elements.nodes * term->elements.nodes);
     return drape_term_piece_places(term) + patches;
 }
 

@@ -131,20 +131,37 @@ static bool is_linked(const drape_midedge *patch, int h)
     return false;
 }
 
-/* The nodes of part h: those of the hinge in the order of the first triangle beside its edge, so that they are
- * the same from all triangles around, or of a clamped one, its edge, its apex and again the first. */
-static void part_nodes(const drape_midedge *patch, int h, int32_t node[4])
+/* The number of the hinge at an edge, by bisection. */
+static int32_t hinge_at(const drape_cloth_view *cloth, int32_t edge)
+{
+    int32_t low = 0, high = cloth->hinge_count - 1;
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2;
+        if (cloth->hinge_edge[middle] < edge)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* The nodes of hinge h of a patch as those of a part: of a clamped one its edge, its apex and again the
+ * first. Returns the sign of its angle in the patch, which depends on the orientation of the triangle. */
+static int part_nodes(const drape_cloth_view *cloth, const drape_midedge *patch, int h, int32_t node[4])
 {
     const int *local = drape_midedge_hinge[h];
-    const int turn = patch->turned[h] && !(h < 3 && patch->clamped[h]);
-    for (int a = 0; a < 4; a++)
-        node[a] = patch->node[local[a ^ turn]];
-    if (h < 3 && patch->clamped[h])
-        node[3] = node[0];
+    if (h < 3 && patch->clamped[h]) {
+        for (int a = 0; a < 4; a++)
+            node[a] = patch->node[local[a % 3]];
+        return 1;
+    }
+    memcpy(node, cloth->hinge + 4 * (size_t)hinge_at(cloth, patch->edge[h]), 4 * sizeof *node);
+    return (patch->node[local[0]] == node[0]) != patch->turned[h] ? 1 : -1;
 }
 
 /* The nodes of the squares of a patch, without copies; returns their number. */
-static int gather_nodes(const drape_midedge *patch, int32_t node[MIDEDGE_NODES])
+static int gather_nodes(const drape_cloth_view *cloth, const drape_midedge *patch,
+                        int32_t node[MIDEDGE_NODES])
 {
     int count = 3;
     memcpy(node, patch->node, 3 * sizeof *node);
@@ -152,7 +169,7 @@ static int gather_nodes(const drape_midedge *patch, int32_t node[MIDEDGE_NODES])
         int32_t of[4];
         if (!is_linked(patch, h))
             continue;
-        part_nodes(patch, h, of);
+        part_nodes(cloth, patch, h, of);
         for (int a = 0; a < 4; a++) {
             int b = 0;
             while (b < count && node[b] != of[a])
@@ -164,7 +181,8 @@ static int gather_nodes(const drape_midedge *patch, int32_t node[MIDEDGE_NODES])
     return count;
 }
 
-/* Counts, and reserves elements and parts: the hinges of the cloth, then the clamped edges of its triangles. */
+/* Counts, and reserves elements and parts: the hinges of the cloth, then the clamped edges of its
+ * triangles. */
 static drape_status reserve(const drape_cloth_view *cloth, const double *values, const double law[9],
                             drape_term_builder *builder)
 {
@@ -174,7 +192,7 @@ static drape_status reserve(const drape_cloth_view *cloth, const double *values,
         int32_t node[MIDEDGE_NODES];
         if (!drape_midedge_of(cloth, t, values, law, &patch))
             return drape_orthotropic_refuse(builder, t);
-        const int nodes = gather_nodes(&patch, node);
+        const int nodes = gather_nodes(cloth, &patch, node);
         n.nodes = nodes > n.nodes ? nodes : n.nodes;
         n.squares += patch.rank;
         n.parts += patch.clamped[0] + patch.clamped[1] + patch.clamped[2];
@@ -214,20 +232,6 @@ static void clamp_of(const drape_cloth_view *cloth, const drape_midedge *patch, 
         r[k] = (a[k] + b[k]) / 2 - apex[k];
 }
 
-/* The number of the hinge at an edge, by bisection. */
-static int32_t hinge_at(const drape_cloth_view *cloth, int32_t edge)
-{
-    int32_t low = 0, high = cloth->hinge_count - 1;
-    while (low < high) {
-        const int32_t middle = low + (high - low) / 2;
-        if (cloth->hinge_edge[middle] < edge)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 /* The angle of a part at rest, by the function that steps use, so that a cloth at rest has no force to the
  * last bit. */
 static double rest_angle(const drape_cloth_view *cloth, const int32_t node[4], const double r[3])
@@ -241,9 +245,11 @@ static double rest_angle(const drape_cloth_view *cloth, const int32_t node[4], c
     return s[0];
 }
 
-/* Sets the parts of a patch: their numbers and angles at rest. clamps: the number of the next clamped one. */
+/* Sets the parts of a patch: their numbers, signs and angles at rest. clamps: the number of the next clamped
+ * one. */
 static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch, int32_t *clamps,
-                      drape_term_builder *builder, int32_t part[MIDEDGE_HINGES], double theta[MIDEDGE_HINGES])
+                      drape_term_builder *builder, int32_t part[MIDEDGE_HINGES], int sign[MIDEDGE_HINGES],
+                      double theta[MIDEDGE_HINGES])
 {
     for (int h = 0; h < MIDEDGE_HINGES; h++) {
         const bool clamped = h < 3 && patch->clamped[h];
@@ -254,7 +260,7 @@ static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch,
             part[h] = (*clamps)++;
         if (!is_linked(patch, h))
             continue;
-        part_nodes(patch, h, node);
+        sign[h] = part_nodes(cloth, patch, h, node);
         if (clamped)
             clamp_of(cloth, patch, h, r);
         else
@@ -277,10 +283,11 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
         drape_midedge patch;
         int32_t part[MIDEDGE_HINGES], node[MIDEDGE_NODES];
+        int sign[MIDEDGE_HINGES];
         double theta[MIDEDGE_HINGES];
         drape_midedge_of(cloth, t, values, law, &patch);
-        set_parts(cloth, &patch, &clamps, builder, part, theta);
-        for (int a = gather_nodes(&patch, node); a < MIDEDGE_NODES; a++)
+        set_parts(cloth, &patch, &clamps, builder, part, sign, theta);
+        for (int a = gather_nodes(cloth, &patch, node); a < MIDEDGE_NODES; a++)
             node[a] = node[0];
         for (int r = 0; r < patch.rank; r++, element++) {
             const double *l = patch.l + 3 * r;
@@ -291,9 +298,10 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
             for (int h = 0; h < MIDEDGE_HINGES; h++) {
                 if (patch.c[r][h] == 0)
                     continue;
-                drape_term_link(builder, element, part[h], patch.c[r][h]);
+                const double weight = sign[h] * patch.c[r][h];
+                drape_term_link(builder, element, part[h], weight);
                 if (values[PARAM_REST] == REST_MESH)
-                    rest[REST_Q0] += patch.c[r][h] * theta[h];
+                    rest[REST_Q0] += weight * theta[h];
             }
             rest[REST_Q0] += l[0] * bend[0] + l[1] * bend[1] + 2 * l[2] * bend[2];
             drape_term_set(builder, element, node, rest);

@@ -14,6 +14,7 @@
  * steps too long by the ratio of the two.
  */
 #include "base/elementary.h"
+#include "base/lanes.h"
 #include "base/reason.h"
 #include "base/vec3.h"
 #include "terms/orthotropic.h"
@@ -70,25 +71,49 @@ static void hessian(const double w[3], double *ddq)
                 ddq[9 * (3 * a + i) + 3 * b + i] = m[3 * a + b];
 }
 
+/* The same for the elements in lanes: their blocks on and below the diagonal. */
+LANES_INLINE void hessian_lanes(const lanes w[3], double *ddq)
+{
+    const lanes m[3][3] = {{w[0] + 2 * w[1] + w[2]}, {-w[0] - w[1], w[0]}, {-w[1] - w[2], w[1], w[2]}};
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b <= a; b++)
+            for (int i = 0; i < 3; i++)
+                for (int j = 0; j < 3; j++)
+                    lanes_store(ddq + LANES * (9 * (3 * a + i) + 3 * b + j), i == j ? m[a][b] : (lanes){0});
+}
+
+LANES_DISPATCH static void measure_lanes(const drape_elements *el, const int32_t *element, const double *x,
+                                         const double *internal, double *q, double *dq, double *ddq)
+{
+    lanes corner[3][3], w[3], d1[3], d2[3];
+    (void)internal;
+    for (int a = 0; a < 3; a++) {
+        int32_t node[LANES];
+        for (int l = 0; l < LANES; l++) {
+            node[l] = el->node[3 * (size_t)element[l] + (size_t)a];
+            w[a][l] = drape_rest_of(el, REST_W11 + a, element[l]);
+        }
+        lanes_gather(x, node, corner[a]);
+    }
+    for (int k = 0; k < 3; k++) {
+        d1[k] = corner[1][k] - corner[0][k];
+        d2[k] = corner[2][k] - corner[0][k];
+    }
+    lanes_store(q, 0.5 * (w[0] * lanes_dot(d1, d1) + w[2] * lanes_dot(d2, d2)) + w[1] * lanes_dot(d1, d2));
+    for (int k = 0; dq && k < 3; k++) {
+        const lanes by_1 = w[0] * d1[k] + w[1] * d2[k], by_2 = w[1] * d1[k] + w[2] * d2[k];
+        lanes_store(dq + LANES * k, -by_1 - by_2);
+        lanes_store(dq + LANES * (3 + k), by_1);
+        lanes_store(dq + LANES * (6 + k), by_2);
+    }
+    if (ddq)
+        hessian_lanes(w, ddq);
+}
+
 static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
                     const double *internal, double *q, double *dq, double *ddq)
 {
-    (void)internal;
-    for (int32_t i = 0; i < count; i++) {
-        const double w[3] = {drape_rest_of(el, REST_W11, first + i), drape_rest_of(el, REST_W12, first + i),
-                             drape_rest_of(el, REST_W22, first + i)};
-        double d1[3], d2[3];
-        sides(el, first + i, x, d1, d2);
-        q[i] = measure_of(w, d1, d2);
-        for (int k = 0; dq && k < 3; k++) {
-            double *g = dq + 9 * (size_t)i;
-            g[3 + k] = w[0] * d1[k] + w[1] * d2[k];
-            g[6 + k] = w[1] * d1[k] + w[2] * d2[k];
-            g[k] = -g[3 + k] - g[6 + k];
-        }
-        if (ddq)
-            hessian(w, ddq + 81 * (size_t)i);
-    }
+    drape_measure_range(el, first, count, x, internal, q, dq, ddq, measure_lanes);
 }
 
 /* W of L+ if the force is a tension, of L- = L - L+ if it is a compression. */
@@ -191,6 +216,7 @@ const drape_term_ops drape_term_stretch_cst = {
     .nodes = 3,
     .build = build,
     .measure = measure,
+    .lanes = measure_lanes,
     .positive = positive,
     .check = check,
 };

@@ -102,14 +102,16 @@ START_TEST(quadratics_are_exact)
 END_TEST
 
 /* If the two triangles of every edge are point reflections of each other, phi is 0 and elements have six
- * nodes. Alternating diagonals are mirror images across sides of cells: they need twelve, as all other
- * meshes do. */
+ * nodes. Alternating diagonals are mirror images across sides of cells: they need more, up to twelve, as all
+ * other meshes do. */
 START_TEST(symmetric_grids_need_six_nodes)
 {
     drape_context *ctx = make_context();
     for (int mesh = 0; mesh < MESH_COUNT; mesh++) {
         drape_model *m = sheet(ctx, NULL, 0, (enum model_mesh)mesh);
-        ck_assert_int_eq(m->terms[0].elements.nodes, mesh == MESH_EQUILATERAL ? MIDEDGE_NEAR : MIDEDGE_NODES);
+        const int nodes = m->terms[0].elements.nodes;
+        ck_assert_int_eq(nodes == 6, mesh == MESH_EQUILATERAL);
+        ck_assert(nodes >= 6 && nodes <= MIDEDGE_NODES);
         drape_model_destroy(&m);
     }
     drape_context_destroy(&ctx);
@@ -236,5 +238,90 @@ START_TEST(constant_moments_are_in_equilibrium)
 }
 END_TEST
 
+/* Forces and matrix are summed over hinges and patches of squares. They equal the sums over squares, each by
+ * itself, of f dq and of f ddq + (k + w c) dq dq'; and have the same bits for any number of threads. */
+START_TEST(sums_over_hinges_equal_sums_over_squares)
+{
+    static const drape_setting damping[] = {{"beta", 0.01, NULL}};
+    const drape_entry_def terms[] = {{"bend.midedge", NULL, 0}, {"damp.kelvin_voigt", damping, 1}};
+    drape_context *ctx = make_context();
+    for (int mesh = 0; mesh < MESH_COUNT; mesh++) {
+        drape_model *m = make_model(
+            ctx,
+            &(model_def){.mesh = (enum model_mesh)mesh, .terms = terms, .term_count = 2, .pinned = true});
+        const drape_elements *el = &m->terms[0].elements;
+        const size_t n = 3 * (size_t)m->node_count, nonzeros = (size_t)m->pattern.nonzeros;
+        drape_arena memory = drape_arena_of(ctx);
+        drape_state s;
+        uint64_t seed = 17;
+        ck_assert_int_eq(drape_state_create(&memory, m, &s), DRAPE_OK);
+        double *history = drape_arena_take(&memory, (size_t)m->measure_count, sizeof *history);
+        for (size_t i = 0; i < n; i++)
+            s.x[i] += 0.01 * random_number(&seed);
+        for (int64_t i = 0; i < m->measure_count; i++)
+            history[i] = random_number(&seed);
+        const drape_point point = {
+            .x = s.x, .v = s.v, .internal = s.internal, .weight = 60, .history = history};
+
+        double *g = drape_arena_take(&memory, n, sizeof *g);
+        double *h = drape_arena_take(&memory, nonzeros, sizeof *h);
+        double *expected = drape_arena_take(&memory, n, sizeof *expected);
+        double *matrix = drape_arena_take(&memory, nonzeros, sizeof *matrix);
+        for (int32_t e = 0; e < el->count; e++) {
+            const int32_t *node = el->node + (size_t)e * (size_t)el->nodes;
+            const int d = 3 * el->nodes;
+            const double k = el->rest[e], c = 0.01 * k;
+            double q, dq[DRAPE_MAX_ELEMENT_DOFS];
+            static double ddq[DRAPE_MAX_ELEMENT_DOFS * DRAPE_MAX_ELEMENT_DOFS];
+            m->terms[0].ops->measure(el, e, 1, s.x, s.internal, &q, dq, ddq);
+            const double force = k * (q - el->rest[el->count + e]) + c * (60 * q + history[e]);
+            for (int i = 0; i < d; i++) {
+                const size_t row = 3 * (size_t)node[i / 3] + (size_t)(i % 3);
+                expected[row] += force * dq[i];
+                for (int j = 0; j < d; j++) {
+                    const int32_t from = m->free_of_node[node[i / 3]], to = m->free_of_node[node[j / 3]];
+                    const double value = force * ddq[d * i + j] + (k + 60 * c) * dq[i] * dq[j];
+                    if (from < 0 || to < 0 || value == 0)
+                        continue;
+                    ck_assert(drape_pattern_has(&m->pattern, from, to));
+                    int64_t stride;
+                    double *at = drape_pattern_at(&m->pattern, matrix, to,
+                                                  drape_pattern_find(&m->pattern, from, to), &stride);
+                    at[(j % 3) * stride + i % 3] += value;
+                }
+            }
+        }
+        for (int threads = 1; threads <= 3; threads++) {
+            drape_system *system = make_system(&memory, m, threads);
+            double *g_of = drape_arena_take(&memory, n, sizeof *g_of),
+                   *h_of = drape_arena_take(&memory, nonzeros, sizeof *h_of);
+            drape_system_force(system, &point, g_of);
+            drape_system_jacobian(system, &point, 0, 0, h_of);
+            if (threads == 1) {
+                memcpy(g, g_of, n * sizeof *g);
+                memcpy(h, h_of, nonzeros * sizeof *h);
+            }
+            ck_assert_mem_eq(g, g_of, n * sizeof *g);
+            ck_assert_mem_eq(h, h_of, nonzeros * sizeof *h);
+            drape_system_destroy(&system);
+        }
+        double force = 0, stiffness = 0;
+        for (size_t i = 0; i < n; i++)
+            force = fmax(force, fabs(expected[i]));
+        for (size_t i = 0; i < nonzeros; i++)
+            stiffness = fmax(stiffness, fabs(matrix[i]));
+        ck_assert(force > 0 && stiffness > 0);
+        /* Rounding of sums of about 100 numbers of that size. */
+        for (size_t i = 0; i < n; i++)
+            ck_assert_double_eq_tol(g[i], expected[i], 1e-13 * force);
+        for (size_t i = 0; i < nonzeros; i++)
+            ck_assert_double_eq_tol(h[i], matrix[i], 1e-13 * stiffness);
+        drape_arena_free(&memory);
+        drape_model_destroy(&m);
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 SUITE("midedge", quadratics_are_exact, symmetric_grids_need_six_nodes, clamps_have_exact_derivatives,
-      clamps_hold, constant_moments_are_in_equilibrium)
+      clamps_hold, constant_moments_are_in_equilibrium, sums_over_hinges_equal_sums_over_squares)

@@ -332,6 +332,121 @@ START_TEST(dashpots_need_their_number)
 }
 END_TEST
 
+/* ---- Parts ---- */
+
+static enum { PARTS_GOOD, PARTS_FEW_LINKS, PARTS_LACK_NODE, PARTS_MISSING, PARTS_STRAY } parts_fault;
+
+/* Parts are the halves of the squared lengths of edges, and elements the triangles: the sum over their edges.
+ * One part more than there are edges has no link. */
+static drape_status parts_build(const drape_cloth_view *cloth, const double *params,
+                                drape_term_builder *builder)
+{
+    (void)params;
+    const int32_t links = 3 * cloth->triangle_count;
+    drape_status status = drape_term_reserve(builder, cloth->triangle_count, 2);
+    if (!status && parts_fault != PARTS_MISSING)
+        status = drape_term_reserve_parts(builder, cloth->edge_count + 1, links, 1);
+    for (int32_t e = 0; !status && e < cloth->edge_count; e++)
+        drape_term_set_part(builder, e + 1, cloth->edge + 2 * (size_t)e, &cloth->edge_length[e]);
+    for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
+        double q0 = 0;
+        for (int k = 0; k < 3 && !(parts_fault == PARTS_FEW_LINKS && t == 0); k++) {
+            const int32_t edge = cloth->triangle_edge[3 * (size_t)t + (size_t)k];
+            const int32_t wrong_edge = t == 0 ? cloth->edge_count - 1 : edge;
+            q0 += 0.25 * cloth->edge_length[edge] * cloth->edge_length[edge];
+            drape_term_link(builder, parts_fault == PARTS_STRAY ? -1 : t,
+                            1 + (parts_fault == PARTS_LACK_NODE ? wrong_edge : edge), 0.5);
+        }
+        drape_term_set(builder, t, cloth->triangle + 3 * (size_t)t, (const double[]){2.385, q0});
+    }
+    return status;
+}
+
+static void parts_part(const drape_elements *el, const int32_t *part, const double *x, const double *internal,
+                       double *s, double *ds, double *dds)
+{
+    (void)internal;
+    for (int l = 0; l < DRAPE_LANES; l++) {
+        const int32_t *node = el->parts->node + 2 * (size_t)part[l];
+        ck_assert_double_gt(el->parts->rest[part[l]], 0); /* those of unused parts are 0 */
+        s[l] = 0;
+        for (int k = 0; k < 3; k++) {
+            const double d = x[3 * node[1] + k] - x[3 * node[0] + k];
+            s[l] += 0.5 * d * d;
+            if (ds) {
+                ds[DRAPE_LANES * k + l] = -d;
+                ds[DRAPE_LANES * (3 + k) + l] = d;
+            }
+        }
+        for (int i = 0; dds && i < 36; i++)
+            dds[DRAPE_LANES * i + l] = i % 6 == i / 6 ? 1 : (i + 3) % 6 == i / 6 ? -1 : 0;
+    }
+}
+
+static void parts_measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                          const double *internal, double *q, double *dq, double *ddq)
+{
+    drape_part_range(el, first, count, x, internal, q, dq, ddq, parts_part);
+}
+
+static const drape_term_ops parts_term = {
+    .struct_size = sizeof(drape_term_ops),
+    .entry = {.name = "host.parts", .summary = "squares of edges, by triangle", .reference = "-"},
+    .element_name = "triangle",
+    .nodes = 3,
+    .build = parts_build,
+    .measure = parts_measure,
+    .part_nodes = 2,
+    .part = parts_part};
+
+START_TEST(user_defined_parts_are_right)
+{
+    static drape_check_result results[DRAPE_MAX_CHECK_RESULTS];
+    drape_context *ctx = make_context();
+    const drape_entry_def term = {.type = "host.parts"};
+    ck_assert_int_eq(drape_context_add_term(ctx, &parts_term), DRAPE_OK);
+    parts_fault = PARTS_GOOD;
+    for (int mesh = 0; mesh < MESH_COUNT; mesh++) {
+        drape_model *model =
+            make_model(ctx, &(model_def){.mesh = (enum model_mesh)mesh, .terms = &term, .term_count = 1});
+        ck_assert_int_eq(model->terms[0].parts.count, model->edge_count);
+        drape_arena memory = drape_arena_of(ctx);
+        drape_system *system = make_system(&memory, model, 1);
+        int count = 0;
+        ck_assert_int_eq(drape_check_derivatives(ctx, system, 1, results, &count), DRAPE_OK);
+        ck_assert_int_ge(count, 5);
+        for (int i = 0; i < count; i++)
+            ck_assert_msg(results[i].pass, "%s is off by %g", results[i].what, results[i].error);
+        drape_system_destroy(&system);
+        drape_arena_free(&memory);
+        drape_model_destroy(&model);
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(wrong_parts_are_refused)
+{
+    static const char *const said[] = {NULL, " links and made ", "lacks a node of its part ",
+                                       "outside of those", "outside of those"};
+    drape_context *ctx = make_context();
+    drape_term_ops ops = parts_term;
+    const drape_entry_def term = {.type = "host.parts"};
+    const model_def def = {.mesh = MESH_SQUARE, .terms = &term, .term_count = 1};
+    ops.part_nodes = 0;
+    ck_assert_int_eq(drape_context_add_term(ctx, &ops), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_context_add_term(ctx, &parts_term), DRAPE_OK);
+    for (int fault = PARTS_FEW_LINKS; fault <= PARTS_STRAY; fault++) {
+        drape_model *model = NULL;
+        parts_fault = fault;
+        ck_assert_int_eq(try_model(ctx, &def, &model), DRAPE_E_ARGUMENT);
+        ck_assert_msg(strstr(drape_context_message(ctx), said[fault]), "%d: %s", fault,
+                      drape_context_message(ctx));
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 /* ---- Physics of one term ---- */
 
 /* E(R x + t) = E(x). Positions of 3 m are rounded, strains are 0.1 of 0.1 m: 1e-15 * 30 / 0.1, and a
@@ -626,6 +741,7 @@ START_TEST(projected_jacobians_are_positive)
 END_TEST
 
 SUITE("terms", entries_are_well_formed, derivatives_agree_with_differences, mistakes_are_found,
-      dashpots_need_their_number, energy_does_not_change_with_rigid_motion, no_force_at_rest,
-      dissipation_takes_power, forces_ahead_agree_with_differences, elements_do_not_depend_on_the_range,
-      threads_give_the_same_bits, projected_jacobians_are_positive)
+      user_defined_parts_are_right, wrong_parts_are_refused, dashpots_need_their_number,
+      energy_does_not_change_with_rigid_motion, no_force_at_rest, dissipation_takes_power,
+      forces_ahead_agree_with_differences, elements_do_not_depend_on_the_range, threads_give_the_same_bits,
+      projected_jacobians_are_positive)
