@@ -447,7 +447,7 @@ DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
 
 /* Places cloth with its pins, and colliders, elsewhere at the present time, by a rigid motion: a character
  * that is put at another place, a world that is shifted back to the origin. No force comes from it: strains,
- * elastic energy and internal variables stay as they are, to rounding; nothing is swept on the way. Tracks of
+ * elastic energy and internal variables stay as they are, to rounding; nothing between is swept. Tracks of
  * pins and colliders, and paths that the host has set, are moved as a whole and go on from there; so is the
  * spring of drape_sim_set_drag_spring. Gravity, the wind and drape_sim_push stay, so a rotation about another
  * axis than that of gravity changes how the cloth hangs. The energy account takes the change of potential

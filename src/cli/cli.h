@@ -129,6 +129,11 @@ typedef struct cli_scene {
  * no file. Returns CLI_GO_ON, or CLI_BAD_INPUT or CLI_INTERRUPTED after a line was printed. Call
  * cli_scene_free in any case. */
 int cli_scene_load(const cli_command *command, const char *path, cli_scene *out);
+
+/* The same; `choose` may change the scene and how the sim will run, once the scene is compiled. */
+typedef drape_status cli_choose(void *user, const cli_scene *scene, drape_sim_def *def);
+int cli_scene_load_with(const cli_command *command, const char *path, cli_choose *choose, void *user,
+                        cli_scene *out);
 void cli_scene_free(cli_scene *scene);
 
 bool cli_is_folder(const char *path);

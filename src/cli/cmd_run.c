@@ -337,8 +337,8 @@ static void advance(run *r)
         return;
     cli_progress_begin(&r->progress, drape_sim_time(r->in.sim), end);
     cli_signals_cancel(r->in.sim);
-    drape_status status = r->request->realtime ? cli_realtime_run(&r->realtime, &r->request->command, &r->in)
-                                               : drape_sim_advance(r->in.sim, end);
+    drape_status status =
+        r->request->realtime ? cli_realtime_run(&r->realtime, &r->in) : drape_sim_advance(r->in.sim, end);
     cli_signals_cancel(NULL);
     if (status == DRAPE_E_STOPPED && cli_interrupted())
         drape_context_set_message(r->in.ctx, "t=%.9g: interrupted", drape_sim_time(r->in.sim));
@@ -438,11 +438,12 @@ static int check_integrator(const run *r)
 static int load_and_run(const void *command)
 {
     const run_request *request = command;
-    run r = {.request = request, .start = drape_clock_seconds()};
+    run r = {.request = request, .start = drape_clock_seconds(), .realtime = {.command = &request->command}};
     int code = check_checkpoints(request);
     if (code != CLI_GO_ON)
         return code;
-    code = cli_scene_load(&request->command, request->command.operand, &r.in);
+    code = cli_scene_load_with(&request->command, request->command.operand,
+                               request->realtime ? cli_realtime_choose : NULL, &r.realtime, &r.in);
     if (code == CLI_GO_ON)
         code = check_integrator(&r);
     if (code == CLI_GO_ON)
@@ -477,7 +478,9 @@ static const cli_option options[] = {
      "resume from the checkpoint in DIR, of the same scene; without one, start from the beginning",
      offsetof(run_request, resume), 0, NULL},
     {"realtime", CLI_FLAG, NULL,
-     "give each frame its duration, 1/frame_rate, as time budget; report how long frames took",
+     "give each frame its duration, 1/frame_rate, as time budget, by newton_k unless a method is named; "
+     "report how "
+     "long frames took",
      offsetof(run_request, realtime), 0, NULL},
 };
 

@@ -1,10 +1,118 @@
 /* realtime.c: see realtime.h. */
 #include "cli/realtime.h"
 
+#include "base/clock.h"
+#include "cli/signals.h"
+#include "model/scene.h"
+
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
+
+#define METHOD       "newton_k"
+#define TRIALS       4    /* steps, of which the first sets up and the fastest other one counts */
+#define SHARE        0.5  /* of a frame that the iterations are to take: the rest is for contact to come */
+#define NODES_THREAD 2500 /* for each thread: with fewer it spends its time waiting */
+
+/* ---- What is chosen ---- */
+
+static void say(cli_realtime *r, const char *format, ...) DRAPE_PRINTF(2, 3);
+static void say(cli_realtime *r, const char *format, ...)
+{
+    const size_t used = strlen(r->chosen);
+    va_list values;
+    va_start(values, format);
+    if (used > 0)
+        snprintf(r->chosen + used, sizeof r->chosen - used, "; ");
+    const size_t at = strlen(r->chosen);
+    vsnprintf(r->chosen + at, sizeof r->chosen - at, format, values);
+    va_end(values);
+}
+
+/* An option that only some methods have stands for the scene's own, as one that is named does. */
+static bool names_method(const cli_realtime *r, const cli_scene *scene)
+{
+    bool named = drape_scene_gives(scene->scene, "/integrator/method");
+    for (size_t i = 0; i < r->command->setting_count; i++)
+        named = named || r->command->settings[i].must_act;
+    return named;
+}
+
+static void choose_threads(cli_realtime *r, const cli_scene *scene, drape_sim_def *def)
+{
+    const long there = sysconf(_SC_NPROCESSORS_ONLN), nodes = drape_model_node_count(scene->model),
+               most = 1 + nodes / NODES_THREAD;
+    if (r->command->threads)
+        return;
+    def->threads = (int)fmax(1, fmin(fmin((double)there, (double)most), 256));
+    say(r, "%d thread%s of %ld, for %ld nodes", def->threads, def->threads > 1 ? "s" : "", there, nodes);
+}
+
+/* Seconds of the steps of a frame with one iteration each; 0 if they are not known, because a step failed. */
+static double try_steps(const cli_scene *scene, const drape_sim_def *def)
+{
+    const double frame = 1 / drape_model_frame_rate(scene->model);
+    drape_sim *sim = NULL;
+    double best = INFINITY, dt = frame;
+    drape_status status = drape_sim_create(scene->ctx, scene->model, def, &sim);
+    if (!status)
+        dt = drape_chosen_integrator_value(&sim->chosen, "dt", frame);
+    for (int i = 0; !status && i < TRIALS && !cli_interrupted(); i++) {
+        const double start = drape_clock_seconds();
+        status = drape_sim_advance(sim, drape_sim_time(sim) + dt);
+        best = i > 0 ? fmin(best, drape_clock_seconds() - start) : best;
+    }
+    drape_sim_destroy(&sim);
+    return status || isinf(best) ? 0 : best * fmax(1, ceil(frame / dt - 1e-9));
+}
+
+static drape_status set_iterations(cli_realtime *r, const cli_scene *scene, double seconds)
+{
+    static const int counts[] = {4, 2, 1};
+    const double budget = 1 / drape_model_frame_rate(scene->model);
+    char text[16];
+    int i = 0;
+    while (counts[i] > 1 && !(seconds > 0 && counts[i] * seconds <= SHARE * budget))
+        i++;
+    r->iterations.number = counts[i];
+    snprintf(text, sizeof text, "%d", counts[i]);
+    if (seconds > 0)
+        say(r, "%d iteration%s, as one takes %.3g ms of a frame of %.4g in trial steps", counts[i],
+            counts[i] > 1 ? "s" : "", 1e3 * seconds, 1e3 * budget);
+    else
+        say(r, "%d iteration, as a trial step failed", counts[i]);
+    return drape_scene_set(scene->scene, "/integrator/iterations", text);
+}
+
+static drape_status choose_method(cli_realtime *r, const cli_scene *scene, drape_sim_def *def)
+{
+    def->integrator = METHOD;
+    say(r, "%s, as no method is named", METHOD);
+    drape_status status = drape_scene_set(scene->scene, "/integrator/method", "\"" METHOD "\"");
+    if (status || drape_scene_gives(scene->scene, "/integrator/iterations"))
+        return status;
+    r->iterations = (drape_setting){.name = "iterations", .number = 1};
+    def->integrator_settings = &r->iterations;
+    def->integrator_setting_count = 1;
+    return set_iterations(r, scene, try_steps(scene, def));
+}
+
+drape_status cli_realtime_choose(void *user, const cli_scene *scene, drape_sim_def *def)
+{
+    cli_realtime *r = user;
+    drape_status status = DRAPE_OK;
+    choose_threads(r, scene, def);
+    if (names_method(r, scene))
+        say(r, "%s, as scene or command line say", scene->model->integrator.type);
+    else
+        status = choose_method(r, scene, def);
+    return status;
+}
+
+/* ---- Frames ---- */
 
 static drape_status add_time(cli_realtime *r, drape_arena *arena, double seconds)
 {
@@ -47,7 +155,7 @@ static double percentile(const cli_realtime *r, double share)
     return r->count ? r->seconds[rank > 0 ? rank - 1 : 0] : 0;
 }
 
-drape_status cli_realtime_run(cli_realtime *r, const cli_command *command, const cli_scene *scene)
+drape_status cli_realtime_run(cli_realtime *r, const cli_scene *scene)
 {
     double end = drape_model_duration(scene->model), frame = 1 / drape_model_frame_rate(scene->model);
     drape_status status = DRAPE_OK;
@@ -57,7 +165,7 @@ drape_status cli_realtime_run(cli_realtime *r, const cli_command *command, const
         double left = end - drape_sim_time(scene->sim) - r->result.debt;
         status = drape_sim_advance_realtime(scene->sim, fmin(frame, left), frame, &report);
         count(&r->result, &report);
-        drape_status kept = add_time(r, command->arena, report.seconds);
+        drape_status kept = add_time(r, r->command->arena, report.seconds);
         status = status ? status : kept;
     }
     if (!status) /* the debt of the last frames, without a deadline */
@@ -74,6 +182,7 @@ drape_status cli_realtime_run(cli_realtime *r, const cli_command *command, const
 void cli_realtime_print(const cli_realtime *r)
 {
     const drape_summary_realtime *s = &r->result;
+    printf("chosen    %s\n", r->chosen);
     printf("realtime  %lld frames of %.4g ms: p50 %.4g, p95 %.4g, p99 %.4g, worst %.4g ms; %lld missed\n",
            (long long)s->frames, 1e3 * s->budget, 1e3 * s->p50, 1e3 * s->p95, 1e3 * s->p99, 1e3 * s->worst,
            (long long)s->missed);

@@ -6,14 +6,23 @@
 #include "io/summary.h"
 
 typedef struct cli_realtime {
-    double *seconds; /* (count) wall clock of each frame, in the command's arena */
+    const cli_command *command;
+    drape_setting iterations; /* that were chosen */
+    char chosen[400];         /* what was, and why */
+    double *seconds;          /* (count) wall clock of each frame, in the command's arena */
     size_t count, capacity;
     drape_summary_realtime result;
 } cli_realtime;
 
+/* A cli_choose, user: a cli_realtime with its command. Unless the scene or the command line names a method,
+ * chooses newton_k, with as many iterations as a few trial steps show to fit into half of a frame, and as
+ * many threads as the machine has processors and the mesh thousands of nodes for, unless they are given. The
+ * method is set in the scene, too, so that its copy runs again alike. */
+cli_choose cli_realtime_choose;
+
 /* Advances in frames of 1 / frame_rate up to the scene's duration, each with that time as its budget, without
  * sleeping. Late frames are not failures. The status is that of the advance. */
-drape_status cli_realtime_run(cli_realtime *realtime, const cli_command *command, const cli_scene *scene);
+drape_status cli_realtime_run(cli_realtime *realtime, const cli_scene *scene);
 void cli_realtime_print(const cli_realtime *realtime); /* on stdout */
 
 #endif

@@ -25,7 +25,8 @@ static drape_status check_formats(const cli_scene *s)
     return DRAPE_OK;
 }
 
-static drape_status load(const cli_command *command, const char *path, cli_scene *s)
+static drape_status load(const cli_command *command, const char *path, cli_choose *choose, void *user,
+                         cli_scene *s)
 {
     drape_sim_def def;
     drape_sim_def_init(&def, sizeof def);
@@ -35,6 +36,8 @@ static drape_status load(const cli_command *command, const char *path, cli_scene
         status = drape_scene_set(s->scene, command->settings[i].pointer, command->settings[i].value);
     if (!status)
         status = drape_scene_compile(s->scene, &s->model);
+    if (!status && choose)
+        status = choose(user, s, &def);
     if (!status)
         status = drape_sim_create(s->ctx, s->model, &def, &s->sim);
     return status ? status : check_formats(s);
@@ -68,8 +71,14 @@ drape_status cli_context_create(drape_context **out)
 
 int cli_scene_load(const cli_command *command, const char *path, cli_scene *out)
 {
+    return cli_scene_load_with(command, path, NULL, NULL, out);
+}
+
+int cli_scene_load_with(const cli_command *command, const char *path, cli_choose *choose, void *user,
+                        cli_scene *out)
+{
     *out = (cli_scene){.ctx = command->ctx};
-    drape_status status = load(command, path, out);
+    drape_status status = load(command, path, choose, user, out);
     if (cli_interrupted()) /* even if loading did not notice it */
         return cli_report_interrupted(command->verb);
     return status ? cli_report(command, CLI_BAD_INPUT) : CLI_GO_ON;

@@ -29,8 +29,7 @@ const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
                                             "at its start, which keeps matrices symmetric"),
     [DRAPE_CONTACT_RESTITUTION_VELOCITY] = DRAPE_NUMBER(
         "restitution_velocity", "m/s",
-        DRAPE_DERIVED("sqrt(2 gravity distance); without gravity, sqrt(2 L distance) in a second"),
-        DRAPE_ABOVE(0), 1e9,
+        DRAPE_DERIVED("sqrt(2 gravity distance); without gravity, sqrt(2 L distance) in a second"), 1e-6, 1e9,
         "impacts much faster than this return the share of energy that restitution says"),
     [DRAPE_CONTACT_NO_ROOM] = DRAPE_CHOICE("no_room", DRAPE_NO_ROOM_AUTO, policies,
                                            "where bodies leave cloth no room, stop: steps fail until the sim "

@@ -35,6 +35,8 @@ typedef struct drape_controller_ops {
     drape_entry entry;
     bool own_steps;    /* steps follow h_next, not the fixed grid of dt */
     int history_depth; /* number of states before `in` that it needs, at most 2 */
+    /* Refuses values that do not go together, with a message at "/controller/...". NULL: all do. */
+    drape_status (*check)(drape_context *ctx, const double *values);
     drape_verdict (*judge)(const double *values, drape_trial *trial);
 } drape_controller_ops;
 

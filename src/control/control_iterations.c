@@ -33,6 +33,17 @@ static double next_size(const double *values, const drape_trial *trial)
     return trial->h;
 }
 
+static drape_status check(drape_context *ctx, const double *values)
+{
+    if (values[PARAM_LEAST] <= values[PARAM_MOST])
+        return DRAPE_OK;
+    return drape_fail_at(
+        ctx, DRAPE_E_ARGUMENT, "/controller/least_iterations",
+        "%g is above most_iterations, %g: steps would be halved and doubled in turn; it is at "
+        "most that",
+        values[PARAM_LEAST], values[PARAM_MOST]);
+}
+
 static drape_verdict judge(const double *values, drape_trial *trial)
 {
     if (trial->status && !trial->info->usable)
@@ -49,5 +60,6 @@ const drape_controller_ops drape_controller_iterations = {
               .reference = "Crisfield 1991, 9.5: increments by the number of iterations",
               DRAPE_PARAMS(params)},
     .own_steps = true,
+    .check = check,
     .judge = judge,
 };

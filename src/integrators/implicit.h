@@ -64,8 +64,9 @@ void drape_implicit_report(const drape_solve_report *report, drape_step_info *in
 double drape_implicit_collider_work(const drape_implicit *implicit, double t0, double t1);
 
 /* Adds to info the work over a step of dissipative forces on all nodes, of moved pins against g, and of the
- * residual, all where the equation was evaluated last: for methods that evaluate the forces of a step at one point only,
- * that of their equation. The force that accelerates the pinned nodes' own mass does no work on the cloth. */
+ * residual, all where the equation was evaluated last: for methods that evaluate forces at one point of a
+ * step only, that of their equation. The force that accelerates the pinned nodes' own mass does no work on
+ * the cloth. */
 void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out,
                           drape_step_info *info);
 

@@ -73,9 +73,10 @@ static const drape_param params[PARAM_COUNT] = {
         "for few nodes"),
 };
 
-#define ERROR_SHARE         1e-3 /* default of error, of the size of the scene */
-#define NOMINAL_RATE        60.  /* [1/s] linear_tolerance applies to steps of 1/60 s */
-#define MAX_LINEAR_RESIDUAL 0.5  /* relative residual left at any step size */
+#define ERROR_SHARE         1e-3     /* default of error, of the size of the scene */
+#define SHORTER             0.999999 /* of a step: not by the rounding of its time */
+#define NOMINAL_RATE        60.      /* [1/s] linear_tolerance applies to steps of 1/60 s */
+#define MAX_LINEAR_RESIDUAL 0.5      /* relative residual left at any step size */
 
 /* The work of a step at each level of effort: Newton iterations, and conjugate gradient iterations in each.
  * 0: as the parameters say. */
@@ -150,7 +151,9 @@ static void guess(newton_k *s, const drape_state *in, double h)
 {
     const drape_step_equation *e = &s->common.equation;
     double before = in->t - s->past_time[1];
-    double share = isnan(before) ? 0 : s->values[PARAM_EXTRAPOLATION] * h * fmin(h / before, 1);
+    if (before < SHORTER * h)
+        before = h;
+    double share = isnan(before) ? 0 : s->values[PARAM_EXTRAPOLATION] * h * h / before;
     for (size_t i = 0; i < e->dofs; i++) {
         size_t at = drape_step_equation_at(e, i);
         s->common.d[i] = e->inertia[i] + share * (in->v[at] - s->past[1][at]);

@@ -538,6 +538,19 @@ static drape_status set_value(drape_scene *scene, const char *pointer, const cha
     return status;
 }
 
+bool drape_scene_gives(const drape_scene *scene, const char *pointer)
+{
+    const json_t *at = scene->ours ? scene->ours : scene->root;
+    char key[DRAPE_POINTER_SIZE];
+    while (at && pointer && *pointer) {
+        size_t index;
+        pointer = drape_pointer_next(pointer, key);
+        at = json_is_array(at) ? (drape_pointer_index(key, &index) ? json_array_get(at, index) : NULL)
+                               : json_object_get(at, key);
+    }
+    return at && pointer;
+}
+
 drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char *value)
 {
     if (!scene)

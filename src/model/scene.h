@@ -20,6 +20,10 @@ drape_status drape_scene_to_def(drape_scene *scene, drape_scene_def *def);
  * "scene.json: text" for a fault without a pointer. Repeating it changes nothing. */
 void drape_scene_locate_fault(drape_scene *scene);
 
+/* Whether a value is given at a JSON pointer, by the text or by drape_scene_set. A scene in another format
+ * must have been compiled. */
+bool drape_scene_gives(const drape_scene *scene, const char *pointer);
+
 drape_context *drape_scene_context(drape_scene *scene);
 
 /* Receives a piece of a text. */

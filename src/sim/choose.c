@@ -117,6 +117,9 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
         return status;
     chosen->integrator = drape_integrators[i];
     chosen->controller = drape_controllers[c];
+    status = chosen->controller->check ? chosen->controller->check(ctx, chosen->controller_values) : DRAPE_OK;
+    if (status)
+        return status;
     if (chosen->integrator->own_steps && chosen->controller->own_steps)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/controller/type",
                              "\"%s\" chooses the step size, but so does the integrator \"%s\"; choose the "

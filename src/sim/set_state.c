@@ -1,6 +1,6 @@
 /*
- * set_state.c: a user-defined state. It is built in the state that the next attempt would overwrite, so that a
- * refused one changes nothing; the history that led to the present state is discarded.
+ * set_state.c: a user-defined state. It is built in the state that the next attempt would overwrite, so
+ * that a refused one changes nothing; the history that led to the present state is discarded.
  */
 #include "base/elementary.h"
 #include "base/finite.h"

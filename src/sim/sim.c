@@ -101,6 +101,20 @@ static void note_tolerance(const drape_sim *sim)
                   given, used);
 }
 
+/* Rules of contact that move nodes return no share of an impact. */
+static void note_restitution(const drape_sim *sim)
+{
+    const drape_model *m = sim->model;
+    bool asked = m->contact.self && m->contact.self_restitution > 0;
+    for (int32_t c = 0; c < m->collider_count && !asked; c++)
+        asked = m->colliders[c].restitution > 0;
+    if (asked && sim->chosen.integrator->projects_contact)
+        drape_log(
+            sim->ctx, DRAPE_LOG_WARNING,
+            "\"%s\" ignores restitution: it resolves contact by moving nodes, and cloth does not rebound",
+            sim->chosen.integrator->entry.name);
+}
+
 static drape_stepping stepping_of(const drape_chosen *chosen)
 {
     if (chosen->integrator->own_steps)
@@ -145,6 +159,7 @@ static drape_status start_sim(drape_sim *sim, int threads)
     if (status)
         return status;
     note_tolerance(sim);
+    note_restitution(sim);
     drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
                         drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
     sim->max_attempts = drape_chosen_controller_value(&sim->chosen, "max_attempts", INFINITY);

@@ -65,7 +65,8 @@ struct drape_sim {
     drape_schedule schedule;
     double max_attempts; /* the controller's max_attempts; INFINITY: it has none */
     double frame_rate;
-    double teleport_speed; /* [m/s] above which the host's pins carry their cloth; 0: never */
+    double teleport_speed; /* [m/s] above which the host's pins carry their cloth; 0: never. A setting of the
+                              host, which a restored sim keeps */
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
     double *query_scratch;          /* (node_count x 3) for queries between steps */

@@ -17,9 +17,9 @@
 
 static bool exceeds(const drape_sim *sim, const double *from, const double *to, double seconds)
 {
-    double way[3];
-    vec3_sub(to, from, way);
-    return sim->teleport_speed > 0 && vec3_norm(way) > sim->teleport_speed * seconds;
+    double path[3];
+    vec3_sub(to, from, path);
+    return sim->teleport_speed > 0 && vec3_norm(path) > sim->teleport_speed * seconds;
 }
 
 /* ---- The best rigid motion ---- */

@@ -758,6 +758,9 @@ START_TEST(a_host_needs_no_memory)
     field f = {.w0 = {1, 0, 1}};
     double forces[60] = {0}, to[3] = {0, 0.1, 0};
     const int32_t node = 0;
+    drape_place_def place;
+    drape_place_def_init(&place, sizeof place);
+    place.translate[0] = 1;
     long calls = memory.calls;
     good(&h, drape_sim_advance(h.sim, FRAME));
     good(&h, drape_sim_set_wind(h.sim, blow, &f));
@@ -770,6 +773,7 @@ START_TEST(a_host_needs_no_memory)
     good(&h, drape_sim_reactions(h.sim, forces));
     good(&h, drape_sim_contact_forces(h.sim, forces));
     drape_sim_normals(h.sim, forces);
+    good(&h, drape_sim_place(h.sim, &place));
     drape_sim_cancel(h.sim);
     ck_assert_int_eq(drape_sim_advance(h.sim, 3 * FRAME), DRAPE_E_STOPPED);
     ck_assert_int_eq(memory.calls, calls);

@@ -1,5 +1,5 @@
-/* test_place.c: cloth, pins and colliders that a host places elsewhere, by drape_sim_place or because it sends
- * pins faster than teleport_speed. */
+/* test_place.c: cloth, pins and colliders that a host places elsewhere, by drape_sim_place or because it
+ * sends pins faster than teleport_speed. */
 #include <float.h>
 
 #include "support/bytes.h"
@@ -62,7 +62,8 @@ static void send(const host *h, int frame, const double to[3])
     good(h, drape_sim_advance(h->sim, frame * FRAME));
 }
 
-/* A quarter turn about the vertical through c, then t: x = c_x + (z - c_z) + t_x, z = c_z - (x - c_x) + t_z. */
+/* A quarter turn about the vertical through c, then t: x = c_x + (z - c_z) + t_x, z = c_z - (x - c_x) +
+ * t_z. */
 static const double center[3] = {0.5, 0, -0.25}, shift[3] = {2, 0.5, -1};
 
 static void quarter(const double x[3], double y[3])
@@ -83,11 +84,12 @@ static drape_place_def quarter_def(void)
 }
 
 /*
- * Two sims of a swept sheet, one of which is placed a quarter turn elsewhere in the middle, the other where it
- * is: both start anew there. A quarter turn exchanges coordinates, so what follows is the same up to rounding
- * of coordinates of 3 m, 7e-16 m, and what contact of 2000 N/m and Newton's tolerance of 1e-9 N on springs of
- * 10 N/m make of it: 1e-10 m a step at most, over 16 steps; the tolerances of verlet's substeps and of ida are
- * as small. What stops short of convergence, newton_k, is compared by the same sums in another order.
+ * Two sims of a swept sheet, one of which is placed a quarter turn elsewhere in the middle, the other where
+ * it is: both start anew there. A quarter turn exchanges coordinates, so what follows is the same up to
+ * rounding of coordinates of 3 m, 7e-16 m, and what contact of 2000 N/m and Newton's tolerance of 1e-9 N on
+ * springs of 10 N/m make of it: 1e-10 m a step at most, over 16 steps; the tolerances of verlet's substeps
+ * and of ida are as small. What stops short of convergence, newton_k, is compared by the same sums in
+ * another order.
  */
 START_TEST(a_placed_sim_goes_on_as_before)
 {
@@ -127,8 +129,8 @@ START_TEST(a_placed_sim_goes_on_as_before)
 }
 END_TEST
 
-/* Any rotation, about any axis: strain and elastic energy of cloth without colliders stay, velocities turn, to
- * rounding; placing it back by the opposite rotation restores it. */
+/* Any rotation, about any axis: strain and elastic energy of cloth without colliders stay, velocities turn,
+ * to rounding; placing it back by the opposite rotation restores it. */
 START_TEST(any_rotation_keeps_the_strain)
 {
     failing_allocator memory = {0};
@@ -251,8 +253,8 @@ START_TEST(colliders_turn_if_they_look_the_same)
 }
 END_TEST
 
-/* Cloth placed with a few millimetres of it inside a ball is pushed out without an error, as cloth that starts
- * there: after a second none is left inside. */
+/* Cloth placed with a few millimetres of it inside a ball is pushed out without an error, as cloth that
+ * starts there: after a second none is left inside. */
 START_TEST(cloth_placed_into_a_collider_comes_out)
 {
     failing_allocator memory = {0};

@@ -215,6 +215,38 @@ def test_realtime():
             says='--realtime: the integrator "static" makes no steps in time')
 
 
+def chosen_by(*options, **changes):
+    """Runs a scene in real time; returns the line that says what was chosen, and the integrator in the copy of the scene."""
+    write_scene(**changes)
+    text = good("run", "scene.json", "--realtime", "--duration", "0.1", "--frame-rate", "20", "--out", "chosen", *options)
+    line = re.search(r"^chosen +(.*)$", text, re.M)
+    assert line, text
+    return line.group(1), read_json("chosen/scene.json")["integrator"]
+
+
+def test_realtime_chooses():
+    """--realtime takes newton_k, as many iterations as fit and the machine's threads, unless these are given; the copy of the scene has it"""
+    line, integrator = chosen_by()
+    found = re.fullmatch(r"1 thread of \d+, for 16 nodes; newton_k, as no method is named; ([124]) iterations?, "
+                         r"as one takes \S+ ms of a frame of 50 in trial steps", line)
+    assert found, line
+    equal((integrator["method"], integrator["iterations"], integrator["dt"]), ("newton_k", int(found.group(1)), 0.01))
+    # A frame of a microsecond has time for one.
+    text = good("run", "scene.json", "--realtime", "--frame-rate", "1e6", "--duration", "2e-5")
+    assert "; 1 iteration, as one takes " in text, text
+    # What the scene or the command line gives stays.
+    line, integrator = chosen_by(integrator={"dt": 0.01, "iterations": 3})
+    assert line.endswith("newton_k, as no method is named"), line
+    equal(integrator["iterations"], 3)
+    line, integrator = chosen_by("--set", "/integrator/iterations=5", "--threads", "1")
+    equal((line, integrator["iterations"]), ("newton_k, as no method is named", 5))
+    for options, changes in (((), {"integrator": {"method": "be", "dt": 0.01}}), (("--integrator", "be"), {}), (("--linear-solver", "klu"), {})):
+        line, integrator = chosen_by(*options, **changes)
+        assert line.endswith("; be, as scene or command line say"), line
+        assert integrator.get("method", "be") == "be" and "iterations" not in integrator, integrator
+    assert "chosen" not in good("run", "scene.json")
+
+
 def test_linear_solver_acts():
     """a linear solver on the command line is refused if the integrator has none; in a scene it is ignored, and other integrators use it"""
     write_scene()

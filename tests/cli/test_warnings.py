@@ -28,6 +28,17 @@ def test_none():
         equal(warnings(f"{SOURCES}/examples/scenes/{name}.json", "--duration", "1"), {}, name)
 
 
+def test_ignored_restitution():
+    """verlet, whose rules of contact return nothing of an impact, says so if a collider asks for it; others do not"""
+    ball = {"type": "sphere", "center": [0, -5, 0], "radius": 1, "restitution": 0.5}
+    says = 'warning: "verlet" ignores restitution: '
+    write_scene(**FINE, colliders=[ball])
+    equal(drape("run", "scene.json", "--integrator", "verlet").stderr.count(says), 1)
+    assert says not in drape("run", "scene.json").stderr
+    write_scene(**FINE, colliders=[{**ball, "restitution": 0}])
+    assert says not in drape("run", "scene.json", "--integrator", "verlet").stderr
+
+
 def test_no_terms():
     """a cloth without terms has a warning that names it; user-visible terms of other cloths do not hide it"""
     write_scene(**FINE, terms=[])

@@ -7,6 +7,7 @@
 #include "base/clock.h"
 #include "base/vec3.h"
 #include "entries/models.h"
+#include "mesh/mesh.h"
 #include "support/scene.h"
 
 #include <unistd.h>
@@ -651,6 +652,45 @@ START_TEST(poses_follow_the_track)
 }
 END_TEST
 
+/* ---- Turning ---- */
+
+/* What says that it looks the same after a rotation does: the distance of a turned point from the shifted
+ * collider is that of the point, to rounding of coordinates of 10 m and of the rotation. All that have such
+ * rotations know some about the axes that their parameters give, and a sphere all. */
+static void check_turned(const drape_collider *c, const struct variant *v)
+{
+    int same = 0;
+    for (int i = 0; c->ops->turned && i < 40; i++) {
+        const double *p = c->values, degrees[] = {90, 180, 37, -90};
+        double rotate[4] = {between(-1, 1), between(-1, 1), between(-1, 1), degrees[i % 4]}, R[3][3],
+               shift[3];
+        for (int k = 0; k < 3 && i < 8; k++)
+            rotate[k] = i < 4 ? p[3 + k] - p[k] : p[3 + k];
+        if (i >= 8 && i < 20)
+            for (int k = 0; k < 3; k++)
+                rotate[k] = k == i / 4 - 2;
+        drape_rotation_matrix(rotate, R);
+        if (!c->ops->turned(c->values, &c->shape, R[0], shift))
+            continue;
+        same++;
+        for (int n = 0; n < 20; n++) {
+            const double x[3] = {between(-5, 5), between(-5, 5), between(-5, 5)};
+            double y[3];
+            for (int k = 0; k < 3; k++)
+                y[k] = vec3_dot(R[k], x) - shift[k];
+            ck_assert_double_eq_tol(distance_of(c, y, NULL, NULL), distance_of(c, x, NULL, NULL), 1e-13);
+        }
+    }
+    ck_assert_msg(!c->ops->turned || same > 0, "%s", v->text);
+    ck_assert(strcmp(c->ops->entry.name, "sphere") != 0 || same == 40);
+}
+
+START_TEST(what_looks_the_same_after_a_rotation_does)
+{
+    each_variant(check_turned);
+}
+END_TEST
+
 /* ---- Speed ---- */
 
 /* A search through all of the 40 000 triangles takes some milliseconds. Near the surface, where contact
@@ -685,4 +725,4 @@ END_TEST
 SUITE("colliders", entries_are_well_formed, distances_are_exact, a_mesh_equals_its_box, derivatives_are_exact,
       normals_are_continuous_outside, the_distance_is_defined_everywhere, shapes_lie_on_the_surface,
       shapes_have_the_right_features, meshes_that_are_no_solid_are_refused, poses_follow_the_track,
-      queries_of_large_meshes_are_fast)
+      what_looks_the_same_after_a_rotation_does, queries_of_large_meshes_are_fast)

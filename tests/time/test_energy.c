@@ -284,11 +284,12 @@ static double make_frame(scene *s, double dt, int effort)
 }
 
 /* A second of long steps at the lowest level of effort, as where a budget starves, leaves a sheet full of
- * waves, from which single steps of one iteration gain a tenth of the available energy, and the next ones lose
- * it. The residuals that they leave explain that, so none is refused once there is time again. Without their
- * work, and with guesses that take twice the change of velocity in the half of a step before, 25 steps a second
- * are, for good. While it starves a run must not gain more than half of what was available: a fall by the
- * diagonal at most, and the scene's own 1/2 m g L, so elastic energy stays below 1.5 times that. */
+ * waves, from which single steps of one iteration gain a tenth of the available energy, and the next ones
+ * lose it. The residuals that they leave explain that, so none is refused once there is time again. Without
+ * their work, and with guesses that take twice the change of velocity in the half of a step before, 25
+ * steps a second are, for good. While it starves a run must not gain more than half of what was available:
+ * a fall by the diagonal at most, and the scene's own 1/2 m g L, so elastic energy stays below 1.5 times
+ * that. */
 START_TEST(a_starved_run_is_not_refused_for_good)
 {
     static const double moduli[] = {1e6, 1.5e6};
