@@ -68,15 +68,22 @@ static void move_out(const drape_contact *c, int32_t collider, double margin, co
     }
 }
 
+/* Whether a collider may be nearer to a point than the margin. */
+static bool may_be_near(const drape_contact *c, int32_t collider, double margin, const double x[3])
+{
+    const double *bound = c->relaxed.bound + 4 * (size_t)collider;
+    double to[3];
+    vec3_sub(x, bound, to);
+    vec3_sub(to, c->pose[collider].displacement, to);
+    return !(vec3_norm(to) > bound[3] + margin);
+}
+
 /* Whether the way out of one collider leads deeper into another one. */
 static bool is_in_the_way(const drape_contact *c, int32_t other, double margin, const double q[3],
                           const double direction[3])
 {
-    const double *bound = c->relaxed.bound + 4 * (size_t)other;
-    double n[3], to[3];
-    vec3_sub(q, bound, to);
-    vec3_sub(to, c->pose[other].displacement, to);
-    if (vec3_norm(to) > bound[3] + margin)
+    double n[3];
+    if (!may_be_near(c, other, margin, q))
         return false;
     return distance_at(c, other, q, n) < margin * (1 - 1e-6) && vec3_dot(n, direction) < 0;
 }
@@ -151,6 +158,31 @@ static drape_status block_between(drape_contact *c, int32_t collider, const clot
     return status;
 }
 
+/* A face that is pierced by a feature without a radius is not near it any more, and its nodes may be outside:
+ * points of the face are looked at, between which a tip may be missed. */
+static drape_status block_pierced(drape_contact *c, int32_t collider, double t, bool may_relax, int32_t *added)
+{
+    static const double shares[][3] = {{1. / 3, 1. / 3, 1. / 3}, {0.5, 0.5, 0}, {0, 0.5, 0.5}, {0.5, 0, 0.5}};
+    const double margin = MARGIN * c->model->contact.distance;
+    drape_status status = DRAPE_OK;
+    for (int32_t f = 0; !status && f < c->model->triangle_count; f++)
+        for (size_t i = 0; !status && i < sizeof shares / sizeof *shares; i++) {
+            cloth_point p = {.nodes = 3};
+            memcpy(p.node, c->model->triangle + 3 * (size_t)f, 3 * sizeof *p.node);
+            for (int a = 0; a < 3; a++)
+                vec3_add_scaled(shares[i][a], c->x + 3 * (size_t)p.node[a], p.x);
+            if (!may_be_near(c, collider, margin, p.x) || !(distance_at(c, collider, p.x, NULL) < margin))
+                continue;
+            for (int a = 0; a < 3; a++)
+                vec3_add_scaled(shares[i][a], c->relaxed.normal + 3 * (size_t)p.node[a], p.normal);
+            const double length = vec3_norm(p.normal);
+            for (int k = 0; k < 3 && length > 0; k++)
+                p.normal[k] /= length;
+            status = block_between(c, collider, &p, margin, t, may_relax, added);
+        }
+    return status;
+}
+
 static drape_status go_to(drape_contact *c, const double *x, double t)
 {
     return drape_contact_update(c, &(drape_contact_at){.x = x, .t = t, .span = {t, t}});
@@ -185,6 +217,11 @@ drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, 
         }
         if (!status)
             status = block_between(c, collider, &p, margin, t, may_relax, added);
+    }
+    for (int32_t k = 0; !status && k < c->model->collider_count; k++) {
+        const drape_collider_shape *shape = &c->model->colliders[k].shape;
+        if (shape->point_count > 0 && !(shape->radius > 0))
+            status = block_pierced(c, k, t, may_relax, added);
     }
     c->listed = c->listed && *added == 0; /* the laws of contacts have changed */
     return status;
