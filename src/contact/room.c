@@ -160,7 +160,8 @@ static drape_status block_between(drape_contact *c, int32_t collider, const clot
 
 /* A face that is pierced by a feature without a radius is not near it any more, and its nodes may be outside:
  * points of the face are looked at, between which a tip may be missed. */
-static drape_status block_pierced(drape_contact *c, int32_t collider, double t, bool may_relax, int32_t *added)
+static drape_status block_pierced(drape_contact *c, int32_t collider, double t, bool may_relax,
+                                  int32_t *added)
 {
     static const double shares[][3] = {{1. / 3, 1. / 3, 1. / 3}, {0.5, 0.5, 0}, {0, 0.5, 0.5}, {0.5, 0, 0.5}};
     const double margin = MARGIN * c->model->contact.distance;

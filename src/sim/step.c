@@ -108,7 +108,9 @@ static bool relax(drape_sim *sim, double t1, drape_status status, drape_verdict 
 {
     int32_t added;
     const bool all = verdict == DRAPE_STOP || sim->failed >= PATIENCE || sim->schedule.level >= PATIENCE;
-    return status > 0 && may_relax(sim) && !drape_system_relax(sim->system, t1, all, &added) && added > 0;
+    const bool may_help =
+        status > 0 || status == DRAPE_E_STEP_TOO_SMALL; /* of integrators with steps of their own */
+    return may_help && may_relax(sim) && !drape_system_relax(sim->system, t1, all, &added) && added > 0;
 }
 
 /* ---- Accept and reject ---- */
