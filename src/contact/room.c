@@ -125,10 +125,16 @@ static drape_status block_pins(drape_contact *c, int32_t collider, double margin
                                int32_t *added)
 {
     drape_status status = DRAPE_OK;
+    const drape_model *m = c->model;
+    const double *reach = c->relaxed.reach;
     reach_from_pins(c, collider, margin, c->relaxed.reach);
-    for (int32_t i = 0; !status && i < c->model->node_count; i++)
-        if (c->relaxed.reach[i] > 0)
-            status = block(c, collider, &i, 1, t, t, may_relax, added);
+    for (int32_t e = 0; !status && e < m->edge_count; e++) {
+        const int32_t *n = m->edge + 2 * (size_t)e; /* pins among pins do not touch anything */
+        const bool free = !m->pinned[n[0]] || !m->pinned[n[1]];
+        for (int k = 0; !status && free && k < 2; k++)
+            if (reach[n[k]] > 0)
+                status = block(c, collider, &n[k], 1, t, t, may_relax, added);
+    }
     return status;
 }
 
