@@ -194,25 +194,6 @@ drape_status drape_contact_take_failure(drape_contact *c)
     return failed ? DRAPE_E_MEMORY : DRAPE_OK;
 }
 
-/* Where a collider has no smooth surface, which is paired with every node, that of its relaxed nodes pushes
- * them out. */
-static drape_status add_surfaces(drape_contact *c, const drape_configuration *at)
-{
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < c->relaxed.count; i++) {
-        const drape_relaxed_node *node = &c->relaxed.nodes[i];
-        if (node->collider < 0 || c->model->colliders[node->collider].ops->smooth ||
-            c->model->pinned[node->node])
-            continue;
-        drape_active_contact contact = {.pair =
-                                            drape_broad_phase_surface(&c->broad, node->node, node->collider),
-                                        .relaxed = node->factor};
-        if (drape_pair_gap(&contact.pair, at, c->broad.rest, &contact.gap))
-            status = drape_active_set_add(&c->active, &contact);
-    }
-    return status;
-}
-
 drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
 {
     const drape_straight_path here = {{*at, *at}};
@@ -225,7 +206,7 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
         return drape_contact_take_failure(c);
     const drape_status status =
         drape_active_set_list(&c->active, candidates, &away, at, &c->inside, !in_step, &c->relaxed);
-    return status ? status : add_surfaces(c, at);
+    return status ? status : drape_room_add_surfaces(c, at);
 }
 
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)

@@ -14,6 +14,87 @@
 #define PASSES 3   /* to find the way out of a curved surface */
 #define HOLD   0.1 /* [s] cloth is relaxed at least, where no look ahead can say whether there is room */
 
+/* Whether a collider may be nearer to a point than the margin. */
+static bool may_be_near(const drape_contact *c, const drape_collider_pose *pose, int32_t collider, double margin,
+                        const double x[3])
+{
+    const double *bound = c->relaxed.bound + 4 * (size_t)collider;
+    double to[3];
+    vec3_sub(x, bound, to);
+    vec3_sub(to, pose[collider].displacement, to);
+    return !(vec3_norm(to) > bound[3] + margin);
+}
+
+/* ---- Contacts of relaxed cloth ---- */
+
+static bool is_sharp(const drape_collider *collider)
+{
+    return collider->shape.point_count > 0 && !(collider->shape.radius > 0);
+}
+
+/* The gap between a point of a face and the surface of a collider. */
+static bool find_face_gap(const drape_contact *c, const drape_configuration *at, int32_t collider,
+                          const double share[3], drape_active_contact *contact)
+{
+    const double distance = contact->pair.distance;
+    drape_gap *gap = &contact->gap;
+    double x[3] = {0};
+    for (int a = 0; a < 3; a++)
+        vec3_add_scaled(share[a], at->x + 3 * (size_t)contact->pair.node[a], x);
+    if (!may_be_near(c, at->pose, collider, distance, x))
+        return false;
+    *gap = (drape_gap){.closest = {.points = 3, .c = {share[0], share[1], share[2]}}, .m = 1};
+    gap->value = drape_collider_distance(&at->model->colliders[collider], &at->pose[collider], x,
+                                         gap->closest.normal, gap->curvature);
+    return gap->value < distance;
+}
+
+#define ACROSS_FACE 3 /* parts of a side: 7 points of a face besides its corners */
+
+static drape_status add_face(drape_contact *c, const drape_configuration *at, int32_t collider, int32_t face)
+{
+    const int32_t *n = c->model->triangle + 3 * (size_t)face;
+    bool blocked = false; /* as long as another body is in the way, the nearest surface may be at the side */
+    drape_status status = DRAPE_OK;
+    drape_active_contact contact = {.pair = drape_broad_phase_surface(&c->broad, n[0], collider)};
+    for (int a = 0; a < 3; a++) {
+        const drape_relaxed_node *found = drape_relaxed_find(&c->relaxed, collider, n[a]);
+        contact.relaxed = fmax(contact.relaxed, found ? found->factor : 0);
+        contact.pair.node[a] = n[a];
+        blocked = blocked || (found && found->blocked);
+    }
+    contact.pair.area = c->broad.face_area[face] / 7;
+    for (int i = 0; i <= ACROSS_FACE && contact.relaxed > 0 && !blocked; i++)
+        for (int j = 0; !status && i + j <= ACROSS_FACE; j++) {
+            const int k = ACROSS_FACE - i - j;
+            const double share[3] = {(double)i / ACROSS_FACE, (double)j / ACROSS_FACE, (double)k / ACROSS_FACE};
+            if ((i < ACROSS_FACE && j < ACROSS_FACE && k < ACROSS_FACE) &&
+                find_face_gap(c, at, collider, share, &contact))
+                status = drape_active_set_add(&c->active, &contact);
+        }
+    return status;
+}
+
+drape_status drape_room_add_surfaces(drape_contact *c, const drape_configuration *at)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; !status && i < c->relaxed.count; i++) {
+        const drape_relaxed_node *node = &c->relaxed.nodes[i];
+        if (node->collider < 0 || c->model->colliders[node->collider].ops->smooth ||
+            c->model->pinned[node->node])
+            continue;
+        drape_active_contact contact = {
+            .pair = drape_broad_phase_surface(&c->broad, node->node, node->collider), .relaxed = node->factor};
+        if (drape_pair_gap(&contact.pair, at, c->broad.rest, &contact.gap))
+            status = drape_active_set_add(&c->active, &contact);
+    }
+    for (int32_t k = 0; !status && k < c->model->collider_count; k++)
+        for (int32_t f = 0; !status && f < c->model->triangle_count; f++)
+            if (drape_relaxed_count(&c->relaxed, k) > 0 && is_sharp(&c->model->colliders[k]))
+                status = add_face(c, at, k, f);
+    return status;
+}
+
 /* ---- Looking ahead ---- */
 
 /* A point of the cloth in a contact. */
@@ -68,22 +149,12 @@ static void move_out(const drape_contact *c, int32_t collider, double margin, co
     }
 }
 
-/* Whether a collider may be nearer to a point than the margin. */
-static bool may_be_near(const drape_contact *c, int32_t collider, double margin, const double x[3])
-{
-    const double *bound = c->relaxed.bound + 4 * (size_t)collider;
-    double to[3];
-    vec3_sub(x, bound, to);
-    vec3_sub(to, c->pose[collider].displacement, to);
-    return !(vec3_norm(to) > bound[3] + margin);
-}
-
 /* Whether the way out of one collider leads deeper into another one. */
 static bool is_in_the_way(const drape_contact *c, int32_t other, double margin, const double q[3],
                           const double direction[3])
 {
     double n[3];
-    if (!may_be_near(c, other, margin, q))
+    if (!may_be_near(c, c->pose, other, margin, q))
         return false;
     return distance_at(c, other, q, n) < margin * (1 - 1e-6) && vec3_dot(n, direction) < 0;
 }
@@ -178,7 +249,7 @@ static drape_status block_pierced(drape_contact *c, int32_t collider, double t, 
             memcpy(p.node, c->model->triangle + 3 * (size_t)f, 3 * sizeof *p.node);
             for (int a = 0; a < 3; a++)
                 vec3_add_scaled(shares[i][a], c->x + 3 * (size_t)p.node[a], p.x);
-            if (!may_be_near(c, collider, margin, p.x) || !(distance_at(c, collider, p.x, NULL) < margin))
+            if (!may_be_near(c, c->pose, collider, margin, p.x) || !(distance_at(c, collider, p.x, NULL) < margin))
                 continue;
             for (int a = 0; a < 3; a++)
                 vec3_add_scaled(shares[i][a], c->relaxed.normal + 3 * (size_t)p.node[a], p.normal);
@@ -226,8 +297,7 @@ drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, 
             status = block_between(c, collider, &p, margin, t, may_relax, added);
     }
     for (int32_t k = 0; !status && k < c->model->collider_count; k++) {
-        const drape_collider_shape *shape = &c->model->colliders[k].shape;
-        if (shape->point_count > 0 && !(shape->radius > 0))
+        if (is_sharp(&c->model->colliders[k]))
             status = block_pierced(c, k, t, may_relax, added);
     }
     c->listed = c->listed && *added == 0; /* the laws of contacts have changed */

@@ -9,6 +9,12 @@
 #define DRAPE_CONTACT_ROOM_H
 
 #include "contact/contact.h"
+#include "contact/pair.h"
+
+/* Adds the contacts of relaxed cloth that no pair stands for, to the active set of a configuration: nodes with
+ * colliders without a smooth surface, and faces, at some points of them, where the features of a collider have no
+ * radius and their pairs are left out. Errors: DRAPE_E_MEMORY. */
+drape_status drape_room_add_surfaces(drape_contact *contact, const drape_configuration *at);
 
 /* At the beginning of a step: measures the relaxed nodes at the present point, which is listed, and holds those
  * again that came out. *changed: some were. */
