@@ -363,8 +363,8 @@ static drape_status lag_at(drape_contact *c, const double *v, double t)
     return drape_contact_lag(c);
 }
 
-/* Looks for room at the end of the step, where some cloth has none already, and holds again what has come out.
- * What the forces do not have any more, or have from now on, is the work of whoever presses. */
+/* Looks for room at the end of the step, where some cloth has none already, and holds again what has come
+ * out. What the forces do not have any more, or have from now on, is the work of whoever presses. */
 static drape_status update_relaxed(drape_contact *c, const drape_contact_at *at)
 {
     bool changed = false;

@@ -32,9 +32,9 @@ double drape_contact_search_seconds(const drape_contact *contact); /* part of it
  * (relaxed.h). Without it, no cloth is, and what is relaxed stays so. */
 void drape_contact_expect(drape_contact *contact, double t1, bool may_relax);
 
-/* After a step to t1 that failed: relaxes cloth that has no room, or, if there is none and `all` is set, the pair
- * that refused the step and those whose gaps are hardly above the least. *added: nodes that are relaxed from now
- * on; if there are any, the same step may succeed. Errors: DRAPE_E_MEMORY. */
+/* After a step to t1 that failed: relaxes cloth that has no room, or, if there is none and `all` is set,
+ * the pair that refused the step and those whose gaps are hardly above the least. *added: nodes that are
+ * relaxed from now on; if there are any, the same step may succeed. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_relax(drape_contact *contact, double t1, bool all, int32_t *added);
 
 /* Begins a step at the state x, v at time t: lagged friction takes its normal forces here, and the end of

@@ -11,12 +11,12 @@
 
 #define MARGIN DRAPE_BARRIER_GENTLE /* of the activation distance, that cloth needs on either side */
 #define ACROSS 0.3 /* cosine: surfaces more upright than this to the cloth are left along their own normal */
-#define PASSES 3   /* to find the way out of a curved surface */
+#define PASSES 3   /* to find the nearest place outside of a curved surface */
 #define HOLD   0.1 /* [s] cloth is relaxed at least, where no look ahead can say whether there is room */
 
 /* Whether a collider may be nearer to a point than the margin. */
-static bool may_be_near(const drape_contact *c, const drape_collider_pose *pose, int32_t collider, double margin,
-                        const double x[3])
+static bool may_be_near(const drape_contact *c, const drape_collider_pose *pose, int32_t collider,
+                        double margin, const double x[3])
 {
     const double *bound = c->relaxed.bound + 4 * (size_t)collider;
     double to[3];
@@ -54,7 +54,7 @@ static bool find_face_gap(const drape_contact *c, const drape_configuration *at,
 static drape_status add_face(drape_contact *c, const drape_configuration *at, int32_t collider, int32_t face)
 {
     const int32_t *n = c->model->triangle + 3 * (size_t)face;
-    bool blocked = false; /* as long as another body is in the way, the nearest surface may be at the side */
+    bool blocked = false; /* as long as another body presses on it, the nearest surface may be at the side */
     drape_status status = DRAPE_OK;
     drape_active_contact contact = {.pair = drape_broad_phase_surface(&c->broad, n[0], collider)};
     for (int a = 0; a < 3; a++) {
@@ -67,7 +67,8 @@ static drape_status add_face(drape_contact *c, const drape_configuration *at, in
     for (int i = 0; i <= ACROSS_FACE && contact.relaxed > 0 && !blocked; i++)
         for (int j = 0; !status && i + j <= ACROSS_FACE; j++) {
             const int k = ACROSS_FACE - i - j;
-            const double share[3] = {(double)i / ACROSS_FACE, (double)j / ACROSS_FACE, (double)k / ACROSS_FACE};
+            const double share[3] = {(double)i / ACROSS_FACE, (double)j / ACROSS_FACE,
+                                     (double)k / ACROSS_FACE};
             if ((i < ACROSS_FACE && j < ACROSS_FACE && k < ACROSS_FACE) &&
                 find_face_gap(c, at, collider, share, &contact))
                 status = drape_active_set_add(&c->active, &contact);
@@ -83,8 +84,9 @@ drape_status drape_room_add_surfaces(drape_contact *c, const drape_configuration
         if (node->collider < 0 || c->model->colliders[node->collider].ops->smooth ||
             c->model->pinned[node->node])
             continue;
-        drape_active_contact contact = {
-            .pair = drape_broad_phase_surface(&c->broad, node->node, node->collider), .relaxed = node->factor};
+        drape_active_contact contact = {.pair =
+                                            drape_broad_phase_surface(&c->broad, node->node, node->collider),
+                                        .relaxed = node->factor};
         if (drape_pair_gap(&contact.pair, at, c->broad.rest, &contact.gap))
             status = drape_active_set_add(&c->active, &contact);
     }
@@ -149,8 +151,8 @@ static void move_out(const drape_contact *c, int32_t collider, double margin, co
     }
 }
 
-/* Whether the way out of one collider leads deeper into another one. */
-static bool is_in_the_way(const drape_contact *c, int32_t other, double margin, const double q[3],
+/* Whether the direction out of one collider leads deeper into another one. */
+static bool is_blocked_by(const drape_contact *c, int32_t other, double margin, const double q[3],
                           const double direction[3])
 {
     double n[3];
@@ -170,8 +172,8 @@ static drape_status block(drape_contact *c, int32_t collider, const int32_t *nod
     return status;
 }
 
-/* Around a pin inside a collider there is a way out only beyond its depth, less the cloth between: edge by edge,
- * from every pin inside, the depth that is left. */
+/* Around a pin inside a collider cloth can be outside only beyond its depth, less the cloth between: edge
+ * by edge, from every pin inside, the depth that is left. */
 static void reach_from_pins(const drape_contact *c, int32_t collider, double margin, double *reach)
 {
     const drape_model *m = c->model;
@@ -226,7 +228,7 @@ static drape_status block_between(drape_contact *c, int32_t collider, const clot
     drape_status status = DRAPE_OK;
     move_out(c, collider, margin, p, q, direction);
     for (int32_t other = 0; !status && other < c->model->collider_count; other++) {
-        if (other == collider || !is_in_the_way(c, other, margin, q, direction))
+        if (other == collider || !is_blocked_by(c, other, margin, q, direction))
             continue;
         status = block(c, collider, p->node, p->nodes, t, t, may_relax, added);
         if (!status)
@@ -249,7 +251,8 @@ static drape_status block_pierced(drape_contact *c, int32_t collider, double t, 
             memcpy(p.node, c->model->triangle + 3 * (size_t)f, 3 * sizeof *p.node);
             for (int a = 0; a < 3; a++)
                 vec3_add_scaled(shares[i][a], c->x + 3 * (size_t)p.node[a], p.x);
-            if (!may_be_near(c, c->pose, collider, margin, p.x) || !(distance_at(c, collider, p.x, NULL) < margin))
+            if (!may_be_near(c, c->pose, collider, margin, p.x) ||
+                !(distance_at(c, collider, p.x, NULL) < margin))
                 continue;
             for (int a = 0; a < 3; a++)
                 vec3_add_scaled(shares[i][a], c->relaxed.normal + 3 * (size_t)p.node[a], p.normal);
@@ -306,9 +309,9 @@ drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, 
 
 /* ---- A step that failed ---- */
 
-/* Relaxes what a pair needs to get through: the nodes of its cloth; of cloth and pinned cloth the free nodes of
- * the piece that meets the other one. */
-static drape_status give_way(drape_contact *c, const drape_pair *pair, double t, int32_t *added)
+/* Relaxes what a pair needs to get through: the nodes of its cloth; of cloth and pinned cloth the free
+ * nodes of the piece that meets the other one. */
+static drape_status relax_pair(drape_contact *c, const drape_pair *pair, double t, int32_t *added)
 {
     const drape_model *m = c->model;
     const int points = drape_pair_points(pair), split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
@@ -331,10 +334,10 @@ static drape_status relax_blockers(drape_contact *c, int32_t *added)
 {
     drape_status status = go_to(c, c->start, c->start_t);
     if (!status && c->refused)
-        status = give_way(c, &c->refusing, c->start_t, added);
+        status = relax_pair(c, &c->refusing, c->start_t, added);
     const int32_t near_count = c->active.near_count;
     for (int32_t i = 0; !status && i < near_count; i++)
-        status = give_way(c, &c->active.near[i].pair, c->start_t, added);
+        status = relax_pair(c, &c->active.near[i].pair, c->start_t, added);
     return status;
 }
 
@@ -382,8 +385,8 @@ static void measure(drape_contact *c)
     }
 }
 
-/* Whether a face of cloth and a piece of a collider pass through each other: two points of an edge, or three of
- * a triangle. */
+/* Whether a face of cloth and a piece of a collider pass through each other: two points of an edge, or
+ * three of a triangle. */
 static bool cross(const drape_contact *c, int32_t collider, const int32_t *face, const int32_t *piece,
                   int points)
 {

@@ -135,8 +135,8 @@ static json_t *with_inside(json_t *object, const drape_sim *sim)
     return drape_json_with(object, "intersections", found(drape_sim_intersections(sim, -1)));
 }
 
-/* For each collider, and pinned pieces of cloth, that left cloth no room, if there are any: the number of nodes that are relaxed there,
- * the most at a time, how deep [m], and when [s]. */
+/* For each collider, and pinned pieces of cloth, that left cloth no room, if there are any: the number of
+ * nodes that are relaxed there, the most at a time, how deep [m], and when [s]. */
 static json_t *with_no_room(json_t *object, const drape_sim *sim)
 {
     json_t *list = json_array();

@@ -14,8 +14,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Attempts that fail in a row, or halvings of a step, after which the pairs that hold it up are relaxed: impacts
- * on cloth that has room take some. */
+/* Attempts that fail in a row, or halvings of a step, after which the pairs that hold it up are relaxed:
+ * impacts on cloth that has room take some. */
 #define PATIENCE 6
 
 /* ---- Compute and check ---- */
@@ -102,9 +102,9 @@ static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status s
     return sim->chosen.controller->judge(sim->chosen.controller_values, trial);
 }
 
-/* For an attempt that failed: relaxes cloth that bodies leave no room at its end and, if the step has failed
- * several times or is not to be tried again, what holds it up. *again: the same step is worth another attempt.
- * Errors: DRAPE_E_MEMORY. */
+/* For an attempt that failed: relaxes cloth that bodies leave no room at its end and, if the step has
+ * failed several times or is not to be tried again, what holds it up. *again: the same step is worth
+ * another attempt. Errors: DRAPE_E_MEMORY. */
 static drape_status relax(drape_sim *sim, double t1, drape_status failure, drape_verdict verdict, bool *again)
 {
     int32_t added = 0;

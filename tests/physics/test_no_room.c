@@ -1,8 +1,8 @@
 /*
- * test_no_room.c: bodies that leave cloth no room. With contact/no_room "relax", and with "auto" in real time,
- * no step fails for good, time goes on at the steps that were asked for, the report names the bodies, the rest
- * of the cloth is not strained, and once there is room nothing is inside any more. With "stop" the run stops and
- * names the pair.
+ * test_no_room.c: bodies that leave cloth no room. With contact/no_room "relax", and with "auto" in real
+ * time, no step fails for good, time goes on at the steps that were asked for, the report names the
+ * bodies, the rest of the cloth is not strained, and once there is room nothing is inside any more. With
+ * "stop" the run stops and names the pair.
  */
 #include "sim/relaxed.h"
 #include "support/bytes.h"
@@ -23,7 +23,8 @@
 #define REST                                                                                                 \
     " 'contact': {'no_room': '%s', 'friction': 'lagged'},"                                                   \
     " 'integrator': {'method': '%s', 'dt': 0.0166666666666666667}, 'duration': 3}"
-/* Two balls that close upon the middle of the sheet from 0.1 to 0.3 s, overlap by 4 cm, and part from 0.7 s on. */
+/* Two balls that close upon the middle of the sheet from 0.1 to 0.3 s, overlap by 4 cm, and part from 0.7
+ * s on. */
 #define BALLS                                                                                                \
     " 'colliders': [{'name': 'left', 'type': 'sphere', 'center': [0, 0.25, -0.15], 'radius': 0.1,"           \
     " 'friction': 0.3, 'track': [[0.1, [0,0,0]], [0.3, [0,0,0.07]], [0.7, [0,0,0.07]], [0.9, [0,0,0]]]},"    \
@@ -119,8 +120,8 @@ static void check_pinch(const char *policy, const char *method, bool realtime)
     record seen = run(&s, realtime, 84);
     drape_warning warning = {.name = ""};
     ck_assert(seen.named[0] && seen.named[1]);
-    /* Each ball goes 2 cm beyond the plane of the sheet. The cloth between may lie anywhere in the overlap of 4
-     * cm, and what is relaxed around it no deeper than that. */
+    /* Each ball goes 2 cm beyond the plane of the sheet. The cloth between may lie anywhere in the overlap
+     * of 4 cm, and what is relaxed around it no deeper than that. */
     ck_assert_double_ge(seen.deepest, 0.02);
     ck_assert_double_le(seen.deepest, 0.04);
     ck_assert_double_lt(seen.strain, 0.1);
@@ -129,7 +130,8 @@ static void check_pinch(const char *policy, const char *method, bool realtime)
     ck_assert_double_le(seen.first, 0.243 + 2 * FRAME);
     ck_assert_double_lt(seen.last_inside, 0.757 + 0.5);
     ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);
-    /* One attempt fails when the balls meet; an impact at 0.35 m/s with a distance of 1 mm may take some more. */
+    /* One attempt fails when the balls meet; an impact at 0.35 m/s with a distance of 1 mm may take some
+     * more. */
     ck_assert_int_le((int)extra_attempts(&s, 84), 12);
     /* Between the balls, which have parted by 10 cm, the cloth hangs again. */
     for (int32_t i = 0; i < s.model->node_count; i++)
@@ -246,8 +248,8 @@ START_TEST(test_pins_inside)
 }
 END_TEST
 
-/* An elbow: an arm of one capsule, and a forearm of balls that turn about its end to 150 degrees and back, with a
- * sheet that hangs over the arm between them. */
+/* An elbow: an arm of one capsule, and a forearm of balls that turn about its end to 150 degrees and back,
+ * with a sheet that hangs over the arm between them. */
 static int print_forearm(char *text, size_t size)
 {
     const double pi = 3.14159265358979323846;
@@ -335,9 +337,9 @@ END_TEST
     ": 1e6, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge'], 'pins': [{'box': [[-1,-1,-1],"    \
     " [1,1,1]], 'track': [[0.1, [0,0,0]], [0.3, [0,0,%g]], [0.6, [0,0,%g]], [0.8, [0,0,0]]]}]}"
 
-/* Pinned pieces of cloth that close upon free cloth have no inside, and pass through it. No geometry tells that
- * there is no room: what refuses the step gives way, after some attempts. It is held again where they are
- * farther away than layers are kept, on whichever side. */
+/* Pinned pieces of cloth that close upon free cloth have no inside, and pass through it. No geometry tells
+ * that there is no room: what refuses the step is relaxed, after some attempts. It is held again where
+ * they are farther away than layers are kept, on whichever side. */
 START_TEST(test_plates)
 {
     scene s = scene_open(
