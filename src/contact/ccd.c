@@ -177,9 +177,30 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
     return fraction;
 }
 
+/* Lowers the fractions of nodes that go farther than a path whose candidates can be kept. A correction throws
+ * nodes so far only if it is of no use there; to search each pair on its own path would take seconds. Returns the
+ * least fraction. */
+static double shorten_long(const drape_contact *c, const double *x, const double *y, double *fraction)
+{
+    const double longest = MAX_PATH * c->mean_edge;
+    double least = 1, move[3];
+    for (int32_t i = 0; i < c->model->node_count; i++) {
+        vec3_sub(y + 3 * (size_t)i, x + 3 * (size_t)i, move);
+        const double length = vec3_norm(move);
+        if (!(length > longest))
+            continue;
+        fraction[i] = longest / length;
+        least = fmin(least, fraction[i]);
+    }
+    return least;
+}
+
 double drape_contact_node_fractions(drape_contact *c, const double *x, const double *y, double t,
                                     double *fraction)
 {
+    const double shortened = shorten_long(c, x, y, fraction);
+    if (shortened < 1)
+        return shortened;
     c->of_node = fraction;
     const double least = drape_contact_step_fraction(c, x, y, t);
     c->of_node = NULL;
