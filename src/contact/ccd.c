@@ -177,9 +177,9 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
     return fraction;
 }
 
-/* Lowers the fractions of nodes that go farther than a path whose candidates can be kept. A correction throws
- * nodes so far only if it is of no use there; to search each pair on its own path would take seconds. Returns the
- * least fraction. */
+/* Lowers the fractions of nodes that go farther than a path whose candidates can be kept. A correction
+ * throws nodes so far only if it is of no use there; to search each pair on its own path would take seconds.
+ * Returns the least fraction. */
 static double shorten_long(const drape_contact *c, const double *x, const double *y, double *fraction)
 {
     const double longest = MAX_PATH * c->mean_edge;

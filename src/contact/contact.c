@@ -9,6 +9,7 @@
  *     force.c        energy, gradient and Hessian of an active contact, by the barrier (barrier.h)
  *     restitution.c  the dissipative part of its normal force
  *     friction.c     its friction, with the normal force of now or, lagged, of the beginning of the step
+ *     relaxed.c      the nodes that bodies leave no room, and whose pairs are not held; room.c finds them
  *     jacobian.c     dg/dx + w dg/dv of the active set, block by block into the pattern
  *
  * This file has the two configurations that these work on: the beginning of a step, and the one at which

@@ -108,8 +108,8 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
  * with a margin; colliders rest in their poses at time t. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t);
 
-/* The same, and lowers `fraction` (node_count) at each node to the smallest of its pairs; where a displacement
- * is longer than a few edges, to such a length without a look at pairs. */
+/* The same, and lowers `fraction` (node_count) at each node to the smallest of its pairs; where a
+ * displacement is longer than a few edges, to such a length without a look at pairs. */
 double drape_contact_node_fractions(drape_contact *contact, const double *x, const double *y, double t,
                                     double *fraction);
 
