@@ -567,22 +567,21 @@ typedef struct drape_relaxed {
     int32_t collider; /* its number in the scene, from 0; -1: pinned pieces of cloth */
     const char *name; /* of the collider, "self_contact" for -1; valid as long as the model */
     int32_t node;     /* of all cloths, from 0 */
-    double
-        depth; /* [m] how far it, or the cloth around it, was inside at the beginning of the last step, >= 0; 0
-                         for pinned pieces of cloth, which have no inside */
+    double depth;   /* [m] how far it, or the cloth around it, was inside at the beginning of the last step; 0
+                         if it was outside, and for pinned pieces of cloth, which have no inside */
     double deepest; /* [m] the largest depth since it was relaxed */
     double since;   /* [s] the time at which it was relaxed */
 } drape_relaxed;
 
-/* The nodes that are relaxed: where two bodies close upon cloth, pins lie in a body, or cloth is held back by
- * what a body presses on, steps have no solution in which nothing passes through anything. With the scene's
- * contact/no_room "relax", and with "auto" in drape_sim_advance_realtime, the surfaces that have no room for
- * the cloth then let it in, at some nodes and the faces around them, and push it out by a bounded pressure; the
- * rest of the cloth goes on as before. Nodes are held again once they have room and are out. drape_sim_inside
- * counts what is inside meanwhile.
+/* The nodes that are relaxed: where two bodies close upon cloth, pins lie in a body, or cloth is held back
+ * by what a body presses on, steps have no solution in which nothing passes through anything. With the
+ * scene's contact/no_room "relax", and with "auto" in drape_sim_advance_realtime, the surfaces that have
+ * no room for the cloth then let it in, at some nodes and the faces around them, and push it out by a
+ * bounded pressure; the rest of the cloth goes on as before. Nodes are held again once they have room and
+ * are out. drape_sim_inside counts what is inside meanwhile.
  *
- * Returns their number and, if index is from 0 to below that, fills *out unless it is NULL; they are ordered by
- * collider and node. 0 for a sim without contact. Not during an advance from another thread. */
+ * Returns their number and, if index is from 0 to below that, fills *out unless it is NULL; they are
+ * ordered by collider and node. 0 for a sim without contact. Not during an advance from another thread. */
 DRAPE_API int32_t drape_sim_relaxed(const drape_sim *sim, int32_t index, drape_relaxed *out);
 
 /* Counts the pairs of an edge and a triangle that pass through each other, with exact signs: of the cloth

@@ -146,10 +146,11 @@ static double stiffness_of_strain(const drape_model *model)
     return ELASTIC * membrane * model->edge_count / edges;
 }
 
-/* Cloth that is pinched between bodies is pushed by both of them: their pressures balance across it, and add up
- * along it, where round bodies squeeze it out. A radius r of a lens between balls of radius R is strained by
- * about p r^2 / (R E h). With p = ELASTIC E h / a that is ELASTIC r^2 / (R a), one per cent for ten edges; with
- * p ten times the weight of the cloth, or of what stops it within L, E h would have to be that small. */
+/* Cloth that is pinched between bodies is pushed by both of them: their pressures balance across it, and
+ * add up along it, where round bodies squeeze it out. A radius r of a lens between balls of radius R is
+ * strained by about p r^2 / (R E h). With p = ELASTIC E h / a that is ELASTIC r^2 / (R a), one per cent
+ * for ten edges; with p ten times the weight of the cloth, or of what stops it within L, E h would have to
+ * be that small. */
 #define WEIGHTS 10
 static double relaxed_pressure(const drape_model *model)
 {

@@ -26,7 +26,8 @@ static void reduce(drape_active_contact *contact)
 static bool is_shared(const drape_active_contact *contact)
 {
     const int points = contact->gap.closest.points;
-    return points > 1 && points < 4 && !contact->gap.mollified && !contact->gap.fixed_normal;
+    return contact->pair.kind != DRAPE_PAIR_SURFACE && points > 1 && points < 4 && !contact->gap.mollified &&
+           !contact->gap.fixed_normal;
 }
 
 static void sort_two(int32_t *a)

@@ -145,6 +145,24 @@ double drape_contact_march(const drape_contact *c, const drape_collider *collide
     return t;
 }
 
+/* Lowers the fractions of nodes that go farther than a path whose candidates can be kept. A correction
+ * throws nodes so far only if it is of no use there; to search each pair on its own path would take seconds.
+ * Returns the least fraction. */
+static double shorten_long(const drape_contact *c, const double *x, const double *y, double *fraction)
+{
+    const double longest = MAX_PATH * c->mean_edge;
+    double least = 1, move[3];
+    for (int32_t i = 0; i < c->model->node_count; i++) {
+        vec3_sub(y + 3 * (size_t)i, x + 3 * (size_t)i, move);
+        const double length = vec3_norm(move);
+        if (!(length > longest))
+            continue;
+        fraction[i] = longest / length;
+        least = fmin(least, fraction[i]);
+    }
+    return least;
+}
+
 double drape_contact_step_fraction(drape_contact *c, const double *x, const double *y, double t,
                                    double *of_node)
 {
@@ -152,6 +170,9 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
     const drape_keep keep = {
         .rounding = c->broad.rounding, .least = 1, .above = KEEP_ITERATE, .below = KEEP_ITERATE};
     drape_pair limiting;
+    const double shortened = of_node ? shorten_long(c, x, y, of_node) : 1;
+    if (shortened < 1)
+        return shortened;
     drape_contact_poses(c, t, span, c->path_pose);
     drape_contact_fill(c, x, c->path_pose, c->from);
     drape_contact_fill(c, y, c->path_pose, c->to);

@@ -246,7 +246,7 @@ bool drape_contact_nearest(const drape_contact *c, drape_diagnostic *diagnostic)
     double gap = nearest ? nearest->gap : INFINITY;
     for (int32_t i = 0; !nearest && i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
-        if (contact->gap.value < gap) {
+        if (!(contact->relaxed > 0) && contact->gap.value < gap) {
             pair = &contact->pair;
             gap = contact->gap.value;
         }

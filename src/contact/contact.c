@@ -9,6 +9,7 @@
  *     force.c        energy, gradient and Hessian of an active contact, by the barrier (barrier.h)
  *     restitution.c  the dissipative part of its normal force
  *     friction.c     its friction, with the normal force of now or, lagged, of the beginning of the step
+ *     relaxed.c      the nodes that bodies leave no room, and whose pairs are not held; room.c finds them
  *     jacobian.c     dg/dx + w dg/dv of the active set, block by block into the pattern
  *
  * This file has the two configurations that these work on: the beginning of a step, and the one at which
@@ -195,25 +196,6 @@ drape_status drape_contact_take_failure(drape_contact *c)
     return failed ? DRAPE_E_MEMORY : DRAPE_OK;
 }
 
-/* Where a collider has no smooth surface, which is paired with every node, that of its relaxed nodes pushes
- * them out. */
-static drape_status add_surfaces(drape_contact *c, const drape_configuration *at)
-{
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < c->relaxed.count; i++) {
-        const drape_relaxed_node *node = &c->relaxed.nodes[i];
-        if (node->collider < 0 || c->model->colliders[node->collider].ops->smooth ||
-            c->model->pinned[node->node])
-            continue;
-        drape_active_contact contact = {.pair =
-                                            drape_broad_phase_surface(&c->broad, node->node, node->collider),
-                                        .relaxed = node->factor};
-        if (drape_pair_gap(&contact.pair, at, c->broad.rest, &contact.gap))
-            status = drape_active_set_add(&c->active, &contact);
-    }
-    return status;
-}
-
 drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
 {
     const drape_straight_path here = {{*at, *at}};
@@ -226,7 +208,7 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
         return drape_contact_take_failure(c);
     const drape_status status =
         drape_active_set_list(&c->active, candidates, &away, at, &c->inside, !in_step, &c->relaxed);
-    return status ? status : add_surfaces(c, at);
+    return status ? status : drape_room_add_surfaces(c, at);
 }
 
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)
@@ -433,8 +415,8 @@ static drape_status lag_at(drape_contact *c, const double *v, double t)
     return drape_contact_lag(c);
 }
 
-/* Looks for room at the end of the step, where some cloth has none already, and holds again what has come out.
- * What the forces do not have any more, or have from now on, is the work of whoever presses. */
+/* Looks for room at the end of the step, where some cloth has none already, and holds again what has come
+ * out. What the forces do not have any more, or have from now on, is the work of whoever presses. */
 static drape_status update_relaxed(drape_contact *c, const drape_contact_at *at)
 {
     bool changed = false;

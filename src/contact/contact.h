@@ -32,9 +32,9 @@ double drape_contact_search_seconds(const drape_contact *contact); /* part of it
  * (relaxed.h). Without it, no cloth is, and what is relaxed stays so. */
 void drape_contact_expect(drape_contact *contact, double t1, bool may_relax);
 
-/* After a step to t1 that failed: relaxes cloth that has no room, or, if there is none and `all` is set, the pair
- * that refused the step and those whose gaps are hardly above the least. *added: nodes that are relaxed from now
- * on; if there are any, the same step may succeed. Errors: DRAPE_E_MEMORY. */
+/* After a step to t1 that failed: relaxes cloth that has no room, or, if there is none and `all` is set,
+ * the pair that refused the step and those whose gaps are hardly above the least. *added: nodes that are
+ * relaxed from now on; if there are any, the same step may succeed. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_relax(drape_contact *contact, double t1, bool all, int32_t *added);
 /* The nominal step [s], unless the integrator has none: where the scene gives no activation distance, that of
  * a moving collider grows with its path in such a step. */
@@ -109,7 +109,8 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
 
 /* The largest step fraction from x to y (node_count x 3) on which no two pieces pass through each other,
  * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered at
- * each node to the smallest fraction of its pairs. */
+ * each node to the smallest fraction of its pairs; where a displacement is longer than a few edges, to such a
+ * length without a look at pairs. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
                                    double *of_node);
 

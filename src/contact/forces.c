@@ -49,8 +49,8 @@ void drape_contact_velocities(const drape_contact *c, const drape_active_contact
 {
     for (int a = 0; a < contact->gap.closest.points; a++)
         memcpy(v[a], c->v + 3 * (size_t)contact->pair.node[a], sizeof v[a]);
-    if (contact->gap.closest.points == 1)
-        vec3_sub(v[0], c->pose[contact->pair.collider].velocity, v[0]);
+    for (int a = 0; contact->pair.kind == DRAPE_PAIR_SURFACE && a < contact->gap.closest.points; a++)
+        vec3_sub(v[a], c->pose[contact->pair.collider].velocity, v[a]);
 }
 
 static void scatter(drape_contact *c, const drape_active_contact *contact, const double *from, double *g)

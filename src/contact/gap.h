@@ -15,7 +15,7 @@ typedef struct drape_gap {
     bool fixed_normal;     /* the normal and c do not change with the points: a sharp feature is touched */
     bool mollified;        /* m and dm are set; else m = 1 and dm = 0 */
     double m, dm[12];      /* mollifier of nearly parallel edges, and its derivative */
-    double curvature[9];   /* 1 point: of the smooth surface, dn/dx (3 x 3 [1/m]) */
+    double curvature[9];   /* of a smooth surface, dn/dx (3 x 3 [1/m]); its points are weights of one place */
 } drape_gap;
 
 /* How the geometry changes with the points. Column 3 i + k belongs to coordinate k of point i. */

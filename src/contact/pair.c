@@ -146,9 +146,10 @@ void drape_pair_derivatives(const drape_pair *pair, const drape_gap *gap, const 
 {
     double x[4][3];
     memset(&derivatives->closest, 0, sizeof derivatives->closest);
-    if (gap->closest.points == 1) {
+    if (pair->kind == DRAPE_PAIR_SURFACE) {
         for (int k = 0; k < 3; k++)
-            memcpy(derivatives->closest.normal[k], gap->curvature + 3 * k, 3 * sizeof *gap->curvature);
+            for (int i = 0; i < 3 * gap->closest.points; i++)
+                derivatives->closest.normal[k][i] = gap->closest.c[i / 3] * gap->curvature[3 * k + i % 3];
         return;
     }
     gather(pair, gap->closest.points, at->x, x);

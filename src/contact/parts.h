@@ -1,7 +1,8 @@
 /*
  * parts.h: the struct behind contact.h, and what its files share. contact.c: the configuration and its
  * active set; forces.c: forces and energy; jacobian.c: derivatives and their blocks in a pattern; ccd.c:
- * continuous collision detection; check.c: the end of a step; checkpoint.c: archives.
+ * continuous collision detection; check.c: the end of a step; room.c: cloth that bodies leave no room;
+ * checkpoint.c: archives.
  */
 #ifndef DRAPE_CONTACT_PARTS_H
 #define DRAPE_CONTACT_PARTS_H

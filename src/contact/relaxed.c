@@ -151,10 +151,13 @@ static void add_to_total(drape_relaxed_set *set, int32_t collider, double t)
         return;
     if (total->most == 0)
         total->first = set->nodes[first].since;
-    for (int32_t i = first; i < first + count; i++)
+    double since = INFINITY;
+    for (int32_t i = first; i < first + count; i++) {
         total->deepest = fmax(total->deepest, set->nodes[i].deepest);
+        since = fmin(since, set->nodes[i].since);
+    }
     total->most = count > total->most ? count : total->most;
-    total->seconds += t - fmin(set->t, t);
+    total->seconds += t - fmin(fmax(set->t, since), t);
     total->last = t;
 }
 

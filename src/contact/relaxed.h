@@ -1,8 +1,9 @@
 /*
- * relaxed.h: the cloth that bodies leave no room: nodes, each with the collider whose surface does not hold it
- * for the time being. A pair is relaxed if one of its nodes of cloth is, for its collider. Relaxed pairs have
- * the bounded barrier (barrier.h), which pushes out with a pressure of no more than the scene's, and are not
- * checked. A node that has room again is pushed more and more, until its gap is as large as contact allows.
+ * relaxed.h: the cloth that bodies leave no room: nodes, each with the collider whose surface does not
+ * hold it for the time being. A pair is relaxed if one of its nodes of cloth is, for its collider. Relaxed
+ * pairs have the bounded barrier (barrier.h), which pushes out with a pressure of no more than the
+ * scene's, and are not checked. A node that has room again is pushed more and more, until its gap is as
+ * large as contact allows.
  */
 #ifndef DRAPE_CONTACT_RELAXED_H
 #define DRAPE_CONTACT_RELAXED_H

@@ -11,8 +11,91 @@
 
 #define MARGIN DRAPE_BARRIER_GENTLE /* of the activation distance, that cloth needs on either side */
 #define ACROSS 0.3 /* cosine: surfaces more upright than this to the cloth are left along their own normal */
-#define PASSES 3   /* to find the way out of a curved surface */
+#define PASSES 3   /* to find the nearest place outside of a curved surface */
 #define HOLD   0.1 /* [s] cloth is relaxed at least, where no look ahead can say whether there is room */
+
+/* Whether a collider may be nearer to a point than the margin. */
+static bool may_be_near(const drape_contact *c, const drape_collider_pose *pose, int32_t collider,
+                        double margin, const double x[3])
+{
+    const double *bound = c->relaxed.bound + 4 * (size_t)collider;
+    double to[3];
+    vec3_sub(x, bound, to);
+    vec3_sub(to, pose[collider].displacement, to);
+    return !(vec3_norm(to) > bound[3] + margin);
+}
+
+/* ---- Contacts of relaxed cloth ---- */
+
+static bool is_sharp(const drape_collider *collider)
+{
+    return collider->shape.point_count > 0 && !(collider->shape.radius > 0);
+}
+
+/* The gap between a point of a face and the surface of a collider. */
+static bool find_face_gap(const drape_contact *c, const drape_configuration *at, int32_t collider,
+                          const double share[3], drape_active_contact *contact)
+{
+    const double distance = contact->pair.distance;
+    drape_gap *gap = &contact->gap;
+    double x[3] = {0};
+    for (int a = 0; a < 3; a++)
+        vec3_add_scaled(share[a], at->x + 3 * (size_t)contact->pair.node[a], x);
+    if (!may_be_near(c, at->pose, collider, distance, x))
+        return false;
+    *gap = (drape_gap){.closest = {.points = 3, .c = {share[0], share[1], share[2]}}, .m = 1};
+    gap->value = drape_collider_distance(&at->model->colliders[collider], &at->pose[collider], x,
+                                         gap->closest.normal, gap->curvature);
+    return gap->value < distance;
+}
+
+#define ACROSS_FACE 3 /* parts of a side: 7 points of a face besides its corners */
+
+static drape_status add_face(drape_contact *c, const drape_configuration *at, int32_t collider, int32_t face)
+{
+    const int32_t *n = c->model->triangle + 3 * (size_t)face;
+    bool blocked = false; /* as long as another body presses on it, the nearest surface may be at the side */
+    drape_status status = DRAPE_OK;
+    drape_active_contact contact = {.pair = drape_broad_phase_surface(&c->broad, n[0], collider)};
+    for (int a = 0; a < 3; a++) {
+        const drape_relaxed_node *found = drape_relaxed_find(&c->relaxed, collider, n[a]);
+        contact.relaxed = fmax(contact.relaxed, found ? found->factor : 0);
+        contact.pair.node[a] = n[a];
+        blocked = blocked || (found && found->blocked);
+    }
+    contact.pair.area = c->broad.face_area[face] / 7;
+    for (int i = 0; i <= ACROSS_FACE && contact.relaxed > 0 && !blocked; i++)
+        for (int j = 0; !status && i + j <= ACROSS_FACE; j++) {
+            const int k = ACROSS_FACE - i - j;
+            const double share[3] = {(double)i / ACROSS_FACE, (double)j / ACROSS_FACE,
+                                     (double)k / ACROSS_FACE};
+            if ((i < ACROSS_FACE && j < ACROSS_FACE && k < ACROSS_FACE) &&
+                find_face_gap(c, at, collider, share, &contact))
+                status = drape_active_set_add(&c->active, &contact);
+        }
+    return status;
+}
+
+drape_status drape_room_add_surfaces(drape_contact *c, const drape_configuration *at)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; !status && i < c->relaxed.count; i++) {
+        const drape_relaxed_node *node = &c->relaxed.nodes[i];
+        if (node->collider < 0 || c->model->colliders[node->collider].ops->smooth ||
+            c->model->pinned[node->node])
+            continue;
+        drape_active_contact contact = {.pair =
+                                            drape_broad_phase_surface(&c->broad, node->node, node->collider),
+                                        .relaxed = node->factor};
+        if (drape_pair_gap(&contact.pair, at, c->broad.rest, &contact.gap))
+            status = drape_active_set_add(&c->active, &contact);
+    }
+    for (int32_t k = 0; !status && k < c->model->collider_count; k++)
+        for (int32_t f = 0; !status && f < c->model->triangle_count; f++)
+            if (drape_relaxed_count(&c->relaxed, k) > 0 && is_sharp(&c->model->colliders[k]))
+                status = add_face(c, at, k, f);
+    return status;
+}
 
 /* ---- Looking ahead ---- */
 
@@ -68,15 +151,12 @@ static void move_out(const drape_contact *c, int32_t collider, double margin, co
     }
 }
 
-/* Whether the way out of one collider leads deeper into another one. */
-static bool is_in_the_way(const drape_contact *c, int32_t other, double margin, const double q[3],
+/* Whether the direction out of one collider leads deeper into another one. */
+static bool is_blocked_by(const drape_contact *c, int32_t other, double margin, const double q[3],
                           const double direction[3])
 {
-    const double *bound = c->relaxed.bound + 4 * (size_t)other;
-    double n[3], to[3];
-    vec3_sub(q, bound, to);
-    vec3_sub(to, c->pose[other].displacement, to);
-    if (vec3_norm(to) > bound[3] + margin)
+    double n[3];
+    if (!may_be_near(c, c->pose, other, margin, q))
         return false;
     return distance_at(c, other, q, n) < margin * (1 - 1e-6) && vec3_dot(n, direction) < 0;
 }
@@ -92,8 +172,8 @@ static drape_status block(drape_contact *c, int32_t collider, const int32_t *nod
     return status;
 }
 
-/* Around a pin inside a collider there is a way out only beyond its depth, less the cloth between: edge by edge,
- * from every pin inside, the depth that is left. */
+/* Around a pin inside a collider cloth can be outside only beyond its depth, less the cloth between: edge
+ * by edge, from every pin inside, the depth that is left. */
 static void reach_from_pins(const drape_contact *c, int32_t collider, double margin, double *reach)
 {
     const drape_model *m = c->model;
@@ -118,10 +198,16 @@ static drape_status block_pins(drape_contact *c, int32_t collider, double margin
                                int32_t *added)
 {
     drape_status status = DRAPE_OK;
+    const drape_model *m = c->model;
+    const double *reach = c->relaxed.reach;
     reach_from_pins(c, collider, margin, c->relaxed.reach);
-    for (int32_t i = 0; !status && i < c->model->node_count; i++)
-        if (c->relaxed.reach[i] > 0)
-            status = block(c, collider, &i, 1, t, t, may_relax, added);
+    for (int32_t e = 0; !status && e < m->edge_count; e++) {
+        const int32_t *n = m->edge + 2 * (size_t)e; /* pins among pins do not touch anything */
+        const bool free = !m->pinned[n[0]] || !m->pinned[n[1]];
+        for (int k = 0; !status && free && k < 2; k++)
+            if (reach[n[k]] > 0)
+                status = block(c, collider, &n[k], 1, t, t, may_relax, added);
+    }
     return status;
 }
 
@@ -142,12 +228,39 @@ static drape_status block_between(drape_contact *c, int32_t collider, const clot
     drape_status status = DRAPE_OK;
     move_out(c, collider, margin, p, q, direction);
     for (int32_t other = 0; !status && other < c->model->collider_count; other++) {
-        if (other == collider || !is_in_the_way(c, other, margin, q, direction))
+        if (other == collider || !is_blocked_by(c, other, margin, q, direction))
             continue;
         status = block(c, collider, p->node, p->nodes, t, t, may_relax, added);
         if (!status)
             status = block(c, other, p->node, p->nodes, t, t, may_relax, added);
     }
+    return status;
+}
+
+/* A face that is pierced by a feature without a radius is not near it any more, and its nodes may be outside:
+ * points of the face are looked at, between which a tip may be missed. */
+static drape_status block_pierced(drape_contact *c, int32_t collider, double t, bool may_relax,
+                                  int32_t *added)
+{
+    static const double shares[][3] = {{1. / 3, 1. / 3, 1. / 3}, {0.5, 0.5, 0}, {0, 0.5, 0.5}, {0.5, 0, 0.5}};
+    const double margin = MARGIN * c->model->contact.distance;
+    drape_status status = DRAPE_OK;
+    for (int32_t f = 0; !status && f < c->model->triangle_count; f++)
+        for (size_t i = 0; !status && i < sizeof shares / sizeof *shares; i++) {
+            cloth_point p = {.nodes = 3};
+            memcpy(p.node, c->model->triangle + 3 * (size_t)f, 3 * sizeof *p.node);
+            for (int a = 0; a < 3; a++)
+                vec3_add_scaled(shares[i][a], c->x + 3 * (size_t)p.node[a], p.x);
+            if (!may_be_near(c, c->pose, collider, margin, p.x) ||
+                !(distance_at(c, collider, p.x, NULL) < margin))
+                continue;
+            for (int a = 0; a < 3; a++)
+                vec3_add_scaled(shares[i][a], c->relaxed.normal + 3 * (size_t)p.node[a], p.normal);
+            const double length = vec3_norm(p.normal);
+            for (int k = 0; k < 3 && length > 0; k++)
+                p.normal[k] /= length;
+            status = block_between(c, collider, &p, margin, t, may_relax, added);
+        }
     return status;
 }
 
@@ -186,15 +299,19 @@ drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, 
         if (!status)
             status = block_between(c, collider, &p, margin, t, may_relax, added);
     }
+    for (int32_t k = 0; !status && k < c->model->collider_count; k++) {
+        if (is_sharp(&c->model->colliders[k]))
+            status = block_pierced(c, k, t, may_relax, added);
+    }
     c->listed = c->listed && *added == 0; /* the laws of contacts have changed */
     return status;
 }
 
 /* ---- A step that failed ---- */
 
-/* Relaxes what a pair needs to get through: the nodes of its cloth; of cloth and pinned cloth the free nodes of
- * the piece that meets the other one. */
-static drape_status give_way(drape_contact *c, const drape_pair *pair, double t, int32_t *added)
+/* Relaxes what a pair needs to get through: the nodes of its cloth; of cloth and pinned cloth the free
+ * nodes of the piece that meets the other one. */
+static drape_status relax_pair(drape_contact *c, const drape_pair *pair, double t, int32_t *added)
 {
     const drape_model *m = c->model;
     const int points = drape_pair_points(pair), split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
@@ -217,10 +334,10 @@ static drape_status relax_blockers(drape_contact *c, int32_t *added)
 {
     drape_status status = go_to(c, c->start, c->start_t);
     if (!status && c->refused)
-        status = give_way(c, &c->refusing, c->start_t, added);
+        status = relax_pair(c, &c->refusing, c->start_t, added);
     const int32_t near_count = c->active.near_count;
     for (int32_t i = 0; !status && i < near_count; i++)
-        status = give_way(c, &c->active.near[i].pair, c->start_t, added);
+        status = relax_pair(c, &c->active.near[i].pair, c->start_t, added);
     return status;
 }
 
@@ -268,8 +385,8 @@ static void measure(drape_contact *c)
     }
 }
 
-/* Whether a face of cloth and a piece of a collider pass through each other: two points of an edge, or three of
- * a triangle. */
+/* Whether a face of cloth and a piece of a collider pass through each other: two points of an edge, or
+ * three of a triangle. */
 static bool cross(const drape_contact *c, int32_t collider, const int32_t *face, const int32_t *piece,
                   int points)
 {

@@ -148,9 +148,9 @@ static json_t *with_inside(json_t *object, const drape_sim *sim)
     return drape_json_with(object, "intersections", found(drape_sim_intersections(sim, -1)));
 }
 
-/* For each collider, and pinned pieces of cloth, that left cloth no room: the number of nodes that are relaxed there,
- * the most at a time, how deep [m], and when [s]. */
-static json_t *no_room(const drape_sim *sim)
+/* For each collider, and pinned pieces of cloth, that left cloth no room, if there are any: the number of
+ * nodes that are relaxed there, the most at a time, how deep [m], and when [s]. */
+static json_t *with_no_room(json_t *object, const drape_sim *sim)
 {
     json_t *list = json_array();
     for (int32_t c = -1; c < drape_sim_model(sim)->collider_count; c++) {
@@ -166,7 +166,10 @@ static json_t *no_room(const drape_sim *sim)
         list = drape_json_append(
             list, with_reals(with_counts(one, counts, LENGTH(counts)), values, LENGTH(values)));
     }
-    return list;
+    if (!list || json_array_size(list) > 0)
+        return drape_json_with(object, "no_room", list);
+    json_decref(list);
+    return object;
 }
 
 static json_t *warnings(drape_sim *sim)
@@ -218,7 +221,7 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     if (s.stability_known)
         object = drape_json_with(object, "equilibrium", stability(&s));
     object = with_inside(object, sim);
-    object = drape_json_with(object, "no_room", no_room(sim));
+    object = with_no_room(object, sim);
     object = drape_json_with(object, "warnings", warnings(sim));
     if (def->realtime)
         object = drape_json_with(object, "realtime", realtime(def->realtime));

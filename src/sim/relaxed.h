@@ -1,5 +1,5 @@
-/* relaxed.h: the cloth that bodies leave no room (contact/relaxed.h), as messages, reports and the summary see
- * it. */
+/* relaxed.h: the cloth that bodies leave no room (contact/relaxed.h), as messages, reports and the summary
+ * see it. */
 #ifndef DRAPE_SIM_RELAXED_H
 #define DRAPE_SIM_RELAXED_H
 

@@ -14,8 +14,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Attempts that fail in a row, or halvings of a step, after which the pairs that hold it up are relaxed: impacts
- * on cloth that has room take some. */
+/* Attempts that fail in a row, or halvings of a step, after which the pairs that hold it up are relaxed:
+ * impacts on cloth that has room take some. */
 #define PATIENCE 6
 
 /* ---- Compute and check ---- */
@@ -102,13 +102,19 @@ static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status s
     return sim->chosen.controller->judge(sim->chosen.controller_values, trial);
 }
 
-/* For an attempt that failed: relaxes cloth that bodies leave no room at its end and, if the step has failed
- * several times or is not to be tried again, what holds it up. True: the same step is worth another attempt. */
-static bool relax(drape_sim *sim, double t1, drape_status status, drape_verdict verdict)
+/* For an attempt that failed: relaxes cloth that bodies leave no room at its end and, if the step has
+ * failed several times or is not to be tried again, what holds it up. *again: the same step is worth
+ * another attempt. Errors: DRAPE_E_MEMORY. */
+static drape_status relax(drape_sim *sim, double t1, drape_status failure, drape_verdict verdict, bool *again)
 {
-    int32_t added;
+    int32_t added = 0;
     const bool all = verdict == DRAPE_STOP || sim->failed >= PATIENCE || sim->schedule.level >= PATIENCE;
-    return status > 0 && may_relax(sim) && !drape_system_relax(sim->system, t1, all, &added) && added > 0;
+    const bool may_help =
+        failure > 0 || failure == DRAPE_E_STEP_TOO_SMALL; /* of integrators with steps of their own */
+    const drape_status status =
+        may_help && may_relax(sim) ? drape_system_relax(sim->system, t1, all, &added) : DRAPE_OK;
+    *again = !status && added > 0;
+    return status;
 }
 
 /* ---- Accept and reject ---- */
@@ -326,10 +332,11 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     drape_status status = compute_next(sim, t1, h, &info);
     drape_verdict verdict = judge(sim, &info, status, &trial);
     sim->further_seconds = info.further_seconds;
-    const bool again = verdict != DRAPE_ACCEPT && relax(sim, t1, status, verdict);
+    bool again = false;
+    const drape_status relaxed = verdict == DRAPE_ACCEPT ? DRAPE_OK : relax(sim, t1, status, verdict, &again);
     verdict = again ? DRAPE_RETRY : verdict;
     bool refused = status == DRAPE_OK && verdict != DRAPE_ACCEPT; /* by the controller alone */
-    *stop = verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
+    *stop = relaxed ? relaxed : verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
     if (verdict == DRAPE_ACCEPT)
         accept(sim, &info, trial.h_next);
     else

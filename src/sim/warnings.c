@@ -159,12 +159,11 @@ static bool had_no_room(drape_sim *sim, char *text, size_t size)
     if (places > 1)
         snprintf(more, sizeof more, ", and at %d other%s", (int)places - 1, places == 2 ? "" : "s");
     snprintf(text, size,
-             "cloth had no room at %s%s: up to %d node%s of it relaxed there, for %.3g s between %.4g and "
+             "cloth had no room at %s%s: up to %d of its nodes relaxed there, for %.3g s between %.4g and "
              "%.4g s, up to "
              "%.3g m deep; %d now",
-             drape_sim_relaxed_name(sim, most), more, (int)total->most, total->most == 1 ? " was" : "s were",
-             total->seconds, total->first, total->last, total->deepest,
-             (int)drape_sim_relaxed_now(sim, &deepest));
+             drape_sim_relaxed_name(sim, most), more, (int)total->most, total->seconds, total->first,
+             total->last, total->deepest, (int)drape_sim_relaxed_now(sim, &deepest));
     return true;
 }
 

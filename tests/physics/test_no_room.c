@@ -1,8 +1,8 @@
 /*
- * test_no_room.c: bodies that leave cloth no room. With contact/no_room "relax", and with "auto" in real time,
- * no step fails for good, time goes on at the steps that were asked for, the report names the bodies, the rest
- * of the cloth is not strained, and once there is room nothing is inside any more. With "stop" the run stops and
- * names the pair.
+ * test_no_room.c: bodies that leave cloth no room. With contact/no_room "relax", and with "auto" in real
+ * time, no step fails for good, time goes on at the steps that were asked for, the report names the
+ * bodies, the rest of the cloth is not strained, and once there is room nothing is inside any more. With
+ * "stop" the run stops and names the pair.
  */
 #include "sim/relaxed.h"
 #include "support/bytes.h"
@@ -23,7 +23,8 @@
 #define REST                                                                                                 \
     " 'contact': {'no_room': '%s', 'friction': 'lagged'},"                                                   \
     " 'integrator': {'method': '%s', 'dt': 0.0166666666666666667}, 'duration': 3}"
-/* Two balls that close upon the middle of the sheet from 0.1 to 0.3 s, overlap by 4 cm, and part from 0.7 s on. */
+/* Two balls that close upon the middle of the sheet from 0.1 to 0.3 s, overlap by 4 cm, and part from 0.7
+ * s on. */
 #define BALLS                                                                                                \
     " 'colliders': [{'name': 'left', 'type': 'sphere', 'center': [0, 0.25, -0.15], 'radius': 0.1,"           \
     " 'friction': 0.3, 'track': [[0.1, [0,0,0]], [0.3, [0,0,0.07]], [0.7, [0,0,0.07]], [0.9, [0,0,0]]]},"    \
@@ -36,15 +37,15 @@ static scene open_pinch(const char *policy, const char *method)
 }
 
 /* What was seen in the frames of a run. */
-typedef struct seen {
+typedef struct record {
     int32_t most;           /* relaxed nodes */
     double deepest, strain; /* [m]; of edges at no relaxed node or neighbour of one */
     double first, last;     /* [s] frames with relaxed nodes */
     bool *named;            /* (collider_count) */
     double last_inside;     /* [s] the last frame with a triangle inside */
-} seen;
+} record;
 
-static void look(const scene *s, seen *seen)
+static void look(const scene *s, record *seen)
 {
     const drape_model *m = s->model;
     const double *x = drape_sim_positions(s->sim), t = drape_sim_time(s->sim);
@@ -90,9 +91,9 @@ static void look(const scene *s, seen *seen)
 }
 
 /* Frames of 1/60 s: every call succeeds and reaches its time. */
-static seen run(scene *s, bool realtime, int frames)
+static record run(scene *s, bool realtime, int frames)
 {
-    seen seen = {.named = calloc((size_t)s->model->collider_count, sizeof *seen.named), .last_inside = -1};
+    record seen = {.named = calloc((size_t)s->model->collider_count, sizeof *seen.named), .last_inside = -1};
     for (int f = 1; f <= frames; f++) {
         drape_realtime report = {0};
         const drape_status status = realtime ? drape_sim_advance_realtime(s->sim, FRAME, 1e9, &report)
@@ -116,11 +117,11 @@ static int64_t extra_attempts(const scene *s, int frames)
 static void check_pinch(const char *policy, const char *method, bool realtime)
 {
     scene s = open_pinch(policy, method);
-    seen seen = run(&s, realtime, 84);
+    record seen = run(&s, realtime, 84);
     drape_warning warning = {.name = ""};
     ck_assert(seen.named[0] && seen.named[1]);
-    /* Each ball goes 2 cm beyond the plane of the sheet. The cloth between may lie anywhere in the overlap of 4
-     * cm, and what is relaxed around it no deeper than that. */
+    /* Each ball goes 2 cm beyond the plane of the sheet. The cloth between may lie anywhere in the overlap
+     * of 4 cm, and what is relaxed around it no deeper than that. */
     ck_assert_double_ge(seen.deepest, 0.02);
     ck_assert_double_le(seen.deepest, 0.04);
     ck_assert_double_lt(seen.strain, 0.1);
@@ -129,7 +130,8 @@ static void check_pinch(const char *policy, const char *method, bool realtime)
     ck_assert_double_le(seen.first, 0.243 + 2 * FRAME);
     ck_assert_double_lt(seen.last_inside, 0.757 + 0.5);
     ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);
-    /* One attempt fails when the balls meet; an impact at 0.35 m/s with a distance of 1 mm may take some more. */
+    /* One attempt fails when the balls meet; an impact at 0.35 m/s with a distance of 1 mm may take some
+     * more. */
     ck_assert_int_le((int)extra_attempts(&s, 84), 12);
     /* Between the balls, which have parted by 10 cm, the cloth hangs again. */
     for (int32_t i = 0; i < s.model->node_count; i++)
@@ -141,7 +143,7 @@ static void check_pinch(const char *policy, const char *method, bool realtime)
     const drape_relaxed_total *total = drape_sim_relaxed_total(s.sim, 0);
     ck_assert_int_gt(total->most, 0);
     ck_assert_double_ge(total->seconds, 0.757 - 0.243 - FRAME);
-    ck_assert_double_le(total->seconds, 0.757 - 0.243 + 0.5);
+    ck_assert_double_eq_tol(total->seconds, total->last - total->first, 1e-9); /* without a break */
     free(seen.named);
     scene_close(&s);
 }
@@ -183,7 +185,7 @@ START_TEST(test_checkpoint)
     scene s = open_pinch("relax", "newton_k");
     for (int f = 1; f <= 66; f++) {
         scene_advance(&s, f * FRAME);
-        if (f != 20 && f != 48)
+        if (f != 20 && f != 46)
             continue;
         ck_assert_int_gt(drape_sim_relaxed(s.sim, 0, NULL), 0);
         bytes saved = bytes_save(s.sim);
@@ -215,7 +217,7 @@ START_TEST(test_table)
               " 'friction': 0.3, 'track': [[0.2, [0,0,0]], [0.4, [0,-0.08,0]], [0.7, [0,-0.08,0]],"
               " [0.9, [0,0,0]]]}]," REST,
         "horizontal", 0.005, 0.25, "", "auto", "newton_k");
-    seen seen = run(&s, true, 84);
+    record seen = run(&s, true, 84);
     ck_assert(seen.named[0] && seen.named[1]);
     ck_assert_double_le(seen.deepest, 0.04);
     ck_assert_double_lt(seen.strain, 0.1);
@@ -236,7 +238,7 @@ START_TEST(test_pins_inside)
                          ", {'nodes': [84], 'track': [[0.1, [0,0,0]], [0.4, [0,0,-0.08]], [0.7, [0,0,-0.08]],"
                          " [1, [0,0,0]]]}",
                          "auto", "newton_k");
-    seen seen = run(&s, true, 90);
+    record seen = run(&s, true, 90);
     ck_assert(seen.named[0]);
     ck_assert_double_eq_tol(seen.deepest, 0.06, 1e-6); /* of the pin, whose place is given */
     ck_assert_double_lt(seen.last_inside, 0.925 + 0.5);
@@ -246,8 +248,8 @@ START_TEST(test_pins_inside)
 }
 END_TEST
 
-/* An elbow: an arm of one capsule, and a forearm of balls that turn about its end to 150 degrees and back, with a
- * sheet that hangs over the arm between them. */
+/* An elbow: an arm of one capsule, and a forearm of balls that turn about its end to 150 degrees and back,
+ * with a sheet that hangs over the arm between them. */
 static int print_forearm(char *text, size_t size)
 {
     const double pi = 3.14159265358979323846;
@@ -283,7 +285,7 @@ START_TEST(test_elbow)
         " 'integrator': {'method': 'newton_k', 'dt': 0.0166666666666666667, 'iterations': 2},"
         " 'duration': 3}",
         forearm);
-    seen seen = run(&s, true, 168);
+    record seen = run(&s, true, 168);
     ck_assert(seen.named[0]);
     ck_assert_int_ge(seen.most, 4);
     ck_assert_double_lt(seen.strain, 0.1);
@@ -300,7 +302,7 @@ START_TEST(test_crevice)
     scene s = scene_open(SHEET " 'colliders': [{'type': 'sphere', 'center': [-0.1, 0, 0], 'radius': 0.13},"
                                " {'type': 'sphere', 'center': [0.1, 0, 0], 'radius': 0.13}]," REST,
                          "horizontal", 0.18, 0.25, "", "auto", "newton_k");
-    seen seen = run(&s, true, 60);
+    record seen = run(&s, true, 60);
     ck_assert_int_eq(seen.most, 0);
     ck_assert_double_lt(seen.last_inside, 0);
     free(seen.named);
@@ -308,25 +310,61 @@ START_TEST(test_crevice)
 }
 END_TEST
 
-/* Stiff cloth that is pulled taut over an edge has no room either: the pair that holds it up gives way. */
-START_TEST(test_taut)
+/* Boxes, whose edges have no radius to tell on which side the cloth belongs. */
+START_TEST(test_boxes)
 {
     scene s = scene_open(
-        "{'drape': 1, 'cloth': [{'name': 'sheet', 'mesh': {'grid': 'square', 'columns': 5, 'rows': 5,"
-        " 'width': 0.4, 'height': 0.4, 'transform': {'translate': [-0.2, 0.01, 0.2]}},"
-        " 'material': {'young_modulus': 3e7, 'thickness': 1e-3, 'density': 200},"
-        " 'terms': ['stretch.edge', 'bend.hinge'],"
-        " 'pins': [{'edge': 'left', 'track': [[0, [0,0,0]], [1, [0,-0.3,0]]]},"
-        " {'edge': 'right', 'track': [[0, [0,0,0]], [1, [0,-0.3,0]]]}]}],"
-        " 'colliders': [{'name': 'post', 'type': 'box', 'center': [0, -0.5, 0], 'size': [0.02, 1, "
-        "0.02]}]," REST,
-        "relax", "be");
-    seen seen = run(&s, false, 60);
-    ck_assert(seen.most == 0 || seen.named[0]);
+        SHEET " 'colliders': [{'name': 'left', 'type': 'box', 'center': [0, 0.25, -0.15],"
+              " 'size': [0.2, 0.2, 0.2], 'track': [[0.1, [0,0,0]], [0.3, [0,0,0.07]],"
+              " [0.7, [0,0,0.07]], [0.9, [0,0,0]]]},"
+              " {'name': 'right', 'type': 'box', 'center': [0, 0.25, 0.15], 'size': [0.2, 0.2, 0.2],"
+              " 'track': [[0.1, [0,0,0]], [0.3, [0,0,-0.07]], [0.7, [0,0,-0.07]], [0.9, [0,0,0]]]}]," REST,
+        "vertical", 0.5, 0.0, CORNERS, "auto", "newton_k");
+    record seen = run(&s, true, 84);
+    ck_assert(seen.named[0] && seen.named[1]);
+    ck_assert_double_lt(seen.strain, 0.1);
+    ck_assert_double_lt(seen.last_inside, 0.757 + 0.5);
+    ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);
     free(seen.named);
     scene_close(&s);
 }
 END_TEST
 
+#define PLATE                                                                                                \
+    "{'name': '%s', 'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.2, 'height': 0.2,"        \
+    " 'orientation': 'vertical', 'transform': {'translate': [-0.1, 0.35, %g]}}, 'material': "                \
+    "{'young_modulus'"                                                                                       \
+    ": 1e6, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge'], 'pins': [{'box': [[-1,-1,-1],"    \
+    " [1,1,1]], 'track': [[0.1, [0,0,0]], [0.3, [0,0,%g]], [0.6, [0,0,%g]], [0.8, [0,0,0]]]}]}"
+
+/* Pinned pieces of cloth that close upon free cloth have no inside, and pass through it. No geometry tells
+ * that there is no room: what refuses the step is relaxed, after some attempts. It is held again where
+ * they are farther away than layers are kept, on whichever side. */
+START_TEST(test_plates)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'name': 'sheet', 'mesh': {'grid': 'square', 'columns': 13, 'rows': 13,"
+        " 'width': 0.5, 'height': 0.5, 'orientation': 'vertical', 'transform': {'translate':"
+        " [-0.25, 0.5, 0]}}, 'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'density': 200},"
+        " 'terms': ['stretch.edge', 'bend.hinge'], 'pins': [" CORNERS "]}, " PLATE ", " PLATE "],"
+        " 'self_contact': {'thickness': 0.002}," REST,
+        "back", -0.06, 0.07, 0.07, "front", 0.06, -0.07, -0.07, "auto", "newton_k");
+    int32_t most = 0;
+    for (int f = 1; f <= 84; f++) {
+        drape_realtime report;
+        drape_relaxed r;
+        const drape_status status = drape_sim_advance_realtime(s.sim, FRAME, 1e9, &report);
+        ck_assert_msg(status == DRAPE_OK, "frame %d: %s", f, drape_context_message(s.ctx));
+        ck_assert_double_eq_tol(drape_sim_time(s.sim), f * FRAME, 1e-9);
+        most = report.relaxed > most ? report.relaxed : most;
+        if (drape_sim_relaxed(s.sim, 0, &r) > 0)
+            ck_assert(r.collider == -1 && strcmp(r.name, "self_contact") == 0 && r.depth == 0);
+    }
+    ck_assert_int_gt(most, 0);
+    ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);
+    scene_close(&s);
+}
+END_TEST
+
 SUITE("no_room", test_pinch, test_stop, test_checkpoint, test_table, test_pins_inside, test_elbow,
-      test_crevice, test_taut)
+      test_crevice, test_boxes, test_plates)
