@@ -31,7 +31,7 @@ struct drape_contact {
     const drape_model *model;
     const drape_motion *motion; /* of its colliders */
     double mean_edge;           /* [m] */
-    double dt; /* [s] nominal step, by which activation distances grow; 0: they do not */
+    double dt;                  /* [s] nominal step, by which activation distances grow; 0: they do not */
     drape_broad_phase broad;
 
     drape_candidates step_candidates;
