@@ -589,7 +589,7 @@ DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t 
 /* A doubt about a run: what is unusual, and which setting would help. */
 typedef struct drape_warning {
     const char *name; /* "no_terms", "few_steps", "large_mesh", "starts_inside", "ends_inside",
-                         "numerical_dissipation" or "slow_contact" */
+                         "numerical_dissipation", "slow_contact" or "contact_distance" */
     char text[400];   /* one line */
 } drape_warning;
 
