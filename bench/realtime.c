@@ -203,6 +203,8 @@ static void run(drape_context *ctx, const scene *s, const variant *v, const char
     *r = (result){.frames = (int)(seconds / FRAME + 0.5)};
     for (int i = 0; i < s->sims; i++) {
         sim[i] = bench_sim(ctx, model, integrator, dt, NULL, NULL);
+        if (getenv("LONGEST"))
+            sim[i]->realtime.longest_asked = atof(getenv("LONGEST"));
         if (s->move(s, sim[i], i, 0, 1e-9) || drape_sim_advance(sim[i], 1e-6))
             bench_fail(ctx, "the start of %s", s->name);
     }
@@ -215,9 +217,11 @@ static void run(drape_context *ctx, const scene *s, const variant *v, const char
             if (s->move(s, sim[i], i, (k + 1) * FRAME, FRAME + debt[i]))
                 bench_fail(ctx, "%s", s->name);
             const drape_status status =
-                converged
-                    ? drape_sim_advance(sim[i], drape_sim_time(sim[i]) + FRAME)
-                    : drape_sim_advance_realtime(sim[i], FRAME, s->budget * (starved ? 0.1 : 1), &report);
+                converged ? drape_sim_advance(sim[i], drape_sim_time(sim[i]) + FRAME)
+                          : drape_sim_advance_realtime(sim[i], FRAME,
+                                                       (getenv("SLOW") ? atof(getenv("SLOW")) : 1) *
+                                                           s->budget * (starved ? 0.1 : 1),
+                                                       &report);
             r->ms[k] += 1e3 * (drape_clock_seconds() - start);
             r->errors += status != DRAPE_OK;
             if (status && r->errors == 1)

@@ -396,8 +396,8 @@ typedef struct drape_realtime {
  * steps become longer, up to realtime_step of the def; then simulated time is left over. The level is chosen
  * anew in each call and rises again as soon as a better one fits.
  *
- * The work of a call is bounded: after its first accepted step, no step is begun that is not expected to end
- * in time. The time owed never exceeds one longest step. Anything beyond that is dropped: simulated time then
+ * The work of a call is bounded: after its first attempt at a step, accepted or rejected, no other is begun
+ * that is not expected to end in time: a rejected step is then retried, at half its size, by the next call. The time owed never exceeds one longest step. Anything beyond that is dropped: simulated time then
  * stays behind the clock for good, but late frames do not delay later ones. Steps follow the frames, so at
  * another frame rate the state differs only by the integrator's error in h. A later drape_sim_advance
  * continues with the scene's own steps. The level depends on the clock, so two runs may differ; they do not
@@ -677,7 +677,7 @@ DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t 
 /* A doubt about a run: what is unusual, and which setting would help. */
 typedef struct drape_warning {
     const char *name; /* "no_terms", "few_steps", "large_mesh", "starts_inside", "ends_inside", "no_room",
-                         "numerical_dissipation", "slow_contact" or "inaccurate" */
+                         "numerical_dissipation", "slow_contact", "contact_distance" or "inaccurate" */
     char text[400];   /* one line */
 } drape_warning;
 

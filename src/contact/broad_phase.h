@@ -23,7 +23,7 @@ typedef struct drape_broad_phase {
     int32_t *triangle_collider;
     bool *near_node, *near_edge; /* of a search of marked pairs: what may meet a marked face or edge */
     double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
-    double *distance; /* (collider_count) activation distance of cloth and each collider [m] */
+    double *distance;       /* (collider_count) activation distance of cloth and each collider [m] */
     double rounding;        /* what rounding can change in a gap, set by who moves the points [m] */
     double obstacle_radius; /* largest radius around the triangles of an obstacle [m] */
 } drape_broad_phase;

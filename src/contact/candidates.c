@@ -17,8 +17,6 @@ static void take_set(drape_arena *arena, const drape_broad_phase *broad, drape_c
         set->pose[end] =
             drape_arena_take(arena, (size_t)broad->model->collider_count, sizeof *set->pose[end]);
     }
-    set->away =
-        drape_arena_take(arena, (size_t)(broad->points + broad->model->collider_count), sizeof *set->away);
 }
 
 drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, double margin,
@@ -208,34 +206,16 @@ static double distance_from(const drape_candidates *c, const drape_candidate_set
     return sqrt(largest);
 }
 
-/* Raises the distances of points and colliders to those of a configuration. */
-static void raise_distances(const drape_candidates *c, const drape_candidate_set *set,
-                            const drape_configuration *at)
-{
-    const double t = nearest_fraction(c, set, at->x);
-    const size_t points = (size_t)c->broad->points;
-    for (size_t i = 0; i < points; i++)
-        set->away[i] =
-            fmax(set->away[i], sqrt(square_away(at->x + 3 * i, set->x[0] + 3 * i, set->x[1] + 3 * i, t)));
-    for (int32_t i = 0; i < c->broad->model->collider_count; i++)
-        set->away[points + (size_t)i] =
-            fmax(set->away[points + (size_t)i],
-                 sqrt(square_away(at->pose[i].displacement, set->pose[0][i].displacement,
-                                  set->pose[1][i].displacement, t)));
-}
-
 static double measure(const drape_candidates *c, const drape_candidate_set *set,
                       const drape_straight_path *path, const bool *without)
 {
     double largest = 0;
-    memset(set->away, 0, (size_t)(c->broad->points + c->broad->model->collider_count) * sizeof *set->away);
     for (int end = 0; end < 2; end++) {
         if (end > 0 && path->end[1].x == path->end[0].x && path->end[1].pose == path->end[0].pose)
             break;
         largest = fmax(largest, distance_from(c, set, &path->end[end], without, NULL));
         if (!(largest <= c->margin))
             break;
-        raise_distances(c, set, &path->end[end]);
     }
     return largest;
 }
@@ -244,9 +224,7 @@ drape_distances drape_candidates_distances(const drape_candidates *c, const drap
 {
     const bool patched = c->patch.known;
     return (drape_distances){.all = measure(c, &c->all, path, patched ? c->patched : NULL),
-                             .patch = patched ? measure(c, &c->patch, path, NULL) : 0,
-                             .of_all = c->all.away,
-                             .of_patch = c->patch.away};
+                             .patch = patched ? measure(c, &c->patch, path, NULL) : 0};
 }
 
 bool drape_candidates_are_valid(const drape_candidates *c, const drape_distances *away)
@@ -280,26 +258,11 @@ drape_status drape_candidates_search(drape_candidates *c, const drape_straight_p
 
 /* ---- The list ---- */
 
-/* How far the pieces of a pair are from where they were found, together. */
-static double away_of(const drape_candidates *c, const drape_pair *pair, const double *away, double largest)
-{
-    const int32_t *n = pair->node;
-    if (!away)
-        return 2 * largest;
-    if (pair->kind == DRAPE_PAIR_SURFACE)
-        return away[n[0]] + away[c->broad->points + pair->collider];
-    const double one = away[n[1]] > away[n[2]] ? away[n[1]] : away[n[2]];
-    if (pair->kind == DRAPE_PAIR_TRIANGLE)
-        return away[n[0]] + (one > away[n[3]] ? one : away[n[3]]);
-    return (away[n[0]] > away[n[1]] ? away[n[0]] : away[n[1]]) +
-           (away[n[2]] > away[n[3]] ? away[n[2]] : away[n[3]]);
-}
-
-static bool may_become_active(const drape_candidates *c, const drape_pair *pair, const double *of,
-                              double largest, double beyond)
+/* Each piece of the pair is at most `away` from where it was found. */
+static bool may_become_active(const drape_candidates *c, const drape_pair *pair, double away, double beyond)
 {
     const double reach = pair->distance + beyond + ROUNDING * c->broad->model->length;
-    return pair->gap_at_search - away_of(c, pair, of, largest) < reach;
+    return pair->gap_at_search - 2 * away < reach;
 }
 
 static bool is_patched(const drape_candidates *c, const drape_pair *pair)
@@ -324,12 +287,10 @@ const drape_pair *drape_candidates_next(const drape_candidates *c, const drape_d
 {
     const drape_pair *all = c->all.pairs, *patch = c->patch.pairs;
     const int32_t patches = c->patch.known ? c->patch.count : 0;
-    while (at->all < c->all.count &&
-           (!may_become_active(c, &all[at->all], away->of_all, away->all, away->beyond) ||
-            (c->patch.known && is_patched(c, &all[at->all]))))
+    while (at->all < c->all.count && (!may_become_active(c, &all[at->all], away->all, away->beyond) ||
+                                      (c->patch.known && is_patched(c, &all[at->all]))))
         at->all++;
-    while (at->patch < patches &&
-           !may_become_active(c, &patch[at->patch], away->of_patch, away->patch, away->beyond))
+    while (at->patch < patches && !may_become_active(c, &patch[at->patch], away->patch, away->beyond))
         at->patch++;
     if (at->patch < patches && (at->all >= c->all.count || is_before(&patch[at->patch], &all[at->all])))
         return &patch[at->patch++];

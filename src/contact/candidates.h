@@ -25,7 +25,6 @@ typedef struct drape_candidate_set {
     drape_collider_pose *pose[2]; /* (collider_count) */
     drape_pair *pairs;            /* (count of room) including those with surfaces, by increasing rank */
     int32_t count, room;
-    double *away; /* (points, then colliders) how far a configuration or a path is from this one [m] */
 } drape_candidate_set;
 
 typedef struct drape_candidates {
@@ -52,12 +51,11 @@ drape_status drape_candidates_search(drape_candidates *candidates, const drape_s
 
 /* How far a straight path is from those of each search. */
 typedef struct drape_distances {
-    double all, patch;               /* [m] at most */
-    const double *of_all, *of_patch; /* (points, then colliders) [m] of each; NULL: the largest of all */
-    double beyond;                   /* [m] of the activation distance: so far off may pairs stay, too */
+    double all, patch; /* [m] at most */
+    double beyond;     /* [m] of the activation distance: so far off may pairs stay, too */
 } drape_distances;
 
-/* The distances of a path, valid until the next call: as far as its ends are, at most. INFINITY if there was
+/* The distances of a path: as far as its ends are, at most. INFINITY if there was
  * no search, or if a position is not finite. */
 drape_distances drape_candidates_distances(const drape_candidates *candidates,
                                            const drape_straight_path *path);

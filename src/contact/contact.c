@@ -341,7 +341,12 @@ double drape_contact_take_work(drape_contact *c)
 
 void drape_contact_set_step(drape_contact *c, double dt)
 {
-    c->dt = c->model->contact.distance_given ? 0 : dt;
+    c->dt = dt;
+}
+
+double drape_contact_longest_path(const drape_contact *c)
+{
+    return c ? c->longest_path : 0;
 }
 
 /* How far a collider moves in a nominal step from time t on, relative to the mean motion of the cloth. */
@@ -371,10 +376,13 @@ static drape_status adapt_distances(drape_contact *c, double t, bool retry)
     bool changed = false;
     for (int32_t i = 0; c->dt > 0 && !retry && i < c->model->collider_count; i++) {
         double *distance = &c->broad.distance[i];
-        const double wanted = GROWTH * path_of(c, i, t), before = *distance;
-        if (wanted > before)
+        const double path = path_of(c, i, t), before = *distance;
+        c->longest_path = fmax(c->longest_path, path);
+        if (c->model->contact.distance_given)
+            continue;
+        if (GROWTH * path > before)
             *distance = 2 * before;
-        else if (wanted < 0.25 * before && before > least)
+        else if (GROWTH * path < 0.25 * before && before > least)
             *distance = 0.5 * before;
         changed = changed || *distance != before;
     }

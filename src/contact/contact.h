@@ -40,6 +40,9 @@ drape_status drape_contact_relax(drape_contact *contact, double t1, bool all, in
  * a moving collider grows with its path in such a step. */
 void drape_contact_set_step(drape_contact *contact, double dt);
 
+/* The longest path [m] of a collider in a nominal step so far, relative to the mean motion of the cloth. */
+double drape_contact_longest_path(const drape_contact *contact);
+
 /* Begins a step at the state x, v at time t: lagged friction takes its normal forces here, and the end of
  * the step is compared with it. The arrays are copied. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_begin(drape_contact *contact, const double *x, const double *v, double t);

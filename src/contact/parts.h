@@ -32,7 +32,8 @@ struct drape_contact {
     const drape_model *model;
     const drape_motion *motion; /* of its colliders */
     double mean_edge;           /* [m] */
-    double dt; /* [s] nominal step, by which activation distances grow; 0: they do not */
+    double dt;                  /* [s] nominal step, by which activation distances grow; 0: there is none */
+    double longest_path; /* [m] of a collider in such a step so far; not archived: for a warning alone */
     drape_broad_phase broad;
 
     drape_candidates step_candidates;

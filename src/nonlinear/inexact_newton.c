@@ -15,7 +15,6 @@
 #include "nonlinear/stress_predictor.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Fraction of the initial work along a correction that the residual may do beyond the minimum. */
@@ -177,21 +176,27 @@ static bool shorten_nodes(drape_inexact_newton *s, double *p)
     return false;
 }
 
+/* Lets the nodes that moving colliders reach slide on these. */
+static void make_way(drape_inexact_newton *s, double *d)
+{
+    drape_step_equation *e = s->equation;
+    memcpy(e->x_ahead, e->x, e->nodes * sizeof *e->x_ahead);
+    for (size_t i = 0; i < e->dofs; i++)
+        e->x_ahead[drape_step_equation_at(e, i)] += d[i];
+    drape_system_sweep(e->system, e->point.t, e->x_ahead);
+    for (size_t i = 0; i < e->dofs; i++) {
+        const size_t at = drape_step_equation_at(e, i);
+        if (e->x_ahead[at] != e->x[at] + d[i])
+            d[i] = e->x_ahead[at] - e->x[at];
+    }
+}
+
 /* A guess that is shortened at some nodes has kinks, which become wrinkles that take many iterations to
  * vanish. It is nearer to the solution nevertheless where few iterations follow. */
 static void make_guess_feasible(drape_inexact_newton *s, int iterations, double *d)
 {
-    if (s->fraction && !getenv("NOSWEEP")) {
-        drape_step_equation *e = s->equation;
-        memcpy(e->x_ahead, e->x, e->nodes * sizeof *e->x_ahead);
-        for (size_t i = 0; i < e->dofs; i++)
-            e->x_ahead[drape_step_equation_at(e, i)] += d[i];
-        drape_system_sweep(e->system, e->point.t, e->x_ahead);
-        for (size_t i = 0; i < e->dofs; i++) {
-            const size_t at = drape_step_equation_at(e, i);
-            d[i] = e->x_ahead[at] - e->x[at];
-        }
-    }
+    if (s->fraction)
+        make_way(s, d);
     if (s->fraction && (iterations > FEW_ITERATIONS || !shorten_nodes(s, d)))
         drape_step_equation_make_feasible(s->equation, d);
 }

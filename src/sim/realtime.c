@@ -6,8 +6,9 @@
  * for the next call. Left-over time above one longest step is dropped, so that late frames do not delay
  * later ones more and more.
  *
- * The work of a call is bounded: after its first accepted step it begins another only if that one is
- * expected to end in time. A step that takes longer than a frame is made once in several frames; the frames
+ * The work of a call is bounded: after its first attempt, accepted or rejected, it begins another only if that
+ * one is expected to end in time. So the halvings of a step that is rejected again and again are spread over
+ * calls. A step that takes longer than a frame is made once in several frames; the frames
  * between show the state before it.
  */
 #include "base/clock.h"
@@ -88,13 +89,23 @@ static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *
     return false;
 }
 
+/* The longest step to keep up with. Not above dt in contact: in a longer step a body moves farther, which costs
+ * more iterations and rejected steps than it saves (docs/realtime.md, "A budget"). */
+static double longest_step(const drape_sim *sim)
+{
+    const drape_realtime_memory *m = &sim->realtime;
+    const drape_contact *contact = drape_system_contact(sim->system);
+    double gap;
+    return contact && drape_contact_active(contact, &gap) > 0 ? m->dt : m->longest;
+}
+
 /* Steps at the lowest level of effort, longer than dt: as many as fit into the budget. If not even one
  * fits, one step for so many frames that it costs no more than their budgets together, and no step before
  * that many frames are owed. */
 static plan plan_stretched(const drape_sim *sim, double owed, double frame, double budget)
 {
     int effort = effort_count(sim) - 1;
-    double longest = fmin(sim->realtime.longest, sim->realtime.cap);
+    double longest = fmin(longest_step(sim), sim->realtime.cap);
     double fit = KEEP * budget / expected(sim, effort);
     int64_t most = steps_of(owed, sim->realtime.dt);
     if (fit < 1 && owed < (1 - SAME) * fmin(longest, ceil(1 / fit) * frame))
@@ -139,7 +150,7 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
     drape_attempt attempt = {.reason = ""};
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
         double start = drape_clock_seconds();
-        if (report->h > 0 && start + expected(sim, sim->realtime.effort) > deadline)
+        if (report->attempts > 0 && start + expected(sim, sim->realtime.effort) > deadline)
             break;
         status = drape_sim_check_attempts(sim, &attempt);
         if (!status)
@@ -151,6 +162,8 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
         learn(sim, drape_clock_seconds() - start - sim->further_seconds);
         report->attempts++;
         report->rejected += !attempt.accepted;
+        if (!attempt.accepted)
+            sim->realtime.cap = fmin(sim->realtime.cap, attempt.h / 2);
         report->h = attempt.accepted ? fmax(report->h, attempt.h) : report->h;
         report->residual = attempt.accepted ? fmax(report->residual, attempt.residual) : report->residual;
         report->error = attempt.accepted ? fmax(report->error, attempt.error) : report->error;
@@ -158,13 +171,14 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
     return status;
 }
 
-/* After a rejection, the next call does not retry the rejected step size; later calls do. */
+/* After a rejection, the next call does not retry the rejected step size; later calls do. If no smaller step
+ * was accepted in the call, the next one begins with half of it, which the cap is by then. */
 static void bound_steps(drape_realtime_memory *m, const drape_realtime *report)
 {
-    if (report->rejected > 0 && report->h > 0)
-        m->cap = report->h;
-    else
+    if (report->rejected == 0)
         m->cap = m->cap < m->longest ? 2 * m->cap : INFINITY;
+    else if (report->h > 0)
+        m->cap = report->h;
 }
 
 /* Time that was not covered is owed to the next call, or dropped. */
@@ -172,8 +186,9 @@ static void settle(drape_sim *sim, double goal, drape_realtime *report)
 {
     drape_realtime_memory *m = &sim->realtime;
     double left = goal - drape_sim_state(sim)->t;
-    m->debt = left > SAME * m->dt ? fmin(left, m->longest) : 0;
-    report->dropped = left > m->longest ? left - m->longest : 0;
+    const double most = longest_step(sim);
+    m->debt = left > SAME * m->dt ? fmin(left, most) : 0;
+    report->dropped = left > most ? left - most : 0;
     m->dropped += report->dropped;
     m->stretched = report->h > (1 + SAME) * m->dt || m->debt > 0;
     bound_steps(m, report);

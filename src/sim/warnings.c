@@ -15,6 +15,7 @@
 
 #define MOST   0.5  /* of the energy, of the time */
 #define MANY   3.0  /* Newton iterations an attempt */
+#define THIN   5.0  /* activation distances in a step of a collider */
 #define LARGE  20.0 /* [m] across */
 #define INSIDE 1e-9 /* [m] a node less deep than this is not inside: contact allows it */
 
@@ -225,6 +226,22 @@ static bool is_inaccurate(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
+/* Bodies that cross the scene's activation distance in a small part of a step accelerate cloth all at once. A
+ * hung sheet under newton_k at 1/60 s, swept by a ball at 2 m/s, 33 mm a step, had 58 % strain and 5 rejected
+ * steps in 2 s at a distance of 10 mm, and 203 % and 27 at 3 mm. */
+static bool is_contact_thin(drape_sim *sim, char *text, size_t size)
+{
+    const double path = drape_contact_longest_path(drape_system_contact(sim->system)),
+                 distance = sim->model->contact.distance;
+    if (!sim->model->contact.distance_given || !(path > THIN * distance))
+        return false;
+    snprintf(text, size,
+             "/contact/distance: a collider moved by %.3g m in a step, for an activation distance of %.3g m: "
+             "leave it out, so that it follows the motion, or take a smaller dt",
+             path, distance);
+    return true;
+}
+
 static const struct {
     const char *name;
     bool (*applies)(drape_sim *sim, char *text, size_t size);
@@ -236,6 +253,7 @@ static const struct {
               {"no_room", had_no_room},
               {"numerical_dissipation", dissipates_most},
               {"slow_contact", is_contact_slow},
+              {"contact_distance", is_contact_thin},
               {"inaccurate", is_inaccurate}};
 
 bool drape_sim_take_warning_failure(drape_sim *sim)

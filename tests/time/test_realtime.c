@@ -4,6 +4,7 @@
  * Measured seconds are no basis for a test: budgets here are either never reached (an hour) or never kept
  * (a nanosecond); those in between are for the bench.
  */
+#include "contact/parts.h"
 #include "support/scene.h"
 
 #define PLENTY  3600.0 /* [s] */
@@ -337,6 +338,111 @@ START_TEST(every_integrator_with_a_time_takes_frames)
 }
 END_TEST
 
+/* ---- Contact ---- */
+
+/* A hung sheet whose edges are 67 mm, and a ball of 0.2 m before it. */
+#define STRUCK                                                                                               \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 16, 'rows': 16, 'width': 1, 'height': "   \
+    "1, "                                                                                                    \
+    "'orientation': 'vertical'}, 'material': {'young_modulus': 968246, 'thickness': 1.0328e-3, "             \
+    "'areal_density': 0.2}, 'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'corner': 'top-left'}, "      \
+    "{'corner': 'top-right'}]}], 'colliders': [{'type': 'sphere', 'center': [0.5, -0.6, 0.4], 'radius': "    \
+    "0.2}], %s 'integrator': {'method': '%s'}, 'duration': 4}"
+
+/* Sends the ball through the place of the sheet at 2 m/s, frame by frame. Returns the largest distance at which
+ * contact acted. */
+static double strike(scene *s, int frames, double budget)
+{
+    double distance = 0, debt = 0;
+    for (int k = 1; k <= frames; k++) {
+        const double to[3] = {0, 0, -2.0 * k / 60};
+        ck_assert_int_eq(drape_sim_move_collider(s->sim, 0, 1.0 / 60 + debt, to, NULL), DRAPE_OK);
+        const drape_realtime r = advance(s, 1.0 / 60, budget);
+        debt = r.debt;
+        s->rejected += r.rejected;
+        distance = fmax(distance, drape_system_contact(s->sim->system)->broad.distance[0]);
+    }
+    return distance;
+}
+
+/* The ball moves by 33 mm a step, 32 times the thickness of the cloth. The distance, between half of that and
+ * all of it, is 2^5 thicknesses. When the ball rests, the sheet swings past it at less than 0.5 m/s in the mean, 8
+ * mm a step, and the distance falls to at most twice that. */
+START_TEST(a_fast_body_is_served_by_the_default_distance)
+{
+    scene s = scene_open(STRUCK, "", "newton_k");
+    s.rejected = 0;
+    const double distance = strike(&s, 24, PLENTY), path = 2.0 / 60;
+    ck_assert_double_ge(distance, 0.5 * path);
+    ck_assert_double_le(distance, path);
+    ck_assert_int_le(s.rejected, 0);
+    ck_assert_int_eq(drape_sim_inside(s.sim, 0, NULL), 0);
+    for (int k = 0; k < 30; k++)
+        advance(&s, 1.0 / 60, PLENTY);
+    ck_assert_double_le(drape_system_contact(s.sim->system)->broad.distance[0], 2 * 0.5 / 60);
+    scene_close(&s);
+}
+END_TEST
+
+/* Where the scene gives a distance, it stays; where the ball moves by more than five of it in a step, there is
+ * a warning. */
+START_TEST(a_distance_that_is_given_is_kept)
+{
+    static const double given[] = {0.001, 0.03};
+    for (int i = 0; i < 2; i++) {
+        char contact[64];
+        drape_warning warning;
+        bool warned = false;
+        snprintf(contact, sizeof contact, "'contact': {'distance': %g},", given[i]);
+        scene s = scene_open(STRUCK, contact, "newton_k");
+        ck_assert_double_eq(strike(&s, 5, PLENTY), given[i]);
+        for (int k = 0; drape_sim_warning(s.sim, k, &warning); k++)
+            warned = warned || strcmp(warning.name, "contact_distance") == 0;
+        ck_assert_int_eq(warned, i == 0);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* Without time for anything a call makes one attempt. Rejected ones halve the step from call to call, until
+ * one is accepted. */
+START_TEST(a_rejected_step_is_retried_by_the_next_call)
+{
+    scene s = scene_open(STRUCK, "'contact': {'distance': 1e-4},", "newton_k");
+    int rejected = 0;
+    for (int k = 1; k <= 60; k++) {
+        const double to[3] = {0, 0, k % 2 ? -0.8 : 0};
+        ck_assert_int_eq(drape_sim_move_collider(s.sim, 0, 1.0 / 60, to, NULL), DRAPE_OK);
+        const drape_realtime r = advance(&s, 1.0 / 60, NOTHING);
+        ck_assert_int_le(r.attempts, 1);
+        rejected += r.rejected;
+    }
+    ck_assert_int_gt(rejected, 0);
+    ck_assert_double_gt(drape_sim_time(s.sim), 0);
+    scene_close(&s);
+}
+END_TEST
+
+/* Time is dropped, and steps are not longer than dt. */
+START_TEST(steps_in_contact_are_not_longer_than_dt)
+{
+    scene s = scene_open(STRUCK, "", "newton_k");
+    int touching = 0;
+    strike(&s, 12, PLENTY);
+    for (int k = 13; k < 24; k++) {
+        double gap;
+        const bool touches = drape_contact_active(drape_system_contact(s.sim->system), &gap) > 0;
+        const double to[3] = {0, 0, -2.0 * k / 60};
+        ck_assert_int_eq(drape_sim_move_collider(s.sim, 0, 1.0 / 60, to, NULL), DRAPE_OK);
+        const drape_realtime r = advance(&s, 1.0 / 60, NOTHING);
+        touching += touches;
+        ck_assert(!touches || (r.attempts == 1 && r.h <= (1 + 1e-9) / 60 && r.debt <= (1 + 1e-9) / 60));
+    }
+    ck_assert_int_gt(touching, 5);
+    scene_close(&s);
+}
+END_TEST
+
 START_TEST(wrong_arguments_are_reported)
 {
     static const double wrong[][2] = {{0, 1},    {-1, 1},    {NAN, 1},       {2e6, 1},
@@ -359,4 +465,6 @@ SUITE("realtime", few_iterations_are_near_the_converged_step, with_many_iteratio
       contact_holds_back_only_what_it_touches, a_ball_that_moves_does_not_stop_it,
       frame_rates_differ_by_the_order_of_the_method, rest_does_not_depend_on_the_frame_rate,
       the_level_degrades_and_recovers, a_single_late_frame_is_made_up_for,
-      every_integrator_with_a_time_takes_frames, wrong_arguments_are_reported)
+      every_integrator_with_a_time_takes_frames, a_fast_body_is_served_by_the_default_distance,
+      a_distance_that_is_given_is_kept, a_rejected_step_is_retried_by_the_next_call,
+      steps_in_contact_are_not_longer_than_dt, wrong_arguments_are_reported)
