@@ -377,6 +377,11 @@ typedef struct drape_realtime {
     double h;               /* [s] largest accepted step; 0: none was accepted */
     double residual; /* [N] largest residual of the accepted steps, in the norm of the integrator; NaN: the
                         integrator reports none */
+    double error;    /* [m] largest drape_attempt.error of the accepted steps; NaN: the integrator estimates
+                        none, or no step was accepted */
+    double error_bound;       /* [m] see drape_statistics; NaN: the integrator estimates no error */
+    bool accurate;            /* whether `error` is at most that; true if there is no estimate */
+    int64_t inaccurate_total; /* calls since the sim was created that were not accurate */
 } drape_realtime;
 
 /* Advances by one frame within a wall-clock budget, for games, previews and anything else that must show a
@@ -576,6 +581,11 @@ typedef struct drape_statistics {
     /* [N] bound on the residual that steps are solved to, for a node of mean mass: the tolerance of the scene
      * unless the load of the nodes limits it; NAN: the integrator bounds no residual */
     double tolerance;
+    /* Of drape_attempt.error; with an integrator that estimates none the lengths are NaN, and the count 0. */
+    double error_bound;        /* [m] to which steps are iterated: "error" of the integrator */
+    double error_max;          /* [m] largest of the accepted steps; NaN before the first */
+    double error_last;         /* [m] of the last accepted step */
+    int64_t steps_above_error; /* accepted steps whose error is above the bound */
 } drape_statistics;
 
 /* Returns a copy of the counts so far. */
@@ -589,7 +599,7 @@ DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t 
 /* A doubt about a run: what is unusual, and which setting would help. */
 typedef struct drape_warning {
     const char *name; /* "no_terms", "few_steps", "large_mesh", "starts_inside", "ends_inside",
-                         "numerical_dissipation" or "slow_contact" */
+                         "numerical_dissipation", "slow_contact" or "inaccurate" */
     char text[400];   /* one line */
 } drape_warning;
 
@@ -600,8 +610,9 @@ typedef struct drape_warning {
  * are inside a collider, by more than 1e-9 m, or it pierces triangles without a pinned node, at the start,
  * or after the steps so far; the text describes the first such collider. numerical_dissipation: the
  * integrator took more than half of the energy that went in. slow_contact: contact takes most of the time
- * of the steps, and longer than the motion lasts, and a setting is known to help. Returns false past the
- * last. */
+ * of the steps, and longer than the motion lasts, and a setting is known to help. inaccurate: by the estimate
+ * of the integrator more than half of the steps, or the last one, are further from the solution of their
+ * equation than its bound. Returns false past the last. */
 DRAPE_API bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out);
 
 /* ---- Checkpoints ---- */
@@ -668,6 +679,9 @@ typedef struct drape_attempt {
     double tolerance;    /* target for the residual [N]; with the reason "rounding", the level that rounding
                          alone leaves; NaN: the integrator guarantees none */
     drape_diagnostic diagnostic; /* the element or node to report */
+    double error; /* [m] estimated distance between the end of the step and the solution of its equation from
+                     the same start, RMS over all nodes; NaN: the integrator estimates none. Those that
+                     converge to a tolerance do not. */
 } drape_attempt;
 
 /* The kind of an event. */

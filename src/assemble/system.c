@@ -389,9 +389,7 @@ void drape_system_jacobian_without(drape_system *system, const drape_point *poin
     drape_summer_add(system->summer, &want, &to);
     if (evaluate_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight,
-                                   positive_share > 0 || point->bounds ? DRAPE_CONTACT_GAUSS_NEWTON
-                                   : point->symmetric                  ? DRAPE_CONTACT_SYMMETRIC
-                                                                       : DRAPE_CONTACT_EXACT,
+                                   positive_share > 0 ? DRAPE_CONTACT_GAUSS_NEWTON : point->contact,
                                    system->pattern, values);
     drape_drag_spring_add_hessian(&system->drag, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);

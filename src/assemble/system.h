@@ -30,8 +30,7 @@ typedef struct drape_point {
     const double *stress;   /* (measure_count) the f before ddq in a Jacobian; NULL: the forces here */
     double t;               /* [s] time of the colliders' poses */
     double span[2]; /* [s] over which the velocities of colliders are taken; equal: they are at rest */
-    bool symmetric; /* a Jacobian may have DRAPE_CONTACT_SYMMETRIC of contact */
-    bool bounds;    /* a Jacobian has DRAPE_CONTACT_GAUSS_NEWTON of contact, and is exact otherwise */
+    drape_contact_derivatives contact; /* of contact in a Jacobian without positive parts */
 } drape_point;
 
 /* Workspace for a model; threads >= 1. The arena owns all of it except the threads. Errors: DRAPE_E_MEMORY;

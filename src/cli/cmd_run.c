@@ -218,6 +218,11 @@ static void print_newton(const drape_statistics *s)
         (long long)s->residuals, (long long)s->jacobians, (long long)s->factorizations);
     if (!isnan(s->tolerance))
         printf("tolerance %.4g N on the residual of a node\n", s->tolerance);
+    if (s->steps_accepted > 0 && !isnan(s->error_bound))
+        printf(
+            "error     %.3g m at most, %.3g m in the last step, by estimate; %lld steps above the bound of "
+            "%.3g m\n",
+            s->error_max, s->error_last, (long long)s->steps_above_error, s->error_bound);
 }
 
 static void print_energy(const run *r)

@@ -28,6 +28,7 @@ static void count(drape_summary_realtime *s, const drape_realtime *frame)
     s->full += full;
     s->fewer += fewer;
     s->larger += !full && !fewer;
+    s->inaccurate += !frame->accurate;
     s->still += !(frame->h > 0);
     s->debt = frame->debt;
     s->dropped = frame->dropped_total;
@@ -80,4 +81,6 @@ void cli_realtime_print(const cli_realtime *r)
            "%.4g s behind after the last frame, then caught up, %.4g s dropped\n",
            (long long)s->full, (long long)s->fewer, (long long)s->larger, (long long)s->still, s->debt,
            s->dropped);
+    printf("accuracy  %lld frames with a step above the bound on its estimated error\n",
+           (long long)s->inaccurate);
 }

@@ -254,7 +254,7 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
     double start = jacobian_clock(s);
     drape_point point = place(s, t, N_VGetArrayPointer(y));
     point.weight = cj;
-    point.bounds = s->newton.bounds;
+    point.contact = s->newton.bounds ? DRAPE_CONTACT_GAUSS_NEWTON : DRAPE_CONTACT_EXACT;
     s->failure = extend_pattern(s, &point);
     if (s->failure)
         return -1;

@@ -113,6 +113,8 @@ void drape_implicit_report(const drape_solve_report *report, drape_step_info *in
     info->iterations += report->iterations;
     info->residual = report->residual;
     info->tolerance = report->tolerance;
+    info->error = report->error;
+    info->further_seconds += report->further_seconds;
     info->lenient = report->lenient;
     info->usable = report->usable;
     info->diagnostic = report->diagnostic;

@@ -16,6 +16,9 @@ typedef struct drape_step_info {
     double h;           /* [s] the step taken; set by integrators that choose their own steps */
     int iterations;
     double residual, tolerance; /* [N] */
+    double error;               /* [m] estimated RMS distance of the nodes of `out` to the solution of the
+                                   step's equation; NaN: the integrator estimates none */
+    double further_seconds;     /* [s] spent on work beyond the least, which set_deadline limits */
     bool lenient, usable;       /* see drape_solve_report */
     double dissipated;          /* [J] work of dissipative terms in this step */
     double pin_work;            /* [J] work of moving pins */
@@ -72,6 +75,11 @@ typedef struct drape_integrator_ops {
     const double *(*residual)(const void *state);
     /* The bound on the weighted norm of F that it uses [N] (nonlinear/residual_bound.h). NULL: none. */
     double (*tolerance)(const void *state);
+    /* The bound on `error` up to which it does more work [m]. NULL: it estimates none. */
+    double (*error_bound)(const void *state);
+    /* Work beyond the least that the present effort asks for ends by this time [s of drape_clock_seconds];
+     * INFINITY, at first: there is no deadline. NULL: it does no such work. */
+    void (*set_deadline)(void *state, double seconds);
     /* The level of effort of a step, if a deadline must be met: from 0, as the parameters say, to efforts -
      * 1, the cheapest. NULL: there is only one level. */
     int efforts;

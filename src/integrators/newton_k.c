@@ -19,6 +19,7 @@
 enum {
     PARAM_DT,
     PARAM_ITERATIONS,
+    PARAM_ERROR,
     PARAM_TOLERANCE,
     PARAM_RESCUE_ITERATIONS,
     PARAM_EXTRAPOLATION,
@@ -37,13 +38,18 @@ static const char *const corrections[] = {[DRAPE_INEXACT_AUTO] = "auto",
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
     [PARAM_ITERATIONS] =
-        DRAPE_INTEGER("iterations", "1", 1, 1, 1000, "inexact Newton iterations in each step"),
+        DRAPE_INTEGER("iterations", "1", 1, 1, 1000, "least number of inexact Newton iterations in a step"),
+    [PARAM_ERROR] = DRAPE_NUMBER(
+        "error", "m", DRAPE_DERIVED("1e-3 times the diagonal of the rest bounding box"), DRAPE_ABOVE(0), 1e9,
+        "further iterations follow while the estimated distance to the converged "
+        "step, RMS over the nodes, is above this; not a bound on an accepted state"),
     [PARAM_TOLERANCE] =
         DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,
                      "residual of the free nodes, largest component, below which no iteration is made, at "
                      "most 1 % of their load; not a bound on an accepted state"),
     [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
-                                              "up to so many further iterations while the residual is not "
+                                              "up to so many further iterations while the estimated distance "
+                                              "is above error, or the residual is not "
                                               "below that of the guess, with factors or contact below a "
                                               "tenth of it; a step that then is not below that of "
                                               "the guess is rejected"),
@@ -66,8 +72,9 @@ static const drape_param params[PARAM_COUNT] = {
         "for few nodes"),
 };
 
-#define NOMINAL_RATE        60. /* [1/s] linear_tolerance applies to steps of 1/60 s */
-#define MAX_LINEAR_RESIDUAL 0.5 /* relative residual left at any step size */
+#define ERROR_SHARE         1e-3 /* default of error, of the size of the scene */
+#define NOMINAL_RATE        60.  /* [1/s] linear_tolerance applies to steps of 1/60 s */
+#define MAX_LINEAR_RESIDUAL 0.5  /* relative residual left at any step size */
 
 /* The work of a step at each level of effort: Newton iterations, and conjugate gradient iterations in each.
  * 0: as the parameters say. */
@@ -82,6 +89,7 @@ typedef struct newton_k {
     double *past[2]; /* nodes: velocities at the start of the step before, and of the one before that */
     double past_time[2], past_end; /* [s] of these; end of the last attempt, NAN: there is none */
     int effort;
+    double deadline; /* [s of drape_clock_seconds]; not archived: it is set before each step that has one */
 } newton_k;
 
 static void restart(void *state, const drape_state *from)
@@ -97,6 +105,9 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     if (!s)
         return DRAPE_E_MEMORY;
     memcpy(s->values, values, sizeof s->values);
+    if (isnan(s->values[PARAM_ERROR]))
+        s->values[PARAM_ERROR] = ERROR_SHARE * drape_system_model(system)->length;
+    s->deadline = INFINITY;
     restart(s, NULL);
     drape_status status = drape_implicit_init(arena, system, &s->common);
     if (!status)
@@ -169,6 +180,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         .iterations = iterations ? iterations : (int)s->values[PARAM_ITERATIONS],
         .rescue_iterations = (int)s->values[PARAM_RESCUE_ITERATIONS],
         .tolerance = s->values[PARAM_TOLERANCE],
+        .error = s->values[PARAM_ERROR],
+        .deadline = s->deadline,
         .linear_tolerance = linear_tolerance(s),
         .max_linear_iterations =
             linear_iterations ? linear_iterations : (int)s->values[PARAM_LINEAR_ITERATIONS]};
@@ -185,6 +198,11 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
 static void set_effort(void *state, int effort)
 {
     ((newton_k *)state)->effort = effort;
+}
+
+static void set_deadline(void *state, double seconds)
+{
+    ((newton_k *)state)->deadline = seconds;
 }
 
 static drape_work work(const void *state)
@@ -208,6 +226,11 @@ static double tolerance(const void *state)
     return ((const newton_k *)state)->values[PARAM_TOLERANCE];
 }
 
+static double error_bound(const void *state)
+{
+    return ((const newton_k *)state)->values[PARAM_ERROR];
+}
+
 static size_t bytes(const void *state)
 {
     return drape_inexact_newton_bytes(((const newton_k *)state)->newton);
@@ -215,8 +238,8 @@ static size_t bytes(const void *state)
 
 const drape_integrator_ops drape_integrator_newton_k = {
     .entry = {.name = "newton_k",
-              .summary = "backward Euler by a fixed number of inexact Newton iterations, for real time; "
-                         "checked, but not converged",
+              .summary = "backward Euler by a few inexact Newton iterations, for real time; checked, but not "
+                         "converged",
               .reference = "Dembo, Eisenstat & Steihaug 1982; Baraff & Witkin 1998 for k = 1",
               DRAPE_PARAMS(params)},
     .order = 1,
@@ -226,6 +249,8 @@ const drape_integrator_ops drape_integrator_newton_k = {
     .efforts = sizeof efforts / sizeof *efforts,
     .set_effort = set_effort,
     .tolerance = tolerance,
+    .error_bound = error_bound,
+    .set_deadline = set_deadline,
     .work = work,
     .archive = archive,
     .bytes = bytes,

@@ -12,7 +12,8 @@
 
 static const char columns[] = "attempt,t,h,accepted,status,reason,iterations,residual,tolerance,"
                               "kinetic,elastic,gravity,contact,dissipated,numerical,"
-                              "worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit\n";
+                              "worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit,"
+                              "error\n";
 
 drape_status drape_steps_open(drape_context *ctx, drape_folder *folder, bool resumes, drape_file *file)
 {
@@ -66,6 +67,7 @@ drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, c
     drape_csv_put_number(file, attempt->tolerance);
     put_energy(file, energy);
     put_worst(file, &attempt->diagnostic);
+    drape_csv_put_number(file, attempt->error);
     drape_file_put_text(file, "\n");
     return drape_file_keep(file);
 }

@@ -68,6 +68,15 @@ static json_t *newton(const drape_statistics *s)
     return with_counts(json_object(), counts, LENGTH(counts));
 }
 
+/* The estimated distance of steps to the solution of their equation [m]. */
+static json_t *error(const drape_statistics *s)
+{
+    const real_item lengths[] = {
+        {"bound", s->error_bound}, {"largest", s->error_max}, {"last", s->error_last}};
+    json_t *object = with_reals(json_object(), lengths, LENGTH(lengths));
+    return drape_json_with(object, "steps_above", json_integer((json_int_t)s->steps_above_error));
+}
+
 static json_t *wall(const drape_summary_def *def, const drape_statistics *s)
 {
     const real_item times[] = {
@@ -101,8 +110,9 @@ static json_t *strain(const drape_statistics *s)
 
 static json_t *realtime(const drape_summary_realtime *r)
 {
-    const count_item counts[] = {{"frames", r->frames}, {"missed", r->missed}, {"full", r->full},
-                                 {"fewer", r->fewer},   {"larger", r->larger}, {"still", r->still}};
+    const count_item counts[] = {{"frames", r->frames},        {"missed", r->missed}, {"full", r->full},
+                                 {"fewer", r->fewer},          {"larger", r->larger}, {"still", r->still},
+                                 {"inaccurate", r->inaccurate}};
     const real_item times[] = {{"budget", r->budget},  {"p50", r->p50},     {"p95", r->p95},
                                {"p99", r->p99},        {"worst", r->worst}, {"debt", r->debt},
                                {"dropped", r->dropped}};
@@ -175,6 +185,8 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     object = drape_json_with(object, "steps", steps(sim, &s));
     object = drape_json_with(object, "newton", newton(&s));
     object = drape_json_with(object, "tolerance", drape_json_number(s.tolerance));
+    if (!isnan(s.error_bound))
+        object = drape_json_with(object, "error", error(&s));
     object = drape_json_with(object, "wall_s", wall(def, &s));
     object = drape_json_with(object, "energy", energy(sim));
     object = drape_json_with(object, "strain", strain(&s));

@@ -9,7 +9,8 @@
 /* Frames with a budget: how long they took, and how many ended at each level. */
 typedef struct drape_summary_realtime {
     int64_t frames, missed, full, fewer, larger;
-    int64_t still; /* frames without a new state: they took no time, and show the state before */
+    int64_t inaccurate; /* frames with a step whose estimated error was above its bound */
+    int64_t still;      /* frames without a new state: they took no time, and show the state before */
     double budget, p50, p95, p99, worst; /* [s] wall time per frame */
     double debt, dropped; /* [s] simulated time still owed after the last frame; dropped in total */
 } drape_summary_realtime;

@@ -3,10 +3,12 @@
  *     correct   A p = -F with A near J: by conjugate gradients, or with factors and predicted stress
  *     feasible  p shortened where pieces meet, until nothing passes through anything
  *     advance   d + a p with a = 1, 1/2, 1/4 ..., until the residual at its end does little work along p
+ *     estimate  the distance to the solution, from one more p
  */
 #include "nonlinear/inexact_newton.h"
 
 #include "base/clock.h"
+#include "base/elementary.h"
 #include "base/reason.h"
 #include "nonlinear/approx_jacobian.h"
 #include "nonlinear/factored_jacobian.h"
@@ -27,6 +29,10 @@
  * ball. Eight are .036 and .035 m off, instead of .039 and .022 m. */
 #define FEW_ITERATIONS 4
 #define MAX_PASSES     3 /* in which a step is shortened node by node, before all of it is */
+/* Limits of the share m in the estimate of the error: beyond them forces are far from linear along p. */
+#define MIN_SHARE 0.05
+#define MAX_SHARE 4
+#define INERTIAL  0.2 /* power of the error if nothing but inertia resisted it */
 
 struct drape_inexact_newton {
     drape_step_equation *equation;
@@ -36,6 +42,7 @@ struct drape_inexact_newton {
     drape_stress_predictor predictor; /* with factors */
     double *p, *minus_f, *trial;      /* free DOFs */
     double *fraction;                 /* nodes; NULL without contact */
+    double *f, *g;                    /* free DOFs, nodes: kept while the estimate evaluates them elsewhere */
 };
 
 /* Conjugate gradients leave a part of the stretch of a correction, which predicted stress would not see. */
@@ -56,6 +63,8 @@ drape_status drape_inexact_newton_create(drape_arena *arena, drape_step_equation
     s->p = drape_arena_take(arena, equation->dofs, sizeof *s->p);
     s->minus_f = drape_arena_take(arena, equation->dofs, sizeof *s->minus_f);
     s->trial = drape_arena_take(arena, equation->dofs, sizeof *s->trial);
+    s->f = drape_arena_take(arena, equation->dofs, sizeof *s->f);
+    s->g = drape_arena_take(arena, equation->nodes, sizeof *s->g);
     if (equation->x_ahead)
         s->fraction = drape_arena_take(arena, equation->nodes / 3, sizeof *s->fraction);
     if (drape_arena_status(arena) || equation->dofs == 0)
@@ -96,7 +105,26 @@ static void begin(drape_inexact_newton *s)
 
 /* ---- Correct ---- */
 
-static drape_status correct_factored(drape_inexact_newton *s)
+/* p = -A^-1 F, with the last matrix. */
+static drape_status solve(drape_inexact_newton *s, const drape_inexact_settings *settings)
+{
+    drape_step_equation *e = s->equation;
+    const double start = drape_clock_seconds();
+    drape_status status = DRAPE_OK;
+    int iterations = 1;
+    for (size_t i = 0; i < e->dofs; i++)
+        s->minus_f[i] = -e->f[i];
+    if (s->factored)
+        status = drape_factored_jacobian_solve(s->factored, s->minus_f, s->p);
+    else
+        iterations = drape_approx_jacobian_solve(s->approximate, s->minus_f, s->p, settings->linear_tolerance,
+                                                 settings->max_linear_iterations);
+    e->work.linear_iterations += iterations;
+    e->work.solve_seconds += drape_clock_seconds() - start;
+    return status;
+}
+
+static drape_status update_factored(drape_inexact_newton *s)
 {
     drape_step_equation *e = s->equation;
     drape_point point = e->point;
@@ -104,34 +132,16 @@ static drape_status correct_factored(drape_inexact_newton *s)
     drape_status status = drape_factored_jacobian_update(s->factored, &point, e->mass_weight, &e->work);
     if (status == DRAPE_E_STOPPED)
         drape_system_cancelled(e->system); /* so that the step ends as cancelled */
-    if (status)
-        return status;
-    const double start = drape_clock_seconds();
-    status = drape_factored_jacobian_solve(s->factored, s->minus_f, s->p);
-    e->work.linear_iterations++;
-    e->work.solve_seconds += drape_clock_seconds() - start;
     return status;
-}
-
-static drape_status correct_approximate(drape_inexact_newton *s, const drape_inexact_settings *settings)
-{
-    drape_step_equation *e = s->equation;
-    drape_status status = drape_approx_jacobian_update(s->approximate, &e->point, e->mass_weight, &e->work);
-    if (status)
-        return status;
-    const double start = drape_clock_seconds();
-    e->work.linear_iterations += drape_approx_jacobian_solve(
-        s->approximate, s->minus_f, s->p, settings->linear_tolerance, settings->max_linear_iterations);
-    e->work.solve_seconds += drape_clock_seconds() - start;
-    return DRAPE_OK;
 }
 
 static drape_status correct(drape_inexact_newton *s, const drape_inexact_settings *settings)
 {
     drape_step_equation *e = s->equation;
-    for (size_t i = 0; i < e->dofs; i++)
-        s->minus_f[i] = -e->f[i];
-    return s->factored ? correct_factored(s) : correct_approximate(s, settings);
+    drape_status status =
+        s->factored ? update_factored(s)
+                    : drape_approx_jacobian_update(s->approximate, &e->point, e->mass_weight, &e->work);
+    return status ? status : solve(s, settings);
 }
 
 /* Predicts stress for the matrix of a next iteration. */
@@ -209,6 +219,66 @@ static bool advance(drape_inexact_newton *s, double *d)
     return false;
 }
 
+/* ---- Estimate ---- */
+
+/* RMS over all nodes; pinned ones do not move. */
+static double rms(const drape_step_equation *e, const double *p)
+{
+    return sqrt(3 * drape_step_equation_dot(e, p, p) / (double)e->nodes);
+}
+
+/* |M^-1 F| / m_w */
+static double inertial_error(const drape_step_equation *e)
+{
+    double sum = 0;
+    for (size_t i = 0; i < e->dofs; i++) {
+        const double p = e->f[i] / (e->mass_weight * e->model->mass[drape_step_equation_at(e, i) / 3]);
+        sum += p * p;
+    }
+    return sqrt(3 * sum / (double)e->nodes);
+}
+
+/* Returns to d from another point, as if F had been evaluated there last. Contact keeps forces of its own. */
+static void return_to(drape_inexact_newton *s, const double *d)
+{
+    drape_step_equation *e = s->equation;
+    if (s->fraction) {
+        drape_step_equation_evaluate(e, d);
+        return;
+    }
+    drape_step_equation_move(e, d);
+    memcpy(e->f, s->f, e->dofs * sizeof *e->f);
+    memcpy(e->g, s->g, e->nodes * sizeof *e->g);
+}
+
+/* p . (F(d + p) - F(d)) / p . A p for p = -A^-1 F, within its limits. */
+static double stiffness_share(drape_inexact_newton *s, const double *d)
+{
+    drape_step_equation *e = s->equation;
+    const double start = drape_step_equation_dot(e, e->f, s->p);
+    double work;
+    memcpy(s->f, e->f, e->dofs * sizeof *s->f);
+    memcpy(s->g, e->g, e->nodes * sizeof *s->g);
+    const bool finite = drape_step_equation_try(e, d, 1, s->p, s->trial, &work);
+    return_to(s, d);
+    return finite && start < 0 ? fmin(fmax(1 - work / start, MIN_SHARE), MAX_SHARE) : 1;
+}
+
+/* The estimated distance from d to the solution. F was evaluated last at d, as it is on return. corrected:
+ * there is a matrix of this solve. Overwrites p. */
+static double estimate_error(drape_inexact_newton *s, const drape_inexact_settings *settings, const double *d,
+                             bool corrected)
+{
+    drape_step_equation *e = s->equation;
+    const double inertial = inertial_error(e);
+    if (!corrected || !(inertial > 0) || solve(s, settings))
+        return inertial;
+    const double along = rms(e, s->p) / stiffness_share(s, d);
+    return along > 0 && along < inertial ? along * drape_pow(inertial / along, INERTIAL) : inertial;
+}
+
+/* ---- Iterate ---- */
+
 /* A residual that does not fall may be the rounding error of its forces. */
 static bool is_rounding(drape_step_equation *e, const double *d, drape_solve_report *report)
 {
@@ -217,6 +287,12 @@ static bool is_rounding(drape_step_equation *e, const double *d, drape_solve_rep
         return false;
     report->reason = drape_reason_name(DRAPE_REASON_ROUNDING);
     return true;
+}
+
+/* Whether an iteration that only reduces the error is expected to end in time. */
+static bool has_time(const drape_inexact_settings *settings, double seconds)
+{
+    return settings->deadline == INFINITY || drape_clock_seconds() + seconds <= settings->deadline;
 }
 
 static drape_status iterate(drape_inexact_newton *s, const drape_inexact_settings *settings, double *d,
@@ -229,29 +305,38 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         return DRAPE_RETRY_NONFINITE;
     const double fall = s->fraction || s->factored ? MAX_LEFT : 1;
     const double first = drape_step_equation_dot(e, e->f, e->f), bound = fall * fall * first;
+    double seconds = 0; /* of the last iteration */
     for (int i = 0;; i++) {
+        const bool least = i >= settings->iterations,
+                   most = i >= settings->iterations + settings->rescue_iterations;
+        const double left = drape_step_equation_dot(e, e->f, e->f);
         report->iterations = i;
         bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;
         report->reason = drape_reason_name(converged ? DRAPE_REASON_CONVERGED : DRAPE_REASON_ITERATIONS);
-        if (converged || (i >= settings->iterations && drape_step_equation_dot(e, e->f, e->f) < bound))
+        converged |= least && left >= bound && is_rounding(e, d, report);
+        const bool fell = converged || (least && left < bound);
+        if (fell || (most && left < first))
+            report->error = estimate_error(s, settings, d, i > 0);
+        if (fell && (converged || most || report->error <= settings->error || !has_time(settings, seconds)))
             return DRAPE_OK;
-        if (i >= settings->iterations && is_rounding(e, d, report))
-            return DRAPE_OK;
-        if (i >= settings->iterations + settings->rescue_iterations) {
-            if (drape_step_equation_dot(e, e->f, e->f) < first)
+        if (most) {
+            if (left < first)
                 return DRAPE_OK;
             report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
             return DRAPE_RETRY_NONLINEAR;
         }
+        const double start = drape_clock_seconds();
         drape_status status = correct(s, settings);
         if (status) {
             report->reason = drape_reason_name(status < 0 ? DRAPE_REASON_MEMORY : DRAPE_REASON_SINGULAR);
             return status;
         }
         make_correction_feasible(s);
-        predict_stress(s, i + 1 < settings->iterations && i < MAX_PREDICTION);
+        predict_stress(s, i < MAX_PREDICTION);
         if (!advance(s, d))
             return DRAPE_RETRY_NONFINITE;
+        seconds = drape_clock_seconds() - start;
+        report->further_seconds += fell ? seconds : 0;
         e->work.newton_iterations++;
     }
 }
@@ -260,7 +345,8 @@ drape_status drape_inexact_newton_solve(drape_inexact_newton *s, const drape_ine
                                         double *d, drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
-    *report = (drape_solve_report){.tolerance = NAN}; /* the residual is reported but not bounded */
+    *report =
+        (drape_solve_report){.tolerance = NAN, .error = NAN}; /* the residual is reported but not bounded */
     drape_status status = iterate(s, settings, d, report);
     report->residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
     report->diagnostic = drape_step_equation_diagnose(e, settings->tolerance);

@@ -532,6 +532,7 @@ drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *
     drape_step_equation *e = s->equation;
     *report =
         (drape_solve_report){.reason = drape_reason_name(DRAPE_REASON_CONVERGED),
+                             .error = NAN,
                              .lenient = s->values[DRAPE_NEWTON_ON_FAILURE] == DRAPE_NEWTON_FAILURE_ACCEPT};
     begin(s);
     if (e->dofs == 0) {

@@ -76,7 +76,7 @@ void drape_step_equation_jacobian(drape_step_equation *s, const double *stress, 
 {
     drape_point point = s->point;
     point.stress = stress;
-    point.symmetric = true;
+    point.contact = DRAPE_CONTACT_SYMMETRIC;
     drape_system_jacobian(s->system, &point, s->mass_weight, positive_share, values);
     s->work.jacobians++;
 }

@@ -142,10 +142,11 @@ static bool is_next_frame(const drape_sim *sim)
 static void archive_statistics(drape_sim *sim, drape_archive *a)
 {
     drape_statistics *s = &sim->statistics;
-    int64_t *const counts[] = {&s->steps_accepted, &s->steps_rejected, &s->steps_unconverged, &sim->attempts,
-                               &sim->next_frame};
-    double *const numbers[] = {&s->h_min,        &s->h_max,      &s->wall_setup, &s->wall_steps,
-                               &s->wall_contact, &s->strain_min, &s->strain_max};
+    int64_t *const counts[] = {&s->steps_accepted,    &s->steps_rejected, &s->steps_unconverged,
+                               &s->steps_above_error, &sim->attempts,     &sim->next_frame};
+    double *const numbers[] = {&s->h_min,      &s->h_max,        &s->wall_setup,
+                               &s->wall_steps, &s->wall_contact, &s->strain_min,
+                               &s->strain_max, &s->error_max,    &s->error_last};
     drape_archive_mark(a, "statistics");
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
         drape_archive_int64(a, counts[i]);
@@ -167,6 +168,7 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         drape_archive_double(a, numbers[i]);
     drape_archive_doubles(a, m->cost, DRAPE_MAX_EFFORTS);
+    drape_archive_int64(a, &m->inaccurate);
     drape_archive_int(a, &m->effort);
     if (drape_archive_good(a) && !is_place(m->effort, 0, efforts))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an effort %d of %d", m->effort, efforts);

@@ -120,8 +120,19 @@ static void aim(drape_sim *sim, const plan *p, double end)
     drape_schedule_aim(s, end);
 }
 
-static drape_status take_steps(drape_sim *sim, double deadline, drape_realtime *report)
+/* Further iterations in a step leave enough of the budget for the least work of the steps after it. */
+static void set_deadline(drape_sim *sim, const plan *p, const drape_realtime *report, double until)
 {
+    const double after = fmax(0, (double)(p->steps - 1 - report->attempts));
+    if (sim->chosen.integrator->set_deadline)
+        sim->chosen.integrator->set_deadline(sim->integrator,
+                                             until - after * expected(sim, sim->realtime.effort));
+}
+
+static drape_status take_steps(drape_sim *sim, const plan *p, double begun, double budget,
+                               drape_realtime *report)
+{
+    const double deadline = begun + budget;
     drape_status status = drape_sim_emit_frames(sim);
     double t1, h;
     drape_attempt attempt = {.reason = ""};
@@ -134,12 +145,14 @@ static drape_status take_steps(drape_sim *sim, double deadline, drape_realtime *
             status = drape_sim_check_cancel(sim);
         if (status)
             break;
+        set_deadline(sim, p, report, begun + KEEP * budget);
         status = drape_sim_step(sim, t1, h, &attempt);
-        learn(sim, drape_clock_seconds() - start);
+        learn(sim, drape_clock_seconds() - start - sim->further_seconds);
         report->attempts++;
         report->rejected += !attempt.accepted;
         report->h = attempt.accepted ? fmax(report->h, attempt.h) : report->h;
         report->residual = attempt.accepted ? fmax(report->residual, attempt.residual) : report->residual;
+        report->error = attempt.accepted ? fmax(report->error, attempt.error) : report->error;
     }
     return status;
 }
@@ -165,6 +178,10 @@ static void settle(drape_sim *sim, double goal, drape_realtime *report)
     bound_steps(m, report);
     report->time = drape_sim_state(sim)->t;
     report->debt = m->debt;
+    report->error_bound = drape_sim_error_bound(sim);
+    report->accurate = !(report->error > report->error_bound);
+    m->inaccurate += !report->accurate;
+    report->inaccurate_total = m->inaccurate;
     report->dropped_total = m->dropped;
 }
 
@@ -203,7 +220,7 @@ static void enter(drape_sim *sim)
 
 drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double budget, drape_realtime *out)
 {
-    drape_realtime report = {.level = "full"};
+    drape_realtime report = {.level = "full", .error = NAN, .error_bound = NAN, .accurate = true};
     double start = drape_clock_seconds();
     drape_status guarded = drape_sim_guard(sim, "drape_sim_advance_realtime");
     if (guarded)
@@ -217,7 +234,7 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
         set_effort(sim, p.effort);
         if (p.steps > 0) {
             aim(sim, &p, goal);
-            status = take_steps(sim, start + budget, &report);
+            status = take_steps(sim, &p, start, budget, &report);
         }
         settle(sim, goal, &report);
         report.level = level_name(sim);
@@ -238,6 +255,8 @@ void drape_sim_leave_realtime(drape_sim *sim)
     m->active = m->stretched = false;
     m->debt = 0;
     set_effort(sim, 0);
+    if (sim->chosen.integrator->set_deadline)
+        sim->chosen.integrator->set_deadline(sim->integrator, INFINITY);
     if (sim->schedule.stepping == DRAPE_STEPS_COUNTED)
         drape_schedule_init(&sim->schedule, sim->schedule.stepping, m->dt, drape_sim_state(sim)->t);
 }

@@ -110,6 +110,7 @@ static drape_status open_sim(drape_context *ctx, const drape_model *model, doubl
                        .ctx = ctx,
                        .arena = drape_arena_create(ctx),
                        .model = model,
+                       .statistics = {.error_max = NAN, .error_last = NAN},
                        .realtime = {.longest_asked = longest_asked},
                        .frame_rate = frame_rate};
     return sim->arena ? DRAPE_OK : DRAPE_E_MEMORY;
@@ -237,6 +238,12 @@ uint64_t drape_sim_hash(const drape_sim *sim)
     return sim ? drape_state_hash(sim->model, drape_sim_state(sim)) : 0;
 }
 
+double drape_sim_error_bound(const drape_sim *sim)
+{
+    const drape_integrator_ops *integrator = sim->chosen.integrator;
+    return integrator->error_bound ? integrator->error_bound(sim->integrator) : NAN;
+}
+
 drape_statistics drape_sim_statistics(const drape_sim *sim)
 {
     if (!sim)
@@ -251,6 +258,7 @@ drape_statistics drape_sim_statistics(const drape_sim *sim)
     s.stability_known = work.stability_known;
     s.unstable_modes = work.unstable_modes;
     s.tolerance = tolerance_of(sim);
+    s.error_bound = drape_sim_error_bound(sim);
     s.wall_residual = work.residual_seconds;
     s.wall_jacobian = work.jacobian_seconds;
     s.wall_factor = work.factor_seconds;

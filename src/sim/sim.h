@@ -24,6 +24,13 @@ typedef struct drape_audit {
     double best;                 /* largest numerical dissipation so far */
 } drape_audit;
 
+/* Where drape_sim_warning continues, so that each test is made once for all indices from 0. Not archived. */
+typedef struct drape_warning_cursor {
+    int index;        /* of the next warning */
+    size_t check;     /* the test that may find it */
+    int64_t attempts; /* made by the sim when this was set: after more of them it is out of date */
+} drape_warning_cursor;
+
 #define DRAPE_MAX_EFFORTS 8
 
 /* The state of advances with a budget, kept between calls. */
@@ -36,6 +43,7 @@ typedef struct drape_realtime_memory {
     int effort;                     /* the integrator's level of effort; 0 is the best */
     bool stretched;                 /* steps were longer than dt, or time was left over */
     double cap;                     /* [s] longer steps were rejected recently; INFINITY: no limit */
+    int64_t inaccurate;             /* calls with a step whose estimated error was above its bound */
 } drape_realtime_memory;
 
 struct drape_sim {
@@ -59,6 +67,8 @@ struct drape_sim {
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
     double *query_scratch;          /* (node_count x 3) for queries between steps */
     int64_t attempts;
+    double further_seconds;      /* [s] of the last attempt, see drape_step_info; not archived: it is read at
+                                    once */
     drape_statistics statistics; /* counted by the driver; the integrator has the others */
     drape_reason_total reasons[DRAPE_MAX_REASONS];
     int reason_count;
@@ -66,8 +76,9 @@ struct drape_sim {
     drape_realtime_memory realtime;
     drape_energy energy, attempted;     /* of the present state; of the last attempted one */
     bool energy_known, attempted_known; /* whether these two are valid */
-    bool warning_failed;                /* memory was out for a test of drape_sim_warning */
-    uint64_t model_hash, choices_hash;  /* identify what a checkpoint belongs to; valid if identity_known */
+    drape_warning_cursor warning_cursor;
+    bool warning_failed;               /* memory was out for a test of drape_sim_warning */
+    uint64_t model_hash, choices_hash; /* identify what a checkpoint belongs to; valid if identity_known */
     bool identity_known;
     /* The members from here on stay in place when a restored sim replaces the others (checkpoint.c). */
     atomic_bool cancel; /* stops the running advance, or the next one */
@@ -103,6 +114,9 @@ static inline const drape_state *drape_sim_state(const drape_sim *sim)
 {
     return &sim->states[sim->now];
 }
+
+/* The bound on the estimated error of a step [m]; NaN: the integrator estimates none. */
+double drape_sim_error_bound(const drape_sim *sim);
 
 /* Whether out has energy that neither the state before nor the work on it can account for, in this step or
  * since the beginning of the run; info->diagnostic then says how much. */

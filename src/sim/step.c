@@ -126,6 +126,15 @@ static void rotate_states(drape_sim *sim)
     sim->next = spare;
 }
 
+/* error: NaN if the integrator estimates none. */
+static void count_error(drape_sim *sim, double error)
+{
+    drape_statistics *s = &sim->statistics;
+    s->error_last = error;
+    s->error_max = fmax(s->error_max, error);
+    s->steps_above_error += error > drape_sim_error_bound(sim);
+}
+
 static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
 {
     drape_statistics *s = &sim->statistics;
@@ -138,6 +147,7 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     s->h_max = fmax(info->h, s->h_max);
     s->steps_accepted++;
     s->steps_unconverged += info->usable;
+    count_error(sim, info->error);
     drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t, h_next);
 }
 
@@ -278,18 +288,20 @@ static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *
                            .iterations = info->iterations,
                            .residual = info->residual,
                            .tolerance = info->tolerance,
-                           .diagnostic = info->diagnostic};
+                           .diagnostic = info->diagnostic,
+                           .error = info->error};
 }
 
 /* Makes one attempt, from proposal to verdict. *stop: the negative status that ends the advance; 0:
  * continue. */
 static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status *stop)
 {
-    drape_step_info info = {.reason = drape_reason_name(DRAPE_REASON_CONVERGED), .h = h};
+    drape_step_info info = {.reason = drape_reason_name(DRAPE_REASON_CONVERGED), .h = h, .error = NAN};
     drape_trial trial;
     double t = drape_sim_state(sim)->t;
     drape_status status = compute_next(sim, t1, h, &info);
     drape_verdict verdict = judge(sim, &info, status, &trial);
+    sim->further_seconds = info.further_seconds;
     bool refused = status == DRAPE_OK && verdict != DRAPE_ACCEPT; /* by the controller alone */
     *stop = verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
     if (verdict == DRAPE_ACCEPT)

@@ -181,13 +181,30 @@ static bool is_contact_slow(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
+/* By its own estimate, of which the last step tells how far off the end of the run is. */
+static bool is_inaccurate(drape_sim *sim, char *text, size_t size)
+{
+    const drape_statistics s = drape_sim_statistics(sim);
+    const bool last = s.error_last > s.error_bound;
+    if (!last && !((double)s.steps_above_error > MOST * (double)s.steps_accepted))
+        return false;
+    snprintf(
+        text, size,
+        "%s: %lld of %lld steps%s ended further from the solution of their equation than \"error\", %.3g m, "
+        "by estimate up to %.3g m: a smaller dt or more \"rescue_iterations\" come nearer, with a budget "
+        "more time a frame; \"be\" converges",
+        sim->chosen.integrator->entry.name, (long long)s.steps_above_error, (long long)s.steps_accepted,
+        last ? ", the last among them," : "", s.error_bound, s.error_max);
+    return true;
+}
+
 static const struct {
     const char *name;
     bool (*applies)(drape_sim *sim, char *text, size_t size);
-} checks[] = {{"no_terms", has_no_terms},       {"few_steps", has_few_steps},
-              {"large_mesh", has_large_file},   {"starts_inside", starts_inside},
-              {"ends_inside", ends_inside},     {"numerical_dissipation", dissipates_most},
-              {"slow_contact", is_contact_slow}};
+} checks[] = {{"no_terms", has_no_terms},        {"few_steps", has_few_steps},
+              {"large_mesh", has_large_file},    {"starts_inside", starts_inside},
+              {"ends_inside", ends_inside},      {"numerical_dissipation", dissipates_most},
+              {"slow_contact", is_contact_slow}, {"inaccurate", is_inaccurate}};
 
 bool drape_sim_take_warning_failure(drape_sim *sim)
 {
@@ -198,12 +215,19 @@ bool drape_sim_take_warning_failure(drape_sim *sim)
 
 bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out)
 {
-    int found = 0;
-    for (size_t i = 0; sim && out && index >= 0 && i < sizeof checks / sizeof *checks; i++)
-        if (checks[i].applies(sim, out->text, sizeof out->text) && found++ == index) {
+    drape_warning_cursor c = {0};
+    if (sim && index > 0 && sim->warning_cursor.index <= index &&
+        sim->warning_cursor.attempts == sim->attempts)
+        c = sim->warning_cursor;
+    while (sim && out && index >= 0 && c.check < sizeof checks / sizeof *checks) {
+        const size_t i = c.check++;
+        if (checks[i].applies(sim, out->text, sizeof out->text) && c.index++ == index) {
             out->name = checks[i].name;
+            c.attempts = sim->attempts;
+            sim->warning_cursor = c;
             return true;
         }
+    }
     if (out)
         *out = (drape_warning){.name = ""};
     return false;

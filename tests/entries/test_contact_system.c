@@ -144,7 +144,7 @@ static void check_symmetrized(probe *t, const char *what, double weight, double 
                                .weight = weight,
                                .t = time,
                                .span = {time - 0.01, time},
-                               .symmetric = true};
+                               .contact = DRAPE_CONTACT_SYMMETRIC};
     const drape_pattern *p = drape_system_pattern(t->system);
     double *exact = take(t, (size_t)p->nonzeros), largest = 0, change = 0;
     drape_system_jacobian(t->system, &point, 0, 0, exact);

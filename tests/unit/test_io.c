@@ -510,10 +510,10 @@ static int split(char *row, char **field, int room, char **next)
     return count;
 }
 
-#define FIELDS 21
+#define FIELDS 22
 static const char columns[] =
     "attempt,t,h,accepted,status,reason,iterations,residual,tolerance,kinetic,elastic,gravity,contact,"
-    "dissipated,numerical,worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit\n";
+    "dissipated,numerical,worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit,error\n";
 
 static void check_number(const char *text, double expected)
 {
@@ -559,6 +559,7 @@ static void check_row(char *const *field, const drape_attempt *a, const drape_en
     for (int i = 0; i < 6; i++)
         check_number(field[9 + i], energies[i]);
     check_worst(field + 15, &a->diagnostic);
+    check_number(field[21], a->error);
 }
 
 START_TEST(steps_has_a_row_for_each_attempt)
@@ -592,6 +593,7 @@ START_TEST(steps_quotes_and_keeps_digits)
         .iterations = 50,
         .residual = -NAN,
         .tolerance = INFINITY,
+        .error = 1.0 / 7,
         .diagnostic = {"ratio, \"worst\"", "host\nterm", 7, {1, 23, 456, -1}, 0, 5e-324, -1 / 3.0}};
     drape_attempt calm = attempt;
     calm.diagnostic = (drape_diagnostic){"", "", -1, {-1, -1, -1, -1}, -1, 0, 0};
