@@ -174,6 +174,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
               linear_iterations = efforts[s->effort].linear_iterations;
     drape_solve_report report;
     drape_implicit_backward_euler(&s->common, in, out->t, h, 1 / h * (1 / h));
+    const bool follows = in->t == s->past_end;
     remember(s, in, out->t);
     guess(s, in, h);
     const drape_inexact_settings settings = {
@@ -183,6 +184,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         .error = s->values[PARAM_ERROR],
         .deadline = s->deadline,
         .linear_tolerance = linear_tolerance(s),
+        .follows = follows,
         .max_linear_iterations =
             linear_iterations ? linear_iterations : (int)s->values[PARAM_LINEAR_ITERATIONS]};
     drape_status status = drape_inexact_newton_solve(s->newton, &settings, s->common.d, &report);

@@ -2,7 +2,7 @@
  * inexact_newton.c: see inexact_newton.h. The stages of an iteration:
  *     correct   A p = -F with A near J: by conjugate gradients, or with factors and predicted stress
  *     feasible  p shortened where pieces meet, until nothing passes through anything
- *     advance   d + a p with a = 1, 1/2, 1/4 ..., until the residual at its end does little work along p
+ *     advance   d + a p, with the length a where the residual does little work along p
  *     estimate  the distance to the solution, from one more p
  */
 #include "nonlinear/inexact_newton.h"
@@ -19,8 +19,11 @@
 
 /* Fraction of the initial work along a correction that the residual may do beyond the minimum. */
 #define WORK_FRACTION  0.5
-#define MAX_HALVINGS   6 /* halvings of a correction; the last one is taken if F is finite there */
-#define MAX_PREDICTION 8 /* corrections in a solve, after which stress is not predicted, as in newton.c */
+#define MAX_TRIALS     8    /* of step lengths beyond the first; the last one is taken if F is finite there */
+#define SHORT_STEP     0.5  /* after a shorter step the next matrix has all of the positive parts */
+#define MIN_REPAIR     1e-3 /* smallest first share of the positive parts; otherwise half of the last one */
+#define SHARE_GROWTH   4    /* factor from one share tried to the next */
+#define MAX_PREDICTION 8    /* corrections in a solve, after which stress is not predicted, as in newton.c */
 /* Of the residual of the guess, that further iterations aim at with factors or contact: with more, stiff
  * elements and barriers that are not yet balanced throw cloth back in the next step. */
 #define MAX_LEFT 0.1
@@ -40,6 +43,9 @@ struct drape_inexact_newton {
     drape_approx_jacobian *approximate;
     drape_factored_jacobian *factored;
     drape_stress_predictor predictor; /* with factors */
+    double share;                     /* of the positive parts in the next matrix; with factors */
+    double used_share, repair_share;  /* in the last matrix; in the last one that was indefinite without */
+    bool indefinite;                  /* one in this solve was */
     double *p, *minus_f, *trial;      /* free DOFs */
     double *fraction;                 /* nodes; NULL without contact */
     double *f, *g;                    /* free DOFs, nodes: kept while the estimate evaluates them elsewhere */
@@ -90,11 +96,16 @@ void drape_inexact_newton_destroy(drape_inexact_newton **newton)
 
 /* ---- Guess ---- */
 
-static void begin(drape_inexact_newton *s)
+/* Stiff elements are left with more stress than the solution has: little displacement, but far more force than
+ * the inertia of light cloth balances, and it would turn up in the first matrix. What was predicted along the last
+ * correction of the step before is free of that. */
+static void begin(drape_inexact_newton *s, bool follows)
 {
     drape_step_equation *e = s->equation;
     drape_step_equation_begin(e);
-    if (!s->factored)
+    s->share = 1;
+    s->indefinite = false;
+    if (!s->factored || (follows && s->predictor.valid))
         return;
     const double clock = drape_system_clock(e->system);
     drape_point start = e->point;
@@ -124,14 +135,33 @@ static drape_status solve(drape_inexact_newton *s, const drape_inexact_settings 
     return status;
 }
 
-static drape_status update_factored(drape_inexact_newton *s)
+static drape_status update_factored(drape_inexact_newton *s, double share)
 {
     drape_step_equation *e = s->equation;
     drape_point point = e->point;
     point.stress = drape_stress_predictor_stress(&s->predictor);
-    drape_status status = drape_factored_jacobian_update(s->factored, &point, e->mass_weight, &e->work);
+    drape_status status =
+        drape_factored_jacobian_update(s->factored, &point, e->mass_weight, share, &e->work);
     if (status == DRAPE_E_STOPPED)
         drape_system_cancelled(e->system); /* so that the step ends as cancelled */
+    s->used_share = share;
+    return status;
+}
+
+/* The first matrix of a solve has all of the positive parts, the others as little of them as makes them
+ * definite: the smaller the share, the faster the convergence, as in newton.c. */
+static drape_status update_definite(drape_inexact_newton *s)
+{
+    double share = s->indefinite && s->share == 0 ? s->repair_share : s->share;
+    drape_status status = update_factored(s, share);
+    s->share = 0;
+    if (status != DRAPE_RETRY_LINEAR || share == 1)
+        return status;
+    share = share > 0 ? fmin(1, SHARE_GROWTH * share) : fmax(s->repair_share / 2, MIN_REPAIR);
+    while ((status = update_factored(s, share)) == DRAPE_RETRY_LINEAR && share < 1)
+        share = fmin(1, SHARE_GROWTH * share);
+    s->repair_share = share;
+    s->indefinite = true;
     return status;
 }
 
@@ -139,7 +169,7 @@ static drape_status correct(drape_inexact_newton *s, const drape_inexact_setting
 {
     drape_step_equation *e = s->equation;
     drape_status status =
-        s->factored ? update_factored(s)
+        s->factored ? update_definite(s)
                     : drape_approx_jacobian_update(s->approximate, &e->point, e->mass_weight, &e->work);
     return status ? status : solve(s, settings);
 }
@@ -202,21 +232,34 @@ static void make_correction_feasible(drape_inexact_newton *s)
 
 /* ---- Advance ---- */
 
-/* Returns false if F is finite at none of the step lengths. Stress was predicted for the whole correction. */
+/* Takes a step a p at whose end the residual does little work along p, by doubling and bisection. Positive parts
+ * make a matrix too stiff: its corrections are lengthened, but not where that might lead into contact. Returns
+ * false if F is finite at none of the step lengths. Stress was predicted for the whole correction. */
 static bool advance(drape_inexact_newton *s, double *d)
 {
     drape_step_equation *e = s->equation;
-    double start = drape_step_equation_dot(e, e->f, s->p), a = 1, work;
-    for (int k = 0; k <= MAX_HALVINGS; k++, a /= 2) {
-        bool finite = drape_step_equation_try(e, d, a, s->p, s->trial, &work);
-        if (finite && (k == MAX_HALVINGS || !(work > -WORK_FRACTION * start))) {
-            memcpy(d, s->trial, e->dofs * sizeof *d);
-            if (k > 0)
-                drape_stress_predictor_forget(&s->predictor);
-            return true;
-        }
+    const bool lengthens = s->factored && s->used_share > 0 && !s->fraction;
+    const double start = drape_step_equation_dot(e, e->f, s->p);
+    double low = 0, high = INFINITY, a = 1, work = 0;
+    bool finite = false;
+    for (int k = 0; k <= MAX_TRIALS; k++) {
+        finite = drape_step_equation_try(e, d, a, s->p, s->trial, &work);
+        const bool whole = a == 1 && (start >= 0 || (work < 0 && !lengthens));
+        if (finite && (whole || k == MAX_TRIALS || fabs(work) <= -WORK_FRACTION * start))
+            break;
+        if (finite && work < 0)
+            low = a;
+        else
+            high = a;
+        a = k + 1 == MAX_TRIALS && low > 0 ? low : isinf(high) ? 2 * a : (low + high) / 2;
     }
-    return false;
+    if (!finite)
+        return false;
+    memcpy(d, s->trial, e->dofs * sizeof *d);
+    s->share = a < SHORT_STEP ? 1 : 0;
+    if (a != 1)
+        drape_stress_predictor_forget(&s->predictor);
+    return true;
 }
 
 /* ---- Estimate ---- */
@@ -299,7 +342,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
                             drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
-    begin(s);
+    begin(s, settings->follows);
     make_guess_feasible(s, settings->iterations, d);
     if (!drape_step_equation_evaluate(e, d))
         return DRAPE_RETRY_NONFINITE;
@@ -363,8 +406,11 @@ void drape_inexact_newton_archive(drape_inexact_newton *s, drape_archive *a)
     drape_work_archive(&s->equation->work, a);
     if (s->approximate)
         drape_approx_jacobian_archive(s->approximate, a);
-    if (s->factored)
-        drape_factored_jacobian_archive(s->factored, a);
+    if (!s->factored)
+        return;
+    drape_archive_double(a, &s->repair_share);
+    drape_stress_predictor_archive(&s->predictor, a);
+    drape_factored_jacobian_archive(s->factored, a);
 }
 
 size_t drape_inexact_newton_bytes(const drape_inexact_newton *s)

@@ -33,6 +33,7 @@ typedef struct drape_inexact_settings {
     double deadline; /* [s of drape_clock_seconds] by which iterations end that only reduce this error */
     double linear_tolerance; /* relative residual that conjugate gradients leave in each correction */
     int max_linear_iterations;
+    bool follows; /* the step begins with the result of the last solve */
 } drape_inexact_settings;
 
 /* auto: whichever factored_jacobian.h says. */

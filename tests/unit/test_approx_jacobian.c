@@ -369,7 +369,7 @@ START_TEST(factored_matrix_is_the_positive_jacobian)
     for (size_t i = 0; i < q.n; i++)
         b[i] = random_number(&seed);
     ck_assert_int_eq(drape_factored_jacobian_create(q.arena, q.system, &jacobian), DRAPE_OK);
-    ck_assert_int_eq(drape_factored_jacobian_update(jacobian, &q.point, 3600, &q.work), DRAPE_OK);
+    ck_assert_int_eq(drape_factored_jacobian_update(jacobian, &q.point, 3600, 1, &q.work), DRAPE_OK);
     ck_assert_int_eq(drape_factored_jacobian_solve(jacobian, b, q.x), DRAPE_OK);
     const double *a = drape_factored_jacobian_values(jacobian);
     drape_system_jacobian(q.system, &q.point, 3600, 1, q.values);
