@@ -38,8 +38,10 @@
 /* Limits of the share m in the estimate of the error: beyond them forces are far from linear along p. */
 #define MIN_SHARE          0.05
 #define MAX_SHARE          4
-#define ESTIMATE_TOLERANCE 0.5 /* relative residual that conjugate gradients leave in the p of an estimate */
-#define INERTIAL           0.2 /* power of the error if nothing but inertia resisted it */
+#define ESTIMATE_TOLERANCE 0.5 /* relative residual that conjugate gradients leave in the p of an estimate, */
+#define MAX_ESTIMATE_ITERATIONS                                                                              \
+    4                /* or after so many iterations: as many more would cost as much as a correction */
+#define INERTIAL 0.2 /* power of the error if nothing but inertia resisted it */
 
 struct drape_inexact_newton {
     drape_step_equation *equation;
@@ -316,14 +318,13 @@ static double stiffness_share(drape_inexact_newton *s, const double *d)
 
 /* The estimated distance from d to the solution. F was evaluated last at d, as it is on return. corrected:
  * there is a matrix of this solve. Overwrites p. */
-static double estimate_error(drape_inexact_newton *s, const drape_inexact_settings *settings, const double *d,
-                             bool corrected)
+static double estimate_error(drape_inexact_newton *s, const double *d, bool corrected)
 {
     drape_step_equation *e = s->equation;
     const double inertial = inertial_error(e);
-    if (!corrected || !(inertial > 0) || solve(s, ESTIMATE_TOLERANCE, settings->max_linear_iterations))
+    if (!corrected || !(inertial > 0) || solve(s, ESTIMATE_TOLERANCE, MAX_ESTIMATE_ITERATIONS))
         return inertial;
-    const double along = rms(e, s->p) / stiffness_share(s, d);
+    const double along = rms(e, s->p) / (s->factored ? stiffness_share(s, d) : 1);
     return along > 0 && along < inertial ? along * drape_pow(inertial / along, INERTIAL) : inertial;
 }
 
@@ -368,7 +369,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         const bool quiet = !s->factored || inertial_error(e) <= MAX_DRIFT * s->edge;
         const bool fell = converged || (least && left < bound && quiet);
         if (fell || most)
-            report->error = estimate_error(s, settings, d, i > 0);
+            report->error = estimate_error(s, d, i > 0);
         if (fell && (converged || most || report->error <= settings->error || !has_time(settings, seconds)))
             return DRAPE_OK;
         if (most) {
