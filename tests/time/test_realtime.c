@@ -62,9 +62,9 @@ START_TEST(few_iterations_are_near_the_converged_step)
 }
 END_TEST
 
-/* Light cloth in wind and light stiff cloth that hangs: 11 steps. The bound is that of the first test; the same
- * scenes were 20 % and 66 % off when drag had positive parts, and when the stress that the step before left in
- * stiff edges was in the first matrix. Accuracy does not depend on the size: a step's bound is relative to it. */
+/* Light stiff cloth that hangs, and flies in wind, for 11 steps. The bound is that of the first test. It
+ * fails without what these need: stress predicted over the end of a step, matrices that lose their positive parts,
+ * drag as it is. */
 #define LIGHT                                                                                                \
     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 8, 'rows': 8, 'width': 0.13, 'height': "  \
     "0.13, 'orientation': 'horizontal'},"                                                                    \

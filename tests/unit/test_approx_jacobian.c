@@ -391,9 +391,8 @@ START_TEST(factored_matrix_is_the_positive_jacobian)
 }
 END_TEST
 
-/* Drag of the wind is not symmetric, and neighbouring triangles cancel much of it: it has no positive parts, and
- * the factors are those of the matrix as it is. In still air the projection of the wind's 9 x 9 blocks would
- * change it by as much as its largest entry. */
+/* Drag of the wind is not symmetric, and neighbouring triangles cancel much of it: it has no positive parts,
+ * and the factors are those of the matrix as it is: 1e-9 is rounding times the condition. */
 START_TEST(factored_matrix_has_drag_as_it_is)
 {
     state q = open_state(5, "{'type': 'drag.wind', 'wind': [5, 0, 2]}");
