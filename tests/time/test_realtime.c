@@ -46,7 +46,7 @@ START_TEST(few_iterations_are_near_the_converged_step)
     scene_advance(&exact, 0.5);
     double errors[2];
     for (int k = 1; k <= 2; k++) {
-        scene s = scene_open(HUNG, "", "newton_k", k == 1 ? "" : ", 'iterations': 2");
+        scene s = scene_open(HUNG, "", "newton_k", k == 1 ? ", 'error': 1" : ", 'error': 1, 'iterations': 2");
         scene_advance(&s, 0.5);
         errors[k - 1] = distance(&exact, &s);
         ck_assert_int_eq(s.rejected, 0);
