@@ -393,12 +393,19 @@ static void evaluate_dissipations(const drape_term *term, const drape_request *w
         b->hessian[i] = want->velocity ? b->scratch[i] : b->hessian[i] + want->point->weight * b->scratch[i];
 }
 
+/* Of a matrix that is not symmetric, the symmetric part is made positive semidefinite. */
 static void project(int d, double share, double *h, double *positive)
 {
-    memcpy(positive, h, (size_t)(d * d) * sizeof *h);
+    for (int i = 0; i < d; i++)
+        for (int j = 0; j < d; j++)
+            positive[d * i + j] = (h[d * i + j] + h[d * j + i]) / 2;
     drape_project(d, positive);
-    for (int i = 0; i < d * d; i++)
-        h[i] += share * (positive[i] - h[i]);
+    for (int i = 0; i < d; i++)
+        for (int j = 0; j <= i; j++) {
+            const double change = share * (positive[d * i + j] - (h[d * i + j] + h[d * j + i]) / 2);
+            h[d * i + j] += change;
+            h[d * j + i] += i == j ? 0 : change;
+        }
 }
 
 void drape_block_evaluate(const drape_term *term, const drape_request *want, drape_block *b)
@@ -415,7 +422,9 @@ void drape_block_evaluate(const drape_term *term, const drape_request *want, dra
     else
         evaluate_dissipations(term, want, b);
     const int d = 3 * term->elements.nodes;
-    const bool given = term->ops->measure; /* the positive part is taken already */
+    /* Of measures the positive part is taken already. Drag has none: it is not symmetric, and much of what
+     * neighbouring triangles add cancels. Positive parts would not, and would hold light cloth fast. */
+    const bool given = term->ops->measure || term->ops->in_medium;
     for (int32_t i = 0; want->hessian && want->positive_share > 0 && !given && i < b->count; i++)
         project(d, want->positive_share, b->hessian + (size_t)i * (size_t)(d * d), b->scratch);
 }

@@ -48,7 +48,7 @@ static const drape_param params[PARAM_COUNT] = {
         DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,
                      "residual of the free nodes, largest component, below which no iteration is made, at "
                      "most 1 % of their load; not a bound on an accepted state"),
-    [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
+    [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 20, 0, 100000,
                                               "up to so many further iterations while the estimated distance "
                                               "is above error, or the residual is not "
                                               "below that of the guess, with factors or contact below a "
@@ -178,6 +178,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
               linear_iterations = efforts[s->effort].linear_iterations;
     drape_solve_report report;
     drape_implicit_backward_euler(&s->common, in, out->t, h, 1 / h * (1 / h));
+    const bool follows = in->t == s->past_end;
     remember(s, in, out->t);
     guess(s, in, h);
     const drape_inexact_settings settings = {
@@ -187,6 +188,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         .error = s->values[PARAM_ERROR],
         .deadline = s->deadline,
         .linear_tolerance = linear_tolerance(s),
+        .follows = follows,
         .max_linear_iterations =
             linear_iterations ? linear_iterations : (int)s->values[PARAM_LINEAR_ITERATIONS]};
     drape_status status = drape_inexact_newton_solve(s->newton, &settings, s->common.d, &report);

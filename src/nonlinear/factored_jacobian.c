@@ -16,13 +16,23 @@
 
 struct drape_factored_jacobian {
     drape_system *system;
-    bool *flat; /* (terms) those that C stands for */
+    bool *flat;        /* (terms) those that C stands for */
+    bool nonsymmetric; /* there is drag that couples nodes */
     drape_scalar_stiffness scalar;
     SUNContext sun;
     drape_sun_linear *linear;
 };
 
 /* ---- Where it is better ---- */
+
+/* Drag that couples nodes is not symmetric, and large beside the inertia of light cloth. */
+static bool has_coupled_drag(const drape_model *m)
+{
+    for (int32_t t = 0; t < m->term_count; t++)
+        if (m->terms[t].ops->in_medium && drape_term_couples(&m->terms[t]))
+            return true;
+    return false;
+}
 
 /* The mean square speed of waves along the pairs of a term at rest, l^2 k/m [m2/s2]. */
 static double mean_square_speed(const drape_system *system, int32_t term, const double *h)
@@ -70,7 +80,7 @@ drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, 
         status = drape_scalar_stiffness_covers(system, flat);
     if (!status)
         status = wave_speed(system, &scratch, &speed);
-    *better = m->free_count <= FEW_NODES || speed * dt > MAX_TRAVEL * m->length;
+    *better = m->free_count <= FEW_NODES || has_coupled_drag(m) || speed * dt > MAX_TRAVEL * m->length;
     for (int32_t t = 0; !status && t < m->term_count; t++)
         *better |= m->terms[t].ops->measure && !m->terms[t].ops->pair && !flat[t];
     drape_arena_free(&scratch);
@@ -97,27 +107,31 @@ static void add_scalars(const drape_factored_jacobian *s, double *values)
     }
 }
 
-static drape_status assemble(drape_factored_jacobian *s, const drape_point *point, double mass_weight)
+static drape_status assemble(drape_factored_jacobian *s, const drape_point *at, double mass_weight,
+                             double share)
 {
     bool changed;
-    drape_status status = drape_system_extend_pattern(s->system, point, &changed);
+    drape_point point = *at;
+    point.contact = DRAPE_CONTACT_GAUSS_NEWTON;
+    drape_status status = drape_system_extend_pattern(s->system, at, &changed);
     s->linear->stale |= changed;
     if (!status && s->linear->stale)
         status = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->system));
     if (status)
         return status;
-    drape_scalar_stiffness_weigh(&s->scalar, point->weight, mass_weight);
-    drape_system_jacobian_without(s->system, point, 0, 1, s->flat, s->linear->values);
+    drape_scalar_stiffness_weigh(&s->scalar, at->weight, mass_weight);
+    drape_system_jacobian_without(s->system, &point, 0, share, s->flat, s->linear->values);
     add_scalars(s, s->linear->values);
-    drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
+    if (!s->nonsymmetric)
+        drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
     return DRAPE_OK;
 }
 
 drape_status drape_factored_jacobian_update(drape_factored_jacobian *s, const drape_point *point,
-                                            double mass_weight, drape_work *work)
+                                            double mass_weight, double share, drape_work *work)
 {
     double start = drape_system_clock(s->system), factoring = s->linear->factor_seconds;
-    drape_status status = assemble(s, point, mass_weight);
+    drape_status status = assemble(s, point, mass_weight, share);
     factoring = s->linear->factor_seconds - factoring; /* the analysis of a new pattern */
     work->jacobians++;
     work->jacobian_seconds += drape_system_clock(s->system) - start - factoring;
@@ -125,7 +139,7 @@ drape_status drape_factored_jacobian_update(drape_factored_jacobian *s, const dr
     if (status)
         return status;
     factoring = s->linear->factor_seconds;
-    status = drape_sun_linear_factor(s->linear, false);
+    status = drape_sun_linear_factor(s->linear, share < 1);
     work->factorizations++;
     work->factor_seconds += s->linear->factor_seconds - factoring;
     return status;
@@ -151,6 +165,7 @@ drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *sy
     if (!s)
         return DRAPE_E_MEMORY;
     s->system = system;
+    s->nonsymmetric = has_coupled_drag(m);
     s->flat = drape_arena_take(arena, (size_t)m->term_count, sizeof *s->flat);
     drape_status status = drape_arena_status(arena);
     if (!status)

@@ -6,8 +6,10 @@
  * with
  *     C   bending of flat cloth: one scalar for each pair of nodes, constant (scalar_stiffness.h); a
  *         hundredth of the time of its Hessians
- *     J+  the positive semidefinite parts of all other terms and of contact, without approximation
- * It is symmetric: of friction it has the symmetric part.
+ *     J+  all other terms and contact, with the positive semidefinite parts of their elements or a share
+ *         of them: 1 is positive semidefinite, and converges slowly where cloth is compressed; 0 is exact,
+ *         except for contact, but may be indefinite
+ * It is symmetric, of friction it has the symmetric part, except for drag, which is exact.
  *
  * With predicted stress (stress_predictor.h) in J+, one correction from the extrapolated guess is within a
  * hundredth of the motion of sheets that hang, at any stiffness of the membrane.
@@ -20,9 +22,8 @@
 typedef struct drape_factored_jacobian drape_factored_jacobian;
 
 /* *better: whether the model needs this matrix for steps of dt: a term of it is neither a measure of pairs
- * nor flat bending, or its membrane is so stiff that conjugate gradients need many iterations, or it has so
- * few nodes that factors cost no more. Errors:
- * DRAPE_E_MEMORY. */
+ * nor flat bending, or is drag that couples nodes, or its membrane is so stiff that conjugate gradients need
+ * many iterations, or it has so few nodes that factors cost no more. Errors: DRAPE_E_MEMORY. */
 drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, bool *better);
 
 /* For a system with at least one free node. The arena must outlive it. Errors: DRAPE_E_MEMORY,
@@ -32,10 +33,11 @@ drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *sy
                                             drape_factored_jacobian **out);
 void drape_factored_jacobian_destroy(drape_factored_jacobian **jacobian);
 
-/* Computes the matrix at a point, factors it, and counts the work. A status > 0: it has no factors. Errors:
+/* Computes the matrix at a point with a share of the positive parts, factors it, and counts the work. A
+ * status > 0: it has no factors; with a share below 1 also if it is not positive definite. Errors:
  * DRAPE_E_MEMORY, if contact couples new nodes; DRAPE_E_STOPPED. */
 drape_status drape_factored_jacobian_update(drape_factored_jacobian *jacobian, const drape_point *point,
-                                            double mass_weight, drape_work *work);
+                                            double mass_weight, double share, drape_work *work);
 
 /* x = A^-1 b (free DOFs). A status > 0: x is not finite. */
 drape_status drape_factored_jacobian_solve(drape_factored_jacobian *jacobian, const double *b, double *x);

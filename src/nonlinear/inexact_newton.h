@@ -15,8 +15,8 @@
  * m is the share that the mean Jacobian along p has of A, so |p| / m is as far as the error along p reaches.
  * What is left of the error is mostly where A is much stiffer than J, as positive semidefinite parts of
  * compressed cloth are, and p is too short; the second factor is the error if nothing but inertia resisted
- * it, so it is too long. The powers are fitted to some 3 600 steps of cloth that hangs, swings, flies and falls
- * on things.
+ * it, so it is too long. The powers are fitted to some 3 600 steps of cloth that hangs, swings, flies and
+ * falls on things. With conjugate gradients p is that of a few of their iterations, and m is 1.
  */
 #ifndef DRAPE_NONLINEAR_INEXACT_NEWTON_H
 #define DRAPE_NONLINEAR_INEXACT_NEWTON_H
@@ -33,6 +33,7 @@ typedef struct drape_inexact_settings {
     double deadline; /* [s of drape_clock_seconds] by which iterations end that only reduce this error */
     double linear_tolerance; /* relative residual that conjugate gradients leave in each correction */
     int max_linear_iterations;
+    bool follows; /* the step begins with the result of the last solve */
 } drape_inexact_settings;
 
 /* auto: whichever factored_jacobian.h says. */

@@ -15,6 +15,7 @@
 #define DRAPE_NONLINEAR_STRESS_PREDICTOR_H
 
 #include "assemble/system.h"
+#include "base/archive.h"
 
 typedef struct drape_stress_predictor {
     drape_system *system;
@@ -41,5 +42,8 @@ void drape_stress_predictor_forget(drape_stress_predictor *predictor);
 
 /* The value for drape_point.stress; NULL: no prediction. */
 const double *drape_stress_predictor_stress(const drape_stress_predictor *predictor);
+
+/* For predictions that are used in the next solve. */
+void drape_stress_predictor_archive(drape_stress_predictor *predictor, drape_archive *a);
 
 #endif

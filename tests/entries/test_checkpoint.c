@@ -107,7 +107,10 @@ static void same_counts(const drape_sim *a, const drape_sim *b, const char *what
     ck_assert_msg(s.steps_accepted == r.steps_accepted && s.steps_rejected == r.steps_rejected &&
                       s.newton_iterations == r.newton_iterations && s.jacobians == r.jacobians &&
                       s.factorizations == r.factorizations && s.linear_iterations == r.linear_iterations &&
-                      s.residuals == r.residuals && s.strain_max == r.strain_max && s.h_min == r.h_min,
+                      s.residuals == r.residuals && s.steps_above_error == r.steps_above_error &&
+                      (s.error_max == r.error_max || isnan(s.error_max)) &&
+                      (s.error_last == r.error_last || isnan(s.error_last)) && s.strain_max == r.strain_max &&
+                      s.h_min == r.h_min,
                   "%s: counts differ", what);
     int64_t count, other;
     for (int i = 0; drape_sim_reason(a, i, &count); i++) {

@@ -37,6 +37,8 @@ static drape_realtime advance(scene *s, double frame, double budget)
 
 /* ---- The fixed-iteration step ---- */
 
+#define NO_MORE ", 'error': 1" /* [m] iterations beyond the least are for larger errors only */
+
 /* One and two iterations against the converged step, on a sheet that falls by half a metre. The errors of
  * one step are those of Newton's second iterate, quadratic in the guess's h^2 dv/2 ~ 1 mm, and of conjugate
  * gradients to a tenth; 2 % of the fall is a bound with room, the goal of the bench. Two are better by more
@@ -47,7 +49,7 @@ START_TEST(few_iterations_are_near_the_converged_step)
     scene_advance(&exact, 0.5);
     double errors[2];
     for (int k = 1; k <= 2; k++) {
-        scene s = scene_open(HUNG, "", "newton_k", k == 1 ? "" : ", 'iterations': 2");
+        scene s = scene_open(HUNG, "", "newton_k", k == 1 ? NO_MORE : NO_MORE ", 'iterations': 2");
         scene_advance(&s, 0.5);
         errors[k - 1] = distance(&exact, &s);
         ck_assert_int_eq(s.rejected, 0);
@@ -58,6 +60,32 @@ START_TEST(few_iterations_are_near_the_converged_step)
     }
     ck_assert_msg(errors[0] < 0.02 && errors[1] < 0.5 * errors[0], "%g m, %g m", errors[0], errors[1]);
     scene_close(&exact);
+}
+END_TEST
+
+/* Light stiff cloth that hangs, and flies in wind, for 11 steps. The bound is that of the first test. It
+ * fails without what these need: stress predicted over the end of a step, matrices that lose their positive parts,
+ * drag as it is. */
+#define LIGHT                                                                                                \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 8, 'rows': 8, 'width': 0.13, 'height': "  \
+    "0.13, 'orientation': 'horizontal'},"                                                                    \
+    "'material': {'young_modulus': 6e6, 'thickness': 6e-4, 'areal_density': 0.045},"                         \
+    "'terms': ['stretch.edge', 'bend.hinge' %s], 'pins': [{'nodes': [0, 7]}]}],"                             \
+    "'integrator': {'method': '%s' %s}, 'duration': 4}"
+
+START_TEST(light_cloth_is_near_the_converged_step)
+{
+    static const char *const wind[] = {"", ", {'type': 'drag.wind', 'wind': [3, 0, 1]}"};
+    for (int i = 0; i < 2; i++) {
+        scene exact = scene_open(LIGHT, wind[i], "be", ", 'dt': 0.016666666666666666"),
+              s = scene_open(LIGHT, wind[i], "newton_k", "");
+        scene_advance(&exact, 11. / 60);
+        scene_advance(&s, 11. / 60);
+        const double error = distance(&exact, &s);
+        ck_assert_msg(error < 0.02 * 0.13, "%s: %g m", wind[i], error);
+        scene_close(&exact);
+        scene_close(&s);
+    }
 }
 END_TEST
 
@@ -460,11 +488,12 @@ START_TEST(wrong_arguments_are_reported)
 }
 END_TEST
 
-SUITE("realtime", few_iterations_are_near_the_converged_step, with_many_iterations_the_step_is_backward_euler,
-      the_step_includes_contact_and_damping, measured_fabrics_fall, stiff_sheets_fall,
-      contact_holds_back_only_what_it_touches, a_ball_that_moves_does_not_stop_it,
-      frame_rates_differ_by_the_order_of_the_method, rest_does_not_depend_on_the_frame_rate,
-      the_level_degrades_and_recovers, a_single_late_frame_is_made_up_for,
-      every_integrator_with_a_time_takes_frames, a_fast_body_is_served_by_the_default_distance,
-      a_distance_that_is_given_is_kept, a_rejected_step_is_retried_by_the_next_call,
-      steps_in_contact_are_not_longer_than_dt, wrong_arguments_are_reported)
+SUITE("realtime", few_iterations_are_near_the_converged_step, light_cloth_is_near_the_converged_step,
+      with_many_iterations_the_step_is_backward_euler, the_step_includes_contact_and_damping,
+      measured_fabrics_fall, stiff_sheets_fall, contact_holds_back_only_what_it_touches,
+      a_ball_that_moves_does_not_stop_it, frame_rates_differ_by_the_order_of_the_method,
+      rest_does_not_depend_on_the_frame_rate, the_level_degrades_and_recovers,
+      a_single_late_frame_is_made_up_for, every_integrator_with_a_time_takes_frames,
+      a_fast_body_is_served_by_the_default_distance, a_distance_that_is_given_is_kept,
+      a_rejected_step_is_retried_by_the_next_call, steps_in_contact_are_not_longer_than_dt,
+      wrong_arguments_are_reported)
