@@ -7,7 +7,7 @@
  *     supports    hung by two corners, swung by them, a flag in the wind, dropped on a ball, over an edge
  *     sides       13 and 30 nodes
  * and scenes drawn at random from a seed: sizes, materials, meshes and supports that nobody chose. Each runs
- * twice: `default`, and `least`, where one iteration is made in each step unless the residual asks for more.
+ * twice: `default`, and `least`, where one iteration is made in a step unless the residual asks for more.
  *
  * A row is one such run, a cell: quantiles of estimate / true over its steps, the share of steps within a
  * factor of 3, and the share of steps that are above the bound and estimated at less than a tenth of the true
