@@ -209,6 +209,16 @@ END_TEST
 
 /* ---- Lists of contacts that grow, and the pattern that is extended ---- */
 
+static drape_model *model_of(drape_context *ctx, const char *text)
+{
+    drape_scene *parsed = NULL;
+    drape_model *model = NULL;
+    ck_assert_int_eq(drape_scene_parse(ctx, text, "test", &parsed), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_compile(parsed, &model), DRAPE_OK);
+    drape_scene_destroy(&parsed);
+    return model;
+}
+
 static drape_model *folding_model(drape_context *ctx)
 {
     static const char text[] =
@@ -222,12 +232,24 @@ static drape_model *folding_model(drape_context *ctx)
         " \"self_contact\": {\"thickness\": 3e-3, \"friction\": 0.3}, \"contact\": {\"friction\": "
         "\"lagged\"},"
         " \"integrator\": {\"dt\": 0.01}, \"duration\": 1}";
-    drape_scene *parsed = NULL;
-    drape_model *model = NULL;
-    ck_assert_int_eq(drape_scene_parse(ctx, text, "folding", &parsed), DRAPE_OK);
-    ck_assert_int_eq(drape_scene_compile(parsed, &model), DRAPE_OK);
-    drape_scene_destroy(&parsed);
-    return model;
+    return model_of(ctx, text);
+}
+
+/* Two balls close upon a sheet and leave it no room. */
+static drape_model *pinched_model(drape_context *ctx)
+{
+    static const char text[] =
+        "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"square\", \"columns\": 7, \"rows\": 7, "
+        "\"width\": 0.1,"
+        " \"height\": 0.1, \"orientation\": \"vertical\", \"transform\": {\"translate\": [-0.05, 0.1, 0]}},"
+        " \"terms\": [\"stretch.edge\", \"bend.hinge\"], \"pins\": [{\"edge\": \"top\"}],"
+        " \"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200}}],"
+        " \"colliders\": [{\"type\": \"sphere\", \"center\": [0, 0.05, -0.035], \"radius\": 0.03,"
+        " \"track\": [[0, [0,0,0]], [0.06, [0,0,0.015]]]}, {\"type\": \"sphere\", \"center\": [0, 0.05, "
+        "0.035],"
+        " \"radius\": 0.03, \"track\": [[0, [0,0,0]], [0.06, [0,0,-0.015]]]}],"
+        " \"contact\": {\"no_room\": \"relax\"}, \"integrator\": {\"dt\": 0.01}, \"duration\": 1}";
+    return model_of(ctx, text);
 }
 
 static drape_status note_accepted(void *user, const drape_event *event)
@@ -239,7 +261,7 @@ static drape_status note_accepted(void *user, const drape_event *event)
 
 /* After the sim is made, every allocation of its run fails once. The failure is reported, the state is the
  * last accepted one, and the run continues from there. */
-static long grow_lists(const drape_model *model, const char *integrator)
+static long grow_lists(const drape_model *model, const char *integrator, int32_t *relaxed)
 {
     const double t = 0.08;
     drape_sim_def def;
@@ -265,6 +287,7 @@ static long grow_lists(const drape_model *model, const char *integrator)
             ck_assert_msg(drape_sim_advance(sim, t) == DRAPE_OK, "%s %ld: %s", integrator, n,
                           drape_context_message(ctx));
         }
+        *relaxed = drape_sim_relaxed(sim, -1, NULL);
         drape_sim_destroy(&sim);
         drape_context_destroy(&ctx);
         ck_assert_int_eq(memory.live, 0);
@@ -279,10 +302,24 @@ START_TEST(contacts_without_memory)
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     drape_model *model = folding_model(ctx);
     for (size_t k = 0; k < sizeof integrators / sizeof *integrators; k++) {
-        const long failures = grow_lists(model, integrators[k]);
+        int32_t relaxed;
+        const long failures = grow_lists(model, integrators[k], &relaxed);
         printf("# %s: %ld allocations in the run\n", integrators[k], failures);
         ck_assert_int_gt(failures, 5);
     }
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(no_room_without_memory)
+{
+    drape_context *ctx = NULL;
+    int32_t relaxed = 0;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    drape_model *model = pinched_model(ctx);
+    ck_assert_int_gt(grow_lists(model, "be", &relaxed), 3);
+    ck_assert_int_gt(relaxed, 0);
     drape_model_destroy(&model);
     drape_context_destroy(&ctx);
 }
@@ -312,4 +349,4 @@ START_TEST(a_context_without_memory)
 END_TEST
 
 SUITE("memory", every_allocation_fails_once, memory_ends_and_stays_away, contacts_without_memory,
-      a_context_without_memory)
+      no_room_without_memory, a_context_without_memory)
