@@ -5,10 +5,10 @@
  *       than a residual and is never factored as a whole, where conjugate gradients solve with it to a
  *       relative tolerance; or that of factored_jacobian.h, where the first would be too far off,
  *     - a correction is shortened for contact only at the nodes that would meet something.
- * If the residual has not fallen below that of the guess, with factors or contact below a tenth of it, or would
- * alone move nodes by edges, or the estimated error is above its bound, some more iterations are made; if then
- * neither the residual nor the estimated error is below that of the guess, the step is refused. So no step is
- * accepted unchecked.
+ * If the residual has not fallen below that of the guess, with factors or contact below a tenth of it, or
+ * would alone move nodes by edges, or the estimated error is above its bound, some more iterations are made;
+ * if then neither the residual nor the estimated error is below that of the guess, the step is refused. So no
+ * step is accepted unchecked.
  *
  * The error, the distance to the solution, is estimated from one more correction p, with the last matrix A,
  * which is not added:
