@@ -29,7 +29,7 @@
 #define FACTOR    3
 #define FAR_BELOW 0.1
 #define BALL      "'colliders': [{'type': 'sphere', 'center': [0, 0, 0], 'radius': %g, 'friction': 0.3}],"
-#define BOX       "'colliders': [{'type': 'box', 'center': [%g, %g, 0], 'size': [%g, %g, %g], 'friction': 0.2}],"
+#define BOX       "'colliders': [{'type': 'box', 'center': [%g,%g,0], 'size': [%g,%g,%g], 'friction': 0.2}],"
 #define FLOOR_PLANE                                                                                          \
     "'colliders': [{'type': 'plane', 'point': [0, %g, 0], 'normal': [0, 1, 0], 'friction': 0.3}],"
 
