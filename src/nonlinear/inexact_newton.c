@@ -39,7 +39,7 @@
 /* Limits of the share m in the estimate of the error: beyond them forces are far from linear along p. */
 #define MIN_SHARE 0.05
 #define MAX_SHARE 4
-/* Power of the error if nothing but inertia resisted it, and with contact, whose matrix is the stiffer one. */
+/* Power of the error if nothing but inertia resisted it, and with contact, whose matrix is stiffer. */
 #define INERTIAL         0.08
 #define INERTIAL_CONTACT 0.2
 /* Conjugate gradients for the p of an estimate: relative residual, and iterations at most. With as many as a
