@@ -11,8 +11,8 @@
  *
  * A row is one such run, a cell: quantiles of estimate / true over its steps, the share of steps within a
  * factor of 3, and the share of steps that are above the bound and estimated at less than a tenth of the true
- * error. Steps that are nearer to `be` than 1e-6 of the scene's size are left out: they are as near as `be` is
- * to the solution. So are steps that `be` does not converge in.
+ * error. Steps that are nearer to `be` than 1e-6 of the scene's size are left out: they are as near as `be`
+ * is to the solution. So are steps that `be` does not converge in.
  *
  *     estimate [--csv FILE] [--seed N] [--count N] [--sides N] [--only TEXT]
  *         --seed, --count   of the random scenes (default 1, 40)
@@ -29,7 +29,7 @@
 #define FACTOR    3
 #define FAR_BELOW 0.1
 #define BALL      "'colliders': [{'type': 'sphere', 'center': [0, 0, 0], 'radius': %g, 'friction': 0.3}],"
-#define EDGE      "'colliders': [{'type': 'box', 'center': [%g, %g, 0], 'size': [%g, %g, %g], 'friction': 0.2}],"
+#define BOX       "'colliders': [{'type': 'box', 'center': [%g,%g,0], 'size': [%g,%g,%g], 'friction': 0.2}],"
 #define FLOOR_PLANE                                                                                          \
     "'colliders': [{'type': 'plane', 'point': [0, %g, 0], 'normal': [0, 1, 0], 'friction': 0.3}],"
 
@@ -88,7 +88,7 @@ static drape_model *compile(drape_context *ctx, const scene *s)
     }
     if (s->support == OVER_EDGE) {
         snprintf(move, sizeof move, "'translate': [%g, %g, %g]", -a / 2, 0.05 * a, a / 2);
-        snprintf(bodies, sizeof bodies, EDGE, -0.3 * a, -0.2 * a, 0.6 * a, 0.4 * a, 2 * a);
+        snprintf(bodies, sizeof bodies, BOX, -0.3 * a, -0.2 * a, 0.6 * a, 0.4 * a, 2 * a);
     }
     if (s->support == THROWN) {
         snprintf(move, sizeof move, "'rotate': [1, 0, 0, %g]", s->tilt);

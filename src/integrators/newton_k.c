@@ -1,8 +1,8 @@
 /*
  * newton_k: backward Euler with k inexact Newton iterations in each step, for real time. be.c solves the
  * same equation to a tolerance; here the solver is nonlinear/inexact_newton.h. No step is accepted
- * unchecked: the final residual is reported, and if it has not fallen below that of the guess the step is
- * refused, so that the controller halves it.
+ * unchecked: the final residual and an estimate of the error are reported, and if neither has fallen below
+ * that of the guess the step is refused, so that the controller halves it.
  *
  * The guess extrapolates the motion, with a share s of the last change of velocity,
  *     d = h v0 + s h^2 (v0 - v-1)/h0
@@ -52,7 +52,7 @@ static const drape_param params[PARAM_COUNT] = {
                                               "up to so many further iterations while the estimated distance "
                                               "is above error, or the residual is not "
                                               "below that of the guess, with factors or contact below a "
-                                              "tenth of it; a step that then is not below that of "
+                                              "tenth of it; a step that then is not nearer than "
                                               "the guess is rejected"),
     [PARAM_EXTRAPOLATION] =
         DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
@@ -69,8 +69,8 @@ static const drape_param params[PARAM_COUNT] = {
         "corrections", DRAPE_INEXACT_AUTO, corrections,
         "conjugate_gradients: a matrix with edges and springs, and one number for each pair of nodes of all "
         "other measures, is never factored; factors: one with all terms, and such numbers for the bending of "
-        "flat cloth only; auto: factors for terms that the first matrix would hold back, for stiff cloth and "
-        "for few nodes"),
+        "flat cloth only; auto: factors for terms that the first matrix would hold back, for stiff cloth, "
+        "for wind and for few nodes"),
 };
 
 #define ERROR_SHARE         1e-3     /* default of error, of the size of the scene */

@@ -39,7 +39,9 @@
 /* Limits of the share m in the estimate of the error: beyond them forces are far from linear along p. */
 #define MIN_SHARE 0.05
 #define MAX_SHARE 4
-#define INERTIAL  0.2 /* power of the error if nothing but inertia resisted it */
+/* Power of the error if nothing but inertia resisted it, and with contact, whose matrix is stiffer. */
+#define INERTIAL         0.08
+#define INERTIAL_CONTACT 0.2
 /* Conjugate gradients for the p of an estimate: relative residual, and iterations at most. With as many as a
  * correction has, the estimate cost as much as the step. */
 #define ESTIMATE_TOLERANCE  0.5
@@ -344,7 +346,8 @@ static double estimate_error(drape_inexact_newton *s, const double *d, bool corr
     if (!corrected || !(inertial > 0) || solve(s, ESTIMATE_TOLERANCE, ESTIMATE_ITERATIONS))
         return inertial;
     const double along = rms(e, s->p) / (s->factored ? stiffness_share(s, d) : 1);
-    return along > 0 && along < inertial ? along * drape_pow(inertial / along, INERTIAL) : inertial;
+    const double power = s->fraction ? INERTIAL_CONTACT : INERTIAL;
+    return along > 0 && along < inertial ? along * drape_pow(inertial / along, power) : inertial;
 }
 
 /* ---- Iterate ---- */

@@ -5,17 +5,18 @@
  *       than a residual and is never factored as a whole, where conjugate gradients solve with it to a
  *       relative tolerance; or that of factored_jacobian.h, where the first would be too far off,
  *     - a correction is shortened for contact only at the nodes that would meet something.
- * If the residual has not fallen below that of the guess, with factors or contact below a tenth of it, or the
- * estimated error is above its bound, some more iterations are made; if the residual is then not below that
- * of the guess, the step is refused. So no step is accepted unchecked.
+ * If the residual has not fallen below that of the guess, with factors or contact below a tenth of it, or
+ * would alone move nodes by edges, or the estimated error is above its bound, some more iterations are made;
+ * if then neither the residual nor the estimated error is below that of the guess, the step is refused. So no
+ * step is accepted unchecked.
  *
  * The error, the distance to the solution, is estimated from one more correction p, with the last matrix A,
  * which is not added:
- *     e = (|p| / m)^(4/5) (|M^-1 F| / m_w)^(1/5),  m = p . (F(d + p) - F(d)) / p . A p
+ *     e = (|p| / m)^(1 - c) (|M^-1 F| / m_w)^c,  m = p . (F(d + p) - F(d)) / p . A p
  * m is the share that the mean Jacobian along p has of A, so |p| / m is as far as the error along p reaches.
  * What is left of the error is mostly where A is much stiffer than J, as positive semidefinite parts of
  * compressed cloth are, and p is too short; the second factor is the error if nothing but inertia resisted
- * it, so it is too long. The powers are fitted to some 3 600 steps of cloth that hangs, swings, flies and
+ * it, so it is too long. The power c is fitted to 1 600 steps of cloth that hangs, swings, flies and
  * falls on things. With conjugate gradients p is that of a few of their iterations, and m is 1.
  */
 #ifndef DRAPE_NONLINEAR_INEXACT_NEWTON_H

@@ -88,10 +88,10 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The median over the steps of a run is within a factor of 4 of the true error on cloth of three materials and
- * two membranes that hangs, swings and falls on a ball, with the default iterations and with the least; no step
- * that is off by more than the bound is estimated at less than a tenth. bench/estimate has more scenes, of which
- * nine in ten are within a factor of 3; 4 has to hold in all of these. */
+/* The median over the steps of a run is within a factor of 4 of the true error on cloth of three materials
+ * and two membranes that hangs, swings and falls on a ball, with the default iterations and the least; no
+ * step that is off by more than the bound is estimated at less than a tenth. bench/estimate has more scenes,
+ * of which nine in ten are within a factor of 3; 4 has to hold in all of these. */
 START_TEST(the_estimate_is_near_the_true_error)
 {
     static const source sources[] = {{"", 16, SOFT, EDGES, PINS},

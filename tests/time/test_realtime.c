@@ -64,8 +64,8 @@ START_TEST(few_iterations_are_near_the_converged_step)
 END_TEST
 
 /* Light stiff cloth that hangs, and flies in wind, for 11 steps. The bound is that of the first test. It
- * fails without what these need: stress predicted over the end of a step, matrices that lose their positive parts,
- * drag as it is. */
+ * fails without what these need: stress predicted over the end of a step, matrices that lose their positive
+ * parts, drag as it is. */
 #define LIGHT                                                                                                \
     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 8, 'rows': 8, 'width': 0.13, 'height': "  \
     "0.13, 'orientation': 'horizontal'},"                                                                    \
