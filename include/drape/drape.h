@@ -600,8 +600,9 @@ typedef struct drape_warning {
  * are inside a collider, by more than 1e-9 m, or it pierces triangles without a pinned node, at the start,
  * or after the steps so far; the text describes the first such collider. numerical_dissipation: the
  * integrator took more than half of the energy that went in. slow_contact: contact takes most of the time
- * of the steps, and longer than the motion lasts, and a setting is known to help. Returns false past the
- * last. */
+ * of the steps, and longer than the motion lasts, and a setting is known to help. contact_distance: a
+ * collider moved in a step by more than five activation distances that the scene gives. Returns false past
+ * the last. */
 DRAPE_API bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out);
 
 /* ---- Checkpoints ---- */
