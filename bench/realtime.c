@@ -12,9 +12,10 @@
  * `strain` is the largest of any edge at the end of a frame, `inside` the depth of cloth in a body,
  * `crossings` that of edges through triangles of the cloth, each the largest of all frames.
  *
- *     realtime [--csv FILE] [--seconds S] [--scene NAME] [--be]
+ *     realtime [--csv FILE] [--seconds S] [--scene NAME] [--slower F] [--be]
  *
- * --be adds the converged steps, which take minutes.
+ * --slower multiplies the budgets, for a machine that is so many times slower than the one that they are meant
+ * for. --be adds the converged steps, which take minutes.
  */
 #define _GNU_SOURCE
 #include "bench.h"
@@ -185,6 +186,8 @@ static double draw(uint64_t *seed)
     return (double)(*seed >> 11) / 9007199254740992.0;
 }
 
+static double slower = 1;
+
 static int compare(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
@@ -203,8 +206,6 @@ static void run(drape_context *ctx, const scene *s, const variant *v, const char
     *r = (result){.frames = (int)(seconds / FRAME + 0.5)};
     for (int i = 0; i < s->sims; i++) {
         sim[i] = bench_sim(ctx, model, integrator, dt, NULL, NULL);
-        if (getenv("LONGEST"))
-            sim[i]->realtime.longest_asked = atof(getenv("LONGEST"));
         if (s->move(s, sim[i], i, 0, 1e-9) || drape_sim_advance(sim[i], 1e-6))
             bench_fail(ctx, "the start of %s", s->name);
     }
@@ -219,9 +220,7 @@ static void run(drape_context *ctx, const scene *s, const variant *v, const char
             const drape_status status =
                 converged ? drape_sim_advance(sim[i], drape_sim_time(sim[i]) + FRAME)
                           : drape_sim_advance_realtime(sim[i], FRAME,
-                                                       (getenv("SLOW") ? atof(getenv("SLOW")) : 1) *
-                                                           s->budget * (starved ? 0.1 : 1),
-                                                       &report);
+                                                       slower * s->budget * (starved ? 0.1 : 1), &report);
             r->ms[k] += 1e3 * (drape_clock_seconds() - start);
             r->errors += status != DRAPE_OK;
             if (status && r->errors == 1)
@@ -230,9 +229,6 @@ static void run(drape_context *ctx, const scene *s, const variant *v, const char
             r->missed += !converged && !starved && !report.kept;
             debt[i] = report.debt;
             r->dropped += report.dropped;
-            if (getenv("TRACE"))
-                printf("T %d %d %.2f ms %s e%d n%d r%d h%.4f debt %.4f\n", k, i, 1e3 * report.seconds,
-                       report.level, report.effort, report.attempts, report.rejected, report.h, report.debt);
             examine(sim[i], v->self, r);
         }
     }
@@ -243,9 +239,6 @@ static void run(drape_context *ctx, const scene *s, const variant *v, const char
         contact += stats.wall_contact;
         r->attempts += stats.steps_accepted + stats.steps_rejected;
         r->rejected += stats.steps_rejected;
-        int64_t count;
-        for (int k = 0; getenv("TRACE") && drape_sim_reason(sim[i], k, &count); k++)
-            printf("R %s %d\n", drape_sim_reason(sim[i], k, &count), (int)count);
         drape_sim_destroy(&sim[i]);
     }
     r->contact = contact / steps;
@@ -279,7 +272,7 @@ static void measure(drape_context *ctx, const scene *s, const variant *v, const 
 
 int main(int argc, char **argv)
 {
-    static const char usage[] = "realtime [--csv FILE] [--seconds S] [--scene NAME] [--be]\n";
+    static const char usage[] = "realtime [--csv FILE] [--seconds S] [--scene NAME] [--slower F] [--be]\n";
     const char *file = NULL, *only = NULL;
     double seconds = 0;
     bool be = false;
@@ -292,10 +285,12 @@ int main(int argc, char **argv)
             seconds = atof(argv[++i]);
         else if (strcmp(argv[i], "--be") == 0)
             be = true;
+        else if (strcmp(argv[i], "--slower") == 0 && i + 1 < argc)
+            slower = atof(argv[++i]);
         else
             return bench_usage(argv[i], usage);
     }
-    if (!(seconds >= 0 && seconds * 60 < MAX_FRAMES))
+    if (!(slower > 0) || !(seconds >= 0 && seconds * 60 < MAX_FRAMES))
         return bench_usage("", usage);
     FILE *csv =
         bench_csv(file, "scene,contact,integrator,frames,starved,p50_ms,p95_ms,p99_ms,worst_ms,missed,"
@@ -305,13 +300,6 @@ int main(int argc, char **argv)
     puts("scene    contact  method    frames     p50     p95     p99   worst  missed  dropped strain % "
          "inside mm "
          "crossings attempts rejected errors contact %");
-    if (getenv("CONTACT")) {
-        const variant own = {"own", getenv("CONTACT"), strstr(getenv("CONTACT"), "self_contact")};
-        for (int i = 0; i < SCENES; i++)
-            if (!only || strcmp(only, scenes[i].name) == 0)
-                measure(ctx, &scenes[i], &own, be ? "be" : "newton_k", seconds, csv);
-        return 0;
-    }
     for (int i = 0; i < SCENES; i++)
         for (int k = 0; k < VARIANTS; k++) {
             if (only && strcmp(only, scenes[i].name) != 0)

@@ -55,7 +55,7 @@ static bool slide(const drape_collider *collider, double distance, double roundi
     return true;
 }
 
-/* The box of the points of the start and end... */
+/* Lets the nodes of y that a collider reaches slide on it; returns whether there are any. */
 static bool sweep(drape_contact *c, int32_t collider, double *y)
 {
     const drape_collider *k = &c->model->colliders[collider];
