@@ -78,6 +78,10 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
     if (!status)
         status = take_arrays(arena, c);
     if (!status)
+        status = drape_predictions_init(arena, c->broad.points, &c->predicted);
+    if (!status)
+        status = drape_predictions_init(arena, c->broad.points, &c->predicting);
+    if (!status)
         drape_contact_set_rounding(c, c->broad.rest);
     *out = status ? NULL : c;
     return status;
@@ -369,6 +373,7 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
         adapt_stiffness(c, t, is_retry(c));
     if (!status)
         status = lag_at(c, v, t);
+    drape_predictions_clear(&c->predicted);
     if (!status) {
         drape_contact_measure_start(c);
         c->begun = true;
