@@ -202,8 +202,12 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
     if (!candidates)
         candidates = drape_contact_search(c, &here, &away);
-    return candidates ? drape_active_set_list(&c->active, candidates, &away, at, &c->inside, !in_step)
-                      : drape_contact_take_failure(c);
+    if (!candidates)
+        return drape_contact_take_failure(c);
+    drape_status status = drape_active_set_list(&c->active, candidates, &away, at, &c->inside, !in_step);
+    if (!status)
+        status = drape_predictions_reserve(&c->predicted, c->active.room);
+    return status ? status : drape_predictions_reserve(&c->predicting, c->active.room);
 }
 
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)

@@ -3,7 +3,6 @@
 
 #include "base/elementary.h"
 #include "base/vec3.h"
-#include "contact/list.h"
 
 #include <math.h>
 #include <string.h>
@@ -27,13 +26,23 @@ void drape_predictions_clear(drape_predictions *p)
     p->count = 0;
 }
 
+drape_status drape_predictions_reserve(drape_predictions *p, int32_t room)
+{
+    if (room <= p->room)
+        return DRAPE_OK;
+    drape_predicted *list = drape_arena_resize(p->arena, p->list, (size_t)room, sizeof *list);
+    if (!list)
+        return DRAPE_E_MEMORY;
+    p->list = list;
+    p->room = room;
+    return DRAPE_OK;
+}
+
 bool drape_predictions_add(drape_predictions *p, const drape_active_contact *contact, double force)
 {
-    drape_predicted *list = drape_list_grow(p->arena, p->list, p->count, &p->room, sizeof *list);
-    if (!list)
+    if (p->count == p->room)
         return false;
-    p->list = list;
-    drape_predicted *to = &list[p->count];
+    drape_predicted *to = &p->list[p->count];
     memcpy(to->node, contact->pair.node, sizeof to->node);
     to->collider = contact->pair.collider;
     to->force = force;

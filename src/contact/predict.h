@@ -36,7 +36,10 @@ typedef struct drape_predictions {
 drape_status drape_predictions_init(drape_arena *arena, int32_t points, drape_predictions *predictions);
 void drape_predictions_clear(drape_predictions *predictions);
 
-/* False: out of memory; the list remains valid. */
+/* Takes room for so many, so that the list grows only where the active set does. Errors: DRAPE_E_MEMORY. */
+drape_status drape_predictions_reserve(drape_predictions *predictions, int32_t room);
+
+/* False: there is no room. */
 bool drape_predictions_add(drape_predictions *predictions, const drape_active_contact *contact, double force);
 
 /* NAN: none. */
