@@ -413,6 +413,12 @@ void drape_system_jacobian_without(drape_system *system, const drape_point *poin
     add_masses(system, mass_weight, values);
 }
 
+void drape_system_predict_contact(drape_system *system, const double *p, double weight, double mass_weight)
+{
+    if (system->contact)
+        drape_contact_predict(system->contact, p, weight, mass_weight);
+}
+
 bool drape_system_is_symmetric(const drape_system *system)
 {
     return !system->contact || drape_contact_is_symmetric(system->contact);

@@ -128,6 +128,9 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
 void drape_system_jacobian_without(drape_system *system, const drape_point *point, double mass_weight,
                                    double positive_share, const bool *without, double *values);
 
+/* drape_contact_predict. */
+void drape_system_predict_contact(drape_system *system, const double *p, double weight, double mass_weight);
+
 /* Whether the Jacobian of contact is symmetric in every state. */
 bool drape_system_is_symmetric(const drape_system *system);
 

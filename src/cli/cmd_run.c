@@ -19,7 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MAX_WARNINGS 8
+#define MAX_WARNINGS 16
 
 typedef struct run_request {
     cli_command command;

@@ -9,9 +9,12 @@
 #include <string.h>
 
 #define KEEP_ITERATE 0.5 /* of what a gap has above the least, kept when a Newton iterate is cut short */
-#define NEAR         0.9 /* of the activation distance: a gap below that is surely found to be below it */
-#define MARCH_SHARE  0.9
-#define MAX_MARCHES  10000 /* maximum number of steps of a node along its path */
+/* of the activation distance: where a pair that comes from beyond it is stopped. Halved from afar, its gap
+ * would reach the barrier only after many iterations, in which it holds up all other pairs. */
+#define ARRIVAL     0.5
+#define NEAR        0.9 /* of the activation distance: a gap below that is surely found to be below it */
+#define MARCH_SHARE 0.9
+#define MAX_MARCHES 10000 /* maximum number of steps of a node along its path */
 
 #define MAX_PATH 8.0 /* in mean edges: the candidates of a longer path may be too many to keep */
 
@@ -127,7 +130,8 @@ double drape_contact_march(const drape_contact *c, const drape_collider *collide
 {
     double p[3], at[3], t = 0;
     double gap = collider->ops->distance(collider->values, &collider->shape, x, NULL, NULL);
-    const double least = drape_contact_least_gap(c), end = drape_keep_gap(keep, least, gap);
+    const double least = drape_contact_least_gap(c),
+                 end = drape_keep_gap(keep, least, gap, c->model->contact.distance);
     vec3_sub(y, x, p);
     const double length = vec3_norm(p), slack = (1 - MARCH_SHARE) * fmin(end, gap - end);
     if (!drape_gap_has_side(gap, keep->rounding) || !(length > gap - end))
@@ -167,8 +171,11 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
                                    double *of_node)
 {
     const double start = drape_clock_seconds(), span[2] = {t, t};
-    const drape_keep keep = {
-        .rounding = c->broad.rounding, .least = 1, .above = KEEP_ITERATE, .below = KEEP_ITERATE};
+    const drape_keep keep = {.rounding = c->broad.rounding,
+                             .least = 1,
+                             .above = KEEP_ITERATE,
+                             .below = KEEP_ITERATE,
+                             .arrival = ARRIVAL};
     drape_pair limiting;
     const double shortened = of_node ? shorten_long(c, x, y, of_node) : 1;
     if (shortened < 1)

@@ -84,6 +84,10 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
     if (!status)
         status = drape_relaxed_create(arena, model, &c->relaxed);
     if (!status)
+        status = drape_predictions_init(arena, c->broad.points, &c->predicted);
+    if (!status)
+        status = drape_predictions_init(arena, c->broad.points, &c->predicting);
+    if (!status)
         drape_contact_set_rounding(c, c->broad.rest);
     *out = status ? NULL : c;
     return status;
@@ -206,9 +210,13 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
         candidates = drape_contact_search(c, &here, &away);
     if (!candidates)
         return drape_contact_take_failure(c);
-    const drape_status status =
+    drape_status status =
         drape_active_set_list(&c->active, candidates, &away, at, &c->inside, !in_step, &c->relaxed);
-    return status ? status : drape_room_add_surfaces(c, at);
+    if (!status)
+        status = drape_room_add_surfaces(c, at);
+    if (!status)
+        status = drape_predictions_reserve(&c->predicted, c->active.room);
+    return status ? status : drape_predictions_reserve(&c->predicting, c->active.room);
 }
 
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)
@@ -474,6 +482,7 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
         adapt_stiffness(c, t, retry);
     if (!status)
         status = lag_at(c, v, t);
+    drape_predictions_clear(&c->predicted);
     if (!status) {
         drape_contact_measure_start(c);
         c->begun = true;

@@ -88,6 +88,11 @@ typedef enum drape_contact_derivatives {
 void drape_contact_add_jacobian(drape_contact *contact, double weight, drape_contact_derivatives which,
                                 const drape_pattern *pattern, double *values);
 
+/* Predicts the normal forces (contact/predict.h) at the end of a correction p (node_count x 3) from the last
+ * point, where the Jacobian had these weights; p NULL: forgets what was predicted. The next Jacobians use
+ * the predictions, until a step begins. */
+void drape_contact_predict(drape_contact *contact, const double *p, double weight, double mass_weight);
+
 /* Whether DRAPE_CONTACT_SYMMETRIC is symmetric: no friction follows the normal force within a step. */
 bool drape_contact_is_symmetric(const drape_contact *contact);
 

@@ -3,6 +3,8 @@
 #include "contact/parts.h"
 
 #include "base/clock.h"
+#include "base/vec3.h"
+#include "contact/barrier.h"
 #include "contact/list.h"
 
 #include <string.h>
@@ -36,6 +38,32 @@ static void add_blocks(const drape_contact *c, const drape_active_contact *conta
         }
 }
 
+/* -dN/dg if only the gap changes, and its rate with it. */
+static double tangent_stiffness(const drape_gap *gap, const drape_contact_law *law, double weight,
+                                double v[4][3], bool bound)
+{
+    const drape_normal normal = drape_normal_at(gap, law, v);
+    const double barrier =
+        gap->m * law->stiffness / law->distance * drape_barrier_at(gap->value / law->distance, law->low).ddb;
+    return bound ? barrier + weight * normal.lambda * normal.secant
+                 : barrier * (1 - normal.share) + weight * normal.lambda * normal.slope;
+}
+
+/* The normal stiffness that a contact has in the Jacobian, less its tangent; bound: of the upper bound of
+ * restitution. */
+static double excess_stiffness(const drape_contact *c, const drape_active_contact *contact,
+                               const drape_contact_law *law, double weight, bool bound)
+{
+    const drape_gap *gap = &contact->gap;
+    const double force = drape_predictions_find(&c->predicted, contact);
+    double v[4][3];
+    if (isnan(force))
+        return 0;
+    drape_contact_velocities(c, contact, v);
+    const double tangent = tangent_stiffness(gap, law, weight, v, bound);
+    return drape_predicted_stiffness(gap, law, weight, v, force, tangent) - tangent;
+}
+
 typedef struct request {
     double weight;
     drape_contact_derivatives which;
@@ -60,12 +88,15 @@ static void add_friction(const request *want, const drape_active_contact *contac
  * NULL, with the place of contact. */
 static void add_changes_of_friction(const drape_gap *gap, const drape_contact_law *law, double weight,
                                     const drape_normal *normal, const drape_gap_derivatives *derivatives,
-                                    const drape_normal_derivatives *by_x, double v[4][3], double *h)
+                                    const drape_normal_derivatives *by_x, double excess, double v[4][3],
+                                    double *h)
 {
     double change[D];
     drape_normal_by_v(gap, normal, weight, change);
     if (derivatives) {
         drape_normal_add_by_x(gap, normal, by_x, change);
+        for (int j = 0; j < 3 * gap->closest.points; j++)
+            change[j] -= excess * gap->closest.c[j / 3] * gap->closest.normal[j % 3];
         drape_friction_add_dgdx(gap, derivatives, law, drape_normal_force(normal), v, h);
     }
     drape_friction_add_normal(gap, law, change, v, h);
@@ -74,7 +105,8 @@ static void add_changes_of_friction(const drape_gap *gap, const drape_contact_la
 /* Adds the derivatives of the dissipative part of the normal force and of friction that is not lagged;
  * derivatives: NULL unless those by x are requested. */
 static void add_dissipative(const drape_contact *c, const request *want, const drape_active_contact *contact,
-                            const drape_contact_law *law, const drape_gap_derivatives *derivatives, double *h)
+                            const drape_contact_law *law, const drape_gap_derivatives *derivatives,
+                            double excess, double *h)
 {
     const drape_gap *gap = &contact->gap;
     const bool friction = law->friction > 0 && !c->model->contact.lagged;
@@ -96,8 +128,8 @@ static void add_dissipative(const drape_contact *c, const request *want, const d
         return;
     add_friction(want, contact, law, drape_normal_force(&normal), v, h);
     if (want->which != DRAPE_CONTACT_GAUSS_NEWTON)
-        add_changes_of_friction(gap, law, want->weight, &normal, derivatives, derivatives ? &by_x : NULL, v,
-                                h);
+        add_changes_of_friction(gap, law, want->weight, &normal, derivatives, derivatives ? &by_x : NULL,
+                                excess, v, h);
 }
 
 /* h = (h + h')/2 of so many points */
@@ -124,7 +156,13 @@ static void differentiate(const drape_contact *c, const request *want, const dra
     } else {
         drape_contact_gauss_newton(&contact->gap, &law, h);
     }
-    add_dissipative(c, want, contact, &law, by_x ? &derivatives : NULL, h);
+    const double excess =
+        want->which == DRAPE_CONTACT_VELOCITY ? 0 : excess_stiffness(c, contact, &law, want->weight, !by_x);
+    add_dissipative(c, want, contact, &law, by_x ? &derivatives : NULL, excess, h);
+    const double *ce = contact->gap.closest.c, *n = contact->gap.closest.normal;
+    for (int i = 0; excess != 0 && i < 3 * contact->gap.closest.points; i++)
+        for (int j = 0; j < 3 * contact->gap.closest.points; j++)
+            h[D * i + j] += excess * ce[i / 3] * n[i % 3] * ce[j / 3] * n[j % 3];
     if (want->which == DRAPE_CONTACT_SYMMETRIC)
         symmetrize(contact->gap.closest.points, h);
 }
@@ -176,11 +214,59 @@ void drape_contact_fix_friction(drape_contact *c, double weight, const drape_pat
         drape_contact_velocities(c, contact, v);
         const drape_normal normal = drape_normal_at(&contact->gap, &law, v);
         drape_normal_derive(&contact->gap, &derivatives, &law, v, &by_x);
-        add_changes_of_friction(&contact->gap, &law, weight, &normal, &derivatives, &by_x, v, h);
+        const double excess = excess_stiffness(c, contact, &law, weight, false);
+        add_changes_of_friction(&contact->gap, &law, weight, &normal, &derivatives, &by_x, excess, v, h);
         for (int k = 0; k < D * D; k++)
             h[k] = -h[k];
         add_blocks(c, contact, h, pattern, values);
     }
+    c->seconds += drape_clock_seconds() - start;
+}
+
+/* ---- Prediction ---- */
+
+/* What accelerates the gap: 1/sum(c_i^2/m_i) over the free nodes; 0: nothing does. */
+static double mass_of(const drape_contact *c, const drape_active_contact *contact)
+{
+    double compliance = 0;
+    for (int a = 0; a < contact->gap.closest.points; a++)
+        if (free_of(c->model, contact->pair.node[a]) >= 0)
+            compliance +=
+                contact->gap.closest.c[a] * contact->gap.closest.c[a] / c->model->mass[contact->pair.node[a]];
+    return compliance > 0 ? 1 / compliance : 0;
+}
+
+static double predict(const drape_contact *c, const drape_active_contact *contact, const double *p,
+                      double weight, double mass_weight)
+{
+    const drape_contact_law law = drape_contact_law_of(c, contact);
+    const drape_gap *gap = &contact->gap;
+    double v[4][3], change = 0;
+    drape_contact_velocities(c, contact, v);
+    const drape_normal normal = drape_normal_at(gap, &law, v);
+    for (int a = 0; a < gap->closest.points; a++)
+        if (free_of(c->model, contact->pair.node[a]) >= 0)
+            change +=
+                gap->closest.c[a] * vec3_dot(gap->closest.normal, p + 3 * (size_t)contact->pair.node[a]);
+    const double stiffness = tangent_stiffness(gap, &law, weight, v, false) +
+                             excess_stiffness(c, contact, &law, weight, false),
+                 through = fmax(-change - gap->value, 0);
+    return fmax(drape_normal_force(&normal) - stiffness * change, 0) +
+           mass_weight * mass_of(c, contact) * through;
+}
+
+void drape_contact_predict(drape_contact *c, const double *p, double weight, double mass_weight)
+{
+    const double start = drape_clock_seconds();
+    drape_predictions *now = &c->predicted, *next = &c->predicting;
+    drape_predictions_clear(next);
+    for (int32_t i = 0; p && i < c->active.count; i++)
+        if (!drape_predictions_add(next, &c->active.contacts[i],
+                                   predict(c, &c->active.contacts[i], p, weight, mass_weight)))
+            break; /* the tangent is used where there is no memory */
+    const drape_predictions swap = *now;
+    *now = *next;
+    *next = swap;
     c->seconds += drape_clock_seconds() - start;
 }
 

@@ -207,7 +207,8 @@ double drape_pair_step_fraction(const drape_pair *pair, const double *from, cons
     }
     if (!(speed > 0) || !drape_gap_has_side(gap, keep->rounding) || gap - least > speed)
         return limit;
-    const double end = drape_keep_gap(keep, least, gap), slack = (1 - ADVANCE) * fmin(end, gap - end);
+    const double end = drape_keep_gap(keep, least, gap, pair->distance),
+                 slack = (1 - ADVANCE) * fmin(end, gap - end);
     for (int i = 0; i < MAX_ADVANCES; i++) {
         t += ADVANCE * (gap - end) / speed;
         if (t >= limit)

@@ -52,12 +52,14 @@ typedef struct drape_keep {
     double least;    /* share of the least gap, for a pair that begins above it, */
     double above;    /* and share of what its gap has more than that */
     double below;    /* share of the gap of a pair that begins below the least gap */
-    bool core;       /* a pair that begins within its radius keeps its distance instead of its gap */
+    double arrival; /* share of the activation distance to which a pair from beyond it may come; 0: `above` */
+    bool core;      /* a pair that begins within its radius keeps its distance instead of its gap */
 } drape_keep;
 
-static inline double drape_keep_gap(const drape_keep *keep, double least, double gap)
+static inline double drape_keep_gap(const drape_keep *keep, double least, double gap, double distance)
 {
-    return gap < least ? keep->below * gap : keep->least * least + keep->above * (gap - least);
+    const double end = gap < least ? keep->below * gap : keep->least * least + keep->above * (gap - least);
+    return keep->arrival > 0 && gap > distance ? fmin(end, fmax(keep->arrival * distance, least)) : end;
 }
 
 /* All points at one instant. */

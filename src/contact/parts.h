@@ -10,6 +10,7 @@
 #include "contact/active.h"
 #include "contact/contact.h"
 #include "contact/friction.h"
+#include "contact/predict.h"
 #include "contact/restitution.h"
 
 /* A contact and its normal force at the beginning of the step. */
@@ -63,6 +64,8 @@ struct drape_contact {
     drape_lagged *lagged; /* (lagged_count of lagged_room) lagged friction */
     int32_t lagged_count, lagged_room;
 
+    drape_predictions predicted, predicting; /* for the next Jacobian, and while they are made; not archived:
+                                                empty when a step begins */
     double *from, *to;              /* (points x 3) the ends of a displacement: ccd.c */
     drape_collider_pose *path_pose; /* (collider_count) */
     drape_collider_pose *kink_pose; /* (collider_count) */

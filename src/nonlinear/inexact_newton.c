@@ -35,7 +35,6 @@
  * down upright, for .16 of the time of be, instead of .066 m for .39, though .031 instead of .022 m on a
  * ball. Eight are .036 and .035 m off, instead of .039 and .022 m. */
 #define FEW_ITERATIONS 4
-#define MAX_PASSES     3 /* in which a step is shortened node by node, before all of it is */
 /* Limits of the share m in the estimate of the error: beyond them forces are far from linear along p. */
 #define MIN_SHARE 0.05
 #define MAX_SHARE 4
@@ -201,24 +200,6 @@ static void predict_stress(drape_inexact_newton *s, bool next)
 
 /* ---- Feasible ---- */
 
-/* Shortens p at the nodes of pieces that would meet, and only there: cloth that is far from contact is not
- * held back by the one pair that is nearest. A shorter path of some nodes may lead others into contact, so
- * this is repeated. False if that is still so after the last pass. */
-static bool shorten_nodes(drape_inexact_newton *s, double *p)
-{
-    drape_step_equation *e = s->equation;
-    for (int pass = 0; pass < MAX_PASSES; pass++) {
-        memcpy(e->x_ahead, e->x, e->nodes * sizeof *e->x_ahead);
-        for (size_t i = 0; i < e->dofs; i++)
-            e->x_ahead[drape_step_equation_at(e, i)] += p[i];
-        if (drape_system_step_fraction(e->system, e->x, e->x_ahead, e->point.t, s->fraction) == 1)
-            return true;
-        for (size_t i = 0; i < e->dofs; i++)
-            p[i] *= s->fraction[drape_step_equation_at(e, i) / 3];
-    }
-    return false;
-}
-
 /* Lets the nodes that moving colliders reach slide on these. */
 static void make_way(drape_inexact_newton *s, double *d)
 {
@@ -240,7 +221,8 @@ static void make_guess_feasible(drape_inexact_newton *s, int iterations, double 
 {
     if (s->fraction)
         make_way(s, d);
-    if (s->fraction && (iterations > FEW_ITERATIONS || !shorten_nodes(s, d)))
+    if (s->fraction &&
+        (iterations > FEW_ITERATIONS || !drape_step_equation_shorten_nodes(s->equation, d, s->fraction)))
         drape_step_equation_make_feasible(s->equation, d);
 }
 
@@ -252,7 +234,7 @@ static void make_correction_feasible(drape_inexact_newton *s)
     if (!s->fraction)
         return;
     memcpy(s->trial, s->p, e->dofs * sizeof *s->trial);
-    if (!shorten_nodes(s, s->p))
+    if (!drape_step_equation_shorten_nodes(e, s->p, s->fraction))
         drape_step_equation_make_feasible(e, s->p);
     if (drape_step_equation_dot(e, s->p, e->f) < 0)
         return;

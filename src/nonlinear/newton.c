@@ -1,13 +1,13 @@
 /*
  * newton.c: see newton.h. A solve runs through these stages, whose functions follow in this order:
  *
- *     guess      the caller's d, shortened to its feasible fraction; d = 0 if it violates a limit
+ *     guess      the caller's d, shortened where cloth would meet something; d = 0 if it violates a limit
  *     residual   F(d)
  *     jacobian   J(d), in a pattern that includes the contacts there
  *     factor     factors of J or, where contact makes J unsymmetric, of a symmetric matrix near J; an
  *                indefinite one is repaired by a share of the positive parts of its elements
- *     correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress predicted
- *                for the next J; p shortened or lengthened by line search, completed by chord steps
+ *     correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress and
+ *                normal forces of contact predicted for the next J; p shortened or lengthened by line search, completed by chord steps
  *     conclude   what KINSOL's return code means, and F at the final d, in the requested norm
  *
  * KINSOL calls the stages between guess and conclude in each iteration: residual as its system function,
@@ -90,6 +90,7 @@ struct drape_newton {
     drape_sun_linear *linear;
     drape_stress_predictor predictor; /* if it searches */
     double *trial;                    /* free DOFs: where the line search was last; NULL unless it searches */
+    double *fraction;                 /* nodes: scratch of the guess; NULL without contact */
     double edge;                      /* [m] mean length of an edge */
     double *chord, *chord_minus_f;    /* free DOFs: a chord step and its right-hand side; the same */
 
@@ -137,6 +138,7 @@ static void begin(drape_newton *s)
     s->indefinite = false;
     s->trial_evaluated = false;
     s->failure = DRAPE_OK;
+    drape_step_equation_predict_contact(e, NULL);
     if (!s->searches)
         return;
     double clock = drape_system_clock(e->system);
@@ -146,12 +148,16 @@ static void begin(drape_newton *s)
     e->work.jacobian_seconds += drape_system_clock(e->system) - clock;
 }
 
-/* A guess that violates a limit is worse than d = 0: springs beyond their limit pull with forces far above
+/* The guess is shortened only at nodes that would meet something: all pairs that come near in the step are
+ * active from the first matrix on, and none of them holds up the rest of the cloth.
+ *
+ * A guess that violates a limit is worse than d = 0: springs beyond their limit pull with forces far above
  * any others. */
 static void improve_guess(drape_newton *s, double *d)
 {
     drape_step_equation *e = s->equation;
-    drape_step_equation_make_feasible(e, d);
+    if (s->fraction && !drape_step_equation_shorten_nodes(e, d, s->fraction))
+        drape_step_equation_make_feasible(e, d);
     drape_step_equation_move(e, d);
     if (drape_system_breaks_limit(e->system, e->x, e->x_base, e->point.internal))
         memset(d, 0, e->dofs * sizeof *d);
@@ -413,6 +419,8 @@ static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
     if (status || !drape_all_finite(p, e->dofs))
         return status;
     s->indefinite = s->indefinite && longest(e, p) > SMALL_STEP * s->edge;
+    if (s->searches)
+        drape_step_equation_predict_contact(e, p);
     drape_step_equation_make_feasible(e, p);
     double start = -drape_step_equation_dot(e, minus_f, p);
     if (!s->searches || start >= 0)
@@ -620,12 +628,16 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
     for (int32_t i = 0; i < equation->model->edge_count; i++)
         s->edge += equation->model->edge_length[i] / equation->model->edge_count;
     memcpy(s->values, values, sizeof s->values);
+    if (equation->x_ahead)
+        s->fraction = drape_arena_take(arena, equation->nodes / 3, sizeof *s->fraction);
     if (s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_AUTO)
         s->values[DRAPE_NEWTON_GLOBALIZATION] = DRAPE_NEWTON_GLOBAL_WORK;
     s->searches = s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_WORK;
     drape_status status =
         drape_residual_bound_set(equation, (drape_norm)values[DRAPE_NEWTON_NORM],
                                  values[DRAPE_NEWTON_TOLERANCE], &s->values[DRAPE_NEWTON_TOLERANCE]);
+    if (!status)
+        status = drape_arena_status(arena);
     if (!status && s->searches)
         status = create_search(arena, s);
     return status ? status : create_solver(arena, s);

@@ -7,6 +7,8 @@
 #include <math.h>
 #include <string.h>
 
+#define MAX_PASSES 3 /* of shortening a displacement at nodes */
+
 drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, drape_step_equation *s)
 {
     const drape_model *model = drape_system_model(system);
@@ -97,6 +99,30 @@ double drape_step_equation_make_feasible(drape_step_equation *s, double *p)
     for (size_t i = 0; fraction < 1 && i < s->dofs; i++)
         p[i] *= fraction;
     return fraction;
+}
+
+bool drape_step_equation_shorten_nodes(drape_step_equation *s, double *p, double *fraction)
+{
+    for (int pass = 0; pass < MAX_PASSES; pass++) {
+        memcpy(s->x_ahead, s->x, s->nodes * sizeof *s->x_ahead);
+        for (size_t i = 0; i < s->dofs; i++)
+            s->x_ahead[drape_step_equation_at(s, i)] += p[i];
+        if (drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t, fraction) == 1)
+            return true;
+        for (size_t i = 0; i < s->dofs; i++)
+            p[i] *= fraction[drape_step_equation_at(s, i) / 3];
+    }
+    return false;
+}
+
+void drape_step_equation_predict_contact(drape_step_equation *s, const double *p)
+{
+    if (!s->x_ahead)
+        return;
+    memset(s->x_ahead, 0, s->nodes * sizeof *s->x_ahead);
+    for (size_t i = 0; p && i < s->dofs; i++)
+        s->x_ahead[drape_step_equation_at(s, i)] = p[i];
+    drape_system_predict_contact(s->system, p ? s->x_ahead : NULL, s->point.weight, s->mass_weight);
 }
 
 typedef struct norms {

@@ -83,6 +83,15 @@ void drape_step_equation_symmetrize(drape_step_equation *equation, double *value
 /* Shortens a step p from the last point to its largest feasible fraction, which it returns. */
 double drape_step_equation_make_feasible(drape_step_equation *equation, double *p);
 
+/* Shortens it at the nodes of pieces that would meet, and only there: cloth that is far from contact is not
+ * held back by the pair that is nearest. A shorter path of some nodes may lead others into contact, so this
+ * is repeated. False if it is still not feasible after the last pass. fraction: (node_count), scratch. */
+bool drape_step_equation_shorten_nodes(drape_step_equation *equation, double *p, double *fraction);
+
+/* Predicts the normal forces of contact at the end of a correction p from the last point, for the next
+ * Jacobians (drape_contact_predict); NULL: forgets them. */
+void drape_step_equation_predict_contact(drape_step_equation *equation, const double *p);
+
 /* The weighted norm of F. */
 double drape_step_equation_norm(const drape_step_equation *equation, drape_norm norm);
 

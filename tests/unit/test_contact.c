@@ -7,6 +7,7 @@
 #include "contact/bound.h"
 #include "contact/friction.h"
 #include "contact/pair.h"
+#include "contact/predict.h"
 #include "geometry/path_bvh.h"
 #include "support/suite.h"
 
@@ -366,7 +367,7 @@ static void check_step_fraction(const drape_keep *keep, double distance)
                      least = drape_pair_least_gap(&pair, keep->rounding);
         if (!(start > 1e-3))
             continue;
-        const double kept = drape_keep_gap(keep, least, start);
+        const double kept = drape_keep_gap(keep, least, start, distance);
         double fraction = drape_pair_step_fraction(&pair, x, y, keep, 1);
         ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, keep, 0.5 * fraction), 0.5 * fraction);
         ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, keep, 0.5 + 0.5 * fraction),
@@ -538,5 +539,36 @@ START_TEST(test_bounds)
 }
 END_TEST
 
-SUITE("contact", test_triangle, test_segments, test_parallel, test_mollified_away, test_barrier,
-      test_bounded_barrier, test_step_fraction, test_no_gap_is_exempt, test_tree, test_bounds)
+/* The secant of a predicted force ends at the gap where the law has that force, to 20 bisections of its
+ * logarithm over a factor of 1000: 1e-5 of the gap; with restitution, its rate changes as well. Close to the
+ * present force it is the tangent. */
+START_TEST(test_predicted)
+{
+    for (int k = 0; k < 2; k++) {
+        const drape_contact_law law = {.distance = 0.2,
+                                       .low = DRAPE_LEAST_GAP,
+                                       .stiffness = 3,
+                                       .damping = k,
+                                       .restitution_velocity = 0.5};
+        drape_gap gap = {.value = 0.02, .closest = {.points = 1, .c = {1}, .normal = {0, 1, 0}}, .m = 1};
+        const double weight = k ? 10 : 0;
+        double v[4][3] = {{0.3, -0.2, 0}}, moved[4][3] = {{0}};
+        for (int side = 0; side < 2; side++) {
+            const double target = side ? 0.05 : 0.002;
+            drape_gap at = gap;
+            at.value = target;
+            moved[0][1] = v[0][1] + weight * (target - gap.value);
+            const drape_normal now = drape_normal_at(&gap, &law, v), then = drape_normal_at(&at, &law, moved);
+            const double force = drape_normal_force(&then), rise = force - drape_normal_force(&now);
+            const double stiffness = drape_predicted_stiffness(&gap, &law, weight, v, force, NAN);
+            ck_assert_double_gt(fabs(rise), 0);
+            ck_assert_double_eq_tol(gap.value - rise / stiffness, target, 2e-5 * target);
+            ck_assert_double_eq(
+                drape_predicted_stiffness(&gap, &law, weight, v, 1.05 * drape_normal_force(&now), 7), 7);
+        }
+    }
+}
+END_TEST
+
+SUITE("contact", test_predicted, test_triangle, test_segments, test_parallel, test_mollified_away,
+      test_barrier, test_bounded_barrier, test_step_fraction, test_no_gap_is_exempt, test_tree, test_bounds)
