@@ -382,7 +382,7 @@ typedef struct drape_realtime {
                         integrator reports none */
     int32_t relaxed; /* nodes that bodies leave no room: drape_sim_relaxed; 0: all cloth is held */
     double deepest_relaxed; /* [m] the deepest of them: how far inside its collider */
-    double error;    /* [m] largest drape_attempt.error of the accepted steps; NaN: the integrator estimates
+    double error; /* [m] largest drape_attempt.error of the accepted steps; NaN: the integrator estimates
                         none, or no step was accepted */
     double error_bound;       /* [m] see drape_statistics; NaN: the integrator estimates no error */
     bool accurate;            /* whether `error` is at most that; true if there is no estimate */

@@ -66,10 +66,10 @@ struct drape_contact {
 
     drape_predictions predicted, predicting; /* for the next Jacobian, and while they are made; not archived:
                                                 empty when a step begins */
-    double *from, *to;              /* (points x 3) the ends of a displacement: ccd.c */
-    drape_collider_pose *path_pose; /* (collider_count) */
-    drape_collider_pose *kink_pose; /* (collider_count) */
-    int32_t *coupling;              /* (coupling_count of coupling_room x 4) */
+    double *from, *to;                       /* (points x 3) the ends of a displacement: ccd.c */
+    drape_collider_pose *path_pose;          /* (collider_count) */
+    drape_collider_pose *kink_pose;          /* (collider_count) */
+    int32_t *coupling;                       /* (coupling_count of coupling_room x 4) */
     int32_t coupling_count, coupling_room;
     double *on_collider; /* (collider_count x 3) [N] */
     double seconds, search_seconds;
