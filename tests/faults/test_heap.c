@@ -219,9 +219,11 @@ START_TEST(no_heap_call_in_contact)
         const size_t n = 3 * (size_t)s.model->node_count;
         double *x = malloc(n * sizeof *x), *v = calloc(n, sizeof *v), gap;
         memcpy(x, drape_sim_positions(s.sim), n * sizeof *x);
-        scene_advance(&s, 0.15);
-        ck_assert_int_gt(drape_contact_active(drape_system_contact(s.sim->system), &gap), 0);
-        ck_assert_int_eq(drape_sim_set_state(s.sim, 0, x, v), DRAPE_OK);
+        for (int fall = 0; fall < 2; fall++) { /* the second one begins with the stiffness of the first */
+            scene_advance(&s, 0.15);
+            ck_assert_int_gt(drape_contact_active(drape_system_contact(s.sim->system), &gap), 0);
+            ck_assert_int_eq(drape_sim_set_state(s.sim, 0, x, v), DRAPE_OK);
+        }
         calls = live = 0;
         counting = true;
         drape_status status = drape_sim_advance(s.sim, 0.15);
