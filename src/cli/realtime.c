@@ -69,21 +69,19 @@ static double try_steps(const cli_scene *scene, const drape_sim_def *def)
     return status || isinf(best) ? 0 : best * fmax(1, ceil(frame / dt - 1e-9));
 }
 
+/* The least number: further iterations follow where the estimated error asks for them and there is time. */
 static drape_status set_iterations(cli_realtime *r, const cli_scene *scene, double seconds)
 {
-    static const int counts[] = {4, 2, 1};
     const double budget = 1 / drape_model_frame_rate(scene->model);
+    const int count = seconds > 0 && 2 * seconds <= SHARE * budget ? 2 : 1;
     char text[16];
-    int i = 0;
-    while (counts[i] > 1 && !(seconds > 0 && counts[i] * seconds <= SHARE * budget))
-        i++;
-    r->iterations.number = counts[i];
-    snprintf(text, sizeof text, "%d", counts[i]);
+    r->iterations.number = count;
+    snprintf(text, sizeof text, "%d", count);
     if (seconds > 0)
-        say(r, "%d iteration%s, as one takes %.3g ms of a frame of %.4g in trial steps", counts[i],
-            counts[i] > 1 ? "s" : "", 1e3 * seconds, 1e3 * budget);
+        say(r, "%d iteration%s or more, as one takes %.3g ms of a frame of %.4g in trial steps", count,
+            count > 1 ? "s" : "", 1e3 * seconds, 1e3 * budget);
     else
-        say(r, "%d iteration, as a trial step failed", counts[i]);
+        say(r, "%d iteration or more, as a trial step failed", count);
     return drape_scene_set(scene->scene, "/integrator/iterations", text);
 }
 
