@@ -1,8 +1,8 @@
 /*
- * realtime: frames of 1/60 s with contact, within a budget. Four scenes, in each of which the cloth is moved as
- * by a host, frame by frame:
- *     sphere, capsule  a sheet of 1 m with 50 x 50 nodes hung by two corners, and a body that goes through its
- *                      place and back at 2 m/s all the time; the budget is a frame
+ * realtime: frames of 1/60 s with contact, within a budget. Four scenes, in each of which the cloth is moved
+ * as by a host, frame by frame:
+ *     sphere, capsule  a sheet of 1 m with 50 x 50 nodes hung by two corners, and a body that goes through
+ *                      its place and back at 2 m/s all the time; the budget is a frame
  *     ball             the same with 30 x 30 nodes and a ball at up to 1.8 m/s; the budget is 4 ms
  *     capes            three capes of 30 x 30 nodes, each a sim of its own with a third of a frame, pinned to
  *                      the shoulders of a body of six capsules that walks, turns back and bobs; in a tenth of
@@ -14,8 +14,8 @@
  *
  *     realtime [--csv FILE] [--seconds S] [--scene NAME] [--slower F] [--be]
  *
- * --slower multiplies the budgets, for a machine that is so many times slower than the one that they are meant
- * for. --be adds the converged steps, which take minutes.
+ * --slower multiplies the budgets, for a machine that is so many times slower than the one that they are
+ * meant for. --be adds the converged steps, which take minutes.
  */
 #define _GNU_SOURCE
 #include "bench.h"

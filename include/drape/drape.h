@@ -397,8 +397,9 @@ typedef struct drape_realtime {
  * anew in each call and rises again as soon as a better one fits.
  *
  * The work of a call is bounded: after its first attempt at a step, accepted or rejected, no other is begun
- * that is not expected to end in time: a rejected step is then retried, at half its size, by the next call. The time owed never exceeds one longest step. Anything beyond that is dropped: simulated time then
- * stays behind the clock for good, but late frames do not delay later ones. Steps follow the frames, so at
+ * that is not expected to end in time: a rejected step is then retried, at half its size, by the next call.
+ * The time owed never exceeds one longest step. Anything beyond that is dropped: simulated time then stays
+ * behind the clock for good, but late frames do not delay later ones. Steps follow the frames, so at
  * another frame rate the state differs only by the integrator's error in h. A later drape_sim_advance
  * continues with the scene's own steps. The level depends on the clock, so two runs may differ; they do not
  * if the budget is never reached.

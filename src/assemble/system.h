@@ -180,7 +180,7 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
 /* See contact/contact.h. */
 void drape_system_set_contact_step(drape_system *system, double dt);
 
-/* Moves the free nodes of y, a guess of the end of the step at time t, out of the way of moving colliders. */
+/* drape_contact_sweep. */
 void drape_system_sweep(drape_system *system, double t, double *y);
 
 /* q of all measures (measure_count). */

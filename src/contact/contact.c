@@ -373,10 +373,11 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
     return vec3_norm(to);
 }
 
-/* Contact with a fast collider over a distance that it crosses in a small part of a step is hard to solve: in a
- * step it accelerates the cloth all at once. So the activation distance grows to a share of the path of a step,
- * and falls again to that of the scene when the collider rests. It changes by powers of two, one a step, because
- * each change needs a search and changes the contact energy: by the work of whoever moves the collider. */
+/* Contact with a fast collider over a distance that it crosses in a small part of a step is hard to solve: in
+ * a step it accelerates the cloth all at once. So the activation distance grows to a share of the path of a
+ * step, and falls again to that of the scene when the collider rests. It changes by powers of two, one a
+ * step, because each change needs a search and changes the contact energy: by the work of whoever moves the
+ * collider. */
 static drape_status adapt_distances(drape_contact *c, double t, bool retry)
 {
     const drape_configuration now = drape_contact_configuration(c);

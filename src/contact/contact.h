@@ -122,7 +122,7 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
                                    double *of_node);
 
-/* Moves the free nodes of y (node_count x 3), a guess of the end of the step at time t, out of the way of
+/* Moves the free nodes of y (node_count x 3), a guess of the end of the step at time t, aside from
  * moving colliders: a node that one of them would reach on the straight path from the beginning of the step
  * slides on it from there on. Nodes that begin inside stay. */
 void drape_contact_sweep(drape_contact *contact, double t, double *y);

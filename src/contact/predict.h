@@ -1,8 +1,8 @@
 /*
  * predict.h: predicts the normal forces of contacts for the next Jacobian of a Newton iteration, as
  * nonlinear/stress_predictor.h predicts stress. The barrier is so far from linear that Newton's method
- * needs an iteration for each halving of a gap on the way to a large force, in which a pair that is cut
- * short holds up all others, and one for each doubling on the way back. But the linear system of an
+ * needs an iteration for each halving of a gap until its force is large, in which a pair that is cut short
+ * holds up all others, and one for each doubling back. But the linear system of an
  * iteration finds a good estimate of the force itself: with the stiffness k that it assumed, the present
  * force N, and the change dg of the gap by its solution, N - k dg. The next Jacobian has the secant from the
  * present gap to the one at which the law gives that force: for a force in inverse proportion to the gap it

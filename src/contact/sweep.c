@@ -6,9 +6,9 @@
 
 #include <string.h>
 
-/* Of the activation distance: nodes that a collider reaches are put there. The force that accelerates cloth of
- * areal density sigma to a speed v within a step h is K b'(y), with K = sigma (2 g L + v^2)/d, so b'(y) = v d/(h
- * (2 g L + v^2)): y is 0.7 to 1 for what moves by d and less in a step. */
+/* Of the activation distance: nodes that a collider reaches are put there. The force that accelerates cloth
+ * of areal density sigma to a speed v within a step h is K b'(y), with K = sigma (2 g L + v^2)/d, so b'(y) =
+ * v d/(h (2 g L + v^2)): y is 0.7 to 1 for what moves by d and less in a step. */
 #define RESTING    0.8
 #define CLOSE      0.05 /* of the activation distance: how far above that a march along the path may end */
 #define MAX_STEPS  50   /* of a march: where it ends the path is free */

@@ -201,7 +201,7 @@ static void predict_stress(drape_inexact_newton *s, bool next)
 /* ---- Feasible ---- */
 
 /* Lets the nodes that moving colliders reach slide on these. */
-static void make_way(drape_inexact_newton *s, double *d)
+static void clear_colliders(drape_inexact_newton *s, double *d)
 {
     drape_step_equation *e = s->equation;
     memcpy(e->x_ahead, e->x, e->nodes * sizeof *e->x_ahead);
@@ -220,7 +220,7 @@ static void make_way(drape_inexact_newton *s, double *d)
 static void make_guess_feasible(drape_inexact_newton *s, int iterations, double *d)
 {
     if (s->fraction)
-        make_way(s, d);
+        clear_colliders(s, d);
     if (s->fraction &&
         (iterations > FEW_ITERATIONS || !drape_step_equation_shorten_nodes(s->equation, d, s->fraction)))
         drape_step_equation_make_feasible(s->equation, d);

@@ -6,8 +6,9 @@
  *     jacobian   J(d), in a pattern that includes the contacts there
  *     factor     factors of J or, where contact makes J unsymmetric, of a symmetric matrix near J; an
  *                indefinite one is repaired by a share of the positive parts of its elements
- *     correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress and
- *                normal forces of contact predicted for the next J; p shortened or lengthened by line search, completed by chord steps
+ *     correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress and normal
+ *                forces of contact predicted for the next J; p shortened or lengthened by line search,
+ *                completed by chord steps
  *     conclude   what KINSOL's return code means, and F at the final d, in the requested norm
  *
  * KINSOL calls the stages between guess and conclude in each iteration: residual as its system function,

@@ -6,10 +6,10 @@
  * for the next call. Left-over time above one longest step is dropped, so that late frames do not delay
  * later ones more and more.
  *
- * The work of a call is bounded: after its first attempt, accepted or rejected, it begins another only if that
- * one is expected to end in time. So the halvings of a step that is rejected again and again are spread over
- * calls. A step that takes longer than a frame is made once in several frames; the frames
- * between show the state before it.
+ * The work of a call is bounded: after its first attempt, accepted or rejected, it begins another only if
+ * that one is expected to end in time. So the halvings of a step that is rejected again and again are spread
+ * over calls. A step that takes longer than a frame is made once in several frames; the frames between show
+ * the state before it.
  */
 #include "base/clock.h"
 #include "base/elementary.h"
@@ -89,8 +89,8 @@ static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *
     return false;
 }
 
-/* The longest step to keep up with. Not above dt in contact: in a longer step a body moves farther, which costs
- * more iterations and rejected steps than it saves (docs/realtime.md, "A budget"). */
+/* The longest step to keep up with. Not above dt in contact: in a longer step a body moves farther, which
+ * costs more iterations and rejected steps than it saves (docs/realtime.md, "A budget"). */
 static double longest_step(const drape_sim *sim)
 {
     const drape_realtime_memory *m = &sim->realtime;

@@ -398,9 +398,9 @@ START_TEST(what_is_inside_a_collider_is_reported)
 }
 END_TEST
 
-/* The rows of a tilted sheet land on a floor one after the other. If each pair halves its gap until the barrier
- * holds it, 6.2 iterations a step; where they arrive together, with predicted forces, 2.3. The bound is
- * between. */
+/* The rows of a tilted sheet land on a floor one after the other. If each pair halves its gap until the
+ * barrier holds it, 6.2 iterations a step; where they arrive together, with predicted forces, 2.3. The bound
+ * is between. */
 START_TEST(a_landing_takes_few_iterations)
 {
     scene s =

@@ -377,8 +377,8 @@ END_TEST
     "{'corner': 'top-right'}]}], 'colliders': [{'type': 'sphere', 'center': [0.5, -0.6, 0.4], 'radius': "    \
     "0.2}], %s 'integrator': {'method': '%s'}, 'duration': 4}"
 
-/* Sends the ball through the place of the sheet at 2 m/s, frame by frame. Returns the largest distance at which
- * contact acted. */
+/* Sends the ball through the place of the sheet at 2 m/s, frame by frame. Returns the largest distance at
+ * which contact acted. */
 static double strike(scene *s, int frames, double budget)
 {
     double distance = 0, debt = 0;
@@ -394,8 +394,8 @@ static double strike(scene *s, int frames, double budget)
 }
 
 /* The ball moves by 33 mm a step, 32 times the thickness of the cloth. The distance, between half of that and
- * all of it, is 2^5 thicknesses. When the ball rests, the sheet swings past it at less than 0.5 m/s in the mean, 8
- * mm a step, and the distance falls to at most twice that. */
+ * all of it, is 2^5 thicknesses. When the ball rests, the sheet swings past it at less than 0.5 m/s in the
+ * mean, 8 mm a step, and the distance falls to at most twice that. */
 START_TEST(a_fast_body_is_served_by_the_default_distance)
 {
     scene s = scene_open(STRUCK, "", "newton_k");
@@ -412,8 +412,8 @@ START_TEST(a_fast_body_is_served_by_the_default_distance)
 }
 END_TEST
 
-/* Where the scene gives a distance, it stays; where the ball moves by more than five of it in a step, there is
- * a warning. */
+/* Where the scene gives a distance, it stays; where the ball moves by more than five of it in a step, there
+ * is a warning. */
 START_TEST(a_distance_that_is_given_is_kept)
 {
     static const double given[] = {0.001, 0.03};
