@@ -249,7 +249,7 @@ START_TEST(test_pins_inside)
 END_TEST
 
 /* An elbow: an arm of one capsule, and a forearm of balls that turn about its end to 150 degrees and back,
- * with a sheet that hangs over the arm between them. */
+ * with a sheet that hangs over the arm between them, and does not slip out. */
 static int print_forearm(char *text, size_t size)
 {
     const double pi = 3.14159265358979323846;
@@ -258,7 +258,7 @@ static int print_forearm(char *text, size_t size)
         const double d = 0.04 * k;
         used += snprintf(text + used, size - (size_t)used,
                          ", {'name': 'forearm %d', 'type': 'sphere', 'center': [%g, 0, 0], 'radius': 0.04,"
-                         " 'friction': 0.3, 'track': [",
+                         " 'friction': 1, 'track': [",
                          k, d);
         for (int i = 0; i <= 20; i++) {
             const double a = pi * 15 * (i <= 10 ? i : 20 - i) / 180;
@@ -280,7 +280,7 @@ START_TEST(test_elbow)
         " 'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'density': 200},"
         " 'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'edge': 'left'}]}],"
         " 'colliders': [{'name': 'arm', 'type': 'capsule', 'a': [-0.3, 0, 0], 'b': [0, 0, 0],"
-        " 'radius': 0.04, 'friction': 0.3}%s],"
+        " 'radius': 0.04, 'friction': 1}%s],"
         " 'contact': {'distance': 0.005, 'friction': 'lagged'},"
         " 'integrator': {'method': 'newton_k', 'dt': 0.0166666666666666667, 'iterations': 2},"
         " 'duration': 3}",
