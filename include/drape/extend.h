@@ -371,12 +371,13 @@ typedef struct drape_term_ops {
      * term, which has no required parameters. */
     bool from_scene_gravity;
 
+    int part_nodes; /* part: nodes of each part, 1 to DRAPE_MAX_ELEMENT_NODES */
+
     /* Optional, beside measure, if measures are linear combinations q = sum weight s of quantities s(x) that
      * several elements share, such as the angles of hinges. The library then evaluates each part once, and
      * calls measure only for checks. part writes s (1), ds (3 part_nodes) and dds (3 part_nodes x 3
      * part_nodes) of a list of DRAPE_LANES parts, laid out as lanes does it. Internal variables belong to
      * parts: internal is indexed by part, and the ranges of commit and initial are parts. */
-    int part_nodes; /* nodes per part, 1 to DRAPE_MAX_ELEMENT_NODES */
     void (*part)(const drape_elements *el, const int32_t *part, const double *x, const double *internal,
                  double *s, double *ds, double *dds);
 } drape_term_ops;
