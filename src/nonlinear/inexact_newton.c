@@ -118,6 +118,7 @@ static void begin(drape_inexact_newton *s, bool follows)
     drape_step_equation_begin(e);
     s->share = 1;
     s->indefinite = false;
+    drape_step_equation_predict_contact(e, NULL);
     if (!s->factored || (follows && s->predictor.valid))
         return;
     const double clock = drape_system_clock(e->system);
@@ -390,6 +391,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         }
         if (i == 0)
             begun = rms(e, s->p);
+        drape_step_equation_predict_contact(e, s->p);
         make_correction_feasible(s);
         predict_stress(s, i < MAX_PREDICTION);
         if (!advance(s, d))
