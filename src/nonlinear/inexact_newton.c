@@ -217,14 +217,27 @@ static void make_way(drape_inexact_newton *s, double *d)
 }
 
 /* A guess that is shortened at some nodes has kinks, which become wrinkles that take many iterations to
- * vanish. It is nearer to the solution nevertheless where few iterations follow. */
+ * vanish. It is nearer to the solution nevertheless where few iterations follow.
+ *
+ * What is shortened is the path from where moving colliders have put the nodes at the start of the step:
+ * from the start itself, which may lie inside a collider at the end of the step, a part of the path may end
+ * inside, too. */
 static void make_guess_feasible(drape_inexact_newton *s, int iterations, double *d)
 {
-    if (s->fraction)
-        make_way(s, d);
-    if (s->fraction &&
-        (iterations > FEW_ITERATIONS || !drape_step_equation_shorten_nodes(s->equation, d, s->fraction)))
-        drape_step_equation_make_feasible(s->equation, d);
+    drape_step_equation *e = s->equation;
+    double *way = s->trial;
+    if (!s->fraction)
+        return;
+    make_way(s, d);
+    memset(way, 0, e->dofs * sizeof *way);
+    make_way(s, way);
+    drape_step_equation_move(e, way);
+    for (size_t i = 0; i < e->dofs; i++)
+        d[i] -= way[i];
+    if (iterations > FEW_ITERATIONS || !drape_step_equation_shorten_nodes(e, d, s->fraction))
+        drape_step_equation_make_feasible(e, d);
+    for (size_t i = 0; i < e->dofs; i++)
+        d[i] += way[i];
 }
 
 /* A correction that is shortened at some nodes may no longer be a descent direction. Then all of it is
