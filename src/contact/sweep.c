@@ -55,7 +55,8 @@ static bool slide(const drape_collider *collider, double distance, double roundi
     return true;
 }
 
-/* Lets the nodes of y that a collider reaches slide on it; returns whether there are any. */
+/* Lets the nodes of y that a collider reaches slide on it; returns whether there are any. A node that its
+ * surface does not hold goes where it goes. */
 static bool sweep(drape_contact *c, int32_t collider, double *y)
 {
     const drape_collider *k = &c->model->colliders[collider];
@@ -64,8 +65,11 @@ static bool sweep(drape_contact *c, int32_t collider, double *y)
     if (memcmp(from, to, 3 * sizeof *from) == 0)
         return false;
     for (int32_t i = 0; i < c->model->free_count; i++) {
-        const size_t at = 3 * (size_t)c->model->node_of_free[i];
+        const int32_t node = c->model->node_of_free[i];
+        const size_t at = 3 * (size_t)node;
         double a[3], b[3];
+        if (drape_relaxed_has(&c->relaxed, collider, &node, 1))
+            continue;
         vec3_sub(c->start + at, from, a);
         vec3_sub(y + at, to, b);
         if (!slide(k, c->broad.distance[collider], c->broad.rounding, a, b))

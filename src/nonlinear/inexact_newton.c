@@ -118,6 +118,7 @@ static void begin(drape_inexact_newton *s, bool follows)
     drape_step_equation_begin(e);
     s->share = 1;
     s->indefinite = false;
+    drape_step_equation_predict_contact(e, NULL);
     if (!s->factored || (follows && s->predictor.valid))
         return;
     const double clock = drape_system_clock(e->system);
@@ -216,14 +217,27 @@ static void clear_colliders(drape_inexact_newton *s, double *d)
 }
 
 /* A guess that is shortened at some nodes has kinks, which become wrinkles that take many iterations to
- * vanish. It is nearer to the solution nevertheless where few iterations follow. */
+ * vanish. It is nearer to the solution nevertheless where few iterations follow.
+ *
+ * What is shortened is the path from where moving colliders have put the nodes at the start of the step:
+ * from the start itself, which may lie inside a collider at the end of the step, a part of the path may end
+ * inside, too. */
 static void make_guess_feasible(drape_inexact_newton *s, int iterations, double *d)
 {
-    if (s->fraction)
-        clear_colliders(s, d);
-    if (s->fraction &&
-        (iterations > FEW_ITERATIONS || !drape_step_equation_shorten_nodes(s->equation, d, s->fraction)))
-        drape_step_equation_make_feasible(s->equation, d);
+    drape_step_equation *e = s->equation;
+    double *aside = s->trial;
+    if (!s->fraction)
+        return;
+    clear_colliders(s, d);
+    memset(aside, 0, e->dofs * sizeof *aside);
+    clear_colliders(s, aside);
+    drape_step_equation_move(e, aside);
+    for (size_t i = 0; i < e->dofs; i++)
+        d[i] -= aside[i];
+    if (iterations > FEW_ITERATIONS || !drape_step_equation_shorten_nodes(e, d, s->fraction))
+        drape_step_equation_make_feasible(e, d);
+    for (size_t i = 0; i < e->dofs; i++)
+        d[i] += aside[i];
 }
 
 /* A correction that is shortened at some nodes may no longer be a descent direction. Then all of it is
@@ -390,6 +404,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         }
         if (i == 0)
             begun = rms(e, s->p);
+        drape_step_equation_predict_contact(e, s->p);
         make_correction_feasible(s);
         predict_stress(s, i < MAX_PREDICTION);
         if (!advance(s, d))
