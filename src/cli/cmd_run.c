@@ -221,7 +221,7 @@ static void print_newton(const drape_statistics *s)
     if (s->steps_accepted > 0 && !isnan(s->error_bound))
         printf(
             "error     %.3g m at most, %.3g m in the last step, by estimate; %lld steps above the bound of "
-            "%.3g m\n",
+            "%.3g m; errors of steps may add up\n",
             s->error_max, s->error_last, (long long)s->steps_above_error, s->error_bound);
 }
 

@@ -104,7 +104,7 @@ drape_status cli_realtime_choose(void *user, const cli_scene *scene, drape_sim_d
     drape_status status = DRAPE_OK;
     choose_threads(r, scene, def);
     if (names_method(r, scene))
-        say(r, "%s, as scene or command line say", scene->model->integrator.type);
+        say(r, "%s, by the scene or the options", scene->model->integrator.type);
     else
         status = choose_method(r, scene, def);
     return status;
@@ -163,6 +163,7 @@ drape_status cli_realtime_run(cli_realtime *r, const cli_scene *scene)
         double left = end - drape_sim_time(scene->sim) - r->result.debt;
         status = drape_sim_advance_realtime(scene->sim, fmin(frame, left), frame, &report);
         count(&r->result, &report);
+        r->estimates = !isnan(report.error_bound);
         drape_status kept = add_time(r, r->command->arena, report.seconds);
         status = status ? status : kept;
     }
@@ -188,6 +189,7 @@ void cli_realtime_print(const cli_realtime *r)
            "%.4g s behind after the last frame, then caught up, %.4g s dropped\n",
            (long long)s->full, (long long)s->fewer, (long long)s->larger, (long long)s->still, s->debt,
            s->dropped);
-    printf("accuracy  %lld frames with a step above the bound on its estimated error\n",
-           (long long)s->inaccurate);
+    if (r->estimates)
+        printf("accuracy  %lld frames with a step above the bound on its estimated error\n",
+               (long long)s->inaccurate);
 }

@@ -12,6 +12,7 @@ typedef struct cli_realtime {
     double *seconds;          /* (count) wall clock of each frame, in the command's arena */
     size_t count, capacity;
     drape_summary_realtime result;
+    bool estimates; /* the integrator estimates its error */
 } cli_realtime;
 
 /* A cli_choose, user: a cli_realtime with its command. Unless the scene or the command line names a method,

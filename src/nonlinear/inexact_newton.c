@@ -378,7 +378,8 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
     double begun = 0;   /* [m] RMS of the first correction, as an estimate of the error of the guess */
     for (int i = 0;; i++) {
         const bool least = i >= settings->iterations,
-                   most = i >= settings->iterations + settings->rescue_iterations;
+                   most = i >= settings->iterations + settings->rescue_iterations ||
+                          (least && !has_time(settings, 0));
         const double left = drape_step_equation_dot(e, e->f, e->f);
         report->iterations = i;
         bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;

@@ -31,7 +31,8 @@ typedef struct drape_inexact_settings {
                                           has fallen and the estimated error is within its bound */
     double tolerance;                  /* [N] largest component of F below which iterations end */
     double error;    /* [m] bound on the estimated RMS distance of the nodes to the solution */
-    double deadline; /* [s of drape_clock_seconds] by which iterations end that only reduce this error */
+    double deadline; /* [s of drape_clock_seconds] by which iterations end that only reduce this error,
+                        and after which no other is begun beyond `iterations` */
     double linear_tolerance; /* relative residual that conjugate gradients leave in each correction */
     int max_linear_iterations;
     bool follows; /* the step begins with the result of the last solve */

@@ -31,6 +31,10 @@ static bool has(const drape_place_list *list, int32_t index)
 static drape_status check_list(const drape_sim *sim, const char *what, const drape_place_list *list,
                                int32_t there)
 {
+    if (list->count < -1)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "drape_sim_place: %s_count = %d; it is -1, for all, or more", what,
+                          (int)list->count);
     if (list->count > 0 && !list->items)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_place: %d %ss, but no list of them",
                           (int)list->count, what);

@@ -200,12 +200,14 @@ static bool is_contact_slow(drape_sim *sim, char *text, size_t size)
     const bool iterates = (double)s.newton_iterations > MANY * attempts;
     if (!(s.wall_contact > MOST * s.wall_steps) || !(s.wall_contact > motion) || !iterates)
         return false;
-    snprintf(
-        text, size,
-        "contact takes %.0f %% of the time of the steps, %.3g s for %.3g s of motion: it takes less "
-        "with %sa coarser mesh; \"newton_k\" takes less time and is far less accurate (docs/realtime.md)",
-        100 * s.wall_contact / s.wall_steps, s.wall_contact, motion,
-        sim->model->contact.self ? "no \"self_contact\" if layers never meet, or " : "");
+    snprintf(text, size,
+             "contact takes %.0f %% of the time of the steps, %.3g s for %.3g s of motion: it takes less "
+             "with %sa coarser mesh%s",
+             100 * s.wall_contact / s.wall_steps, s.wall_contact, motion,
+             sim->model->contact.self ? "no \"self_contact\" if layers never meet, or " : "",
+             sim->chosen.integrator->error_bound
+                 ? ""
+                 : "; \"newton_k\" takes less time and is far less accurate (docs/realtime.md)");
     return true;
 }
 
@@ -236,7 +238,8 @@ static bool is_contact_thin(drape_sim *sim, char *text, size_t size)
     if (!sim->model->contact.distance_given || !(path > THIN * distance))
         return false;
     snprintf(text, size,
-             "/contact/distance: a collider moved by %.3g m in a step, for an activation distance of %.3g m: "
+             "/contact/distance: a collider moved by %.3g m against the mean of the cloth in a step, for an "
+             "activation distance of %.3g m: "
              "leave it out, so that it follows the motion, or take a smaller dt",
              path, distance);
     return true;

@@ -242,7 +242,7 @@ def test_realtime_chooses():
     equal((line, integrator["iterations"]), ("newton_k, as no method is named", 5))
     for options, changes in (((), {"integrator": {"method": "be", "dt": 0.01}}), (("--integrator", "be"), {}), (("--linear-solver", "klu"), {})):
         line, integrator = chosen_by(*options, **changes)
-        assert line.endswith("; be, as scene or command line say"), line
+        assert line.endswith("; be, by the scene or the options"), line
         assert integrator.get("method", "be") == "be" and "iterations" not in integrator, integrator
     assert "chosen" not in good("run", "scene.json")
 
