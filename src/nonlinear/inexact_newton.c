@@ -225,19 +225,19 @@ static void make_way(drape_inexact_newton *s, double *d)
 static void make_guess_feasible(drape_inexact_newton *s, int iterations, double *d)
 {
     drape_step_equation *e = s->equation;
-    double *way = s->trial;
+    double *pushed = s->trial;
     if (!s->fraction)
         return;
     make_way(s, d);
-    memset(way, 0, e->dofs * sizeof *way);
-    make_way(s, way);
-    drape_step_equation_move(e, way);
+    memset(pushed, 0, e->dofs * sizeof *pushed);
+    make_way(s, pushed);
+    drape_step_equation_move(e, pushed);
     for (size_t i = 0; i < e->dofs; i++)
-        d[i] -= way[i];
+        d[i] -= pushed[i];
     if (iterations > FEW_ITERATIONS || !drape_step_equation_shorten_nodes(e, d, s->fraction))
         drape_step_equation_make_feasible(e, d);
     for (size_t i = 0; i < e->dofs; i++)
-        d[i] += way[i];
+        d[i] += pushed[i];
 }
 
 /* A correction that is shortened at some nodes may no longer be a descent direction. Then all of it is
