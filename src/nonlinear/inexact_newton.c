@@ -389,10 +389,12 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         const bool fell = converged || (least && left < bound && quiet);
         if (fell || most)
             report->error = estimate_error(s, d, i > 0);
-        if (fell && (converged || most || report->error <= settings->error || !has_time(settings, seconds)))
+        const bool lost = report->error > e->model->length; /* nowhere near the solution */
+        if (converged ||
+            (fell && !lost && (most || report->error <= settings->error || !has_time(settings, seconds))))
             return DRAPE_OK;
         if (most) {
-            if (left < first || report->error < begun)
+            if (!lost && (left < first || report->error < begun))
                 return DRAPE_OK;
             report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
             return DRAPE_RETRY_NONLINEAR;
