@@ -303,7 +303,7 @@ static bool linearizes(const drape_newton *s)
 {
     const drape_step_equation *e = s->equation;
     const drape_motion *motion = drape_system_motion(e->system);
-    if (!s->searches || s->fraction || !e->x_start ||
+    if (!e->pins_pull || !s->searches || s->fraction || !e->x_start ||
         s->values[DRAPE_NEWTON_METHOD] != DRAPE_NEWTON_METHOD_EXACT ||
         s->values[DRAPE_NEWTON_PREDICTOR] != DRAPE_NEWTON_PREDICTOR_INERTIAL)
         return false;
