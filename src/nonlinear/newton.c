@@ -1,7 +1,8 @@
 /*
  * newton.c: see newton.h. A solve runs through these stages, whose functions follow in this order:
  *
- *     guess      the caller's d, shortened where cloth would meet something; d = 0 if it violates a limit
+ *     guess      the caller's d or, where pins move, that of the equation linearized at the start of the
+ *                step; shortened where cloth would meet something; d = 0 if it violates a limit
  *     residual   F(d)
  *     jacobian   J(d), in a pattern that includes the contacts there
  *     factor     factors of J or, where contact makes J unsymmetric, of a symmetric matrix near J; an
@@ -79,6 +80,7 @@
 #define STALLED               0.5 /* of the residual before: if no more is gained, it may be rounding */
 /* Times the last estimate in a solve: a larger residual is not compared with a new one */
 #define FAR_FROM_ROUNDING 1e3
+#define PROBED            1e-6 /* of the displacement of pins: their pull is a difference over that much */
 
 struct drape_newton {
     drape_step_equation *equation;
@@ -293,6 +295,69 @@ static int factor(SUNLinearSolver solver, SUNMatrix matrix)
     s->repair_share = share;
     s->indefinite = true;
     return return_status(s, status);
+}
+
+/* ---- Guess where pins move ---- */
+
+/* Whether the solve begins with the linearized equation. Its solution knows of no contact to come. */
+static bool linearizes(const drape_newton *s)
+{
+    const drape_step_equation *e = s->equation;
+    const drape_motion *motion = drape_system_motion(e->system);
+    if (!e->pins_pull || !s->searches || s->fraction || !e->x_start ||
+        s->values[DRAPE_NEWTON_METHOD] != DRAPE_NEWTON_METHOD_EXACT ||
+        s->values[DRAPE_NEWTON_PREDICTOR] != DRAPE_NEWTON_PREDICTOR_INERTIAL)
+        return false;
+    for (int32_t i = 0; i < motion->moved_count; i++) {
+        const size_t at = 3 * (size_t)motion->moved_node[i];
+        if (memcmp(e->x_base + at, e->x_start + at, 3 * sizeof *e->x_base) != 0)
+            return true;
+    }
+    return false;
+}
+
+/* F at d = 0 with the pins where a share of their displacement takes them. */
+static void evaluate_with_pins(drape_newton *s, double share)
+{
+    drape_step_equation *e = s->equation;
+    const drape_motion *motion = drape_system_motion(e->system);
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            const size_t at = 3 * (size_t)motion->moved_node[i] + k;
+            e->x[at] = e->x_start[at] + share * (e->x_base[at] - e->x_start[at]);
+            e->v[at] = share * e->v_base[at];
+        }
+    drape_step_equation_evaluate(e, s->trial);
+}
+
+/* Where a pin takes a sheet along, nodes that keep their velocity stay behind. The elements at the pin are
+ * stretched by as much, and it takes many corrections until their forces have reached the rest of a stiff
+ * sheet. The linearized equation takes the pull of the pins to all nodes at once: d = -J^-1 (F + dF/dpins
+ * times their displacement), with F and J at the start of the step, J repaired where it is indefinite. A
+ * guess needs no exact derivative: the pull is a difference. */
+static drape_status guess_linearized(drape_newton *s, double *d)
+{
+    drape_step_equation *e = s->equation;
+    if (!linearizes(s))
+        return DRAPE_OK;
+    memset(s->trial, 0, e->dofs * sizeof *s->trial);
+    N_VSetArrayPointer(s->trial, s->unknown);
+    evaluate_with_pins(s, PROBED);
+    memcpy(s->chord, e->f, e->dofs * sizeof *s->chord);
+    evaluate_with_pins(s, 0);
+    for (size_t i = 0; i < e->dofs; i++)
+        s->chord_minus_f[i] = -(e->f[i] + (s->chord[i] - e->f[i]) / PROBED);
+    drape_status status = assemble(s, s->trial, 0);
+    if (!status)
+        status = factor(s->linear->solver, NULL);
+    if (!status)
+        status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
+    if (!status && drape_all_finite(s->chord, e->dofs))
+        memcpy(d, s->chord, e->dofs * sizeof *d);
+    s->positive_share = 0;
+    s->indefinite = false;
+    drape_step_equation_begin(e);
+    return status < 0 ? status : DRAPE_OK;
 }
 
 /* ---- Correct ---- */
@@ -547,6 +612,13 @@ drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *
     if (e->dofs == 0) {
         drape_step_equation_evaluate(e, d);
         return DRAPE_OK;
+    }
+    drape_status status = guess_linearized(s, d);
+    if (drape_system_status(e->system))
+        return drape_system_status(e->system);
+    if (status) {
+        report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
+        return status;
     }
     improve_guess(s, d);
     bool keeps_factors = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_MODIFIED && s->factored &&

@@ -64,10 +64,11 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
         "none: full Newton steps, failures go to the controller; line_search: steps shortened until the "    \
         "residual falls; work: steps shortened until the work of the residual along them falls, with "       \
         "positive matrices after short steps and where the exact one is indefinite; auto: work"),            \
-    [DRAPE_NEWTON_PREDICTOR] =                                                                               \
-        DRAPE_CHOICE("predictor", DRAPE_NEWTON_PREDICTOR_INERTIAL, drape_newton_predictors,                  \
-                     "guess; inertial: the nodes keep their velocity; rest: they stay "                      \
-                     "where they are, as in the DEP report"),                                                \
+    [DRAPE_NEWTON_PREDICTOR] = DRAPE_CHOICE(                                                                 \
+        "predictor", DRAPE_NEWTON_PREDICTOR_INERTIAL, drape_newton_predictors,                               \
+        "guess; inertial: the nodes keep their velocity or, in be where pins move and no contact is "        \
+        "possible, solve the linearized equation; rest: they stay where they are, as in the "                \
+        "DEP report"),                                                                                       \
     [DRAPE_NEWTON_PROJECT] =                                                                                 \
         DRAPE_BOOLEAN("project", false, "project the Hessian of every element to positive semidefinite"),    \
     [DRAPE_NEWTON_LINEAR_SOLVER] =                                                                           \

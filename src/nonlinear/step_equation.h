@@ -34,6 +34,8 @@ typedef struct drape_step_equation {
     const double *x_start;   /* nodes: the beginning of the step or stage; NULL: no stress prediction
                                 (stress_predictor.h) */
 
+    bool pins_pull; /* the guess takes the pull of moved pins to all nodes (newton.c) */
+
     /* Where it was evaluated last: after a solve that returned a state, at the solution. */
     double *x, *v, *g; /* nodes: g(x, v) [N] */
     double *f;         /* free DOFs: F [N] */
