@@ -78,8 +78,8 @@ typedef struct drape_integrator_ops {
     double (*tolerance)(const void *state);
     /* The bound on `error` up to which it does more work [m]. NULL: it estimates none. */
     double (*error_bound)(const void *state);
-    /* Work beyond the least that the present effort asks for is not begun after this time
-     * [s of drape_clock_seconds], nor, if it only reduces the error, where it would not end by then; INFINITY, at
+    /* Work beyond the least that the present effort asks for is not begun after this time [s of
+     * drape_clock_seconds], nor, if it only reduces the error, where it would not end by then; INFINITY, at
      * first: there is no deadline. NULL: it does no such work. */
     void (*set_deadline)(void *state, double seconds);
     /* The level of effort of a step, if a deadline must be met: from 0, as the parameters say, to efforts -

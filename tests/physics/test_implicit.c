@@ -153,9 +153,10 @@ START_TEST(boson_does_not_blow_up)
 }
 END_TEST
 
-/* A stiff sheet (E h = 2e5 N/m), which two corners swing to and fro by up to a tenth of its size in a step. Where
- * the guess takes the pull of the pins to all nodes, what is left is of second order in the displacement:
- * 4 iterations a step. 18 were needed where nodes kept their velocity; the bound is between the two. */
+/* A stiff sheet (E h = 2e5 N/m), which two corners swing to and fro by up to a tenth of its size in a step.
+ * Where the guess takes the pull of the pins to all nodes, what is left is of second order in the
+ * displacement: 4 iterations a step. 18 were needed where nodes kept their velocity; the bound is between the
+ * two. */
 START_TEST(a_stiff_sheet_follows_its_pins)
 {
     scene s = scene_open(
