@@ -107,6 +107,10 @@ drape_status drape_relaxed_add(drape_relaxed_set *set, int32_t collider, int32_t
                                int32_t *added)
 {
     drape_relaxed_node *found = drape_relaxed_find(set, collider, node);
+    if (set->counting) {
+        *added += !found;
+        return DRAPE_OK;
+    }
     if (found) {
         found->blocked = true;
         found->until = fmax(found->until, until);

@@ -42,6 +42,7 @@ typedef struct drape_relaxed_set {
     double *bound;    /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none */
     drape_relaxed_total *total; /* (collider_count + 1) the last one: of pinned pieces of cloth */
     double t;                   /* [s] of the last update */
+    bool counting; /* nodes that would be relaxed are counted, and nothing changes; during one search */
 } drape_relaxed_set;
 
 drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, drape_relaxed_set *out);

@@ -4,18 +4,21 @@
  * would overwrite, so that a refused placement changes nothing.
  */
 #include "sim/place.h"
+
+#include "base/def.h"
 #include "mesh/mesh.h"
 
 #include <math.h>
 #include <string.h>
 
 #define MAX_DISTANCE 1e9 /* [m] the limit of a track's keys */
+/* The def has had these members since its first version. */
+#define MIN_SIZE sizeof(drape_place_def)
 
 void drape_place_def_init(drape_place_def *def, size_t struct_size)
 {
     const drape_place_def defaults = {.struct_size = struct_size, .cloth_count = -1, .collider_count = -1};
-    memset(def, 0, struct_size);
-    memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 /* ---- What is placed ---- */
@@ -186,7 +189,7 @@ static drape_status read_def(const drape_sim *sim, const drape_place_def *given,
     drape_place_def_init(def, sizeof *def);
     if (!given)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_place: the def is NULL");
-    if (given->struct_size == 0 || given->struct_size > sizeof *def)
+    if (!drape_def_fits(given->struct_size, MIN_SIZE, sizeof *def))
         return drape_fail(
             sim->ctx, DRAPE_E_VERSION,
             "the place def was not initialised by drape_place_def_init of this version: struct_size %zu",

@@ -442,8 +442,10 @@ START_TEST(wrong_placements_are_refused)
     drape_sim_def sim;
     ck_assert_int_eq(drape_sim_place(NULL, &def), e);
     says(&h, drape_sim_place(h.sim, NULL), e, "the def is NULL");
-    def.struct_size = 0;
-    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_VERSION, "drape_place_def_init");
+    for (size_t i = 0; i < 4; i++) { /* not initialised, only its size, a member short, too long */
+        def.struct_size = (const size_t[]){0, 8, sizeof def - 8, sizeof def + 8}[i];
+        says(&h, drape_sim_place(h.sim, &def), DRAPE_E_VERSION, "drape_place_def_init");
+    }
     def = place_def();
     def.rotate[3] = 10;
     says(&h, drape_sim_place(h.sim, &def), e, "axis");

@@ -167,6 +167,7 @@ static void check_stop(const char *policy, bool realtime)
     ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
     const char *message = drape_context_message(s.ctx);
     ck_assert_msg(strstr(message, "left") || strstr(message, "right"), "%s", message);
+    ck_assert_msg(strstr(message, "no room there: with /contact/no_room \"relax\""), "%s", message);
     ck_assert_double_lt(drape_sim_time(s.sim), 0.25);
     ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);
     scene_close(&s);
