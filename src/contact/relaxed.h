@@ -69,6 +69,9 @@ void drape_relaxed_update(drape_relaxed_set *set, double t, double max_factor);
 /* The number of nodes that are relaxed for a collider. */
 int32_t drape_relaxed_count(const drape_relaxed_set *set, int32_t collider);
 
+/* [s] When the first of these was relaxed; INFINITY: there are none. */
+double drape_relaxed_since(const drape_relaxed_set *set, int32_t collider);
+
 /* Removes the nodes for which `leaves` is true. Returns their number. */
 typedef bool drape_relaxed_leaves(void *user, const drape_relaxed_node *node);
 int32_t drape_relaxed_remove(drape_relaxed_set *set, drape_relaxed_leaves *leaves, void *user);

@@ -209,6 +209,44 @@ START_TEST(test_checkpoint)
 }
 END_TEST
 
+static void keep_line(void *user, drape_log_level level, const char *text)
+{
+    char *lines = user;
+    (void)level;
+    if (strstr(text, "room"))
+        snprintf(lines + strlen(lines), 2000 - strlen(lines), "%s\n", text);
+}
+
+/* The log says once that cloth at a ball is relaxed, and once that it is not any more, with the times of the
+ * summary; also if the run was saved in between and restored. */
+START_TEST(test_log)
+{
+    char lines[2000] = "", line[200];
+    scene s = open_pinch("relax", "newton_k"), other = open_pinch("relax", "newton_k");
+    s.ctx->def.log = other.ctx->def.log = keep_line;
+    s.ctx->def.log_user = other.ctx->def.log_user = lines;
+    scene_advance(&s, 20 * FRAME);
+    bytes saved = bytes_save(s.sim);
+    ck_assert_int_eq(drape_sim_restore_from(other.sim, saved.data, saved.size), DRAPE_OK);
+    scene_advance(&other, 84 * FRAME);
+    int count = 0;
+    for (const char *c = lines; (c = strchr(c, '\n')); c++)
+        count++;
+    ck_assert_msg(count == 4, "%s", lines);
+    for (int32_t c = 0; c < 2; c++) {
+        const drape_relaxed_total *total = drape_sim_relaxed_total(other.sim, c);
+        const char *name = s.model->colliders[c].name;
+        snprintf(line, sizeof line, "t=%.9g: no room for the cloth at %s:", total->first, name);
+        ck_assert_msg(strstr(lines, line), "%s not in %s", line, lines);
+        snprintf(line, sizeof line, "t=%.9g: the cloth at %s has room again;", total->last, name);
+        ck_assert_msg(strstr(lines, line), "%s not in %s", line, lines);
+    }
+    free(saved.data);
+    scene_close(&other);
+    scene_close(&s);
+}
+END_TEST
+
 /* A ball that is pressed 3 cm into a table through the cloth on it. */
 START_TEST(test_table)
 {
@@ -367,5 +405,5 @@ START_TEST(test_plates)
 }
 END_TEST
 
-SUITE("no_room", test_pinch, test_stop, test_checkpoint, test_table, test_pins_inside, test_elbow,
+SUITE("no_room", test_pinch, test_stop, test_checkpoint, test_log, test_table, test_pins_inside, test_elbow,
       test_crevice, test_boxes, test_plates)
