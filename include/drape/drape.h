@@ -458,10 +458,11 @@ DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
  * axis than that of gravity changes how the cloth hangs. The energy account takes the change of potential
  * and kinetic energy as given by the host.
  *
- * Colliders do not turn: a rotation is refused if one of the colliders is not the same shape afterwards.
- * Spheres always are; planes, capsules and cylinders are if they turn about their own axis or normal, and the
- * latter two also if they are turned over. Name the others' cloths and colliders apart, or replace a body
- * that turns by a cloth whose nodes are all pinned.
+ * Colliders do not turn: a rotation is refused unless each of the colliders looks the same afterwards.
+ * Spheres always do; planes, capsules and cylinders do if they are turned about their own axis or normal, the
+ * latter two also if they are turned over; boxes do after a half turn about one of their axes, and after a
+ * quarter turn about one if their sizes along the two others are equal. Leave the others out, or replace a
+ * body that turns by a cloth whose nodes are all pinned.
  *
  * Contact is not checked. Where cloth and colliders move together their contacts stay as they were. Cloth
  * that is placed into a collider, or a collider into cloth, is like cloth that starts there: it is pushed out

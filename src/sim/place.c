@@ -89,8 +89,9 @@ static drape_status check_colliders(const drape_sim *sim, const drape_place_list
             continue;
         if (!place_displacement(sim, c, by, &own))
             return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                              "drape_sim_place: %s is a %s, which cannot turn; only spheres, and planes, "
-                              "capsules and cylinders about their axis, look the same afterwards",
+                              "drape_sim_place: %s is a %s that would not look the same after this rotation, "
+                              "and colliders do not turn: spheres may be turned by any, planes, capsules and "
+                              "cylinders about their axes, boxes by quarter turns that keep their sizes",
                               collider->name, collider->ops->entry.name);
         drape_motion_collider(drape_system_motion(sim->system), c, drape_sim_state(sim)->t, at);
         drape_placement_move(&own, at, at);

@@ -177,7 +177,7 @@ static host several(failing_allocator *memory)
         memory,
         "{'drape': 1, 'cloth': [" SMALL("a") ", " SMALL(
             "b") "], 'colliders': [{'type': 'box', "
-                 "'center': [9, 0, 0], 'size': [1, 1, 1], 'name': 'crate'}, {'type': 'sphere', 'center': "
+                 "'center': [9, 0, 0], 'size': [2, 1, 1], 'name': 'crate'}, {'type': 'sphere', 'center': "
                  "[0, -5, 0], 'radius': 1}, {'type': 'capsule', 'a': [5, 1, 0], 'b': [5, 2, 0], 'radius': "
                  "0.1}, "
                  "{'type': 'cylinder', 'a': [6, 1, 0], 'b': [6, 2, 0], 'radius': 0.1}], "
@@ -220,20 +220,30 @@ START_TEST(only_what_is_chosen_is_placed)
 }
 END_TEST
 
-/* A sphere turns about any axis, a capsule and a cylinder about their own or upside down; a box never. */
+/* A sphere turns about any axis, a capsule and a cylinder about their own or upside down; a box by half turns,
+ * and by quarter turns about the axis across which it is square. */
 START_TEST(colliders_turn_if_they_look_the_same)
 {
     failing_allocator memory = {0};
     host h = several(&memory);
-    const int32_t sphere = 1, capsule = 2, cylinder = 3;
+    const int32_t crate = 0, sphere = 1, capsule = 2, cylinder = 3;
     drape_place_def def = place_def();
-    const double upright[4] = {0, 1, 0, 90}, over[4] = {1, 0, 0, 180}, tilt[4] = {0, 0, 1, 10};
+    const double upright[4] = {0, 1, 0, 90}, over[4] = {1, 0, 0, 180}, tilt[4] = {0, 0, 1, 10},
+                 quarter[4] = {1, 0, 0, -90}, half[4] = {0, 1, 0, 180};
     const uint64_t before = drape_sim_hash(h.sim);
     memcpy(def.rotate, upright, sizeof upright);
-    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_ARGUMENT, "crate is a box, which cannot turn");
+    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_ARGUMENT, "crate is a box that would not look the same");
     ck_assert_uint_eq(drape_sim_hash(h.sim), before);
     def.cloth_count = 0;
     def.collider_count = 1;
+    def.colliders = &crate;
+    memcpy(def.rotate, quarter, sizeof quarter);
+    good(&h, drape_sim_place(h.sim, &def)); /* about the line through its middle, which stays */
+    ck_assert(drape_sim_collider(h.sim, crate).displacement[0] == 0);
+    memcpy(def.rotate, half, sizeof half);
+    good(&h, drape_sim_place(h.sim, &def)); /* (9, 0, 0) to (-9, 0, 0) */
+    ck_assert(drape_sim_collider(h.sim, crate).displacement[0] == -18);
+    memcpy(def.rotate, upright, sizeof upright);
     def.colliders = &capsule;
     good(&h, drape_sim_place(h.sim, &def)); /* its middle, (5, 1.5, 0), goes to (0, 1.5, -5) */
     const double to[3] = {0, 1.5, -5}, middle[3] = {5, 1.5, 0};
@@ -244,7 +254,7 @@ START_TEST(colliders_turn_if_they_look_the_same)
     good(&h, drape_sim_place(h.sim, &def)); /* (6, 1.5, 0) to (6, -1.5, 0) */
     ck_assert(drape_sim_collider(h.sim, cylinder).displacement[1] == -3);
     memcpy(def.rotate, tilt, sizeof tilt);
-    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_ARGUMENT, "cannot turn");
+    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_ARGUMENT, "would not look the same");
     def.colliders = &sphere;
     good(&h, drape_sim_place(h.sim, &def)); /* (0, -5, 0) to 5 (sin 10, -cos 10, 0) */
     ck_assert_double_eq_tol(drape_sim_collider(h.sim, sphere).displacement[0], 5 * sin(10 * acos(-1) / 180),
