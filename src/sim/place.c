@@ -1,7 +1,7 @@
 /*
  * place.c: cloth with its pins, and colliders, as a host places them elsewhere by a rigid motion. Nothing is
- * strained by it, so nothing is left to calm down. The new state is built in the one that the next attempt
- * would overwrite, so that a refused placement changes nothing.
+ * strained by it, so nothing is left to calm down. All is checked before anything changes. The new state is
+ * built in the one that the next attempt would overwrite.
  */
 #include "sim/place.h"
 
@@ -102,10 +102,36 @@ static drape_status check_colliders(const drape_sim *sim, const drape_place_list
     return DRAPE_OK;
 }
 
+static drape_status check_nodes(const drape_sim *sim, const drape_place_list *cloths,
+                                const drape_placement *by)
+{
+    const drape_model *m = sim->model;
+    const double *now = drape_sim_state(sim)->x;
+    for (int32_t c = 0; c < m->cloth_count; c++) {
+        const drape_cloth *cloth = &m->cloths[c];
+        for (int32_t i = 0; has(cloths, c) && i < cloth->mesh.node_count; i++) {
+            double x[3];
+            drape_placement_move(by, now + 3 * (size_t)(cloth->first_node + i), x);
+            if (is_far(x))
+                return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                                  "drape_sim_place: node %d of %s would be beyond %g m", (int)i, cloth->name,
+                                  MAX_DISTANCE);
+        }
+    }
+    return DRAPE_OK;
+}
+
+drape_status drape_sim_check_place(const drape_sim *sim, const drape_place_list *cloths,
+                                   const drape_place_list *colliders, const drape_placement *by)
+{
+    const drape_status status = check_colliders(sim, colliders, by);
+    return status ? status : check_nodes(sim, cloths, by);
+}
+
 /* ---- Placing ---- */
 
-static drape_status place_nodes(const drape_sim *sim, const drape_place_list *cloths,
-                                const drape_placement *by, bool stop, drape_state *to)
+static void place_nodes(const drape_sim *sim, const drape_place_list *cloths, const drape_placement *by,
+                        bool stop, drape_state *to)
 {
     const drape_model *m = sim->model;
     const drape_state *now = drape_sim_state(sim);
@@ -123,13 +149,8 @@ static drape_status place_nodes(const drape_sim *sim, const drape_place_list *cl
             drape_placement_turn(by, v, v);
             if (stop)
                 memset(v, 0, 3 * sizeof *v);
-            if (is_far(x))
-                return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                                  "drape_sim_place: node %d of %s would be beyond %g m", (int)i, cloth->name,
-                                  MAX_DISTANCE);
         }
     }
-    return DRAPE_OK;
 }
 
 /* A spring by which a host drags a node goes with it. */
@@ -168,12 +189,11 @@ drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloth
                                    const drape_place_list *colliders, const drape_placement *by, bool stop)
 {
     drape_state *next = &sim->states[sim->next];
-    drape_status status = check_colliders(sim, colliders, by);
-    if (!status)
-        status = place_nodes(sim, cloths, by, stop, next);
+    const drape_status status = drape_sim_check_place(sim, cloths, colliders, by);
     if (status)
         return status;
     const drape_energy before = drape_sim_energy(sim);
+    place_nodes(sim, cloths, by, stop, next);
     place_drag_spring(sim, cloths, by);
     place_motion(sim, cloths, colliders, by);
     sim->next = sim->now;

@@ -485,7 +485,64 @@ START_TEST(wrong_placements_are_refused)
 }
 END_TEST
 
+/* Two cloths of 9 nodes each, with the pins 0 and 1. The first is sent 100 m away, the second so far that its
+ * nodes would be beyond the limit although the pin is not. Colliders are sent beyond it by what they would
+ * have covered on the way at their own velocity. */
+static void send_wrongly(host *h)
+{
+    const drape_status e = DRAPE_E_ARGUMENT;
+    const int32_t pins[2] = {0, 9}, free_node[2] = {0, 8}, nowhere[2] = {0, 99};
+    const double near[6] = {0, 0, 0, 0, 0, 0}, far[6] = {100, 0, 0, 1e9, 0, 0},
+                 none[6] = {0, 0, 0, 0, NAN, 0}, beyond[6] = {0, 0, 0, 2e9, 0, 0}, fast[3] = {-1e9, 0, 0};
+    says(h, drape_sim_move_pins(h->sim, 2, free_node, 1, near, NULL), e, "is free");
+    says(h, drape_sim_move_pins(h->sim, 2, nowhere, 1, near, NULL), e, "node 99");
+    says(h, drape_sim_move_pins(h->sim, 2, pins, 0, near, NULL), e, "seconds = 0");
+    says(h, drape_sim_move_pins(h->sim, 2, pins, 1, none, NULL), e, "position and velocity of node 9");
+    says(h, drape_sim_move_pins(h->sim, 2, pins, 1, near, none), e, "position and velocity of node 9");
+    says(h, drape_sim_move_pins(h->sim, 2, pins, 1, beyond, NULL), e, "position and velocity of node 9");
+    says(h, drape_sim_move_pins(h->sim, 2, pins, 1, far, NULL), e, "of b would be beyond");
+    for (int32_t c = 0; c < 4; c++) {
+        says(h, drape_sim_move_collider(h->sim, c, 0, near, NULL), e, "seconds = 0");
+        says(h, drape_sim_move_collider(h->sim, c, 1, none + 3, NULL), e, "displacement and velocity");
+        says(h, drape_sim_move_collider(h->sim, c, 1, near, none + 3), e, "displacement and velocity");
+        says(h, drape_sim_move_collider(h->sim, c, 1, beyond + 3, NULL), e, "displacement and velocity");
+        says(h, drape_sim_move_collider(h->sim, c, 2, far, fast), e, "would be beyond");
+    }
+    drape_place_def def = place_def();
+    def.translate[0] = 1e9;
+    says(h, drape_sim_place(h->sim, &def), e, "would be beyond");
+    def.collider_count = 0;
+    says(h, drape_sim_place(h->sim, &def), e, "would be beyond");
+}
+
+/* After a step, whose beginning is kept for the frames within it, all that a checkpoint contains is the same
+ * byte for byte. */
+START_TEST(what_is_sent_wrongly_changes_nothing)
+{
+    for (int i = 0; i < METHODS; i++) {
+        failing_allocator memory = {0};
+        host h = several(&memory);
+        const int32_t node = 0;
+        const double at[3] = {0.01, 0, 0};
+        use(&h, methods[i], 20);
+        good(&h, drape_sim_move_pins(h.sim, 1, &node, 1, at, NULL));
+        for (int32_t c = 0; c < 4; c++)
+            good(&h, drape_sim_move_collider(h.sim, c, 1, at, NULL));
+        good(&h, drape_sim_advance(h.sim, 3.3 * FRAME));
+        bytes before = bytes_save(h.sim);
+        send_wrongly(&h);
+        bytes after = bytes_save(h.sim);
+        ck_assert_uint_eq(before.size, after.size);
+        ck_assert_msg(memcmp(before.data, after.data, before.size) == 0, "%s", methods[i]);
+        free(before.data);
+        free(after.data);
+        close_scene(&h, &memory);
+    }
+}
+END_TEST
+
 SUITE("place", a_placed_sim_goes_on_as_before, any_rotation_keeps_the_strain, only_what_is_chosen_is_placed,
       colliders_turn_if_they_look_the_same, cloth_placed_into_a_collider_comes_out,
       a_checkpoint_keeps_placements, pins_that_are_sent_far_take_their_cloth_along,
-      colliders_that_are_sent_far_are_there, a_free_rotation_is_not_made, wrong_placements_are_refused)
+      colliders_that_are_sent_far_are_there, a_free_rotation_is_not_made, wrong_placements_are_refused,
+      what_is_sent_wrongly_changes_nothing)
