@@ -188,12 +188,6 @@ static double draw(uint64_t *seed)
 
 static double slower = 1;
 
-static int compare(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void run(drape_context *ctx, const scene *s, const variant *v, const char *integrator, double seconds,
                 result *r)
 {
@@ -243,7 +237,7 @@ static void run(drape_context *ctx, const scene *s, const variant *v, const char
     }
     r->contact = contact / steps;
     drape_model_destroy(&model);
-    qsort(r->ms, (size_t)r->frames, sizeof *r->ms, compare);
+    qsort(r->ms, (size_t)r->frames, sizeof *r->ms, bench_compare);
 }
 
 static double percentile(const result *r, double share)
