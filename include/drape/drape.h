@@ -343,8 +343,8 @@ typedef struct drape_sim_def {
                               0: never */
 } drape_sim_def;
 
-/* Fills *def with the defaults. Pass the caller's sizeof(drape_sim_def) as struct_size. Nothing if def is NULL.
- */
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_sim_def) as struct_size. Nothing if def is
+ * NULL. */
 DRAPE_API void drape_sim_def_init(drape_sim_def *def, size_t struct_size);
 
 /* Creates a sim at t = 0 with the model's rest positions and initial velocities. If def is NULL, the scene's

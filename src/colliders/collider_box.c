@@ -122,8 +122,8 @@ static double distance(const double *values, const drape_collider_shape *shape, 
     return (outside > 0 ? outside : q[most]) - values[ROUNDING];
 }
 
-/* A rotation that takes each axis of the box to one along which the box is as long: half turns about its axes,
- * and quarter turns if the two others are equal. */
+/* A rotation that takes each axis of the box to one along which the box is as long: half turns about its
+ * axes, and quarter turns if the two others are equal. */
 static bool turned(const double *values, const drape_collider_shape *shape, const double *rotation,
                    double *shift)
 {

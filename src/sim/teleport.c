@@ -164,8 +164,8 @@ static bool is_sent_too_fast(const drape_sim *sim, const drape_cloth *cloth, int
     return fast;
 }
 
-/* Before any cloth is placed, all placements are checked, so that after an error nothing has changed. That of a
- * cloth does not depend on the others. */
+/* Before any cloth is placed, all placements are checked, so that after an error nothing has changed. That
+ * of a cloth does not depend on the others. */
 drape_status drape_sim_teleport_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
                                      const double *positions, const double *velocities)
 {

@@ -220,8 +220,8 @@ START_TEST(only_what_is_chosen_is_placed)
 }
 END_TEST
 
-/* A sphere turns about any axis, a capsule and a cylinder about their own or upside down; a box by half turns,
- * and by quarter turns about the axis across which it is square. */
+/* A sphere turns about any axis, a capsule and a cylinder about their own or upside down; a box by half
+ * turns, and by quarter turns about the axis across which it is square. */
 START_TEST(colliders_turn_if_they_look_the_same)
 {
     failing_allocator memory = {0};
@@ -487,7 +487,7 @@ END_TEST
 
 /* Two cloths of 9 nodes each, with the pins 0 and 1. The first is sent 100 m away, the second so far that its
  * nodes would be beyond the limit although the pin is not. Colliders are sent beyond it by what they would
- * have covered on the way at their own velocity. */
+ * have covered at their own velocity. */
 static void send_wrongly(host *h)
 {
     const drape_status e = DRAPE_E_ARGUMENT;

@@ -362,10 +362,10 @@ static double stiffness_along(probe *t, const double *p)
 }
 
 /* A correction by which the sheet, 3 mm above the floor, would pass it meets the inertia of its mass M at
- * least: by Newton's tangent k it has the force N + k p, and M / h^2 (p - 3 mm) is added where it goes beyond.
- * The next Jacobian leads to the gap with that force, which is positive: its secant is stiffer than the
- * tangent, and the correction that it allows under that force ends before the floor. Without a correction,
- * and after predictions are forgotten, the Jacobian has the bits of the tangent. */
+ * least: by Newton's tangent k it has the force N + k p, and M / h^2 (p - 3 mm) is added where it goes
+ * beyond. The next Jacobian leads to the gap with that force, which is positive: its secant is stiffer than
+ * the tangent, and the correction that it allows under that force ends before the floor. Without a
+ * correction, and after predictions are forgotten, the Jacobian has the bits of the tangent. */
 START_TEST(the_jacobian_has_the_predicted_forces)
 {
     const double gap = 3e-3, h = 0.01;

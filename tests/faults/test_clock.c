@@ -94,9 +94,9 @@ START_TEST(a_budget_on_a_jumping_clock_ends)
 }
 END_TEST
 
-/* Frames in a budget, on a clock that advances by a millisecond each time it is read and not otherwise, so that a
- * call takes the same time on any machine. newton_k would make 20 further iterations in each step for an error
- * that it never reaches, or as many as rounding allows. */
+/* Frames in a budget, on a clock that advances by a millisecond each time it is read and not otherwise, so
+ * that a call takes the same time on any machine. newton_k would make 20 further iterations in each step for
+ * an error that it never reaches, or as many as rounding allows. */
 typedef struct timed {
     int64_t iterations, late;
     double longest; /* [s] of a call */
@@ -120,8 +120,8 @@ static timed run_in(double budget)
     return out;
 }
 
-/* In six tenths of the time that all iterations take, a call makes fewer than all and more than the least, one a
- * frame; what an iteration takes is known after the first frames, which alone may be late. */
+/* In six tenths of the time that all iterations take, a call makes fewer than all and more than the least,
+ * one a frame; what an iteration takes is known after the first frames, which alone may be late. */
 START_TEST(further_iterations_end_in_time)
 {
     const timed all = run_in(3600), some = run_in(0.6 * all.longest);

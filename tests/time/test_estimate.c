@@ -207,8 +207,8 @@ static drape_status keep_attempt(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Nodes that fly apart at random with 1 km/s go 16 m in a step of 1/60 s, where the sheet would hold them within
- * 1.4 m: one iteration is nowhere near that, and the step is rejected. At 0.1 m/s it is accepted. */
+/* Nodes that fly apart at random with 1 km/s go 16 m in a step of 1/60 s, where the sheet would hold them
+ * within 1.4 m: one iteration is nowhere near that, and the step is rejected. At 0.1 m/s it is accepted. */
 START_TEST(a_step_that_is_lost_is_rejected)
 {
     for (int lost = 0; lost < 2; lost++) {

@@ -402,8 +402,8 @@ START_TEST(test_step_fraction)
 }
 END_TEST
 
-/* A trial state may bring a pair from far beyond the activation distance to a share of it at once, and one from
- * just beyond it as far as if it were within. */
+/* A trial state may bring a pair from far beyond the activation distance to a share of it at once, and one
+ * from just beyond it as far as if it were within. */
 START_TEST(test_arrival)
 {
     const drape_keep trial = {.least = 1, .above = 0.5, .below = 0.5, .arrival = 0.4};
