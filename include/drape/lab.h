@@ -60,7 +60,8 @@ typedef struct drape_lab_def {
     void *user;                   /* passed to progress and cancel */
 } drape_lab_def;
 
-/* Fills *def with the defaults. */
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_lab_def) as struct_size. Nothing if def is
+ * NULL. */
 DRAPE_API void drape_lab_def_init(drape_lab_def *def, size_t struct_size);
 
 /* The outcome of a run or a merge. */

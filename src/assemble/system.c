@@ -243,6 +243,12 @@ drape_status drape_system_relax(drape_system *system, double t1, bool all, int32
     return system->contact ? drape_contact_relax(system->contact, t1, all, added) : DRAPE_OK;
 }
 
+drape_status drape_system_lacks_room(drape_system *system, double t1, bool all, bool *lacks)
+{
+    *lacks = false;
+    return system->contact ? drape_contact_lacks_room(system->contact, t1, all, lacks) : DRAPE_OK;
+}
+
 bool drape_system_nearest(const drape_system *system, drape_diagnostic *diagnostic)
 {
     return system->contact && drape_contact_nearest(system->contact, diagnostic);

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #define ROUNDING  1e-12 /* of the model's length: larger than the rounding of a bound of a gap */
-#define MAX_PATCH 0.3   /* of all points: if more have left their path, all pairs are searched */
+#define MAX_PATCH 0.3   /* of the nodes: if more have left their path, all pairs are searched */
 
 static void take_set(drape_arena *arena, const drape_broad_phase *broad, drape_candidate_set *set)
 {
@@ -25,7 +25,8 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
     *out = (drape_candidates){.arena = arena, .broad = broad, .margin = margin};
     take_set(arena, broad, &out->all);
     take_set(arena, broad, &out->patch);
-    out->patched = drape_arena_take(arena, (size_t)broad->points, sizeof *out->patched);
+    out->patched = drape_arena_take(arena, (size_t)(broad->points + broad->model->collider_count),
+                                    sizeof *out->patched);
     return drape_arena_status(arena);
 }
 
@@ -116,7 +117,7 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
             continue;
         for (int32_t i = 0; i < m->free_count; i++) {
             const drape_pair pair = drape_broad_phase_surface(broad, m->node_of_free[i], k);
-            if (!marked || marked[pair.node[0]])
+            if (!marked || marked[broad->points + k] || marked[pair.node[0]])
                 consider(&s, &pair);
         }
     }
@@ -183,8 +184,8 @@ static double square_away(const double *x, const double *a, const double *b, dou
     return vec3_dot(d, d);
 }
 
-/* The largest distance of a point, other than those left out, and of a collider. Marks the points of which it
- * exceeds the margin, unless beyond is NULL. */
+/* The largest distance of a point or a collider other than those left out. Marks those of which it exceeds the
+ * margin, unless beyond is NULL. */
 static double distance_from(const drape_candidates *c, const drape_candidate_set *set,
                             const drape_configuration *at, const bool *without, bool *beyond)
 {
@@ -200,9 +201,14 @@ static double distance_from(const drape_candidates *c, const drape_candidate_set
             beyond[i] = beyond[i] || square > limit;
         largest = square > largest && !(without && without[i]) ? square : largest;
     }
-    for (int32_t i = 0; i < c->broad->model->collider_count; i++)
-        largest = fmax(largest, square_away(at->pose[i].displacement, set->pose[0][i].displacement,
-                                            set->pose[1][i].displacement, t));
+    for (int32_t i = 0; i < c->broad->model->collider_count; i++) {
+        const size_t place = (size_t)(c->broad->points + i);
+        const double square = square_away(at->pose[i].displacement, set->pose[0][i].displacement,
+                                          set->pose[1][i].displacement, t);
+        if (beyond)
+            beyond[place] = beyond[place] || square > limit;
+        largest = square > largest && !(without && without[place]) ? square : largest;
+    }
     return sqrt(largest);
 }
 
@@ -232,20 +238,23 @@ bool drape_candidates_are_valid(const drape_candidates *c, const drape_distances
     return away->all <= c->margin && away->patch <= c->margin;
 }
 
-/* Whether the first search is valid but for a few points, which it marks. */
+/* Whether the first search is valid but for colliders and a few nodes, which it marks. */
 static bool find_patch(drape_candidates *c, const drape_straight_path *path)
 {
+    const drape_broad_phase *broad = c->broad;
+    const int32_t nodes = broad->model->node_count;
     int32_t count = 0;
-    memset(c->patched, 0, (size_t)c->broad->points * sizeof *c->patched);
+    memset(c->patched, 0, (size_t)(broad->points + broad->model->collider_count) * sizeof *c->patched);
     for (int end = 0; end < 2; end++)
         if (isinf(distance_from(c, &c->all, &path->end[end], NULL, c->patched)))
             return false;
-    for (int end = 0; end < 2; end++)
-        if (!(distance_from(c, &c->all, &path->end[end], c->patched, NULL) <= c->margin))
-            return false; /* a collider moved */
-    for (int32_t i = 0; i < c->broad->points; i++)
+    for (int32_t i = nodes; i < broad->points; i++) /* a collider with all of its points */
+        c->patched[broad->points + broad->point_collider[i - nodes]] |= c->patched[i];
+    for (int32_t i = nodes; i < broad->points; i++)
+        c->patched[i] = c->patched[broad->points + broad->point_collider[i - nodes]];
+    for (int32_t i = 0; i < nodes; i++)
         count += c->patched[i];
-    return count <= MAX_PATCH * c->broad->points;
+    return count <= MAX_PATCH * nodes;
 }
 
 drape_status drape_candidates_search(drape_candidates *c, const drape_straight_path *path,
@@ -268,10 +277,10 @@ static bool may_become_active(const drape_candidates *c, const drape_pair *pair,
 static bool is_patched(const drape_candidates *c, const drape_pair *pair)
 {
     const int points = drape_pair_points(pair);
-    for (int a = 0; a < points; a++)
-        if (c->patched[pair->node[a]])
-            return true;
-    return false;
+    bool found = pair->collider >= 0 && c->patched[c->broad->points + pair->collider];
+    for (int a = 0; a < points && !found; a++)
+        found = c->patched[pair->node[a]];
+    return found;
 }
 
 static bool is_before(const drape_pair *a, const drape_pair *b)

@@ -3,10 +3,10 @@
  * for a configuration if no point is farther than the margin from its place at some step fraction of the
  * path, the same for all points.
  *
- * Where some points have left the path, a patch is searched instead of all: along a new path of all points,
- * the pairs that have one of these. They replace the pairs of the first search that have one. The rank of
- * pairs depends on the pieces alone: sums over the active ones, in this order, have the same bits wherever a
- * search was made.
+ * Where some points or colliders have left the path, a patch is searched instead of all: along a new path of
+ * all points, the pairs that have one of these. They replace the pairs of the first search that have one. So
+ * layers of cloth are not searched because a collider moves. The rank of pairs depends on the pieces alone:
+ * sums over the active ones, in this order, have the same bits wherever a search was made.
  */
 #ifndef DRAPE_CONTACT_CANDIDATES_H
 #define DRAPE_CONTACT_CANDIDATES_H
@@ -32,7 +32,7 @@ typedef struct drape_candidates {
     drape_broad_phase *broad;
     double margin; /* how far points may be from the paths [m] */
     drape_candidate_set all, patch;
-    bool *patched; /* (points) those of the patch; none unless it is known */
+    bool *patched; /* (points + collider_count) those of the patch; none unless it is known */
 } drape_candidates;
 
 /* arena and broad must outlive the candidates. */
@@ -40,7 +40,8 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
                                      drape_candidates *out);
 
 /* Calls visit, by increasing rank, for all pairs that can become active while no point is farther than margin
- * from the path; marked: as in broad_phase.h. */
+ * from the path; marked: NULL for all, or (points + collider_count) those of which a pair must have one. The
+ * points of a marked collider must be marked, too. */
 void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *path, double margin,
                            const bool *marked, drape_broad_phase_visit *visit, void *user);
 

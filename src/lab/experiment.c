@@ -2,6 +2,7 @@
 #include "drape/lab.h"
 
 #include "base/clock.h"
+#include "base/def.h"
 #include "base/hash.h"
 #include "base/param.h"
 #include "lab/run.h"
@@ -26,8 +27,7 @@ void drape_lab_def_init(drape_lab_def *def, size_t struct_size)
                                     .jobs = 1,
                                     .shard = 1,
                                     .shards = 1};
-    memset(def, 0, struct_size);
-    memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 void drape_lab_outcome_free(drape_lab_outcome *outcome)

@@ -51,8 +51,11 @@ static const drape_scene_key pin_keys[] = {
 };
 static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
 
-const drape_scene_object drape_form_pin = {
-    .name = "pin", KEYS(pin_keys), .one_of = pin_selectors, .def_size = sizeof(drape_pin_def), .sized = true};
+const drape_scene_object drape_form_pin = {.name = "pin",
+                                           KEYS(pin_keys),
+                                           .one_of = pin_selectors,
+                                           .def_size = sizeof(drape_pin_def),
+                                           .least_size = offsetof(drape_pin_def, clamp)};
 
 /* ---- Objects with settings ---- */
 
@@ -123,8 +126,10 @@ static const drape_scene_key cloth_keys[] = {
      IN(drape_cloth_def, velocity)},
 };
 
-const drape_scene_object drape_form_cloth = {
-    .name = "cloth", KEYS(cloth_keys), .def_size = sizeof(drape_cloth_def), .sized = true};
+const drape_scene_object drape_form_cloth = {.name = "cloth",
+                                             KEYS(cloth_keys),
+                                             .def_size = sizeof(drape_cloth_def),
+                                             .least_size = offsetof(drape_cloth_def, velocity)};
 
 /* ---- Colliders and contact ---- */
 
@@ -148,7 +153,7 @@ const drape_scene_object drape_form_collider = {
     KEYS(collider_keys),
     SETTINGS(drape_collider_def, entry.settings, entry.setting_count),
     .def_size = sizeof(drape_collider_def),
-    .sized = true,
+    .least_size = offsetof(drape_collider_def, track),
 };
 
 /* All members of these two are settings. */
@@ -198,5 +203,7 @@ static const drape_scene_key scene_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECT, "output", UNSAID, "what a run writes"), .child = &drape_form_output},
 };
 
-const drape_scene_object drape_form_scene = {
-    .name = "scene", KEYS(scene_keys), .def_size = sizeof(drape_scene_def), .sized = true};
+const drape_scene_object drape_form_scene = {.name = "scene",
+                                             KEYS(scene_keys),
+                                             .def_size = sizeof(drape_scene_def),
+                                             .least_size = offsetof(drape_scene_def, formats)};
