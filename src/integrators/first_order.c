@@ -11,6 +11,8 @@
 
 enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
 
+#define FIRST_SHARE    1e-3 /* of the first step; IDA's own */
+#define FIRST_CHANGE   0.5
 #define MAX_EXACT_SPAN 64 /* maximum number of exact matrices in a row if symmetric ones keep failing */
 /* Fraction of the time: steps whose sum ends this near to the end of an advance end there. What is left is
  * the sum's rounding error, which the schedule does not step over. */
@@ -76,6 +78,21 @@ int drape_first_order_rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user)
         out[s->n + i] = -s->g[drape_first_order_at(s, i)] / s->mass[i];
     }
     return drape_first_order_judge(s, t, out, start);
+}
+
+double drape_first_order_norm(const drape_first_order *s, N_Vector vector)
+{
+    const double *a = N_VGetArrayPointer(vector), *w = N_VGetArrayPointer(s->weights);
+    double sum = 0;
+    for (int64_t i = 0; i < 2 * s->n; i++)
+        sum += a[i] / w[i] * (a[i] / w[i]);
+    return sqrt(sum / (double)(2 * s->n));
+}
+
+double drape_first_order_first_step(const drape_first_order *s)
+{
+    const double h = FIRST_SHARE * (s->span[1] - s->span[0]), norm = drape_first_order_norm(s, s->rate);
+    return norm * h > FIRST_CHANGE ? FIRST_CHANGE / norm : h;
 }
 
 /* ---- Jacobian ---- */

@@ -172,6 +172,11 @@ void drape_first_order_force(drape_first_order *f, double t, const double *y);
 int drape_first_order_judge(drape_first_order *f, double t, const double *out, double start);
 /* y' = (v, -M^-1 g): a callback of CVODE and ARKODE; user: the drape_first_order. */
 int drape_first_order_rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user);
+/* Weighted root mean square of a vector: 1 is the tolerance. */
+double drape_first_order_norm(const drape_first_order *f, N_Vector vector);
+/* A first step, as IDA chooses it: y, with the rate in f->rate, changes by half of its tolerance; at most a
+ * thousandth of the span without a kink [s]. */
+double drape_first_order_first_step(const drape_first_order *f);
 /* Assembles K + c_j D + c_j^2 M at (t, y), and D; of I - gamma J, c_j = 1/gamma. 0, or < 0: fatal. */
 int drape_first_order_jacobian(drape_first_order *f, double t, double cj, const double *y);
 /* Solves with (r1, r2) as above. Status of the linear solver. */
