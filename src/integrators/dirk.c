@@ -238,18 +238,23 @@ static drape_first_order_outcome outcome_of(int code)
     }
 }
 
-/* A step that was cut, to end at a stop, says nothing against the size that had been chosen. */
+/* After a failed attempt the size does not grow. A step that was cut, to end at a stop, says nothing against
+ * the size that had been chosen. */
 static void choose_next(dirk_state *s)
 {
     drape_first_order *f = &s->base;
     const int k = methods[order_of(s)].error_order;
+    long attempts = 0;
+    ARKStepGetNumStepAttempts(f->memory, &attempts);
     ARKStepGetEstLocalErrors(f->memory, f->between);
-    const double error = fmax(TINY_ERROR, drape_first_order_norm(f, f->between));
+    const double error = fmax(TINY_ERROR, drape_first_order_norm(f, f->between)), chosen = s->next;
     double growth = SAFETY * drape_pow(error, -INTEGRAL / k) * drape_pow(s->error, PROPORTION / k);
-    growth = fmax(SHRINK, fmin(GROWTH, growth));
+    growth = fmax(SHRINK, fmin(attempts > 1 ? 1 : GROWTH, growth));
     if (growth > 1 && growth < KEEP)
         growth = 1;
-    s->next = s->h < s->next ? fmax(s->next, growth * s->h) : growth * s->h;
+    s->next = growth * s->h;
+    if (attempts == 1 && s->t == s->stop)
+        s->next = fmax(s->next, chosen);
     s->error = error;
 }
 
