@@ -13,14 +13,13 @@
  * more where waves are outside the region of stability, judged by the sizes of the derivatives of the last
  * steps.
  *
- * No function of CVODE returns its history, so a checkpoint has the derivatives of the last step, by which its
- * frames are interpolated, and CVODE restarts there.
+ * Checkpoints have a log of what CVODE was told: cvode_log.h.
  */
+#include "integrators/cvode_log.h"
 #include "integrators/first_order.h"
 
 #include <cvode/cvode.h>
 #include <math.h>
-#include <string.h>
 
 #define LOOSE_ORDER 2
 #define TIGHT_ORDER 5
@@ -42,11 +41,28 @@ static const drape_param params[PARAM_COUNT] = {
 
 typedef struct cvode_state {
     drape_first_order base;
-    /* From a checkpoint: derivatives of y at `end`, from the 0th, until the next step. */
-    double *derivatives; /* (TIGHT_ORDER + 1, 2 n) */
-    double end;          /* [s] */
-    int count;           /* 0: there are none */
+    drape_cvode_log log;
+    double stop; /* [s] steps end there */
 } cvode_state;
+
+static drape_cvode_log *log_of(drape_first_order *f)
+{
+    return &((cvode_state *)f)->log;
+}
+
+/* While the log is replayed, nothing is computed. */
+static int rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user)
+{
+    drape_cvode_log *log = log_of(user);
+    return drape_cvode_log_code(log, log->replaying ? 0 : drape_first_order_rhs(t, y, rate, user));
+}
+
+static int factor(SUNLinearSolver linear_solver, SUNMatrix matrix)
+{
+    (void)matrix;
+    drape_sun_linear *linear = linear_solver->content;
+    return log_of(linear->owner)->replaying ? 0 : (int)drape_sun_linear_factor(linear, false);
+}
 
 static int system_matrix(sunrealtype t, N_Vector y, N_Vector rate, SUNMatrix matrix, sunbooleantype keep,
                          sunbooleantype *renewed, sunrealtype gamma, void *user, N_Vector a, N_Vector b,
@@ -54,18 +70,18 @@ static int system_matrix(sunrealtype t, N_Vector y, N_Vector rate, SUNMatrix mat
 {
     (void)rate, (void)matrix, (void)keep, (void)a, (void)b, (void)c;
     *renewed = SUNTRUE;
-    return drape_first_order_jacobian(user, t, 1 / gamma, N_VGetArrayPointer(y));
+    return log_of(user)->replaying ? 0
+                                   : drape_first_order_jacobian(user, t, 1 / gamma, N_VGetArrayPointer(y));
 }
 
 static bool configure(drape_first_order *f)
 {
     void *m = f->memory;
     DRAPE_CVODE_QUIET(m);
-    bool good = !CVodeInit(m, drape_first_order_rhs, 0, f->y) && !CVodeSetUserData(m, f) &&
+    bool good = drape_cvode_log_init(log_of(f), m, rhs, f->y, f->newton.solver) && !CVodeSetUserData(m, f) &&
                 !CVodeSVtolerances(m, 0, f->weights) &&
                 !CVodeSetLinearSolver(m, f->linear->solver, f->linear->matrix) &&
-                !CVodeSetLinSysFn(m, system_matrix) && !CVodeSetNonlinearSolver(m, f->newton.solver) &&
-                drape_sun_newton_set_test(&f->newton) &&
+                !CVodeSetLinSysFn(m, system_matrix) && drape_sun_newton_set_test(&f->newton) &&
                 !CVodeSetMaxOrd(m, (int)f->values[DRAPE_FIRST_ORDER_ORDER]) &&
                 !CVodeSetMaxErrTestFails(m, DRAPE_FIRST_ORDER_ERROR_FAILS) &&
                 !CVodeSetMaxConvFails(m, DRAPE_FIRST_ORDER_SOLVER_FAILS) &&
@@ -79,13 +95,12 @@ static bool configure(drape_first_order *f)
 
 static bool create_cvode(drape_first_order *f)
 {
-    cvode_state *s = (cvode_state *)f;
     f->linear->solver->ops->solve = drape_first_order_solve_rhs;
+    f->linear->solver->ops->setup = factor;
     f->newton.mass = f->mass;
     f->newton.gamma = CVodeGetCurrentGamma;
-    s->derivatives = drape_arena_take(f->arena, 2 * (size_t)f->n * (TIGHT_ORDER + 1), sizeof *s->derivatives);
     f->memory = CVodeCreate(CV_BDF, f->sun);
-    return s->derivatives && f->memory && configure(f);
+    return drape_cvode_log_create(log_of(f), f->arena, f->y) && f->memory && configure(f);
 }
 
 static void destroy_cvode(drape_first_order *f)
@@ -96,19 +111,24 @@ static void destroy_cvode(drape_first_order *f)
 
 static bool begin(drape_first_order *f, double t, double h)
 {
-    return !CVodeReInit(f->memory, t, f->y) &&
-           !CVodeSetInitStep(f->memory, h > 0 ? h : drape_first_order_first_step(f));
+    return drape_cvode_log_begin(log_of(f), f->memory, t, h > 0 ? h : drape_first_order_first_step(f), f->y);
+}
+
+static bool must_begin(const drape_first_order *f)
+{
+    return drape_cvode_log_is_full(&((const cvode_state *)f)->log);
 }
 
 static bool stop_at(drape_first_order *f, double stop)
 {
-    return !CVodeSetStopTime(f->memory, stop);
+    ((cvode_state *)f)->stop = stop;
+    return true;
 }
 
 static drape_first_order_outcome step(drape_first_order *f, double end, double *t)
 {
-    ((cvode_state *)f)->count = 0;
-    switch (CVode(f->memory, end, f->y, t, CV_ONE_STEP)) {
+    (void)end;
+    switch (drape_cvode_log_step(log_of(f), f->memory, ((cvode_state *)f)->stop, f->y, t)) {
     case CV_SUCCESS:
     case CV_TSTOP_RETURN:
         return DRAPE_FIRST_ORDER_STEPPED;
@@ -134,51 +154,18 @@ static drape_first_order_outcome step(drape_first_order *f, double end, double *
 
 static int dense(drape_first_order *f, double t, N_Vector out)
 {
-    const cvode_state *s = (const cvode_state *)f;
-    if (s->count == 0)
-        return CVodeGetDky(f->memory, t, 0, out);
-    const size_t n = 2 * (size_t)f->n;
-    double *y = N_VGetArrayPointer(out);
-    memset(y, 0, n * sizeof *y);
-    for (int k = s->count - 1; k >= 0; k--) /* Horner's scheme of Taylor's polynomial */
-        for (size_t i = 0; i < n; i++)
-            y[i] = s->derivatives[(size_t)k * n + i] + (t - s->end) / (k + 1) * y[i];
-    return 0;
+    return CVodeGetDky(f->memory, t, 0, out);
 }
 
-/* The derivatives of the step that ended at `reached`. */
-static void collect(cvode_state *s)
-{
-    drape_first_order *f = &s->base;
-    const size_t n = 2 * (size_t)f->n;
-    int order = 0;
-    s->end = f->reached;
-    if (s->count > 0 || isnan(f->reached) || CVodeGetLastOrder(f->memory, &order))
-        return;
-    for (int k = 0; k <= order; k++) {
-        if (CVodeGetDky(f->memory, f->reached, k, f->between))
-            return;
-        memcpy(s->derivatives + (size_t)k * n, N_VGetArrayPointer(f->between), n * sizeof(double));
-    }
-    s->count = order + 1;
-}
-
+/* After a failure there is nothing to continue. Replayed steps counted no iterations. */
 static bool archive_cvode(drape_first_order *f, drape_archive *a)
 {
-    cvode_state *s = (cvode_state *)f;
-    const int before = s->count;
-    if (!a->reading)
-        collect(s);
-    drape_archive_mark(a, "cvode");
-    drape_archive_double(a, &s->end);
-    drape_archive_int(a, &s->count);
-    if (drape_archive_has_read(a) && (s->count < 0 || s->count > TIGHT_ORDER + 1))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %d derivatives", s->count);
-    for (int k = 0; k < s->count && drape_archive_good(a); k++)
-        drape_archive_doubles(a, s->derivatives + 2 * (size_t)f->n * (size_t)k, 2 * (size_t)f->n);
-    if (!a->reading)
-        s->count = before;
-    return false;
+    if (isnan(f->reached))
+        log_of(f)->count = 0;
+    drape_cvode_log_archive(log_of(f), f->memory, f->y, a);
+    if (drape_archive_has_read(a))
+        CVodeGetNumNonlinSolvIters(f->memory, &f->counted);
+    return true;
 }
 
 /* The Nordsieck array, and scratch. */
@@ -192,6 +179,7 @@ static const drape_first_order_solver solver = {
     .create = create_cvode,
     .destroy = destroy_cvode,
     .begin = begin,
+    .must_begin = must_begin,
     .stop_at = stop_at,
     .step = step,
     .last_step = CVodeGetLastStep,
@@ -221,7 +209,6 @@ const drape_integrator_ops drape_integrator_cvode = {
     .own_steps = true,
     .gain = DRAPE_FIRST_ORDER_GAIN,
     .smooth_forces = true,
-    .loses_history = true,
     .step = drape_first_order_step,
     .interpolate = drape_first_order_interpolate,
     .restart = drape_first_order_restart,

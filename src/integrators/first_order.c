@@ -371,7 +371,8 @@ static drape_status prepare(drape_first_order *s, const drape_state *in, double 
         measure_powers(s, in->t, s->powers);
         return DRAPE_OK;
     }
-    if (s->reached != in->t || drape_motion_at_kink(s->motion, in->t)) {
+    if (s->reached != in->t || drape_motion_at_kink(s->motion, in->t) ||
+        (s->solver->must_begin && s->solver->must_begin(s))) {
         drape_status status = start(s, in, h < end - in->t ? h : 0, info);
         if (status)
             return status;
@@ -484,8 +485,6 @@ void drape_first_order_restart(void *state, const drape_state *from)
     s->exact_remaining = 0;
     s->exact_span = 1;
     drape_sun_newton_forget(&s->newton);
-    if (s->solver->restart)
-        s->solver->restart(s);
 }
 
 /* ---- Creation and destruction ---- */

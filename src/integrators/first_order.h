@@ -98,6 +98,7 @@ typedef struct drape_first_order_solver {
     void (*destroy)(drape_first_order *f);
     /* Restarts at t from y, y' in f->y, f->rate with a first step of h at most; 0: it chooses. */
     bool (*begin)(drape_first_order *f, double t, double h);
+    bool (*must_begin)(const drape_first_order *f);     /* it has to restart; NULL: never by itself */
     bool (*stop_at)(drape_first_order *f, double stop); /* steps end there */
     /* One step towards end. *t: where it ended, y there in f->y. */
     drape_first_order_outcome (*step)(drape_first_order *f, double end, double *t);

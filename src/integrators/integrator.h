@@ -91,9 +91,6 @@ typedef struct drape_integrator_ops {
      * done, to an archive or, if this was just created for a system of the same model with the same
      * pattern, reads it back. Data with the same bits whenever they are computed are left out. */
     void (*archive)(void *state, drape_archive *a);
-    /* No library function returns all of its history: an archived one restarts from the state, and results
-     * agree within its tolerance, not bit for bit. */
-    bool loses_history;
     /* Bytes outside the arena: factors, vectors of SUNDIALS. NULL: none. */
     size_t (*bytes)(const void *state);
     /* Frees what is not in the arena. NULL: everything is in the arena. */
