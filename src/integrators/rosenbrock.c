@@ -31,6 +31,8 @@ enum { PARAM_SCHEME = DRAPE_LOCAL_ERROR_PARAM_COUNT, PARAM_LINEAR_SOLVER, PARAM_
 /* Of the step: the interval of the differences for f_t. Their truncation error is its square times the third
  * derivative, their rounding error 1e-16 over it: 1e-8 and 1e-12 of what the term adds. */
 #define DIFFERENCE 1e-4
+/* Of the stages: the step along them for the derivative of the power. */
+#define ALONG 1e-6
 
 static const char *const schemes[] = {"rodas4", "ros34pw2", "rodas3", NULL};
 
@@ -54,6 +56,8 @@ const drape_rosenbrock_scheme drape_rosenbrock_schemes[] = {
             -6.058818238834054}},
      .m = {1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 1, 1},
      .e = {0, 0, 0, 0, 0, 1},
+     .b = {0.34844427128605154, 0.2130136219118987, -0.15410253266231846, 0.4713207793914958,
+           -0.12867613992712837, 0.25},
      .alpha = {0, 0.386, 0.21, 0.63, 1, 1},
      .gammas = {0.25, -0.1043, 0.1035, -0.0362, 0, 0}},
     /* ROS34PW2: order 3 with any matrix (a W-method), embedded order 2. Rang & Angermann 2005, in their
@@ -71,6 +75,7 @@ const drape_rosenbrock_scheme drape_rosenbrock_schemes[] = {
            {-6.368179200128358, -6.795620944466836, 2.870098604331056}},
      .m = {4.18476048231916, -0.28519201735549593, 2.294280360279042, 1},
      .e = {0.2777499476479681, -1.403239895175999, 1.7726301276675507, 0.5},
+     .b = {0.24212380706095346, -1.2232505839045147, 1.545260255335102, 0.435866521508459},
      .alpha = {0, 0.871733043016918, 0.7315799577888524, 1},
      .gammas = {0.435866521508459, -0.435866521508459, -0.4133333762338865, 0}},
     /* RODAS3: order 3, embedded order 2. Sandu et al. 1997. */
@@ -81,6 +86,7 @@ const drape_rosenbrock_scheme drape_rosenbrock_schemes[] = {
      .c = {{0}, {4}, {1, -1}, {1, -1, -8.0 / 3}},
      .m = {2, 0, 1, 1},
      .e = {0, 0, 0, 1},
+     .b = {5.0 / 6, -1.0 / 6, -1.0 / 6, 0.5},
      .alpha = {0, 0, 1, 1},
      .gammas = {0.5, 1.5, 0, 0}},
     {.stages = 0}};
@@ -104,9 +110,44 @@ typedef struct rosenbrock_state {
     double *g0;                                                        /* nodes: at the start of the step */
     double *change;                                                    /* free DOFs: g_t [N/s] */
     double *rx, *right;                                                /* free DOFs: of the present stage */
-    double *damping; /* D (nonzeros); NULL if nothing dissipates */
-    bool moved;      /* g depends on t */
+    double *damping;    /* D (nonzeros); NULL if nothing dissipates */
+    bool moved;         /* g depends on t */
+    double start_power; /* [W] P of pins and colliders at the start of the step */
+    double power;       /* [W] sum b_i P_i of the stages so far */
 } rosenbrock_state;
+
+/* ---- Work of pins and colliders ----
+ *
+ * As if the work z were another component of y, z' = P(t, y), the power of what moves them. Its stages are
+ * those of the rest, with P' in place of J, which sums up to
+ *     z1 = z0 + h (sum b_i P_i + P'(y0) sum b_i u_i + h P_t sum b_i gamma_i),
+ * so only one derivative along one direction is needed. Sums of powers at the ends of a step would count the
+ * force of a dashpot at a jump of a pin's velocity for a large part of the step. */
+
+static bool has_movers(const rosenbrock_state *s)
+{
+    return s->common.motion->moved_count > 0 || s->common.motion->model->collider_count > 0;
+}
+
+/* P where the forces g were evaluated last. */
+static double power(const rosenbrock_state *s, const double *g)
+{
+    const drape_step_equation *e = &s->common.equation;
+    const drape_motion *m = s->common.motion;
+    const double *on = drape_system_on_colliders(e->system);
+    double sum = 0, v[3];
+    for (int32_t c = 0; on && c < m->model->collider_count; c++) {
+        drape_motion_collider_velocity(m, c, e->point.t, (e->point.span[0] + e->point.span[1]) / 2, v);
+        for (int k = 0; k < 3; k++)
+            sum += on[3 * c + k] * v[k];
+    }
+    for (int32_t i = 0; i < m->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            const size_t at = 3 * (size_t)m->moved_node[i] + k;
+            sum += g[at] * e->v[at];
+        }
+    return sum;
+}
 
 /* ---- Forces ---- */
 
@@ -155,7 +196,9 @@ static drape_status evaluate_start(rosenbrock_state *s, const drape_state *in, d
     for (size_t i = 0; i < e->dofs; i++)
         e->v[drape_step_equation_at(e, i)] = in->v[drape_step_equation_at(e, i)];
     place_pins(s, in->t, e->x, e->v);
-    return evaluate(s, in->t, s->g0, info);
+    const drape_status status = evaluate(s, in->t, s->g0, info);
+    s->start_power = status ? NAN : power(s, s->g0);
+    return status;
 }
 
 /* g_t = (-3 g(t) + 4 g(t + d) - g(t + 2 d))/(2 d), with the free nodes as they are. */
@@ -260,13 +303,17 @@ static drape_status stage_forces(rosenbrock_state *s, const drape_state *in, dou
     const drape_rosenbrock_scheme *scheme = s->scheme;
     const double t = in->t + scheme->alpha[i] * h;
     move_to(s, in, scheme->a[i], i, t);
-    *g = s->g0;
-    if (scheme->alpha[i] == 0)
+    *g = scheme->alpha[i] == 0 ? s->g0 : e->g;
+    if (*g == s->g0) {
+        s->power += scheme->b[i] * s->start_power;
         return DRAPE_OK;
-    *g = e->g;
+    }
     if (drape_system_crosses(e->system, e->x, t, &info->reason, &info->diagnostic))
         return DRAPE_RETRY_REJECTED;
-    return evaluate(s, t, e->g, info);
+    const drape_status status = evaluate(s, t, e->g, info);
+    if (!status)
+        s->power += scheme->b[i] * power(s, e->g);
+    return status;
 }
 
 static drape_status solve_stage(rosenbrock_state *s, const drape_state *in, double h, int i,
@@ -311,6 +358,29 @@ static void estimate(rosenbrock_state *s)
     }
 }
 
+/* Adds the work in the step: that of pins and colliders as above, and the dissipated one by the midpoint
+ * rule. */
+static drape_status audit(rosenbrock_state *s, const drape_state *in, const drape_state *out, double h,
+                          drape_step_info *info)
+{
+    const drape_rosenbrock_scheme *scheme = s->scheme;
+    double weights[DRAPE_ROSENBROCK_STAGES], ahead = 0;
+    if (has_movers(s)) {
+        for (int i = 0; i < scheme->stages; i++) {
+            weights[i] = ALONG * scheme->b[i];
+            ahead += weights[i] * scheme->gammas[i] * h;
+        }
+        move_to(s, in, weights, s->common.equation.dofs > 0 ? scheme->stages : 0, in->t + ahead);
+        const drape_status status = evaluate(s, in->t + ahead, s->common.equation.g, info);
+        if (status)
+            return status;
+        const double change = (power(s, s->common.equation.g) - s->start_power) / ALONG;
+        info->pin_work += h * (s->power + change);
+    }
+    drape_implicit_audit_dissipation(&s->common, in->x, out->x, in->t, h, info);
+    return DRAPE_OK;
+}
+
 /* ---- A step ---- */
 
 /* What the forces depend on besides the state of the free nodes. */
@@ -326,6 +396,7 @@ static bool depends_on_time(const rosenbrock_state *s)
 static drape_status solve(rosenbrock_state *s, const drape_state *in, double h, drape_step_info *info)
 {
     drape_status status = DRAPE_OK;
+    s->power = 0;
     s->moved = depends_on_time(s);
     if (s->moved)
         status = evaluate_change(s, in->t, h, info);
@@ -357,9 +428,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     out->t = attempt.t1;
     estimate(s);
     status = drape_local_error_test(&s->control, &attempt, s->rx, s->right, info);
-    if (!status)
-        drape_implicit_audit_stage(&s->common, in->x, out->x, in->t, attempt.h, e->probe, info);
-    return status;
+    return status ? status : audit(s, in, out, attempt.h, info);
 }
 
 static void restart(void *state, const drape_state *from)
