@@ -158,8 +158,9 @@ static double propose(const drape_local_error *c, const drape_local_attempt *a, 
 {
     const drape_step_record *past = &c->past;
     const double e = fmax(error, MIN_ERROR), simple = elementary(c, a->h, error);
+    /* the error of a much shorter step is rounding */
     if (a->cut && !a->again)
-        return fmin(simple, past->proposed);
+        return a->h > MAX_CUT * past->proposed ? fmin(simple, past->proposed) : past->proposed;
     double next = simple;
     if (past->h > 0)
         next =

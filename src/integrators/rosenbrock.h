@@ -1,4 +1,4 @@
-/* rosenbrock.h: the coefficients of the schemes of rosenbrock.c, for the test of their orders. */
+/* rosenbrock.h: the coefficients of rosenbrock.c, for the test of their orders. */
 #ifndef DRAPE_INTEGRATORS_ROSENBROCK_H
 #define DRAPE_INTEGRATORS_ROSENBROCK_H
 
@@ -16,6 +16,6 @@ typedef struct drape_rosenbrock_scheme {
     double alpha[DRAPE_ROSENBROCK_STAGES], gammas[DRAPE_ROSENBROCK_STAGES];
 } drape_rosenbrock_scheme;
 
-extern const drape_rosenbrock_scheme drape_rosenbrock_schemes[]; /* the last one has no stages */
+extern const drape_rosenbrock_scheme drape_rosenbrock_rodas;
 
 #endif
