@@ -31,11 +31,12 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
     [DRAPE_REASON_NONFINITE] = REASON("nonfinite", "all integrators",
                                       "an infinity or NaN in the residual, the Jacobian or the new state"),
     [DRAPE_REASON_ERROR_TEST] =
-        REASON("error_test", "ida, the controller error", "the local error is above the tolerance"),
-    [DRAPE_REASON_ROUND_OFF] =
-        REASON("round_off", "ida", "the tolerance is below the rounding error of the state"),
-    [DRAPE_REASON_MAX_STEPS] =
-        REASON("max_steps", "ida", "more steps in a second of simulated time than `max_steps`"),
+        REASON("error_test", "integrators with steps of their own, the controller error",
+               "the local error is above the tolerance"),
+    [DRAPE_REASON_ROUND_OFF] = REASON("round_off", "integrators with steps of their own",
+                                      "the tolerance is below the rounding error of the state"),
+    [DRAPE_REASON_MAX_STEPS] = REASON("max_steps", "integrators with steps of their own",
+                                      "more steps in a second of simulated time than `max_steps`"),
     [DRAPE_REASON_MAX_SUBSTEPS] =
         REASON("max_substeps", "verlet", "more substeps in a step than `max_substeps`"),
     [DRAPE_REASON_MOVE] =

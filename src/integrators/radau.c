@@ -30,31 +30,18 @@
 #include "base/elementary.h"
 #include "base/finite.h"
 #include "base/reason.h"
-#include "integrators/integrator.h"
+#include "integrators/local_error.h"
 #include "integrators/radau_matrix.h"
-#include "integrators/tolerance.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
-enum {
-    PARAM_RTOL,
-    PARAM_ATOL_X,
-    PARAM_ATOL_V,
-    PARAM_MAX_STEP,
-    PARAM_MAX_STEPS,
-    PARAM_LINEAR_SOLVER,
-    PARAM_COUNT
-};
+enum { PARAM_LINEAR_SOLVER = DRAPE_LOCAL_ERROR_PARAM_COUNT, PARAM_COUNT };
 enum { STAGES = 3 };
 
-/* Of the step size, as in RADAU5. */
-#define SAFETY      0.9
-#define MAX_GROWTH  8.0
-#define MAX_SHRINK  5.0
-#define KEPT_GROWTH 1.2 /* a smaller growth is not worth new factors */
-#define FIRST_STEP  0.1 /* of the time in which the scene moves by its size, times the root of the bound */
+#define ERROR_POWER 4   /* the error of the embedded formula is O(h^4) */
+#define KEPT_GROWTH 1.2 /* less is not worth new factors */
 /* Of Newton's iteration. */
 #define MAX_ITERATIONS 7
 #define FAST           1e-3 /* K and D are kept after a step whose iteration converged at this rate */
@@ -62,12 +49,7 @@ enum { STAGES = 3 };
 #define NEWTON_SHARE   0.03 /* of the error's bound: error that the iteration may leave */
 #define ROUNDING       10.0 /* of the sizes of the scene: no smaller error can be asked for */
 /* Residual of the complex system: below the rate at which matrices are kept, it would set this rate. */
-#define LINEAR_TOLERANCE 1e-3
-/* Of the time in which the scene moves by its size: steps as short as this, one after the other, lead
- * nowhere (ida.c). */
-#define LEAST_STEP   1e-10
-#define MAX_TINY     20
-#define MAX_FAILURES 20 /* in one step */
+#define LINEAR_TOLERANCE 1e-2
 
 static const double fraction[STAGES] = {0.1550510257216821902, 0.6449489742783178098, 1};
 static const double quadrature[STAGES] = {0.3764030627004672751, 0.5124858261884216138, 0.1111111111111111111};
@@ -92,15 +74,7 @@ static const double to_eigenvectors[STAGES][STAGES] = {
 static const double embedded[STAGES] = {-10.04880939982741556, 1.382142733160748896, -0.3333333333333333333};
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_RTOL] = DRAPE_RTOL_PARAM,
-    [PARAM_ATOL_X] = DRAPE_ATOL_X_PARAM,
-    [PARAM_ATOL_V] = DRAPE_ATOL_V_PARAM,
-    [PARAM_MAX_STEP] =
-        DRAPE_NUMBER("max_step", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),
-    [PARAM_MAX_STEPS] =
-        DRAPE_INTEGER("max_steps", "1/s", 100000, 1, 1e9,
-                      "largest number of steps within one second of simulated time, not counting those "
-                      "that end an advance; one more ends the run"),
+    DRAPE_LOCAL_ERROR_PARAMS,
     [PARAM_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver",
                                          .aliases = drape_linears_aliases),
 };
@@ -116,9 +90,8 @@ typedef struct radau_state {
     drape_system *system;
     const drape_model *model;
     const drape_motion *motion;
-    double values[PARAM_COUNT];
-    double bound_x, bound_v; /* [m], [m/s] of the embedded formula's error */
-    double newton_bound;     /* of the iteration's error, relative to those */
+    drape_local_error control;
+    double newton_bound;     /* of the iteration's error, in its norm */
     int64_t n;               /* free DOFs */
     drape_radau_matrix matrix;
     double *x, *v, *g;                  /* nodes: where the forces were evaluated last; g there */
@@ -134,18 +107,10 @@ typedef struct radau_state {
     /* Kept between steps. */
     polynomial last, next; /* of the last accepted step; of the one being made */
     double reached;        /* [s] where the last step ended; NAN: the next one starts anew */
-    double from;           /* [s] where it began */
-    double h;              /* [s] of the next step; 0: unknown */
-    double accepted_h, accepted_error; /* of the last accepted step; 0: none */
     double theta;                      /* rate of convergence of the last iteration */
     double left;                       /* theta/(1 - theta) */
     bool current;                      /* K and D are of the present state */
     bool have_matrix;
-    bool rejected; /* the last attempt */
-    double second; /* [s] beginning of the second of simulated time in which steps are counted */
-    double least_step; /* [s] */
-    int64_t tiny;      /* steps in a row that were shorter than that */
-    int64_t steps;     /* attempted in that second, except those that end an advance */
     drape_work work;
 
     /* Why the last evaluation failed. */
@@ -181,17 +146,6 @@ static drape_point place(radau_state *s, double time, const double *x0, const do
     }
     return (drape_point){
         .x = s->x, .v = s->v, .internal = s->internal, .t = time, .span = {s->span[0], s->span[1]}};
-}
-
-/* sum_i of |x_i/bound_x|^2 + |v_i/bound_v|^2 */
-static double weigh(const radau_state *s, const double *x, const double *v)
-{
-    double sum = 0;
-    for (int64_t i = 0; i < s->n; i++) {
-        const double dx = x[i] / s->bound_x, dv = v[i] / s->bound_v;
-        sum += dx * dx + dv * dv;
-    }
-    return sum;
 }
 
 /* out_i = sum_j matrix_ij in_j over the stages */
@@ -361,16 +315,16 @@ static double move(radau_state *s, double h)
     for (int i = 0; i < STAGES; i++) {
         for (int64_t k = 0; k < s->n; k++)
             s->rate[i][k] += change[i][k];
-        sum += weigh(s, s->force[i], change[i]);
+        const double norm = drape_local_error_norm(&s->control, s->force[i], change[i], NULL);
+        sum += norm * norm;
     }
-    return sqrt(sum / (2 * STAGES * (double)s->n));
+    return sqrt(sum / STAGES);
 }
 
-/* Solves for the stages. *shrink: by how much h should be reduced after a failure. */
-static drape_status solve(radau_state *s, double h, double *shrink, drape_step_info *info)
+/* Solves for the stages. */
+static drape_status solve(radau_state *s, double h, drape_step_info *info)
 {
     double before = 0, rate_before = 0;
-    *shrink = 0.5;
     info->reason = drape_reason_name(DRAPE_REASON_NEWTON);
     s->left = drape_pow(fmax(s->left, DBL_EPSILON), 0.8);
     s->theta = FAST;
@@ -400,7 +354,7 @@ static drape_status solve(radau_state *s, double h, double *shrink, drape_step_i
             for (int i = 0; i < remaining; i++)
                 expected *= s->theta;
             if (expected >= 1) {
-                *shrink = 0.8 * drape_pow(fmax(1e-4, fmin(20, expected)), -1.0 / (4 + remaining));
+                info->retry = 0.8 * h * drape_pow(fmax(1e-4, fmin(20, expected)), -1.0 / (4 + remaining));
                 return DRAPE_RETRY_NONLINEAR;
             }
         }
@@ -418,10 +372,10 @@ static drape_status solve(radau_state *s, double h, double *shrink, drape_step_i
 
 /* ---- Error ---- */
 
-/* The error from g at the beginning, in error_x and error_v; its norm. Its equation with P is that of IDA's
+/* The error from g at the beginning, in error_x and error_v. Its equation with P is that of IDA's
  * corrections (ida.c): P dx = r2 + (D + w M) r1, dv = w dx - r1, w = gamma/h, with r1 and r2 those of x' = v
  * and of M v' = -g. */
-static drape_status measure_error(radau_state *s, double h, const double *g, double *norm)
+static drape_status solve_error(radau_state *s, double h, const double *g)
 {
     const polynomial *p = &s->next;
     const double w = DRAPE_RADAU_GAMMA / h, *mass = s->matrix.mass;
@@ -439,73 +393,28 @@ static drape_status measure_error(radau_state *s, double h, const double *g, dou
     drape_status status = drape_radau_matrix_solve(&s->matrix, r2, s->error_x);
     for (int64_t k = 0; k < s->n; k++)
         s->error_v[k] = w * s->error_x[k] - r1[k];
-    *norm = fmax(sqrt(weigh(s, s->error_x, s->error_v) / (2 * (double)s->n)), 1e-10);
     return status;
 }
 
 /* The same; at the start and after a rejection, where a stiff component may be far from its equilibrium, it
- * is filtered twice. */
-static drape_status estimate_error(radau_state *s, double h, bool twice, double *norm)
+ * is filtered twice unless it is small enough. */
+static drape_status estimate_error(radau_state *s, const drape_local_attempt *a)
 {
     const polynomial *p = &s->next;
-    drape_status status = measure_error(s, h, s->g0, norm);
-    if (status || *norm < 1 || !twice)
+    drape_status status = solve_error(s, a->h, s->g0);
+    if (status || (s->last.h > 0 && !a->again) ||
+        drape_local_error_norm(&s->control, s->error_x, s->error_v, NULL) <= 1)
         return status;
-    double *x = s->error_x, *v = s->correction + s->n, *g = s->correction + 2 * s->n;
+    double *v = s->correction + s->n, *g = s->correction + 2 * s->n;
     for (int64_t k = 0; k < s->n; k++)
         v[k] = p->v[k] + s->error_v[k];
-    const drape_point point = place(s, p->t, p->x, x, v);
+    const drape_point point = place(s, p->t, p->x, s->error_x, v);
     status = evaluate(s, &point);
     if (status)
         return status > 0 ? DRAPE_OK : status; /* the first estimate rejects the step */
     for (int64_t k = 0; k < s->n; k++)
         g[k] = s->g[node_at(s, k)];
-    return measure_error(s, h, g, norm);
-}
-
-/* ---- Step size ---- */
-
-static double limit_change(double shrink)
-{
-    return fmax(1 / MAX_GROWTH, fmin(MAX_SHRINK, shrink));
-}
-
-/* By what h should be divided after a step with this error and so many iterations. */
-static double change_of(double error, int iterations)
-{
-    const double safety =
-        fmin(SAFETY, SAFETY * (1 + 2 * MAX_ITERATIONS) / (double)(iterations + 2 * MAX_ITERATIONS));
-    return limit_change(sqrt(sqrt(error)) / safety);
-}
-
-/* The size of the step after one of size h, which was to have the size `planned` if no end had cut it. */
-static double next_size(radau_state *s, double h, double planned, double error, int iterations)
-{
-    double change = change_of(error, iterations);
-    if (s->accepted_h > 0)
-        change = fmax(change, limit_change(s->accepted_h / h *
-                                           sqrt(sqrt(error * error / s->accepted_error)) / SAFETY));
-    s->accepted_h = h;
-    s->accepted_error = fmax(1e-2, error);
-    double next = h / change;
-    if (s->rejected)
-        next = fmin(next, h);
-    if (s->theta <= FAST && next >= h && next <= KEPT_GROWTH * h)
-        next = h;
-    return h < planned ? fmax(next, planned) : next;
-}
-
-/* A step ends at `stop` or leaves room for another one that is not much shorter. */
-static double cut(double h, double left)
-{
-    return h >= left ? left : 2 * h > left ? left / 2 : h;
-}
-
-static double first_size(const radau_state *s)
-{
-    double size = NAN, speed = NAN;
-    drape_derive_tolerances(s->model, 1, &size, &speed);
-    return FIRST_STEP * sqrt(sqrt(s->bound_x / size)) * size / speed;
+    return solve_error(s, a->h, g);
 }
 
 /* ---- Work of dissipation, pins and colliders ---- */
@@ -560,149 +469,89 @@ static void audit(radau_state *s, double h, double end, drape_step_info *info)
 
 /* ---- A step ---- */
 
-/* After a failure, reports the degenerate element or the node whose force is not finite; the pair that
- * crossed; otherwise the node with the largest weighted error. */
+/* After a failure, reports the degenerate element or the node whose force is not finite, or the pair that
+ * crossed. */
 static void diagnose(radau_state *s, drape_step_info *info)
 {
-    double *of = s->rhs;
-    if (s->n == 0)
-        return;
-    if (s->nonfinite) {
-        for (int64_t i = 0; i < s->n; i++)
-            of[i] = s->g[node_at(s, i)];
-        info->diagnostic = drape_system_diagnose_dof(s->system, of, "force [N]", INFINITY);
-        drape_system_check(s->system, s->x, NULL, s->internal, &info->reason, &info->diagnostic);
-        return;
-    }
-    if (s->crossing) {
+    double *force = s->rhs;
+    if (s->crossing)
         info->diagnostic = s->crossing_pair;
+    if (!s->nonfinite)
         return;
-    }
+    info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
     for (int64_t i = 0; i < s->n; i++)
-        of[i] = fmax(fabs(s->error_x[i]) / s->bound_x, fabs(s->error_v[i]) / s->bound_v);
-    info->diagnostic = drape_system_diagnose_dof(s->system, of, "local error / tolerance", 1);
-}
-
-/* Bounds the work, as in ida.c. */
-static bool exhausted(radau_state *s, const drape_state *in, drape_step_info *info)
-{
-    if (floor(in->t) != s->second)
-        s->steps = 0;
-    s->second = floor(in->t);
-    if (s->steps++ < (int64_t)s->values[PARAM_MAX_STEPS])
-        return false;
-    s->steps = 0;
-    info->reason = drape_reason_name(DRAPE_REASON_MAX_STEPS);
-    info->h = s->h;
-    diagnose(s, info);
-    return true;
-}
-
-/* Stops a run whose steps have become so small that it no longer moves, as in ida.c. */
-static drape_status check_step_size(radau_state *s, double h, bool last, drape_step_info *info)
-{
-    s->tiny = h < s->least_step && !last ? s->tiny + 1 : 0;
-    if (s->tiny <= MAX_TINY)
-        return DRAPE_OK;
-    s->tiny = 0;
-    info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
-    return DRAPE_E_STEP_TOO_SMALL;
+        force[i] = s->g[node_at(s, i)];
+    info->diagnostic = drape_system_diagnose_dof(s->system, force, "force [N]", INFINITY);
+    drape_system_check(s->system, s->x, NULL, s->internal, &info->reason, &info->diagnostic);
 }
 
 /* The state at the beginning, and g there. Pinned nodes that do not move keep their positions, and zero
  * velocity, in s->x and s->v for the whole step. */
-static drape_status begin(radau_state *s, const drape_state *in)
+static drape_status begin(radau_state *s, const drape_state *in, double stop)
 {
     const size_t nodes = 3 * (size_t)s->model->node_count;
     polynomial *p = &s->next;
     memcpy(s->x, in->x, nodes * sizeof *s->x);
     memcpy(s->v, in->v, nodes * sizeof *s->v);
     s->internal = in->internal;
-    s->nonfinite = s->crossing = false;
-    p->t = in->t;
+    s->span[0] = p->t = in->t;
+    s->span[1] = stop;
+    s->nonfinite = s->crossing = s->current = false;
     for (int64_t k = 0; k < s->n; k++) {
         p->x[k] = in->x[node_at(s, k)];
         p->v[k] = in->v[node_at(s, k)];
     }
-    const bool continues = s->reached == in->t && !drape_motion_at_kink(s->motion, in->t);
-    s->current = false;
-    if (!continues) {
-        s->last.h = s->accepted_h = 0;
+    if (s->reached != in->t || drape_motion_at_kink(s->motion, in->t)) {
+        s->last.h = 0;
         s->left = 1;
     }
-    if (s->n == 0)
-        return DRAPE_OK;
+    s->reached = NAN;
     const drape_point point = place(s, in->t, p->x, NULL, p->v);
     drape_system_force(s->system, &point, s->g);
     s->work.residuals++;
     s->nonfinite = !drape_all_finite(s->g, nodes);
     for (int64_t k = 0; k < s->n; k++)
         s->g0[k] = s->g[node_at(s, k)];
-    return drape_system_status(s->system) ? drape_system_status(s->system)
-           : s->nonfinite                 ? DRAPE_RETRY_NONFINITE
-                                          : DRAPE_OK;
+    if (drape_system_status(s->system))
+        return drape_system_status(s->system);
+    return s->nonfinite ? DRAPE_RETRY_NONFINITE : DRAPE_OK;
 }
 
-/* Solves the stages of a step of size h and estimates its error. *shrink: the factor for h after a failure. */
-static drape_status attempt(radau_state *s, double h, double *error, double *shrink, drape_step_info *info)
+/* The stages of a step of size h; with new K and D where those of an earlier step fail. */
+static drape_status find_stages(radau_state *s, double h, drape_step_info *info)
 {
-    const int before = info->iterations;
-    *shrink = 0.5;
-    info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
-    drape_status status = prepare_matrix(s, h);
-    if (!status)
-        status = solve(s, h, shrink, info);
-    if (status > 0 && !s->current) {
+    drape_status status;
+    do {
+        const bool kept = s->have_matrix && !s->current;
+        info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
+        status = prepare_matrix(s, h);
+        if (!status)
+            status = solve(s, h, info);
+        if (status <= 0 || !kept)
+            return status;
         s->have_matrix = false;
-        return status;
-    }
+    } while (true);
+}
+
+/* Solves the stages and tests the error. */
+static drape_status attempt(radau_state *s, const drape_local_attempt *a, drape_step_info *info)
+{
+    drape_status status = find_stages(s, a->h, info);
     if (!status)
-        status = estimate_error(s, h, s->rejected || s->last.h == 0, error);
-    if (status)
+        status = estimate_error(s, a);
+    if (status) {
+        diagnose(s, info);
         return status;
-    if (*error < 1)
-        return DRAPE_OK;
-    info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
-    *shrink = s->last.h == 0 ? 0.1 : 1 / change_of(*error, info->iterations - before);
-    return DRAPE_RETRY_REJECTED;
-}
-
-/* Finds the longest step, of at most s->h and ending at most at `stop`, that passes; *h: its size. */
-static drape_status find_step(radau_state *s, double stop, double *h, drape_step_info *info)
-{
-    const double left = stop - s->next.t;
-    for (int failures = 0;; failures++) {
-        double error = INFINITY, shrink = 0.5;
-        const int before = info->iterations;
-        *h = info->h = cut(s->h, left);
-        const bool old_matrix = s->have_matrix && !s->current;
-        drape_status status = attempt(s, *h, &error, &shrink, info);
-        if (!status) {
-            s->h = next_size(s, *h, s->h, error, info->iterations - before);
-            s->rejected = false;
-            s->have_matrix = s->theta <= FAST;
-            return DRAPE_OK;
-        }
-        if (status < 0)
-            return status;
-        if (old_matrix && status != DRAPE_RETRY_REJECTED)
-            continue; /* with new K and D */
-        s->have_matrix &= s->current;
-        s->rejected = true;
-        s->h = shrink * *h;
-        if (failures >= MAX_FAILURES || s->next.t + s->h == s->next.t)
-            return status;
     }
+    status = drape_local_error_test(&s->control, a, s->error_x, s->error_v, info);
+    s->have_matrix &= status ? s->current : s->theta <= FAST;
+    return status;
 }
 
-static void finish(radau_state *s, const drape_state *in, drape_state *out, double h, double end,
-                   drape_step_info *info)
+/* The stages become the polynomial of the last step. */
+static void keep_polynomial(radau_state *s, double h)
 {
-    const size_t nodes = 3 * (size_t)s->model->node_count;
-    polynomial kept = s->last;
-    audit(s, h, end, info);
-    memcpy(out->x, s->x, nodes * sizeof *out->x);
-    memcpy(out->v, s->v, nodes * sizeof *out->v);
+    const polynomial kept = s->last;
     for (int i = 0; i < STAGES; i++) {
         double *stage = s->next.stage[i];
         s->next.stage[i] = s->rate[i];
@@ -711,47 +560,34 @@ static void finish(radau_state *s, const drape_state *in, drape_state *out, doub
     s->next.h = h;
     s->last = s->next;
     s->next = kept;
-    out->t = s->reached = end;
-    s->from = in->t;
-    info->h = end - in->t;
-    info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
 }
 
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
     radau_state *s = state;
-    const double end = out->t, stop = drape_motion_next_kink(s->motion, in->t, end);
+    const size_t nodes = 3 * (size_t)s->model->node_count;
+    const double stop = drape_local_error_stop(&s->control, in, out->t);
+    drape_local_attempt a = {.h = stop - in->t, .t1 = stop, .stop = stop, .end = out->t, .bound = h};
     info->tolerance = info->residual = NAN; /* errors are bounded, not residuals */
-    if (exhausted(s, in, info))
-        return DRAPE_E_STEP_TOO_SMALL;
-    s->span[0] = in->t;
-    s->span[1] = stop;
-    info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
-    drape_status status = begin(s, in);
-    if (in->t == s->from) /* the sim rejected the last step */
-        s->rejected = true;
-    s->reached = s->from = NAN;
-    if (!(s->h > 0) || isinf(s->h))
-        s->h = first_size(s);
-    if (s->n == 0)
-        s->h = INFINITY;
-    s->h = fmin(s->h, isnan(s->values[PARAM_MAX_STEP]) ? INFINITY : s->values[PARAM_MAX_STEP]);
-    if (h < end - in->t)
-        s->h = fmin(s->h, h);
-    double taken = cut(s->h, stop - in->t);
-    if (!status && s->n > 0)
-        status = find_step(s, stop, &taken, info);
-    const double reached = taken < stop - in->t ? in->t + taken : stop;
-    if (!status)
-        status = check_step_size(s, taken, reached == stop, info);
+    drape_status status = begin(s, in, stop);
     if (status) {
-        info->h = fmin(taken, h);
         diagnose(s, info);
         return status;
     }
-    finish(s, in, out, taken, reached, info);
-    s->steps -= reached == end;
+    if (s->n > 0)
+        status = drape_local_error_begin(&s->control, in, s->g, &a, info);
+    if (!status && s->n > 0)
+        status = attempt(s, &a, info);
+    if (status)
+        return status;
+    audit(s, a.h, a.t1, info);
+    memcpy(out->x, s->x, nodes * sizeof *out->x);
+    memcpy(out->v, s->v, nodes * sizeof *out->v);
+    keep_polynomial(s, a.h);
+    out->t = s->reached = a.t1;
+    info->h = a.h;
+    info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
     return DRAPE_OK;
 }
 
@@ -759,10 +595,9 @@ static void restart(void *state, const drape_state *from)
 {
     (void)from;
     radau_state *s = state;
-    s->reached = s->from = NAN;
-    s->h = s->accepted_h = s->last.h = 0;
-    s->have_matrix = s->rejected = false;
-    s->left = 1;
+    s->reached = NAN;
+    s->have_matrix = false;
+    drape_local_error_restart(&s->control);
 }
 
 /* ---- Creation and destruction ---- */
@@ -794,22 +629,20 @@ static void take_arrays(radau_state *s)
         s->dissipated = drape_arena_take(s->arena, nodes, sizeof *s->dissipated);
 }
 
-/* 0.1 rtol^(2/3) for each of the two bounds, relative to the scene. */
+/* 0.1 r^(2/3) for a bound of r relative to the scene. */
 static double raise_bound(double bound, double size)
 {
     return 0.1 * size * drape_pow(bound / size, 2.0 / 3);
 }
 
-static void set_tolerances(radau_state *s)
+static void set_tolerances(radau_state *s, const double *values)
 {
-    double size = NAN, speed = NAN;
-    drape_derive_tolerances(s->model, s->values[PARAM_RTOL], &s->values[PARAM_ATOL_X],
-                            &s->values[PARAM_ATOL_V]);
-    drape_derive_tolerances(s->model, 1, &size, &speed);
-    s->least_step = LEAST_STEP * size / speed;
-    s->bound_x = raise_bound(s->values[PARAM_ATOL_X], size);
-    s->bound_v = raise_bound(s->values[PARAM_ATOL_V], speed);
-    const double bound = fmin(s->bound_x / size, s->bound_v / speed);
+    drape_local_error *control = &s->control;
+    drape_local_error_init(s->system, values, ERROR_POWER, control);
+    control->kept_growth = KEPT_GROWTH;
+    control->atol_x = raise_bound(control->atol_x, control->size);
+    control->atol_v = raise_bound(control->atol_v, control->speed);
+    const double bound = fmin(control->atol_x / control->size, control->atol_v / control->speed);
     s->newton_bound = fmax(ROUNDING * DBL_EPSILON / bound, fmin(NEWTON_SHARE, sqrt(bound)));
 }
 
@@ -823,9 +656,8 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
                        .model = drape_system_model(system),
                        .motion = drape_system_motion(system)};
     s->n = 3 * (int64_t)s->model->free_count;
-    memcpy(s->values, values, sizeof s->values);
     take_arrays(s);
-    set_tolerances(s);
+    set_tolerances(s, values);
     restart(s, NULL);
     drape_status status = drape_arena_status(arena);
     if (status || s->n == 0)
@@ -871,14 +703,11 @@ static void archive_polynomial(drape_archive *a, size_t n, polynomial *p)
 static void archive(void *state, drape_archive *a)
 {
     radau_state *s = state;
-    double *const numbers[] = {&s->reached, &s->from, &s->h,     &s->accepted_h, &s->accepted_error,
-                               &s->theta,   &s->left, &s->second};
-    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
-        drape_archive_double(a, numbers[i]);
+    drape_local_error_archive(&s->control, a);
+    drape_archive_double(a, &s->reached);
+    drape_archive_double(a, &s->theta);
+    drape_archive_double(a, &s->left);
     drape_archive_bool(a, &s->have_matrix);
-    drape_archive_bool(a, &s->rejected);
-    drape_archive_int64(a, &s->tiny);
-    drape_archive_int64(a, &s->steps);
     drape_work_archive(&s->work, a);
     if (s->n == 0)
         return;
