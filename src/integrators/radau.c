@@ -43,8 +43,9 @@ enum { STAGES = 3 };
 #define ERROR_POWER 4   /* the error of the embedded formula is O(h^4) */
 #define KEPT_GROWTH 1.2 /* less is not worth new factors */
 /* Of Newton's iteration. */
-#define MAX_ITERATIONS 7
+#define MAX_ITERATIONS 10
 #define FAST           1e-3 /* K and D are kept after a step whose iteration converged at this rate */
+#define AIM            0.2 /* rate for which the next step is made short enough */
 #define SLOWEST        0.99
 #define NEWTON_SHARE   0.03 /* of the error's bound: error that the iteration may leave */
 #define ROUNDING       10.0 /* of the sizes of the scene: no smaller error can be asked for */
@@ -240,13 +241,40 @@ static double jacobian_clock(const radau_state *s)
     return drape_system_clock(s->system) - s->matrix.linear->factor_seconds;
 }
 
-/* K and D at the beginning of the step, unless they are kept, and factors for h. */
+/* Where K and D are evaluated: at the last polynomial's extrapolation to the middle of the step, as K at the
+ * beginning is twice as far from K at the end; but at the beginning if there is none or if it crosses
+ * something. */
+static drape_point choose_matrix_point(radau_state *s, double h)
+{
+    const polynomial *p = &s->next, *last = &s->last;
+    if (last->h > 0) {
+        double of_x[STAGES + 1], of_v[STAGES + 1], *z = s->rhs, *v = s->correction;
+        weights_of_position(1 + h / (2 * last->h), of_x);
+        weights_of_velocity(1 + h / (2 * last->h), of_v);
+        for (int64_t k = 0; k < s->n; k++) {
+            const double from[STAGES + 1] = {last->v[k], last->stage[0][k], last->stage[1][k],
+                                             last->stage[2][k]};
+            z[k] = v[k] = 0;
+            for (int i = 0; i <= STAGES; i++) {
+                z[k] += last->h * of_x[i] * from[i];
+                v[k] += of_v[i] * from[i];
+            }
+        }
+        const drape_point point = place(s, p->t + h / 2, last->x, z, v);
+        const char *reason;
+        drape_diagnostic pair;
+        if (!drape_system_crosses(s->system, s->x, point.t, &reason, &pair))
+            return point;
+    }
+    return place(s, p->t, p->x, NULL, p->v);
+}
+
+/* K and D, unless they are kept, and factors for h. */
 static drape_status prepare_matrix(radau_state *s, double h)
 {
     const double start = jacobian_clock(s);
     if (!s->have_matrix) {
-        const polynomial *p = &s->next;
-        const drape_point point = place(s, p->t, p->x, NULL, p->v);
+        const drape_point point = choose_matrix_point(s, h);
         drape_status status = drape_radau_matrix_evaluate(&s->matrix, &point);
         s->work.jacobians++;
         s->work.jacobian_seconds += jacobian_clock(s) - start;
@@ -505,7 +533,6 @@ static drape_status begin(radau_state *s, const drape_state *in, double stop)
         s->last.h = 0;
         s->left = 1;
     }
-    s->reached = NAN;
     const drape_point point = place(s, in->t, p->x, NULL, p->v);
     drape_system_force(s->system, &point, s->g);
     s->work.residuals++;
@@ -545,6 +572,8 @@ static drape_status attempt(radau_state *s, const drape_local_attempt *a, drape_
     }
     status = drape_local_error_test(&s->control, a, s->error_x, s->error_v, info);
     s->have_matrix &= status ? s->current : s->theta <= FAST;
+    if (!status && s->theta > 0)
+        s->control.made.proposed = fmin(s->control.made.proposed, a->h * AIM / s->theta);
     return status;
 }
 
