@@ -37,7 +37,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { PARAM_LINEAR_SOLVER = DRAPE_LOCAL_ERROR_PARAM_COUNT, PARAM_COUNT };
+enum { PARAM_NEWTON_SHARE = DRAPE_LOCAL_ERROR_PARAM_COUNT, PARAM_LINEAR_SOLVER, PARAM_COUNT };
 enum { STAGES = 3 };
 
 #define ERROR_POWER 4   /* the error of the embedded formula is O(h^4) */
@@ -45,7 +45,7 @@ enum { STAGES = 3 };
 /* Of Newton's iteration. */
 #define MAX_ITERATIONS 10
 #define FAST           1e-3 /* K and D are kept after a step whose iteration converged at this rate */
-#define AIM            0.2 /* rate for which the next step is made short enough */
+#define AIM            0.3  /* rate for which the next step is made short enough */
 #define SLOWEST        0.99
 #define NEWTON_SHARE   0.03 /* of the error's bound: error that the iteration may leave */
 #define ROUNDING       10.0 /* of the sizes of the scene: no smaller error can be asked for */
@@ -53,7 +53,8 @@ enum { STAGES = 3 };
 #define LINEAR_TOLERANCE 1e-2
 
 static const double fraction[STAGES] = {0.1550510257216821902, 0.6449489742783178098, 1};
-static const double quadrature[STAGES] = {0.3764030627004672751, 0.5124858261884216138, 0.1111111111111111111};
+static const double quadrature[STAGES] = {0.3764030627004672751, 0.5124858261884216138,
+                                          0.1111111111111111111};
 static const double coefficients[STAGES][STAGES] = {
     {0.1968154772236604259, -0.06553542585019838811, 0.02377097434822015242},
     {0.3944243147390872770, 0.2920734116652284630, -0.04154875212599793020},
@@ -76,13 +77,16 @@ static const double embedded[STAGES] = {-10.04880939982741556, 1.382142733160748
 
 static const drape_param params[PARAM_COUNT] = {
     DRAPE_LOCAL_ERROR_PARAMS,
+    [PARAM_NEWTON_SHARE] =
+        DRAPE_NUMBER("newton_share", "1", DRAPE_DERIVED("0.03, at rtol below 1e-3 less"), DRAPE_ABOVE(0), 1,
+                     "error that the iteration may leave, relative to the bound of the error test"),
     [PARAM_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver",
                                          .aliases = drape_linears_aliases),
 };
 
 /* The polynomial of a step: v through v0 and the stages, x its integral. */
 typedef struct polynomial {
-    double t, h;                /* [s] its beginning; 0: there is none */
+    double t, h;                   /* [s] its beginning; 0: there is none */
     double *x, *v, *stage[STAGES]; /* (n) at its beginning; V_i */
 } polynomial;
 
@@ -92,25 +96,26 @@ typedef struct radau_state {
     const drape_model *model;
     const drape_motion *motion;
     drape_local_error control;
-    double newton_bound;     /* of the iteration's error, in its norm */
-    int64_t n;               /* free DOFs */
+    double newton_bound; /* of the iteration's error, in its norm */
+    int64_t n;           /* free DOFs */
     drape_radau_matrix matrix;
-    double *x, *v, *g;                  /* nodes: where the forces were evaluated last; g there */
-    double *z[STAGES], *rate[STAGES];   /* (n) Z_i, V_i */
-    double *force[STAGES];              /* (n) -F_i, then the correction of Z_i */
-    double *rhs, *correction;           /* (3 n) in the basis of the eigenvectors */
-    double *g0;                         /* (n) at the beginning of the step */
-    double *error_x, *error_v;          /* (n) */
-    double *dissipated;                 /* nodes; NULL if nothing dissipates */
-    const double *internal;             /* of the last accepted state */
-    double span[2];                     /* [s] interval without a kink in the motion of pins and colliders */
+    double *x, *v, *g;                /* nodes: where the forces were evaluated last; g there */
+    double *z[STAGES], *rate[STAGES]; /* (n) Z_i, V_i */
+    double *force[STAGES];            /* (n) -F_i, then the correction of Z_i */
+    double *rhs, *correction;         /* (3 n) in the basis of the eigenvectors */
+    double *g0;                       /* (n) at the beginning of the step */
+    double *error_x, *error_v;        /* (n) */
+    double *dissipated;               /* nodes; NULL if nothing dissipates */
+    const double *internal;           /* of the last accepted state */
+    double span[2];                   /* [s] interval without a kink in the motion of pins and colliders */
 
     /* Kept between steps. */
     polynomial last, next; /* of the last accepted step; of the one being made */
     double reached;        /* [s] where the last step ended; NAN: the next one starts anew */
-    double theta;                      /* rate of convergence of the last iteration */
-    double left;                       /* theta/(1 - theta) */
-    bool current;                      /* K and D are of the present state */
+    double hardest;        /* largest rate of the last iteration, of those that mattered */
+    double theta;          /* rate of convergence of the last iteration */
+    double left;           /* theta/(1 - theta) */
+    bool current;          /* K and D are of the present state */
     bool have_matrix;
     drape_work work;
 
@@ -150,8 +155,8 @@ static drape_point place(radau_state *s, double time, const double *x0, const do
 }
 
 /* out_i = sum_j matrix_ij in_j over the stages */
-static void combine(int64_t n, const double matrix[STAGES][STAGES], double factor,
-                    double *const in[STAGES], double *const out[STAGES])
+static void combine(int64_t n, const double matrix[STAGES][STAGES], double factor, double *const in[STAGES],
+                    double *const out[STAGES])
 {
     for (int64_t k = 0; k < n; k++) {
         const double from[STAGES] = {in[0][k], in[1][k], in[2][k]};
@@ -194,8 +199,8 @@ static void interpolate(void *state, double time, double *x)
         return;
     weights_of_position((time - p->t) / p->h, w);
     for (int64_t i = 0; i < s->n; i++)
-        x[node_at(s, i)] = p->x[i] + p->h * (w[0] * p->v[i] + w[1] * p->stage[0][i] +
-                                             w[2] * p->stage[1][i] + w[3] * p->stage[2][i]);
+        x[node_at(s, i)] = p->x[i] + p->h * (w[0] * p->v[i] + w[1] * p->stage[0][i] + w[2] * p->stage[1][i] +
+                                             w[3] * p->stage[2][i]);
 }
 
 /* ---- Forces ---- */
@@ -206,8 +211,8 @@ static drape_status evaluate(radau_state *s, const drape_point *point)
     const double start = drape_system_clock(s->system);
     drape_system_force(s->system, point, s->g);
     s->nonfinite = !drape_all_finite(s->g, 3 * (size_t)s->model->node_count);
-    s->crossing = !s->nonfinite && drape_system_crosses(s->system, s->x, point->t, &s->crossing_reason,
-                                                        &s->crossing_pair);
+    s->crossing = !s->nonfinite &&
+                  drape_system_crosses(s->system, s->x, point->t, &s->crossing_reason, &s->crossing_pair);
     s->work.residuals++;
     s->work.residual_seconds += drape_system_clock(s->system) - start;
     if (drape_system_status(s->system))
@@ -356,6 +361,7 @@ static drape_status solve(radau_state *s, double h, drape_step_info *info)
     info->reason = drape_reason_name(DRAPE_REASON_NEWTON);
     s->left = drape_pow(fmax(s->left, DBL_EPSILON), 0.8);
     s->theta = FAST;
+    s->hardest = 0;
     drape_status status = guess_stages(s, h);
     for (int k = 1; !status && k <= MAX_ITERATIONS; k++) {
         info->iterations++;
@@ -370,6 +376,8 @@ static drape_status solve(radau_state *s, double h, drape_step_info *info)
             const double rate = norm / before;
             s->theta = k == 2 ? rate : sqrt(rate * rate_before);
             rate_before = rate;
+            if (norm > s->newton_bound)
+                s->hardest = fmax(s->hardest, rate);
             if (!(s->theta < SLOWEST))
                 return DRAPE_RETRY_NONLINEAR;
             s->left = s->theta / (1 - s->theta);
@@ -567,13 +575,14 @@ static drape_status attempt(radau_state *s, const drape_local_attempt *a, drape_
     if (!status)
         status = estimate_error(s, a);
     if (status) {
+        info->retry = info->retry > 0 ? info->retry : a->h / 2;
         diagnose(s, info);
         return status;
     }
     status = drape_local_error_test(&s->control, a, s->error_x, s->error_v, info);
     s->have_matrix &= status ? s->current : s->theta <= FAST;
-    if (!status && s->theta > 0)
-        s->control.made.proposed = fmin(s->control.made.proposed, a->h * AIM / s->theta);
+    if (!status && s->hardest > 0)
+        s->control.made.proposed = fmin(s->control.made.proposed, a->h * AIM / s->hardest);
     return status;
 }
 
@@ -672,7 +681,9 @@ static void set_tolerances(radau_state *s, const double *values)
     control->atol_x = raise_bound(control->atol_x, control->size);
     control->atol_v = raise_bound(control->atol_v, control->speed);
     const double bound = fmin(control->atol_x / control->size, control->atol_v / control->speed);
-    s->newton_bound = fmax(ROUNDING * DBL_EPSILON / bound, fmin(NEWTON_SHARE, sqrt(bound)));
+    const double share = values[PARAM_NEWTON_SHARE];
+    s->newton_bound =
+        fmax(ROUNDING * DBL_EPSILON / bound, isnan(share) ? fmin(NEWTON_SHARE, sqrt(bound)) : share);
 }
 
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
