@@ -124,6 +124,11 @@ void drape_system_copy_wind(drape_system *system, const drape_system *from)
     drape_system_set_wind(system, from->wind.field, from->wind.user);
 }
 
+bool drape_system_has_wind(const drape_system *system)
+{
+    return system->wind.field && system->wind.against;
+}
+
 void drape_system_add_loads(const drape_system *system, const double *x, double *g)
 {
     drape_drag_spring_add_gradient(&system->drag, x, g);

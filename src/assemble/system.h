@@ -65,6 +65,7 @@ double drape_system_push_work(const drape_system *system, const double *x, const
  * rest. */
 void drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user);
 void drape_system_copy_wind(drape_system *system, const drape_system *from);
+bool drape_system_has_wind(const drape_system *system); /* it moves, and is felt */
 
 /* Adds the host's loads on nodes at x, the drag spring and the forces, to g (node_count x 3).
  * drape_system_force contains them. */

@@ -7,7 +7,7 @@
 #include <float.h>
 #include <math.h>
 
-#define SAFETY     0.9
+#define SAFETY     0.8
 #define MAX_GROWTH 5.0
 #define MAX_CUT    0.2
 #define RETRY_CUT  0.9  /* at most, after a failed test */
