@@ -33,6 +33,9 @@ drape_status drape_compile_contact_stiffness(drape_model *model, const drape_sce
 /* Builds the colliders, after contact. */
 drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def);
 
+/* Resolves the events, after the pins. */
+drape_status drape_compile_events(drape_model *model, const drape_scene_def *def);
+
 /* Builds the terms of all cloths and assigns indices to measures and internal variables. */
 drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def);
 

@@ -573,6 +573,16 @@ static void interpolate(void *state, double t, double *x)
         x[node_at(s, i)] = y[i];
 }
 
+static void interpolate_velocities(void *state, double t, double *v)
+{
+    ida_state *s = state;
+    if (s->n == 0 || IDAGetDky(s->ida, t, 0, s->between))
+        return;
+    const double *y = N_VGetArrayPointer(s->between);
+    for (int64_t i = 0; i < s->n; i++)
+        v[node_at(s, i)] = y[s->n + i];
+}
+
 static void restart(void *state, const drape_state *from)
 {
     (void)from;
@@ -773,6 +783,7 @@ const drape_integrator_ops drape_integrator_ida = {
     .smooth_forces = true,
     .step = step,
     .interpolate = interpolate,
+    .interpolate_velocities = interpolate_velocities,
     .restart = restart,
     .work = work,
     .archive = archive,

@@ -192,6 +192,13 @@ void drape_collider_def_init(drape_collider_def *def, size_t struct_size)
     give(def, struct_size, true, &defaults, sizeof defaults);
 }
 
+void drape_event_def_init(drape_event_def *def, size_t struct_size)
+{
+    drape_event_def defaults = {.name = NULL};
+    drape_scene_set_defaults(&drape_form_event, &defaults);
+    give(def, struct_size, true, &defaults, sizeof defaults);
+}
+
 void drape_pin_def_init(drape_pin_def *def, size_t struct_size)
 {
     drape_pin_def defaults = {.nodes = NULL};

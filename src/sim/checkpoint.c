@@ -70,8 +70,8 @@ static bool is_schedule(const drape_schedule *s)
 static void archive_schedule(drape_schedule *s, drape_archive *a)
 {
     double *const times[] = {
-        &s->end,          &s->now,          &s->dt, &s->limit, &s->tried, &s->start, &s->interval_start,
-        &s->interval_end, &s->interval_size};
+        &s->end,          &s->now,           &s->dt,     &s->limit, &s->tried, &s->start, &s->interval_start,
+        &s->interval_end, &s->interval_size, &s->cut_end};
     drape_archive_mark(a, "schedule");
     for (size_t i = 0; i < sizeof times / sizeof *times; i++)
         drape_archive_double(a, times[i]);
@@ -80,6 +80,7 @@ static void archive_schedule(drape_schedule *s, drape_archive *a)
     drape_archive_int64(a, &s->part);
     drape_archive_bool(a, &s->stepped);
     drape_archive_bool(a, &s->anew);
+    drape_archive_bool(a, &s->cut);
     if (drape_archive_good(a) && !is_schedule(s))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step that could come next");
 }
@@ -190,6 +191,7 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
     archive_audit(sim, a);
     archive_statistics(sim, a);
     archive_realtime(sim, a);
+    drape_events_archive(sim, a);
     drape_system_archive(sim->system, a);
     drape_archive_mark(a, "integrator");
     if (drape_archive_good(a))

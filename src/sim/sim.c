@@ -156,6 +156,8 @@ static drape_status start_sim(drape_sim *sim, int threads)
         status = create_integrator(sim);
     if (!status)
         status = drape_check_cancel(sim->ctx);
+    if (!status)
+        status = drape_events_create(sim);
     if (status)
         return status;
     note_tolerance(sim);
@@ -176,6 +178,8 @@ drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out)
     if (!status) {
         (*out)->chosen = like->chosen;
         status = start_sim(*out, drape_pool_threads(drape_system_pool(like->system)));
+        if (!status)
+            status = drape_events_copy(*out, like);
     }
     if (status)
         drape_sim_destroy(out);

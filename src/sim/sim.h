@@ -5,10 +5,12 @@
 #include "base/archive.h"
 #include "base/arena.h"
 #include "sim/choose.h"
+#include "sim/events.h"
 #include "sim/schedule.h"
 
-#define DRAPE_MAX_OBSERVERS 8
-#define DRAPE_MAX_REASONS   32 /* the last one is "other" if there are more */
+#define DRAPE_MAX_OBSERVERS   8
+#define DRAPE_MAX_HOST_EVENTS 64
+#define DRAPE_MAX_REASONS     32 /* the last one is "other" if there are more */
 
 typedef struct drape_reason_total {
     const char *reason; /* static text */
@@ -81,6 +83,7 @@ struct drape_sim {
     int reason_count;
     drape_audit audit;
     drape_realtime_memory realtime;
+    drape_event_set events;
     drape_energy energy, attempted;     /* of the present state; of the last attempted one */
     bool energy_known, attempted_known; /* whether these two are valid */
     drape_warning_cursor warning_cursor;
@@ -128,6 +131,13 @@ double drape_sim_error_bound(const drape_sim *sim);
 /* Whether out has energy that neither the state before nor the work on it can account for, in this step or
  * since the beginning of the run; info->diagnostic then says how much. */
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info);
+
+/* The energies at positions and velocities (node_count x 3) at time t, with the internal variables of the
+ * present state; `dissipated` and `numerical` are 0. */
+drape_energy drape_sim_energy_of(const drape_sim *sim, double t, const double *x, const double *v);
+
+/* drape_sim_reactions at another point. Errors: DRAPE_E_MEMORY. */
+drape_status drape_sim_reactions_at(drape_sim *sim, const drape_point *point, double *forces);
 
 /* drape_sim_energy_density at other positions (node_count x 3), with the internal variables of the present
  * state. */
