@@ -726,9 +726,10 @@ typedef drape_status drape_event_function(void *user, double t, const double *po
                                           const double *velocities, double *value);
 
 /* Adds an event to those of the scene. def: its name, which must be given, and what else applies; its type is
- * NULL. A root is counted when f passes 0 in the direction of the def; that f is 0 at the start, or in a state
- * that was set, is not a root. The texts of the def are copied. A sim that is restored from a checkpoint keeps
- * its functions, and must have as many events as the one that was saved. There are at most 64. Errors:
+ * NULL. A root is counted when f passes 0 in the direction of the def; that f is 0 at the start, or in a
+ * state that was set, is not a root. The texts of the def are copied. A sim that is restored from a
+ * checkpoint keeps its functions, and must have as many events as the one that was saved. There are at most
+ * 64. Memory is allocated. Errors:
  * DRAPE_E_ARGUMENT (NULL, no name or one that there is already, a value of the def that is not allowed),
  * DRAPE_E_VERSION (struct_size), DRAPE_E_MEMORY. Must not be called by an observer. Thread-safety: as the
  * sim. */

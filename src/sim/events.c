@@ -180,8 +180,8 @@ static void insert(course *c, point p)
     c->points[k] = p;
 }
 
-/* If the cubic through the samples comes near 0 at s (of the step), between two of them of one sign, evaluates
- * the function there. */
+/* If the cubic through the samples comes near 0 at s (of the step), between two of them of one sign,
+ * evaluates the function there. */
 static drape_status look_at(course *c, const double a[4], double s)
 {
     const double *f = c->watch->sample, value = a[0] + s * (a[1] + s * (a[2] + s * a[3]));

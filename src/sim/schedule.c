@@ -17,7 +17,7 @@ void drape_schedule_init(drape_schedule *s, drape_stepping stepping, double dt, 
 
 void drape_schedule_aim(drape_schedule *s, double end)
 {
-    if ((s->part > 0 && end != s->end) || s->cut) {
+    if ((s->part > 0 || s->cut) && end != s->end) {
         s->start = s->now;
         s->count = 0;
         s->part = 0;

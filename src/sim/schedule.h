@@ -43,8 +43,8 @@ typedef struct drape_schedule {
 
 void drape_schedule_init(drape_schedule *schedule, drape_stepping stepping, double dt, double start);
 
-/* Sets the end of an advance. A partly completed interval is continued if the end is the same; otherwise it
- * is abandoned, and counting restarts at the present time. */
+/* Sets the end of an advance. A partly completed or cut interval is continued if the end is the same;
+ * otherwise it is abandoned, and counting restarts at the present time. */
 void drape_schedule_aim(drape_schedule *schedule, double end);
 
 /* The next step: its end and its size. False if the end is reached. */

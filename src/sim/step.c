@@ -209,7 +209,7 @@ static void reject(drape_sim *sim, const drape_step_info *info)
 /* For an attempt that the controller accepted: whether it is made again, so that it ends at an event, or
  * given up, because an event acts on the present state. *stop: an event function failed. memory: of the
  * controller before it judged. */
-static bool give_way(drape_sim *sim, const double memory[2], drape_step_info *info, drape_status *stop)
+static bool must_repeat(drape_sim *sim, const double memory[2], drape_step_info *info, drape_status *stop)
 {
     drape_system_end_step(sim->system); /* what events evaluate leaves no trace in the next step */
     const drape_event_verdict verdict = drape_events_examine(sim, next_state(sim), stop);
@@ -358,7 +358,7 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     drape_verdict verdict = judge(sim, &info, status, &trial);
     sim->further_seconds = info.further_seconds;
     *stop = DRAPE_OK;
-    if (verdict == DRAPE_ACCEPT && give_way(sim, memory, &info, stop))
+    if (verdict == DRAPE_ACCEPT && must_repeat(sim, memory, &info, stop))
         return record_of(sim, t, &info, DRAPE_RETRY_REJECTED, false);
     bool again = false;
     const drape_status relaxed = verdict == DRAPE_ACCEPT ? DRAPE_OK : relax(sim, t1, status, verdict, &again);
