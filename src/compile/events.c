@@ -94,6 +94,20 @@ static drape_status choose(const place *p, const char *key, const char *text, in
     return status;
 }
 
+/* The rest shapes of clamped edges contain the directions in which they are held. */
+static drape_status check_release(const place *p, const drape_model_event *to)
+{
+    char text[128];
+    for (int32_t k = 0; k < to->pin_count; k++) {
+        const drape_pin *pin = &p->model->pins[to->pin[k]];
+        snprintf(text, sizeof text, "the pins \"%.60s\" clamp edges; such pins cannot be released",
+                 pin->name);
+        if (pin->clamps)
+            return refuse(p, "action", text);
+    }
+    return to->pinned_count > 0 ? DRAPE_OK : refuse(p, "action", "there are no pins to release");
+}
+
 /* All but the event function. */
 static drape_status resolve(const place *p, const drape_event_def *def, drape_model_event *to)
 {
@@ -108,9 +122,7 @@ static drape_status resolve(const place *p, const drape_event_def *def, drape_mo
         status = find_cloth(p, def->cloth, to);
     if (!status)
         status = find_pins(p, def->pins, to);
-    if (!status && to->action == DRAPE_ACTION_RELEASE && to->pinned_count == 0)
-        status = refuse(p, "action", "there are no pins to release");
-    return status;
+    return status || to->action != DRAPE_ACTION_RELEASE ? status : check_release(p, to);
 }
 
 /* ---- Of a scene ---- */

@@ -202,6 +202,7 @@ static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, in
     for (size_t p = 0; !status && p < def->cloths[c].pin_count; p++) {
         drape_pin *to = &model->pins[model->pin_count++];
         to->cloth = c;
+        to->clamps = def->cloths[c].pins[p].clamp;
         pin->cloth = &model->cloths[c];
         pin->def = &def->cloths[c].pins[p];
         pin->taken = 0;
@@ -243,8 +244,7 @@ static drape_status clamp_edges(drape_model *model, const uint8_t *clamped)
     return DRAPE_OK;
 }
 
-/* Numbers the free nodes in order and lists the moved ones. */
-static drape_status number_nodes(drape_model *model, const int32_t *track_of_node)
+drape_status drape_compile_number_nodes(drape_model *model, const int32_t *track_of_node)
 {
     for (int32_t i = 0; i < model->node_count; i++) {
         model->free_of_node[i] = model->pinned[i] ? -1 : model->free_count++;
@@ -291,7 +291,7 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
         if (!status)
             status = clamp_edges(model, clamped);
         if (!status)
-            status = number_nodes(model, track_of_node);
+            status = drape_compile_number_nodes(model, track_of_node);
     }
     drape_arena_free(&scratch);
     return status;

@@ -160,6 +160,7 @@ typedef struct drape_pin {
     int32_t cloth;
     int32_t *node; /* (node_count) ascending node numbers of the model */
     int32_t node_count;
+    bool clamps;
 } drape_pin;
 
 /* What happens at an event, beside that it is recorded and reported. */
@@ -195,6 +196,9 @@ typedef struct drape_model_event {
 } drape_model_event;
 
 struct drape_model {
+    const drape_model
+        *base;         /* the model that this one is without some of its pins, and whose arrays it shares
+                                except those that depend on the pins; NULL: it is its own */
     drape_arena arena; /* holds everything below except the meshes */
     drape_context *ctx;
     int32_t cloth_count, term_count, node_count, triangle_count, edge_count;

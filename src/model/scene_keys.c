@@ -163,7 +163,7 @@ static const drape_scene_object contact = {.name = "contact",
 /* ---- Events ---- */
 
 static const char *const directions[] = {"both", "up", "down", NULL};
-static const char *const actions[] = {"record", "stop", NULL};
+static const char *const actions[] = {"record", "stop", "release", NULL};
 
 static const drape_scene_key event_keys[] = {
     {DRAPE_TEXT("type", "name of an event; its parameters are keys beside it"),

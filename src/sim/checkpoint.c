@@ -183,8 +183,20 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
         sim->chosen.integrator->set_effort(sim->integrator, m->effort);
 }
 
+/* Read by create_restored. */
+static void write_released(drape_sim *sim, drape_archive *a)
+{
+    bool any = sim->released != NULL;
+    drape_archive_bool(a, &any);
+    if (any)
+        drape_archive_bytes(a, sim->released, (size_t)sim->model->node_count);
+}
+
 void drape_sim_archive(drape_sim *sim, drape_archive *a)
 {
+    if (!a->reading)
+        write_released(sim, a);
+    drape_work_archive(&sim->earlier, a);
     archive_states(sim, a);
     drape_archive_doubles(a, sim->scratch, sizeof sim->scratch / sizeof *sim->scratch);
     archive_schedule(&sim->schedule, a);
@@ -200,10 +212,7 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
 
 /* ---- For hosts ---- */
 
-/* Exchanges the contents of two sims, except what belongs to the host and stays with `sim`: observers, the
- * cancel flag, the wind. Afterwards `other` has the former contents of `sim` and is only fit to be
- * destroyed. */
-static void exchange(drape_sim *sim, drape_sim *other)
+void drape_sim_exchange(drape_sim *sim, drape_sim *other)
 {
     drape_sim former;
     const size_t size = offsetof(drape_sim, cancel);
@@ -215,16 +224,36 @@ static void exchange(drape_sim *sim, drape_sim *other)
     drape_system_copy_wind(sim->system, other->system);
 }
 
+/* A new sim without the pins that had been released when the archive was written. */
+static drape_status create_restored(drape_sim *sim, drape_archive *a, drape_sim **out)
+{
+    const size_t nodes = (size_t)sim->model->node_count;
+    bool any = false, pinned = true;
+    drape_archive_bool(a, &any);
+    uint8_t *released = any && drape_archive_good(a) ? drape_alloc(sim->ctx, nodes, 1) : NULL;
+    if (any && !released)
+        drape_archive_note(a, DRAPE_E_MEMORY);
+    if (released)
+        drape_archive_bytes(a, released, nodes);
+    for (size_t i = 0; released && i < nodes; i++)
+        pinned = pinned && released[i] <= drape_sim_base_model(sim)->pinned[i];
+    if (drape_archive_good(a) && !pinned)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint releases a node that is not pinned");
+    const drape_status status = drape_archive_good(a) ? drape_sim_create_like(sim, released, out) : a->status;
+    drape_free(sim->ctx, released);
+    return status;
+}
+
 drape_status drape_sim_read(drape_sim *sim, drape_archive *a)
 {
     drape_sim *restored = NULL;
     drape_sim_archive_identity(sim, a);
     if (drape_archive_good(a))
-        drape_archive_note(a, drape_sim_create_like(sim, &restored));
+        drape_archive_note(a, create_restored(sim, a, &restored));
     if (drape_archive_good(a))
         drape_sim_archive(restored, a);
     if (drape_archive_good(a))
-        exchange(sim, restored);
+        drape_sim_exchange(sim, restored);
     drape_sim_destroy(&restored);
     return a->status;
 }

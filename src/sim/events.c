@@ -514,13 +514,38 @@ drape_status drape_events_report(drape_sim *sim)
     return status;
 }
 
+static drape_status release(drape_sim *sim)
+{
+    const drape_event_set *e = &sim->events;
+    drape_arena scratch = drape_arena_of(sim->ctx);
+    uint8_t *nodes = drape_arena_take(&scratch, (size_t)sim->model->node_count, sizeof *nodes);
+    drape_status status = drape_arena_status(&scratch);
+    bool any = false;
+    for (int32_t i = 0; !status && i < e->pending_count; i++) {
+        const drape_model_event *event = e->watches[e->pending[i].event].event;
+        for (int32_t k = 0; event->action == DRAPE_ACTION_RELEASE && k < event->pinned_count; k++)
+            nodes[event->pinned[k]] = 1;
+        any = any || event->action == DRAPE_ACTION_RELEASE;
+    }
+    const int32_t before = sim->model->free_count;
+    if (any)
+        status = drape_sim_release(sim, nodes);
+    if (any && !status)
+        drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g: %d nodes are released", drape_sim_state(sim)->t,
+                  (int)(sim->model->free_count - before));
+    drape_arena_free(&scratch);
+    return status;
+}
+
 drape_status drape_events_act(drape_sim *sim)
 {
-    drape_event_set *e = &sim->events;
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; i < e->pending_count; i++) {
+    drape_event_set *e = &sim->events; /* stays in place when the sim is built anew */
+    drape_status status = e->pending_count > 0 ? release(sim) : DRAPE_OK;
+    if (status)
+        return status;
+    for (int32_t i = 0; !status && i < e->pending_count; i++) {
         const drape_watch *w = &e->watches[e->pending[i].event];
-        if (status || w->event->action != DRAPE_ACTION_STOP)
+        if (w->event->action != DRAPE_ACTION_STOP)
             continue;
         e->stopped_by = e->pending[i].event;
         status = drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: stopped by event \"%.60s\"",
@@ -618,6 +643,25 @@ drape_status drape_events_copy(drape_sim *sim, const drape_sim *from)
         status = add_function(sim, &w->def, w->function, w->user);
     }
     return status;
+}
+
+void drape_events_continue(drape_sim *sim, const drape_sim *from)
+{
+    drape_event_set *to = &sim->events;
+    for (int32_t i = 0; i < to->count; i++) {
+        const drape_watch *w = &from->events.watches[i];
+        drape_watch *same = &to->watches[i];
+        same->known = w->known;
+        same->before = w->before;
+        same->side = w->side;
+        same->count = w->count;
+        memcpy(same->first, w->first, sizeof same->first);
+        same->last = w->last;
+    }
+    to->pending_count = from->events.pending_count;
+    to->reported = from->events.reported;
+    if (to->pending_count > 0)
+        memcpy(to->pending, from->events.pending, (size_t)to->pending_count * sizeof *to->pending);
 }
 
 void drape_events_reset(drape_sim *sim)

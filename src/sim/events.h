@@ -99,11 +99,15 @@ void drape_events_commit(struct drape_sim *sim);
  * stops the run. */
 drape_status drape_events_report(struct drape_sim *sim);
 
-/* Performs the actions of pending roots, which are then over. Errors: DRAPE_E_STOPPED, with its message. */
+/* Performs the actions of pending roots, which are then over: pins are released, then the advance stops.
+ * Errors: DRAPE_E_STOPPED, with its message; those of drape_sim_release, after which they are still pending. */
 drape_status drape_events_act(struct drape_sim *sim);
 
 /* Reports and performs what a stopped advance left over. */
 drape_status drape_events_resume(struct drape_sim *sim);
+
+/* Takes what another sim with the same events knows about them. */
+void drape_events_continue(struct drape_sim *sim, const struct drape_sim *from);
 
 void drape_events_archive(struct drape_sim *sim, drape_archive *a);
 

@@ -220,7 +220,7 @@ static void archive_hash(drape_archive *a, const char *what, uint64_t hash)
 
 void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
 {
-    const drape_model *m = sim->model;
+    const drape_model *m = drape_sim_base_model(sim);
     if (!sim->identity_known) {
         sim->model_hash = model_hash(m);
         sim->choices_hash = choices_hash(sim);

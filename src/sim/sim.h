@@ -55,6 +55,9 @@ struct drape_sim {
     drape_arena *arena; /* holds all memory of the sim and stays at its address: see drape_sim_read */
     size_t state_bytes, integrator_bytes; /* in the arena, after create */
     const drape_model *model;
+    drape_model *own_model; /* the model, if it lacks pins that were released; NULL: it is the host's */
+    uint8_t *released;      /* (node_count) 1: its pins were released; NULL: none were */
+    drape_work earlier;     /* done by the integrators that went before, each until pins were released */
     drape_chosen chosen;
     drape_system *system;
     void *integrator;      /* state of chosen.integrator */
@@ -102,8 +105,25 @@ struct drape_sim {
  * call comes from one of its observers). */
 drape_status drape_sim_guard(drape_sim *sim, const char *function);
 
-/* Creates a new sim with the same choices, at the beginning. */
-drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out);
+/* Creates a new sim with the same choices, at the beginning. released (node_count): the nodes whose pins were
+ * released; NULL: none. */
+drape_status drape_sim_create_like(const drape_sim *like, const uint8_t *released, drape_sim **out);
+
+/* Exchanges the contents of two sims, except what belongs to the host and stays with `sim`: observers, the
+ * cancel flag, the wind. Afterwards `other` has the former contents of `sim` and is only fit to be
+ * destroyed. */
+void drape_sim_exchange(drape_sim *sim, drape_sim *other);
+
+/* Makes pinned nodes free, which go on with the velocity of their pins. The sim is built anew, for a model
+ * without these pins, and takes the place of the present one if that succeeds. Errors: DRAPE_E_MEMORY,
+ * DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's cancel function); then the sim is unchanged. */
+drape_status drape_sim_release(drape_sim *sim, const uint8_t *nodes);
+
+/* The model of the host, with all pins. */
+static inline const drape_model *drape_sim_base_model(const drape_sim *sim)
+{
+    return sim->model->base ? sim->model->base : sim->model;
+}
 
 /* Writes everything that the next steps, frames and statistics depend on, besides the model and the
  * choices, to an archive or, if the sim was just created, reads it back. */
