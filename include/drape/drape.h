@@ -164,6 +164,7 @@ typedef struct drape_pin_def {
     size_t key_count;              /* length of track */
     bool clamp; /* edges between these nodes keep the direction of the sheet across them, for bending terms
                    that support it */
+    const char *name; /* for events, unique among the pins of the cloth; NULL: "pin0", "pin1" ... */
 } drape_pin_def;
 
 /* One piece of cloth. */
@@ -195,6 +196,20 @@ typedef struct drape_collider_def {
                            0 */
 } drape_collider_def;
 
+/* An event: a root of a function of the state, which is located within the step in which it lies. Initialise
+ * with drape_event_def_init. */
+typedef struct drape_event_def {
+    size_t struct_size;    /* set by drape_event_def_init */
+    drape_entry_def entry; /* the event: "height", "plane", "energy" or "pin_force"; for a function of the
+                              host, drape_sim_add_event, its type is NULL */
+    const char *name;      /* NULL: "event0", "event1" ... */
+    const char *cloth;     /* name of the cloth that it is about; NULL: all of them */
+    const char *pins;      /* name of the pins that it measures or releases; NULL: all pins of the cloth */
+    const char *direction; /* in which the quantity passes its bound: "up", "down" or "both"; NULL: "both" */
+    const char *action;    /* "record", "stop" or "release"; NULL: "record" */
+    bool once;             /* only the first time counts; default false */
+} drape_event_def;
+
 /* A whole scene. Initialise with drape_scene_def_init. Everything it points to need only live until
  * drape_model_create returns. */
 typedef struct drape_scene_def {
@@ -219,6 +234,8 @@ typedef struct drape_scene_def {
     const drape_setting *contact;        /* distance, stiffness ...; `drape list contact` shows all */
     size_t contact_count;                /* length of contact */
     const char *up; /* axis that points up in frames written by `drape run`: "y" or "z"; NULL: "y" */
+    const drape_event_def *events; /* at most 256 */
+    size_t event_count;            /* length of events */
 } drape_scene_def;
 
 /* Fill a def with the defaults documented above. Pass the caller's sizeof of the def as struct_size. Nothing
@@ -227,6 +244,7 @@ DRAPE_API void drape_scene_def_init(drape_scene_def *def, size_t struct_size);
 DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
 DRAPE_API void drape_pin_def_init(drape_pin_def *def, size_t struct_size);
+DRAPE_API void drape_event_def_init(drape_event_def *def, size_t struct_size);
 DRAPE_API void drape_collider_def_init(drape_collider_def *def, size_t struct_size);
 
 /* ---- Scene from text ---- */
@@ -701,6 +719,45 @@ typedef struct drape_warning {
  * their equation than its bound. Returns false past the last. */
 DRAPE_API bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out);
 
+/* ---- Events ---- */
+
+/* The function of an event of a host: writes f(t, x, v) to *value, whose roots are the events. positions and
+ * velocities (node_count x 3 [m], [m/s]) are those of a time t [s] within the step that is being made; they
+ * are valid during the call. It is called at four or more times in each step, not in order, so it must depend
+ * on nothing else. Returns 0; any other value, or a *value that is not finite, ends the advance with the last
+ * accepted state: with the status if that is negative, DRAPE_E_STOPPED if it is positive, DRAPE_E_ARGUMENT if
+ * the value is not finite. It must not call functions of the sim. */
+typedef drape_status drape_event_function(void *user, double t, const double *positions,
+                                          const double *velocities, double *value);
+
+/* Adds an event to those of the scene. def: its name, which must be given, and what else applies; its type is
+ * NULL. A root is counted when f passes 0 in the direction of the def; that f is 0 at the start, or in a
+ * state that was set, is not a root. The texts of the def are copied. A sim that is restored from a
+ * checkpoint keeps its functions, and must have as many events as the one that was saved. There are at most
+ * 64. Memory is allocated. Errors:
+ * DRAPE_E_ARGUMENT (NULL, no name or one that there is already, a value of the def that is not allowed),
+ * DRAPE_E_VERSION (struct_size), DRAPE_E_MEMORY. Must not be called by an observer. Thread-safety: as the
+ * sim. */
+DRAPE_API drape_status drape_sim_add_event(drape_sim *sim, const drape_event_def *def,
+                                           drape_event_function *function, void *user);
+
+/* What is known about an event. */
+typedef struct drape_event_record {
+    const char *name;   /* valid as long as the sim, or until it is restored */
+    int64_t count;      /* times that it occurred since the sim was created */
+    double first, last; /* [s] the first and the last time; NaN: never */
+    double value;       /* of the quantity at the last time; NaN: never */
+    int direction;      /* of the last time: 1: up; -1: down; 0: never */
+} drape_event_record;
+
+/* Returns the number of events, those of the scene first, and fills *out with what is known about one of them
+ * if out is not NULL and there is one with this index, from 0. */
+DRAPE_API int32_t drape_sim_event(const drape_sim *sim, int32_t index, drape_event_record *out);
+
+/* The event that ended the last advance, which then returned DRAPE_E_STOPPED; -1: none did. The state is that
+ * of the event. A later advance continues from there. */
+DRAPE_API int32_t drape_sim_stopped_by(const drape_sim *sim);
+
 /* ---- Checkpoints ---- */
 
 /* Receives the next size bytes of a stream. Returns DRAPE_OK to continue, or a negative status to stop; it
@@ -773,7 +830,8 @@ typedef struct drape_attempt {
 /* The kind of an event. */
 typedef enum drape_event_kind {
     DRAPE_EVENT_ATTEMPT, /* an attempt was judged; the sim's state is the one that is kept */
-    DRAPE_EVENT_FRAME    /* a frame time was reached: t = 0 at the first advance, then k / frame_rate */
+    DRAPE_EVENT_FRAME,   /* a frame time was reached: t = 0 at the first advance, then k / frame_rate */
+    DRAPE_EVENT_ROOT     /* an event of the scene, or of drape_sim_add_event, has occurred */
 } drape_event_kind;
 
 /* An event as an observer receives it. Valid during the call. */
@@ -782,13 +840,21 @@ typedef struct drape_event {
     drape_sim *sim;               /* the sim that the event belongs to */
     const drape_attempt *attempt; /* ATTEMPT only */
     int64_t frame;                /* FRAME: number of the frame, from 0 */
-    double time;                  /* FRAME [s]: frame / frame_rate, up to rounding; see positions */
+    double time;                  /* FRAME [s]: frame / frame_rate, up to rounding; see positions. ROOT [s]:
+                                     of the event */
     const double *positions;  /* FRAME: node_count x 3 [m]; interpolated between the two steps around it by a
                                  cubic Hermite polynomial or, where that passes through something, on the
                                  straight line between them, at the nearest free point to the time. If none is
                                  free, they and the time are those of the later step, also in the other frames
                                  between the two */
-    const double *velocities; /* FRAME: node_count x 3 [m/s]; linear between the two steps around it */
+    const double *velocities; /* FRAME: node_count x 3 [m/s]; linear between the two steps around it, for
+                                 methods of order 1 and 2; otherwise the integrator's dense output or the
+                                 slope of the polynomial. Positions and velocities of ROOT are dense output,
+                                 too, which is not checked for contact; for an event that acts, the state */
+    int32_t event;            /* ROOT: number of the event, for drape_sim_event */
+    const char *name;         /* ROOT: its name */
+    double value;  /* ROOT: the quantity, in the unit of its bound; of a function of the host, its value */
+    int direction; /* ROOT: 1: it passed its bound upwards; -1: downwards */
 } drape_event;
 
 /* Called within drape_sim_advance. Returns 0 to continue. Any other value stops the advance, which then

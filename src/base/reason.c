@@ -66,6 +66,9 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
         REASON("penetration", "contact", "cloth is deeper in a collider than allowed"),
     [DRAPE_REASON_COLLISION] = REASON(
         "collision", "contact", "a piece passed through another between the start and the end of the step"),
+    [DRAPE_REASON_EVENT] =
+        REASON("event", "the sim",
+               "an event that acts lies within the step, which is repeated so that it ends there"),
     [DRAPE_REASON_CANCELLED] =
         REASON("cancelled", "the host", "`drape_sim_cancel` was called during the attempt"),
     [DRAPE_REASON_OTHER] = REASON("other", "statistics", "all reasons beyond the 31st"),

@@ -25,8 +25,8 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
     *out = (drape_candidates){.arena = arena, .broad = broad, .margin = margin};
     take_set(arena, broad, &out->all);
     take_set(arena, broad, &out->patch);
-    out->patched = drape_arena_take(arena, (size_t)(broad->points + broad->model->collider_count),
-                                    sizeof *out->patched);
+    out->patched =
+        drape_arena_take(arena, (size_t)(broad->points + broad->model->collider_count), sizeof *out->patched);
     return drape_arena_status(arena);
 }
 

@@ -211,6 +211,7 @@ const drape_integrator_ops drape_integrator_cvode = {
     .smooth_forces = true,
     .step = drape_first_order_step,
     .interpolate = drape_first_order_interpolate,
+    .interpolate_velocities = drape_first_order_interpolate_velocities,
     .restart = drape_first_order_restart,
     .work = drape_first_order_work,
     .archive = drape_first_order_archive,

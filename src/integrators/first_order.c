@@ -476,6 +476,16 @@ void drape_first_order_interpolate(void *state, double t, double *x)
         x[drape_first_order_at(s, i)] = y[i];
 }
 
+void drape_first_order_interpolate_velocities(void *state, double t, double *v)
+{
+    drape_first_order *s = state;
+    if (s->n == 0 || s->solver->dense(s, t, s->between))
+        return;
+    const double *y = N_VGetArrayPointer(s->between);
+    for (int64_t i = 0; i < s->n; i++)
+        v[drape_first_order_at(s, i)] = y[s->n + i];
+}
+
 void drape_first_order_restart(void *state, const drape_state *from)
 {
     (void)from;

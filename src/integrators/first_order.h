@@ -197,6 +197,7 @@ drape_status drape_first_order_create(drape_first_order *f, const drape_first_or
 drape_status drape_first_order_step(void *state, const drape_state *in, drape_state *out, double h,
                                     drape_step_info *info);
 void drape_first_order_interpolate(void *state, double t, double *x);
+void drape_first_order_interpolate_velocities(void *state, double t, double *v);
 void drape_first_order_restart(void *state, const drape_state *from);
 drape_work drape_first_order_work(const void *state);
 void drape_first_order_archive(void *state, drape_archive *a);

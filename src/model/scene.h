@@ -71,6 +71,7 @@ typedef struct drape_scene_key {
 
 #define DRAPE_MAX_CLOTHS    (1 << 20)
 #define DRAPE_MAX_COLLIDERS 4096
+#define DRAPE_MAX_EVENTS    256
 
 typedef struct drape_scene_object {
     const char *name;
@@ -88,7 +89,7 @@ typedef struct drape_scene_object {
 
 /* The top-level object and some of its descendants. */
 extern const drape_scene_object drape_form_scene, drape_form_output, drape_form_cloth, drape_form_mesh,
-    drape_form_transform, drape_form_pin, drape_form_collider;
+    drape_form_transform, drape_form_pin, drape_form_collider, drape_form_event;
 
 /* Returns the key of an object by its name; NULL if there is none. */
 const drape_scene_key *drape_scene_key_of(const drape_scene_object *object, const char *name);

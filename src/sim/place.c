@@ -183,6 +183,7 @@ static void forget_past(drape_sim *sim)
     sim->before = sim->past[0] = sim->past[1] = -1;
     memset(sim->scratch, 0, sizeof sim->scratch);
     sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+    drape_events_reset(sim);
 }
 
 drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloths,

@@ -206,6 +206,24 @@ static void reject(drape_sim *sim, const drape_step_info *info)
     count_reason(sim, info->reason);
 }
 
+/* For an attempt that the controller accepted: whether it is made again, so that it ends at an event, or
+ * given up, because an event acts on the present state. *stop: an event function failed. memory: of the
+ * controller before it judged. */
+static bool must_repeat(drape_sim *sim, const double memory[2], drape_step_info *info, drape_status *stop)
+{
+    drape_system_end_step(sim->system); /* what events evaluate leaves no trace in the next step */
+    const drape_event_verdict verdict = drape_events_examine(sim, next_state(sim), stop);
+    if (verdict == DRAPE_EVENTS_PASS)
+        return false;
+    memcpy(sim->scratch, memory, sizeof sim->scratch);
+    if (sim->chosen.integrator->own_steps) /* it has accepted the step already */
+        sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+    info->reason = drape_reason_name(DRAPE_REASON_EVENT);
+    reject(sim, info);
+    sim->failed--;
+    return true;
+}
+
 /* ---- Messages ---- */
 
 /* "bend.hinge 37 (nodes 4 5 9 10 of sheet): altitude / rest altitude = 3e-09, limit 1e-06" */
@@ -266,11 +284,17 @@ static drape_status describe_room(drape_sim *sim, const drape_attempt *attempt, 
     return status;
 }
 
+/* Whether an event, and nothing else, kept an attempt from being accepted. */
+static bool is_event(const drape_attempt *attempt)
+{
+    return attempt->reason == drape_reason_name(DRAPE_REASON_EVENT);
+}
+
 /* Logs what was rejected, and why. */
 static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 {
     char diagnostic[400];
-    if (attempt->accepted || !sim->ctx->def.log)
+    if (attempt->accepted || is_event(attempt) || !sim->ctx->def.log)
         return;
     describe_diagnostic(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
     drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g h=%.4g: step rejected, %s (%s)%s", attempt->t, attempt->h,
@@ -280,7 +304,7 @@ static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
     char diagnostic[400], nearest[400], residual[100] = "", distortion[200] = "", room[200] = "";
-    if (stop == DRAPE_E_MEMORY) /* the allocator set the message */
+    if (stop == DRAPE_E_MEMORY || is_event(attempt)) /* the message is set */
         return stop;
     if (stop == DRAPE_E_STOPPED)
         return drape_sim_check_cancel(sim);
@@ -352,17 +376,22 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     drape_step_info info = {.reason = drape_reason_name(DRAPE_REASON_CONVERGED), .h = h, .error = NAN};
     drape_trial trial;
     double t = drape_sim_state(sim)->t;
+    const double memory[2] = {sim->scratch[0], sim->scratch[1]};
     drape_status status = compute_next(sim, t1, h, &info);
     drape_verdict verdict = judge(sim, &info, status, &trial);
     sim->further_seconds = info.further_seconds;
+    *stop = DRAPE_OK;
+    if (verdict == DRAPE_ACCEPT && must_repeat(sim, memory, &info, stop))
+        return record_of(sim, t, &info, DRAPE_RETRY_REJECTED, false);
     bool again = false;
     const drape_status relaxed = verdict == DRAPE_ACCEPT ? DRAPE_OK : relax(sim, t1, status, verdict, &again);
     verdict = again ? DRAPE_RETRY : verdict;
     bool refused = status == DRAPE_OK && verdict != DRAPE_ACCEPT; /* by the controller alone */
     *stop = relaxed ? relaxed : verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
-    if (verdict == DRAPE_ACCEPT)
+    if (verdict == DRAPE_ACCEPT) {
         accept(sim, &info, trial.h_next);
-    else
+        drape_events_commit(sim);
+    } else
         reject(sim, &info);
     if (again)
         drape_schedule_repeat(&sim->schedule);
@@ -391,10 +420,13 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     if (attempt->accepted)
         drape_sim_log_relaxed(sim);
     drape_status notified = notify_attempt(sim, attempt);
+    drape_status reported = drape_events_report(sim);
     drape_status emitted = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
     if (stop)
         return explain(sim, stop, attempt);
-    return notified ? notified : emitted;
+    if (notified || reported || emitted) /* the actions are for the next advance */
+        return notified ? notified : reported ? reported : emitted;
+    return drape_events_act(sim);
 }
 
 drape_status drape_sim_advance(drape_sim *sim, double t_end)
@@ -410,6 +442,8 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
     drape_status status =
         drape_sim_emit_frames(sim); /* the first frame, and those left over when an observer stopped the
                                        run */
+    if (!status)
+        status = drape_events_resume(sim);
     drape_sim_leave_realtime(sim);
     drape_schedule_aim(&sim->schedule, t_end);
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
