@@ -35,7 +35,8 @@ typedef struct drape_inexact_settings {
                         and after which no other is begun beyond `iterations` */
     double linear_tolerance; /* relative residual that conjugate gradients leave in each correction */
     int max_linear_iterations;
-    bool follows; /* the step begins with the result of the last solve */
+    bool follows;      /* the step begins with the result of the last solve */
+    double pins_ahead; /* [m] largest coordinate by which moved pins are ahead of where the guess has them */
 } drape_inexact_settings;
 
 /* auto: whichever factored_jacobian.h says. */
