@@ -25,8 +25,9 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
     *out = (drape_candidates){.arena = arena, .broad = broad, .margin = margin};
     take_set(arena, broad, &out->all);
     take_set(arena, broad, &out->patch);
-    out->patched = drape_arena_take(arena, (size_t)(broad->points + broad->model->collider_count),
-                                    sizeof *out->patched);
+    out->patched =
+        drape_arena_take(arena, (size_t)(broad->points + broad->model->collider_count), sizeof *out->patched);
+    out->stale = drape_arena_take(arena, (size_t)broad->model->collider_count, sizeof *out->stale);
     return drape_arena_status(arena);
 }
 
@@ -226,10 +227,20 @@ static double measure(const drape_candidates *c, const drape_candidate_set *set,
     return largest;
 }
 
+/* Whether the first search has pairs with an activation distance that is not theirs any more. */
+static bool has_stale(const drape_candidates *c)
+{
+    bool found = false;
+    for (int32_t i = 0; i < c->broad->model->collider_count; i++)
+        found = found || (c->stale[i] && !(c->patch.known && c->patched[c->broad->points + i]));
+    return found;
+}
+
 drape_distances drape_candidates_distances(const drape_candidates *c, const drape_straight_path *path)
 {
     const bool patched = c->patch.known;
-    return (drape_distances){.all = measure(c, &c->all, path, patched ? c->patched : NULL),
+    return (drape_distances){.all = has_stale(c) ? INFINITY
+                                                 : measure(c, &c->all, path, patched ? c->patched : NULL),
                              .patch = patched ? measure(c, &c->patch, path, NULL) : 0};
 }
 
@@ -238,13 +249,15 @@ bool drape_candidates_are_valid(const drape_candidates *c, const drape_distances
     return away->all <= c->margin && away->patch <= c->margin;
 }
 
-/* Whether the first search is valid but for colliders and a few nodes, which it marks. */
-static bool find_patch(drape_candidates *c, const drape_straight_path *path)
+/* Marks the colliders and nodes for which the first search is not valid. */
+bool drape_candidates_patch_serves(drape_candidates *c, const drape_straight_path *path)
 {
     const drape_broad_phase *broad = c->broad;
     const int32_t nodes = broad->model->node_count;
     int32_t count = 0;
-    memset(c->patched, 0, (size_t)(broad->points + broad->model->collider_count) * sizeof *c->patched);
+    c->patch.known = false;
+    memset(c->patched, 0, (size_t)broad->points * sizeof *c->patched);
+    memcpy(c->patched + broad->points, c->stale, (size_t)broad->model->collider_count * sizeof *c->stale);
     for (int end = 0; end < 2; end++)
         if (isinf(distance_from(c, &c->all, &path->end[end], NULL, c->patched)))
             return false;
@@ -260,9 +273,16 @@ static bool find_patch(drape_candidates *c, const drape_straight_path *path)
 drape_status drape_candidates_search(drape_candidates *c, const drape_straight_path *path,
                                      const double *ahead)
 {
-    const bool patch = find_patch(c, path);
+    if (drape_candidates_patch_serves(c, path))
+        return collect(c, &c->patch, c->patched, path, ahead);
+    memset(c->stale, 0, (size_t)c->broad->model->collider_count * sizeof *c->stale);
+    return collect(c, &c->all, NULL, path, ahead);
+}
+
+void drape_candidates_forget_collider(drape_candidates *c, int32_t collider)
+{
+    c->stale[collider] = true;
     c->patch.known = false;
-    return patch ? collect(c, &c->patch, c->patched, path, ahead) : collect(c, &c->all, NULL, path, ahead);
 }
 
 /* ---- The list ---- */

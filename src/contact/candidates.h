@@ -33,6 +33,7 @@ typedef struct drape_candidates {
     double margin; /* how far points may be from the paths [m] */
     drape_candidate_set all, patch;
     bool *patched; /* (points + collider_count) those of the patch; none unless it is known */
+    bool *stale;   /* (collider_count) whose pairs in `all` have another activation distance by now */
 } drape_candidates;
 
 /* arena and broad must outlive the candidates. */
@@ -49,6 +50,12 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
  * patch if few points are away from the first search there. Errors: DRAPE_E_MEMORY. */
 drape_status drape_candidates_search(drape_candidates *candidates, const drape_straight_path *path,
                                      const double *ahead);
+
+/* Whether that would search no more than a patch. The candidates are not valid afterwards, until it has. */
+bool drape_candidates_patch_serves(drape_candidates *candidates, const drape_straight_path *path);
+
+/* The activation distance of a collider has changed: its pairs are searched anew. */
+void drape_candidates_forget_collider(drape_candidates *candidates, int32_t collider);
 
 /* How far a straight path is from those of each search. */
 typedef struct drape_distances {
