@@ -185,8 +185,8 @@ static double square_away(const double *x, const double *a, const double *b, dou
     return vec3_dot(d, d);
 }
 
-/* The largest distance of a point or a collider other than those left out. Marks those of which it exceeds the
- * margin, unless beyond is NULL. */
+/* The largest distance of a point or a collider other than those left out. Marks those of which it exceeds
+ * the margin, unless beyond is NULL. */
 static double distance_from(const drape_candidates *c, const drape_candidate_set *set,
                             const drape_configuration *at, const bool *without, bool *beyond)
 {

@@ -214,8 +214,8 @@ static bool is_near_start(const drape_contact *c, const double *x)
     return true;
 }
 
-/* The path of a search for a configuration. In a step all pairs are searched from its beginning on, or that of
- * the step before, since that and the continuation will be looked at, too. */
+/* The path of a search for a configuration. In a step all pairs are searched from its beginning on, or that
+ * of the step before, since that and the continuation will be looked at, too. */
 static drape_straight_path path_to(drape_contact *c, const drape_configuration *at, bool in_step)
 {
     const drape_straight_path here = {{*at, *at}};
