@@ -168,7 +168,7 @@ static bool are_valid(const drape_candidates *candidates, const drape_straight_p
                       drape_distances *away)
 {
     *away = drape_candidates_distances(candidates, path);
-    return drape_candidates_are_valid(candidates, away);
+    return drape_candidates_farthest(candidates, away) <= candidates->margin;
 }
 
 const drape_candidates *drape_contact_valid_candidates(const drape_contact *c,
@@ -188,7 +188,8 @@ const drape_candidates *drape_contact_search(drape_contact *c, const drape_strai
         c->ahead[i] = path->end[1].x[i] + AHEAD * (path->end[1].x[i] - path->end[0].x[i]);
     const drape_status status = drape_candidates_search(candidates, path, c->ahead);
     if (!are_valid(candidates, path, away)) /* positions that are not finite */
-        *away = (drape_distances){.all = INFINITY, .patch = INFINITY};
+        for (int i = 0; i < DRAPE_CANDIDATE_SETS; i++)
+            away->set[i] = INFINITY;
     c->search_seconds += drape_clock_seconds() - start;
     c->out_of_memory = c->out_of_memory || status != DRAPE_OK;
     return status ? NULL : candidates;
