@@ -65,6 +65,8 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     drape_system_expect(sim->system, t1, may_relax(sim));
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
     drape_sim_add_contact_work(sim);
+    if (drape_system_contact(sim->system) && !sim->chosen.integrator->own_steps)
+        drape_sim_energy(sim); /* for the check, while contact is where the step begins */
     if (!status)
         status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
     if (status == DRAPE_E_STOPPED)

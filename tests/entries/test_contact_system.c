@@ -256,19 +256,24 @@ START_TEST(colliders_without_terms)
 }
 END_TEST
 
+/* A square grid with so many nodes a side under a triangle with so many edges a side. */
+static scene two_cloths(int columns, int edges, const char *pins, bool lagged)
+{
+    return scene_model(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': %d, 'rows': %d, 'width': 0.3,"
+        " 'height': 0.3}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200},"
+        " 'terms': ['stretch.edge']}, {'mesh': {'grid': 'equilateral', 'edges': %d, 'edge_length': 0.07,"
+        " 'transform': {'translate': [0.013, 0.03, -0.017]}}, 'pins': [%s],"
+        " 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, 'terms': ['bend.hinge']}],"
+        " 'self_contact': {'thickness': 2e-3, 'friction': 0.4},"
+        " 'contact': {'stiffness': 1e5, 'friction': '%s'}, 'duration': 1}",
+        columns, columns, edges, pins, lagged ? "lagged" : "implicit");
+}
+
 START_TEST(cloth_on_cloth)
 {
     for (int k = 0; k < 2; k++) {
-        scene s = scene_model(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3,"
-            " 'height': 0.3}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200},"
-            " 'terms': ['stretch.edge']}, {'mesh': {'grid': 'equilateral', 'edges': 4, 'edge_length': 0.07,"
-            " 'transform': {'translate': [0.013, 0.03, -0.017]}}, 'pins': [{'nodes': [3]}],"
-            " 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, 'terms': "
-            "['bend.hinge']}],"
-            " 'self_contact': {'thickness': 2e-3, 'friction': 0.4},"
-            " 'contact': {'stiffness': 1e5, 'friction': '%s'}, 'duration': 1}",
-            k ? "lagged" : "implicit");
+        scene s = two_cloths(6, 4, "{'nodes': [3]}", k);
         probe t = open_probe(s, -0.028, 17);
         check(&t, "cloth on cloth", 0.02);
         close_probe(&t);
@@ -282,16 +287,7 @@ END_TEST
 START_TEST(near_the_least_gap)
 {
     for (int k = 0; k < 2; k++) {
-        scene s = scene_model(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, 'width': 0.3,"
-            " 'height': 0.3}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200},"
-            " 'terms': ['stretch.edge']}, {'mesh': {'grid': 'equilateral', 'edges': 3, 'edge_length': 0.07,"
-            " 'transform': {'translate': [0.013, 0.03, -0.017]}}, 'material': {'young_modulus': 1e3, "
-            "'thickness': 1e-3,"
-            " 'density': 200}, 'terms': ['bend.hinge']}],"
-            " 'self_contact': {'thickness': 2e-3, 'friction': 0.4},"
-            " 'contact': {'stiffness': 1e5, 'friction': '%s'}, 'duration': 1}",
-            k ? "lagged" : "implicit");
+        scene s = two_cloths(4, 3, "", k);
         double gap;
         probe t = open_probe(s, 0, 17);
         for (int32_t i = 0; i < s.model->node_count; i++) /* flat, one 8e-6 m above the other */
