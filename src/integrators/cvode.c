@@ -1,7 +1,7 @@
 /*
  * cvode: variable order and step size with local error control by CVODE (Hindmarsh et al. 2005; Cohen &
- * Hindmarsh 1996): backward differentiation formulas (BDF) with a fixed leading coefficient, whose history is
- * a Nordsieck array, for
+ * Hindmarsh 1996): backward differentiation formulas (BDF) with a fixed leading coefficient, whose
+ * history is a Nordsieck array, for
  *     y' = (v, -M^-1 g(x, v, t)).
  * first_order.h has all that does not concern CVODE alone.
  *
@@ -9,11 +9,11 @@
  * r1 = c_j b1, r2 = c_j M b2. It changes the step size only where it would grow by half or more, so factors
  * serve longer than in IDA.
  *
- * The maximum order is 2 at loose tolerances, as in `ida`. stability_detection: CVODE lowers an order of 3 or
- * more where waves are outside the region of stability, judged by the sizes of the derivatives of the last
- * steps.
+ * The maximum order is 2 at loose tolerances, as in `ida`. stability_detection: CVODE lowers an order of
+ * 3 or more where waves are outside the region of stability, judged by the sizes of the derivatives of
+ * the last steps.
  *
- * Checkpoints have a log of what CVODE was told: cvode_log.h.
+ * Checkpoints have a log of what CVODE has been given: cvode_log.h.
  */
 #include "integrators/cvode_log.h"
 #include "integrators/first_order.h"
@@ -25,8 +25,8 @@
 #define TIGHT_ORDER 5
 /* Of the tolerance of the error test: bound for the error of the Newton iteration. */
 #define NEWTON_SHARE 0.1
-/* The matrix is factored again when gamma changed by more than this, and after this number of steps; the test
- * of convergence notices earlier if it must be. */
+/* The matrix is factored again when gamma changed by more than this, and after this number of steps; the
+ * test of convergence notices earlier if it must be. */
 #define GAMMA_CHANGE 0.3
 #define SETUP_STEPS  1000
 

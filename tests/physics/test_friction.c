@@ -107,7 +107,8 @@ static bool own_steps(const char *method)
     return strcmp(method, "ida") == 0 || strcmp(method, "cvode") == 0 || strcmp(method, "dirk") == 0;
 }
 
-/* ida, cvode and dirk bound the error of a step in a norm over 2 n unknowns: one of them may have all of it. */
+/* ida, cvode and dirk bound the error of a step in a norm over 2 n unknowns: one of them may have all of
+ * it. */
 static double ida_velocity(const scene *s)
 {
     return sqrt(2.0 * 3 * s->model->node_count) * RTOL * sqrt(GRAVITY * s->model->length);

@@ -1,10 +1,10 @@
 /*
  * test_first_order.c: the integrators that choose their own steps by a local error: they agree when their
- * tolerances are tight, have the orders that they are set to, end where they are told to, and continue as they
- * were after a checkpoint; the energy of an oscillator under dirk in closed form.
+ * tolerances are tight, have the orders that they are set to, end at the ends of their runs, and continue
+ * as they were after a checkpoint; the energy of an oscillator under dirk in closed form.
  *
- * The sheet is that of test_order.c: E h = 20 N/m, 2 g a node, dashpots and drag: smooth, with waves that steps
- * of a millisecond resolve.
+ * The sheet is that of test_order.c: E h = 20 N/m, 2 g a node, dashpots and drag: smooth, with waves that
+ * steps of a millisecond resolve.
  */
 #include <complex.h>
 
@@ -40,8 +40,8 @@ static double distance(const scene *a, const scene *b)
     return sqrt(sum / a->model->node_count);
 }
 
-/* rtol 1e-11 of the size a step, in less than 1e3 steps, whose errors do not grow on a sheet with drag: 1e-8 of
- * the size at most. */
+/* rtol 1e-11 of the size a step, in less than 1e3 steps, whose errors do not grow on a sheet with drag:
+ * 1e-8 of the size at most. */
 START_TEST(they_agree_at_tight_tolerances)
 {
     for (int moved = 0; moved < 2; moved++) {
@@ -104,8 +104,8 @@ START_TEST(cvode_has_the_order_that_is_set)
 }
 END_TEST
 
-/* Thousands of steps end within their rounding errors of the end, but the run ends there, to the last bit; so
- * do parts of it. */
+/* Thousands of steps end within their rounding errors of the end, but the run ends there, to the last
+ * bit; so do parts of it. */
 START_TEST(runs_end_at_their_ends)
 {
     for (int i = 0; drape_integrators[i]; i++) {
@@ -122,8 +122,8 @@ START_TEST(runs_end_at_their_ends)
 }
 END_TEST
 
-/* What pins put in comes out, and what dashpots take is counted: the remainder is the error of the method, and
- * of the trapezoidal rule in two powers, which falls with the tolerance. */
+/* What pins put in comes out, and what dashpots take is counted: the remainder is the error of the
+ * method, and of the trapezoidal rule in two powers, which falls with the tolerance. */
 START_TEST(the_energy_balance_is_kept)
 {
     for (int i = 0; drape_integrators[i]; i++) {
@@ -150,7 +150,8 @@ END_TEST
 #define LENGTH  0.1
 #define MODULUS 1e6
 
-/* The centre of a hexagon of pinned springs, as in test_oscillator.c: linear up to the square of the strain. */
+/* The centre of a hexagon of pinned springs, as in test_oscillator.c: linear up to the square of the
+ * strain. */
 static scene oscillator(double max_step, double speed)
 {
     return scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 2, 'edge_length': %g,"
