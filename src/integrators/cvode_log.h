@@ -1,11 +1,12 @@
 /*
- * cvode_log.h: the history of CVODE, for checkpoints. No function of CVODE writes or reads it, and the header
- * that declares it is not installed.
+ * cvode_log.h: the history of CVODE, for checkpoints. No function of CVODE writes or reads it, and the
+ * header that declares it is not installed.
  *
  * CVODE is deterministic. Its decisions depend on the times that it is given, on norms of vectors, on the
- * results of the right-hand side and of the nonlinear solver, and on nothing else. All of these are noted, a
- * few numbers a step. Another CVODE that takes the same steps and is told the same numbers, in place of
- * computing anything, makes the same decisions; then its vectors receive the contents of the first one's.
+ * results of the right-hand side and of the nonlinear solver, and on nothing else. All of these are
+ * noted, a few numbers a step. Another CVODE that takes the same steps and is given the same numbers, in
+ * place of computing anything, makes the same decisions; then its vectors receive the contents of the
+ * first one's.
  */
 #ifndef DRAPE_INTEGRATORS_CVODE_LOG_H
 #define DRAPE_INTEGRATORS_CVODE_LOG_H
@@ -37,8 +38,8 @@ typedef struct drape_cvode_log {
 /* Takes memory, and makes vectors cloned from `like` part of the log. False: out of memory. */
 bool drape_cvode_log_create(drape_cvode_log *log, drape_arena *arena, N_Vector like);
 
-/* CVodeInit and CVodeSetNonlinearSolver, with a solver that is SUNDIALS' Newton or derived from it. False if
- * refused. */
+/* CVodeInit and CVodeSetNonlinearSolver, with a solver that is SUNDIALS' Newton or derived from it. False
+ * if refused. */
 bool drape_cvode_log_init(drape_cvode_log *log, void *cvode,
                           int (*rhs)(sunrealtype, N_Vector, N_Vector, void *), N_Vector y,
                           SUNNonlinearSolver solver);
@@ -55,8 +56,8 @@ int drape_cvode_log_code(drape_cvode_log *log, int code);
 /* Whether there is no room for another step: CVODE must begin again. */
 bool drape_cvode_log_is_full(const drape_cvode_log *log);
 
-/* Archives the log and the vectors; when reading, replays it first, with y as scratch. CVODE must have all its
- * settings and must not have made a step. */
+/* Archives the log and the vectors; when reading, replays it first, with y as scratch. CVODE must have
+ * all its settings and must not have made a step. */
 void drape_cvode_log_archive(drape_cvode_log *log, void *cvode, N_Vector y, drape_archive *a);
 
 #endif

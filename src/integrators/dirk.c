@@ -1,11 +1,11 @@
 /*
- * dirk: singly diagonally implicit Runge-Kutta methods whose first stage is explicit (ESDIRK), of orders 2 to
- * 5, with step sizes by the embedded error, by ARKODE's ARKStep (Reynolds, Gardner, Woodward & Chinomona
- * 2023), for
+ * dirk: singly diagonally implicit Runge-Kutta methods whose first stage is explicit (ESDIRK), of orders
+ * 2 to 5, with step sizes by the embedded error, by ARKODE's ARKStep (Reynolds, Gardner, Woodward &
+ * Chinomona 2023), for
  *     y' = (v, -M^-1 g(x, v, t)).
- * All are L-stable and stiffly accurate: waves that a step does not resolve die out within it, at every order,
- * unlike in the BDF of order 3 and more. All stages have the same gamma, and so one matrix. first_order.h has
- * all that does not concern ARKODE alone.
+ * All are L-stable and stiffly accurate: waves that a step does not resolve die out within it, at every
+ * order, unlike in the BDF of order 3 and more. All stages have the same gamma, and so one matrix.
+ * first_order.h has all that does not concern ARKODE alone.
  *     order 2: TR-BDF2, 3 stages (Bank et al. 1985; Hosea & Shampine 1996)
  *           3: ESDIRK3(2)I5L[2]SA, 5 stages (Kennedy & Carpenter 2016)
  *           4: ARK4(3)7L[2]SA1, 7 stages (Kennedy & Carpenter 2019)
@@ -16,12 +16,12 @@
  * A step depends on the state at its beginning, the derivative there, and the size that was chosen for it.
  * ARKODE is started anew in each step with these, so a checkpoint has all of its history. The derivative is
  * that of the last stage of the step before, as deduced from the stage equation: an evaluation of the force
- * would multiply the error of the Newton iteration by the stiffness (Shampine 1980, Implementation of implicit
- * formulas).
+ * would multiply the error of the Newton iteration by the stiffness (Shampine 1980, Implementation of
+ * implicit formulas).
  *
- * Between the ends of a step positions are interpolated by Hermite's polynomials: of degree 3 from positions
- * and velocities at order 2 and 3, of degree 5 with accelerations above. Their local error is of one order
- * more than the method.
+ * Between the ends of a step positions are interpolated by Hermite's polynomials: of degree 3 from
+ * positions and velocities at order 2 and 3, of degree 5 with accelerations above. Their local error is
+ * of one order more than the method.
  */
 #include "base/elementary.h"
 #include "integrators/first_order.h"
@@ -33,13 +33,13 @@
 #define LOOSE_ORDER  3
 #define TIGHT_ORDER  5
 #define NEWTON_SHARE 0.1 /* of the error tolerance: bound for the error of the Newton iteration */
-/* The matrix is factored again when gamma changed by more than this; the test of convergence notices earlier
- * if it must be. */
+/* The matrix is factored again when gamma changed by more than this; the test of convergence notices
+ * earlier if it must be. */
 #define GAMMA_CHANGE    0.2
 #define MAX_CORRECTIONS 6 /* of the undamped Newton iteration */
-/* The next step, from the estimated local error e of this one and the one before, relative to the tolerance:
- * h S e^(-I/k) e'^(P/k), k the order of the error (Gustafsson 1991). A growth below KEEP is not worth a new
- * matrix. */
+/* The next step, from the estimated local error e of this one and the one before, relative to the
+ * tolerance: h S e^(-I/k) e'^(P/k), k the order of the error (Gustafsson 1991). A growth below KEEP is
+ * not worth a new matrix. */
 #define SAFETY     0.9
 #define INTEGRAL   0.7
 #define PROPORTION 0.3
@@ -125,7 +125,7 @@ static int rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user)
 }
 
 /* Predicts a stage: Taylor's polynomial at the beginning of the step, with one term more from the farthest
- * stage. ARKODE's own predictors use earlier steps, which it is not told of. y of the stage before is in
+ * stage. ARKODE's own predictors use earlier steps, which it does not know. y of the stage before is in
  * f->y. */
 static int predict(sunrealtype t, N_Vector predicted, void *user)
 {
@@ -238,8 +238,8 @@ static drape_first_order_outcome outcome_of(int code)
     }
 }
 
-/* After a failed attempt the size does not grow. A step that was cut, to end at a stop, says nothing against
- * the size that had been chosen. */
+/* After a failed attempt the size does not grow. A step that was cut, to end at a stop, says nothing
+ * against the size that had been chosen. */
 static void choose_next(dirk_state *s)
 {
     drape_first_order *f = &s->base;

@@ -1,5 +1,5 @@
-/* first_order.c: see first_order.h. The callbacks of a solver follow in the order in which it calls them, then
- * the stages of a step around it. */
+/* first_order.c: see first_order.h. The callbacks of a solver follow in the order in which it calls them,
+ * then the stages of a step around it. */
 #include "integrators/first_order.h"
 
 #include "base/finite.h"
@@ -351,10 +351,10 @@ static drape_status start(drape_first_order *s, const drape_state *in, double h,
     return s->solver->begin(s, in->t, h) ? DRAPE_OK : DRAPE_E_SOLVER;
 }
 
-/* Continues from `in` if that is the solver's state; otherwise restarts, with a first step of at most h if the
- * attempt before was rejected. *t: the next kink or the end, whichever comes first; a scene without free
- * nodes advances to there. Pinned nodes that do not move keep their positions, and zero velocity, in s->x
- * and s->v for the whole step. */
+/* Continues from `in` if that is the solver's state; otherwise restarts, with a first step of at most h
+ * if the attempt before was rejected. *t: the next kink or the end, whichever comes first; a scene
+ * without free nodes advances to there. Pinned nodes that do not move keep their positions, and zero
+ * velocity, in s->x and s->v for the whole step. */
 static drape_status prepare(drape_first_order *s, const drape_state *in, double end, double h, double *t,
                             drape_step_info *info)
 {

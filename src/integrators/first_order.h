@@ -2,15 +2,15 @@
  * first_order.h: solvers of SUNDIALS for systems of first order, from one state of the cloth to the next.
  *     y = (x, v) of the free nodes,  x' = v,  M v' = -g(x, v, t)
  *
- * A solver chooses order and step, predicts, tests errors and iterates. Each of its Newton corrections solves,
- * for some c_j = 1/(gamma h),
+ * A solver chooses order and step, predicts, tests errors and iterates. Each of its Newton corrections
+ * solves, for some c_j = 1/(gamma h),
  *     [c_j I, -I; K, D + c_j M] (dx, dv) = (r1, r2),  K = dg/dx, D = dg/dv.
  * Eliminating dv = c_j dx - r1 leaves
  *     (K + c_j D + c_j^2 M) dx = r2 + (D + c_j M) r1:
  * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers. The
- * solvers keep matrix and factors while c_j stays near the value that they were computed for; that is most of
- * their advantage over one factorisation for each iteration. sun_newton.h decides when the iteration with old
- * factors has converged, and damps one that fails.
+ * solvers keep matrix and factors while c_j stays near the value that they were computed for; that is
+ * most of their advantage over one factorisation for each iteration. sun_newton.h decides when the
+ * iteration with old factors has converged, and damps one that fails.
  *
  * That iteration does not need an exact matrix either. The nonsymmetric parts are those of friction, whose
  * force follows the normal force, and of dashpots of strains that rotate. Both are small beside c_j^2 M and
@@ -21,11 +21,11 @@
  * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative
  * part would make the error depend on where the scene is.
  *
- * The motion of pins has kinks at the keys of their tracks, and where a host changes their paths: the solver
- * stops there and restarts.
+ * The motion of pins has kinks at the keys of their tracks, and where a host changes their paths: the
+ * solver stops there and restarts.
  *
- * Here is what they share. An entry of the table holds a drape_first_order at the beginning of its state, its
- * parameters begin with those below, and a drape_first_order_solver calls its library.
+ * Here is what they share. An entry of the table holds a drape_first_order at the beginning of its state,
+ * its parameters begin with those below, and a drape_first_order_solver calls its library.
  */
 #ifndef DRAPE_INTEGRATORS_FIRST_ORDER_H
 #define DRAPE_INTEGRATORS_FIRST_ORDER_H
@@ -168,8 +168,8 @@ static inline size_t drape_first_order_at(const drape_first_order *f, int64_t i)
 }
 /* g at (t, y), into f->g. */
 void drape_first_order_force(drape_first_order *f, double t, const double *y);
-/* To be called with what follows from that force, `out` (2 n). 0; > 0: not finite, or it crosses contact; < 0:
- * fatal. start: the time at which the evaluation began [s of drape_system_clock]. */
+/* To be called with what follows from that force, `out` (2 n). 0; > 0: not finite, or it crosses contact;
+ * < 0: fatal. start: the time at which the evaluation began [s of drape_system_clock]. */
 int drape_first_order_judge(drape_first_order *f, double t, const double *out, double start);
 /* y' = (v, -M^-1 g): a callback of CVODE and ARKODE; user: the drape_first_order. */
 int drape_first_order_rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user);
@@ -189,8 +189,8 @@ int drape_first_order_solve_rhs(SUNLinearSolver solver, SUNMatrix matrix, N_Vect
 
 /* ---- For an entry of the table; `state` begins with a drape_first_order ---- */
 
-/* Fills f, which is zero, with the solver and its parameters; a derived order is max_order of a loose or tight
- * rtol. Errors: out of memory; it must be destroyed after one, too. */
+/* Fills f, which is zero, with the solver and its parameters. An order that is derived is loose_order for
+ * rtol >= 1e-4, else tight_order. Errors: out of memory; it must be destroyed after one, too. */
 drape_status drape_first_order_create(drape_first_order *f, const drape_first_order_solver *solver,
                                       drape_arena *arena, drape_system *system, const double *values,
                                       int param_count, int loose_order, int tight_order);

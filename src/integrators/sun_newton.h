@@ -1,12 +1,12 @@
 /*
- * sun_newton.h: the Newton iteration in a step of IDA, CVODE or ARKODE: when it has converged, and what to do
- * where it fails.
+ * sun_newton.h: the Newton iteration in a step of IDA, CVODE or ARKODE: when it has converged, and what
+ * to do where it fails.
  *
- * IDA, whose ways the others share, estimates the rate at which the iteration with old factors contracts from the last step that took two
- * iterations. While c_j does not change, that may be thousands of steps ago, and each step since has ended
- * after one correction, however inaccurate the matrix had become. The residual that such a step leaves is
- * below the tolerance, but it has the same effect in every step, and makes waves with w h about 1, which
- * BDF 2 damps, grow: the energy of a sheet rose from 1470 J to 2345 J.
+ * IDA estimates, like the others, the rate at which the iteration with old factors contracts from the
+ * last step that took two iterations. While c_j does not change, that may be thousands of steps ago, and
+ * each step since has ended after one correction, however inaccurate the matrix had become. The residual
+ * that such a step leaves is below the tolerance, but it has the same effect in every step, and makes
+ * waves with w h about 1, which BDF 2 damps, grow: the energy of a sheet rose from 1470 J to 2345 J.
  *
  * Here the estimated rate is doubled with every step that does not measure it, and it is unknown after new
  * factors.
@@ -18,8 +18,8 @@
  * of that of friction, by which corrections do not overshoot (drape_friction_bound). The step is shortened
  * only where this fails, too.
  *
- * The residual of IDA is F = (x' - v, M v' + g). That of CVODE and ARKODE is gamma (x' - v, v' + M^-1 g), from
- * which gamma and the masses make the first.
+ * The residual of IDA is F = (x' - v, M v' + g). That of CVODE and ARKODE is gamma (x' - v, v' + M^-1 g),
+ * from which gamma and the masses make the first.
  */
 #ifndef DRAPE_INTEGRATORS_SUN_NEWTON_H
 #define DRAPE_INTEGRATORS_SUN_NEWTON_H

@@ -473,7 +473,8 @@ END_TEST
  * up to the rounding of sums. */
 START_TEST(scenes_without_contact_pay_nothing)
 {
-    static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "ida", "static", "verlet"};
+    static const char *const methods[] = {"be",     "bdf2",   "midpoint", "trbdf2", "ida",
+                                          "static", "verlet", "cvode",    "dirk"};
     for (size_t k = 0; k < 2 * sizeof methods / sizeof *methods; k++) {
         const bool there = k % 2;
         scene s = scene_open(
