@@ -18,9 +18,9 @@
  * r is the factor by which a step multiplies what is far too fast for it; 1 is the trapezoidal rule, which
  * damps nothing. The first two families are of order 2, Newmark's is so for gamma = 1/2 only.
  *
- * The acceleration a is kept between steps. It starts from M a = -g, and again wherever forces jump. It is that
- * of the time t + (m - f) h, not t (Erlicher, Bonaventura & Bursi 2002), so where h changes to h' it is taken to
- * t + (m - f) h' on the line through -M^-1 g at t: without that the order would be 1.
+ * The acceleration a is kept between steps. It starts from M a = -g, and again wherever forces jump. It is
+ * that of the time t + (m - f) h, not t (Erlicher, Bonaventura & Bursi 2002), so where h changes to h' it is
+ * taken to t + (m - f) h' on the line through -M^-1 g at t: without that the order would be 1.
  */
 #include "integrators/implicit.h"
 
