@@ -18,7 +18,9 @@
  * r is the factor by which a step multiplies what is far too fast for it; 1 is the trapezoidal rule, which
  * damps nothing. The first two families are of order 2, Newmark's is so for gamma = 1/2 only.
  *
- * The acceleration a is kept between steps. It starts from M a = -g, and again wherever forces jump.
+ * The acceleration a is kept between steps. It starts from M a = -g, and again wherever forces jump. It is
+ * that of the time t + (m - f) h, not t (Erlicher, Bonaventura & Bursi 2002), so where h changes to h' it is
+ * taken to t + (m - f) h' on the line through -M^-1 g at t: without that the order would be 1.
  */
 #include "integrators/implicit.h"
 
@@ -43,7 +45,7 @@ static const drape_param params[PARAM_COUNT] = {
         DRAPE_CHOICE("family", FAMILY_RHO_INF, families,
                      "rho_inf: Chung & Hulbert, by rho_inf; hht: by alpha; newmark: by beta and gamma"),
     [PARAM_RHO_INF] =
-        DRAPE_NUMBER("rho_inf", "1", 0.8, 0, 1,
+        DRAPE_NUMBER("rho_inf", "1", 0.5, 0, 1,
                      "factor by which a step multiplies waves that it does not resolve; 1 damps "
                      "nothing, 0 the most"),
     [PARAM_ALPHA] =
@@ -57,8 +59,9 @@ typedef struct alpha_state {
     drape_implicit common; /* first */
     double m, f, b, c;     /* alpha_m, alpha_f, beta, gamma */
     double *a, *a1;        /* nodes [m/s2]: of the last accepted state; at the end of the last attempt */
-    double *v0, *g0;       /* nodes: at the start of the step, with the velocities of pins; forces there */
+    double *v0, *g0, *a0;  /* nodes: at the start of the step, with the velocities of pins; forces; a for h */
     double known, made;    /* [s] times of a and a1; NAN: unknown */
+    double h, h1;          /* [s] the steps that led to them; 0: none, a is that of the time itself */
 } alpha_state;
 
 static drape_status choose(drape_context *ctx, const double *values, alpha_state *s)
@@ -100,6 +103,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     s->a1 = drape_arena_take(arena, nodes, sizeof *s->a1);
     s->v0 = drape_arena_take(arena, nodes, sizeof *s->v0);
     s->g0 = drape_arena_take(arena, nodes, sizeof *s->g0);
+    s->a0 = drape_arena_take(arena, nodes, sizeof *s->a0);
     s->known = s->made = NAN;
     return status ? status : drape_arena_status(arena);
 }
@@ -122,8 +126,22 @@ static void move_pins(alpha_state *s, const drape_state *in, double t1, double h
         }
 }
 
-/* g0 and, where it is not known, a0. */
-static void evaluate_start(alpha_state *s, const drape_state *in)
+/* Takes over a1 if the last attempt was accepted, which computed it for the state that this step starts
+ * from. */
+static void settle(alpha_state *s, const drape_state *in)
+{
+    if (s->made == in->t) {
+        double *swap = s->a;
+        s->a = s->a1;
+        s->a1 = swap;
+        s->known = s->made;
+        s->h = s->h1;
+    }
+    s->made = NAN;
+}
+
+/* g0, and a0 for a step of size h. */
+static void evaluate_start(alpha_state *s, const drape_state *in, double h)
 {
     const drape_step_equation *e = &s->common.equation;
     const drape_point start = {.x = in->x,
@@ -131,19 +149,19 @@ static void evaluate_start(alpha_state *s, const drape_state *in)
                                .internal = in->internal,
                                .t = in->t,
                                .span = {e->point.span[0], e->point.span[1]}};
+    const bool known = s->known == in->t && !drape_motion_at_kink(s->common.motion, in->t);
     drape_system_force(e->system, &start, s->g0);
-    if (s->made == in->t) { /* the last attempt was accepted */
-        double *swap = s->a;
-        s->a = s->a1;
-        s->a1 = swap;
-        s->known = s->made;
+    for (size_t i = 0; i < e->dofs; i++) {
+        const size_t at = drape_step_equation_at(e, i);
+        const double now = -s->g0[at] / e->model->mass[at / 3];
+        if (!known)
+            s->a[at] = now;
+        s->a0[at] = s->a[at];
+        if (known && s->m != s->f && s->h > 0 && s->h != h)
+            s->a0[at] = now + h / s->h * (s->a[at] - now);
     }
-    s->made = NAN;
-    if (s->known != in->t)
-        for (size_t i = 0; i < e->dofs; i++) {
-            const size_t at = drape_step_equation_at(e, i);
-            s->a[at] = -s->g0[at] / e->model->mass[at / 3];
-        }
+    if (!known)
+        s->h = 0;
     s->known = in->t;
 }
 
@@ -156,7 +174,7 @@ static void set_equation(alpha_state *s, const drape_state *in, double h)
     e->mass_weight = share / (1 - s->f);
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
-        const double v = in->v[at], a = s->a[at], mass = e->model->mass[at / 3];
+        const double v = in->v[at], a = s->a0[at], mass = e->model->mass[at / 3];
         e->v_base[at] = (1 - s->c / s->b) * v + h * (1 - s->c / (2 * s->b)) * a;
         e->inertia[i] = h * v + h * h * (0.5 - s->b) * a - (s->m * a + s->f * s->g0[at] / mass) / share;
         common->d[i] = common->inertial_guess ? h * v : 0;
@@ -176,7 +194,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         s->v0[at] = in->v[at];
     }
     move_pins(s, in, out->t, h);
-    evaluate_start(s, in);
+    settle(s, in);
+    evaluate_start(s, in, h);
     set_equation(s, in, h);
     drape_status status = drape_implicit_solve_from(common, info);
     if (status && !info->usable)
@@ -185,10 +204,11 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     memcpy(out->v, e->v, e->nodes * sizeof *out->v);
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
-        const double flight = h * in->v[at] + h * h * (0.5 - s->b) * s->a[at];
+        const double flight = h * in->v[at] + h * h * (0.5 - s->b) * s->a0[at];
         s->a1[at] = (common->d[i] - flight) / (s->b * h * h);
     }
     s->made = out->t;
+    s->h1 = h;
     drape_implicit_audit_stage(common, in->x, out->x, in->t, h, e->probe, info);
     return status;
 }
@@ -200,9 +220,11 @@ static void restart(void *state, const drape_state *from)
     drape_implicit_restart(state, from);
 }
 
-static void archive_acceleration(const alpha_state *s, double *t, double *a, drape_archive *archive)
+static void archive_acceleration(const alpha_state *s, double *t, double *h, double *a,
+                                 drape_archive *archive)
 {
     drape_archive_double(archive, t);
+    drape_archive_double(archive, h);
     if (!isnan(*t))
         drape_archive_doubles(archive, a, s->common.equation.nodes);
 }
@@ -210,8 +232,8 @@ static void archive_acceleration(const alpha_state *s, double *t, double *a, dra
 static void archive(void *state, drape_archive *a)
 {
     alpha_state *s = state;
-    archive_acceleration(s, &s->known, s->a, a);
-    archive_acceleration(s, &s->made, s->a1, a);
+    archive_acceleration(s, &s->known, &s->h, s->a, a);
+    archive_acceleration(s, &s->made, &s->h1, s->a1, a);
     drape_implicit_archive(state, a);
 }
 

@@ -10,7 +10,7 @@
 
 #define MAX DRAPE_ROSENBROCK_STAGES
 
-/* The method in the coefficients in which orders are stated: alpha_ij and gamma_ij of k_i, with u = Gamma k. */
+/* The method in the coefficients in which orders are stated: alpha_ij and gamma_ij, with u = Gamma k. */
 typedef struct original {
     int n;
     double alpha[MAX][MAX], gamma[MAX][MAX], b[MAX], embedded[MAX];
@@ -156,8 +156,8 @@ static double *advance(const char *pins, const char *method, const drape_setting
     return x;
 }
 
-/* The steps of test_order.c, 4 to 1 ms; at the last pair the slope of an error C h^p (1 + c h) is p +- c h/1.4
- * = 260/s 1 ms/1.4 = 0.19 if c is the fastest rate. The reference, ida at rtol 1e-12, is off by 1e-11 m. */
+/* Steps of 4 to 1 ms. At the last pair the slope of an error C h^p (1 + c h) is off by c h/1.4, which is 0.19
+ * if c is the fastest rate, 260/s (test_order.c). The reference, ida at rtol 1e-12, is off by 1e-11 m. */
 START_TEST(rosenbrock_has_its_order)
 {
     static const char *const pins[] = {HUNG, MOVED};
