@@ -51,7 +51,7 @@ enum { STAGES = 3 };
 #define MAX_ITERATIONS 10
 #define FAST                                                                                                 \
     1e-2                 /* K and D are kept after a step whose iteration converged at this rate: that
-                               which LINEAR_TOLERANCE allows */
+                               which LINEAR_TOLERANCE allows; never in contact */
 #define AIM          0.3 /* rate for which the next step is made short enough */
 #define SLOWEST      0.99
 #define NEWTON_SHARE 0.03 /* of the error's bound: error that the iteration may leave */
@@ -595,7 +595,7 @@ static drape_status attempt(radau_state *s, const drape_local_attempt *a, drape_
         return status;
     }
     status = drape_local_error_test(&s->control, a, s->error_x, s->error_v, info);
-    s->have_matrix &= status ? s->current : s->theta <= FAST;
+    s->have_matrix &= status ? s->current : s->theta <= FAST && !s->touches;
     if (!status && s->hardest > 0)
         s->control.made.proposed = fmin(s->control.made.proposed, a->h * AIM / s->hardest);
     return status;
