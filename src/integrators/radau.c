@@ -26,9 +26,10 @@
  * Different are
  *   - the place of K and D, the extrapolated middle of the step instead of its beginning: a sheet of 13 x 13
  *     nodes and E h = 1e5 N/m takes half of the iterations;
- *   - a limit to the next step by the rate of convergence (Gustafsson & Soederlind 1997, Control strategies for
- *     the iterative solution of nonlinear equations in ODE solvers): where cloth swings fast, the iteration
- *     bounds the steps, not the error.
+ *   - a limit to the next step by the rate of convergence (Gustafsson & Soederlind 1997, Control strategies
+ *     for the iterative solution of nonlinear equations in ODE solvers): where cloth swings fast, the
+ *     iteration bounds the steps, not the error.
+ *   - in contact, K and D of the present state, in every step, and the present velocities as a guess.
  *
  * The energy account integrates the powers by the quadrature of the stages.
  */
@@ -257,8 +258,8 @@ static double jacobian_clock(const radau_state *s)
 }
 
 /* Where K and D are evaluated: at the last polynomial's extrapolation to the middle of the step, as K at the
- * beginning is twice as far from K at the end; but at the beginning if there is none, if it crosses something,
- * or in contact, whose forces make extrapolation a bad guess. */
+ * beginning is twice as far from K at the end; but at the beginning if there is none, if it crosses
+ * something, or in contact, whose forces make extrapolation a bad guess. */
 static drape_point choose_matrix_point(radau_state *s, double h)
 {
     const polynomial *p = &s->next, *last = &s->last;
@@ -321,8 +322,8 @@ static void set_guess(radau_state *s, guess kind, double h)
     combine(s->n, coefficients, h, s->rate, s->z);
 }
 
-/* Finds a guess in which nothing passes through anything else, and -F there. In contact an extrapolation costs
- * more iterations than it saves. */
+/* Finds a guess in which nothing passes through anything else, and -F there. In contact an extrapolation
+ * costs more iterations than it saves. */
 static drape_status guess_stages(radau_state *s, double h)
 {
     drape_status status = DRAPE_RETRY_NONLINEAR;

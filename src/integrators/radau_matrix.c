@@ -97,8 +97,8 @@ drape_status drape_radau_matrix_evaluate(drape_radau_matrix *m, const drape_poin
     drape_system_jacobian(m->system, &at, 0, 0, m->stiffness);
     if (m->damping)
         drape_system_damping(m->system, &at, m->damping);
-    /* Friction and dashpots of strains that rotate are not symmetric. As in ida.c, Newton's iteration does not
-     * need those parts, and Cholesky factors take three quarters of the time or less for as many
+    /* Friction and dashpots of strains that rotate are not symmetric. As in ida.c, Newton's iteration does
+     * not need those parts: with Cholesky factors a run takes three quarters of the time, for as many
      * iterations. */
     drape_pattern_symmetrize(m->linear->pattern, m->stiffness);
     if (m->damping)

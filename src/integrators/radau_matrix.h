@@ -13,9 +13,9 @@
  * triangle at a distance of 0.73 from 0, whatever the mesh, the stiffness, the damping and h. Without damping
  * it is a segment, and the residual falls by .46 in each iteration: 6 take it to 1e-2.
  *
- * On sheets of 13 x 13 to 50 x 50 nodes these 14 solves take the time of 2.4 to 0.9 factorisations of P. C as a
- * real matrix of 2 n rows, symmetric and quasidefinite once it is multiplied by a phase, takes 6.5 to 8.5 of
- * them for its factors, and each solution 4.5 to 12 solves with P; by KLU the factors take 50 to 100.
+ * On sheets of 13 x 13 to 50 x 50 nodes these 14 solves take the time of 2.4 to 0.9 factorisations of P. C as
+ * a real matrix of 2 n rows, symmetric and quasidefinite once it is multiplied by a phase, takes 6.5 to 8.5
+ * of them for its factors, and each solution 4.5 to 12 solves with P; by KLU the factors take 50 to 100.
  */
 #ifndef DRAPE_INTEGRATORS_RADAU_MATRIX_H
 #define DRAPE_INTEGRATORS_RADAU_MATRIX_H
