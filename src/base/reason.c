@@ -23,9 +23,10 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
         REASON("line_search", "KINSOL", "no step along the correction makes the residual smaller"),
     [DRAPE_REASON_NEWTON_STEP] =
         REASON("newton_step", "KINSOL", "five corrections in a row had the largest allowed size"),
-    [DRAPE_REASON_NEWTON] = REASON("newton", "ida", "Newton's corrections do not converge at this step size"),
+    [DRAPE_REASON_NEWTON] =
+        REASON("newton", "ida, radau", "Newton's corrections do not converge at this step size"),
     [DRAPE_REASON_SINGULAR] =
-        REASON("singular", "KINSOL, IDA, newton_k", "a factorisation or a linear solve failed"),
+        REASON("singular", "KINSOL, IDA, newton_k, radau", "a factorisation or a linear solve failed"),
     [DRAPE_REASON_SOLVER] = REASON("solver", "KINSOL, IDA", "any other failure that these libraries report"),
     [DRAPE_REASON_MEMORY] = REASON("memory", "Newton, newton_k", "memory for the factors ran out"),
     [DRAPE_REASON_NONFINITE] = REASON("nonfinite", "all integrators",
