@@ -364,9 +364,9 @@ DRAPE_API void drape_sim_def_init(drape_sim_def *def, size_t struct_size);
 
 /* Creates a sim at t = 0 with the model's rest positions and initial velocities. If def is NULL, the scene's
  * integrator and controller are used. All heap memory of Drape itself is allocated here; no step allocates
- * any, except where contact outgrows its lists, and at an event that releases pins. The messages of the sim go to ctx, which may differ from the model's context. Errors: DRAPE_E_ARGUMENT
- * (unknown entry, or a setting out of range), DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's
- * cancel function). */
+ * any, except where contact outgrows its lists, and at an event that releases pins. The messages of the sim
+ * go to ctx, which may differ from the model's context. Errors: DRAPE_E_ARGUMENT (unknown entry, or a setting
+ * out of range), DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's cancel function). */
 DRAPE_API drape_status drape_sim_create(drape_context *ctx, const drape_model *model,
                                         const drape_sim_def *def, drape_sim **out);
 

@@ -443,10 +443,18 @@ static drape_event_verdict extend(drape_sim *sim, const drape_state *next)
     return DRAPE_EVENTS_PASS;
 }
 
+static bool has_active(const drape_event_set *e)
+{
+    bool active = false;
+    for (int32_t i = 0; i < e->count && !active; i++)
+        active = !is_over(&e->watches[i]);
+    return active;
+}
+
 drape_event_verdict drape_events_examine(drape_sim *sim, const drape_state *next, drape_status *status)
 {
     drape_event_set *e = &sim->events;
-    if (e->count == 0 || sim->chosen.integrator->steady_state)
+    if (!has_active(e) || sim->chosen.integrator->steady_state)
         return DRAPE_EVENTS_PASS;
     *status = search_all(sim, next);
     if (*status) {

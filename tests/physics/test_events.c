@@ -229,6 +229,40 @@ START_TEST(a_stop_is_a_state_of_the_run_at_the_root)
 }
 END_TEST
 
+static drape_status clock_of(void *user, double t, const double *x, const double *v, double *value)
+{
+    (void)x, (void)v;
+    *value = t - *(const double *)user;
+    return DRAPE_OK;
+}
+
+/* A step that is to end very soon after it begins can be made, in contact and with damping; if it would be
+ * shorter than what events are located to, the event is where the step begins. */
+START_TEST(an_event_may_follow_a_step_closely)
+{
+    static const double after[] = {1e-6, 1e-8, 1e-9, 1e-10, 3e-11, 5e-12};
+    for (int i = 0; method(i); i++)
+        for (size_t k = 0; k < sizeof after / sizeof *after; k++) {
+            const char *name = method(i)->entry.name;
+            scene s = swing(name, "");
+            drape_event_def def;
+            drape_event_def_init(&def, sizeof def);
+            def.name = "clock";
+            def.action = "stop";
+            scene_advance(&s, 0.4);
+            double at = drape_sim_time(s.sim) + after[k];
+            ck_assert_int_eq(drape_sim_add_event(s.sim, &def, clock_of, &at), DRAPE_OK);
+            ck_assert_msg(drape_sim_advance(s.sim, 0.5) == DRAPE_E_STOPPED, "%s %g: %s", name, after[k],
+                          drape_context_message(s.ctx));
+            ck_assert_msg(fabs(drape_sim_time(s.sim) - at) <= 1e-11, "%s %g: %g", name, after[k],
+                          drape_sim_time(s.sim) - at);
+            ck_assert_msg(drape_sim_advance(s.sim, 0.5) == DRAPE_OK, "%s %g: %s", name, after[k],
+                          drape_context_message(s.ctx));
+            scene_close(&s);
+        }
+}
+END_TEST
+
 /* ---- Checkpoints ---- */
 
 static const char stopping[] = "{'type': 'height', 'height': -0.05, 'node': 22},"
@@ -337,8 +371,8 @@ static void check_release(const char *name)
     scene_close(&without);
 }
 
-/* After the release the run is that of a scene without the pin, started from the state of the event: every bit
- * of it. */
+/* After the release the run is that of a scene without the pin, started from the state of the event: every
+ * bit of it. */
 START_TEST(a_released_pin_is_gone)
 {
     for (int i = 0; method(i); i++)
@@ -443,5 +477,5 @@ END_TEST
 
 SUITE("events", free_fall_stops_at_its_height, recorded_events_are_located_on_dense_output,
       a_height_is_passed_twice_in_a_step, recording_changes_no_bit, a_stop_is_a_state_of_the_run_at_the_root,
-      a_restored_sim_has_the_same_events, a_released_pin_is_gone, a_sheet_that_is_let_go_falls,
-      a_release_gives_no_energy, a_release_is_in_checkpoints)
+      an_event_may_follow_a_step_closely, a_restored_sim_has_the_same_events, a_released_pin_is_gone,
+      a_sheet_that_is_let_go_falls, a_release_gives_no_energy, a_release_is_in_checkpoints)
