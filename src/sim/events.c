@@ -774,6 +774,9 @@ static void archive_search(drape_event_search *s, int32_t count, drape_archive *
         drape_archive_double(a, numbers[i]);
     drape_archive_int(a, &s->moved);
     drape_archive_int64(a, &s->tries);
+    if (drape_archive_good(a) && s->event >= 0 &&
+        !(s->from <= s->low && s->low < s->high && isfinite(s->high)))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no interval with an event");
 }
 
 static void archive_pending(drape_event_set *e, drape_archive *a)
