@@ -367,9 +367,9 @@ DRAPE_API void drape_sim_def_init(drape_sim_def *def, size_t struct_size);
 
 /* Creates a sim at t = 0 with the model's rest positions and initial velocities. If def is NULL, the scene's
  * integrator and controller are used. All heap memory of Drape itself is allocated here; no step allocates
- * any. The messages of the sim go to ctx, which may differ from the model's context. Errors: DRAPE_E_ARGUMENT
- * (unknown entry, or a setting out of range), DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's
- * cancel function). */
+ * any, except where contact outgrows its lists, and at an event that releases pins. The messages of the sim
+ * go to ctx, which may differ from the model's context. Errors: DRAPE_E_ARGUMENT (unknown entry, or a setting
+ * out of range), DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's cancel function). */
 DRAPE_API drape_status drape_sim_create(drape_context *ctx, const drape_model *model,
                                         const drape_sim_def *def, drape_sim **out);
 
@@ -380,8 +380,9 @@ DRAPE_API void drape_sim_destroy(drape_sim **sim);
  * remainder below 1e-9 dt joins the step before it. If t_end is not later than the present time, apart from
  * rounding, nothing happens. After a failure the state is the last accepted one. Errors:
  * DRAPE_E_STEP_TOO_SMALL (the step was halved below dt_min; "ida" took max_steps; max_attempts within one
- * dt), DRAPE_E_SOLVER (a step failed under the controller "fixed"), DRAPE_E_STOPPED (by an observer or
- * drape_sim_cancel), DRAPE_E_ARGUMENT (t_end not finite). The message names the time, step size, reason and
+ * dt), DRAPE_E_SOLVER (a step failed under the controller "fixed"), DRAPE_E_STOPPED (by an observer,
+ * drape_sim_cancel or an event, see drape_sim_stopped_by), DRAPE_E_ARGUMENT (t_end not finite, or an event
+ * function is not), DRAPE_E_MEMORY. The message names the time, step size, reason and
  * diagnostic. */
 DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
 
@@ -570,7 +571,8 @@ DRAPE_API drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *fiel
 /* ---- Sim: what can be read ---- */
 
 /* The last accepted state: time [s], positions [m] and velocities [m/s], node_count x 3 each; valid until the
- * next call that changes the sim. drape_sim_model returns the model that the sim was created with. */
+ * next call that changes the sim. drape_sim_model returns the model that the sim was created with
+ * or, after an event released pins, a model of the sim without these, valid until the next release. */
 DRAPE_API double drape_sim_time(const drape_sim *sim);
 DRAPE_API const double *drape_sim_positions(const drape_sim *sim);
 DRAPE_API const double *drape_sim_velocities(const drape_sim *sim);

@@ -360,9 +360,7 @@ static void advance(run *r)
     cli_signals_cancel(NULL);
     if (status == DRAPE_E_STOPPED && cli_interrupted())
         drape_context_set_message(r->in.ctx, "t=%.9g: interrupted", drape_sim_time(r->in.sim));
-    if (status == DRAPE_E_STOPPED && drape_sim_stopped_by(r->in.sim) >= 0) /* as the scene says */
-        snprintf(r->message, sizeof r->message, "%s", drape_context_message(r->in.ctx));
-    else
+    if (status != DRAPE_E_STOPPED || drape_sim_stopped_by(r->in.sim) < 0)
         note(r, status);
     cli_progress_clear(&r->progress);
 }
@@ -381,6 +379,18 @@ static void finish(run *r)
     r->wall = keeps && !r->status ? drape_recorder_wall(r->recorder) : drape_clock_seconds() - r->start;
 }
 
+/* A run that an event stopped has completed, and the summary says why. */
+static void note_event(run *r)
+{
+    drape_event_record event;
+    const int32_t by = drape_sim_stopped_by(r->in.sim);
+    if (r->status || by < 0)
+        return;
+    drape_sim_event(r->in.sim, by, &event);
+    snprintf(r->message, sizeof r->message, "t=%.9g: stopped by event \"%.60s\"", drape_sim_time(r->in.sim),
+             event.name);
+}
+
 static void simulate(run *r)
 {
     const bool done = drape_recorder_is_finished(r->recorder);
@@ -391,6 +401,7 @@ static void simulate(run *r)
         r->wall = drape_recorder_wall(r->recorder);
     else
         finish(r);
+    note_event(r);
     if (r->recorder)
         write_summary(r, drape_recorder_folder(r->recorder), DRAPE_SUMMARY_NAME);
     if (r->request->summary)

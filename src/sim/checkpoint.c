@@ -64,7 +64,8 @@ static void archive_states(drape_sim *sim, drape_archive *a)
 static bool is_schedule(const drape_schedule *s)
 {
     return s->level >= 0 && s->level <= MAX_LEVELS && s->part >= 0 && s->part < (int64_t)1 << s->level &&
-           s->count >= 0 && !(s->dt < 0) && !isnan(s->dt);
+           s->count >= 0 && !(s->dt < 0) && !isnan(s->dt) &&
+           (!s->cut || (isfinite(s->cut_end) && s->cut_end > s->now));
 }
 
 static void archive_schedule(drape_schedule *s, drape_archive *a)

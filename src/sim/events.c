@@ -443,10 +443,18 @@ static drape_event_verdict extend(drape_sim *sim, const drape_state *next)
     return DRAPE_EVENTS_PASS;
 }
 
+static bool has_active(const drape_event_set *e)
+{
+    bool active = false;
+    for (int32_t i = 0; i < e->count && !active; i++)
+        active = !is_over(&e->watches[i]);
+    return active;
+}
+
 drape_event_verdict drape_events_examine(drape_sim *sim, const drape_state *next, drape_status *status)
 {
     drape_event_set *e = &sim->events;
-    if (e->count == 0 || sim->chosen.integrator->steady_state)
+    if (!has_active(e) || sim->chosen.integrator->steady_state)
         return DRAPE_EVENTS_PASS;
     *status = search_all(sim, next);
     if (*status) {
@@ -750,18 +758,25 @@ static void archive_watch(drape_watch *w, drape_archive *a)
     archive_root(&w->last, a);
 }
 
+/* The number of an event; -1: none. */
+static void archive_index(int32_t *index, int32_t count, drape_archive *a)
+{
+    drape_archive_int32(a, index);
+    if (drape_archive_good(a) && !(*index >= -1 && *index < count))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an event %d of %d", (int)*index, (int)count);
+}
+
 static void archive_search(drape_event_search *s, int32_t count, drape_archive *a)
 {
-    int event = s->event;
     double *const numbers[] = {&s->from, &s->target, &s->low, &s->high, &s->low_value, &s->high_value};
-    drape_archive_int(a, &event);
+    archive_index(&s->event, count, a);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         drape_archive_double(a, numbers[i]);
     drape_archive_int(a, &s->moved);
     drape_archive_int64(a, &s->tries);
-    if (drape_archive_good(a) && !(event >= -1 && event < count))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an event %d of %d", event, (int)count);
-    s->event = event;
+    if (drape_archive_good(a) && s->event >= 0 &&
+        !(s->from <= s->low && s->low < s->high && isfinite(s->high)))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no interval with an event");
 }
 
 static void archive_pending(drape_event_set *e, drape_archive *a)
@@ -773,13 +788,10 @@ static void archive_pending(drape_event_set *e, drape_archive *a)
         !(count >= 0 && count <= e->pending_room && reported >= 0 && reported <= count))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %d events to report", count);
     for (int i = 0; i < count && drape_archive_good(a); i++) {
-        int event = e->pending[i].event;
-        drape_archive_int(a, &event);
+        archive_index(&e->pending[i].event, e->count, a);
+        if (drape_archive_good(a) && e->pending[i].event < 0)
+            drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no event to report");
         archive_root(&e->pending[i].root, a);
-        if (drape_archive_good(a) && !(event >= 0 && event < e->count))
-            drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an event %d of %d", event,
-                               (int)e->count);
-        e->pending[i].event = event;
     }
     e->pending_count = drape_archive_good(a) ? count : 0;
     e->reported = drape_archive_good(a) ? reported : 0;
@@ -795,5 +807,6 @@ void drape_events_archive(drape_sim *sim, drape_archive *a)
     if (e->count == 0 || !drape_archive_good(a))
         return;
     archive_search(&e->search, e->count, a);
+    archive_index(&e->stopped_by, e->count, a);
     archive_pending(e, a);
 }

@@ -100,7 +100,8 @@ void drape_events_commit(struct drape_sim *sim);
 drape_status drape_events_report(struct drape_sim *sim);
 
 /* Performs the actions of pending roots, which are then over: pins are released, then the advance stops.
- * Errors: DRAPE_E_STOPPED, with its message; those of drape_sim_release, after which they are still pending. */
+ * Errors: DRAPE_E_STOPPED, with its message; those of drape_sim_release, after which they are still
+ * pending. */
 drape_status drape_events_act(struct drape_sim *sim);
 
 /* Reports and performs what a stopped advance left over. */

@@ -1,7 +1,7 @@
 /* release.c: pins that let their nodes go. Which nodes are free decides the size of everything: the unknowns,
- * the pattern of the matrix, what integrators keep. So a sim is made for a model without these pins, beside the
- * present one, as when a checkpoint is restored. It goes on from the same state and account; the integrator and
- * the controller start anew, as after a kink. */
+ * the pattern of the matrix, what integrators keep. So a sim is made for a model without these pins, beside
+ * the present one, as when a checkpoint is restored. It goes on from the same state and account; the
+ * integrator and the controller start anew, as after a kink. */
 #include "sim/sim.h"
 
 #include <math.h>

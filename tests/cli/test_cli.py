@@ -324,6 +324,43 @@ def test_last_frame():
     equal(read_npy("out/positions.npy")[0][0], 4)
 
 
+def test_events():
+    """events are printed and in the summary; a run that one stops has completed, with exit code 0 and the state of the event as last frame"""
+    events = [{"name": "low", "type": "height", "height": -0.02, "action": "stop"}, {"type": "energy", "bound": 1e-4, "direction": "up"},
+              {"name": "never", "type": "height", "height": -9}]
+    write_scene(events=events)
+    text = good("run", "scene.json", "--out", "out", "--format", "npy")
+    assert re.search(r"^status +ok$", text, re.M) and re.search(r"^event +never: did not occur$", text, re.M), text
+    summary = read_json("out/summary.json")
+    low, fast, never = summary["events"]
+    at = low["occurrences"][0]
+    equal((low["name"], low["count"], at["direction"], at["time"]), ("low", 1, "down", summary["time"]))
+    assert abs(at["value"] + 0.02) < 1e-9 and 0 < at["time"] < 0.1, at
+    equal((fast["name"], fast["count"], fast["occurrences"][0]["direction"]), ("event1", 1, "up"))
+    equal((never["count"], never["occurrences"]), (0, []))
+    equal((summary["status"], summary["message"]), ("ok", f't={summary["time"]:.9g}: stopped by event "low"'))
+    assert f'low: down at {at["time"]:.12g} s' in text and f'event1: up at {fast["occurrences"][0]["time"]:.12g} s' in text, text
+    shape, numbers = read_npy("out/positions.npy")
+    assert abs(min(numbers[-48:][1::3]) + 0.02) < 1e-9, "the last frame"
+    rows = read_steps("out")
+    repeated = [row for row in rows if row["reason"] == "event"]
+    equal(len(repeated), summary["steps"]["reasons"]["event"])
+    assert repeated and all(row["accepted"] == "0" for row in repeated)
+    equal(shape[0], summary["frames"])
+
+
+def test_released():
+    """a pin that an event releases is gone, and the run goes on to its end"""
+    write_scene(events=[{"name": "tears", "type": "pin_force", "limit": 0.02, "action": "release"}])
+    text = good("run", "scene.json", "--out", "out", "--format", "npy", "--duration", "0.5")
+    assert re.search(r"^event +tears: up at", text, re.M), text
+    summary = read_json("out/summary.json")
+    equal((summary["status"], summary["message"], summary["time"]), ("ok", "", 0.5))
+    count = summary["nodes"]
+    _, numbers = read_npy("out/positions.npy")
+    assert max(numbers[-3 * count:][1::3]) < -0.05, "all nodes fall"
+
+
 def test_settings():
     """--set and the short options change the scene, the last one wins, and the result is the same"""
     write_scene()
@@ -698,10 +735,10 @@ def test_every_key_is_everywhere():
             part = part["items"] if step == "N" else next(form["properties"][step] for form in forms(part) if step in form.get("properties", {}))
         return part
 
-    write_scene(colliders=[{"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}])
+    write_scene(colliders=[{"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}], events=[{"type": "height", "height": -1}])
     schema, found, seen = json.loads(good("list", "--schema")), json.loads(good("info", "scene.json", "--json")), set()
     objects = {"/": found, "/output": found, "/cloth/N": found["cloths"][0], "/cloth/N/mesh/transform": found["cloths"][0]["mesh"]["transform"],
-               "/colliders/N": found["colliders"][0]}
+               "/colliders/N": found["colliders"][0], "/events/N": found["events"][0]}
     table = good("list", "--markdown").split("\n### ")[0]
     for place, name, unit, default, takes, what in re.findall(r"^\| `(/.*?)` \| `(.*?)` \|(.*?) \|(.*?) \|(.*?) \| (.*) \|$", table, re.M):
         entry = schema_of(schema, f"{place}/{name}")
@@ -716,7 +753,7 @@ def test_every_key_is_everywhere():
         if place in objects:
             seen.add(name)
             assert name in objects[place], (place, name)
-    assert {"gravity", "frame_rate", "friction", "translate", "up", "formats", "velocity"} <= seen, seen
+    assert {"gravity", "frame_rate", "friction", "translate", "up", "formats", "velocity", "action", "once"} <= seen, seen
 
 
 def test_info_of_contact():
@@ -799,6 +836,14 @@ def variants():
     yield False, scene(self_contact={"thickness": 0})
     yield False, scene(contact={"distance": 0})
     yield False, scene(contact={"friction": 0.5})
+    fall = {"type": "height", "height": -1}
+    for more in ({}, {"name": "a", "cloth": "sheet", "direction": "up", "action": "stop", "once": True}, {"action": "release", "pins": "pin0"}, {"node": 3}):
+        yield True, scene(events=[{**fall, **more}])
+    yield True, scene(events=[{"type": "plane", "normal": [0, 2, 0]}, {"type": "energy", "of": "total", "bound": 0}, {"type": "pin_force", "limit": 1}])
+    for more in ({"height": "1"}, {"type": "heigth"}, {"action": "explode"}, {"direction": 1}, {"once": "maybe"}, {"bound": 1}, {"name": ""}, {"node": 1.5}):
+        yield False, scene(events=[{**fall, **more}])
+    yield False, scene(events=[{"type": "pin_force"}])
+    yield False, scene(events=fall)
     yield False, scene(drape=2)
     yield False, scene(duration=0)
     yield False, scene(duration="5")

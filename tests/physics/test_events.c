@@ -229,6 +229,99 @@ START_TEST(a_stop_is_a_state_of_the_run_at_the_root)
 }
 END_TEST
 
+static drape_status clock_of(void *user, double t, const double *x, const double *v, double *value)
+{
+    (void)x, (void)v;
+    *value = t - *(const double *)user;
+    return DRAPE_OK;
+}
+
+/* A step that is to end very soon after it begins can be made, in contact and with damping; if it would be
+ * shorter than what events are located to, the event is where the step begins. */
+START_TEST(an_event_may_follow_a_step_closely)
+{
+    static const double after[] = {1e-6, 1e-8, 1e-9, 1e-10, 3e-11, 5e-12};
+    for (int i = 0; method(i); i++)
+        for (size_t k = 0; k < sizeof after / sizeof *after; k++) {
+            const char *name = method(i)->entry.name;
+            scene s = swing(name, "");
+            drape_event_def def;
+            drape_event_def_init(&def, sizeof def);
+            def.name = "clock";
+            def.action = "stop";
+            scene_advance(&s, 0.4);
+            double at = drape_sim_time(s.sim) + after[k];
+            ck_assert_int_eq(drape_sim_add_event(s.sim, &def, clock_of, &at), DRAPE_OK);
+            ck_assert_msg(drape_sim_advance(s.sim, 0.5) == DRAPE_E_STOPPED, "%s %g: %s", name, after[k],
+                          drape_context_message(s.ctx));
+            ck_assert_msg(fabs(drape_sim_time(s.sim) - at) <= 1e-11, "%s %g: %g", name, after[k],
+                          drape_sim_time(s.sim) - at);
+            ck_assert_msg(drape_sim_advance(s.sim, 0.5) == DRAPE_OK, "%s %g: %s", name, after[k],
+                          drape_context_message(s.ctx));
+            scene_close(&s);
+        }
+}
+END_TEST
+
+/* ---- Dense output ---- */
+
+#define FRAMES   20000 /* a second */
+#define DISTANCE (1.0 / FRAMES)
+
+typedef struct film {
+    double x[3][75], v[75]; /* the last three frames, and the velocities of the one in the middle */
+    int64_t count;
+    double worst, fastest;
+} film;
+
+/* Compares the velocities of a frame with the difference of the frames around it. */
+static drape_status compare(void *user, const drape_event *event)
+{
+    film *f = user;
+    if (event->kind != DRAPE_EVENT_FRAME)
+        return DRAPE_OK;
+    memmove(f->x[0], f->x[1], 2 * sizeof *f->x);
+    memcpy(f->x[2], event->positions, sizeof *f->x);
+    for (size_t i = 0; f->count >= 2 && i < 75; i++) {
+        const double slope = (f->x[2][i] - f->x[0][i]) / (2 * DISTANCE);
+        f->worst = fmax(f->worst, fabs(slope - f->v[i]));
+        f->fastest = fmax(f->fastest, fabs(slope));
+    }
+    memcpy(f->v, event->velocities, sizeof f->v);
+    f->count++;
+    return DRAPE_OK;
+}
+
+/* Frames are far closer, 50 us, than the steps of a method of high order, 2 ms. With its own velocities
+ * between steps, these and the difference of frames agree to what the tolerance, 1e-7, leaves: some 1e-5 of
+ * 3 m/s. Linear velocities would be off by (w h)^2/8 = 5e-4 of that for the oscillations that the fall
+ * excites, w = 30/s, and more for faster ones. */
+START_TEST(own_velocities_belong_to_the_motion)
+{
+    int checked = 0;
+    for (int i = 0; method(i); i++) {
+        if (!method(i)->interpolate_velocities)
+            continue;
+        const char *name = method(i)->entry.name;
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4,"
+            "   'height': 0.4}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200},"
+            " 'terms': ['stretch.cst', 'bend.hinge'], 'pins': [{'corner': 'top-left'}]}],"
+            " 'integrator': {'method': '%s', 'rtol': 1e-7}, 'frame_rate': %d, 'duration': 1}",
+            name, FRAMES);
+        film f = {.count = 0};
+        ck_assert_int_eq(drape_sim_observe(s.sim, compare, &f), DRAPE_OK);
+        scene_advance(&s, 0.3);
+        printf("# %s: %g of %g m/s, %lld steps\n", name, f.worst, f.fastest,
+               (long long)drape_sim_statistics(s.sim).steps_accepted);
+        ck_assert_double_le(f.worst, 3e-5 * f.fastest);
+        scene_close(&s);
+        checked++;
+    }
+    ck_assert_int_ge(checked, 1);
+}
+END_TEST
+
 /* ---- Checkpoints ---- */
 
 static const char stopping[] = "{'type': 'height', 'height': -0.05, 'node': 22},"
@@ -337,8 +430,8 @@ static void check_release(const char *name)
     scene_close(&without);
 }
 
-/* After the release the run is that of a scene without the pin, started from the state of the event: every bit
- * of it. */
+/* After the release the run is that of a scene without the pin, started from the state of the event: every
+ * bit of it. */
 START_TEST(a_released_pin_is_gone)
 {
     for (int i = 0; method(i); i++)
@@ -443,5 +536,6 @@ END_TEST
 
 SUITE("events", free_fall_stops_at_its_height, recorded_events_are_located_on_dense_output,
       a_height_is_passed_twice_in_a_step, recording_changes_no_bit, a_stop_is_a_state_of_the_run_at_the_root,
+      own_velocities_belong_to_the_motion, an_event_may_follow_a_step_closely,
       a_restored_sim_has_the_same_events, a_released_pin_is_gone, a_sheet_that_is_let_go_falls,
       a_release_gives_no_energy, a_release_is_in_checkpoints)
