@@ -186,14 +186,16 @@ static drape_status check_settings(lab *l)
 static drape_status try_scene(lab *l)
 {
     const char *before = "";
-    drape_status status = l->experiment->prepare ? lab_try(l->ctx, l->def, NULL) : DRAPE_OK;
+    drape_status status = l->experiment->prepare ? lab_try(l->ctx, &(lab_request){.def = l->def}) : DRAPE_OK;
     if (!status && l->experiment->check)
         status = l->experiment->check(l);
     for (size_t i = 0; !status && i < json_array_size(l->cases); i++) {
         const json_t *one = json_array_get(l->cases, i);
         const char *series = lab_tag_text(one, "series");
-        if (strcmp(series, before) != 0)
-            status = lab_try(l->ctx, l->def, json_object_get(one, "settings"));
+        if (strcmp(series, before) != 0) {
+            const lab_request request = lab_request_of(l, i);
+            status = lab_try(l->ctx, &request);
+        }
         before = series;
     }
     return status;
