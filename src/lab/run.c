@@ -157,17 +157,6 @@ static json_t *probed_positions(const run *r, const double *x)
 
 /* ---- The result ---- */
 
-/* The number of correct digits as the test set of Bari has it: -log10 of the largest component of the error at
- * the end, relative to the size of the scene plus the displacement. */
-static double correct_digits(const run *r, const double *x)
-{
-    const double *rest = drape_model_rest_positions(r->model), *y = lab_trace_end(r->request->reference);
-    double largest = 0;
-    for (size_t i = 0; i < r->request->reference->size; i++)
-        largest = fmax(largest, fabs(x[i] - y[i]) / (r->model->length + fabs(y[i] - rest[i])));
-    return largest > 0 ? -log10(largest) : INFINITY;
-}
-
 /* Errors relative to the size of the scene, of a run that reached its last time. */
 static void put_relative_errors(const run *r, const double *x, json_t *result)
 {
@@ -179,7 +168,7 @@ static void put_relative_errors(const run *r, const double *x, json_t *result)
         drape_json_number(whole ? lab_distance(r->model, x, lab_trace_end(r->request->reference)) / size
                                 : NAN));
     json_object_set_new(result, "error_max", drape_json_number(whole ? r->far / size : NAN));
-    json_object_set_new(result, "mescd", drape_json_number(whole ? correct_digits(r, x) : NAN));
+    json_object_set_new(result, "mescd", drape_json_number(whole ? lab_correct_digits(r->model, x, lab_trace_end(r->request->reference)) : NAN));
 }
 
 static json_t *describe(const run *r, drape_sim *sim)
