@@ -58,9 +58,9 @@ typedef struct drape_lab_def {
     drape_lab_progress *progress; /* NULL: no reports */
     drape_lab_cancel *cancel;     /* NULL: never */
     void *user;                   /* passed to progress and cancel */
-    const char *const *scenes;    /* ivp: names of scene files, each with a reference, the first that of `scene`;
+    const char *const *scenes; /* ivp: names of scene files, each with a reference, the first that of `scene`;
                                      NULL: `scene` alone */
-    size_t scene_count;           /* length of scenes */
+    size_t scene_count;        /* length of scenes */
 } drape_lab_def;
 
 /* Fills *def with the defaults. */

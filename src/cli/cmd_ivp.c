@@ -72,7 +72,8 @@ static int code_of(const cli_command *command, drape_status status)
 {
     if (status == DRAPE_E_STOPPED)
         return cli_report(command, CLI_INTERRUPTED);
-    return cli_report(command, status == DRAPE_E_SOLVER || status == DRAPE_E_MEMORY ? CLI_FAILED : CLI_BAD_INPUT);
+    return cli_report(command,
+                      status == DRAPE_E_SOLVER || status == DRAPE_E_MEMORY ? CLI_FAILED : CLI_BAD_INPUT);
 }
 
 static int do_scene(const ivp_request *request, ivp_deed *deed, const char *scene, const char *more)
@@ -114,7 +115,8 @@ static int run(const void *given)
     while (i < ACTIONS && strcmp(actions[i].name, command->operand) != 0)
         i++;
     if (i == ACTIONS)
-        return cli_misuse("ivp", "there is no \"%.60s\"; must be one of run, horizon, reference, score, export",
+        return cli_misuse("ivp",
+                          "there is no \"%.60s\"; must be one of run, horizon, reference, score, export",
                           command->operand);
     const int given_operands = command->operand_count - 1;
     if (given_operands < 1 || (actions[i].operands && given_operands != actions[i].operands))
@@ -126,27 +128,33 @@ static int run(const void *given)
 
 static const cli_option options[] = {
     CLI_LAB_OPTIONS,
-    CLI_LAB_OPTION("repeats", CLI_NUMBER, "N", "runs of a short case, of which the fastest counts (default 3)",
-                   repeats, 100),
-    CLI_LAB_OPTION("budget", CLI_TEXT, "MINUTES",
-                   "limit of wall-clock time; the least informative cases are left out and named (default none)",
-                   budget, 0),
+    CLI_LAB_OPTION("repeats", CLI_NUMBER, "N",
+                   "runs of a short case, of which the fastest counts (default 3)", repeats, 100),
+    CLI_LAB_OPTION(
+        "budget", CLI_TEXT, "MINUTES",
+        "limit of wall-clock time; the least informative cases are left out and named (default none)", budget,
+        0),
     {"check", CLI_FLAG, NULL, "reference: compare with the stored one instead of storing it",
      offsetof(ivp_request, check), 0, NULL},
 };
 
 const drape_verb drape_verb_ivp = {
-    .entry = {.name = "ivp", .summary = "the test set of initial value problems: all integrators against references"},
+    .entry = {.name = "ivp",
+              .summary = "the test set of initial value problems: all integrators against references"},
     .operand = "ACTION SCENE...",
     .max_operands = 1000,
     .details =
-        "drape ivp run SCENE...            every integrator over its dt or rtol: errors, costs, orders, tables\n"
+        "drape ivp run SCENE...            every integrator over its dt or rtol: errors, costs, orders, "
+        "tables\n"
         "drape ivp score SCENE FILE.npy    how far the frames of another program are from the reference\n"
         "drape ivp export SCENE --out DIR  mesh, masses, pins and reference for another program\n"
-        "drape ivp reference SCENE...      compute references/NAME.npy beside the scene, by unrelated methods\n"
+        "drape ivp reference SCENE...      compute references/NAME.npy beside the scene, by unrelated "
+        "methods\n"
         "drape ivp horizon SCENE...        measure how a perturbation grows, into horizons/NAME.json\n"
-        "The scenes are in examples/ivp. A run of which cases were left out, or that was stopped, continues by the\n"
-        "same command. --case-seconds is also the CPU time that a method may take for a reference (default 60).",
+        "The scenes are in examples/ivp. A run of which cases were left out, or that was stopped, continues "
+        "by the\n"
+        "same command. --case-seconds is also the CPU time that a method may take for a reference (default "
+        "60).",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(ivp_request),

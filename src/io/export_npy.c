@@ -12,7 +12,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define FILE_NAME   "positions.npy"
+#define FILE_NAME "positions.npy"
 
 typedef struct npy_state {
     drape_file file;

@@ -47,7 +47,8 @@ static void perturb(const lab_ivp *s, int direction, double *x)
 }
 
 /* The motion from the start, perturbed in a direction or, 0, not. */
-static drape_status start(const lab_ivp *s, const drape_model *model, int direction, double *x, drape_sim **sim)
+static drape_status start(const lab_ivp *s, const drape_model *model, int direction, double *x,
+                          drape_sim **sim)
 {
     const size_t size = 3 * (size_t)drape_model_node_count(model);
     drape_status status = drape_sim_create(s->arena->ctx, model, NULL, sim);
@@ -151,14 +152,16 @@ drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
     for (size_t i = 0; i < count && t[i] <= duration * (1 + 1e-9); i++)
         largest = fmax(largest, growth[i]);
     const double horizon = find_horizon(t, growth, count);
-    *within = !status && count > 0 && t[count - 1] >= duration * (1 - 1e-9) && horizon >= duration * (1 - 1e-9);
+    *within =
+        !status && count > 0 && t[count - 1] >= duration * (1 - 1e-9) && horizon >= duration * (1 - 1e-9);
     if (!status)
         status = store(s, settings, t, growth, count, horizon);
     if (!status && isfinite(horizon))
         fprintf(out, "horizon   %.4g s: a perturbation of %.0e of the size grows %.0e-fold\n", horizon,
                 PERTURBATION, LIMIT);
     else if (!status)
-        fprintf(out, "horizon   beyond %.4g s: a perturbation of %.0e of the size grows less than %.0e-fold\n",
+        fprintf(out,
+                "horizon   beyond %.4g s: a perturbation of %.0e of the size grows less than %.0e-fold\n",
                 count ? t[count - 1] : 0, PERTURBATION, LIMIT);
     if (!status)
         fprintf(out, "duration  %.4g s: within it, the perturbation grows %.3g-fold\n", duration, largest);

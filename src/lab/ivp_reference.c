@@ -6,10 +6,10 @@
  */
 #include "base/clock.h"
 #include "base/hash.h"
+#include "base/param.h"
 #include "io/npy.h"
 #include "lab/ivp.h"
 #include "lab/lab.h"
-#include "base/param.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -28,16 +28,13 @@ typedef struct family {
     double rtol, ratio; /* the first and how it falls; methods of fixed steps: 0, and dt is halved */
     const char *also;   /* a parameter of the method that is set; NULL: none */
     int also_value;
-    int stride;         /* of the exponents of dt in the error: 2 for a symmetric method */
+    int stride; /* of the exponents of dt in the error: 2 for a symmetric method */
 } family;
 
 static const family families[] = {
-    {"Radau", "radau", 1e-6, 0.1, NULL, 0, 1},
-    {"BDF", "ida", 1e-8, 0.1, "max_order", 5, 1},
-    {"BDF", "cvode", 1e-8, 0.1, "max_order", 5, 1},
-    {"SDIRK", "dirk", 1e-6, 0.1, NULL, 0, 1},
-    {"SDIRK", "trbdf2", 0, 0.5, NULL, 0, 1},
-    {"Verlet", "verlet", 0, 0.5, "substeps", 1, 2},
+    {"Radau", "radau", 1e-6, 0.1, NULL, 0, 1},      {"BDF", "ida", 1e-8, 0.1, "max_order", 5, 1},
+    {"BDF", "cvode", 1e-8, 0.1, "max_order", 5, 1}, {"SDIRK", "dirk", 1e-6, 0.1, NULL, 0, 1},
+    {"SDIRK", "trbdf2", 0, 0.5, NULL, 0, 1},        {"Verlet", "verlet", 0, 0.5, "substeps", 1, 2},
 };
 #define FAMILIES ((int)(sizeof families / sizeof *families))
 
@@ -46,9 +43,9 @@ typedef struct attempt {
     const family *family;
     lab_trace columns[MAX_LEVELS]; /* of the last level: extrapolated so many times */
     lab_trace best;
-    int count, column;  /* levels; the column that is best */
+    int count, column;   /* levels; the column that is best */
     double knob, change; /* of the last level; the change of best at it, relative to the size */
-    double spent;       /* [s] CPU */
+    double spent;        /* [s] CPU */
     char ended_by[160];
 } attempt;
 
@@ -197,11 +194,12 @@ static drape_status compare(lab_ivp *s, const attempt *best, double error, FILE 
         return status;
     const double distance = lab_ivp_distance(s, &s->reference, &best->best), allowed = s->error + error;
     fprintf(out, "stored    differs by %.2g of the size; its error is %.2g\n", distance, s->error);
-    return distance <= allowed ? DRAPE_OK
-                               : drape_fail(s->arena->ctx, DRAPE_E_SOLVER,
-                                            "%.300s: the stored reference differs by %.2g of the size from the "
-                                            "one computed now; both errors together are %.2g",
-                                            s->path, distance, allowed);
+    return distance <= allowed
+               ? DRAPE_OK
+               : drape_fail(s->arena->ctx, DRAPE_E_SOLVER,
+                            "%.300s: the stored reference differs by %.2g of the size from the "
+                            "one computed now; both errors together are %.2g",
+                            s->path, distance, allowed);
 }
 
 drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out)
@@ -219,19 +217,24 @@ drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out
         status = refine(s, seconds, a);
         count++;
         if (!status)
-            fprintf(out, "%-9s %d levels to %s %.3g, extrapolated %d times: the last changed it by %.2g of the "
-                    "size; %.3g s%s%s\n", a->family->method, a->count, a->family->rtol > 0 ? "rtol" : "dt",
-                    a->knob, a->column, a->change, a->spent, *a->ended_by ? "; ended by: " : "", a->ended_by);
+            fprintf(out,
+                    "%-9s %d levels to %s %.3g, extrapolated %d times: the last changed it by %.2g of the "
+                    "size; %.3g s%s%s\n",
+                    a->family->method, a->count, a->family->rtol > 0 ? "rtol" : "dt", a->knob, a->column,
+                    a->change, a->spent, *a->ended_by ? "; ended by: " : "", a->ended_by);
     }
     if (status)
         return status;
     const attempt *best = choose(attempts, count);
-    const double error = disagreement(s, attempts, count, best), goal = s->contact ? CONTACT_GOAL : SMOOTH_GOAL;
+    const double error = disagreement(s, attempts, count, best),
+                 goal = s->contact ? CONTACT_GOAL : SMOOTH_GOAL;
     if (!(error <= goal))
-        return drape_fail(s->arena->ctx, DRAPE_E_SOLVER,
-                          "%.300s: no reference: its families of methods agree to %.2g of the size; they must "
-                          "to %.0e",
-                          s->path, error, goal);
-    fprintf(out, "reference %s, agrees with another family to %.2g of the size\n", best->family->method, error);
+        return drape_fail(
+            s->arena->ctx, DRAPE_E_SOLVER,
+            "%.300s: no reference: its families of methods agree to %.2g of the size; they must "
+            "to %.0e",
+            s->path, error, goal);
+    fprintf(out, "reference %s, agrees with another family to %.2g of the size\n", best->family->method,
+            error);
     return check ? compare(s, best, error, out) : store(s, attempts, count, best, error);
 }

@@ -1,10 +1,10 @@
 /* ivp_score.c: scenes of the test set for other programs: what they need, and how far their motion is from the
  * reference; see ivp.h. */
+#include "io/export.h"
 #include "io/npy.h"
 #include "lab/ivp.h"
 #include "lab/lab.h"
 #include "lab/text.h"
-#include "io/export.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -29,8 +29,8 @@ static drape_status read_frames(const lab_ivp *s, const char *path, const double
                           "%.400s: not an array of float64, times x nodes x 3, C order (numpy.save)", path);
     if (nodes != count || (frames != times && frames != times + 1))
         return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
-                          "%.300s: its shape is (%" PRId64 ", %" PRId32 ", 3); it must be (%" PRId64 ", %" PRId32
-                          ", 3), a frame every %.9g s, or one more with the start",
+                          "%.300s: its shape is (%" PRId64 ", %" PRId32 ", 3); it must be (%" PRId64
+                          ", %" PRId32 ", 3), a frame every %.9g s, or one more with the start",
                           path, frames, nodes, times, count, s->interval);
     const size_t frame = 24 * (size_t)nodes;
     if (size != data + frame * (size_t)frames)
@@ -44,7 +44,8 @@ static drape_status read_frames(const lab_ivp *s, const char *path, const double
     *x = copy;
     for (size_t i = 0; i < s->reference.size * s->time_count; i++)
         if (!isfinite(copy[i]))
-            return drape_fail(s->arena->ctx, DRAPE_E_PARSE, "%.400s: a position is not a finite number", path);
+            return drape_fail(s->arena->ctx, DRAPE_E_PARSE, "%.400s: a position is not a finite number",
+                              path);
     return DRAPE_OK;
 }
 
@@ -187,7 +188,8 @@ drape_status lab_ivp_export(const lab_ivp *s, const char *path, FILE *out)
     if (!status)
         status = put_all(s, drape_sim_velocities(sim), folder);
     if (!status)
-        fprintf(out, "export    %s: start.obj, nodes.csv, pins.csv, times.csv, scene.json, reference.npy\n", path);
+        fprintf(out, "export    %s: start.obj, nodes.csv, pins.csv, times.csv, scene.json, reference.npy\n",
+                path);
     drape_folder_close(&folder);
     drape_sim_destroy(&sim);
     return status;

@@ -108,8 +108,7 @@ drape_status lab_ivp_dt(const lab_ivp *s, const drape_integrator_ops *integrator
     def.scene = s->path;
     json_t *settings =
         json_pack("{s:s, s:f}", "/integrator/method", integrator->entry.name, "/integrator/dt", *dt);
-    drape_status status =
-        lab_load(s->arena->ctx, &(lab_request){.def = &def, .settings = settings}, &model);
+    drape_status status = lab_load(s->arena->ctx, &(lab_request){.def = &def, .settings = settings}, &model);
     if (!status)
         status = drape_sim_create(s->arena->ctx, model, NULL, &sim);
     if (!status)
@@ -151,8 +150,8 @@ double lab_ivp_distance(const lab_ivp *s, const lab_trace *a, const lab_trace *b
 {
     double largest = 0;
     for (int64_t i = 0; i < a->frames; i++)
-        largest = fmax(largest, lab_distance(s->model, a->x + a->size * (size_t)i,
-                                             b->x + b->size * (size_t)i));
+        largest =
+            fmax(largest, lab_distance(s->model, a->x + a->size * (size_t)i, b->x + b->size * (size_t)i));
     return largest / s->size;
 }
 
@@ -241,8 +240,8 @@ static drape_status read_positions(lab_ivp *s, const char *path, const json_t *a
              (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, bytes, size));
     if (strcmp(digits, lab_text(about, "data_hash")) != 0)
         return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
-                          "%.400s: damaged: its bytes are not those that %.60s.json beside it describes", path,
-                          s->name);
+                          "%.400s: damaged: its bytes are not those that %.60s.json beside it describes",
+                          path, s->name);
     if (!drape_npy_read_header(bytes, size, &frames, &nodes, &data) || nodes != count ||
         frames != (int64_t)s->time_count || size != data + 24 * (size_t)nodes * (size_t)frames)
         return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
@@ -263,9 +262,10 @@ drape_status lab_ivp_read_reference(lab_ivp *s)
     const char *path = lab_ivp_file(s, "references", "json"), *data = lab_ivp_file(s, "references", "npy");
     drape_status status = path && data ? read_json(s, path, &about) : DRAPE_E_MEMORY;
     if (!status && strcmp(lab_text(about, "scene_hash"), s->hash) != 0)
-        status = drape_fail(s->arena->ctx, DRAPE_E_PARSE,
-                            "%.400s: of another version of the scene; `drape ivp reference %.300s` makes it anew",
-                            path, s->path);
+        status =
+            drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+                       "%.400s: of another version of the scene; `drape ivp reference %.300s` makes it anew",
+                       path, s->path);
     s->error = lab_number(about, "error");
     if (!status && !(s->error >= 0))
         status = drape_fail(s->arena->ctx, DRAPE_E_PARSE, "%.400s: it has no number \"error\"", path);

@@ -128,8 +128,8 @@ static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
     }
     r->start = drape_clock_thread_seconds();
     const double wall = drape_clock_seconds();
-    r->status = r->request->times ? advance_to_times(sim, r)
-                                  : drape_sim_advance(sim, drape_model_duration(r->model));
+    r->status =
+        r->request->times ? advance_to_times(sim, r) : drape_sim_advance(sim, drape_model_duration(r->model));
     r->cpu = drape_clock_thread_seconds() - r->start;
     r->wall = drape_clock_seconds() - wall;
     snprintf(r->message, sizeof r->message, "%s", r->status ? drape_context_message(ctx) : "");
@@ -168,7 +168,10 @@ static void put_relative_errors(const run *r, const double *x, json_t *result)
         drape_json_number(whole ? lab_distance(r->model, x, lab_trace_end(r->request->reference)) / size
                                 : NAN));
     json_object_set_new(result, "error_max", drape_json_number(whole ? r->far / size : NAN));
-    json_object_set_new(result, "mescd", drape_json_number(whole ? lab_correct_digits(r->model, x, lab_trace_end(r->request->reference)) : NAN));
+    json_object_set_new(
+        result, "mescd",
+        drape_json_number(whole ? lab_correct_digits(r->model, x, lab_trace_end(r->request->reference))
+                                : NAN));
 }
 
 static json_t *describe(const run *r, drape_sim *sim)

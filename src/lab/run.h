@@ -18,13 +18,13 @@ typedef struct lab_request {
     const double *times;        /* (time_count) [s] at which steps end, and at which it is compared and
                                    recorded; NULL: at frames, which may lie within steps, and at the end */
     size_t time_count;
-    const lab_probe *probe;     /* NULL or no points: nowhere */
-    lab_trace *record;          /* its frames and, last, its end; or its states at `times`. NULL: not
+    const lab_probe *probe; /* NULL or no points: nowhere */
+    lab_trace *record;      /* its frames and, last, its end; or its states at `times`. NULL: not
                                    recorded. Made here, in: */
-    drape_arena *arena;         /* of the record */
-    double seconds;             /* CPU: a run that takes more is stopped */
-    double deadline; /* [s] of the wall clock: a run that is not done by then is abandoned; 0: none */
-    int repeats;     /* the least CPU time of so many counts */
+    drape_arena *arena;     /* of the record */
+    double seconds;         /* CPU: a run that takes more is stopped */
+    double deadline;        /* [s] of the wall clock: a run that is not done by then is abandoned; 0: none */
+    int repeats;            /* the least CPU time of so many counts */
     const atomic_bool *given_up; /* another thread failed; NULL: there is none */
 } lab_request;
 
