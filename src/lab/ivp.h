@@ -24,6 +24,7 @@ typedef struct lab_ivp {
     char hash[17];           /* of the text of the scene */
     drape_model *model;      /* to be closed */
     double size;             /* [m] */
+    double node_mass;        /* [kg] mean */
     bool contact;            /* with colliders or of cloth with itself */
     double interval;         /* [s] between the times */
     double *times;           /* (time_count) [s] */

@@ -34,6 +34,16 @@ static drape_status make_times(lab_ivp *s)
     return s->times ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
+static double mean_mass(const drape_model *model)
+{
+    const double *masses = drape_model_masses(model);
+    const int32_t count = drape_model_node_count(model);
+    double sum = 0;
+    for (int32_t i = 0; i < count; i++)
+        sum += masses[i];
+    return sum / count;
+}
+
 drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
 {
     char *text, *name;
@@ -53,6 +63,7 @@ drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
              (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, text, length));
     drape_arena_release(arena, text);
     s->size = s->model->length;
+    s->node_mass = mean_mass(s->model);
     s->contact = s->model->collider_count > 0 || s->model->contact.self;
     return make_times(s);
 }
@@ -74,12 +85,8 @@ bool lab_ivp_admits(const lab_ivp *s, const drape_integrator_ops *integrator)
  */
 static double residual_of_size(const lab_ivp *s)
 {
-    const double *masses = drape_model_masses(s->model), end = s->times[s->time_count - 1];
-    const int32_t count = drape_model_node_count(s->model);
-    double sum = 0;
-    for (int32_t i = 0; i < count; i++)
-        sum += masses[i];
-    return sum / count * s->size / (end * end);
+    const double end = s->times[s->time_count - 1];
+    return s->node_mass * s->size / (end * end);
 }
 
 double lab_ivp_tolerance(const lab_ivp *s, int order, double dt)
