@@ -16,7 +16,8 @@
 #include <string.h>
 
 #define MAX_LEVELS   8
-#define ENOUGH       1e-11 /* of the size: no further refinement */
+#define ENOUGH       1e-2 /* of the goal: no further refinement */
+#define GROWTH       1.7
 #define SMOOTH_GOAL  1e-8  /* of the size: families agree to this, */
 #define CONTACT_GOAL 1e-5  /* or with contact to this */
 #define COARSEST     8     /* steps in an interval at the first level of fixed steps */
@@ -98,8 +99,27 @@ static drape_status extrapolate(const lab_ivp *s, attempt *a, lab_trace next)
     return DRAPE_OK;
 }
 
-static drape_status refine(const lab_ivp *s, double seconds, attempt *a)
+/* The distance to the nearest result of a family of another name. */
+static double disagreement(const lab_ivp *s, const attempt *attempts, int count, const attempt *best)
 {
+    double least = INFINITY;
+    for (int i = 0; best && i < count; i++)
+        if (attempts[i].count > 1 && strcmp(attempts[i].family->name, best->family->name) != 0)
+            least = fmin(least, lab_ivp_distance(s, &attempts[i].best, &best->best));
+    return least;
+}
+
+static double goal_of(const lab_ivp *s)
+{
+    return s->contact ? CONTACT_GOAL : SMOOTH_GOAL;
+}
+
+/* Refines the last of the attempts until it changes no more, agrees with an earlier one of another family, or
+ * its next level, which is expected to take GROWTH times the last one, would exceed its time. */
+static drape_status refine(const lab_ivp *s, double seconds, const attempt *attempts, attempt *a)
+{
+    const int before = (int)(a - attempts);
+    double took = 0;
     const family *f = a->family;
     drape_status status = DRAPE_OK;
     const double start = drape_clock_thread_seconds();
@@ -107,13 +127,21 @@ static drape_status refine(const lab_ivp *s, double seconds, attempt *a)
     if (!(knob > 0))
         status = lab_ivp_dt(s, lab_find_integrator(f->method), COARSEST, &knob);
     a->change = INFINITY;
-    for (; !status && !*a->ended_by && a->count < MAX_LEVELS && !(a->change < ENOUGH); knob *= f->ratio) {
+    for (; !status && !*a->ended_by && a->count < MAX_LEVELS; knob *= f->ratio) {
         json_t *result = NULL;
         lab_trace trace;
+        if (a->change < ENOUGH * goal_of(s) ||
+            (a->count > 1 && disagreement(s, attempts, before, a) < ENOUGH * goal_of(s)))
+            break;
         if (f->rtol > 0 && knob < 0.99e-12)
             break; /* the least that parameters allow */
+        if (GROWTH * took > seconds - a->spent) {
+            snprintf(a->ended_by, sizeof a->ended_by, "the next level would take too long");
+            break;
+        }
         status = lab_ivp_run(s, settings_of(s, f, knob), seconds - a->spent, &trace, &result);
-        a->spent = drape_clock_thread_seconds() - start;
+        took = drape_clock_thread_seconds() - start - a->spent;
+        a->spent += took;
         if (!status && trace.frames) {
             status = extrapolate(s, a, trace);
             a->knob = knob;
@@ -134,16 +162,6 @@ static const attempt *choose(const attempt *attempts, int count)
         if (attempts[i].count > 1 && (!best || attempts[i].change < best->change))
             best = &attempts[i];
     return best;
-}
-
-/* The distance to the nearest result of a family of another name. */
-static double disagreement(const lab_ivp *s, const attempt *attempts, int count, const attempt *best)
-{
-    double least = INFINITY;
-    for (int i = 0; best && i < count; i++)
-        if (attempts[i].count > 1 && strcmp(attempts[i].family->name, best->family->name) != 0)
-            least = fmin(least, lab_ivp_distance(s, &attempts[i].best, &best->best));
-    return least;
 }
 
 static json_t *describe(const lab_ivp *s, const attempt *attempts, int count, const attempt *best)
@@ -206,15 +224,17 @@ drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out
 {
     attempt attempts[FAMILIES];
     int count = 0;
+    bool agreed = false;
     drape_status status = DRAPE_OK;
     memset(attempts, 0, sizeof attempts);
-    for (int i = 0; !status && i < FAMILIES; i++) {
+    for (int i = 0; !status && i < FAMILIES && !agreed; i++) {
         const drape_integrator_ops *integrator = lab_find_integrator(families[i].method);
         attempt *a = &attempts[count];
         if (!integrator || !lab_ivp_admits(s, integrator))
             continue;
         a->family = &families[i];
-        status = refine(s, seconds, a);
+        status = refine(s, seconds, attempts, a);
+        agreed = !status && a->count > 1 && disagreement(s, attempts, count, a) < ENOUGH * goal_of(s);
         count++;
         if (!status)
             fprintf(out,
@@ -227,7 +247,7 @@ drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out
         return status;
     const attempt *best = choose(attempts, count);
     const double error = disagreement(s, attempts, count, best),
-                 goal = s->contact ? CONTACT_GOAL : SMOOTH_GOAL;
+                 goal = goal_of(s);
     if (!(error <= goal))
         return drape_fail(
             s->arena->ctx, DRAPE_E_SOLVER,
