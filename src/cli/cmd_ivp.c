@@ -1,6 +1,6 @@
 /* cmd_ivp.c: `drape ivp`: the test set of initial value problems: horizons, references, runs, scores. */
 #include "cli/lab.h"
-
+#include "cli/signals.h"
 #include "lab/ivp.h"
 
 #include <stdlib.h>
@@ -71,9 +71,15 @@ static int run_scenes(const ivp_request *request)
 static int code_of(const cli_command *command, drape_status status)
 {
     if (status == DRAPE_E_STOPPED)
-        return cli_report(command, CLI_INTERRUPTED);
+        return cli_report_interrupted(command->verb);
     return cli_report(command,
                       status == DRAPE_E_SOLVER || status == DRAPE_E_MEMORY ? CLI_FAILED : CLI_BAD_INPUT);
+}
+
+static bool interrupted(void *user)
+{
+    (void)user;
+    return cli_interrupted();
 }
 
 static int do_scene(const ivp_request *request, ivp_deed *deed, const char *scene, const char *more)
@@ -83,6 +89,7 @@ static int do_scene(const ivp_request *request, ivp_deed *deed, const char *scen
     lab_ivp s = {0};
     bool good = true;
     drape_status status = lab_ivp_open(&arena, scene, &s);
+    s.cancel = interrupted;
     if (!status)
         status = deed(&s, request, more, &good);
     lab_ivp_close(&s);

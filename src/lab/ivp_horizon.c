@@ -74,10 +74,9 @@ static drape_status measure(const lab_ivp *s, const drape_model *model, const do
     bool running = !status;
     for (*reached = 0; running && *reached < SAMPLES; *reached += running) {
         for (int d = 0; running && d <= DIRECTIONS; d++) {
-            const drape_status advanced = drape_sim_advance(sims[d], t[*reached]);
-            if (advanced == DRAPE_E_STOPPED)
-                status = advanced;
-            running = !advanced;
+            if (s->cancel && s->cancel(NULL))
+                status = drape_fail(s->arena->ctx, DRAPE_E_STOPPED, "interrupted");
+            running = !status && !drape_sim_advance(sims[d], t[*reached]);
             if (running && d)
                 growth[*reached] = fmax(growth[*reached], lab_distance(model, drape_sim_positions(sims[0]),
                                                                        drape_sim_positions(sims[d])) /

@@ -18,9 +18,9 @@
 #define MAX_LEVELS   8
 #define ENOUGH       1e-2 /* of the goal: no further refinement */
 #define GROWTH       1.7
-#define SMOOTH_GOAL  1e-8  /* of the size: families agree to this, */
-#define CONTACT_GOAL 1e-5  /* or with contact to this */
-#define COARSEST     8     /* steps in an interval at the first level of fixed steps */
+#define SMOOTH_GOAL  1e-8 /* of the size: families agree to this, */
+#define CONTACT_GOAL 1e-5 /* or with contact to this */
+#define COARSEST     8    /* steps in an interval at the first level of fixed steps */
 
 /* Methods that have nothing in common but the equations: of different names. A method that the build does not
  * have is left out. */
@@ -246,8 +246,7 @@ drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out
     if (status)
         return status;
     const attempt *best = choose(attempts, count);
-    const double error = disagreement(s, attempts, count, best),
-                 goal = goal_of(s);
+    const double error = disagreement(s, attempts, count, best), goal = goal_of(s);
     if (!(error <= goal))
         return drape_fail(
             s->arena->ctx, DRAPE_E_SOLVER,

@@ -133,6 +133,7 @@ drape_status lab_ivp_run(const lab_ivp *s, json_t *settings, double seconds, lab
     drape_lab_def def;
     drape_lab_def_init(&def, sizeof def);
     def.scene = s->path;
+    def.cancel = s->cancel;
     const lab_request request = {.def = &def,
                                  .settings = settings,
                                  .times = s->times,
