@@ -2,6 +2,7 @@
  * test_estimate.c: the error that an integrator estimates for each step, the distance to the converged step,
  * and what follows from it: further iterations, what the frames of a budget report, and a warning.
  */
+#include "support/bytes.h"
 #include "support/scene.h"
 
 #define DT    (1.0 / 60)
@@ -270,6 +271,27 @@ START_TEST(steps_without_contact_take_one_iteration)
 }
 END_TEST
 
+/* What was measured is in a checkpoint: a restored sim does not measure it again. */
+START_TEST(what_a_correction_leaves_is_archived)
+{
+    static const source stiff = {"", 10, STIFF, EDGES, PINS};
+    scene s = open(&stiff, "newton_k", ""), other = open(&stiff, "newton_k", "");
+    for (int steps = 10; steps < 13; steps++) {
+        scene_advance(&s, steps * DT);
+        bytes saved = bytes_save(s.sim);
+        ck_assert_int_eq(drape_sim_restore_from(other.sim, saved.data, saved.size), DRAPE_OK);
+        free(saved.data);
+        scene_advance(&s, (steps + 1) * DT);
+        scene_advance(&other, (steps + 1) * DT);
+        const drape_statistics a = drape_sim_statistics(s.sim), b = drape_sim_statistics(other.sim);
+        ck_assert_int_eq(a.residuals, b.residuals);
+        ck_assert(a.error_last == b.error_last);
+    }
+    scene_close(&s);
+    scene_close(&other);
+}
+END_TEST
+
 /* Where pins jump to 2 m/s, by a third of an edge in the first step, the linearized equation leads to a guess
  * from which two iterations are enough. */
 START_TEST(pins_that_jump_take_the_sheet_along)
@@ -295,4 +317,5 @@ END_TEST
 SUITE("estimate", the_estimate_is_near_the_true_error, iterations_follow_while_it_is_above_the_bound,
       the_default_bound_is_a_thousandth_of_the_size, a_budget_limits_the_iterations,
       an_inaccurate_run_has_a_warning, steps_without_contact_take_one_iteration,
-      pins_that_jump_take_the_sheet_along, an_estimate_in_contact_is_added)
+      what_a_correction_leaves_is_archived, pins_that_jump_take_the_sheet_along,
+      an_estimate_in_contact_is_added)
