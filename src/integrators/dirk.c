@@ -80,6 +80,7 @@ typedef struct dirk_state {
     double next;                  /* [s] size of the next step */
     int64_t matrices;             /* factored before that step */
     double error;                 /* estimated local error of the last step relative to the tolerance */
+    bool attempted;               /* a step, by this ARKODE */
     double stop;                  /* [s] steps end there */
 } dirk_state;
 
@@ -296,6 +297,7 @@ static drape_first_order_outcome step(drape_first_order *f, double end, double *
     N_VScale(1, f->rate, s->rate_before);
     s->far_after = s->last_after = 0;
     s->matrices = f->linear->factorizations;
+    s->attempted = true;
     f->counted = 0; /* ARKODE begins to count */
     if (ARKStepReInit(m, NULL, rhs, s->t, s->before) || ARKStepSetInitStep(m, s->next) ||
         ARKStepSetStopTime(m, s->stop))
@@ -334,6 +336,15 @@ static int dense(drape_first_order *f, double t, N_Vector out)
     return 0;
 }
 
+/* Those of ARKODE are in scratch that nothing has been written to before the first step. */
+static int errors(drape_first_order *f, N_Vector out)
+{
+    if (((const dirk_state *)f)->attempted)
+        return ARKStepGetEstLocalErrors(f->memory, out);
+    N_VConst(0, out);
+    return 0;
+}
+
 static bool archive_arkode(drape_first_order *f, drape_archive *a)
 {
     dirk_state *s = (dirk_state *)f;
@@ -363,7 +374,7 @@ static const drape_first_order_solver solver = {
     .last_step = ARKStepGetLastStep,
     .current_step = ARKStepGetCurrentStep,
     .iterations = ARKStepGetNumNonlinSolvIters,
-    .errors = ARKStepGetEstLocalErrors,
+    .errors = errors,
     .dense = dense,
     .archive = archive_arkode,
     .vectors = vectors,
