@@ -268,8 +268,8 @@ typedef struct extreme {
     void (*start)(scene *);                 /* NULL: at rest */
     unsigned stops;   /* integrators that may stop with a message; all others must end ok */
     unsigned crawls;  /* integrators that run 3 times duration, not 3 s, if DRAPE_SLOW is set */
-    unsigned without; /* integrators that it is not run with: dirk follows a crumpled start in steps of
-                         0.1 us, two of three of them rejected for their energy, past the attempts of a test */
+    unsigned without; /* integrators that it is not run with: dirk follows a crumpled start in steps
+                         of 0.1 us, two of three of them rejected, past the attempts of a test */
 } extreme;
 
 /*
