@@ -362,7 +362,6 @@ static bool depends_on_time(const rosenbrock_state *s)
 static drape_status solve(rosenbrock_state *s, const drape_state *in, double h, drape_step_info *info)
 {
     drape_status status = DRAPE_OK;
-    s->power = 0;
     s->moved = depends_on_time(s);
     if (s->moved)
         status = evaluate_change(s, in->t, h, info);
@@ -384,6 +383,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_status status = evaluate_start(s, in, attempt.stop, info);
     if (!status)
         status = drape_local_error_begin(&s->control, in, s->g0, &attempt, info);
+    s->power = e->dofs > 0 ? 0 : s->start_power; /* the sum of all b_i is 1 */
     if (!status && e->dofs > 0)
         status = solve(s, in, attempt.h, info);
     if (status)
