@@ -20,9 +20,9 @@
  *
  * The acceleration a is kept between steps. It starts from M a = -g, and again wherever forces jump. It is
  * that of the time t + (m - f) h, not t (Erlicher, Bonaventura & Bursi 2002), so where h changes to h' it is
- * taken to t + (m - f) h' on the line through -M^-1 g at t: without that the order would be 1. A step from a kink in
- * the motion of pins is backward Euler, which these formulas give for m = f = 0, b = c = 1, a0 = 0: the dashpots
- * between a pin that jumps to another velocity and its neighbours would make a0 far too large.
+ * taken to t + (m - f) h' on the line through -M^-1 g at t: without that the order would be 1. A step from a
+ * kink in the motion of pins is backward Euler, which these formulas give for m = f = 0, b = c = 1, a0 = 0:
+ * the dashpots between a pin that jumps to another velocity and its neighbours would make a0 far too large.
  */
 #include "integrators/implicit.h"
 

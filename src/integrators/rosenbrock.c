@@ -331,8 +331,8 @@ static void estimate(rosenbrock_state *s)
 }
 
 /* Adds what is dissipated in a step of size h, by the midpoint rule on its halves, which does not see the
- * short force of a dashpot at a jump of a pin's velocity. The middle is that of the method's own interpolation
- * of order 3,
+ * short force of a dashpot at a jump of a pin's velocity. The middle is that of the interpolation of order 3
+ * that belongs to the method,
  *     y(s) = (1 - s) y0 + s (y1 + (1 - s) (sum d2_i u_i + s sum d3_i u_i)):
  * a cubic through the velocities at both ends would have nodes swing about a jump. */
 static void add_dissipated(rosenbrock_state *s, const drape_state *in, const drape_state *out, double h,

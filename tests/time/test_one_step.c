@@ -45,8 +45,8 @@ static double dot(int n, const double *a, const double *b)
     return sum;
 }
 
-/* The largest violation of the conditions up to an order, Hairer & Wanner 1996, Table IV.7.1, by weights b that
- * lead from 0 to s. */
+/* The largest violation of the conditions up to an order, Hairer & Wanner 1996, Table IV.7.1, by weights b
+ * that lead from 0 to s. */
 static double violation(const original *o, const double *b, double s, int order)
 {
     double a[MAX], beta[MAX], aa[MAX], aaa[MAX], by_beta[MAX], a_by_beta[MAX], by_aa[MAX], twice[MAX];
