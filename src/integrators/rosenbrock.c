@@ -35,8 +35,8 @@ enum { PARAM_LINEAR_SOLVER = DRAPE_LOCAL_ERROR_PARAM_COUNT, PARAM_COUNT };
 #define ALONG 1e-6
 
 /* RODAS of order 4 with an embedded solution of order 3, Hairer & Wanner 1996, VI.4. Of order 3, RODAS3
- * (Sandu et al. 1997) and ROS34PW2 (Rang & Angermann 2005) took about as long for an error of 1e-3 of the size of a
- * sheet, and 1.2 to 2 times as long for 1e-4 and less. */
+ * (Sandu et al. 1997) and ROS34PW2 (Rang & Angermann 2005) took about as long for an error of 1e-3 of the
+ * size of a sheet, and 1.2 to 2 times as long for 1e-4 and less. */
 const drape_rosenbrock_scheme drape_rosenbrock_rodas = {
     .stages = 6,
     .order = 4,
