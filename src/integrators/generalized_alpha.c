@@ -20,7 +20,9 @@
  *
  * The acceleration a is kept between steps. It starts from M a = -g, and again wherever forces jump. It is
  * that of the time t + (m - f) h, not t (Erlicher, Bonaventura & Bursi 2002), so where h changes to h' it is
- * taken to t + (m - f) h' on the line through -M^-1 g at t: without that the order would be 1.
+ * taken to t + (m - f) h' on the line through -M^-1 g at t: without that the order would be 1. A step from a
+ * kink in the motion of pins is backward Euler, which these formulas give for m = f = 0, b = c = 1, a0 = 0:
+ * the dashpots between a pin that jumps to another velocity and its neighbours would make a0 far too large.
  */
 #include "integrators/implicit.h"
 
@@ -55,16 +57,22 @@ static const drape_param params[PARAM_COUNT] = {
         DRAPE_NUMBER("gamma", "1", 0.5, 0.5, 1, "of family newmark; above 1/2 it damps, and is of order 1"),
 };
 
+typedef struct coefficients {
+    double m, f, b, c; /* alpha_m, alpha_f, beta, gamma */
+} coefficients;
+
+static const coefficients backward_euler = {.b = 1, .c = 1};
+
 typedef struct alpha_state {
     drape_implicit common; /* first */
-    double m, f, b, c;     /* alpha_m, alpha_f, beta, gamma */
-    double *a, *a1;        /* nodes [m/s2]: of the last accepted state; at the end of the last attempt */
-    double *v0, *g0, *a0;  /* nodes: at the start of the step, with the velocities of pins; forces; a for h */
-    double known, made;    /* [s] times of a and a1; NAN: unknown */
-    double h, h1;          /* [s] the steps that led to them; 0: none, a is that of the time itself */
+    coefficients usual;
+    double *a, *a1;       /* nodes [m/s2]: of the last accepted state; at the end of the last attempt */
+    double *v0, *g0, *a0; /* nodes: at the start of the step, with the velocities of pins; forces; a for h */
+    double known, made;   /* [s] times of a and a1; NAN: unknown */
+    double h, h1;         /* [s] the steps that led to them; 0: none, a is that of the time itself */
 } alpha_state;
 
-static drape_status choose(drape_context *ctx, const double *values, alpha_state *s)
+static drape_status choose(drape_context *ctx, const double *values, coefficients *s)
 {
     const double r = values[PARAM_RHO_INF], alpha = values[PARAM_ALPHA];
     switch ((int)values[PARAM_FAMILY]) {
@@ -95,7 +103,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     alpha_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    drape_status status = choose(arena->ctx, values, s);
+    drape_status status = choose(arena->ctx, values, &s->usual);
     if (!status)
         status = drape_implicit_init_newton(arena, system, values, &s->common);
     const size_t nodes = s->common.equation.nodes;
@@ -149,7 +157,7 @@ static void evaluate_start(alpha_state *s, const drape_state *in, double h)
                                .internal = in->internal,
                                .t = in->t,
                                .span = {e->point.span[0], e->point.span[1]}};
-    const bool known = s->known == in->t && !drape_motion_at_kink(s->common.motion, in->t);
+    const bool known = s->known == in->t;
     drape_system_force(e->system, &start, s->g0);
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
@@ -157,7 +165,7 @@ static void evaluate_start(alpha_state *s, const drape_state *in, double h)
         if (!known)
             s->a[at] = now;
         s->a0[at] = s->a[at];
-        if (known && s->m != s->f && s->h > 0 && s->h != h)
+        if (known && s->usual.m != s->usual.f && s->h > 0 && s->h != h)
             s->a0[at] = now + h / s->h * (s->a[at] - now);
     }
     if (!known)
@@ -165,18 +173,18 @@ static void evaluate_start(alpha_state *s, const drape_state *in, double h)
     s->known = in->t;
 }
 
-static void set_equation(alpha_state *s, const drape_state *in, double h)
+static void set_equation(alpha_state *s, const drape_state *in, double h, const coefficients *k)
 {
     drape_implicit *common = &s->common;
     drape_step_equation *e = &common->equation;
-    const double share = (1 - s->m) / (s->b * h * h); /* (1 - f) mu */
-    e->point.weight = s->c / (s->b * h);
-    e->mass_weight = share / (1 - s->f);
+    const double share = (1 - k->m) / (k->b * h * h); /* (1 - f) mu */
+    e->point.weight = k->c / (k->b * h);
+    e->mass_weight = share / (1 - k->f);
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
         const double v = in->v[at], a = s->a0[at], mass = e->model->mass[at / 3];
-        e->v_base[at] = (1 - s->c / s->b) * v + h * (1 - s->c / (2 * s->b)) * a;
-        e->inertia[i] = h * v + h * h * (0.5 - s->b) * a - (s->m * a + s->f * s->g0[at] / mass) / share;
+        e->v_base[at] = (1 - k->c / k->b) * v + h * (1 - k->c / (2 * k->b)) * a;
+        e->inertia[i] = h * v + h * h * (0.5 - k->b) * a - (k->m * a + k->f * s->g0[at] / mass) / share;
         common->d[i] = common->inertial_guess ? h * v : 0;
     }
 }
@@ -195,8 +203,13 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     }
     move_pins(s, in, out->t, h);
     settle(s, in);
-    evaluate_start(s, in, h);
-    set_equation(s, in, h);
+    const bool kink = drape_motion_at_kink(common->motion, in->t);
+    const coefficients *k = kink ? &backward_euler : &s->usual;
+    if (kink)
+        memset(s->a0, 0, e->nodes * sizeof *s->a0);
+    else
+        evaluate_start(s, in, h);
+    set_equation(s, in, h, k);
     drape_status status = drape_implicit_solve_from(common, info);
     if (status && !info->usable)
         return status;
@@ -204,11 +217,11 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     memcpy(out->v, e->v, e->nodes * sizeof *out->v);
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
-        const double flight = h * in->v[at] + h * h * (0.5 - s->b) * s->a0[at];
-        s->a1[at] = (common->d[i] - flight) / (s->b * h * h);
+        const double flight = h * in->v[at] + h * h * (0.5 - k->b) * s->a0[at];
+        s->a1[at] = (common->d[i] - flight) / (k->b * h * h);
     }
     s->made = out->t;
-    s->h1 = h;
+    s->h1 = kink ? 0 : h;
     drape_implicit_audit_stage(common, in->x, out->x, in->t, h, e->probe, info);
     return status;
 }

@@ -34,9 +34,9 @@ enum { PARAM_LINEAR_SOLVER = DRAPE_LOCAL_ERROR_PARAM_COUNT, PARAM_COUNT };
 /* Of the stages: the step along them for the derivative of the power. */
 #define ALONG 1e-6
 
-/* RODAS of order 4 with an embedded solution of order 3, Hairer & Wanner 1996, VI.4. Of methods of order 3,
- * RODAS3 (Sandu et al. 1997) and ROS34PW2 (Rang & Angermann 2005) took 1 to 3 times as long for an error of
- * 1e-3 of the size of a sheet, and 2 to 5 times for 1e-5. */
+/* RODAS of order 4 with an embedded solution of order 3, Hairer & Wanner 1996, VI.4. Of order 3, RODAS3
+ * (Sandu et al. 1997) and ROS34PW2 (Rang & Angermann 2005) took about as long for an error of 1e-3 of the
+ * size of a sheet, and 1.2 to 2 times as long for 1e-4 and less. */
 const drape_rosenbrock_scheme drape_rosenbrock_rodas = {
     .stages = 6,
     .order = 4,
@@ -57,6 +57,8 @@ const drape_rosenbrock_scheme drape_rosenbrock_rodas = {
     .e = {0, 0, 0, 0, 0, 1},
     .b = {0.34844427128605154, 0.2130136219118987, -0.15410253266231846, 0.4713207793914958,
           -0.12867613992712837, 0.25},
+    .d2 = {10.12623508344586, -7.487995877610167, -34.80091861555747, -7.992771707568823, 1.025137723295662},
+    .d3 = {-0.6762803392801253, 6.087714651680015, 16.43084320892478, 24.76722511418386, -6.594389125716872},
     .alpha = {0, 0.386, 0.21, 0.63, 1, 1},
     .gammas = {0.25, -0.1043, 0.1035, -0.0362, 0, 0}};
 
@@ -78,21 +80,30 @@ typedef struct rosenbrock_state {
     double *rx, *right;                                                /* free DOFs: of the present stage */
     double *damping;    /* D (nonzeros); NULL if nothing dissipates */
     bool moved;         /* g depends on t */
-    double start_power; /* [W] P of pins and colliders at the start of the step */
+    double start_power; /* [W] P at the start of the step */
     double power;       /* [W] sum b_i P_i of the stages so far */
 } rosenbrock_state;
 
-/* ---- Work of pins and colliders ----
+/* ---- Work ----
  *
- * As if the work z were another component of y, z' = P(t, y), the power of what moves them. Its stages are
- * those of the rest, with P' in place of J, which sums up to
+ * That of pins and colliders: as if the work z were another component of y, z' = P(t, y), with the power P of
+ * what moves them. Its stages are those of the rest, with P' in place of J, which sums up to
  *     z1 = z0 + h (sum b_i P_i + P'(y0) sum b_i u_i + h P_t sum b_i gamma_i),
  * so only one derivative along one direction is needed. Sums of powers at the ends of a step would count the
  * force of a dashpot at a jump of a pin's velocity for a large part of the step. */
 
-static bool has_movers(const rosenbrock_state *s)
+/* Forces on moving colliders, times their velocities; NULL: no contact. */
+static double collider_power(const rosenbrock_state *s, const double *force)
 {
-    return s->common.motion->moved_count > 0 || s->common.motion->model->collider_count > 0;
+    const drape_point *point = &s->common.equation.point;
+    const drape_motion *m = s->common.motion;
+    double sum = 0, v[3];
+    for (int32_t c = 0; force && c < m->model->collider_count; c++) {
+        drape_motion_collider_velocity(m, c, point->t, (point->span[0] + point->span[1]) / 2, v);
+        for (int k = 0; k < 3; k++)
+            sum += force[3 * c + k] * v[k];
+    }
+    return sum;
 }
 
 /* P where the forces g were evaluated last. */
@@ -100,13 +111,7 @@ static double power(const rosenbrock_state *s, const double *g)
 {
     const drape_step_equation *e = &s->common.equation;
     const drape_motion *m = s->common.motion;
-    const double *on = drape_system_on_colliders(e->system);
-    double sum = 0, v[3];
-    for (int32_t c = 0; on && c < m->model->collider_count; c++) {
-        drape_motion_collider_velocity(m, c, e->point.t, (e->point.span[0] + e->point.span[1]) / 2, v);
-        for (int k = 0; k < 3; k++)
-            sum += on[3 * c + k] * v[k];
-    }
+    double sum = collider_power(s, drape_system_on_colliders(e->system));
     for (int32_t i = 0; i < m->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             const size_t at = 3 * (size_t)m->moved_node[i] + k;
@@ -163,7 +168,8 @@ static drape_status evaluate_start(rosenbrock_state *s, const drape_state *in, d
         e->v[drape_step_equation_at(e, i)] = in->v[drape_step_equation_at(e, i)];
     place_pins(s, in->t, e->x, e->v);
     const drape_status status = evaluate(s, in->t, s->g0, info);
-    s->start_power = status ? NAN : power(s, s->g0);
+    if (!status)
+        s->start_power = power(s, s->g0);
     return status;
 }
 
@@ -324,27 +330,48 @@ static void estimate(rosenbrock_state *s)
     }
 }
 
-/* Adds the work in the step: that of pins and colliders as above, and the dissipated one by the midpoint
- * rule. */
-static drape_status audit(rosenbrock_state *s, const drape_state *in, const drape_state *out, double h,
-                          drape_step_info *info)
+/* Adds what is dissipated in a step of size h, by the midpoint rule on its halves, which does not see the
+ * short force of a dashpot at a jump of a pin's velocity. The middle is that of the interpolation of order 3
+ * that belongs to the method,
+ *     y(s) = (1 - s) y0 + s (y1 + (1 - s) (sum d2_i u_i + s sum d3_i u_i)):
+ * a cubic through the velocities at both ends would have nodes swing about a jump. */
+static void add_dissipated(rosenbrock_state *s, const drape_state *in, const drape_state *out, double h,
+                           drape_step_info *info)
+{
+    const drape_step_equation *e = &s->common.equation;
+    double *middle = e->probe;
+    if (!s->common.dissipated)
+        return;
+    memcpy(middle, in->x, e->nodes * sizeof *middle);
+    drape_motion_place_pins(s->common.motion, in->t + h / 2, middle);
+    for (size_t i = 0; i < e->dofs; i++) {
+        const size_t at = drape_step_equation_at(e, i);
+        double bend = 0;
+        for (int j = 0; j < drape_rosenbrock_rodas.stages; j++)
+            bend += (drape_rosenbrock_rodas.d2[j] + drape_rosenbrock_rodas.d3[j] / 2) * s->ux[j][i];
+        middle[at] = (in->x[at] + out->x[at] + bend / 2) / 2;
+    }
+    drape_implicit_audit_dissipation(&s->common, in->x, middle, in->t, h / 2, info);
+    drape_implicit_audit_dissipation(&s->common, middle, out->x, in->t + h / 2, h / 2, info);
+}
+
+/* Adds the work of pins and colliders. */
+static drape_status add_moved(rosenbrock_state *s, const drape_state *in, double h, drape_step_info *info)
 {
     const drape_rosenbrock_scheme *scheme = &drape_rosenbrock_rodas;
+    const drape_motion *m = s->common.motion;
     double weights[DRAPE_ROSENBROCK_STAGES], ahead = 0;
-    if (has_movers(s)) {
-        for (int i = 0; i < scheme->stages; i++) {
-            weights[i] = ALONG * scheme->b[i];
-            ahead += weights[i] * scheme->gammas[i] * h;
-        }
-        move_to(s, in, weights, s->common.equation.dofs > 0 ? scheme->stages : 0, in->t + ahead);
-        const drape_status status = evaluate(s, in->t + ahead, s->common.equation.g, info);
-        if (status)
-            return status;
-        const double change = (power(s, s->common.equation.g) - s->start_power) / ALONG;
-        info->pin_work += h * (s->power + change);
+    if (m->moved_count == 0 && m->model->collider_count == 0)
+        return DRAPE_OK;
+    for (int i = 0; i < scheme->stages; i++) {
+        weights[i] = ALONG * scheme->b[i];
+        ahead += weights[i] * scheme->gammas[i] * h;
     }
-    drape_implicit_audit_dissipation(&s->common, in->x, out->x, in->t, h, info);
-    return DRAPE_OK;
+    move_to(s, in, weights, s->common.equation.dofs > 0 ? scheme->stages : 0, in->t + ahead);
+    const drape_status status = evaluate(s, in->t + ahead, s->common.equation.g, info);
+    if (!status)
+        info->pin_work += h * (s->power + (power(s, s->common.equation.g) - s->start_power) / ALONG);
+    return status;
 }
 
 /* ---- A step ---- */
@@ -362,7 +389,6 @@ static bool depends_on_time(const rosenbrock_state *s)
 static drape_status solve(rosenbrock_state *s, const drape_state *in, double h, drape_step_info *info)
 {
     drape_status status = DRAPE_OK;
-    s->power = 0;
     s->moved = depends_on_time(s);
     if (s->moved)
         status = evaluate_change(s, in->t, h, info);
@@ -384,6 +410,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_status status = evaluate_start(s, in, attempt.stop, info);
     if (!status)
         status = drape_local_error_begin(&s->control, in, s->g0, &attempt, info);
+    s->power = e->dofs > 0 ? 0 : s->start_power; /* the sum of all b_i is 1 */
     if (!status && e->dofs > 0)
         status = solve(s, in, attempt.h, info);
     if (status)
@@ -394,7 +421,11 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     out->t = attempt.t1;
     estimate(s);
     status = drape_local_error_test(&s->control, &attempt, s->rx, s->right, info);
-    return status ? status : audit(s, in, out, attempt.h, info);
+    if (!status)
+        status = add_moved(s, in, attempt.h, info);
+    if (!status)
+        add_dissipated(s, in, out, attempt.h, info);
+    return status;
 }
 
 static void restart(void *state, const drape_state *from)

@@ -12,6 +12,7 @@ typedef struct drape_rosenbrock_scheme {
     double a[DRAPE_ROSENBROCK_STAGES][DRAPE_ROSENBROCK_STAGES],
         c[DRAPE_ROSENBROCK_STAGES][DRAPE_ROSENBROCK_STAGES];
     double m[DRAPE_ROSENBROCK_STAGES], e[DRAPE_ROSENBROCK_STAGES];
+    double d2[DRAPE_ROSENBROCK_STAGES], d3[DRAPE_ROSENBROCK_STAGES]; /* of the interpolation */
     double b[DRAPE_ROSENBROCK_STAGES]; /* m_j = sum b_i omega_ij, omega the inverse of gamma_ij */
     double alpha[DRAPE_ROSENBROCK_STAGES], gammas[DRAPE_ROSENBROCK_STAGES];
 } drape_rosenbrock_scheme;
