@@ -11,7 +11,7 @@
 
 #define DEEPEST 1e-9 /* [m] */
 
-static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
+static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "ida", "radau"};
 #define METHODS (sizeof methods / sizeof *methods)
 
 /* ---- Solids ---- */
