@@ -15,7 +15,7 @@
 /* Share of the time in which the scene moves by its size that the first step takes at an error of 1. A
  * step that is too long costs one attempt, one that is too short a few to grow by MAX_GROWTH. */
 #define START_SHARE 0.1
-/* Fraction: a step as long as this much of the way to a stop ends there. What would be left is rounding. */
+/* Fraction: a step as long as this much of what is left before a stop ends there; the rest is rounding. */
 #define LANDED (1 - 1e-9)
 /* Of the time in which the scene moves by its size: steps as short as this, one after the other, lead
  * nowhere, at any speed that the scene can have. A few may start a run. */
@@ -159,8 +159,9 @@ static double propose(const drape_local_error *c, const drape_local_attempt *a, 
 {
     const drape_step_record *past = &c->past;
     const double e = fmax(error, MIN_ERROR), simple = elementary(c, a->h, error);
+    /* the error of a much shorter step is rounding */
     if (a->cut && !a->again)
-        return fmin(simple, past->proposed);
+        return a->h > MAX_CUT * past->proposed ? fmin(simple, past->proposed) : past->proposed;
     double next = simple;
     if (past->h > 0)
         next =

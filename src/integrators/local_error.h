@@ -22,7 +22,7 @@
  *     safety h e^(-1/q)                              elementary control
  *     safety h e^(-1/q) (h/h_) (e_/e)^(1/q)          predictive control, Gustafsson 1994
  * where e is O(h^q); Hairer & Wanner 1996, IV.8, (8.25). No step is longer than the one before if that took
- * more than one attempt. A step that ends at a kink or at the end of an advance is cut, or the way there is
+ * more than one attempt. A step that ends at a kink or at the end of an advance is cut, or what is left is
  * halved, so that no sliver is left over; what was proposed before the cut is kept.
  */
 #ifndef DRAPE_INTEGRATORS_LOCAL_ERROR_H

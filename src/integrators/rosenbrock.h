@@ -1,4 +1,4 @@
-/* rosenbrock.h: the coefficients of the schemes of rosenbrock.c, for the test of their orders. */
+/* rosenbrock.h: the coefficients of rosenbrock.c, for the test of their orders. */
 #ifndef DRAPE_INTEGRATORS_ROSENBROCK_H
 #define DRAPE_INTEGRATORS_ROSENBROCK_H
 
@@ -12,9 +12,10 @@ typedef struct drape_rosenbrock_scheme {
     double a[DRAPE_ROSENBROCK_STAGES][DRAPE_ROSENBROCK_STAGES],
         c[DRAPE_ROSENBROCK_STAGES][DRAPE_ROSENBROCK_STAGES];
     double m[DRAPE_ROSENBROCK_STAGES], e[DRAPE_ROSENBROCK_STAGES];
+    double b[DRAPE_ROSENBROCK_STAGES]; /* m_j = sum b_i omega_ij, omega the inverse of gamma_ij */
     double alpha[DRAPE_ROSENBROCK_STAGES], gammas[DRAPE_ROSENBROCK_STAGES];
 } drape_rosenbrock_scheme;
 
-extern const drape_rosenbrock_scheme drape_rosenbrock_schemes[]; /* the last one has no stages */
+extern const drape_rosenbrock_scheme drape_rosenbrock_rodas;
 
 #endif

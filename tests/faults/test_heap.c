@@ -11,6 +11,7 @@
 
 #include "io/recorder.h"
 #include "solvers/linear.h"
+#include "support/methods.h"
 #include "support/scene.h"
 
 #if defined(__SANITIZE_ADDRESS__) || !defined(__GLIBC__)
@@ -202,8 +203,7 @@ END_TEST
  * allocated. */
 START_TEST(no_heap_call_in_contact)
 {
-    static const char *const integrators[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
-    for (size_t k = 0; k < sizeof integrators / sizeof *integrators; k++) {
+    for (size_t k = 0; k < METHODS; k++) {
         scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, "
             "'height': 0.3,"
@@ -215,7 +215,7 @@ START_TEST(no_heap_call_in_contact)
             "'normal':"
             " [0,1,0]}], 'contact': {'distance': 4e-3, 'friction': '%s'},"
             " 'integrator': {'method': '%s', 'dt': 0.01, 'linear_solver': 'klu'}, 'duration': 1}",
-            k % 2 ? "lagged" : "implicit", integrators[k]);
+            k % 2 ? "lagged" : "implicit", methods[k]);
         const size_t n = 3 * (size_t)s.model->node_count;
         double *x = malloc(n * sizeof *x), *v = calloc(n, sizeof *v), gap;
         memcpy(x, drape_sim_positions(s.sim), n * sizeof *x);
@@ -229,7 +229,7 @@ START_TEST(no_heap_call_in_contact)
         drape_status status = drape_sim_advance(s.sim, 0.15);
         counting = false;
         ck_assert_int_eq(status, DRAPE_OK);
-        ck_assert_msg(calls == 0, "%s: %ld heap calls", integrators[k], calls);
+        ck_assert_msg(calls == 0, "%s: %ld heap calls", methods[k], calls);
         free(x);
         free(v);
         scene_close(&s);

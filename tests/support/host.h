@@ -74,7 +74,8 @@ static inline double distance(const double *a, const double *b)
     "64, %s 'duration': 1}"
 
 /* The integrators that have steps in time. */
-static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "newton_k", "verlet", "ida"};
+static const char *const methods[] = {"be",     "bdf2", "midpoint",   "trbdf2",           "newton_k",
+                                      "verlet", "ida",  "rosenbrock", "generalized_alpha"};
 enum { METHODS = sizeof methods / sizeof *methods };
 
 #endif
