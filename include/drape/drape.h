@@ -67,7 +67,7 @@ typedef enum drape_log_level { DRAPE_LOG_INFO = 0, DRAPE_LOG_WARNING = 1 } drape
 
 /* Settings of a context. Initialise with drape_context_def_init. */
 typedef struct drape_context_def {
-    size_t struct_size; /* set by drape_context_def_init; a def with 0 here is rejected */
+    size_t struct_size; /* set by drape_context_def_init; a def that is too short or too long is rejected */
     /* Allocator for all memory that Drape itself takes. Set both functions or neither. allocate returns
      * memory aligned for any type, or NULL on failure; release receives what allocate returned, never NULL.
      * Default: malloc and free. SUNDIALS and KLU always use malloc. */
@@ -85,7 +85,8 @@ typedef struct drape_context_def {
     void *cancel_user;
 } drape_context_def;
 
-/* Fills *def with the defaults. Pass the caller's sizeof(drape_context_def) as struct_size. */
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_context_def) as struct_size. Nothing if def is
+ * NULL. */
 DRAPE_API void drape_context_def_init(drape_context_def *def, size_t struct_size);
 
 /* Creates a context. If def is NULL, the defaults apply. Errors: DRAPE_E_ARGUMENT (def not initialised, or
@@ -237,7 +238,8 @@ typedef struct drape_scene_def {
     size_t event_count;            /* length of events */
 } drape_scene_def;
 
-/* Fill a def with the defaults documented above. Pass the caller's sizeof of the def as struct_size. */
+/* Fill a def with the defaults documented above. Pass the caller's sizeof of the def as struct_size. Nothing
+ * if def is NULL. */
 DRAPE_API void drape_scene_def_init(drape_scene_def *def, size_t struct_size);
 DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
@@ -359,7 +361,8 @@ typedef struct drape_sim_def {
                               0: never */
 } drape_sim_def;
 
-/* Fills *def with the defaults. */
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_sim_def) as struct_size. Nothing if def is
+ * NULL. */
 DRAPE_API void drape_sim_def_init(drape_sim_def *def, size_t struct_size);
 
 /* Creates a sim at t = 0 with the model's rest positions and initial velocities. If def is NULL, the scene's
@@ -462,7 +465,8 @@ typedef struct drape_place_def {
     bool stop; /* the cloth is at rest afterwards; default false: its velocities turn with it */
 } drape_place_def;
 
-/* Fills *def with the defaults. Pass the caller's sizeof(drape_place_def) as struct_size. */
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_place_def) as struct_size. Nothing if def is
+ * NULL. */
 DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
 
 /* Places cloth with its pins, and colliders, elsewhere at the present time, by a rigid motion: a character
@@ -473,10 +477,11 @@ DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
  * axis than that of gravity changes how the cloth hangs. The energy account takes the change of potential
  * and kinetic energy as given by the host.
  *
- * Colliders do not turn: a rotation is refused if one of the colliders is not the same shape afterwards.
- * Spheres always are; planes, capsules and cylinders are if they turn about their own axis or normal, and the
- * latter two also if they are turned over. Name the others' cloths and colliders apart, or replace a body
- * that turns by a cloth whose nodes are all pinned.
+ * Colliders do not turn: a rotation is refused unless each of the colliders looks the same afterwards.
+ * Spheres always do; planes, capsules and cylinders do if they are turned about their own axis or normal, the
+ * latter two also if they are turned over; boxes do after a half turn about one of their axes, and after a
+ * quarter turn about one if their sizes along the two others are equal. Leave the others out, or replace a
+ * body that turns by a cloth whose nodes are all pinned.
  *
  * Contact is not checked. Where cloth and colliders move together their contacts stay as they were. Cloth
  * that is placed into a collider, or a collider into cloth, is like cloth that starts there: it is pushed out

@@ -124,6 +124,11 @@ void drape_system_copy_wind(drape_system *system, const drape_system *from)
     drape_system_set_wind(system, from->wind.field, from->wind.user);
 }
 
+bool drape_system_has_wind(const drape_system *system)
+{
+    return system->wind.field && system->wind.against;
+}
+
 void drape_system_add_loads(const drape_system *system, const double *x, double *g)
 {
     drape_drag_spring_add_gradient(&system->drag, x, g);
@@ -241,6 +246,12 @@ drape_status drape_system_relax(drape_system *system, double t1, bool all, int32
 {
     *added = 0;
     return system->contact ? drape_contact_relax(system->contact, t1, all, added) : DRAPE_OK;
+}
+
+drape_status drape_system_lacks_room(drape_system *system, double t1, bool all, bool *lacks)
+{
+    *lacks = false;
+    return system->contact ? drape_contact_lacks_room(system->contact, t1, all, lacks) : DRAPE_OK;
 }
 
 bool drape_system_nearest(const drape_system *system, drape_diagnostic *diagnostic)

@@ -65,6 +65,7 @@ double drape_system_push_work(const drape_system *system, const double *x, const
  * rest. */
 void drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user);
 void drape_system_copy_wind(drape_system *system, const drape_system *from);
+bool drape_system_has_wind(const drape_system *system); /* it moves, and is felt */
 
 /* Adds the host's loads on nodes at x, the drag spring and the forces, to g (node_count x 3).
  * drape_system_force contains them. */
@@ -97,9 +98,10 @@ drape_status drape_system_continue(drape_system *system, drape_system *from);
 /* Begins a step at a state, against which contact compares until the next call. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
 
-/* drape_contact_expect and drape_contact_relax; without contact nothing. */
+/* drape_contact_expect, drape_contact_relax and drape_contact_lacks_room; without contact nothing. */
 void drape_system_expect(drape_system *system, double t1, bool may_relax);
 drape_status drape_system_relax(drape_system *system, double t1, bool all, int32_t *added);
+drape_status drape_system_lacks_room(drape_system *system, double t1, bool all, bool *lacks);
 
 /* Ends the step, so that queries between steps leave no trace in the next one. */
 void drape_system_end_step(drape_system *system);

@@ -23,19 +23,21 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
         REASON("line_search", "KINSOL", "no step along the correction makes the residual smaller"),
     [DRAPE_REASON_NEWTON_STEP] =
         REASON("newton_step", "KINSOL", "five corrections in a row had the largest allowed size"),
-    [DRAPE_REASON_NEWTON] = REASON("newton", "ida", "Newton's corrections do not converge at this step size"),
+    [DRAPE_REASON_NEWTON] =
+        REASON("newton", "ida, radau", "Newton's corrections do not converge at this step size"),
     [DRAPE_REASON_SINGULAR] =
-        REASON("singular", "KINSOL, IDA, newton_k", "a factorisation or a linear solve failed"),
+        REASON("singular", "KINSOL, IDA, newton_k, radau", "a factorisation or a linear solve failed"),
     [DRAPE_REASON_SOLVER] = REASON("solver", "KINSOL, IDA", "any other failure that these libraries report"),
     [DRAPE_REASON_MEMORY] = REASON("memory", "Newton, newton_k", "memory for the factors ran out"),
     [DRAPE_REASON_NONFINITE] = REASON("nonfinite", "all integrators",
                                       "an infinity or NaN in the residual, the Jacobian or the new state"),
     [DRAPE_REASON_ERROR_TEST] =
-        REASON("error_test", "ida, the controller error", "the local error is above the tolerance"),
-    [DRAPE_REASON_ROUND_OFF] =
-        REASON("round_off", "ida", "the tolerance is below the rounding error of the state"),
-    [DRAPE_REASON_MAX_STEPS] =
-        REASON("max_steps", "ida", "more steps in a second of simulated time than `max_steps`"),
+        REASON("error_test", "integrators with steps of their own, the controller error",
+               "the local error is above the tolerance"),
+    [DRAPE_REASON_ROUND_OFF] = REASON("round_off", "integrators with steps of their own",
+                                      "the tolerance is below the rounding error of the state"),
+    [DRAPE_REASON_MAX_STEPS] = REASON("max_steps", "integrators with steps of their own",
+                                      "more steps in a second of simulated time than `max_steps`"),
     [DRAPE_REASON_MAX_SUBSTEPS] =
         REASON("max_substeps", "verlet", "more substeps in a step than `max_substeps`"),
     [DRAPE_REASON_MOVE] =

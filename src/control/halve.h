@@ -14,8 +14,8 @@
                   "largest number of attempted steps within one dt; one more ends the run")
 
 /* For an attempt that failed or was rejected with a status > 0: retries with half the size, or stops with
- * DRAPE_E_STEP_TOO_SMALL if that is below dt_min or no longer changes the time. A negative status stops
- * unchanged. */
+ * DRAPE_E_STEP_TOO_SMALL if that is below dt_min or no longer changes the time. A size that the integrator
+ * advises takes the place of half; dt_min does not apply to it. A negative status stops unchanged. */
 drape_verdict drape_halve(double dt_min, drape_trial *trial);
 
 #endif

@@ -161,19 +161,26 @@ void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_
     info->dissipated += drape_implicit_collider_work(s, in->t, out->t);
 }
 
-void drape_implicit_audit_stage(drape_implicit *s, const double *from, const double *to, double t,
-                                double span, double *g, drape_step_info *info)
+/* The middle of a stage, with the mean velocity; in the base of the equation. */
+static drape_point middle_of(drape_step_equation *e, const double *from, const double *to, double t,
+                             double span)
 {
-    drape_step_equation *e = &s->equation;
-    const drape_point middle = {.x = e->x_base,
-                                .v = e->v_base,
-                                .internal = e->point.internal,
-                                .t = t + span / 2,
-                                .span = {t, t + span}};
     for (size_t i = 0; i < e->nodes; i++) {
         e->x_base[i] = (from[i] + to[i]) / 2;
         e->v_base[i] = (to[i] - from[i]) / span;
     }
+    return (drape_point){.x = e->x_base,
+                         .v = e->v_base,
+                         .internal = e->point.internal,
+                         .t = t + span / 2,
+                         .span = {t, t + span}};
+}
+
+void drape_implicit_audit_stage(drape_implicit *s, const double *from, const double *to, double t,
+                                double span, double *g, drape_step_info *info)
+{
+    drape_step_equation *e = &s->equation;
+    const drape_point middle = middle_of(e, from, to, t, span);
     if (s->motion->moved_count > 0 || e->model->collider_count > 0)
         drape_system_force(e->system, &middle, g);
     info->pin_work += drape_implicit_collider_work(s, t, t + span);
@@ -182,8 +189,16 @@ void drape_implicit_audit_stage(drape_implicit *s, const double *from, const dou
             size_t at = 3 * (size_t)s->motion->moved_node[i] + k;
             info->pin_work += g[at] * (to[at] - from[at]);
         }
+    drape_implicit_audit_dissipation(s, from, to, t, span, info);
+}
+
+void drape_implicit_audit_dissipation(drape_implicit *s, const double *from, const double *to, double t,
+                                      double span, drape_step_info *info)
+{
+    drape_step_equation *e = &s->equation;
     if (!s->dissipated)
         return;
+    const drape_point middle = middle_of(e, from, to, t, span);
     drape_system_dissipation(e->system, &middle, s->dissipated);
     for (size_t i = 0; i < e->nodes; i++)
         info->dissipated += s->dissipated[i] * (to[i] - from[i]);

@@ -78,5 +78,8 @@ void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const
  * Overwrites the base of the equation and g (nodes). */
 void drape_implicit_audit_stage(drape_implicit *implicit, const double *from, const double *to, double t,
                                 double span, double *g, drape_step_info *info);
+/* The part of it that is dissipated. */
+void drape_implicit_audit_dissipation(drape_implicit *implicit, const double *from, const double *to,
+                                      double t, double span, drape_step_info *info);
 
 #endif

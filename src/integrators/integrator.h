@@ -14,6 +14,7 @@
 typedef struct drape_step_info {
     const char *reason; /* "converged", or why not; static text */
     double h;           /* [s] the step taken; set by integrators that choose their own steps */
+    double retry;       /* [s] after a failed error test: the size of the next attempt; 0: half of h */
     int iterations;
     double residual, tolerance; /* [N] */
     double error;               /* [m] estimated RMS distance of the nodes of `out` to the solution of the

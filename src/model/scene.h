@@ -84,7 +84,7 @@ typedef struct drape_scene_object {
     size_t settings_offset, settings_count_offset; /* open: offsets in the def */
     size_t def_size;                               /* size of the def; 0: the values are stored in the
                                                       parent's def */
-    bool sized;                                    /* the def begins with its size */
+    size_t least_size; /* the shortest def of an older host; 0: the def does not begin with its size */
 } drape_scene_object;
 
 /* The top-level object and some of its descendants. */

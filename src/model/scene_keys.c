@@ -54,8 +54,11 @@ static const drape_scene_key pin_keys[] = {
 };
 static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
 
-const drape_scene_object drape_form_pin = {
-    .name = "pin", KEYS(pin_keys), .one_of = pin_selectors, .def_size = sizeof(drape_pin_def), .sized = true};
+const drape_scene_object drape_form_pin = {.name = "pin",
+                                           KEYS(pin_keys),
+                                           .one_of = pin_selectors,
+                                           .def_size = sizeof(drape_pin_def),
+                                           .least_size = offsetof(drape_pin_def, clamp)};
 
 /* ---- Objects with settings ---- */
 
@@ -126,8 +129,10 @@ static const drape_scene_key cloth_keys[] = {
      IN(drape_cloth_def, velocity)},
 };
 
-const drape_scene_object drape_form_cloth = {
-    .name = "cloth", KEYS(cloth_keys), .def_size = sizeof(drape_cloth_def), .sized = true};
+const drape_scene_object drape_form_cloth = {.name = "cloth",
+                                             KEYS(cloth_keys),
+                                             .def_size = sizeof(drape_cloth_def),
+                                             .least_size = offsetof(drape_cloth_def, velocity)};
 
 /* ---- Colliders and contact ---- */
 
@@ -151,7 +156,7 @@ const drape_scene_object drape_form_collider = {
     KEYS(collider_keys),
     SETTINGS(drape_collider_def, entry.settings, entry.setting_count),
     .def_size = sizeof(drape_collider_def),
-    .sized = true,
+    .least_size = offsetof(drape_collider_def, track),
 };
 
 /* All members of these two are settings. */
@@ -187,7 +192,7 @@ const drape_scene_object drape_form_event = {
     KEYS(event_keys),
     SETTINGS(drape_event_def, entry.settings, entry.setting_count),
     .def_size = sizeof(drape_event_def),
-    .sized = true,
+    .least_size = sizeof(drape_event_def),
 };
 
 /* ---- Scene ---- */
@@ -233,5 +238,7 @@ static const drape_scene_key scene_keys[] = {
      ARRAY(drape_scene_def, events, event_count), .at_most = DRAPE_MAX_EVENTS, .child = &drape_form_event},
 };
 
-const drape_scene_object drape_form_scene = {
-    .name = "scene", KEYS(scene_keys), .def_size = sizeof(drape_scene_def), .sized = true};
+const drape_scene_object drape_form_scene = {.name = "scene",
+                                             KEYS(scene_keys),
+                                             .def_size = sizeof(drape_scene_def),
+                                             .least_size = offsetof(drape_scene_def, formats)};

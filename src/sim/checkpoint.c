@@ -161,6 +161,14 @@ static void archive_statistics(drape_sim *sim, drape_archive *a)
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no frame that could come next");
 }
 
+/* What was logged before a sim was saved is not logged again. */
+static void archive_relaxed_logged(drape_sim *sim, drape_archive *a)
+{
+    drape_archive_mark(a, "logged");
+    for (int32_t i = 0; i <= sim->model->collider_count; i++)
+        drape_archive_bool(a, &sim->relaxed_logged[i]);
+}
+
 static void archive_realtime(drape_sim *sim, drape_archive *a)
 {
     drape_realtime_memory *m = &sim->realtime;
@@ -203,6 +211,7 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
     archive_schedule(&sim->schedule, a);
     archive_audit(sim, a);
     archive_statistics(sim, a);
+    archive_relaxed_logged(sim, a);
     archive_realtime(sim, a);
     drape_events_archive(sim, a);
     drape_system_archive(sim->system, a);

@@ -2,18 +2,20 @@
 #include "sim/sim.h"
 
 #include "base/clock.h"
+#include "base/def.h"
 #include "compile/compile.h"
 
 #include <math.h>
 #include <string.h>
 
 #define MAX_THREADS 256
+/* The shortest def of an older host. */
+#define MIN_SIZE offsetof(drape_sim_def, controller)
 
 void drape_sim_def_init(drape_sim_def *def, size_t struct_size)
 {
     const drape_sim_def defaults = {.struct_size = struct_size, .threads = 1};
-    memset(def, 0, struct_size);
-    memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 /* Reads a def of this version or of an older, shorter one. */
@@ -22,7 +24,7 @@ static drape_status read_def(drape_context *ctx, const drape_sim_def *given, dra
     drape_sim_def_init(def, sizeof *def);
     if (!given)
         return DRAPE_OK;
-    if (given->struct_size == 0 || given->struct_size > sizeof *def)
+    if (!drape_def_fits(given->struct_size, MIN_SIZE, sizeof *def))
         return drape_fail(
             ctx, DRAPE_E_VERSION,
             "the sim def was not initialised by drape_sim_def_init of this version: struct_size %zu",

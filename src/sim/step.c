@@ -65,6 +65,8 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     drape_system_expect(sim->system, t1, may_relax(sim));
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
     drape_sim_add_contact_work(sim);
+    if (drape_system_contact(sim->system) && !sim->chosen.integrator->own_steps)
+        drape_sim_energy(sim); /* for the check, while contact is where the step begins */
     if (!status)
         status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
     if (status == DRAPE_E_STOPPED)
@@ -265,6 +267,25 @@ static void describe_nearest(const drape_sim *sim, const drape_attempt *attempt,
         describe_diagnostic(sim->model, &nearest, text, size);
 }
 
+/* Whether bodies leave the cloth no room at the end of a step that was too small, and the choice that makes
+ * the sim go on. Where contact refused the step, the pairs that hold it up are taken for such. */
+static drape_status describe_room(drape_sim *sim, const drape_attempt *attempt, char *text, size_t size)
+{
+    bool lacks = false;
+    text[0] = 0;
+    if (may_relax(sim) || sim->chosen.integrator->projects_contact)
+        return DRAPE_OK;
+    const bool refused = strcmp(attempt->reason, drape_reason_name(DRAPE_REASON_PENETRATION)) == 0 ||
+                         strcmp(attempt->reason, drape_reason_name(DRAPE_REASON_COLLISION)) == 0;
+    const double t1 = attempt->t + fmax(attempt->h, sim->schedule.dt);
+    const drape_status status = drape_system_lacks_room(sim->system, t1, refused, &lacks);
+    if (lacks)
+        snprintf(text, size,
+                 "; bodies leave the cloth no room there: with /contact/no_room \"relax\" they are let into "
+                 "it, and the run goes on");
+    return status;
+}
+
 /* Whether an event, and nothing else, kept an attempt from being accepted. */
 static bool is_event(const drape_attempt *attempt)
 {
@@ -284,7 +305,7 @@ static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
-    char diagnostic[400], nearest[400], residual[100] = "", distortion[200] = "";
+    char diagnostic[400], nearest[400], residual[100] = "", distortion[200] = "", room[200] = "";
     if (stop == DRAPE_E_MEMORY || is_event(attempt)) /* the message is set */
         return stop;
     if (stop == DRAPE_E_STOPPED)
@@ -294,31 +315,35 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
     /* a diagnostic that names only a node may not give the cause, which the distortion may */
     if (attempt->diagnostic.element < 0)
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
+    if (stop == DRAPE_E_STEP_TOO_SMALL && describe_room(sim, attempt, room, sizeof room))
+        return DRAPE_E_MEMORY;
     /* NAN: integrators that bound errors have no residual */
     if (!isnan(attempt->tolerance) && !isnan(attempt->residual))
         snprintf(residual, sizeof residual, ", residual %.4g N for a tolerance of %.4g N", attempt->residual,
                  attempt->tolerance);
-    return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s%s", attempt->t,
+    return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s%s%s", attempt->t,
                       attempt->h, attempt->reason, drape_status_name(attempt->status), attempt->iterations,
-                      residual, diagnostic, nearest, distortion);
+                      residual, diagnostic, nearest, distortion, room);
 }
 
 /* An integrator that chooses its own steps has no dt, and a limit of its own. */
 drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 {
-    char diagnostic[400], nearest[400];
+    char diagnostic[400], nearest[400], room[200];
     const drape_schedule *s = &sim->schedule;
     if (!(s->dt > 0) || (double)s->tries < sim->max_attempts)
         return DRAPE_OK;
     describe_diagnostic(sim->model, &last->diagnostic, diagnostic, sizeof diagnostic);
     describe_nearest(sim, last, nearest, sizeof nearest);
+    if (describe_room(sim, last, room, sizeof room))
+        return DRAPE_E_MEMORY;
     return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
                       "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64
                       " attempts since t=%.9g advanced less than one dt, %.4g s; the controller's "
-                      "max_attempts is %.15g%s%s",
+                      "max_attempts is %.15g%s%s%s",
                       drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status),
                       last->iterations, s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic,
-                      nearest);
+                      nearest, room);
 }
 
 /* ---- One step, and an advance ---- */

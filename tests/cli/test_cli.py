@@ -204,7 +204,7 @@ def test_realtime():
         equal(realtime["full"] + realtime["fewer"] + realtime["larger"], realtime["frames"])
         assert abs(summary["time"] - (0.1 if rate < 1e6 else 2e-5)) < 1e-12, summary
         assert realtime["worst"] >= realtime["p50"] > 0 and realtime["dropped"] >= 0
-        equal(realtime["still"], int(re.search(r"; (\d+) without a new state; ", text).group(1)))
+        equal(realtime["still"], int(re.search(r"; (\d+) frames without a new state; ", text).group(1)))
         equal(realtime["still"] > 0, rate == 1e6)
         if rate == 1e6:  # no machine keeps up with a microsecond a frame: frames that make a step miss their budget, the others wait
             assert realtime["missed"] > 0 and realtime["larger"] > 0, realtime
@@ -227,22 +227,24 @@ def chosen_by(*options, **changes):
 def test_realtime_chooses():
     """--realtime takes newton_k, as many iterations as fit and the machine's threads, unless these are given; the copy of the scene has it"""
     line, integrator = chosen_by()
-    found = re.fullmatch(r"1 thread of \d+, for 16 nodes; newton_k, as no method is named; ([12]) iterations? or more, "
-                         r"as one takes \S+ ms of a frame of 50 in trial steps", line)
+    found = re.fullmatch(r"threads 1: chosen, for 16 nodes and \d+ processors?; method newton_k: chosen, as none is named; "
+                         r"iterations ([12]): chosen, as one takes \S+ ms of a frame of 50 ms in trial steps", line)
     assert found, line
     equal((integrator["method"], integrator["iterations"], integrator["dt"]), ("newton_k", int(found.group(1)), 0.01))
     # A frame of a microsecond has time for one.
     text = good("run", "scene.json", "--realtime", "--frame-rate", "1e6", "--duration", "2e-5")
-    assert "; 1 iteration or more, as one takes " in text, text
+    assert "; iterations 1: chosen, as one takes " in text, text
     # What the scene or the command line gives stays.
     line, integrator = chosen_by(integrator={"dt": 0.01, "iterations": 3})
-    assert line.endswith("newton_k, as no method is named"), line
+    assert line.endswith("; method newton_k: chosen, as none is named; iterations 3: given"), line
     equal(integrator["iterations"], 3)
     line, integrator = chosen_by("--set", "/integrator/iterations=5", "--threads", "1")
-    equal((line, integrator["iterations"]), ("newton_k, as no method is named", 5))
+    equal((line, integrator["iterations"]), ("threads 1: given; method newton_k: chosen, as none is named; iterations 5: given", 5))
+    line, integrator = chosen_by("--integrator", "newton_k")
+    assert line.endswith("; method newton_k: given by the scene or an option; iterations 1: the default of the method"), line
     for options, changes in (((), {"integrator": {"method": "be", "dt": 0.01}}), (("--integrator", "be"), {}), (("--linear-solver", "klu"), {})):
         line, integrator = chosen_by(*options, **changes)
-        assert line.endswith("; be, by the scene or the options"), line
+        assert line.endswith("; method be: given by the scene or an option; iterations: not a parameter of be"), line
         assert integrator.get("method", "be") == "be" and "iterations" not in integrator, integrator
     assert "chosen" not in good("run", "scene.json")
 

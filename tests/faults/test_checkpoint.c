@@ -175,8 +175,8 @@ static void forge(const char *integrator, const char *settings, uint64_t seed)
 
 START_TEST(forged_ones_crash_nothing)
 {
-    static const char *const integrators[] = {"be",     "bdf2",   "midpoint", "ida",
-                                              "verlet", "trbdf2", "newton_k"};
+    static const char *const integrators[] = {"be",     "bdf2",     "midpoint", "ida", "verlet",
+                                              "trbdf2", "newton_k", "cvode",    "dirk"};
     for (size_t i = 0; i < sizeof integrators / sizeof *integrators; i++)
         forge(integrators[i], "", i + 1);
     forge("be", ", 'newton': 'modified', 'linear_solver': 'klu'", 99);

@@ -202,7 +202,7 @@ END_TEST
  * allocated. */
 START_TEST(no_heap_call_in_contact)
 {
-    static const char *const integrators[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
+    static const char *const integrators[] = {"be", "bdf2", "midpoint", "trbdf2", "ida", "cvode", "dirk"};
     for (size_t k = 0; k < sizeof integrators / sizeof *integrators; k++) {
         scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, "

@@ -4,15 +4,13 @@
  * frames between them; cloth that falls on itself never passes through itself.
  */
 #include "geometry/intersect.h"
+#include "support/methods.h"
 #include "support/scene.h"
 #include "support/solids.h"
 
 #include <unistd.h>
 
 #define DEEPEST 1e-9 /* [m] */
-
-static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
-#define METHODS (sizeof methods / sizeof *methods)
 
 /* ---- Solids ---- */
 

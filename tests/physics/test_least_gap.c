@@ -9,13 +9,11 @@
 #include "colliders/colliders.h"
 #include "contact/barrier.h"
 #include "contact/parts.h"
+#include "support/methods.h"
 #include "support/scene.h"
 
 #include <stdlib.h>
 #include <unistd.h>
-
-static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "newton_k", "ida"};
-#define METHODS (sizeof methods / sizeof *methods)
 
 /* ---- Crossings ---- */
 
@@ -184,10 +182,7 @@ static void leave_folder(void)
 static const char *method_of(const char *name, double dt)
 {
     static char text[100];
-    if (strcmp(name, "ida") == 0)
-        snprintf(text, sizeof text, "'integrator': {'method': 'ida'}");
-    else
-        snprintf(text, sizeof text, "'integrator': {'method': '%s', 'dt': %g}", name, dt);
+    snprintf(text, sizeof text, "'integrator': {'method': '%s', 'dt': %g}", name, dt);
     return text;
 }
 

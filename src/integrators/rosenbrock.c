@@ -1,0 +1,505 @@
+/*
+ * rosenbrock: a linearly implicit Runge-Kutta method (Rosenbrock-Wanner) with local error control: no Newton
+ * iteration, one matrix and one factorisation a step. With y = (x, v) of the free nodes, y' = f(t, y), J =
+ * df/dy and f_t = df/dt at the start of the step, stage i solves
+ *     (1/(gamma h) - J) u_i = f(t0 + alpha_i h, y0 + sum a_ij u_j) + sum c_ij/h u_j + gamma_i h f_t
+ * and y1 = y0 + sum m_i u_i, with the error estimate sum e_i u_i. Hairer & Wanner 1996, IV.7, (7.25).
+ *
+ * Here f = (v, -M^-1 g(x, v, t)) and u = (ux, uv). With w = 1/(gamma h), rx and M rv the two halves of the
+ * right-hand side, the first half of the rows is uv = w ux - rx, and what remains is
+ *     (w^2 M + w D + K) ux = M rv + (w M + D) rx,  K = dg/dx, D = dg/dv:
+ * the matrix of a backward Euler step of size gamma h, as in ida. It is exact, so where friction or dashpots
+ * make it nonsymmetric it is factored by LU. f_t is the change of the forces by what moves by itself: pins,
+ * colliders, wind. It is taken by differences of second order.
+ *
+ * The method is stiffly accurate and L-stable. Contact is part of f: a stage that passes through something,
+ * or comes too near, ends the attempt, and the next one is half as long.
+ */
+#include "integrators/rosenbrock.h"
+
+#include "base/finite.h"
+#include "base/reason.h"
+#include "integrators/implicit.h"
+#include "integrators/local_error.h"
+#include "solvers/sun_linear.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { PARAM_LINEAR_SOLVER = DRAPE_LOCAL_ERROR_PARAM_COUNT, PARAM_COUNT };
+
+/* Of the step: the interval of the differences for f_t. Their truncation error is its square times the third
+ * derivative, their rounding error 1e-16 over it: 1e-8 and 1e-12 of what the term adds. */
+#define DIFFERENCE 1e-4
+/* Of the stages: the step along them for the derivative of the power. */
+#define ALONG 1e-6
+
+/* RODAS of order 4 with an embedded solution of order 3, Hairer & Wanner 1996, VI.4. Of methods of order 3,
+ * RODAS3 (Sandu et al. 1997) and ROS34PW2 (Rang & Angermann 2005) took 1 to 3 times as long for an error of
+ * 1e-3 of the size of a sheet, and 2 to 5 times for 1e-5. */
+const drape_rosenbrock_scheme drape_rosenbrock_rodas = {
+    .stages = 6,
+    .order = 4,
+    .gamma = 0.25,
+    .a = {{0},
+          {1.544},
+          {0.9466785280815826, 0.2557011698983284},
+          {3.314825187068521, 2.896124015972201, 0.9986419139977817},
+          {1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950},
+          {1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 1}},
+    .c = {{0},
+          {-5.6688},
+          {-2.430093356833875, -0.2063599157091915},
+          {-0.1073529058151375, -9.594562251023355, -20.47028614809616},
+          {7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160},
+          {8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054}},
+    .m = {1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 1, 1},
+    .e = {0, 0, 0, 0, 0, 1},
+    .b = {0.34844427128605154, 0.2130136219118987, -0.15410253266231846, 0.4713207793914958,
+          -0.12867613992712837, 0.25},
+    .alpha = {0, 0.386, 0.21, 0.63, 1, 1},
+    .gammas = {0.25, -0.1043, 0.1035, -0.0362, 0, 0}};
+
+static const drape_param params[PARAM_COUNT] = {
+    DRAPE_LOCAL_ERROR_PARAMS,
+    [PARAM_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver",
+                                         .aliases = drape_linears_aliases),
+};
+
+typedef struct rosenbrock_state {
+    drape_implicit common; /* its equation is not solved; its arrays, and the account of work, are used */
+    drape_local_error control;
+    drape_arena *arena;
+    SUNContext sun;
+    drape_sun_linear *linear;                                          /* NULL without free nodes */
+    double *ux[DRAPE_ROSENBROCK_STAGES], *uv[DRAPE_ROSENBROCK_STAGES]; /* free DOFs */
+    double *g0;                                                        /* nodes: at the start of the step */
+    double *change;                                                    /* free DOFs: g_t [N/s] */
+    double *rx, *right;                                                /* free DOFs: of the present stage */
+    double *damping;    /* D (nonzeros); NULL if nothing dissipates */
+    bool moved;         /* g depends on t */
+    double start_power; /* [W] P of pins and colliders at the start of the step */
+    double power;       /* [W] sum b_i P_i of the stages so far */
+} rosenbrock_state;
+
+/* ---- Work of pins and colliders ----
+ *
+ * As if the work z were another component of y, z' = P(t, y), the power of what moves them. Its stages are
+ * those of the rest, with P' in place of J, which sums up to
+ *     z1 = z0 + h (sum b_i P_i + P'(y0) sum b_i u_i + h P_t sum b_i gamma_i),
+ * so only one derivative along one direction is needed. Sums of powers at the ends of a step would count the
+ * force of a dashpot at a jump of a pin's velocity for a large part of the step. */
+
+static bool has_movers(const rosenbrock_state *s)
+{
+    return s->common.motion->moved_count > 0 || s->common.motion->model->collider_count > 0;
+}
+
+/* P where the forces g were evaluated last. */
+static double power(const rosenbrock_state *s, const double *g)
+{
+    const drape_step_equation *e = &s->common.equation;
+    const drape_motion *m = s->common.motion;
+    const double *on = drape_system_on_colliders(e->system);
+    double sum = 0, v[3];
+    for (int32_t c = 0; on && c < m->model->collider_count; c++) {
+        drape_motion_collider_velocity(m, c, e->point.t, (e->point.span[0] + e->point.span[1]) / 2, v);
+        for (int k = 0; k < 3; k++)
+            sum += on[3 * c + k] * v[k];
+    }
+    for (int32_t i = 0; i < m->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            const size_t at = 3 * (size_t)m->moved_node[i] + k;
+            sum += g[at] * e->v[at];
+        }
+    return sum;
+}
+
+/* ---- Forces ---- */
+
+/* Pins at time t; within the step, in which none of them has a kink. */
+static void place_pins(const rosenbrock_state *s, double t, double *x, double *v)
+{
+    const drape_motion *m = s->common.motion;
+    const double *span = s->common.equation.point.span;
+    drape_motion_place_pins(m, t, x);
+    for (int32_t i = 0; i < m->moved_count; i++)
+        drape_motion_pin_velocity(m, i, t, (span[0] + span[1]) / 2, v + 3 * (size_t)m->moved_node[i]);
+}
+
+/* g at x, v of the equation and time t. */
+static drape_status evaluate(rosenbrock_state *s, double t, double *g, drape_step_info *info)
+{
+    drape_step_equation *e = &s->common.equation;
+    const double start = drape_system_clock(e->system);
+    e->point.t = t;
+    drape_system_force(e->system, &e->point, g);
+    e->work.residuals++;
+    e->work.residual_seconds += drape_system_clock(e->system) - start;
+    if (drape_system_status(e->system))
+        return drape_system_status(e->system);
+    if (drape_all_finite(g, e->nodes))
+        return DRAPE_OK;
+    info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
+    for (size_t i = 0; i < e->dofs; i++)
+        s->right[i] = g[drape_step_equation_at(e, i)];
+    info->diagnostic = drape_system_diagnose_dof(e->system, s->right, "force [N]", INFINITY);
+    drape_system_check(e->system, e->x, NULL, e->point.internal, &info->reason, &info->diagnostic);
+    return DRAPE_RETRY_NONFINITE;
+}
+
+/* The start of the step, at which forces are smooth up to `stop`. */
+static drape_status evaluate_start(rosenbrock_state *s, const drape_state *in, double stop,
+                                   drape_step_info *info)
+{
+    drape_step_equation *e = &s->common.equation;
+    e->point.internal = in->internal;
+    e->point.history = NULL;
+    e->point.span[0] = in->t;
+    e->point.span[1] = stop;
+    memcpy(e->x, in->x, e->nodes * sizeof *e->x);
+    memset(e->v, 0, e->nodes * sizeof *e->v);
+    for (size_t i = 0; i < e->dofs; i++)
+        e->v[drape_step_equation_at(e, i)] = in->v[drape_step_equation_at(e, i)];
+    place_pins(s, in->t, e->x, e->v);
+    const drape_status status = evaluate(s, in->t, s->g0, info);
+    s->start_power = status ? NAN : power(s, s->g0);
+    return status;
+}
+
+/* g_t = (-3 g(t) + 4 g(t + d) - g(t + 2 d))/(2 d), with the free nodes as they are. */
+static drape_status evaluate_change(rosenbrock_state *s, double t, double h, drape_step_info *info)
+{
+    drape_step_equation *e = &s->common.equation;
+    const double d = DIFFERENCE * h;
+    for (size_t i = 0; i < e->dofs; i++)
+        s->change[i] = -3 * s->g0[drape_step_equation_at(e, i)];
+    for (int k = 1; k <= 2; k++) {
+        place_pins(s, t + k * d, e->x, e->v);
+        drape_status status = evaluate(s, t + k * d, e->g, info);
+        if (status)
+            return status;
+        for (size_t i = 0; i < e->dofs; i++)
+            s->change[i] += (k == 1 ? 4 : -1) * e->g[drape_step_equation_at(e, i)];
+    }
+    for (size_t i = 0; i < e->dofs; i++)
+        s->change[i] /= 2 * d;
+    place_pins(s, t, e->x, e->v);
+    e->point.t = t;
+    return DRAPE_OK;
+}
+
+/* ---- The matrix ---- */
+
+static drape_status renew_matrices(rosenbrock_state *s)
+{
+    const drape_pattern *pattern = drape_system_pattern(s->common.equation.system);
+    if (s->common.dissipated) {
+        drape_arena_release(s->arena, s->damping);
+        s->damping = drape_arena_take(s->arena, (size_t)pattern->nonzeros, sizeof *s->damping);
+        if (!s->damping)
+            return DRAPE_E_MEMORY;
+    }
+    return drape_sun_linear_extend_pattern(s->linear, pattern);
+}
+
+static double jacobian_clock(const rosenbrock_state *s)
+{
+    return drape_system_clock(s->common.equation.system) - s->linear->factor_seconds;
+}
+
+/* Assembles and factors w^2 M + w D + K at the start of the step. Contact may couple new nodes. */
+static drape_status factor(rosenbrock_state *s, double w, drape_step_info *info)
+{
+    drape_step_equation *e = &s->common.equation;
+    const double start = jacobian_clock(s);
+    bool changed;
+    e->point.weight = w;
+    e->point.contact = DRAPE_CONTACT_EXACT;
+    drape_status status = drape_system_extend_pattern(e->system, &e->point, &changed);
+    s->linear->stale |= changed;
+    if (!status && s->linear->stale)
+        status = renew_matrices(s);
+    if (status)
+        return status;
+    drape_system_jacobian(e->system, &e->point, w * w, 0, s->linear->values);
+    if (s->damping)
+        drape_system_damping(e->system, &e->point, s->damping);
+    e->work.jacobians++;
+    e->work.jacobian_seconds += jacobian_clock(s) - start;
+    info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
+    return drape_sun_linear_factor(s->linear, false);
+}
+
+/* y += D x */
+static void add_damping(const rosenbrock_state *s, const double *x, double *y)
+{
+    const drape_pattern *p = drape_system_pattern(s->common.equation.system);
+    if (!s->damping)
+        return;
+    for (int64_t j = 0; j < p->n; j++)
+        for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
+            y[p->row[k]] += s->damping[k] * x[j];
+}
+
+/* ---- Stages ---- */
+
+/* x, v of the equation, and pins, at a sum of stages. */
+static void move_to(rosenbrock_state *s, const drape_state *in, const double *weights, int stages, double t)
+{
+    drape_step_equation *e = &s->common.equation;
+    for (size_t i = 0; i < e->dofs; i++) {
+        const size_t at = drape_step_equation_at(e, i);
+        double dx = 0, dv = 0;
+        for (int j = 0; j < stages; j++) {
+            dx += weights[j] * s->ux[j][i];
+            dv += weights[j] * s->uv[j][i];
+        }
+        e->x[at] = in->x[at] + dx;
+        e->v[at] = in->v[at] + dv;
+    }
+    place_pins(s, t, e->x, e->v);
+}
+
+/* The forces of a stage, in *g: those of the start of the step in a stage that is evaluated there. */
+static drape_status stage_forces(rosenbrock_state *s, const drape_state *in, double h, int i,
+                                 const double **g, drape_step_info *info)
+{
+    drape_step_equation *e = &s->common.equation;
+    const drape_rosenbrock_scheme *scheme = &drape_rosenbrock_rodas;
+    const double t = in->t + scheme->alpha[i] * h;
+    move_to(s, in, scheme->a[i], i, t);
+    *g = scheme->alpha[i] == 0 ? s->g0 : e->g;
+    if (*g == s->g0) {
+        s->power += scheme->b[i] * s->start_power;
+        return DRAPE_OK;
+    }
+    if (drape_system_crosses(e->system, e->x, t, &info->reason, &info->diagnostic))
+        return DRAPE_RETRY_REJECTED;
+    const drape_status status = evaluate(s, t, e->g, info);
+    if (!status)
+        s->power += scheme->b[i] * power(s, e->g);
+    return status;
+}
+
+static drape_status solve_stage(rosenbrock_state *s, const drape_state *in, double h, int i,
+                                drape_step_info *info)
+{
+    drape_step_equation *e = &s->common.equation;
+    const drape_rosenbrock_scheme *scheme = &drape_rosenbrock_rodas;
+    const double w = 1 / (scheme->gamma * h), *g = NULL;
+    drape_status status = stage_forces(s, in, h, i, &g, info);
+    if (status)
+        return status;
+    for (size_t k = 0; k < e->dofs; k++) {
+        const size_t at = drape_step_equation_at(e, k);
+        const double mass = e->model->mass[at / 3];
+        double cx = 0, cv = 0;
+        for (int j = 0; j < i; j++) {
+            cx += scheme->c[i][j] * s->ux[j][k];
+            cv += scheme->c[i][j] * s->uv[j][k];
+        }
+        s->rx[k] = e->v[at] + cx / h;
+        s->right[k] = mass * (cv / h + w * s->rx[k]) - g[at];
+        if (s->moved)
+            s->right[k] -= scheme->gammas[i] * h * s->change[k];
+    }
+    add_damping(s, s->rx, s->right);
+    info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
+    status = drape_sun_linear_solve(s->linear, s->right, s->ux[i]);
+    for (size_t k = 0; k < e->dofs; k++)
+        s->uv[i][k] = w * s->ux[i][k] - s->rx[k];
+    return status;
+}
+
+/* The estimate, into rx and right. */
+static void estimate(rosenbrock_state *s)
+{
+    for (size_t k = 0; k < s->common.equation.dofs; k++) {
+        s->rx[k] = s->right[k] = 0;
+        for (int j = 0; j < drape_rosenbrock_rodas.stages; j++) {
+            s->rx[k] += drape_rosenbrock_rodas.e[j] * s->ux[j][k];
+            s->right[k] += drape_rosenbrock_rodas.e[j] * s->uv[j][k];
+        }
+    }
+}
+
+/* Adds the work in the step: that of pins and colliders as above, and the dissipated one by the midpoint
+ * rule. */
+static drape_status audit(rosenbrock_state *s, const drape_state *in, const drape_state *out, double h,
+                          drape_step_info *info)
+{
+    const drape_rosenbrock_scheme *scheme = &drape_rosenbrock_rodas;
+    double weights[DRAPE_ROSENBROCK_STAGES], ahead = 0;
+    if (has_movers(s)) {
+        for (int i = 0; i < scheme->stages; i++) {
+            weights[i] = ALONG * scheme->b[i];
+            ahead += weights[i] * scheme->gammas[i] * h;
+        }
+        move_to(s, in, weights, s->common.equation.dofs > 0 ? scheme->stages : 0, in->t + ahead);
+        const drape_status status = evaluate(s, in->t + ahead, s->common.equation.g, info);
+        if (status)
+            return status;
+        const double change = (power(s, s->common.equation.g) - s->start_power) / ALONG;
+        info->pin_work += h * (s->power + change);
+    }
+    drape_implicit_audit_dissipation(&s->common, in->x, out->x, in->t, h, info);
+    return DRAPE_OK;
+}
+
+/* ---- A step ---- */
+
+/* What the forces depend on besides the state of the free nodes. */
+static bool depends_on_time(const rosenbrock_state *s)
+{
+    const drape_motion *m = s->common.motion;
+    bool moved = m->moved_count > 0 || drape_system_has_wind(s->common.equation.system);
+    for (int32_t c = 0; !moved && c < m->model->collider_count; c++)
+        moved = drape_motion_moves_collider(m, c);
+    return moved;
+}
+
+static drape_status solve(rosenbrock_state *s, const drape_state *in, double h, drape_step_info *info)
+{
+    drape_status status = DRAPE_OK;
+    s->power = 0;
+    s->moved = depends_on_time(s);
+    if (s->moved)
+        status = evaluate_change(s, in->t, h, info);
+    if (!status)
+        status = factor(s, 1 / (drape_rosenbrock_rodas.gamma * h), info);
+    for (int i = 0; !status && i < drape_rosenbrock_rodas.stages; i++)
+        status = solve_stage(s, in, h, i, info);
+    return status;
+}
+
+static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
+                         drape_step_info *info)
+{
+    rosenbrock_state *s = state;
+    drape_step_equation *e = &s->common.equation;
+    drape_local_attempt attempt = {
+        .stop = drape_local_error_stop(&s->control, in, out->t), .end = out->t, .bound = h};
+    info->tolerance = info->residual = NAN; /* errors are bounded, not residuals */
+    drape_status status = evaluate_start(s, in, attempt.stop, info);
+    if (!status)
+        status = drape_local_error_begin(&s->control, in, s->g0, &attempt, info);
+    if (!status && e->dofs > 0)
+        status = solve(s, in, attempt.h, info);
+    if (status)
+        return status;
+    move_to(s, in, drape_rosenbrock_rodas.m, e->dofs > 0 ? drape_rosenbrock_rodas.stages : 0, attempt.t1);
+    memcpy(out->x, e->x, e->nodes * sizeof *out->x);
+    memcpy(out->v, e->v, e->nodes * sizeof *out->v);
+    out->t = attempt.t1;
+    estimate(s);
+    status = drape_local_error_test(&s->control, &attempt, s->rx, s->right, info);
+    return status ? status : audit(s, in, out, attempt.h, info);
+}
+
+static void restart(void *state, const drape_state *from)
+{
+    (void)from;
+    drape_local_error_restart(&((rosenbrock_state *)state)->control);
+}
+
+/* ---- Creation and destruction ---- */
+
+static void create_arrays(rosenbrock_state *s)
+{
+    const drape_step_equation *e = &s->common.equation;
+    for (int i = 0; i < drape_rosenbrock_rodas.stages; i++) {
+        s->ux[i] = drape_arena_take(s->arena, e->dofs, sizeof *s->ux[i]);
+        s->uv[i] = drape_arena_take(s->arena, e->dofs, sizeof *s->uv[i]);
+    }
+    s->g0 = drape_arena_take(s->arena, e->nodes, sizeof *s->g0);
+    s->change = drape_arena_take(s->arena, e->dofs, sizeof *s->change);
+    s->rx = drape_arena_take(s->arena, e->dofs, sizeof *s->rx);
+    s->right = drape_arena_take(s->arena, e->dofs, sizeof *s->right);
+    if (s->common.dissipated)
+        s->damping =
+            drape_arena_take(s->arena, (size_t)drape_system_pattern(e->system)->nonzeros, sizeof *s->damping);
+}
+
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
+{
+    rosenbrock_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
+    if (!s)
+        return DRAPE_E_MEMORY;
+    s->arena = arena;
+    drape_status status = drape_implicit_init(arena, system, &s->common);
+    drape_local_error_init(system, values, drape_rosenbrock_rodas.order, &s->control);
+    create_arrays(s);
+    if (!status)
+        status = drape_arena_status(arena);
+    if (status || s->common.equation.dofs == 0)
+        return status;
+    if (drape_sundials_context(&s->sun))
+        return drape_fail_memory(arena->ctx, sizeof s->sun);
+    return drape_sun_linear_create(arena, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
+                                   drape_system_pattern(system), drape_system_pool(system),
+                                   drape_system_cancel_flag(system), &s->linear);
+}
+
+static void destroy(void **state)
+{
+    rosenbrock_state *s = *state;
+    if (!s)
+        return;
+    drape_sun_linear_destroy(&s->linear);
+    if (s->sun)
+        SUNContext_Free(&s->sun);
+    *state = NULL;
+}
+
+/* ---- For the table ---- */
+
+static drape_work work(const void *state)
+{
+    const rosenbrock_state *s = state;
+    drape_work work = s->common.equation.work;
+    if (s->linear) {
+        work.factorizations = s->linear->factorizations;
+        work.linear_iterations = s->linear->iterations;
+        work.factor_seconds = s->linear->factor_seconds;
+        work.solve_seconds = s->linear->solve_seconds;
+    }
+    return work;
+}
+
+/* Each step has its own factors. */
+static void archive(void *state, drape_archive *a)
+{
+    rosenbrock_state *s = state;
+    drape_local_error_archive(&s->control, a);
+    drape_work_archive(&s->common.equation.work, a);
+    if (!s->linear)
+        return;
+    if (drape_archive_has_read(a) && drape_system_pattern(s->common.equation.system) != s->linear->pattern)
+        drape_archive_note(a, renew_matrices(s));
+    drape_sun_linear_archive(s->linear, a, false);
+}
+
+static size_t bytes(const void *state)
+{
+    const rosenbrock_state *s = state;
+    return s->linear ? drape_sun_linear_bytes(s->linear) : 0;
+}
+
+const drape_integrator_ops drape_integrator_rosenbrock = {
+    .entry = {.name = "rosenbrock",
+              .summary = "linearly implicit Runge-Kutta with local error control: one matrix a step, no "
+                         "Newton; L-stable",
+              .reference = "Hairer & Wanner 1996, Solving Ordinary Differential Equations II, IV.7 and VI.4",
+              DRAPE_PARAMS(params)},
+    .order = 4,
+    .create = create,
+    .own_steps = true,
+    .gain = DRAPE_LOCAL_ERROR_GAIN,
+    .step = step,
+    .restart = restart,
+    .work = work,
+    .archive = archive,
+    .bytes = bytes,
+    .destroy = destroy,
+};
