@@ -208,9 +208,9 @@ static void reject(drape_sim *sim, const drape_step_info *info)
     count_reason(sim, info->reason);
 }
 
-/* Ends a step of an integrator that has dense output of its own at the time that the schedule was cut to: there
- * the dense output is its solution. It is left as a step of another size is, if the state passes the checks.
- * Its work is taken to be done evenly. */
+/* Ends a step of an integrator that has dense output of its own at the time that the schedule was cut to,
+ * where the dense output is its solution. False: it has none, or the state does not pass the checks of a
+ * step. The work of the step is taken to be done evenly. */
 static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
 {
     const drape_state *now = drape_sim_state(sim);
