@@ -21,7 +21,7 @@
  *
  * Between the ends of a step positions are interpolated by Hermite's polynomials: of degree 3 from
  * positions and velocities at order 2 and 3, of degree 5 with accelerations above. Their local error is
- * of one order more than the method.
+ * of one order more than the method. Velocities are of degree 3, from velocities and accelerations.
  */
 #include "base/elementary.h"
 #include "integrators/first_order.h"
@@ -332,6 +332,7 @@ static int dense(drape_first_order *f, double t, N_Vector out)
         else
             y[i] =
                 w * w * (y0[i] * (1 + 2 * u) + h * u * y0[j]) + u * u * (y1[i] * (1 + 2 * w) - h * w * y1[j]);
+        y[j] = w * w * (y0[j] * (1 + 2 * u) + h * u * r0[j]) + u * u * (y1[j] * (1 + 2 * w) - h * w * r1[j]);
     }
     return 0;
 }

@@ -228,6 +228,19 @@ static void interpolate(void *state, double time, double *x)
                                              w[3] * p->stage[2][i]);
 }
 
+static void interpolate_velocities(void *state, double time, double *v)
+{
+    radau_state *s = state;
+    const polynomial *p = &s->last;
+    double w[STAGES + 1];
+    if (s->n == 0 || p->h == 0)
+        return;
+    weights_of_velocity((time - p->t) / p->h, w);
+    for (int64_t i = 0; i < s->n; i++)
+        v[node_at(s, i)] =
+            w[0] * p->v[i] + w[1] * p->stage[0][i] + w[2] * p->stage[1][i] + w[3] * p->stage[2][i];
+}
+
 /* ---- Forces ---- */
 
 /* g at a point; 0, or why it cannot be used. */
@@ -811,6 +824,7 @@ const drape_integrator_ops drape_integrator_radau = {
     .own_steps = true,
     .step = step,
     .interpolate = interpolate,
+    .interpolate_velocities = interpolate_velocities,
     .restart = restart,
     .work = work,
     .archive = archive,
