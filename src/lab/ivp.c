@@ -1,7 +1,7 @@
 /*
- * ivp: every integrator over its dt or rtol on scenes of the test set, compared with their references (ivp.h).
- * The residual that Newton's method may leave falls with dt as fast as the error of the method does. Errors
- * are relative to the size of the scene, and taken at times at which steps end.
+ * ivp: every integrator over its dt or rtol on scenes of the test set, compared with their references
+ * (ivp.h). The residual that Newton's method may leave falls with dt as fast as the error of the method
+ * does. Errors are relative to the size of the scene, and taken at times at which steps end.
  */
 #include "lab/ivp.h"
 #include "base/param.h"
@@ -394,8 +394,8 @@ static bool has_its_steps(const json_t *r)
     return lab_number(r, "rejected") == 0 && !(lab_tag_number(r, "value") > 0.5 * limit);
 }
 
-/* The points of the asymptotic range, from the finest on: those whose orders between neighbours are that of the finest.
- * Points within the reference's error, and cases whose steps were cut, are none. */
+/* The points of the asymptotic range, from the finest on: those whose orders between neighbours are that of
+ * the finest. Points within the reference's error, and cases whose steps were cut, are none. */
 static size_t asymptotic_range(const series *s, double *dt, double *error)
 {
     size_t count = 0;

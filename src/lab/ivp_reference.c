@@ -1,8 +1,9 @@
 /*
- * ivp_reference.c: the reference of a scene. Each family of methods is refined until it changes no more, or its
- * time is used up; of those of fixed steps the results of successive dt are extrapolated to dt = 0 (Richardson
- * 1911; Hairer, Norsett & Wanner 1993, II.9). The reference is that of the family with the smallest change at
- * its last refinement, and its error the distance to the nearest result of another family.
+ * ivp_reference.c: the reference of a scene. Each family of methods is refined until it changes no more, or
+ * its time is used up; of those of fixed steps the results of successive dt are extrapolated to dt = 0
+ * (Richardson 1911; Hairer, Norsett & Wanner 1993, II.9). The reference is that of the family with the
+ * smallest change at its last refinement, and its error the distance to the nearest result of another
+ * family.
  */
 #include "base/clock.h"
 #include "base/hash.h"
