@@ -18,7 +18,7 @@
 
 #define MAX_LEVELS   8
 #define ENOUGH       1e-2 /* of the goal: no further refinement */
-#define GROWTH       1.7
+#define GROWTH       1.7  /* expected cost of a level over that of the one before, at least */
 #define SMOOTH_GOAL  1e-8 /* of the size: families agree to this, */
 #define CONTACT_GOAL 1e-5 /* or with contact to this */
 #define COARSEST     8    /* steps in an interval at the first level of fixed steps */
