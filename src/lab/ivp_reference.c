@@ -16,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MAX_LEVELS   8
+#define MAX_LEVELS   10
 #define ENOUGH       1e-2 /* of the goal: no further refinement */
 #define GROWTH       1.7  /* expected cost of a level over that of the one before, at least */
 #define SMOOTH_GOAL  1e-8 /* of the size: families agree to this, */
