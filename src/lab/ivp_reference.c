@@ -248,6 +248,11 @@ drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out
         return status;
     const attempt *best = choose(attempts, count);
     const double error = disagreement(s, attempts, count, best), goal = goal_of(s);
+    if (!isfinite(error))
+        return drape_fail(s->arena->ctx, DRAPE_E_SOLVER,
+                          "%.300s: no reference: no two families of methods completed two levels; more CPU "
+                          "seconds help",
+                          s->path);
     if (!(error <= goal))
         return drape_fail(
             s->arena->ctx, DRAPE_E_SOLVER,
