@@ -389,8 +389,9 @@ static double stiffness_share(drape_inexact_newton *s, double *d, bool *adds)
 /* The estimated distance from d to the solution. F was evaluated last at d, as it is on return. corrected:
  * there is a matrix of this solve. Overwrites p.
  *
- * With contact, where returning to d would take another evaluation, p is added to d if it can be: that alone
- * brought cloth on balls a fifth nearer at the same cost. Without contact it gained nothing. */
+ * With contact, where returning to d would take another evaluation, p is added to d if it can be: 32 random
+ * scenes of cloth on balls and floors came a sixth nearer at the same cost, 16 others did not. Without
+ * contact it gained nothing. */
 static double estimate_error(drape_inexact_newton *s, double *d, bool corrected)
 {
     drape_step_equation *e = s->equation;
