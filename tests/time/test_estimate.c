@@ -263,8 +263,8 @@ static double off_after(const source *of, const char *settings, int steps, drape
     scene exact = open(of, "be", ""), s = open(of, "newton_k", settings);
     scene_advance(&exact, steps * DT);
     scene_advance(&s, steps * DT);
-    const double off =
-        rms_distance(drape_sim_positions(s.sim), drape_sim_positions(exact.sim), 3 * (size_t)s.model->node_count);
+    const double off = rms_distance(drape_sim_positions(s.sim), drape_sim_positions(exact.sim),
+                                    3 * (size_t)s.model->node_count);
     *done = drape_sim_statistics(s.sim);
     scene_close(&s);
     scene_close(&exact);
