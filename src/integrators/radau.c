@@ -28,7 +28,7 @@
  *     nodes and E h = 1e5 N/m takes half of the iterations;
  *   - a limit to the next step by the rate of convergence (Gustafsson & Soederlind 1997, Control strategies
  *     for the iterative solution of nonlinear equations in ODE solvers): where cloth swings fast, the
- *     iteration bounds the steps, not the error.
+ *     iteration bounds the steps, not the error; and after a failure of the iteration, steps grow slowly;
  *   - in contact, K and D of the present state, in every step, and the present velocities as a guess.
  *
  * The energy account integrates the powers by the quadrature of the stages.
@@ -51,10 +51,14 @@ enum { STAGES = 3 };
 /* Of Newton's iteration. */
 #define MAX_ITERATIONS 10
 #define FAST                                                                                                 \
-    1e-2                 /* K and D are kept after a step whose iteration converged at this rate: that
+    1e-2            /* K and D are kept after a step whose iteration converged at this rate: that
                                which LINEAR_TOLERANCE allows; never in contact */
-#define AIM          0.3 /* rate for which the next step is made short enough */
-#define SLOWEST      0.99
+#define AIM     0.3 /* rate for which the next step is made short enough */
+#define SLOWEST 0.99
+/* Where the iteration failed, the next step is at most this much of that, and from step to step the limit is
+ * relaxed by a factor. With contact this saves a third of the time. */
+#define CEILING      0.5
+#define RELAXATION   1.2
 #define NEWTON_SHARE 0.03 /* of the error's bound: error that the iteration may leave */
 #define ROUNDING     10.0 /* of the sizes of the scene: no smaller error can be asked for */
 /* Residual of the complex system, relative. 1e-3 takes a third more solves and saves a fiftieth of the
@@ -121,6 +125,7 @@ typedef struct radau_state {
     /* Kept between steps. */
     polynomial last, next; /* of the last accepted step; of the one being made */
     double reached;        /* [s] where the last step ended; NAN: the next one starts anew */
+    double ceiling;        /* [s] of the next step; INFINITY: the iteration has not failed lately */
     double hardest;        /* largest rate of the last iteration, of those that mattered */
     double theta;          /* rate of convergence of the last iteration */
     double left;           /* theta/(1 - theta) */
@@ -584,6 +589,16 @@ static drape_status find_stages(radau_state *s, double h, drape_step_info *info)
     } while (true);
 }
 
+/* Bounds what the error test proposed by what the iteration is likely to manage. */
+static void bound_next_step(radau_state *s, double h)
+{
+    double *proposed = &s->control.made.proposed;
+    if (s->hardest > 0)
+        *proposed = fmin(*proposed, h * AIM / s->hardest);
+    *proposed = fmin(*proposed, s->ceiling);
+    s->ceiling *= RELAXATION;
+}
+
 /* Solves the stages and tests the error. */
 static drape_status attempt(radau_state *s, const drape_local_attempt *a, drape_step_info *info)
 {
@@ -592,13 +607,14 @@ static drape_status attempt(radau_state *s, const drape_local_attempt *a, drape_
         status = estimate_error(s, a);
     if (status) {
         info->retry = info->retry > 0 ? info->retry : a->h / 2;
+        s->ceiling = CEILING * a->h;
         diagnose(s, info);
         return status;
     }
     status = drape_local_error_test(&s->control, a, s->error_x, s->error_v, info);
     s->have_matrix &= status ? s->current : s->theta <= FAST && !s->touches;
-    if (!status && s->hardest > 0)
-        s->control.made.proposed = fmin(s->control.made.proposed, a->h * AIM / s->hardest);
+    if (!status)
+        bound_next_step(s, a->h);
     return status;
 }
 
@@ -650,6 +666,7 @@ static void restart(void *state, const drape_state *from)
     (void)from;
     radau_state *s = state;
     s->reached = NAN;
+    s->ceiling = INFINITY;
     s->have_matrix = false;
     drape_local_error_restart(&s->control);
 }
@@ -761,6 +778,7 @@ static void archive(void *state, drape_archive *a)
     radau_state *s = state;
     drape_local_error_archive(&s->control, a);
     drape_archive_double(a, &s->reached);
+    drape_archive_double(a, &s->ceiling);
     drape_archive_double(a, &s->theta);
     drape_archive_double(a, &s->left);
     drape_archive_bool(a, &s->have_matrix);
