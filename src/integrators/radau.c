@@ -51,10 +51,12 @@ enum { STAGES = 3 };
 /* Of Newton's iteration. */
 #define MAX_ITERATIONS 10
 #define FAST                                                                                                 \
-    1e-2            /* K and D are kept after a step whose iteration converged at this rate: that
+    1e-2        /* K and D are kept after a step whose iteration converged at this rate: that
                                which LINEAR_TOLERANCE allows; never in contact */
-#define AIM     0.3 /* rate for which the next step is made short enough */
-#define SLOWEST 0.99
+#define AIM 0.3 /* rate for which the next step is made short enough */
+/* Extrapolation, in steps of the last size: one that was cut by the end of an advance may be tiny. */
+#define FARTHEST 8.0
+#define SLOWEST  0.99
 /* Where the iteration failed, the next step is at most this much of that, and from step to step the limit is
  * relaxed by a factor. With contact this saves a third of the time. */
 #define CEILING      0.5
@@ -205,6 +207,13 @@ static void weights_of_position(double p, double w[STAGES + 1])
         w[i] = p / 2 * (left[i] + right[i]);
 }
 
+/* Whether the last polynomial says something about a step of size h. In contact its extrapolation costs more
+ * iterations than it saves. */
+static bool extrapolates(const radau_state *s, double h)
+{
+    return s->last.h > 0 && h <= FARTHEST * s->last.h && !s->touches;
+}
+
 static void interpolate(void *state, double time, double *x)
 {
     radau_state *s = state;
@@ -263,12 +272,12 @@ static double jacobian_clock(const radau_state *s)
 }
 
 /* Where K and D are evaluated: at the last polynomial's extrapolation to the middle of the step, as K at the
- * beginning is twice as far from K at the end; but at the beginning if there is none, if it crosses
- * something, or in contact, whose forces make extrapolation a bad guess. */
+ * beginning is twice as far from K at the end; but at the beginning if there is none, or if it crosses
+ * something. */
 static drape_point choose_matrix_point(radau_state *s, double h)
 {
     const polynomial *p = &s->next, *last = &s->last;
-    if (last->h > 0 && !s->touches) {
+    if (extrapolates(s, h)) {
         double of_x[STAGES + 1], of_v[STAGES + 1], *z = s->rhs, *v = s->correction;
         weights_of_position(1 + h / (2 * last->h), of_x);
         weights_of_velocity(1 + h / (2 * last->h), of_v);
@@ -327,13 +336,11 @@ static void set_guess(radau_state *s, guess kind, double h)
     combine(s->n, coefficients, h, s->rate, s->z);
 }
 
-/* Finds a guess in which nothing passes through anything else, and -F there. In contact an extrapolation
- * costs more iterations than it saves. */
+/* Finds a guess in which nothing passes through anything else, and -F there. */
 static drape_status guess_stages(radau_state *s, double h)
 {
     drape_status status = DRAPE_RETRY_NONLINEAR;
-    for (int kind = s->last.h > 0 && !s->touches ? EXTRAPOLATED : UNIFORM; status > 0 && kind < GUESSES;
-         kind++) {
+    for (int kind = extrapolates(s, h) ? EXTRAPOLATED : UNIFORM; status > 0 && kind < GUESSES; kind++) {
         set_guess(s, (guess)kind, h);
         status = evaluate_stages(s, h);
     }
