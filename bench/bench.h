@@ -136,4 +136,11 @@ static inline void bench_csv_row(FILE *csv)
             commit ? commit : "unknown", BENCH_COMPILER, BENCH_OPTIONS);
 }
 
+/* For qsort, by increasing size. */
+static inline int bench_compare(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
 #endif

@@ -20,6 +20,7 @@
  *         --only            runs only scenes whose name contains this
  */
 #include "bench.h"
+#include "support/step_error.h"
 
 #define MAX_STEPS 64
 #define STEPS     24
@@ -111,26 +112,10 @@ typedef struct cell {
 } cell;
 
 typedef struct pair {
-    drape_sim *exact;
-    size_t n;      /* numbers in x and v */
-    double *x, *v; /* the state before the step */
+    step_error error;
     double floor, bound;
     cell *cell;
 } pair;
-
-static double distance(const double *a, const double *b, size_t n)
-{
-    double sum = 0;
-    for (size_t i = 0; i < n; i++)
-        sum += (a[i] - b[i]) * (a[i] - b[i]);
-    return sqrt(sum / ((double)n / 3));
-}
-
-static void keep_state(pair *p, const drape_sim *sim)
-{
-    memcpy(p->x, drape_sim_positions(sim), p->n * sizeof *p->x);
-    memcpy(p->v, drape_sim_velocities(sim), p->n * sizeof *p->v);
-}
 
 static drape_status compare(void *user, const drape_event *event)
 {
@@ -139,10 +124,10 @@ static drape_status compare(void *user, const drape_event *event)
     if (event->kind != DRAPE_EVENT_ATTEMPT || !a->accepted)
         return DRAPE_OK;
     cell *c = p->cell;
-    if (drape_sim_set_state(p->exact, a->t, p->x, p->v) || drape_sim_advance(p->exact, a->t + a->h))
+    const double e = step_error_of(&p->error, event);
+    if (isnan(e))
         c->missing++;
     else {
-        const double e = distance(drape_sim_positions(event->sim), drape_sim_positions(p->exact), p->n);
         if (e > p->floor && c->count < MAX_STEPS)
             c->ratio[c->count++] = a->error / e;
         c->above += e > p->bound;
@@ -150,7 +135,6 @@ static drape_status compare(void *user, const drape_event *event)
         c->largest = fmax(c->largest, e);
         c->largest_estimate = fmax(c->largest_estimate, a->error);
     }
-    keep_state(p, event->sim);
     return DRAPE_OK;
 }
 
@@ -170,31 +154,26 @@ static void measure(drape_context *ctx, const scene *s, bool least, cell *out)
     const drape_setting settings[] = {
         {.name = "dt", .number = DT}, {.name = least ? "error" : NULL, .number = 1e6}, {0}};
     drape_sim *sim = bench_sim(ctx, model, "newton_k", settings, NULL, NULL);
-    pair p = {.exact = exact_sim(ctx, model), .n = 3 * (size_t)drape_model_node_count(model), .cell = out};
-    p.x = malloc(p.n * sizeof *p.x);
-    p.v = malloc(p.n * sizeof *p.v);
-    if (!p.x || !p.v)
+    const size_t n = 3 * (size_t)drape_model_node_count(model);
+    pair p = {.error = {.exact = exact_sim(ctx, model), .n = n}, .cell = out};
+    p.error.x = malloc(n * sizeof *p.error.x);
+    p.error.v = malloc(n * sizeof *p.error.v);
+    if (!p.error.x || !p.error.v)
         bench_fail(ctx, "out of memory");
     p.floor = FLOOR * model->length;
     p.bound = 1e-3 * model->length;
     *out = (cell){0};
-    keep_state(&p, sim);
+    step_error_keep(&p.error, sim);
     if (drape_sim_observe(sim, compare, &p) || drape_sim_advance(sim, STEPS * DT))
         fprintf(stderr, "%s: %s\n", s->name, drape_context_message(ctx));
-    free(p.x);
-    free(p.v);
+    free(p.error.x);
+    free(p.error.v);
     drape_sim_destroy(&sim);
-    drape_sim_destroy(&p.exact);
+    drape_sim_destroy(&p.error.exact);
     drape_model_destroy(&model);
 }
 
 /* ---- Tables ---- */
-
-static int compare_numbers(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 static double quantile(const cell *c, double share)
 {
@@ -215,7 +194,7 @@ typedef struct total {
 
 static void print_cell(const options *o, const scene *s, const char *mode, cell *c, total *t)
 {
-    qsort(c->ratio, (size_t)c->count, sizeof *c->ratio, compare_numbers);
+    qsort(c->ratio, (size_t)c->count, sizeof *c->ratio, bench_compare);
     const double median = quantile(c, 0.5);
     printf("%-44s %-8s %3d steps  %8.3g %8.3g %8.3g  within %3d  largest %.2e, estimate %.2e\n", s->name,
            mode, c->count, quantile(c, 0.05), median, quantile(c, 0.95), within(c), c->largest / s->size,

@@ -90,18 +90,12 @@ static void run_once(const char *method, int side, const terms *kind, result *r)
     drape_context_destroy(&ctx);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void finish(result *r)
 {
     r->cpu = 0;
     for (int k = 0; k < r->frames; k++)
         r->cpu += 1e3 * r->least[k] / r->frames;
-    qsort(r->least, (size_t)r->frames, sizeof *r->least, compare_doubles);
+    qsort(r->least, (size_t)r->frames, sizeof *r->least, bench_compare);
     r->median = 1e3 * r->least[r->frames / 2];
 }
 

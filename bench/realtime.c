@@ -12,7 +12,7 @@
  * `strain` is the largest of any edge at the end of a frame, `inside` the depth of cloth in a body,
  * `crossings` that of edges through triangles of the cloth, each the largest of all frames.
  *
- *     realtime [--csv FILE] [--seconds S] [--scene NAME] [--slower F] [--be]
+ *     realtime [--csv FILE] [--seconds S] [--scene NAME] [--contact NAME] [--slower F] [--be]
  *
  * --slower multiplies the budgets, for a machine that is so many times slower than the one that they are
  * meant for. --be adds the converged steps, which take minutes.
@@ -188,12 +188,6 @@ static double draw(uint64_t *seed)
 
 static double slower = 1;
 
-static int compare(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void run(drape_context *ctx, const scene *s, const variant *v, const char *integrator, double seconds,
                 result *r)
 {
@@ -243,7 +237,7 @@ static void run(drape_context *ctx, const scene *s, const variant *v, const char
     }
     r->contact = contact / steps;
     drape_model_destroy(&model);
-    qsort(r->ms, (size_t)r->frames, sizeof *r->ms, compare);
+    qsort(r->ms, (size_t)r->frames, sizeof *r->ms, bench_compare);
 }
 
 static double percentile(const result *r, double share)
@@ -272,8 +266,9 @@ static void measure(drape_context *ctx, const scene *s, const variant *v, const 
 
 int main(int argc, char **argv)
 {
-    static const char usage[] = "realtime [--csv FILE] [--seconds S] [--scene NAME] [--slower F] [--be]\n";
-    const char *file = NULL, *only = NULL;
+    static const char usage[] =
+        "realtime [--csv FILE] [--seconds S] [--scene NAME] [--contact NAME] [--slower F] [--be]\n";
+    const char *file = NULL, *only = NULL, *contact = NULL;
     double seconds = 0;
     bool be = false;
     for (int i = 1; i < argc; i++) {
@@ -281,6 +276,8 @@ int main(int argc, char **argv)
             file = argv[++i];
         else if (strcmp(argv[i], "--scene") == 0 && i + 1 < argc)
             only = argv[++i];
+        else if (strcmp(argv[i], "--contact") == 0 && i + 1 < argc)
+            contact = argv[++i];
         else if (strcmp(argv[i], "--seconds") == 0 && i + 1 < argc)
             seconds = atof(argv[++i]);
         else if (strcmp(argv[i], "--be") == 0)
@@ -302,7 +299,8 @@ int main(int argc, char **argv)
          "crossings attempts rejected errors contact %");
     for (int i = 0; i < SCENES; i++)
         for (int k = 0; k < VARIANTS; k++) {
-            if (only && strcmp(only, scenes[i].name) != 0)
+            if ((only && strcmp(only, scenes[i].name) != 0) ||
+                (contact && strcmp(contact, variants[k].name) != 0))
                 continue;
             measure(ctx, &scenes[i], &variants[k], "newton_k", seconds, csv);
             if (be)

@@ -268,12 +268,6 @@ static int repeats_of(int side, const method *g)
     return g == &be_dense || side > 50 ? 1 : side > 25 ? 3 : 7;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static result measure(const bench_group *group, int side, const method *g, const double *converged)
 {
     result r = NAN_RESULT;
@@ -285,7 +279,7 @@ static result measure(const bench_group *group, int side, const method *g, const
         run_once(group, side, g, converged, least, &r);
     for (; count < MAX_STEPS && isfinite(least[count]); count++)
         r.cpu += 1e3 * least[count] / r.steps;
-    qsort(least, (size_t)count, sizeof *least, compare_doubles);
+    qsort(least, (size_t)count, sizeof *least, bench_compare);
     r.median = 1e3 * least[count / 2];
     r.worst = 1e3 * least[count - 1];
     return r;

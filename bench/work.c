@@ -142,9 +142,10 @@ static void add_integrator(bench *b, const drape_integrator_ops *ops)
     static const double rtols[] = {3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6},
                         controlled[] = {3e-2, 1e-2, 1e-3, 1e-4};
     static const int rates[] = {30, 60, 120, 240, 480, 960, 1920}, orders[] = {2, 5};
-    for (size_t i = 0; ops->own_steps && i < sizeof orders / sizeof *orders; i++)
+    const bool has_orders = drape_param_find(ops->entry.params, ops->entry.param_count, "max_order") >= 0;
+    for (size_t i = 0; ops->own_steps && i < (has_orders ? sizeof orders / sizeof *orders : 1); i++)
         for (size_t k = 0; k < sizeof rtols / sizeof *rtols; k++)
-            add(b, ops->entry.name, "halving", "rtol", rtols[k], orders[i]);
+            add(b, ops->entry.name, "halving", "rtol", rtols[k], has_orders ? orders[i] : 0);
     for (size_t i = 0; !ops->own_steps && i < sizeof rates / sizeof *rates; i++)
         add(b, ops->entry.name, "halving", "dt", 1.0 / rates[i], 0);
     for (size_t i = 0; !ops->own_steps && i < sizeof controlled / sizeof *controlled; i++)

@@ -67,7 +67,7 @@ typedef enum drape_log_level { DRAPE_LOG_INFO = 0, DRAPE_LOG_WARNING = 1 } drape
 
 /* Settings of a context. Initialise with drape_context_def_init. */
 typedef struct drape_context_def {
-    size_t struct_size; /* set by drape_context_def_init; a def with 0 here is rejected */
+    size_t struct_size; /* set by drape_context_def_init; a def that is too short or too long is rejected */
     /* Allocator for all memory that Drape itself takes. Set both functions or neither. allocate returns
      * memory aligned for any type, or NULL on failure; release receives what allocate returned, never NULL.
      * Default: malloc and free. SUNDIALS and KLU always use malloc. */
@@ -85,7 +85,8 @@ typedef struct drape_context_def {
     void *cancel_user;
 } drape_context_def;
 
-/* Fills *def with the defaults. Pass the caller's sizeof(drape_context_def) as struct_size. */
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_context_def) as struct_size. Nothing if def is
+ * NULL. */
 DRAPE_API void drape_context_def_init(drape_context_def *def, size_t struct_size);
 
 /* Creates a context. If def is NULL, the defaults apply. Errors: DRAPE_E_ARGUMENT (def not initialised, or
@@ -163,6 +164,7 @@ typedef struct drape_pin_def {
     size_t key_count;              /* length of track */
     bool clamp; /* edges between these nodes keep the direction of the sheet across them, for bending terms
                    that support it */
+    const char *name; /* for events, unique among the pins of the cloth; NULL: "pin0", "pin1" ... */
 } drape_pin_def;
 
 /* One piece of cloth. */
@@ -194,6 +196,20 @@ typedef struct drape_collider_def {
                            0 */
 } drape_collider_def;
 
+/* An event: a root of a function of the state, which is located within the step in which it lies. Initialise
+ * with drape_event_def_init. */
+typedef struct drape_event_def {
+    size_t struct_size;    /* set by drape_event_def_init */
+    drape_entry_def entry; /* the event: "height", "plane", "energy" or "pin_force"; for a function of the
+                              host, drape_sim_add_event, its type is NULL */
+    const char *name;      /* NULL: "event0", "event1" ... */
+    const char *cloth;     /* name of the cloth that it is about; NULL: all of them */
+    const char *pins;      /* name of the pins that it measures or releases; NULL: all pins of the cloth */
+    const char *direction; /* in which the quantity passes its bound: "up", "down" or "both"; NULL: "both" */
+    const char *action;    /* "record", "stop" or "release"; NULL: "record" */
+    bool once;             /* only the first time counts; default false */
+} drape_event_def;
+
 /* A whole scene. Initialise with drape_scene_def_init. Everything it points to need only live until
  * drape_model_create returns. */
 typedef struct drape_scene_def {
@@ -218,13 +234,17 @@ typedef struct drape_scene_def {
     const drape_setting *contact;        /* distance, stiffness ...; `drape list contact` shows all */
     size_t contact_count;                /* length of contact */
     const char *up; /* axis that points up in frames written by `drape run`: "y" or "z"; NULL: "y" */
+    const drape_event_def *events; /* at most 256 */
+    size_t event_count;            /* length of events */
 } drape_scene_def;
 
-/* Fill a def with the defaults documented above. Pass the caller's sizeof of the def as struct_size. */
+/* Fill a def with the defaults documented above. Pass the caller's sizeof of the def as struct_size. Nothing
+ * if def is NULL. */
 DRAPE_API void drape_scene_def_init(drape_scene_def *def, size_t struct_size);
 DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
 DRAPE_API void drape_pin_def_init(drape_pin_def *def, size_t struct_size);
+DRAPE_API void drape_event_def_init(drape_event_def *def, size_t struct_size);
 DRAPE_API void drape_collider_def_init(drape_collider_def *def, size_t struct_size);
 
 /* ---- Scene from text ---- */
@@ -341,14 +361,15 @@ typedef struct drape_sim_def {
                               0: never */
 } drape_sim_def;
 
-/* Fills *def with the defaults. */
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_sim_def) as struct_size. Nothing if def is
+ * NULL. */
 DRAPE_API void drape_sim_def_init(drape_sim_def *def, size_t struct_size);
 
 /* Creates a sim at t = 0 with the model's rest positions and initial velocities. If def is NULL, the scene's
  * integrator and controller are used. All heap memory of Drape itself is allocated here; no step allocates
- * any. The messages of the sim go to ctx, which may differ from the model's context. Errors: DRAPE_E_ARGUMENT
- * (unknown entry, or a setting out of range), DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's
- * cancel function). */
+ * any, except where contact outgrows its lists, and at an event that releases pins. The messages of the sim
+ * go to ctx, which may differ from the model's context. Errors: DRAPE_E_ARGUMENT (unknown entry, or a setting
+ * out of range), DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's cancel function). */
 DRAPE_API drape_status drape_sim_create(drape_context *ctx, const drape_model *model,
                                         const drape_sim_def *def, drape_sim **out);
 
@@ -359,8 +380,9 @@ DRAPE_API void drape_sim_destroy(drape_sim **sim);
  * remainder below 1e-9 dt joins the step before it. If t_end is not later than the present time, apart from
  * rounding, nothing happens. After a failure the state is the last accepted one. Errors:
  * DRAPE_E_STEP_TOO_SMALL (the step was halved below dt_min; "ida" took max_steps; max_attempts within one
- * dt), DRAPE_E_SOLVER (a step failed under the controller "fixed"), DRAPE_E_STOPPED (by an observer or
- * drape_sim_cancel), DRAPE_E_ARGUMENT (t_end not finite). The message names the time, step size, reason and
+ * dt), DRAPE_E_SOLVER (a step failed under the controller "fixed"), DRAPE_E_STOPPED (by an observer,
+ * drape_sim_cancel or an event, see drape_sim_stopped_by), DRAPE_E_ARGUMENT (t_end not finite, or an event
+ * function is not), DRAPE_E_MEMORY. The message names the time, step size, reason and
  * diagnostic. */
 DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
 
@@ -443,7 +465,8 @@ typedef struct drape_place_def {
     bool stop; /* the cloth is at rest afterwards; default false: its velocities turn with it */
 } drape_place_def;
 
-/* Fills *def with the defaults. Pass the caller's sizeof(drape_place_def) as struct_size. */
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_place_def) as struct_size. Nothing if def is
+ * NULL. */
 DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
 
 /* Places cloth with its pins, and colliders, elsewhere at the present time, by a rigid motion: a character
@@ -454,10 +477,11 @@ DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
  * axis than that of gravity changes how the cloth hangs. The energy account takes the change of potential
  * and kinetic energy as given by the host.
  *
- * Colliders do not turn: a rotation is refused if one of the colliders is not the same shape afterwards.
- * Spheres always are; planes, capsules and cylinders are if they turn about their own axis or normal, and the
- * latter two also if they are turned over. Name the others' cloths and colliders apart, or replace a body
- * that turns by a cloth whose nodes are all pinned.
+ * Colliders do not turn: a rotation is refused unless each of the colliders looks the same afterwards.
+ * Spheres always do; planes, capsules and cylinders do if they are turned about their own axis or normal, the
+ * latter two also if they are turned over; boxes do after a half turn about one of their axes, and after a
+ * quarter turn about one if their sizes along the two others are equal. Leave the others out, or replace a
+ * body that turns by a cloth whose nodes are all pinned.
  *
  * Contact is not checked. Where cloth and colliders move together their contacts stay as they were. Cloth
  * that is placed into a collider, or a collider into cloth, is like cloth that starts there: it is pushed out
@@ -547,7 +571,8 @@ DRAPE_API drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *fiel
 /* ---- Sim: what can be read ---- */
 
 /* The last accepted state: time [s], positions [m] and velocities [m/s], node_count x 3 each; valid until the
- * next call that changes the sim. drape_sim_model returns the model that the sim was created with. */
+ * next call that changes the sim. drape_sim_model returns the model that the sim was created with
+ * or, after an event released pins, a model of the sim without these, valid until the next release. */
 DRAPE_API double drape_sim_time(const drape_sim *sim);
 DRAPE_API const double *drape_sim_positions(const drape_sim *sim);
 DRAPE_API const double *drape_sim_velocities(const drape_sim *sim);
@@ -696,6 +721,45 @@ typedef struct drape_warning {
  * their equation than its bound. Returns false past the last. */
 DRAPE_API bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out);
 
+/* ---- Events ---- */
+
+/* The function of an event of a host: writes f(t, x, v) to *value, whose roots are the events. positions and
+ * velocities (node_count x 3 [m], [m/s]) are those of a time t [s] within the step that is being made; they
+ * are valid during the call. It is called at four or more times in each step, not in order, so it must depend
+ * on nothing else. Returns 0; any other value, or a *value that is not finite, ends the advance with the last
+ * accepted state: with the status if that is negative, DRAPE_E_STOPPED if it is positive, DRAPE_E_ARGUMENT if
+ * the value is not finite. It must not call functions of the sim. */
+typedef drape_status drape_event_function(void *user, double t, const double *positions,
+                                          const double *velocities, double *value);
+
+/* Adds an event to those of the scene. def: its name, which must be given, and what else applies; its type is
+ * NULL. A root is counted when f passes 0 in the direction of the def; that f is 0 at the start, or in a
+ * state that was set, is not a root. The texts of the def are copied. A sim that is restored from a
+ * checkpoint keeps its functions, and must have as many events as the one that was saved. There are at most
+ * 64. Memory is allocated. Errors:
+ * DRAPE_E_ARGUMENT (NULL, no name or one that there is already, a value of the def that is not allowed),
+ * DRAPE_E_VERSION (struct_size), DRAPE_E_MEMORY. Must not be called by an observer. Thread-safety: as the
+ * sim. */
+DRAPE_API drape_status drape_sim_add_event(drape_sim *sim, const drape_event_def *def,
+                                           drape_event_function *function, void *user);
+
+/* What is known about an event. */
+typedef struct drape_event_record {
+    const char *name;   /* valid as long as the sim, or until it is restored */
+    int64_t count;      /* times that it occurred since the sim was created */
+    double first, last; /* [s] the first and the last time; NaN: never */
+    double value;       /* of the quantity at the last time; NaN: never */
+    int direction;      /* of the last time: 1: up; -1: down; 0: never */
+} drape_event_record;
+
+/* Returns the number of events, those of the scene first, and fills *out with what is known about one of them
+ * if out is not NULL and there is one with this index, from 0. */
+DRAPE_API int32_t drape_sim_event(const drape_sim *sim, int32_t index, drape_event_record *out);
+
+/* The event that ended the last advance, which then returned DRAPE_E_STOPPED; -1: none did. The state is that
+ * of the event. A later advance continues from there. */
+DRAPE_API int32_t drape_sim_stopped_by(const drape_sim *sim);
+
 /* ---- Checkpoints ---- */
 
 /* Receives the next size bytes of a stream. Returns DRAPE_OK to continue, or a negative status to stop; it
@@ -768,7 +832,8 @@ typedef struct drape_attempt {
 /* The kind of an event. */
 typedef enum drape_event_kind {
     DRAPE_EVENT_ATTEMPT, /* an attempt was judged; the sim's state is the one that is kept */
-    DRAPE_EVENT_FRAME    /* a frame time was reached: t = 0 at the first advance, then k / frame_rate */
+    DRAPE_EVENT_FRAME,   /* a frame time was reached: t = 0 at the first advance, then k / frame_rate */
+    DRAPE_EVENT_ROOT     /* an event of the scene, or of drape_sim_add_event, has occurred */
 } drape_event_kind;
 
 /* An event as an observer receives it. Valid during the call. */
@@ -777,13 +842,21 @@ typedef struct drape_event {
     drape_sim *sim;               /* the sim that the event belongs to */
     const drape_attempt *attempt; /* ATTEMPT only */
     int64_t frame;                /* FRAME: number of the frame, from 0 */
-    double time;                  /* FRAME [s]: frame / frame_rate, up to rounding; see positions */
+    double time;                  /* FRAME [s]: frame / frame_rate, up to rounding; see positions. ROOT [s]:
+                                     of the event */
     const double *positions;  /* FRAME: node_count x 3 [m]; interpolated between the two steps around it by a
                                  cubic Hermite polynomial or, where that passes through something, on the
                                  straight line between them, at the nearest free point to the time. If none is
                                  free, they and the time are those of the later step, also in the other frames
                                  between the two */
-    const double *velocities; /* FRAME: node_count x 3 [m/s]; linear between the two steps around it */
+    const double *velocities; /* FRAME: node_count x 3 [m/s]; linear between the two steps around it, for
+                                 methods of order 1 and 2; otherwise the integrator's dense output or the
+                                 slope of the polynomial. Positions and velocities of ROOT are dense output,
+                                 too, which is not checked for contact; for an event that acts, the state */
+    int32_t event;            /* ROOT: number of the event, for drape_sim_event */
+    const char *name;         /* ROOT: its name */
+    double value;  /* ROOT: the quantity, in the unit of its bound; of a function of the host, its value */
+    int direction; /* ROOT: 1: it passed its bound upwards; -1: downwards */
 } drape_event;
 
 /* Called within drape_sim_advance. Returns 0 to continue. Any other value stops the advance, which then

@@ -58,9 +58,13 @@ typedef struct drape_lab_def {
     drape_lab_progress *progress; /* NULL: no reports */
     drape_lab_cancel *cancel;     /* NULL: never */
     void *user;                   /* passed to progress and cancel */
+    const char *const *scenes; /* ivp: names of scene files, each with a reference, the first that of `scene`;
+                                     NULL: `scene` alone */
+    size_t scene_count;        /* length of scenes */
 } drape_lab_def;
 
-/* Fills *def with the defaults. */
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_lab_def) as struct_size. Nothing if def is
+ * NULL. */
 DRAPE_API void drape_lab_def_init(drape_lab_def *def, size_t struct_size);
 
 /* The outcome of a run or a merge. */
@@ -78,7 +82,7 @@ typedef struct drape_lab_outcome {
 /* Frees the text of an outcome. The struct itself belongs to the caller. */
 DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
 
-/* Runs "tradeoff", "stability" or "converge" and writes cases.jsonl, experiment.json, results.csv,
+/* Runs "tradeoff", "stability", "converge" or "ivp" and writes cases.jsonl, experiment.json, results.csv,
  * figures (SVG and PDF) and report.html into the folder. A shard, whose folder other shards may share,
  * writes only experiment.json and cases-1-of-4.jsonl; the merge writes the rest. Existing results of the
  * same experiment are kept as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, an invalid def, a

@@ -248,6 +248,12 @@ drape_status drape_system_relax(drape_system *system, double t1, bool all, int32
     return system->contact ? drape_contact_relax(system->contact, t1, all, added) : DRAPE_OK;
 }
 
+drape_status drape_system_lacks_room(drape_system *system, double t1, bool all, bool *lacks)
+{
+    *lacks = false;
+    return system->contact ? drape_contact_lacks_room(system->contact, t1, all, lacks) : DRAPE_OK;
+}
+
 bool drape_system_nearest(const drape_system *system, drape_diagnostic *diagnostic)
 {
     return system->contact && drape_contact_nearest(system->contact, diagnostic);
@@ -666,22 +672,75 @@ static void archive_push(drape_system *system, drape_archive *a)
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pushes with a force that is not finite");
 }
 
-/* The pairs of contact that the extended pattern was built from are archived, too: they belong to an
- * earlier state, so they cannot be found again from the present one. */
+/* Contact, and the pairs that the extended pattern was built from: they belong to an earlier state, so they
+ * cannot be found again from the present one. */
+static void archive_contact(drape_system *system, drape_archive *a)
+{
+    bool extended = system->blocks != NULL;
+    const int32_t *nodes = NULL;
+    if (system->contact)
+        drape_contact_archive(system->contact, a);
+    drape_archive_bool(a, &extended);
+    if (!drape_archive_has_read(a) || !system->contact || !extended)
+        return;
+    int32_t pairs = drape_contact_last_couplings(system->contact, &nodes);
+    drape_archive_note(a, extend(system, pairs, nodes));
+}
+
 void drape_system_archive(drape_system *system, drape_archive *a)
 {
-    bool contact = system->contact != NULL, extended = system->blocks != NULL;
-    const int32_t *nodes = NULL;
     drape_archive_mark(a, "system");
     drape_motion_archive(system->motion, a);
     archive_drag_spring(system, a);
     archive_push(system, a);
-    drape_archive_same(a, "whether there is contact", contact);
-    if (contact)
-        drape_contact_archive(system->contact, a);
-    drape_archive_bool(a, &extended);
-    if (!drape_archive_has_read(a) || !contact || !extended)
-        return;
-    int32_t pairs = drape_contact_last_couplings(system->contact, &nodes);
-    drape_archive_note(a, extend(system, pairs, nodes));
+    drape_archive_same(a, "whether there is contact", system->contact != NULL);
+    archive_contact(system, a);
+}
+
+/* ---- Another system goes on ---- */
+
+/* Bytes of an archive: counted, or kept if there is memory for them. */
+typedef struct kept {
+    unsigned char *bytes;
+    size_t size;
+} kept;
+
+static drape_status keep(void *user, const void *bytes, size_t size)
+{
+    kept *k = user;
+    if (k->bytes)
+        memcpy(k->bytes + k->size, bytes, size);
+    k->size += size;
+    return DRAPE_OK;
+}
+
+static void write_contact(drape_system *system, drape_archive *a, kept *k)
+{
+    k->size = 0;
+    drape_archive_write_to(a, system->arena->ctx, "contact", keep, k);
+    archive_contact(system, a);
+    drape_archive_end(a);
+}
+
+static drape_status continue_contact(drape_system *system, drape_system *from)
+{
+    drape_archive a;
+    kept k = {.bytes = NULL};
+    write_contact(from, &a, &k);
+    k.bytes = drape_alloc(system->arena->ctx, k.size, 1);
+    if (!k.bytes)
+        return DRAPE_E_MEMORY;
+    write_contact(from, &a, &k);
+    if (!a.status && !drape_archive_read_from(&a, system->arena->ctx, "contact", k.bytes, k.size))
+        archive_contact(system, &a);
+    drape_free(system->arena->ctx, k.bytes);
+    return a.status;
+}
+
+drape_status drape_system_continue(drape_system *system, drape_system *from)
+{
+    drape_motion_copy(system->motion, from->motion);
+    drape_system_set_drag_spring(system, &from->drag);
+    drape_system_set_push(system, from->pushed ? from->push : NULL);
+    return continue_contact(system, from);
 }

@@ -91,12 +91,17 @@ double drape_system_clock(const drape_system *system);
  * created, reads it back. The wind is left out: it is a function of the host. */
 void drape_system_archive(drape_system *system, drape_archive *a);
 
+/* Takes what another system of the same scene, in which more nodes may be pinned, keeps besides its model,
+ * except the wind. Errors: DRAPE_E_MEMORY. */
+drape_status drape_system_continue(drape_system *system, drape_system *from);
+
 /* Begins a step at a state, against which contact compares until the next call. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
 
-/* drape_contact_expect and drape_contact_relax; without contact nothing. */
+/* drape_contact_expect, drape_contact_relax and drape_contact_lacks_room; without contact nothing. */
 void drape_system_expect(drape_system *system, double t1, bool may_relax);
 drape_status drape_system_relax(drape_system *system, double t1, bool all, int32_t *added);
+drape_status drape_system_lacks_room(drape_system *system, double t1, bool all, bool *lacks);
 
 /* Ends the step, so that queries between steps leave no trace in the next one. */
 void drape_system_end_step(drape_system *system);

@@ -2,11 +2,16 @@
  * without allocating. */
 #include "base/context.h"
 
+#include "base/def.h"
+
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* The shortest def of an older host. */
+#define MIN_SIZE offsetof(drape_context_def, log)
 
 static void *default_allocate(void *user, size_t size)
 {
@@ -22,8 +27,8 @@ static void default_release(void *user, void *memory)
 
 void drape_context_def_init(drape_context_def *def, size_t struct_size)
 {
-    memset(def, 0, struct_size);
-    def->struct_size = struct_size;
+    const drape_context_def defaults = {.struct_size = struct_size};
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 drape_status drape_context_create(const drape_context_def *def, drape_context **out)
@@ -34,7 +39,7 @@ drape_status drape_context_create(const drape_context_def *def, drape_context **
         return DRAPE_E_ARGUMENT;
     *out = NULL;
     if (def) {
-        if (def->struct_size == 0 || def->struct_size > sizeof d || !def->allocate != !def->release)
+        if (!drape_def_fits(def->struct_size, MIN_SIZE, sizeof d) || !def->allocate != !def->release)
             return DRAPE_E_ARGUMENT;
         memcpy(&d, def, def->struct_size);
     }

@@ -23,9 +23,10 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
         REASON("line_search", "KINSOL", "no step along the correction makes the residual smaller"),
     [DRAPE_REASON_NEWTON_STEP] =
         REASON("newton_step", "KINSOL", "five corrections in a row had the largest allowed size"),
-    [DRAPE_REASON_NEWTON] = REASON("newton", "ida", "Newton's corrections do not converge at this step size"),
+    [DRAPE_REASON_NEWTON] =
+        REASON("newton", "ida, radau", "Newton's corrections do not converge at this step size"),
     [DRAPE_REASON_SINGULAR] =
-        REASON("singular", "KINSOL, IDA, newton_k", "a factorisation or a linear solve failed"),
+        REASON("singular", "KINSOL, IDA, newton_k, radau", "a factorisation or a linear solve failed"),
     [DRAPE_REASON_SOLVER] = REASON("solver", "KINSOL, IDA", "any other failure that these libraries report"),
     [DRAPE_REASON_MEMORY] = REASON("memory", "Newton, newton_k", "memory for the factors ran out"),
     [DRAPE_REASON_NONFINITE] = REASON("nonfinite", "all integrators",
@@ -66,6 +67,9 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
         REASON("penetration", "contact", "cloth is deeper in a collider than allowed"),
     [DRAPE_REASON_COLLISION] = REASON(
         "collision", "contact", "a piece passed through another between the start and the end of the step"),
+    [DRAPE_REASON_EVENT] =
+        REASON("event", "the sim",
+               "an event that acts lies within the step, which is repeated so that it ends there"),
     [DRAPE_REASON_CANCELLED] =
         REASON("cancelled", "the host", "`drape_sim_cancel` was called during the attempt"),
     [DRAPE_REASON_OTHER] = REASON("other", "statistics", "all reasons beyond the 31st"),

@@ -239,6 +239,23 @@ static void print_energy(const run *r)
     fputc('\n', stdout);
 }
 
+/* One line for each event: how often it occurred, and when. */
+static void print_events(const run *r)
+{
+    drape_event_record event;
+    for (int32_t i = 0; i < drape_sim_event(r->in.sim, -1, NULL); i++) {
+        drape_sim_event(r->in.sim, i, &event);
+        printf("event     %s: ", CLI_SHOWN(event.name));
+        if (event.count == 0)
+            puts("did not occur");
+        else if (event.count == 1)
+            printf("%s at %.12g s\n", event.direction > 0 ? "up" : "down", event.last);
+        else
+            printf("%lld times, first at %.12g s, last %s at %.12g s\n", (long long)event.count, event.first,
+                   event.direction > 0 ? "up" : "down", event.last);
+    }
+}
+
 static void print_wall(const run *r, const drape_statistics *s)
 {
     const struct {
@@ -289,6 +306,7 @@ static void print_results(const run *r)
         printf("equilibrium %s, %lld unstable modes\n", s.unstable_modes == 0 ? "stable" : "unstable",
                (long long)s.unstable_modes);
     print_energy(r);
+    print_events(r);
     print_inside(r);
     print_wall(r, &s);
     if (r->request->realtime)
@@ -342,7 +360,8 @@ static void advance(run *r)
     cli_signals_cancel(NULL);
     if (status == DRAPE_E_STOPPED && cli_interrupted())
         drape_context_set_message(r->in.ctx, "t=%.9g: interrupted", drape_sim_time(r->in.sim));
-    note(r, status);
+    if (status != DRAPE_E_STOPPED || drape_sim_stopped_by(r->in.sim) < 0)
+        note(r, status);
     cli_progress_clear(&r->progress);
 }
 
@@ -360,6 +379,18 @@ static void finish(run *r)
     r->wall = keeps && !r->status ? drape_recorder_wall(r->recorder) : drape_clock_seconds() - r->start;
 }
 
+/* A run that an event stopped has completed, and the summary says why. */
+static void note_event(run *r)
+{
+    drape_event_record event;
+    const int32_t by = drape_sim_stopped_by(r->in.sim);
+    if (r->status || by < 0)
+        return;
+    drape_sim_event(r->in.sim, by, &event);
+    snprintf(r->message, sizeof r->message, "t=%.9g: stopped by event \"%.60s\"", drape_sim_time(r->in.sim),
+             event.name);
+}
+
 static void simulate(run *r)
 {
     const bool done = drape_recorder_is_finished(r->recorder);
@@ -370,6 +401,7 @@ static void simulate(run *r)
         r->wall = drape_recorder_wall(r->recorder);
     else
         finish(r);
+    note_event(r);
     if (r->recorder)
         write_summary(r, drape_recorder_folder(r->recorder), DRAPE_SUMMARY_NAME);
     if (r->request->summary)

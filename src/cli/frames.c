@@ -122,6 +122,8 @@ static drape_status observe(void *user, const drape_event *event)
         drape_context_set_message(w->source->in.ctx, "t=%.9g: interrupted", drape_sim_time(event->sim));
         return DRAPE_E_STOPPED;
     }
+    if (event->kind != DRAPE_EVENT_FRAME)
+        return DRAPE_OK;
     w->last = event->time;
     if (w->def->one == CLI_LAST_FRAME || (w->def->one >= 0 && event->frame != w->def->one) ||
         event->frame % w->def->every != 0)
@@ -140,6 +142,8 @@ static int simulate(const cli_frames_def *def, cli_source *s)
     if (!status)
         status = drape_sim_advance(s->in.sim, end);
     cli_progress_clear(&w.progress);
+    if (status == DRAPE_E_STOPPED && drape_sim_stopped_by(s->in.sim) >= 0)
+        status = DRAPE_OK; /* as the scene says */
     if (w.found)
         return CLI_GO_ON;
     s->incomplete = status != DRAPE_OK;

@@ -1,5 +1,6 @@
 /* info_json.c: `drape info --json`. As in info_text.c, what the scene does not model has no key. */
 #include "cli/info.h"
+#include "events/events.h"
 #include "io/json.h"
 
 #include <math.h>
@@ -109,6 +110,28 @@ static json_t *collider(const drape_collider *from, const drape_collider_def *de
     object = drape_json_with(object, "segments", count(from->shape.segment_count));
     object = drape_json_with(object, "triangles", count(from->shape.triangle_count));
     return drape_json_with(object, "nodes_inside", count(info->inside));
+}
+
+static json_t *event(const drape_model_event *from, const drape_event_def *def)
+{
+    const drape_entry *entry = &from->ops->entry;
+    json_t *object = drape_json_with(json_object(), "name", drape_json_text(from->name));
+    object = drape_json_with(object, "type", json_string(entry->name));
+    object = drape_json_with(object, "parameters",
+                             params_of(entry->params, entry->param_count, from->values, &from->choice));
+    object = with_keys(object, &drape_form_event, def);
+    return drape_json_with(object, "pinned_nodes", count(from->pinned_count));
+}
+
+static json_t *with_events(json_t *object, const cli_info *info)
+{
+    json_t *events = json_array();
+    for (int32_t i = 0; i < info->model->event_count; i++)
+        events = drape_json_append(events, event(&info->model->events[i], &info->def.events[i]));
+    if (info->model->event_count > 0)
+        object = drape_json_with(object, "events", json_incref(events));
+    json_decref(events);
+    return object;
 }
 
 static json_t *with_contact(json_t *object, const cli_info *info)
@@ -294,6 +317,7 @@ json_t *cli_info_json(const cli_info *info)
     object = drape_json_with(object, "nnz", count(model->pattern.nonzeros));
     object = drape_json_with(object, "cloths", cloths);
     object = with_contact(object, info);
+    object = with_events(object, info);
     cli_chosen_entries(info->sim, entries);
     for (int i = 0; i < CLI_CHOSEN; i++)
         object = drape_json_with(object, entries[i].title, chosen(&entries[i], &info->sim->chosen));

@@ -1,6 +1,7 @@
 /* info_text.c: `drape info` as text. It does not mention what the scene does not model: every mesh has pairs
  * of neighbouring triangles, for instance, but only a term that uses them names them. */
 #include "cli/info.h"
+#include "events/events.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -180,6 +181,17 @@ static void print_chosen(const cli_chosen *entry, const drape_chosen *chosen)
 
 /* ---- Colliders and contact ---- */
 
+static void print_event(const drape_model_event *event, const drape_event_def *def)
+{
+    drape_event_def defaults = {.name = NULL};
+    drape_scene_set_defaults(&drape_form_event, &defaults);
+    printf("\nevent %s: %s, %s\n", CLI_SHOWN(event->name), event->ops->entry.name, event->ops->entry.summary);
+    print_given(event->ops->entry.params, event->ops->entry.param_count, event->values, &event->choice);
+    print_keys("  ", 16, &drape_form_event, def, &defaults);
+    if (event->pinned_count > 0)
+        printf("  %-16s %d\n", "pinned nodes", (int)event->pinned_count);
+}
+
 static void print_collider(const drape_collider *collider, const drape_collider_def *def,
                            const cli_collider_info *info)
 {
@@ -352,6 +364,8 @@ void cli_info_text(const cli_info *info)
     for (int32_t c = 0; c < info->model->collider_count; c++)
         print_collider(&info->model->colliders[c], &info->def.colliders[c], &info->colliders[c]);
     print_contact(info->sim);
+    for (int32_t i = 0; i < info->model->event_count; i++)
+        print_event(&info->model->events[i], &info->def.events[i]);
     cli_chosen_entries(info->sim, entries);
     for (int i = 0; i < CLI_CHOSEN; i++)
         print_chosen(&entries[i], &info->sim->chosen);

@@ -91,6 +91,8 @@ static int make_def(const cli_lab_request *request, int default_jobs, double def
     /* scenes/flag.json, tradeoff -> flag.tradeoff */
     snprintf(folder, room, "%.*s.%s", dot ? (int)(dot - name) : (int)strlen(name), name, command->verb);
     def->scene = command->operand;
+    def->scenes = (const char *const *)command->operands;
+    def->scene_count = (size_t)command->operand_count;
     def->folder = request->out ? request->out : folder;
     def->settings = settings;
     def->setting_count = command->setting_count;

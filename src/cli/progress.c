@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #define PERIOD        0.1 /* shortest time between two updates [s] */
+#define LOG_PERIOD    60  /* the same of lines in a log [s] */
 #define DEFAULT_WIDTH 80
 #define MAX_WIDTH     120
 #define BAR           24 /* cells */
@@ -39,8 +40,11 @@ static void draw(const cli_progress *p, const char *line)
 void cli_progress_begin(cli_progress *p, double from, double end)
 {
     *p = (cli_progress){.on = isatty(STDERR_FILENO), .from = from, .end = end, .shown = -INFINITY};
-    if (!p->on)
+    if (!p->on) {
+        p->logs = end == 0;
+        p->shown = drape_clock_seconds(); /* short sweeps leave no line */
         return;
+    }
     struct winsize size;
     int columns =
         ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : DEFAULT_WIDTH;
@@ -82,10 +86,27 @@ void cli_progress_show(cli_progress *p, double time, int64_t rejected)
     draw(p, line);
 }
 
+/* A line once a minute, where stderr is a file: a sweep of hours must not be silent there. */
+static void log_count(cli_progress *p, int64_t done, int64_t total, double seconds_left)
+{
+    char eta[24];
+    const double now = drape_clock_seconds();
+    if (now - p->shown < LOG_PERIOD)
+        return;
+    p->shown = now;
+    time_text(isnan(seconds_left) ? INFINITY : seconds_left, eta, sizeof eta);
+    if (total > 0)
+        fprintf(stderr, "%lld of %lld cases, about %s left\n", (long long)done, (long long)total, eta);
+    else
+        fprintf(stderr, "the reference\n");
+}
+
 void cli_progress_count(cli_progress *p, int64_t done, int64_t total, double seconds_left)
 {
     char bar[BAR + 1], eta[24], line[256];
     double now, share = total > 0 ? (double)done / (double)total : 0;
+    if (p->logs)
+        log_count(p, done, total, seconds_left);
     if (total > 0 && !is_due(p, &now))
         return;
     fill_bar(share, bar);

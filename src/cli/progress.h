@@ -1,5 +1,5 @@
-/* progress.h: a line on the terminal that shows the progress of a run. Nothing is shown if stderr is not a
- * terminal. */
+/* progress.h: a line on the terminal that shows the progress of a run. If stderr is not a terminal, sweeps add a
+ * line a minute to it, and runs nothing. */
 #ifndef DRAPE_CLI_PROGRESS_H
 #define DRAPE_CLI_PROGRESS_H
 
@@ -7,7 +7,8 @@
 #include <stdint.h>
 
 typedef struct cli_progress {
-    bool on;
+    bool on;             /* stderr is a terminal */
+    bool logs;           /* a sweep, and it is none */
     double from, end;    /* simulated time at the beginning and the end [s] */
     double start, shown; /* clock at the beginning and at the last update [s] */
     int width;           /* columns of the line */

@@ -45,10 +45,13 @@ static void choose_threads(cli_realtime *r, const cli_scene *scene, drape_sim_de
 {
     const long there = sysconf(_SC_NPROCESSORS_ONLN), nodes = drape_model_node_count(scene->model),
                most = 1 + nodes / NODES_THREAD;
-    if (r->command->threads)
+    if (r->command->threads) {
+        say(r, "threads %d: given", def->threads);
         return;
+    }
     def->threads = (int)fmax(1, fmin(fmin((double)there, (double)most), 256));
-    say(r, "%d thread%s of %ld, for %ld nodes", def->threads, def->threads > 1 ? "s" : "", there, nodes);
+    say(r, "threads %d: chosen, for %ld nodes and %ld processor%s", def->threads, nodes, there,
+        there > 1 ? "s" : "");
 }
 
 /* Seconds of the steps of a frame with one iteration each; 0 if they are not known, because a step failed. */
@@ -78,19 +81,19 @@ static drape_status set_iterations(cli_realtime *r, const cli_scene *scene, doub
     r->iterations.number = count;
     snprintf(text, sizeof text, "%d", count);
     if (seconds > 0)
-        say(r, "%d iteration%s or more, as one takes %.3g ms of a frame of %.4g in trial steps", count,
-            count > 1 ? "s" : "", 1e3 * seconds, 1e3 * budget);
+        say(r, "iterations %d: chosen, as one takes %.3g ms of a frame of %.4g ms in trial steps", count,
+            1e3 * seconds, 1e3 * budget);
     else
-        say(r, "%d iteration or more, as a trial step failed", count);
+        say(r, "iterations %d: chosen, as a trial step failed", count);
     return drape_scene_set(scene->scene, "/integrator/iterations", text);
 }
 
 static drape_status choose_method(cli_realtime *r, const cli_scene *scene, drape_sim_def *def)
 {
     def->integrator = METHOD;
-    say(r, "%s, as no method is named", METHOD);
+    say(r, "method %s: chosen, as none is named", METHOD);
     drape_status status = drape_scene_set(scene->scene, "/integrator/method", "\"" METHOD "\"");
-    if (status || drape_scene_gives(scene->scene, "/integrator/iterations"))
+    if (status || r->iterations_given)
         return status;
     r->iterations = (drape_setting){.name = "iterations", .number = 1};
     def->integrator_settings = &r->iterations;
@@ -102,9 +105,10 @@ drape_status cli_realtime_choose(void *user, const cli_scene *scene, drape_sim_d
 {
     cli_realtime *r = user;
     drape_status status = DRAPE_OK;
+    r->iterations_given = drape_scene_gives(scene->scene, "/integrator/iterations");
     choose_threads(r, scene, def);
     if (names_method(r, scene))
-        say(r, "%s, by the scene or the options", scene->model->integrator.type);
+        say(r, "method %s: given by the scene or an option", scene->model->integrator.type);
     else
         status = choose_method(r, scene, def);
     return status;
@@ -153,11 +157,24 @@ static double percentile(const cli_realtime *r, double share)
     return r->count ? r->seconds[rank > 0 ? rank - 1 : 0] : 0;
 }
 
+/* Those that were not chosen. */
+static void say_iterations(cli_realtime *r, const drape_chosen *chosen)
+{
+    const double number = drape_chosen_integrator_value(chosen, "iterations", NAN);
+    if (r->iterations.name)
+        return;
+    if (isnan(number))
+        say(r, "iterations: not a parameter of %s", chosen->integrator->entry.name);
+    else
+        say(r, "iterations %.0f: %s", number, r->iterations_given ? "given" : "the default of the method");
+}
+
 drape_status cli_realtime_run(cli_realtime *r, const cli_scene *scene)
 {
     double end = drape_model_duration(scene->model), frame = 1 / drape_model_frame_rate(scene->model);
     drape_status status = DRAPE_OK;
     r->result.budget = frame;
+    say_iterations(r, &scene->sim->chosen);
     while (!status && end - drape_sim_time(scene->sim) - r->result.debt > 1e-9 * frame) {
         drape_realtime report;
         double left = end - drape_sim_time(scene->sim) - r->result.debt;
@@ -185,10 +202,11 @@ void cli_realtime_print(const cli_realtime *r)
     printf("realtime  %lld frames of %.4g ms: p50 %.4g, p95 %.4g, p99 %.4g, worst %.4g ms; %lld missed\n",
            (long long)s->frames, 1e3 * s->budget, 1e3 * s->p50, 1e3 * s->p95, 1e3 * s->p99, 1e3 * s->worst,
            (long long)s->missed);
-    printf("levels    full %lld, fewer iterations %lld, larger steps %lld; %lld without a new state; "
-           "%.4g s behind after the last frame, then caught up, %.4g s dropped\n",
-           (long long)s->full, (long long)s->fewer, (long long)s->larger, (long long)s->still, s->debt,
-           s->dropped);
+    printf("levels    %lld frames with all iterations, %lld with fewer, %lld with longer steps; "
+           "%lld frames without a new state; %.4g s of simulated time dropped; %.4g s behind at the last "
+           "frame\n",
+           (long long)s->full, (long long)s->fewer, (long long)s->larger, (long long)s->still, s->dropped,
+           s->debt);
     if (r->estimates)
         printf("accuracy  %lld frames with a step above the bound on its estimated error\n",
                (long long)s->inaccurate);

@@ -8,8 +8,9 @@
 typedef struct cli_realtime {
     const cli_command *command;
     drape_setting iterations; /* that were chosen */
-    char chosen[400];         /* what was, and why */
-    double *seconds;          /* (count) wall clock of each frame, in the command's arena */
+    bool iterations_given;    /* by the scene or the command line */
+    char chosen[400]; /* threads, method and iterations: what was chosen, and why, and what was given */
+    double *seconds;  /* (count) wall clock of each frame, in the command's arena */
     size_t count, capacity;
     drape_summary_realtime result;
     bool estimates; /* the integrator estimates its error */

@@ -8,6 +8,7 @@
 #include "colliders/colliders.h"
 #include "compile/compile.h"
 #include "control/control.h"
+#include "events/events.h"
 #include "io/export.h"
 #include "io/json.h"
 #include "model/scene.h"
@@ -263,6 +264,7 @@ static const struct opening {
     {"term", "type", ENTRY_PARAMS, &drape_term_registry, NULL, NULL, NULL},
     {"mesh", "grid", ENTRY_PARAMS, &drape_grid_registry, NULL, NULL, NULL},
     {"collider", "type", ENTRY_PARAMS, &drape_collider_registry, NULL, NULL, NULL},
+    {"event", "type", ENTRY_PARAMS, &drape_event_registry, NULL, NULL, NULL},
     {"self_contact", NULL, ENTRY_PARAMS, &drape_self_contact_registry, NULL, NULL, NULL},
     {"contact", NULL, ENTRY_PARAMS, &drape_contact_registry, NULL, NULL, NULL},
     {"integrator", "method", TABLE_PARAMS, &drape_integrator_registry, NULL, NULL, NULL},

@@ -32,13 +32,13 @@ void drape_turned_point(const double *rotation, const double *x, double *shift)
         shift[k] = vec3_dot(rotation + 3 * k, x) - x[k];
 }
 
-bool drape_turned_axis(const double *rotation, const double *axis, bool flip)
+bool drape_turned_axis(const double *rotation, const double *axis, const double *to, bool flip)
 {
     double turned[3], across[3];
     for (int k = 0; k < 3; k++)
         turned[k] = vec3_dot(rotation + 3 * k, axis);
-    vec3_cross(axis, turned, across);
-    return vec3_norm(across) <= SAME_AXIS && (flip || vec3_dot(axis, turned) > 0);
+    vec3_cross(to, turned, across);
+    return vec3_norm(across) <= SAME_AXIS && (flip || vec3_dot(to, turned) > 0);
 }
 
 drape_status drape_collider_build(drape_context *ctx, drape_arena *arena, const char *pointer,

@@ -60,7 +60,7 @@ static bool turned(const double *values, const drape_collider_shape *shape, cons
         axis[k] /= length;
     }
     drape_turned_point(rotation, middle, shift);
-    return drape_turned_axis(rotation, axis, true);
+    return drape_turned_axis(rotation, axis, axis, true);
 }
 
 const drape_collider_ops drape_collider_capsule = {

@@ -158,7 +158,7 @@ static bool turned(const double *values, const drape_collider_shape *shape, cons
     const axis *c = shape->kept;
     (void)values;
     drape_turned_point(rotation, c->middle, shift);
-    return drape_turned_axis(rotation, c->u, true);
+    return drape_turned_axis(rotation, c->u, c->u, true);
 }
 
 const drape_collider_ops drape_collider_cylinder = {

@@ -50,7 +50,7 @@ static bool turned(const double *values, const drape_collider_shape *shape, cons
                    double *shift)
 {
     drape_turned_point(rotation, values + POINT, shift);
-    return drape_turned_axis(rotation, shape->kept, false);
+    return drape_turned_axis(rotation, shape->kept, shape->kept, false);
 }
 
 const drape_collider_ops drape_collider_plane = {

@@ -29,8 +29,8 @@ double drape_collider_distance(const drape_collider *collider, const drape_colli
 /* The shift that turns a point about the origin: rotation x - x. */
 void drape_turned_point(const double *rotation, const double *x, double *shift);
 
-/* Whether a rotation leaves a direction of length 1 as it is, to within 1e-9; flip: or reverses it. */
-bool drape_turned_axis(const double *rotation, const double *axis, bool flip);
+/* Whether a rotation turns a direction of length 1 to another, to within 1e-9; flip: or to its opposite. */
+bool drape_turned_axis(const double *rotation, const double *axis, const double *to, bool flip);
 
 /* ---- Compiling a scene ---- */
 

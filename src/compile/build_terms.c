@@ -1,5 +1,6 @@
 /* build_terms.c: finds the terms of each cloth by name, resolves their parameters, has them build their
  * elements, and connects laws to the measures of their cloth. */
+#include "base/def.h"
 #include "compile/term_builder.h"
 #include "terms/terms.h"
 
@@ -321,7 +322,7 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
         return DRAPE_E_ARGUMENT;
     if (!given)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_context_add_term: there are no ops");
-    if (given->struct_size < MIN_SIZE || given->struct_size > sizeof own)
+    if (!drape_def_fits(given->struct_size, MIN_SIZE, sizeof own))
         return drape_fail(
             ctx, DRAPE_E_VERSION,
             "the ops of a term have %zu bytes; this library's have %zu, an older one's %zu or more",

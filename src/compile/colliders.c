@@ -1,5 +1,6 @@
 /* colliders.c: colliders by name, with their parameters, shapes and tracks. */
 #include "colliders/colliders.h"
+#include "base/def.h"
 #include "compile/stages.h"
 
 #include <stdio.h>
@@ -95,7 +96,7 @@ drape_status drape_context_add_collider(drape_context *ctx, const drape_collider
         return DRAPE_E_ARGUMENT;
     if (!given)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_context_add_collider: there are no ops");
-    if (given->struct_size < MIN_SIZE || given->struct_size > sizeof own)
+    if (!drape_def_fits(given->struct_size, MIN_SIZE, sizeof own))
         return drape_fail(
             ctx, DRAPE_E_VERSION,
             "the ops of a collider have %zu bytes; this library's have %zu, an older one's %zu or more",

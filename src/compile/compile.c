@@ -222,6 +222,7 @@ drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape
                                           const drape_scene_def *) = {copy_scene,
                                                                       compile_cloths,
                                                                       drape_compile_pins,
+                                                                      drape_compile_events,
                                                                       drape_compile_contact,
                                                                       drape_compile_colliders,
                                                                       drape_compile_contact_stiffness,

@@ -36,4 +36,14 @@ drape_status drape_compile_read_def(drape_context *ctx, drape_arena *arena, cons
  * copied but not checked yet. */
 drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape_model **out);
 
+/* The model without the pins of the nodes that are marked in `released` (node_count): these are free. base
+ * must be compiled from a scene, and outlive the result. Errors: DRAPE_E_MEMORY, DRAPE_E_STOPPED. */
+drape_status drape_compile_released(drape_context *ctx, const drape_model *base, const uint8_t *released,
+                                    drape_model **out);
+
+/* Resolves an event of a host, whose function the caller has; its arrays are taken from the arena. Errors:
+ * DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. */
+drape_status drape_compile_host_event(drape_context *ctx, drape_arena *arena, const drape_model *model,
+                                      const drape_event_def *def, drape_model_event *to);
+
 #endif

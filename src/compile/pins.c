@@ -20,6 +20,7 @@ typedef struct pin_place {
     int32_t track;          /* number of its track, -1: fixed */
     int32_t *track_of_node; /* (node_count) -1: fixed or free */
     uint8_t *clamped;       /* (node_count) 1: held by a pin that clamps */
+    uint8_t *held;          /* (node_count) 1: held by this pin */
     int32_t taken;          /* number of nodes pinned so far by this pin */
 } pin_place;
 
@@ -41,6 +42,7 @@ static drape_status take_node(pin_place *pin, const char *key, int32_t local)
     pin->model->pinned[node] = 1;
     pin->clamped[node] |= pin->def->clamp;
     pin->track_of_node[node] = pin->track;
+    pin->held[node] = 1;
     pin->taken++;
     return DRAPE_OK;
 }
@@ -163,22 +165,64 @@ static drape_status keep_track(pin_place *pin)
                                &model->tracks[pin->track]);
 }
 
-static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, int32_t *track_of_node,
-                               uint8_t *clamped)
+/* The name is unique among the pins of the cloth, of which this is number p. */
+static drape_status name_pin(const pin_place *pin, size_t p, drape_pin *to)
+{
+    char name[32], text[128];
+    snprintf(name, sizeof name, "pin%zu", p);
+    const char *wanted = pin->def->name ? pin->def->name : name;
+    snprintf(text, sizeof text, "two pins of the cloth have the name \"%.60s\"", wanted);
+    for (size_t i = 1; i <= p; i++)
+        if (strcmp((to - i)->name, wanted) == 0)
+            return refuse(pin, "/name", text);
+    to->name = drape_arena_text(&pin->model->arena, wanted);
+    return drape_arena_status(&pin->model->arena);
+}
+
+/* Lists the nodes that the pin holds, and clears their marks for the next pin. */
+static drape_status list_nodes(const pin_place *pin, drape_pin *to)
+{
+    const int32_t first = pin->cloth->first_node, count = pin->cloth->mesh.node_count;
+    for (int32_t i = 0; i < count; i++)
+        to->node_count += pin->held[first + i];
+    to->node = drape_arena_take(&pin->model->arena, (size_t)to->node_count, sizeof *to->node);
+    if (!to->node)
+        return DRAPE_E_MEMORY;
+    int32_t listed = 0;
+    for (int32_t i = first; i < first + count; i++)
+        if (pin->held[i])
+            to->node[listed++] = i;
+    memset(pin->held + first, 0, (size_t)count);
+    return DRAPE_OK;
+}
+
+static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, int32_t c, pin_place *pin)
 {
     drape_status status = DRAPE_OK;
-    for (int32_t c = 0; c < model->cloth_count; c++)
-        for (size_t p = 0; !status && p < def->cloths[c].pin_count; p++) {
-            pin_place pin = {.model = model,
-                             .cloth = &model->cloths[c],
-                             .def = &def->cloths[c].pins[p],
-                             .track_of_node = track_of_node,
-                             .clamped = clamped};
-            snprintf(pin.pointer, sizeof pin.pointer, "/cloth/%d/pins/%zu", (int)c, p);
-            status = keep_track(&pin);
-            if (!status)
-                status = take_selection(&pin);
-        }
+    for (size_t p = 0; !status && p < def->cloths[c].pin_count; p++) {
+        drape_pin *to = &model->pins[model->pin_count++];
+        to->cloth = c;
+        to->clamps = def->cloths[c].pins[p].clamp;
+        pin->cloth = &model->cloths[c];
+        pin->def = &def->cloths[c].pins[p];
+        pin->taken = 0;
+        snprintf(pin->pointer, sizeof pin->pointer, "/cloth/%d/pins/%zu", (int)c, p);
+        status = name_pin(pin, p, to);
+        if (!status)
+            status = keep_track(pin);
+        if (!status)
+            status = take_selection(pin);
+        if (!status)
+            status = list_nodes(pin, to);
+    }
+    return status;
+}
+
+static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, pin_place *pin)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t c = 0; !status && c < model->cloth_count; c++)
+        status = pin_cloth(model, def, c, pin);
     return status;
 }
 
@@ -200,8 +244,7 @@ static drape_status clamp_edges(drape_model *model, const uint8_t *clamped)
     return DRAPE_OK;
 }
 
-/* Numbers the free nodes in order and lists the moved ones. */
-static drape_status number_nodes(drape_model *model, const int32_t *track_of_node)
+drape_status drape_compile_number_nodes(drape_model *model, const int32_t *track_of_node)
 {
     for (int32_t i = 0; i < model->node_count; i++) {
         model->free_of_node[i] = model->pinned[i] ? -1 : model->free_count++;
@@ -233,19 +276,22 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
     for (size_t c = 0; c < def->cloth_count; c++)
         pin_count += def->cloths[c].pin_count;
     model->tracks = drape_arena_take(&model->arena, pin_count, sizeof *model->tracks);
+    model->pins = drape_arena_take(&model->arena, pin_count, sizeof *model->pins);
     model->pinned = drape_arena_take(&model->arena, nodes, sizeof *model->pinned);
     model->free_of_node = drape_arena_take(&model->arena, nodes, sizeof *model->free_of_node);
     drape_arena scratch = drape_arena_of(model->ctx);
     int32_t *track_of_node = drape_arena_take(&scratch, nodes, sizeof *track_of_node);
     uint8_t *clamped = drape_arena_take(&scratch, nodes, sizeof *clamped);
+    uint8_t *held = drape_arena_take(&scratch, nodes, sizeof *held);
     drape_status status = drape_arena_status(&model->arena) ? DRAPE_E_MEMORY : drape_arena_status(&scratch);
     if (!status) {
         memset(track_of_node, 0xff, nodes * sizeof *track_of_node); /* all -1 */
-        status = pin_cloths(model, def, track_of_node, clamped);
+        pin_place pin = {.model = model, .track_of_node = track_of_node, .clamped = clamped, .held = held};
+        status = pin_cloths(model, def, &pin);
         if (!status)
             status = clamp_edges(model, clamped);
         if (!status)
-            status = number_nodes(model, track_of_node);
+            status = drape_compile_number_nodes(model, track_of_node);
     }
     drape_arena_free(&scratch);
     return status;

@@ -5,9 +5,9 @@
  */
 #include "compile/stages.h"
 
-#include <stddef.h>
 #include <string.h>
 
+#include "base/def.h"
 #include "model/scene.h"
 
 /* Returns the size with which all defs of an array begin; 0 if they differ. */
@@ -38,7 +38,7 @@ static drape_status widen_array(drape_context *ctx, drape_arena *arena, const dr
     if (!from || count == 0 || (key->at_most && count > key->at_most))
         return DRAPE_OK;
     const size_t stride = stride_of(from, count, size);
-    if (stride < sizeof(size_t) || stride > size)
+    if (!drape_def_fits(stride, key->child->least_size, size))
         return drape_fail(ctx, DRAPE_E_VERSION,
                           "a def was not initialised by drape_%s_def_init of this version", key->child->name);
     char *to = drape_arena_take(arena, count, size);
@@ -60,7 +60,7 @@ static drape_status widen_arrays(drape_context *ctx, drape_arena *arena, const d
 {
     drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < object->key_count; i++)
-        if (object->keys[i].shape == DRAPE_SCENE_OBJECTS && object->keys[i].child->sized)
+        if (object->keys[i].shape == DRAPE_SCENE_OBJECTS && object->keys[i].child->least_size)
             status = widen_array(ctx, arena, &object->keys[i], def);
     return status;
 }
@@ -68,7 +68,7 @@ static drape_status widen_arrays(drape_context *ctx, drape_arena *arena, const d
 drape_status drape_compile_read_def(drape_context *ctx, drape_arena *arena, const drape_scene_def *given,
                                     drape_scene_def *out)
 {
-    if (!given || given->struct_size < offsetof(drape_scene_def, cloths) || given->struct_size > sizeof *out)
+    if (!given || !drape_def_fits(given->struct_size, drape_form_scene.least_size, sizeof *out))
         return drape_fail(ctx, DRAPE_E_VERSION,
                           "the scene def was not initialised by drape_scene_def_init of this version");
     drape_scene_def_init(out, sizeof *out);

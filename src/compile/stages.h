@@ -16,6 +16,10 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
 /* Marks the pinned nodes of all cloths, numbers the free ones, and stores the tracks. */
 drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def);
 
+/* Numbers the free nodes of a model in order, and lists the moved ones. track_of_node (node_count): -1: fixed
+ * or free. */
+drape_status drape_compile_number_nodes(drape_model *model, const int32_t *track_of_node);
+
 /* Checks a track of one or more keys and copies it. pointer: that of its pin or collider. */
 drape_status drape_compile_track(drape_model *model, const char *pointer, const drape_track_key *keys,
                                  size_t key_count, drape_track *track);
@@ -32,6 +36,9 @@ drape_status drape_compile_contact_stiffness(drape_model *model, const drape_sce
 
 /* Builds the colliders, after contact. */
 drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def);
+
+/* Resolves the events, after the pins. */
+drape_status drape_compile_events(drape_model *model, const drape_scene_def *def);
 
 /* Builds the terms of all cloths and assigns indices to measures and internal variables. */
 drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def);

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #define ROUNDING  1e-12 /* of the model's length: larger than the rounding of a bound of a gap */
-#define MAX_PATCH 0.3   /* of all points: if more have left their path, all pairs are searched */
+#define MAX_PATCH 0.3   /* of the nodes: if more have left their path, all pairs are searched */
 
 static void take_set(drape_arena *arena, const drape_broad_phase *broad, drape_candidate_set *set)
 {
@@ -23,9 +23,12 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
                                      drape_candidates *out)
 {
     *out = (drape_candidates){.arena = arena, .broad = broad, .margin = margin};
-    take_set(arena, broad, &out->all);
-    take_set(arena, broad, &out->patch);
-    out->patched = drape_arena_take(arena, (size_t)broad->points, sizeof *out->patched);
+    const size_t marks = (size_t)(broad->points + broad->model->collider_count);
+    for (int i = 0; i < DRAPE_CANDIDATE_SETS; i++)
+        take_set(arena, broad, &out->set[i]);
+    out->level = drape_arena_take(arena, marks, sizeof *out->level);
+    out->marked = drape_arena_take(arena, marks, sizeof *out->marked);
+    out->stale = drape_arena_take(arena, (size_t)broad->model->collider_count, sizeof *out->stale);
     return drape_arena_status(arena);
 }
 
@@ -116,7 +119,7 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
             continue;
         for (int32_t i = 0; i < m->free_count; i++) {
             const drape_pair pair = drape_broad_phase_surface(broad, m->node_of_free[i], k);
-            if (!marked || marked[pair.node[0]])
+            if (!marked || marked[broad->points + k] || marked[pair.node[0]])
                 consider(&s, &pair);
         }
     }
@@ -183,77 +186,135 @@ static double square_away(const double *x, const double *a, const double *b, dou
     return vec3_dot(d, d);
 }
 
-/* The largest distance of a point, other than those left out, and of a collider. Marks the points of which it
- * exceeds the margin, unless beyond is NULL. */
-static double distance_from(const drape_candidates *c, const drape_candidate_set *set,
-                            const drape_configuration *at, const bool *without, bool *beyond)
+/* The largest distance from the path of a set, of the points and colliders that were not marked for a later
+ * one. Marks those of which it exceeds the margin, unless marked is NULL. */
+static double distance_from(const drape_candidates *c, int set, const drape_configuration *at, bool *marked)
 {
+    const drape_candidate_set *from = &c->set[set];
+    const int32_t points = c->broad->points;
+    const double t = nearest_fraction(c, from, at->x), limit = c->margin * c->margin;
     double largest = 0;
-    if (!set->known)
-        return INFINITY;
-    const double t = nearest_fraction(c, set, at->x), limit = c->margin * c->margin;
-    for (size_t i = 0; i < (size_t)c->broad->points; i++) {
-        const double square = square_away(at->x + 3 * i, set->x[0] + 3 * i, set->x[1] + 3 * i, t);
+    for (int32_t i = 0; i < points + c->broad->model->collider_count; i++) {
+        const int32_t k = i - points;
+        if (c->level[i] > set)
+            continue;
+        const double square = k < 0 ? square_away(at->x + 3 * (size_t)i, from->x[0] + 3 * (size_t)i,
+                                                  from->x[1] + 3 * (size_t)i, t)
+                                    : square_away(at->pose[k].displacement, from->pose[0][k].displacement,
+                                                  from->pose[1][k].displacement, t);
         if (isnan(square))
             return INFINITY;
-        if (beyond)
-            beyond[i] = beyond[i] || square > limit;
-        largest = square > largest && !(without && without[i]) ? square : largest;
+        if (marked)
+            marked[i] = marked[i] || square > limit;
+        largest = square > largest ? square : largest;
     }
-    for (int32_t i = 0; i < c->broad->model->collider_count; i++)
-        largest = fmax(largest, square_away(at->pose[i].displacement, set->pose[0][i].displacement,
-                                            set->pose[1][i].displacement, t));
     return sqrt(largest);
 }
 
-static double measure(const drape_candidates *c, const drape_candidate_set *set,
-                      const drape_straight_path *path, const bool *without)
+static double measure(const drape_candidates *c, int set, const drape_straight_path *path)
 {
     double largest = 0;
     for (int end = 0; end < 2; end++) {
         if (end > 0 && path->end[1].x == path->end[0].x && path->end[1].pose == path->end[0].pose)
             break;
-        largest = fmax(largest, distance_from(c, set, &path->end[end], without, NULL));
+        largest = fmax(largest, distance_from(c, set, &path->end[end], NULL));
         if (!(largest <= c->margin))
             break;
     }
     return largest;
 }
 
+static bool has_stale(const drape_candidates *c)
+{
+    bool found = false;
+    for (int32_t i = 0; i < c->broad->model->collider_count; i++)
+        found = found || c->stale[i];
+    return found;
+}
+
 drape_distances drape_candidates_distances(const drape_candidates *c, const drape_straight_path *path)
 {
-    const bool patched = c->patch.known;
-    return (drape_distances){.all = measure(c, &c->all, path, patched ? c->patched : NULL),
-                             .patch = patched ? measure(c, &c->patch, path, NULL) : 0};
+    drape_distances away = {.set = {INFINITY}};
+    for (int i = 0; i < c->sets && !has_stale(c); i++) {
+        away.set[i] = measure(c, i, path);
+        if (!(away.set[i] <= c->margin))
+            break;
+    }
+    return away;
 }
 
-bool drape_candidates_are_valid(const drape_candidates *c, const drape_distances *away)
+double drape_candidates_farthest(const drape_candidates *c, const drape_distances *away)
 {
-    return away->all <= c->margin && away->patch <= c->margin;
+    double largest = away->set[0];
+    for (int i = 1; i < c->sets; i++)
+        largest = fmax(largest, away->set[i]);
+    return largest <= c->margin ? largest : INFINITY;
 }
 
-/* Whether the first search is valid but for a few points, which it marks. */
-static bool find_patch(drape_candidates *c, const drape_straight_path *path)
+/* Marks what a patch on the path must have whose set follows the first `sets` ones. Returns the number of
+ * nodes among it; more than there are if these sets are of no use there. */
+static int32_t mark(drape_candidates *c, int sets, const drape_straight_path *path)
 {
+    const drape_broad_phase *broad = c->broad;
+    const int32_t nodes = broad->model->node_count, points = broad->points;
     int32_t count = 0;
-    memset(c->patched, 0, (size_t)c->broad->points * sizeof *c->patched);
-    for (int end = 0; end < 2; end++)
-        if (isinf(distance_from(c, &c->all, &path->end[end], NULL, c->patched)))
-            return false;
-    for (int end = 0; end < 2; end++)
-        if (!(distance_from(c, &c->all, &path->end[end], c->patched, NULL) <= c->margin))
-            return false; /* a collider moved */
-    for (int32_t i = 0; i < c->broad->points; i++)
-        count += c->patched[i];
-    return count <= MAX_PATCH * c->broad->points;
+    for (int32_t i = 0; i < points; i++)
+        c->marked[i] = c->level[i] >= sets;
+    for (int32_t i = 0; i < broad->model->collider_count; i++)
+        c->marked[points + i] = c->stale[i] || c->level[points + i] >= sets;
+    for (int i = 0; i < sets; i++)
+        for (int end = 0; end < 2; end++)
+            if (isinf(distance_from(c, i, &path->end[end], c->marked)))
+                return nodes + 1;
+    for (int32_t i = nodes; i < points; i++) /* a collider with all of its points */
+        c->marked[points + broad->point_collider[i - nodes]] |= c->marked[i];
+    for (int32_t i = nodes; i < points; i++)
+        c->marked[i] = c->marked[points + broad->point_collider[i - nodes]];
+    for (int32_t i = 0; i < nodes; i++)
+        count += c->marked[i];
+    return count;
+}
+
+/* After how many sets a patch is searched on the path, which marks what it must have: after all, or in place
+ * of all patches if that is fewer or there is no room. 0: all pairs are searched. */
+static int choose_set(drape_candidates *c, const drape_straight_path *path)
+{
+    const int32_t nodes = c->broad->model->node_count;
+    const bool room = c->sets > 1 && c->sets < DRAPE_CANDIDATE_SETS;
+    const int32_t after_all = room ? mark(c, c->sets, path) : nodes + 1,
+                  after_first = c->sets > 0 ? mark(c, 1, path) : nodes + 1;
+    const int sets = after_first <= after_all ? 1 : c->sets;
+    if (sets > 1)
+        mark(c, sets, path);
+    return (sets > 1 ? after_all : after_first) <= MAX_PATCH * nodes ? sets : 0;
+}
+
+bool drape_candidates_patch_serves(drape_candidates *c, const drape_straight_path *path)
+{
+    return choose_set(c, path) > 0;
 }
 
 drape_status drape_candidates_search(drape_candidates *c, const drape_straight_path *path,
                                      const double *ahead)
 {
-    const bool patch = find_patch(c, path);
-    c->patch.known = false;
-    return patch ? collect(c, &c->patch, c->patched, path, ahead) : collect(c, &c->all, NULL, path, ahead);
+    const int sets = choose_set(c, path);
+    const size_t count = (size_t)(c->broad->points + c->broad->model->collider_count);
+    for (size_t i = 0; i < count; i++)
+        c->level[i] = sets > 0 && c->marked[i] ? (uint8_t)sets : sets > 0 ? c->level[i] : 0;
+    memset(c->stale, 0, (size_t)c->broad->model->collider_count * sizeof *c->stale);
+    const drape_status status = collect(c, &c->set[sets], sets > 0 ? c->marked : NULL, path, ahead);
+    c->sets = status ? 0 : sets + 1;
+    return status;
+}
+
+void drape_candidates_forget(drape_candidates *c)
+{
+    c->sets = 0;
+}
+
+void drape_candidates_forget_collider(drape_candidates *c, int32_t collider)
+{
+    c->stale[collider] = true;
 }
 
 /* ---- The list ---- */
@@ -265,13 +326,14 @@ static bool may_become_active(const drape_candidates *c, const drape_pair *pair,
     return pair->gap_at_search - 2 * away < reach;
 }
 
-static bool is_patched(const drape_candidates *c, const drape_pair *pair)
+/* Whether the pair is of the last set for which one of its pieces was marked. */
+static bool is_of(const drape_candidates *c, const drape_pair *pair, int set)
 {
     const int points = drape_pair_points(pair);
+    int level = pair->collider >= 0 ? c->level[c->broad->points + pair->collider] : 0;
     for (int a = 0; a < points; a++)
-        if (c->patched[pair->node[a]])
-            return true;
-    return false;
+        level = c->level[pair->node[a]] > level ? c->level[pair->node[a]] : level;
+    return level == set;
 }
 
 static bool is_before(const drape_pair *a, const drape_pair *b)
@@ -283,16 +345,22 @@ static bool is_before(const drape_pair *a, const drape_pair *b)
 }
 
 const drape_pair *drape_candidates_next(const drape_candidates *c, const drape_distances *away,
-                                        drape_candidate_cursor *at)
+                                        drape_candidate_cursor *cursor)
 {
-    const drape_pair *all = c->all.pairs, *patch = c->patch.pairs;
-    const int32_t patches = c->patch.known ? c->patch.count : 0;
-    while (at->all < c->all.count && (!may_become_active(c, &all[at->all], away->all, away->beyond) ||
-                                      (c->patch.known && is_patched(c, &all[at->all]))))
-        at->all++;
-    while (at->patch < patches && !may_become_active(c, &patch[at->patch], away->patch, away->beyond))
-        at->patch++;
-    if (at->patch < patches && (at->all >= c->all.count || is_before(&patch[at->patch], &all[at->all])))
-        return &patch[at->patch++];
-    return at->all < c->all.count ? &all[at->all++] : NULL;
+    const drape_pair *next = NULL;
+    int from = 0;
+    for (int i = 0; i < c->sets; i++) {
+        const drape_candidate_set *set = &c->set[i];
+        int32_t at = cursor->at[i];
+        while (at < set->count && (!may_become_active(c, &set->pairs[at], away->set[i], away->beyond) ||
+                                   (c->sets > 1 && !is_of(c, &set->pairs[at], i))))
+            at++;
+        cursor->at[i] = at;
+        if (at < set->count && (!next || is_before(&set->pairs[at], next))) {
+            next = &set->pairs[at];
+            from = i;
+        }
+    }
+    cursor->at[from] += next != NULL;
+    return next;
 }

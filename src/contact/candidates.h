@@ -3,10 +3,11 @@
  * for a configuration if no point is farther than the margin from its place at some step fraction of the
  * path, the same for all points.
  *
- * Where some points have left the path, a patch is searched instead of all: along a new path of all points,
- * the pairs that have one of these. They replace the pairs of the first search that have one. The rank of
- * pairs depends on the pieces alone: sums over the active ones, in this order, have the same bits wherever a
- * search was made.
+ * Where some points or colliders have left the path, a patch is searched instead of all: along a new path of
+ * all points, the pairs that have one of these. They replace the pairs of earlier searches that have one. So
+ * layers of cloth are not searched because a collider moves, and of a correction that is shortened again and
+ * again only what meets something each time. The rank of pairs depends on the pieces alone: sums over the
+ * active ones, in this order, have the same bits wherever searches were made.
  */
 #ifndef DRAPE_CONTACT_CANDIDATES_H
 #define DRAPE_CONTACT_CANDIDATES_H
@@ -20,19 +21,25 @@ typedef struct drape_straight_path {
 
 /* The pairs of one search. */
 typedef struct drape_candidate_set {
-    bool known;                   /* a search was made, and there was memory for everything that it found */
+    bool known;                   /* there was memory for everything that the search found */
     double *x[2];                 /* (points x 3) the ends of its path */
     drape_collider_pose *pose[2]; /* (collider_count) */
     drape_pair *pairs;            /* (count of room) including those with surfaces, by increasing rank */
     int32_t count, room;
 } drape_candidate_set;
 
+#define DRAPE_CANDIDATE_SETS 4
+
 typedef struct drape_candidates {
     drape_arena *arena;
     drape_broad_phase *broad;
     double margin; /* how far points may be from the paths [m] */
-    drape_candidate_set all, patch;
-    bool *patched; /* (points) those of the patch; none unless it is known */
+    drape_candidate_set
+        set[DRAPE_CANDIDATE_SETS]; /* of all pairs, and patches, each later than those before */
+    int sets;                      /* that are in use; 0: no search was made */
+    uint8_t *level; /* (points + collider_count) the last set for which a point or collider was marked; 0 */
+    bool *marked;   /* (points + collider_count) of the search in progress */
+    bool *stale;    /* (collider_count) whose pairs have another activation distance by now */
 } drape_candidates;
 
 /* arena and broad must outlive the candidates. */
@@ -40,31 +47,42 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
                                      drape_candidates *out);
 
 /* Calls visit, by increasing rank, for all pairs that can become active while no point is farther than margin
- * from the path; marked: as in broad_phase.h. */
+ * from the path; marked: NULL for all, or (points + collider_count) those of which a pair must have one. The
+ * points of a marked collider must be marked, too. */
 void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *path, double margin,
                            const bool *marked, drape_broad_phase_visit *visit, void *user);
 
 /* Makes the candidates valid on the path: between `path` and its continuation to `ahead` (points x 3), by a
- * patch if few points are away from the first search there. Errors: DRAPE_E_MEMORY. */
+ * patch if few points are away from earlier searches there. Errors: DRAPE_E_MEMORY. */
 drape_status drape_candidates_search(drape_candidates *candidates, const drape_straight_path *path,
                                      const double *ahead);
 
+/* Whether that would search no more than a patch. */
+bool drape_candidates_patch_serves(drape_candidates *candidates, const drape_straight_path *path);
+
+/* Forgets all searches. */
+void drape_candidates_forget(drape_candidates *candidates);
+
+/* The activation distance of a collider has changed: its pairs are searched anew. */
+void drape_candidates_forget_collider(drape_candidates *candidates, int32_t collider);
+
 /* How far a straight path is from those of each search. */
 typedef struct drape_distances {
-    double all, patch; /* [m] at most */
-    double beyond;     /* [m] of the activation distance: so far off may pairs stay, too */
+    double set[DRAPE_CANDIDATE_SETS]; /* [m] at most */
+    double beyond;                    /* [m] of the activation distance: so far off may pairs stay, too */
 } drape_distances;
 
-/* The distances of a path: as far as its ends are, at most. INFINITY if there was
- * no search, or if a position is not finite. */
+/* The distances of a path: as far as its ends are, at most. INFINITY if there was no search, or if a position
+ * is not finite; those after one that is above the margin are not measured. */
 drape_distances drape_candidates_distances(const drape_candidates *candidates,
                                            const drape_straight_path *path);
 
-bool drape_candidates_are_valid(const drape_candidates *candidates, const drape_distances *away);
+/* The largest of them; INFINITY if the candidates are not valid on the path. */
+double drape_candidates_farthest(const drape_candidates *candidates, const drape_distances *away);
 
 /* A position in the list of candidates. */
 typedef struct drape_candidate_cursor {
-    int32_t all, patch;
+    int32_t at[DRAPE_CANDIDATE_SETS];
 } drape_candidate_cursor;
 
 /* The next candidate by rank whose gap can fall below its activation distance; NULL: there is none. */

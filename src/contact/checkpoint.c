@@ -48,8 +48,9 @@ static bool are_distances(const drape_contact *c)
 static drape_status restore(drape_contact *c)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
-    c->step_candidates.all.known = c->query_candidates.all.known = c->listed = false;
-    c->step_candidates.patch.known = c->query_candidates.patch.known = false;
+    drape_candidates_forget(&c->step_candidates);
+    drape_candidates_forget(&c->query_candidates);
+    c->listed = false;
     c->between_steps = c->begun;
     if (!c->begun)
         return DRAPE_OK;

@@ -26,8 +26,9 @@
 #include <float.h>
 #include <string.h>
 
-#define MARGIN 0.12 /* by which points may leave the path of a search before a new one, in mean edges */
-#define AHEAD  1.0  /* by which a path is continued, in its length: the next step begins there */
+#define MARGIN  0.12 /* by which points may leave the path of a search before a new one, in mean edges */
+#define LONGEST 8.0  /* in mean edges: for a path that is longer, candidates are searched at its end alone */
+#define AHEAD   1.0  /* by which a path is continued, in its length: the next step begins there */
 /* A gap below this share of the largest coordinate is rounding: closest points and their distance have
  * errors of some hundred units in the last place. */
 #define ROUNDING (1e4 * DBL_EPSILON)
@@ -167,7 +168,7 @@ static bool are_valid(const drape_candidates *candidates, const drape_straight_p
                       drape_distances *away)
 {
     *away = drape_candidates_distances(candidates, path);
-    return drape_candidates_are_valid(candidates, away);
+    return drape_candidates_farthest(candidates, away) <= candidates->margin;
 }
 
 const drape_candidates *drape_contact_valid_candidates(const drape_contact *c,
@@ -187,7 +188,8 @@ const drape_candidates *drape_contact_search(drape_contact *c, const drape_strai
         c->ahead[i] = path->end[1].x[i] + AHEAD * (path->end[1].x[i] - path->end[0].x[i]);
     const drape_status status = drape_candidates_search(candidates, path, c->ahead);
     if (!are_valid(candidates, path, away)) /* positions that are not finite */
-        *away = (drape_distances){.all = INFINITY, .patch = INFINITY};
+        for (int i = 0; i < DRAPE_CANDIDATE_SETS; i++)
+            away->set[i] = INFINITY;
     c->search_seconds += drape_clock_seconds() - start;
     c->out_of_memory = c->out_of_memory || status != DRAPE_OK;
     return status ? NULL : candidates;
@@ -200,14 +202,40 @@ drape_status drape_contact_take_failure(drape_contact *c)
     return failed ? DRAPE_E_MEMORY : DRAPE_OK;
 }
 
+/* Whether all points are so near to where the step began that candidates can be searched from there. */
+static bool is_near_start(const drape_contact *c, const double *x)
+{
+    const double longest = LONGEST * c->mean_edge;
+    double move[3];
+    for (size_t i = 0; i < (size_t)c->broad.points; i++) {
+        vec3_sub(x + 3 * i, c->start + 3 * i, move);
+        if (!(vec3_dot(move, move) <= longest * longest))
+            return false;
+    }
+    return true;
+}
+
+/* The path of a search for a configuration. In a step all pairs are searched from its beginning on, or that
+ * of the step before, since that and the continuation will be looked at, too. */
+static drape_straight_path path_to(drape_contact *c, const drape_configuration *at, bool in_step)
+{
+    const drape_straight_path here = {{*at, *at}};
+    const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
+    if (!in_step || drape_candidates_patch_serves(&c->step_candidates, &here) || !is_near_start(c, at->x))
+        return here;
+    return (drape_straight_path){{start, *at}};
+}
+
 drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
 {
     const drape_straight_path here = {{*at, *at}};
     const bool in_step = c->begun && !c->between_steps;
     drape_distances away;
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
-    if (!candidates)
-        candidates = drape_contact_search(c, &here, &away);
+    if (!candidates) {
+        const drape_straight_path path = path_to(c, at, in_step);
+        candidates = drape_contact_search(c, &path, &away);
+    }
     if (!candidates)
         return drape_contact_take_failure(c);
     drape_status status =
@@ -393,13 +421,15 @@ static drape_status adapt_distances(drape_contact *c, double t, bool retry)
             *distance = 2 * before;
         else if (GROWTH * path < 0.25 * before && before > least)
             *distance = 0.5 * before;
-        changed = changed || *distance != before;
+        if (*distance == before)
+            continue;
+        changed = true;
+        drape_candidates_forget_collider(&c->step_candidates, i);
+        drape_candidates_forget_collider(&c->query_candidates, i);
     }
     if (!changed)
         return DRAPE_OK;
     const double before = drape_contact_potential(c);
-    c->step_candidates.all.known = c->query_candidates.all.known = false;
-    c->step_candidates.patch.known = c->query_candidates.patch.known = false;
     const drape_status status = drape_contact_list(c, &now);
     if (!status)
         c->press.work += drape_contact_potential(c) - before;

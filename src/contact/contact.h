@@ -36,6 +36,11 @@ void drape_contact_expect(drape_contact *contact, double t1, bool may_relax);
  * the pair that refused the step and those whose gaps are hardly above the least. *added: nodes that are
  * relaxed from now on; if there are any, the same step may succeed. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_relax(drape_contact *contact, double t1, bool all, int32_t *added);
+
+/* After a step that failed: whether drape_contact_relax would relax any cloth in a step to t1. Relaxes none.
+ * *lacks stays as it is if no step has begun. Errors: DRAPE_E_MEMORY. */
+drape_status drape_contact_lacks_room(drape_contact *contact, double t1, bool all, bool *lacks);
+
 /* The nominal step [s], unless the integrator has none: where the scene gives no activation distance, that of
  * a moving collider grows with its path in such a step. */
 void drape_contact_set_step(drape_contact *contact, double dt);

@@ -340,7 +340,7 @@ static void visit_near(drape_contact *c, listing *list)
     drape_candidate_cursor cursor = {0};
     const drape_pair *pair;
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
-    if (candidates && fmax(away.all, away.patch) + 0.5 * margin <= candidates->margin) {
+    if (candidates && drape_candidates_farthest(candidates, &away) + 0.5 * margin <= candidates->margin) {
         away.beyond = margin;
         while ((pair = drape_candidates_next(candidates, &away, &cursor)))
             list_near(list, pair);

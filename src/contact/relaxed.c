@@ -107,6 +107,10 @@ drape_status drape_relaxed_add(drape_relaxed_set *set, int32_t collider, int32_t
                                int32_t *added)
 {
     drape_relaxed_node *found = drape_relaxed_find(set, collider, node);
+    if (set->counting) {
+        *added += !found;
+        return DRAPE_OK;
+    }
     if (found) {
         found->blocked = true;
         found->until = fmax(found->until, until);
@@ -143,19 +147,25 @@ int32_t drape_relaxed_count(const drape_relaxed_set *set, int32_t collider)
     return place_of(set, collider + 1, 0) - place_of(set, collider, 0);
 }
 
+double drape_relaxed_since(const drape_relaxed_set *set, int32_t collider)
+{
+    double since = INFINITY;
+    for (int32_t i = place_of(set, collider, 0); i < place_of(set, collider + 1, 0); i++)
+        since = fmin(since, set->nodes[i].since);
+    return since;
+}
+
 static void add_to_total(drape_relaxed_set *set, int32_t collider, double t)
 {
     drape_relaxed_total *total = total_of(set, collider);
     const int32_t first = place_of(set, collider, 0), count = drape_relaxed_count(set, collider);
+    const double since = drape_relaxed_since(set, collider);
     if (count == 0)
         return;
     if (total->most == 0)
-        total->first = set->nodes[first].since;
-    double since = INFINITY;
-    for (int32_t i = first; i < first + count; i++) {
+        total->first = since;
+    for (int32_t i = first; i < first + count; i++)
         total->deepest = fmax(total->deepest, set->nodes[i].deepest);
-        since = fmin(since, set->nodes[i].since);
-    }
     total->most = count > total->most ? count : total->most;
     total->seconds += t - fmin(fmax(set->t, since), t);
     total->last = t;

@@ -42,6 +42,7 @@ typedef struct drape_relaxed_set {
     double *bound;    /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none */
     drape_relaxed_total *total; /* (collider_count + 1) the last one: of pinned pieces of cloth */
     double t;                   /* [s] of the last update */
+    bool counting; /* nodes that would be relaxed are counted, and nothing changes; during one search */
 } drape_relaxed_set;
 
 drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, drape_relaxed_set *out);
@@ -67,6 +68,9 @@ void drape_relaxed_update(drape_relaxed_set *set, double t, double max_factor);
 
 /* The number of nodes that are relaxed for a collider. */
 int32_t drape_relaxed_count(const drape_relaxed_set *set, int32_t collider);
+
+/* [s] When the first of these was relaxed; INFINITY: there are none. */
+double drape_relaxed_since(const drape_relaxed_set *set, int32_t collider);
 
 /* Removes the nodes for which `leaves` is true. Returns their number. */
 typedef bool drape_relaxed_leaves(void *user, const drape_relaxed_node *node);

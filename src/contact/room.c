@@ -281,7 +281,7 @@ drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, 
     c->between_steps = between;
     if (status)
         return status;
-    for (int32_t i = 0; i < relaxed->count; i++)
+    for (int32_t i = 0; i < relaxed->count && !relaxed->counting; i++)
         relaxed->nodes[i].blocked = t < relaxed->nodes[i].until;
     drape_model_normals(c->model, c->x, relaxed->normal);
     memset(relaxed->pins, 0, (size_t)c->model->collider_count * sizeof *relaxed->pins);
@@ -341,6 +341,27 @@ static drape_status relax_blockers(drape_contact *c, int32_t *added)
     return status;
 }
 
+static drape_status relax(drape_contact *c, double t1, bool all, int32_t *added)
+{
+    drape_status status = drape_room_look_ahead(c, c->start, c->start_t, t1, true, added);
+    if (!status && *added == 0 && all)
+        status = relax_blockers(c, added);
+    c->listed = false;
+    return status;
+}
+
+drape_status drape_contact_lacks_room(drape_contact *c, double t1, bool all, bool *lacks)
+{
+    int32_t found = 0;
+    if (!c->begun)
+        return DRAPE_OK;
+    c->relaxed.counting = true;
+    const drape_status status = relax(c, t1, all, &found);
+    c->relaxed.counting = false;
+    *lacks = found > 0;
+    return status;
+}
+
 drape_status drape_contact_relax(drape_contact *c, double t1, bool all, int32_t *added)
 {
     const double clock = drape_clock_seconds();
@@ -348,10 +369,7 @@ drape_status drape_contact_relax(drape_contact *c, double t1, bool all, int32_t 
     drape_status status = go_to(c, c->start, c->start_t);
     const double before = status ? 0 : drape_contact_potential(c);
     if (!status)
-        status = drape_room_look_ahead(c, c->start, c->start_t, t1, true, added);
-    if (!status && *added == 0 && all)
-        status = relax_blockers(c, added);
-    c->listed = false;
+        status = relax(c, t1, all, added);
     if (!status && *added > 0 && !(status = go_to(c, c->start, c->start_t)))
         c->press.work += drape_contact_potential(c) - before;
     c->seconds += drape_clock_seconds() - clock;

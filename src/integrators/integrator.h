@@ -72,6 +72,9 @@ typedef struct drape_integrator_ops {
     /* Positions (node_count x 3) at a time within the last step. NULL: cubic Hermite interpolation between
      * the states is used. */
     void (*interpolate)(void *state, double t, double *x);
+    /* The velocities of the free nodes (node_count x 3) at such a time, as well; the rest of v is unchanged.
+     * NULL: an interpolant of the states is used. */
+    void (*interpolate_velocities)(void *state, double t, double *v);
     /* F of the free DOFs (3 free_count [N]) that the solver of the last step left. NULL: it solves no
      * equation. */
     const double *(*residual)(const void *state);

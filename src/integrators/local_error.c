@@ -34,6 +34,7 @@ void drape_local_error_init(const drape_system *system, const double *values, in
                              .speed = NAN,
                              .max_step = values[DRAPE_LOCAL_ERROR_MAX_STEP],
                              .max_steps = values[DRAPE_LOCAL_ERROR_MAX_STEPS],
+                             .kept_growth = 1,
                              .second = NAN};
     drape_derive_tolerances(m, values[DRAPE_LOCAL_ERROR_RTOL], &c->atol_x, &c->atol_v);
     drape_derive_tolerances(m, 1, &c->size, &c->speed);
@@ -166,7 +167,7 @@ static double propose(const drape_local_error *c, const drape_local_attempt *a, 
         next =
             fmin(next, elementary(c, a->h, e) * (a->h / past->h) * drape_pow(past->error / e, 1 / c->power));
     next = fmin(fmax(next, MAX_CUT * a->h), (a->again ? 1 : MAX_GROWTH) * a->h);
-    return next;
+    return next > a->h && next < c->kept_growth * a->h ? a->h : next;
 }
 
 static drape_status reject(const drape_local_error *c, const drape_local_attempt *a, double error,

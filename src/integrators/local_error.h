@@ -69,6 +69,7 @@ typedef struct drape_local_error {
     double atol_x, atol_v;
     double size, speed;         /* [m], [m/s]: of the scene, by which time is measured */
     double max_step, max_steps; /* [s], INFINITY: none; [1/s] */
+    double kept_growth; /* a step that would grow by less keeps its size, and a method its factors; 1: none */
 
     /* Kept between steps. */
     drape_step_record past, made; /* of the last accepted step; of the last one whose test was passed */

@@ -161,6 +161,20 @@ static void guess(newton_k *s, const drape_state *in, double h)
     }
 }
 
+/* How far moved pins get ahead of where their velocity at the start of the step would take them [m]. */
+static double pins_ahead(const newton_k *s, const drape_state *in, double h)
+{
+    const drape_step_equation *e = &s->common.equation;
+    const drape_motion *motion = drape_system_motion(e->system);
+    double most = 0;
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            const size_t at = 3 * (size_t)motion->moved_node[i] + k;
+            most = fmax(most, fabs(e->x_base[at] - in->x[at] - h * in->v[at]));
+        }
+    return most;
+}
+
 /* The relative residual that is left. An error e in the displacement of a step is an error e/h in its
  * velocity, and a second has 1/h steps: for the sum to vanish with h like the method's own error, e must be
  * of order h^3. The error of the guess is of order h^2, so the relative residual is of order h. */
@@ -190,6 +204,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         .deadline = s->deadline,
         .linear_tolerance = linear_tolerance(s),
         .follows = follows,
+        .pins_ahead = pins_ahead(s, in, h),
         .max_linear_iterations =
             linear_iterations ? linear_iterations : (int)s->values[PARAM_LINEAR_ITERATIONS]};
     drape_status status = drape_inexact_newton_solve(s->newton, &settings, s->common.d, &report);

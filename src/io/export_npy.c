@@ -1,41 +1,24 @@
 /*
  * export_npy.c: folder/positions.npy: frames x nodes x 3, float64, C order, little endian.
  *
- * NPY format version 1.0 (numpy.lib.format; NEP 1): magic, version, length of the header, a Python dict
- * padded with blanks so that the data begin at a multiple of 64 bytes. The header has the same length for
- * any number of frames, and its count is raised after a frame's data are written: at any moment the file
- * contains what its header says.
+ * The header (npy.h) has the same length for any number of frames, and its count is raised after a frame's
+ * data are written: at any moment the file contains what its header says.
  */
 
 #include "io/export.h"
+#include "io/npy.h"
 
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
-#define FILE_NAME   "positions.npy"
-#define HEADER_SIZE 128 /* the dict takes at most 92 bytes with counts of 19 and 10 digits */
-#define MAGIC_SIZE  10  /* magic, version, length */
+#define FILE_NAME "positions.npy"
 
 typedef struct npy_state {
     drape_file file;
     int32_t node_count;
     int64_t frames; /* complete frames in the file */
 } npy_state;
-
-static void make_header(int64_t frames, int32_t node_count, char header[HEADER_SIZE])
-{
-    const int length = HEADER_SIZE - MAGIC_SIZE;
-    memset(header, ' ', HEADER_SIZE);
-    memcpy(header, "\x93NUMPY\x01", 8); /* with version 1.0, whose 0 is the end of the string */
-    header[8] = (char)(length & 0xff);
-    header[9] = (char)(length >> 8);
-    int used = snprintf(header + MAGIC_SIZE, (size_t)length,
-                        "{'descr': '<f8', 'fortran_order': False, 'shape': (%" PRId64 ", %" PRId32 ", 3), }",
-                        frames, node_count);
-    header[MAGIC_SIZE + used] = ' ';
-    header[HEADER_SIZE - 1] = '\n';
-}
 
 static bool npy_names(const char *name)
 {
@@ -45,20 +28,20 @@ static bool npy_names(const char *name)
 static drape_status npy_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
     npy_state *npy = state;
-    char header[HEADER_SIZE];
+    char header[DRAPE_NPY_HEADER];
     npy->node_count = drape_model_node_count(def->model);
     drape_status status = drape_export_begin(ctx, def->folder, FILE_NAME, &npy->file);
     if (status)
         return status;
-    make_header(0, npy->node_count, header);
+    drape_npy_put_header(0, npy->node_count, header);
     drape_file_put(&npy->file, header, sizeof header);
     return drape_file_publish(&npy->file);
 }
 
 static drape_status write_count(npy_state *npy, int64_t frames)
 {
-    char header[HEADER_SIZE];
-    make_header(frames, npy->node_count, header);
+    char header[DRAPE_NPY_HEADER];
+    drape_npy_put_header(frames, npy->node_count, header);
     return drape_file_overwrite(&npy->file, 0, header, sizeof header);
 }
 

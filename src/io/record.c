@@ -11,10 +11,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "io/npy.h"
 #include "io/scene_copy.h"
-
-#define NPY_MAGIC  "\x93NUMPY\x01"
-#define NPY_HEADER 128 /* the size that the exporter writes; headers of other sizes are read, too */
 
 /* ---- Names ---- */
 
@@ -57,18 +55,16 @@ static drape_status not_positions(const drape_record *run, const char *path, con
 /* An array of frames x nodes x 3, float64, as export_npy.c writes it. */
 static drape_status read_header(drape_record *run, const char *path)
 {
-    char header[NPY_HEADER + 1] = "";
+    char header[DRAPE_NPY_HEADER];
     int32_t nodes = 0;
+    size_t data = 0;
     struct stat info;
-    ssize_t size = pread(run->positions, header, NPY_HEADER, 0);
-    const char *shape =
-        size == NPY_HEADER && memcmp(header, NPY_MAGIC, 7) == 0 ? strstr(header + 10, "'shape': (") : NULL;
-    if (!shape || !strstr(header + 10, "'<f8'") || !strstr(header + 10, "'fortran_order': False") ||
-        sscanf(shape, "'shape': (%" SCNd64 ", %" SCNd32 ", 3)", &run->frames, &nodes) != 2)
+    ssize_t size = pread(run->positions, header, sizeof header, 0);
+    if (size < 0 || !drape_npy_read_header(header, (size_t)size, &run->frames, &nodes, &data))
         return not_positions(
             run, path,
             "it is not an array of float64, frames x nodes x 3, C order, as `drape run` writes it");
-    run->data = 10 + (off_t)((unsigned char)header[8] | (unsigned char)header[9] << 8);
+    run->data = (off_t)data;
     if (nodes != run->nodes)
         return drape_fail(run->ctx, DRAPE_E_PARSE,
                           "\"%.500s\": it has %" PRId32 " nodes, the scene of the folder has %" PRId32, path,

@@ -260,6 +260,8 @@ static drape_status observe(void *user, const drape_event *event)
         write_frame(r, event->time, event->positions, event->velocities);
         write_due_checkpoint(r);
         break;
+    case DRAPE_EVENT_ROOT: /* the summary has them */
+        break;
     }
     scope_leave(r, s);
     return report(r);

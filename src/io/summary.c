@@ -8,6 +8,7 @@
 #include "model/model.h"
 #include "sim/inside.h"
 #include "sim/relaxed.h"
+#include "sim/sim.h"
 #include "sim/warnings.h"
 
 #include <inttypes.h>
@@ -172,6 +173,33 @@ static json_t *with_no_room(json_t *object, const drape_sim *sim)
     return object;
 }
 
+/* The time and value of an event, and the direction in which its bound was passed. */
+static json_t *root(const drape_event_root *r)
+{
+    const real_item numbers[] = {{"time", r->t}, {"value", r->value}};
+    json_t *one = with_reals(json_object(), numbers, LENGTH(numbers));
+    return drape_json_with(one, "direction", json_string(r->direction > 0 ? "up" : "down"));
+}
+
+/* For each event, if there are any: how often it occurred, and the first times. */
+static json_t *with_events(json_t *object, const drape_sim *sim)
+{
+    json_t *list = json_array();
+    for (int32_t i = 0; i < sim->events.count; i++) {
+        const drape_watch *w = &sim->events.watches[i];
+        json_t *times = json_array();
+        for (int64_t k = 0; k < w->count && k < DRAPE_EVENT_TIMES; k++)
+            times = drape_json_append(times, root(&w->first[k]));
+        json_t *one = drape_json_with(json_object(), "name", drape_json_text(w->event->name));
+        one = drape_json_with(one, "count", json_integer((json_int_t)w->count));
+        list = drape_json_append(list, drape_json_with(one, "occurrences", times));
+    }
+    if (sim->events.count > 0)
+        return drape_json_with(object, "events", list);
+    json_decref(list);
+    return object;
+}
+
 static json_t *warnings(drape_sim *sim)
 {
     json_t *list = json_array();
@@ -222,6 +250,7 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
         object = drape_json_with(object, "equilibrium", stability(&s));
     object = with_inside(object, sim);
     object = with_no_room(object, sim);
+    object = with_events(object, sim);
     object = drape_json_with(object, "warnings", warnings(sim));
     if (def->realtime)
         object = drape_json_with(object, "realtime", realtime(def->realtime));

@@ -2,6 +2,7 @@
 #include "drape/lab.h"
 
 #include "base/clock.h"
+#include "base/def.h"
 #include "base/hash.h"
 #include "base/param.h"
 #include "lab/run.h"
@@ -26,8 +27,7 @@ void drape_lab_def_init(drape_lab_def *def, size_t struct_size)
                                     .jobs = 1,
                                     .shard = 1,
                                     .shards = 1};
-    memset(def, 0, struct_size);
-    memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 void drape_lab_outcome_free(drape_lab_outcome *outcome)
@@ -186,14 +186,16 @@ static drape_status check_settings(lab *l)
 static drape_status try_scene(lab *l)
 {
     const char *before = "";
-    drape_status status = l->experiment->prepare ? lab_try(l->ctx, l->def, NULL) : DRAPE_OK;
+    drape_status status = l->experiment->prepare ? lab_try(l->ctx, &(lab_request){.def = l->def}) : DRAPE_OK;
     if (!status && l->experiment->check)
         status = l->experiment->check(l);
     for (size_t i = 0; !status && i < json_array_size(l->cases); i++) {
         const json_t *one = json_array_get(l->cases, i);
         const char *series = lab_tag_text(one, "series");
-        if (strcmp(series, before) != 0)
-            status = lab_try(l->ctx, l->def, json_object_get(one, "settings"));
+        if (strcmp(series, before) != 0) {
+            const lab_request request = lab_request_of(l, i);
+            status = lab_try(l->ctx, &request);
+        }
         before = series;
     }
     return status;
@@ -236,7 +238,7 @@ static bool writes(const void *user, const char *name)
     lab_cases_name(user, cases);
     return strcmp(name, ABOUT) == 0 || strcmp(name, cases) == 0 || strcmp(name, "results.csv") == 0 ||
            strcmp(name, "report.html") == 0 || strncmp(name, "reference", 9) == 0 || ends_in(name, ".svg") ||
-           ends_in(name, ".pdf") || ends_in(name, ".gp");
+           ends_in(name, ".pdf") || ends_in(name, ".gp") || strcmp(name, "tables.md") == 0;
 }
 
 /* Shards may write into one folder at the same time. */
@@ -310,7 +312,14 @@ static drape_status prepare(lab *l)
 
 /* ---- Reporting ---- */
 
-/* Writes which cases have no result because the budget was used up, by series. Returns their number. */
+/* By what cases are counted that were left out: the scene, of several, or the series. */
+static const char *group_of(const json_t *one)
+{
+    const char *scene = lab_tag_text(one, "scene");
+    return *scene ? scene : lab_tag_text(one, "series");
+}
+
+/* Writes which cases have no result because the budget was used up, by group. Returns their number. */
 static int64_t list_left_out(lab *l)
 {
     const double budget = l->def->budget_seconds;
@@ -325,11 +334,9 @@ static int64_t list_left_out(lab *l)
             (long long)all, l->count, budget / 60);
     const char *comma = " ";
     for (size_t i = 0, end; i < l->count; i = end) {
-        const char *series = lab_tag_text(json_array_get(l->cases, i), "series");
+        const char *series = group_of(json_array_get(l->cases, i));
         int64_t missing = 0;
-        for (end = i;
-             end < l->count && strcmp(lab_tag_text(json_array_get(l->cases, end), "series"), series) == 0;
-             end++)
+        for (end = i; end < l->count && strcmp(group_of(json_array_get(l->cases, end)), series) == 0; end++)
             missing += !l->results[end];
         if (missing > 0) {
             fprintf(l->summary, "%s%s (%lld of %zu)", comma, series, (long long)missing, end - i);

@@ -43,7 +43,7 @@ lab_style lab_style_of(const char *integrator, size_t variant)
     for (int i = 0; drape_integrators[i] && strcmp(drape_integrators[i]->entry.name, integrator) != 0; i++)
         k += !drape_integrators[i]->steady_state;
     return (lab_style){colours[k % colour_count], 1 + (int)variant % 5,
-                       points[k % point_count] - (variant > 0)};
+                       points[(k + k / colour_count) % point_count] - (variant > 0)};
 }
 
 /* ---- Text ---- */

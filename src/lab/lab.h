@@ -26,6 +26,7 @@
 #include <stdio.h>
 
 typedef struct lab lab;
+struct lab_request;
 
 typedef struct lab_experiment_ops {
     drape_entry entry;
@@ -35,6 +36,9 @@ typedef struct lab_experiment_ops {
     drape_status (*plan)(lab *l);
     /* Faults in what prepare will run, found before there is a folder. NULL: it runs nothing. */
     drape_status (*check)(lab *l);
+    /* Completes the request of a case: its scene and what it is compared with, if these are not those of the
+     * def and of all cases. NULL: they are. */
+    void (*request)(const lab *l, size_t index, struct lab_request *request);
     /* Makes l->reference or l->probe. NULL: there is nothing to prepare. */
     drape_status (*prepare)(lab *l);
     /* Writes figures, sentences (l->summary) and the body of the page (lab_page_*). All cases have
@@ -64,6 +68,7 @@ struct lab {
     lab_trace reference;       /* the motion that cases are compared with; no frames: none */
     double reference_error;    /* [m] RMS at the end: its distance from the next less accurate one */
     double start;              /* [s] wall clock at the start of the run */
+    void *own;                 /* of the experiment, in the arena */
     lab_probe probe;           /* where final positions are taken; no points: nowhere */
     FILE *summary;             /* sentences for the terminal and the head of the page, one a line */
     char *summary_text;        /* valid when summary is flushed or closed */

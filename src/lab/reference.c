@@ -75,7 +75,7 @@ drape_status lab_check_reference(lab *l)
     drape_status status = DRAPE_OK;
     for (int i = 0; !status && i < SEQUENCES; i++) {
         json_t *settings = settings_of(&sequences[i], sequences[i].first);
-        status = lab_try(l->ctx, l->def, settings);
+        status = lab_try(l->ctx, &(lab_request){.def = l->def, .settings = settings});
         json_decref(settings);
     }
     return status;

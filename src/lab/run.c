@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "lab/lab.h"
+#include "model/model.h"
 #include "sim/sim.h"
 
 #include <math.h>
@@ -33,7 +34,7 @@ drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drap
     const drape_lab_def *def = request->def;
     const char *pointer;
     json_t *value;
-    drape_status status = drape_scene_load(ctx, def->scene, scene);
+    drape_status status = drape_scene_load(ctx, request->scene ? request->scene : def->scene, scene);
     for (size_t i = 0; !status && i < def->setting_count; i++)
         status = drape_scene_set(*scene, def->settings[i].pointer, def->settings[i].value);
     json_object_foreach((json_t *)(uintptr_t)request->settings, pointer, value)
@@ -58,13 +59,21 @@ drape_status lab_load(drape_context *ctx, const lab_request *request, drape_mode
     return status;
 }
 
-drape_status lab_try(drape_context *ctx, const drape_lab_def *def, const json_t *settings)
+drape_status lab_try(drape_context *ctx, const lab_request *request)
 {
-    const lab_request request = {.def = def, .settings = settings};
     drape_model *model = NULL;
-    drape_status status = lab_load(ctx, &request, &model);
+    drape_status status = lab_load(ctx, request, &model);
     drape_model_destroy(&model);
     return status;
+}
+
+static void compare(run *r, const double *x, int64_t frame)
+{
+    const lab_trace *reference = r->request->reference;
+    const double d = lab_distance(r->model, x, reference->x + reference->size * (size_t)frame);
+    r->squares += d * d;
+    r->far = fmax(r->far, d);
+    r->compared++;
 }
 
 static drape_status watch(void *user, const drape_event *event)
@@ -74,13 +83,10 @@ static drape_status watch(void *user, const drape_event *event)
     const drape_lab_def *def = request->def;
     const lab_trace *reference = request->reference;
     if (event->kind == DRAPE_EVENT_FRAME) {
-        if (reference && event->frame < reference->frames - 1) { /* the last one is the end, not a frame */
-            const double d = lab_distance(r->model, event->positions,
-                                          reference->x + reference->size * (size_t)event->frame);
-            r->squares += d * d;
-            r->far = fmax(r->far, d);
-            r->compared++;
-        }
+        if (request->times)
+            return DRAPE_OK;
+        if (reference && event->frame < reference->frames - 1) /* the last one is the end, not a frame */
+            compare(r, event->positions, event->frame);
         if (request->record)
             lab_trace_add(request->record, event->positions);
         return DRAPE_OK;
@@ -91,6 +97,21 @@ static drape_status watch(void *user, const drape_event *event)
     r->cancelled =
         (request->given_up && atomic_load(request->given_up)) || (def->cancel && def->cancel(def->user));
     return r->over_budget || r->late || r->cancelled ? DRAPE_RETRY_REJECTED : DRAPE_OK;
+}
+
+/* Advances to each of the times, where steps then end, and compares and records the states there. */
+static drape_status advance_to_times(drape_sim *sim, run *r)
+{
+    const lab_request *request = r->request;
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < request->time_count; i++) {
+        status = drape_sim_advance(sim, request->times[i]);
+        if (!status && request->reference && (int64_t)i < request->reference->frames)
+            compare(r, drape_sim_positions(sim), (int64_t)i);
+        if (!status && request->record)
+            lab_trace_add(request->record, drape_sim_positions(sim));
+    }
+    return status;
 }
 
 static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
@@ -107,14 +128,17 @@ static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
     }
     r->start = drape_clock_thread_seconds();
     const double wall = drape_clock_seconds();
-    r->status = drape_sim_advance(sim, drape_model_duration(r->model));
+    r->status =
+        r->request->times ? advance_to_times(sim, r) : drape_sim_advance(sim, drape_model_duration(r->model));
+    if (r->status == DRAPE_E_STOPPED && drape_sim_stopped_by(sim) >= 0)
+        r->status = DRAPE_OK; /* as the scene says */
     r->cpu = drape_clock_thread_seconds() - r->start;
     r->wall = drape_clock_seconds() - wall;
     snprintf(r->message, sizeof r->message, "%s", r->status ? drape_context_message(ctx) : "");
     if (r->over_budget)
         snprintf(r->message, sizeof r->message, "t=%.9g: its budget of %.4g s of CPU time was used up",
                  drape_sim_time(sim), r->request->seconds);
-    if (r->request->record)
+    if (r->request->record && !r->request->times)
         lab_trace_add(r->request->record, drape_sim_positions(sim));
     return r->cancelled ? drape_fail(ctx, DRAPE_E_STOPPED, "interrupted") : DRAPE_OK;
 }
@@ -134,6 +158,23 @@ static json_t *probed_positions(const run *r, const double *x)
 }
 
 /* ---- The result ---- */
+
+/* Errors relative to the size of the scene, of a run that reached its last time. */
+static void put_relative_errors(const run *r, const double *x, json_t *result)
+{
+    const double size = r->model->length;
+    const bool whole = !r->status;
+    json_object_set_new(result, "size_m", json_real(size));
+    json_object_set_new(
+        result, "error_end",
+        drape_json_number(whole ? lab_distance(r->model, x, lab_trace_end(r->request->reference)) / size
+                                : NAN));
+    json_object_set_new(result, "error_max", drape_json_number(whole ? r->far / size : NAN));
+    json_object_set_new(
+        result, "mescd",
+        drape_json_number(whole ? lab_correct_digits(r->model, x, lab_trace_end(r->request->reference))
+                                : NAN));
+}
 
 static json_t *describe(const run *r, drape_sim *sim)
 {
@@ -184,6 +225,10 @@ static json_t *describe(const run *r, drape_sim *sim)
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
         json_object_set_new(result, counts[i].key, json_integer(counts[i].value));
     json_object_set_new(result, "reasons", reasons);
+    if (compares)
+        json_object_set_new(result, "reference_error_m", drape_json_number(request->reference_error));
+    if (compares && request->times)
+        put_relative_errors(r, x, result);
     json_t *positions = probed_positions(r, x);
     if (positions)
         json_object_set_new(result, "positions", positions);
@@ -198,9 +243,10 @@ drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **re
     *result = NULL;
     drape_status status = lab_load(ctx, request, &model);
     if (!status && request->record) {
-        const double frames = ceil(drape_model_duration(model) * drape_model_frame_rate(model)) + 2;
+        const double frames = ceil(drape_model_duration(model) * drape_model_frame_rate(model)) + 3;
         status = lab_trace_create(request->arena, 3 * (size_t)drape_model_node_count(model),
-                                  (int64_t)frames + 1, request->record);
+                                  request->times ? (int64_t)request->time_count : (int64_t)frames,
+                                  request->record);
     }
     for (int i = 1; !status && repeat; i++) {
         drape_sim *sim = NULL;

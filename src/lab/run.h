@@ -11,14 +11,20 @@
 /* A case to simulate, and the measurements to make. */
 typedef struct lab_request {
     const drape_lab_def *def;   /* scene, settings of all cases, cancel */
+    const char *scene;          /* name of its file; NULL: the def's */
     const json_t *settings;     /* {pointer: value} of the case; NULL: none */
     const lab_trace *reference; /* NULL or no frames: nothing to compare with */
-    const lab_probe *probe;     /* NULL or no points: nowhere */
-    lab_trace *record;          /* its frames and, last, its end; NULL: not recorded. Made here, in: */
-    drape_arena *arena;         /* of the record */
-    double seconds;             /* CPU: a run that takes more is stopped */
-    double deadline; /* [s] of the wall clock: a run that is not done by then is abandoned; 0: none */
-    int repeats;     /* the least CPU time of so many counts */
+    double reference_error;     /* [m] estimate of its error */
+    const double *times;        /* (time_count) [s] at which steps end, and at which it is compared and
+                                   recorded; NULL: at frames, which may lie within steps, and at the end */
+    size_t time_count;
+    const lab_probe *probe; /* NULL or no points: nowhere */
+    lab_trace *record;      /* its frames and, last, its end; or its states at `times`. NULL: not
+                                   recorded. Made here, in: */
+    drape_arena *arena;     /* of the record */
+    double seconds;         /* CPU: a run that takes more is stopped */
+    double deadline;        /* [s] of the wall clock: a run that is not done by then is abandoned; 0: none */
+    int repeats;            /* the least CPU time of so many counts */
     const atomic_bool *given_up; /* another thread failed; NULL: there is none */
 } lab_request;
 
@@ -27,8 +33,8 @@ typedef struct lab_request {
 drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drape_scene **scene);
 drape_status lab_load(drape_context *ctx, const lab_request *request, drape_model **model);
 
-/* Whether it compiles. settings: of a case; NULL: the scene itself. */
-drape_status lab_try(drape_context *ctx, const drape_lab_def *def, const json_t *settings);
+/* Whether it compiles. */
+drape_status lab_try(drape_context *ctx, const lab_request *request);
 
 /* Runs it. *result: what was measured, to be freed by the caller; a simulation that stops is a result.
  * NULL: the deadline passed before it was done. Errors: those of loading, DRAPE_E_MEMORY, DRAPE_E_STOPPED

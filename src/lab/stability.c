@@ -6,7 +6,7 @@
  */
 #include "base/param.h"
 #include "lab/figure.h"
-#include "lab/run.h"
+#include "lab/sweep.h"
 #include "lab/text.h"
 #include "sim/warnings.h"
 
@@ -216,9 +216,10 @@ static drape_status try_ends(lab *l, size_t first, const space *s)
         stride *= (size_t)s->axes[a].count;
     }
     const size_t cells[] = {0, inside, s->cells - 1};
-    for (size_t i = 0; i < sizeof cells / sizeof *cells && !status; i++)
-        status =
-            lab_try(l->ctx, l->def, json_object_get(json_array_get(l->cases, first + cells[i]), "settings"));
+    for (size_t i = 0; i < sizeof cells / sizeof *cells && !status; i++) {
+        const lab_request request = lab_request_of(l, first + cells[i]);
+        status = lab_try(l->ctx, &request);
+    }
     return status;
 }
 

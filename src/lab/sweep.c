@@ -3,7 +3,6 @@
 
 #include "base/clock.h"
 #include "io/export.h"
-#include "lab/run.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -160,8 +159,6 @@ static void keep(sweep *s, size_t i, json_t *result)
     const drape_lab_def *def = l->def;
     json_object_set_new(result, "case", json_integer((json_int_t)i));
     json_object_set_new(result, "tags", json_deep_copy(json_object_get(json_array_get(l->cases, i), "tags")));
-    if (l->reference.frames)
-        json_object_set_new(result, "reference_error_m", drape_json_number(l->reference_error));
     l->results[i] = result;
     s->done++;
     lab_put_line(&s->file, result);
@@ -174,12 +171,25 @@ static void keep(sweep *s, size_t i, json_t *result)
         def->progress(def->user, s->done, s->total, wall / (double)fresh * (double)(s->total - s->done));
 }
 
+lab_request lab_request_of(const lab *l, size_t index)
+{
+    lab_request request = {.def = l->def,
+                           .settings = json_object_get(json_array_get(l->cases, index), "settings"),
+                           .reference = &l->reference,
+                           .reference_error = l->reference_error,
+                           .probe = &l->probe,
+                           .seconds = l->def->case_seconds,
+                           .repeats = l->experiment->compares_costs ? l->def->repeats : 1};
+    if (l->experiment->request)
+        l->experiment->request(l, index, &request);
+    return request;
+}
+
 /* A thread: runs cases until there is none left. */
 static void *work(void *user)
 {
     sweep *s = user;
     lab *l = s->l;
-    const drape_lab_def *def = l->def;
     drape_context *ctx = NULL;
     locale_t old = drape_locale_enter();
     if (drape_context_create(&l->ctx->def, &ctx)) {
@@ -189,14 +199,9 @@ static void *work(void *user)
     }
     for (size_t i = ctx ? take_case(s) : l->count; i < l->count; i = take_case(s)) {
         json_t *result = NULL;
-        const lab_request request = {.def = def,
-                                     .settings = json_object_get(json_array_get(l->cases, i), "settings"),
-                                     .reference = &l->reference,
-                                     .probe = &l->probe,
-                                     .seconds = def->case_seconds,
-                                     .deadline = s->deadline,
-                                     .repeats = l->experiment->compares_costs ? def->repeats : 1,
-                                     .given_up = &s->given_up};
+        lab_request request = lab_request_of(l, i);
+        request.deadline = s->deadline;
+        request.given_up = &s->given_up;
         drape_status status = lab_run(ctx, &request, &result);
         pthread_mutex_lock(&s->lock);
         if (!status && result)

@@ -2,6 +2,7 @@
 #include "lab/trace.h"
 
 #include "base/vec3.h"
+#include "model/model.h"
 
 #include <math.h>
 #include <string.h>
@@ -38,6 +39,15 @@ double lab_distance(const drape_model *model, const double *a, const double *b)
         nodes++;
     }
     return nodes ? sqrt(sum / (double)nodes) : 0;
+}
+
+double lab_correct_digits(const drape_model *model, const double *x, const double *y)
+{
+    const double *rest = drape_model_rest_positions(model);
+    double largest = 0;
+    for (size_t i = 0; i < 3 * (size_t)drape_model_node_count(model); i++)
+        largest = fmax(largest, fabs(x[i] - y[i]) / (model->length + fabs(y[i] - rest[i])));
+    return largest > 0 ? -log10(largest) : INFINITY;
 }
 
 drape_status lab_probe_create(drape_arena *arena, const drape_model *model, lab_probe *probe)

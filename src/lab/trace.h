@@ -18,6 +18,11 @@ const double *lab_trace_end(const lab_trace *trace);   /* the last frame; there 
 /* Root of the mean, over the free nodes, of the square of the distance between two arrays of positions. */
 double lab_distance(const drape_model *model, const double *a, const double *b);
 
+/* The number of correct digits of x beside y as the test set of Bari has it (mescd; Mazzia & Magherini 2008):
+ * -log10 of the largest component of the error, each relative to the size of the scene plus the
+ * displacement. INFINITY: they are the same. */
+double lab_correct_digits(const drape_model *model, const double *x, const double *y);
+
 /* Material points: where the nodes of one mesh lie in the rest shape of another, finer one of the same
  * cloth. */
 typedef struct lab_probe {

@@ -154,7 +154,51 @@ typedef struct drape_contact_def {
     double relaxed_pressure;     /* with which relaxed cloth is pushed out of them [Pa] */
 } drape_contact_def;
 
+/* Nodes of one cloth that one item of its "pins" holds. */
+typedef struct drape_pin {
+    char *name;
+    int32_t cloth;
+    int32_t *node; /* (node_count) ascending node numbers of the model */
+    int32_t node_count;
+    bool clamps;
+} drape_pin;
+
+/* What happens at an event, beside that it is recorded and reported. */
+typedef enum drape_event_action {
+    DRAPE_ACTION_RECORD,
+    DRAPE_ACTION_STOP,
+    DRAPE_ACTION_RELEASE
+} drape_event_action;
+
+/* The directions of a root that are an event. */
+typedef enum drape_event_direction {
+    DRAPE_DIRECTION_BOTH,
+    DRAPE_DIRECTION_UP,
+    DRAPE_DIRECTION_DOWN
+} drape_event_direction;
+
+typedef struct drape_event_ops drape_event_ops;
+
+/* One event: a root of a function of the state. */
+typedef struct drape_model_event {
+    const drape_event_ops *ops; /* NULL: the function of a host */
+    char *name;
+    drape_choice choice; /* the choice of the scene */
+    double values[DRAPE_MAX_PARAMS];
+    int32_t cloth; /* -1: all */
+    int32_t *pin;  /* (pin_count) the pins that it measures or releases, as numbers of the model */
+    int32_t pin_count;
+    int32_t *pinned; /* (pinned_count) their nodes, each once */
+    int32_t pinned_count;
+    drape_event_direction direction;
+    drape_event_action action;
+    bool once; /* it is over after the first root */
+} drape_model_event;
+
 struct drape_model {
+    const drape_model
+        *base;         /* the model that this one is without some of its pins, and whose arrays it shares
+                                except those that depend on the pins; NULL: it is its own */
     drape_arena arena; /* holds everything below except the meshes */
     drape_context *ctx;
     int32_t cloth_count, term_count, node_count, triangle_count, edge_count;
@@ -189,7 +233,11 @@ struct drape_model {
     double duration, frame_rate;
     char **formats;
     size_t format_count;
-    bool z_up; /* frames are rotated so that z points up */
+    bool z_up;       /* frames are rotated so that z points up */
+    drape_pin *pins; /* (pin_count) of all cloths, in scene order */
+    int32_t pin_count;
+    drape_model_event *events; /* (event_count) in scene order */
+    int32_t event_count;
 };
 
 /* Writes the positions that tracks give pinned nodes at time t; other entries of x (node_count x 3) are

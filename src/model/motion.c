@@ -284,6 +284,19 @@ void drape_motion_place_cloth(drape_motion *motion, int32_t cloth, const drape_p
             place_path(by, &motion->pin_path[i]);
 }
 
+void drape_motion_copy(drape_motion *motion, const drape_motion *from)
+{
+    const drape_model *m = motion->model;
+    for (int32_t i = 0; i < from->moved_count; i++)
+        if (m->pinned[from->moved_node[i]])
+            motion->pin_path[find_place(motion, from->moved_node[i])] = from->pin_path[i];
+    memcpy(motion->collider_path, from->collider_path,
+           (size_t)m->collider_count * sizeof *motion->collider_path);
+    memcpy(motion->collider_placed, from->collider_placed,
+           (size_t)m->collider_count * sizeof *motion->collider_placed);
+    memcpy(motion->cloth_placed, from->cloth_placed, (size_t)m->cloth_count * sizeof *motion->cloth_placed);
+}
+
 void drape_motion_hold_pins(drape_motion *motion, const double *x)
 {
     for (int32_t i = 0; i < motion->moved_count; i++) {

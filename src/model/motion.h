@@ -84,6 +84,9 @@ void drape_placement_turn(const drape_placement *by, const double x[3], double y
 /* The position of a pinned node that neither a track nor a path moves. */
 void drape_motion_place_fixed(const drape_motion *motion, int32_t node, double x[3]);
 
+/* Takes the paths and placements of another motion of the same scene, in which more nodes may be pinned. */
+void drape_motion_copy(drape_motion *motion, const drape_motion *from);
+
 /* Pins that a host has moved rest from now on at these positions (node_count x 3). */
 void drape_motion_hold_pins(drape_motion *motion, const double *x);
 

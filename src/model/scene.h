@@ -71,6 +71,7 @@ typedef struct drape_scene_key {
 
 #define DRAPE_MAX_CLOTHS    (1 << 20)
 #define DRAPE_MAX_COLLIDERS 4096
+#define DRAPE_MAX_EVENTS    256
 
 typedef struct drape_scene_object {
     const char *name;
@@ -83,12 +84,12 @@ typedef struct drape_scene_object {
     size_t settings_offset, settings_count_offset; /* open: offsets in the def */
     size_t def_size;                               /* size of the def; 0: the values are stored in the
                                                       parent's def */
-    bool sized;                                    /* the def begins with its size */
+    size_t least_size; /* the shortest def of an older host; 0: the def does not begin with its size */
 } drape_scene_object;
 
 /* The top-level object and some of its descendants. */
 extern const drape_scene_object drape_form_scene, drape_form_output, drape_form_cloth, drape_form_mesh,
-    drape_form_transform, drape_form_pin, drape_form_collider;
+    drape_form_transform, drape_form_pin, drape_form_collider, drape_form_event;
 
 /* Returns the key of an object by its name; NULL if there is none. */
 const drape_scene_key *drape_scene_key_of(const drape_scene_object *object, const char *name);

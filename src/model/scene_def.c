@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/def.h"
 #include "base/vec3.h"
 #include "model/scene_text.h"
 
@@ -140,22 +141,10 @@ static void set_default(const drape_scene_key *key, void *def)
 
 void drape_scene_set_defaults(const drape_scene_object *object, void *def)
 {
-    if (object->sized)
+    if (object->least_size)
         memcpy(def, &object->def_size, sizeof object->def_size);
     for (size_t i = 0; i < object->key_count; i++)
         set_default(&object->keys[i], def);
-}
-
-/* struct_size is the caller's sizeof. A caller built against an older header has a shorter struct, whose
- * members are the first ones of ours. In a longer struct, the members that we do not know are set to zero. */
-static void give(void *def, size_t struct_size, bool sized, const void *defaults, size_t size)
-{
-    if (!def)
-        return;
-    memset(def, 0, struct_size);
-    memcpy(def, defaults, struct_size < size ? struct_size : size);
-    if (sized)
-        memcpy(def, &struct_size, struct_size < sizeof struct_size ? struct_size : sizeof struct_size);
 }
 
 /* Two defaults of hosts differ from the table of keys. A text must give a duration, so its key has no
@@ -163,40 +152,52 @@ static void give(void *def, size_t struct_size, bool sized, const void *defaults
  * to files by default; a host reads the states itself, so it starts without formats. */
 void drape_scene_def_init(drape_scene_def *def, size_t struct_size)
 {
-    drape_scene_def defaults = {.struct_size = struct_size};
+    drape_scene_def defaults = {.struct_size = 0};
     drape_scene_set_defaults(&drape_form_scene, &defaults);
+    defaults.struct_size = struct_size;
     defaults.duration = 1;
     defaults.formats = NULL;
     defaults.format_count = 0;
-    give(def, struct_size, true, &defaults, sizeof defaults);
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size)
 {
     drape_mesh_def defaults = {.file = NULL};
     drape_scene_set_defaults(&drape_form_mesh, &defaults);
-    give(def, struct_size, false, &defaults, sizeof defaults);
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size)
 {
-    drape_cloth_def defaults = {.name = NULL};
+    drape_cloth_def defaults = {.struct_size = 0};
     drape_scene_set_defaults(&drape_form_cloth, &defaults);
-    give(def, struct_size, true, &defaults, sizeof defaults);
+    defaults.struct_size = struct_size;
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 void drape_collider_def_init(drape_collider_def *def, size_t struct_size)
 {
-    drape_collider_def defaults = {.name = NULL};
+    drape_collider_def defaults = {.struct_size = 0};
     drape_scene_set_defaults(&drape_form_collider, &defaults);
-    give(def, struct_size, true, &defaults, sizeof defaults);
+    defaults.struct_size = struct_size;
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
+}
+
+void drape_event_def_init(drape_event_def *def, size_t struct_size)
+{
+    drape_event_def defaults = {.struct_size = 0};
+    drape_scene_set_defaults(&drape_form_event, &defaults);
+    defaults.struct_size = struct_size;
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 void drape_pin_def_init(drape_pin_def *def, size_t struct_size)
 {
-    drape_pin_def defaults = {.nodes = NULL};
+    drape_pin_def defaults = {.struct_size = 0};
     drape_scene_set_defaults(&drape_form_pin, &defaults);
-    give(def, struct_size, true, &defaults, sizeof defaults);
+    defaults.struct_size = struct_size;
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 /* ---- Keys as text ---- */

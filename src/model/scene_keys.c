@@ -32,6 +32,9 @@ static const char *const up_axes[] = {"y", "z", NULL};
 /* ---- Pins ---- */
 
 static const drape_scene_key pin_keys[] = {
+    {DRAPE_TEXT("name", "unique name among the pins of the cloth, for events",
+                .derived = "\"pin0\", \"pin1\" ..."),
+     IN(drape_pin_def, name)},
     {DRAPE_INTEGER("nodes", "1", UNSAID, 0, INT32_MAX, "node numbers of this cloth"),
      .shape = DRAPE_SCENE_LIST, ARRAY(drape_pin_def, nodes, node_count), .at_least = 1},
     {DRAPE_CHOICE("corner", UNSAID, corners, "a corner of a grid; top is row 0, left is column 0"),
@@ -51,8 +54,11 @@ static const drape_scene_key pin_keys[] = {
 };
 static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
 
-const drape_scene_object drape_form_pin = {
-    .name = "pin", KEYS(pin_keys), .one_of = pin_selectors, .def_size = sizeof(drape_pin_def), .sized = true};
+const drape_scene_object drape_form_pin = {.name = "pin",
+                                           KEYS(pin_keys),
+                                           .one_of = pin_selectors,
+                                           .def_size = sizeof(drape_pin_def),
+                                           .least_size = offsetof(drape_pin_def, clamp)};
 
 /* ---- Objects with settings ---- */
 
@@ -123,8 +129,10 @@ static const drape_scene_key cloth_keys[] = {
      IN(drape_cloth_def, velocity)},
 };
 
-const drape_scene_object drape_form_cloth = {
-    .name = "cloth", KEYS(cloth_keys), .def_size = sizeof(drape_cloth_def), .sized = true};
+const drape_scene_object drape_form_cloth = {.name = "cloth",
+                                             KEYS(cloth_keys),
+                                             .def_size = sizeof(drape_cloth_def),
+                                             .least_size = offsetof(drape_cloth_def, velocity)};
 
 /* ---- Colliders and contact ---- */
 
@@ -148,7 +156,7 @@ const drape_scene_object drape_form_collider = {
     KEYS(collider_keys),
     SETTINGS(drape_collider_def, entry.settings, entry.setting_count),
     .def_size = sizeof(drape_collider_def),
-    .sized = true,
+    .least_size = offsetof(drape_collider_def, track),
 };
 
 /* All members of these two are settings. */
@@ -156,6 +164,36 @@ static const drape_scene_object self_contact = {.name = "self_contact",
                                                 SETTINGS(drape_scene_def, self_contact, self_contact_count)};
 static const drape_scene_object contact = {.name = "contact",
                                            SETTINGS(drape_scene_def, contact, contact_count)};
+
+/* ---- Events ---- */
+
+static const char *const directions[] = {"both", "up", "down", NULL};
+static const char *const actions[] = {"record", "stop", "release", NULL};
+
+static const drape_scene_key event_keys[] = {
+    {DRAPE_TEXT("type", "name of an event; its parameters are keys beside it"),
+     IN(drape_event_def, entry.type)},
+    {DRAPE_TEXT("name", "unique name", .derived = "\"event0\", \"event1\" ..."), IN(drape_event_def, name)},
+    {DRAPE_TEXT("cloth", "name of the cloth that it is about", .derived = "all of them"),
+     IN(drape_event_def, cloth)},
+    {DRAPE_TEXT("pins", "name of the pins that it measures or releases", .derived = "all pins of the cloth"),
+     IN(drape_event_def, pins)},
+    {DRAPE_CHOICE("direction", 0, directions,
+                  "whether the quantity passes its bound upwards, downwards, or either"),
+     IN(drape_event_def, direction)},
+    {DRAPE_CHOICE("action", 0, actions,
+                  "record: the run goes on; stop: it ends there; release: the pins let their nodes go"),
+     IN(drape_event_def, action)},
+    {DRAPE_BOOLEAN("once", false, "only the first time counts"), IN(drape_event_def, once)},
+};
+
+const drape_scene_object drape_form_event = {
+    .name = "event",
+    KEYS(event_keys),
+    SETTINGS(drape_event_def, entry.settings, entry.setting_count),
+    .def_size = sizeof(drape_event_def),
+    .least_size = sizeof(drape_event_def),
+};
 
 /* ---- Scene ---- */
 
@@ -196,7 +234,11 @@ static const drape_scene_key scene_keys[] = {
     {DRAPE_NUMBER("frame_rate", "1/s", 60, DRAPE_ABOVE(0), 1e6, "frames per second of simulated time"),
      IN(drape_scene_def, frame_rate)},
     {SHAPED(DRAPE_SCENE_OBJECT, "output", UNSAID, "what a run writes"), .child = &drape_form_output},
+    {SHAPED(DRAPE_SCENE_OBJECTS, "events", NONE, "what is looked out for during the run"),
+     ARRAY(drape_scene_def, events, event_count), .at_most = DRAPE_MAX_EVENTS, .child = &drape_form_event},
 };
 
-const drape_scene_object drape_form_scene = {
-    .name = "scene", KEYS(scene_keys), .def_size = sizeof(drape_scene_def), .sized = true};
+const drape_scene_object drape_form_scene = {.name = "scene",
+                                             KEYS(scene_keys),
+                                             .def_size = sizeof(drape_scene_def),
+                                             .least_size = offsetof(drape_scene_def, formats)};

@@ -9,6 +9,7 @@
 
 #include "base/clock.h"
 #include "base/elementary.h"
+#include "base/finite.h"
 #include "base/reason.h"
 #include "nonlinear/approx_jacobian.h"
 #include "nonlinear/factored_jacobian.h"
@@ -35,6 +36,18 @@
  * down upright, for .16 of the time of be, instead of .066 m for .39, though .031 instead of .022 m on a
  * ball. Eight are .036 and .035 m off, instead of .039 and .022 m. */
 #define FEW_ITERATIONS 4
+/* In edges: by how much pins may be ahead before the step begins with the linearized equation. */
+#define MAX_AHEAD 0.1
+/* Without contact, in sizes of the scene: how far nodes would move in a step with the energy that is left,
+ * at most sqrt(error x inertial error). A tenth of it costs a third more iterations and is hardly nearer;
+ * with ten times as much stiff sheets heat up. */
+#define MAX_JUMP 1e-2
+/* Errors further above the bound are not estimated, where the last two corrections tell them. */
+#define FAR_ABOVE 3
+/* Of the bound: an error that is only expected, from an earlier step, must be below. It is measured again
+ * after so many steps. */
+#define MAX_EXPECTED 0.33
+#define MAX_STEPS    3
 /* Limits of the share m in the estimate of the error: beyond them forces are far from linear along p. */
 #define MIN_SHARE 0.05
 #define MAX_SHARE 4
@@ -46,6 +59,14 @@
 #define ESTIMATE_TOLERANCE  0.5
 #define ESTIMATE_ITERATIONS 4
 
+/* What the first correction of a step leaves as error, as a share of itself, when that was measured last. */
+typedef struct contraction {
+    double share;       /* 0: not known */
+    double along;       /* [m] RMS of that correction */
+    double mass_weight; /* of the step */
+    int32_t steps;      /* that were judged by it since */
+} contraction;
+
 struct drape_inexact_newton {
     drape_step_equation *equation;
     /* One of them; both NULL without free nodes. */
@@ -55,18 +76,17 @@ struct drape_inexact_newton {
     double share;                     /* of the positive parts in the next matrix; with factors */
     double used_share, repair_share;  /* in the last matrix; in the last one that was indefinite without */
     bool indefinite;                  /* one in this solve was */
-    double edge;                      /* [m] mean length of an edge; with factors */
+    double edge;                      /* [m] mean length of an edge */
+    contraction first;                /* of the first correction */
+    bool nonlinear;                   /* forces are, along the correction of the last estimate */
     double *p, *minus_f, *trial;      /* free DOFs */
     double *fraction;                 /* nodes; NULL without contact */
-    double *f, *g;                    /* free DOFs, nodes: kept while the estimate evaluates them elsewhere */
+    double *f, *g;                    /* free DOFs, nodes: kept while F is evaluated elsewhere */
 };
 
 /* Conjugate gradients leave a part of the stretch of a correction, which predicted stress would not see. */
 static drape_status create_factored(drape_arena *arena, drape_inexact_newton *s)
 {
-    const drape_model *m = s->equation->model;
-    for (int32_t i = 0; i < m->edge_count; i++)
-        s->edge += m->edge_length[i] / m->edge_count;
     drape_status status = drape_stress_predictor_init(arena, s->equation->system, &s->predictor);
     return status ? status : drape_factored_jacobian_create(arena, s->equation->system, &s->factored);
 }
@@ -78,7 +98,10 @@ drape_status drape_inexact_newton_create(drape_arena *arena, drape_step_equation
     drape_inexact_newton *s = *out = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
+    const drape_model *m = equation->model;
     s->equation = equation;
+    for (int32_t i = 0; i < m->edge_count; i++)
+        s->edge += m->edge_length[i] / m->edge_count;
     s->p = drape_arena_take(arena, equation->dofs, sizeof *s->p);
     s->minus_f = drape_arena_take(arena, equation->dofs, sizeof *s->minus_f);
     s->trial = drape_arena_take(arena, equation->dofs, sizeof *s->trial);
@@ -117,6 +140,8 @@ static void begin(drape_inexact_newton *s, bool follows)
     drape_step_equation *e = s->equation;
     drape_step_equation_begin(e);
     s->share = 1;
+    if (!follows || s->first.mass_weight != e->mass_weight)
+        s->first = (contraction){0};
     s->indefinite = false;
     drape_step_equation_predict_contact(e, NULL);
     if (!s->factored || (follows && s->predictor.valid))
@@ -214,6 +239,26 @@ static void clear_colliders(drape_inexact_newton *s, double *d)
         if (e->x_ahead[at] != e->x[at] + d[i])
             d[i] = e->x_ahead[at] - e->x[at];
     }
+}
+
+/* Where a pin takes a sheet along, nodes that keep their motion stay behind, and it takes many corrections
+ * until the forces of the elements at the pin have reached the others. The equation linearized at the start
+ * of the step takes the pull of pins to all nodes at once, as in newton.c, but knows of no contact to come. */
+static drape_status guess_linearized(drape_inexact_newton *s, const drape_inexact_settings *settings,
+                                     double *d)
+{
+    drape_step_equation *e = s->equation;
+    if (s->fraction || !(settings->pins_ahead > MAX_AHEAD * s->edge) || !drape_step_equation_pins_move(e))
+        return DRAPE_OK;
+    drape_step_equation_pull(e, s->trial, s->f);
+    memcpy(e->f, s->f, e->dofs * sizeof *e->f);
+    s->share = 0;
+    drape_status status = correct(s, settings);
+    if (!status && drape_all_finite(s->p, e->dofs))
+        memcpy(d, s->p, e->dofs * sizeof *d);
+    s->share = 1;
+    drape_step_equation_begin(e);
+    return status < 0 ? status : DRAPE_OK;
 }
 
 /* A guess that is shortened at some nodes has kinks, which become wrinkles that take many iterations to
@@ -320,28 +365,50 @@ static void return_to(drape_inexact_newton *s, const double *d)
     memcpy(e->g, s->g, e->nodes * sizeof *e->g);
 }
 
-/* p . (F(d + p) - F(d)) / p . A p for p = -A^-1 F, within its limits. */
-static double stiffness_share(drape_inexact_newton *s, const double *d)
+/* p . (F(d + p) - F(d)) / p . A p for p = -A^-1 F, within its limits. *adds: p may be added to d; on return,
+ * whether it was, because that leaves less residual. */
+static double stiffness_share(drape_inexact_newton *s, double *d, bool *adds)
 {
     drape_step_equation *e = s->equation;
-    const double start = drape_step_equation_dot(e, e->f, s->p);
+    const double start = drape_step_equation_dot(e, e->f, s->p),
+                 left = drape_step_equation_dot(e, e->f, e->f);
     double work;
     memcpy(s->f, e->f, e->dofs * sizeof *s->f);
     memcpy(s->g, e->g, e->nodes * sizeof *s->g);
-    const bool finite = drape_step_equation_try(e, d, 1, s->p, s->trial, &work);
-    return_to(s, d);
-    return finite && start < 0 ? fmin(fmax(1 - work / start, MIN_SHARE), MAX_SHARE) : 1;
+    const bool falls = drape_step_equation_try(e, d, 1, s->p, s->trial, &work) && start < 0;
+    *adds &= falls && fabs(work) <= -WORK_FRACTION * start && drape_step_equation_dot(e, e->f, e->f) < left;
+    if (*adds)
+        memcpy(d, s->trial, e->dofs * sizeof *d);
+    else
+        return_to(s, d);
+    const double share = falls ? 1 - work / start : 1;
+    s->nonlinear = share > MAX_SHARE;
+    return fmin(fmax(share, MIN_SHARE), MAX_SHARE);
 }
 
 /* The estimated distance from d to the solution. F was evaluated last at d, as it is on return. corrected:
- * there is a matrix of this solve. Overwrites p. */
-static double estimate_error(drape_inexact_newton *s, const double *d, bool corrected)
+ * there is a matrix of this solve. Overwrites p.
+ *
+ * With contact, where returning to d would take another evaluation, p is added to d if it can be: that alone
+ * brought cloth on balls a fifth nearer at the same cost. Without contact it gained nothing. */
+static double estimate_error(drape_inexact_newton *s, double *d, bool corrected)
 {
     drape_step_equation *e = s->equation;
-    const double inertial = inertial_error(e);
+    double inertial = inertial_error(e), share = 1;
+    s->nonlinear = false;
     if (!corrected || !(inertial > 0) || solve(s, ESTIMATE_TOLERANCE, ESTIMATE_ITERATIONS))
         return inertial;
-    const double along = rms(e, s->p) / (s->factored ? stiffness_share(s, d) : 1);
+    double along = rms(e, s->p);
+    if (s->factored) {
+        bool adds = s->fraction;
+        make_correction_feasible(s);
+        share = stiffness_share(s, d, &adds);
+        if (adds && !solve(s, ESTIMATE_TOLERANCE, ESTIMATE_ITERATIONS)) {
+            along = rms(e, s->p);
+            inertial = inertial_error(e);
+        }
+    }
+    along /= share;
     const double power = s->fraction ? INERTIAL_CONTACT : INERTIAL;
     return along > 0 && along < inertial ? along * drape_pow(inertial / along, power) : inertial;
 }
@@ -364,56 +431,123 @@ static bool has_time(const drape_inexact_settings *settings, double seconds)
     return settings->deadline == INFINITY || drape_clock_seconds() + seconds <= settings->deadline;
 }
 
+/* Of one solve. */
+typedef struct progress {
+    int iteration;
+    double start, bound; /* |F|^2 of the guess, and what it must fall below */
+    double first, last;  /* [m] RMS of the first and of the last correction */
+    double ratio;        /* of the last one to the one before */
+    double seconds;      /* of the last iteration */
+} progress;
+
+/* Without contact, factors leave so little that the error alone tells whether to go on. */
+static bool goes_by_error(const drape_inexact_newton *s)
+{
+    return s->factored && !s->fraction;
+}
+
+/* Whether so little is left that the error is worth an estimate. */
+static bool has_fallen(const drape_inexact_newton *s, const drape_inexact_settings *settings,
+                       const progress *p, double left)
+{
+    if (p->iteration < settings->iterations)
+        return false;
+    if (goes_by_error(s))
+        return p->iteration == 1 || fmin(1, p->ratio) * p->last < FAR_ABOVE * settings->error;
+    return left < p->bound && (!s->factored || inertial_error(s->equation) <= MAX_DRIFT * s->edge);
+}
+
+static bool is_quiet(const drape_inexact_newton *s, double error)
+{
+    const drape_step_equation *e = s->equation;
+    return !goes_by_error(s) || sqrt(error * inertial_error(e)) <= MAX_JUMP * e->model->length;
+}
+
+static void measure_contraction(drape_inexact_newton *s, double error, double first)
+{
+    if (first > 0)
+        s->first = (contraction){error / first, first, s->equation->mass_weight, 0};
+}
+
+/* The error after the first correction by the contraction of an earlier step, as Hairer & Wanner 1996,
+ * section IV.8, end iterations after the first; INFINITY if that is not known well enough. A longer
+ * correction is expected to converge more slowly in proportion. */
+static double expected_error(const drape_inexact_newton *s, const progress *p)
+{
+    const contraction *c = &s->first;
+    if (p->iteration != 1 || s->fraction || !(c->share > 0) || c->steps >= MAX_STEPS)
+        return INFINITY;
+    return c->share * p->first * fmax(1, p->first / c->along);
+}
+
 static drape_status iterate(drape_inexact_newton *s, const drape_inexact_settings *settings, double *d,
                             drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
     begin(s, settings->follows);
+    drape_status status = guess_linearized(s, settings, d);
+    if (status) {
+        report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
+        return status;
+    }
     make_guess_feasible(s, settings->iterations, d);
     if (!drape_step_equation_evaluate(e, d))
         return DRAPE_RETRY_NONFINITE;
     const double fall = s->fraction || s->factored ? MAX_LEFT : 1;
-    const double first = drape_step_equation_dot(e, e->f, e->f), bound = fall * fall * first;
-    double seconds = 0; /* of the last iteration */
-    double begun = 0;   /* [m] RMS of the first correction, as an estimate of the error of the guess */
-    for (int i = 0;; i++) {
-        const bool least = i >= settings->iterations,
-                   most = i >= settings->iterations + settings->rescue_iterations ||
+    progress p = {.start = drape_step_equation_dot(e, e->f, e->f)};
+    p.bound = fall * fall * p.start;
+    for (;; p.iteration++) {
+        const bool least = p.iteration >= settings->iterations,
+                   most = p.iteration >= settings->iterations + settings->rescue_iterations ||
                           (least && !has_time(settings, 0));
         const double left = drape_step_equation_dot(e, e->f, e->f);
-        report->iterations = i;
+        report->iterations = p.iteration;
         bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;
         report->reason = drape_reason_name(converged ? DRAPE_REASON_CONVERGED : DRAPE_REASON_ITERATIONS);
-        converged |= least && left >= bound && is_rounding(e, d, report);
-        const bool quiet = !s->factored || inertial_error(e) <= MAX_DRIFT * s->edge;
-        const bool fell = converged || (least && left < bound && quiet);
+        converged |= least && left >= p.bound && is_rounding(e, d, report);
+        const bool fell = converged || has_fallen(s, settings, &p, left);
+        const double expected = expected_error(s, &p);
+        if (fell && expected <= MAX_EXPECTED * settings->error && is_quiet(s, expected)) {
+            report->error = expected;
+            s->first.steps++;
+            return DRAPE_OK;
+        }
         if (fell || most)
-            report->error = estimate_error(s, d, i > 0);
+            report->error = estimate_error(s, d, p.iteration > 0);
+        if (p.iteration == 1 && fell)
+            measure_contraction(s, report->error, p.first);
         const bool lost = report->error > e->model->length; /* nowhere near the solution */
-        if (converged ||
-            (fell && !lost && (most || report->error <= settings->error || !has_time(settings, seconds))))
+        const bool measures = s->nonlinear && p.iteration == 1 && goes_by_error(s);
+        const bool ends =
+            most || (report->error <= settings->error && !measures) || !has_time(settings, p.seconds);
+        if (converged || (fell && !lost && ends && is_quiet(s, report->error)))
             return DRAPE_OK;
         if (most) {
-            if (!lost && (left < first || report->error < begun))
+            if (!lost && (left < p.start || report->error < p.first))
                 return DRAPE_OK;
             report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
             return DRAPE_RETRY_NONLINEAR;
         }
         const double start = drape_clock_seconds();
-        drape_status status = correct(s, settings);
+        status = correct(s, settings);
         if (status) {
             report->reason = drape_reason_name(status < 0 ? DRAPE_REASON_MEMORY : DRAPE_REASON_SINGULAR);
             return status;
         }
-        if (i == 0)
-            begun = rms(e, s->p);
+        const double now = rms(e, s->p);
+        if (p.iteration == 0)
+            p.first = now;
+        if (p.iteration == 1)
+            measure_contraction(s, now, p.first);
+        p.ratio = p.iteration > 0 ? now / p.last : 1;
+        p.last = now;
         drape_step_equation_predict_contact(e, s->p);
         make_correction_feasible(s);
-        predict_stress(s, i < MAX_PREDICTION);
+        predict_stress(s, p.iteration < MAX_PREDICTION);
         if (!advance(s, d))
             return DRAPE_RETRY_NONFINITE;
-        seconds = drape_clock_seconds() - start;
-        report->further_seconds += fell ? seconds : 0;
+        p.seconds = drape_clock_seconds() - start;
+        report->further_seconds += fell ? p.seconds : 0;
         e->work.newton_iterations++;
     }
 }
@@ -438,6 +572,10 @@ void drape_inexact_newton_archive(drape_inexact_newton *s, drape_archive *a)
 {
     drape_archive_mark(a, "inexact newton");
     drape_work_archive(&s->equation->work, a);
+    drape_archive_double(a, &s->first.share);
+    drape_archive_double(a, &s->first.along);
+    drape_archive_double(a, &s->first.mass_weight);
+    drape_archive_int32(a, &s->first.steps);
     if (s->approximate)
         drape_approx_jacobian_archive(s->approximate, a);
     if (!s->factored)

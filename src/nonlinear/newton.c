@@ -80,7 +80,6 @@
 #define STALLED               0.5 /* of the residual before: if no more is gained, it may be rounding */
 /* Times the last estimate in a solve: a larger residual is not compared with a new one */
 #define FAR_FROM_ROUNDING 1e3
-#define PROBED            1e-6 /* of the displacement of pins: their pull is a difference over that much */
 
 struct drape_newton {
     drape_step_equation *equation;
@@ -303,31 +302,10 @@ static int factor(SUNLinearSolver solver, SUNMatrix matrix)
 static bool linearizes(const drape_newton *s)
 {
     const drape_step_equation *e = s->equation;
-    const drape_motion *motion = drape_system_motion(e->system);
-    if (!e->pins_pull || !s->searches || s->fraction || !e->x_start ||
-        s->values[DRAPE_NEWTON_METHOD] != DRAPE_NEWTON_METHOD_EXACT ||
-        s->values[DRAPE_NEWTON_PREDICTOR] != DRAPE_NEWTON_PREDICTOR_INERTIAL)
-        return false;
-    for (int32_t i = 0; i < motion->moved_count; i++) {
-        const size_t at = 3 * (size_t)motion->moved_node[i];
-        if (memcmp(e->x_base + at, e->x_start + at, 3 * sizeof *e->x_base) != 0)
-            return true;
-    }
-    return false;
-}
-
-/* F at d = 0 with the pins where a share of their displacement takes them. */
-static void evaluate_with_pins(drape_newton *s, double share)
-{
-    drape_step_equation *e = s->equation;
-    const drape_motion *motion = drape_system_motion(e->system);
-    for (int32_t i = 0; i < motion->moved_count; i++)
-        for (size_t k = 0; k < 3; k++) {
-            const size_t at = 3 * (size_t)motion->moved_node[i] + k;
-            e->x[at] = e->x_start[at] + share * (e->x_base[at] - e->x_start[at]);
-            e->v[at] = share * e->v_base[at];
-        }
-    drape_step_equation_evaluate(e, s->trial);
+    return e->pins_pull && s->searches && !s->fraction && e->x_start &&
+           s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT &&
+           s->values[DRAPE_NEWTON_PREDICTOR] == DRAPE_NEWTON_PREDICTOR_INERTIAL &&
+           drape_step_equation_pins_move(e);
 }
 
 /* Where a pin takes a sheet along, nodes that keep their velocity stay behind. The elements at the pin are
@@ -340,13 +318,10 @@ static drape_status guess_linearized(drape_newton *s, double *d)
     drape_step_equation *e = s->equation;
     if (!linearizes(s))
         return DRAPE_OK;
-    memset(s->trial, 0, e->dofs * sizeof *s->trial);
     N_VSetArrayPointer(s->trial, s->unknown);
-    evaluate_with_pins(s, PROBED);
-    memcpy(s->chord, e->f, e->dofs * sizeof *s->chord);
-    evaluate_with_pins(s, 0);
+    drape_step_equation_pull(e, s->trial, s->chord);
     for (size_t i = 0; i < e->dofs; i++)
-        s->chord_minus_f[i] = -(e->f[i] + (s->chord[i] - e->f[i]) / PROBED);
+        s->chord_minus_f[i] = -s->chord[i];
     drape_status status = assemble(s, s->trial, 0);
     if (!status)
         status = factor(s->linear->solver, NULL);

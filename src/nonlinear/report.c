@@ -13,3 +13,18 @@ void drape_work_archive(drape_work *work, drape_archive *a)
     for (size_t i = 0; i < sizeof seconds / sizeof *seconds; i++)
         drape_archive_double(a, seconds[i]);
 }
+
+drape_work drape_work_sum(drape_work work, const drape_work *other)
+{
+    work.newton_iterations += other->newton_iterations;
+    work.jacobians += other->jacobians;
+    work.factorizations += other->factorizations;
+    work.linear_iterations += other->linear_iterations;
+    work.residuals += other->residuals;
+    work.residual_seconds += other->residual_seconds;
+    work.jacobian_seconds += other->jacobian_seconds;
+    work.factor_seconds += other->factor_seconds;
+    work.solve_seconds += other->solve_seconds;
+    work.contact_seconds += other->contact_seconds;
+    return work;
+}

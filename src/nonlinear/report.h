@@ -27,6 +27,9 @@ typedef struct drape_work {
     double residual_seconds, jacobian_seconds, factor_seconds, solve_seconds, contact_seconds;
 } drape_work;
 
+/* The counts and times of both, and the equilibrium of `work`. */
+drape_work drape_work_sum(drape_work work, const drape_work *other);
+
 void drape_work_archive(drape_work *work, drape_archive *a);
 
 #endif

@@ -7,7 +7,8 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_PASSES 3 /* of shortening a displacement at nodes */
+#define MAX_PASSES 3    /* of shortening a displacement at nodes */
+#define PROBED     1e-6 /* of the displacement of pins: their pull is a difference over that much */
 
 drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, drape_step_equation *s)
 {
@@ -123,6 +124,42 @@ void drape_step_equation_predict_contact(drape_step_equation *s, const double *p
     for (size_t i = 0; p && i < s->dofs; i++)
         s->x_ahead[drape_step_equation_at(s, i)] = p[i];
     drape_system_predict_contact(s->system, p ? s->x_ahead : NULL, s->point.weight, s->mass_weight);
+}
+
+/* ---- Pins that move ---- */
+
+bool drape_step_equation_pins_move(const drape_step_equation *s)
+{
+    const drape_motion *motion = drape_system_motion(s->system);
+    for (int32_t i = 0; i < motion->moved_count; i++) {
+        const size_t at = 3 * (size_t)motion->moved_node[i];
+        if (memcmp(s->x_base + at, s->x_start + at, 3 * sizeof *s->x_base) != 0)
+            return true;
+    }
+    return false;
+}
+
+/* F at d = 0 with the pins where a share of their displacement takes them. */
+static void evaluate_with_pins(drape_step_equation *s, const double *zero, double share)
+{
+    const drape_motion *motion = drape_system_motion(s->system);
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            const size_t at = 3 * (size_t)motion->moved_node[i] + k;
+            s->x[at] = s->x_start[at] + share * (s->x_base[at] - s->x_start[at]);
+            s->v[at] = share * s->v_base[at];
+        }
+    drape_step_equation_evaluate(s, zero);
+}
+
+void drape_step_equation_pull(drape_step_equation *s, double *zero, double *f)
+{
+    memset(zero, 0, s->dofs * sizeof *zero);
+    evaluate_with_pins(s, zero, PROBED);
+    memcpy(f, s->f, s->dofs * sizeof *f);
+    evaluate_with_pins(s, zero, 0);
+    for (size_t i = 0; i < s->dofs; i++)
+        f[i] = s->f[i] + (f[i] - s->f[i]) / PROBED;
 }
 
 typedef struct norms {

@@ -94,6 +94,14 @@ bool drape_step_equation_shorten_nodes(drape_step_equation *equation, double *p,
  * Jacobians (drape_contact_predict); NULL: forgets them. */
 void drape_step_equation_predict_contact(drape_step_equation *equation, const double *p);
 
+/* Whether a track or a path moves a pin in this step. */
+bool drape_step_equation_pins_move(const drape_step_equation *equation);
+
+/* Moves to the start of the step, pins too, and sets f (free DOFs) to F there plus its derivative by the
+ * positions of pins times their displacement, a difference: then -J^-1 f is the displacement that the
+ * linearized equation gives. zero (free DOFs) becomes 0. */
+void drape_step_equation_pull(drape_step_equation *equation, double *zero, double *f);
+
 /* The weighted norm of F. */
 double drape_step_equation_norm(const drape_step_equation *equation, drape_norm norm);
 

@@ -48,15 +48,28 @@ static double kinetic(const drape_model *model, const double *v)
 }
 
 /* The energy of a state, given the internal variables of the state before it and the work so far. */
+static drape_energy measure_at(const drape_sim *sim, const drape_point *point)
+{
+    drape_energy e = {.kinetic = kinetic(sim->model, point->v)};
+    drape_system_energy(sim->system, point, &e.elastic, &e.gravity);
+    e.contact = drape_system_contact_energy(sim->system, point);
+    return e;
+}
+
 static drape_energy measure(const drape_sim *sim, const drape_state *state, const double *internal,
                             double dissipated, double pin_work)
 {
-    drape_energy e = {.kinetic = kinetic(sim->model, state->v), .dissipated = dissipated};
-    const drape_point point = {.x = state->x, .v = state->v, .internal = internal, .t = state->t};
-    drape_system_energy(sim->system, &point, &e.elastic, &e.gravity);
-    e.contact = drape_system_contact_energy(sim->system, &point);
+    drape_energy e =
+        measure_at(sim, &(drape_point){.x = state->x, .v = state->v, .internal = internal, .t = state->t});
+    e.dissipated = dissipated;
     e.numerical = sim->audit.start + pin_work - dissipated - (e.kinetic + e.elastic + e.gravity + e.contact);
     return e;
+}
+
+drape_energy drape_sim_energy_of(const drape_sim *sim, double t, const double *x, const double *v)
+{
+    return measure_at(sim,
+                      &(drape_point){.x = x, .v = v, .internal = drape_sim_state(sim)->internal, .t = t});
 }
 
 drape_energy drape_sim_energy(drape_sim *sim)

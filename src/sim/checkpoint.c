@@ -46,8 +46,9 @@ static void archive_states(drape_sim *sim, drape_archive *a)
     int *const places[] = {&sim->now, &sim->next, &sim->before, &sim->past[0], &sim->past[1]};
     drape_archive_mark(a, "states");
     for (int i = 0; i < 5; i++) {
+        const bool kept = i < 3 || i - 3 < sim->chosen.controller->history_depth;
         drape_archive_int(a, places[i]);
-        if (drape_archive_good(a) && !is_place(*places[i], i < 2 ? 0 : -1, count))
+        if (drape_archive_good(a) && !is_place(*places[i], i < 2 ? 0 : -1, kept ? count : 0))
             drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a state %d of %d", *places[i], count);
     }
     if (drape_archive_good(a) &&
@@ -64,14 +65,15 @@ static void archive_states(drape_sim *sim, drape_archive *a)
 static bool is_schedule(const drape_schedule *s)
 {
     return s->level >= 0 && s->level <= MAX_LEVELS && s->part >= 0 && s->part < (int64_t)1 << s->level &&
-           s->count >= 0 && !(s->dt < 0) && !isnan(s->dt);
+           s->count >= 0 && !(s->dt < 0) && !isnan(s->dt) &&
+           (!s->cut || (isfinite(s->cut_end) && s->cut_end > s->now));
 }
 
 static void archive_schedule(drape_schedule *s, drape_archive *a)
 {
     double *const times[] = {
-        &s->end,          &s->now,          &s->dt, &s->limit, &s->tried, &s->start, &s->interval_start,
-        &s->interval_end, &s->interval_size};
+        &s->end,          &s->now,           &s->dt,     &s->limit, &s->tried, &s->start, &s->interval_start,
+        &s->interval_end, &s->interval_size, &s->cut_end};
     drape_archive_mark(a, "schedule");
     for (size_t i = 0; i < sizeof times / sizeof *times; i++)
         drape_archive_double(a, times[i]);
@@ -80,6 +82,7 @@ static void archive_schedule(drape_schedule *s, drape_archive *a)
     drape_archive_int64(a, &s->part);
     drape_archive_bool(a, &s->stepped);
     drape_archive_bool(a, &s->anew);
+    drape_archive_bool(a, &s->cut);
     if (drape_archive_good(a) && !is_schedule(s))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step that could come next");
 }
@@ -159,6 +162,14 @@ static void archive_statistics(drape_sim *sim, drape_archive *a)
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no frame that could come next");
 }
 
+/* What was logged before a sim was saved is not logged again. */
+static void archive_relaxed_logged(drape_sim *sim, drape_archive *a)
+{
+    drape_archive_mark(a, "logged");
+    for (int32_t i = 0; i <= sim->model->collider_count; i++)
+        drape_archive_bool(a, &sim->relaxed_logged[i]);
+}
+
 static void archive_realtime(drape_sim *sim, drape_archive *a)
 {
     drape_realtime_memory *m = &sim->realtime;
@@ -182,14 +193,28 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
         sim->chosen.integrator->set_effort(sim->integrator, m->effort);
 }
 
+/* Read by create_restored. */
+static void write_released(drape_sim *sim, drape_archive *a)
+{
+    bool any = sim->released != NULL;
+    drape_archive_bool(a, &any);
+    if (any)
+        drape_archive_bytes(a, sim->released, (size_t)sim->model->node_count);
+}
+
 void drape_sim_archive(drape_sim *sim, drape_archive *a)
 {
+    if (!a->reading)
+        write_released(sim, a);
+    drape_work_archive(&sim->earlier, a);
     archive_states(sim, a);
     drape_archive_doubles(a, sim->scratch, sizeof sim->scratch / sizeof *sim->scratch);
     archive_schedule(&sim->schedule, a);
     archive_audit(sim, a);
     archive_statistics(sim, a);
+    archive_relaxed_logged(sim, a);
     archive_realtime(sim, a);
+    drape_events_archive(sim, a);
     drape_system_archive(sim->system, a);
     drape_archive_mark(a, "integrator");
     if (drape_archive_good(a))
@@ -198,10 +223,7 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
 
 /* ---- For hosts ---- */
 
-/* Exchanges the contents of two sims, except what belongs to the host and stays with `sim`: observers, the
- * cancel flag, the wind. Afterwards `other` has the former contents of `sim` and is only fit to be
- * destroyed. */
-static void exchange(drape_sim *sim, drape_sim *other)
+void drape_sim_exchange(drape_sim *sim, drape_sim *other)
 {
     drape_sim former;
     const size_t size = offsetof(drape_sim, cancel);
@@ -213,16 +235,36 @@ static void exchange(drape_sim *sim, drape_sim *other)
     drape_system_copy_wind(sim->system, other->system);
 }
 
+/* A new sim without the pins that had been released when the archive was written. */
+static drape_status create_restored(drape_sim *sim, drape_archive *a, drape_sim **out)
+{
+    const size_t nodes = (size_t)sim->model->node_count;
+    bool any = false, pinned = true;
+    drape_archive_bool(a, &any);
+    uint8_t *released = any && drape_archive_good(a) ? drape_alloc(sim->ctx, nodes, 1) : NULL;
+    if (any && !released)
+        drape_archive_note(a, DRAPE_E_MEMORY);
+    if (released)
+        drape_archive_bytes(a, released, nodes);
+    for (size_t i = 0; released && i < nodes; i++)
+        pinned = pinned && released[i] <= drape_sim_base_model(sim)->pinned[i];
+    if (drape_archive_good(a) && !pinned)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint releases a node that is not pinned");
+    const drape_status status = drape_archive_good(a) ? drape_sim_create_like(sim, released, out) : a->status;
+    drape_free(sim->ctx, released);
+    return status;
+}
+
 drape_status drape_sim_read(drape_sim *sim, drape_archive *a)
 {
     drape_sim *restored = NULL;
     drape_sim_archive_identity(sim, a);
     if (drape_archive_good(a))
-        drape_archive_note(a, drape_sim_create_like(sim, &restored));
+        drape_archive_note(a, create_restored(sim, a, &restored));
     if (drape_archive_good(a))
         drape_sim_archive(restored, a);
     if (drape_archive_good(a))
-        exchange(sim, restored);
+        drape_sim_exchange(sim, restored);
     drape_sim_destroy(&restored);
     return a->status;
 }

@@ -1,7 +1,6 @@
 /*
  * frames.c: frame times are k / frame_rate. No step is shortened for a frame: between the states of a
- * step, positions are the cubic Hermite interpolant of positions and velocities, of fourth order in h for
- * smooth motion.
+ * step, it shows dense output.
  *
  * A frame is written only if its positions, and the straight path to them from the state before the step,
  * pass the check that steps pass, with the colliders where they are at the time of the frame. If the
@@ -12,41 +11,17 @@
  * fail, the frame is the state at the end of the step, at its own time, and so are the other frames of
  * this step.
  */
-#include "sim/sim.h"
+#include "sim/dense.h"
 
 #include <math.h>
-#include <string.h>
 
 #define SAME_TIME 1e-9 /* of the step: a frame nearer than this to a state shows that state */
 #define PARTS     16   /* of the line between two states, on which free positions are searched */
-
-static void hermite(const drape_state *a, const drape_state *b, double t, size_t n, double *x)
-{
-    double h = b->t - a->t, s = (t - a->t) / h;
-    double h00 = (1 + 2 * s) * (1 - s) * (1 - s), h10 = s * (1 - s) * (1 - s);
-    double h01 = s * s * (3 - 2 * s), h11 = s * s * (s - 1);
-    for (size_t i = 0; i < n; i++)
-        x[i] = h00 * a->x[i] + h10 * h * a->v[i] + h01 * b->x[i] + h11 * h * b->v[i];
-}
 
 static void straight(const drape_state *a, const drape_state *b, double share, size_t n, double *x)
 {
     for (size_t i = 0; i < n; i++)
         x[i] = (1 - share) * a->x[i] + share * b->x[i];
-}
-
-/* Interpolates into sim->frame, by the integrator's own dense output if it has one. */
-static void interpolate(drape_sim *sim, const drape_state *before, double t)
-{
-    const drape_state *now = drape_sim_state(sim);
-    size_t n = 3 * (size_t)sim->model->node_count;
-    if (sim->chosen.integrator->interpolate) {
-        memcpy(sim->frame, now->x, n * sizeof *sim->frame);
-        sim->chosen.integrator->interpolate(sim->integrator, t, sim->frame);
-        return;
-    }
-    hermite(before, now, t, n, sim->frame);
-    drape_motion_place_pins(drape_system_motion(sim->system), t, sim->frame);
 }
 
 /* Checks contact in sim->frame. Contact still compares with the state before, in which the last step
@@ -64,7 +39,7 @@ static drape_status make_frame(drape_sim *sim, const drape_state *before, double
     const drape_state *now = drape_sim_state(sim);
     const size_t n = 3 * (size_t)sim->model->node_count;
     const double share = (t - before->t) / (now->t - before->t);
-    interpolate(sim, before, t);
+    drape_sim_dense_positions(sim, before, now, t, sim->frame);
     drape_status status = check(sim, t);
     for (int i = 0; status > 0 && i <= 2 * PARTS; i++) {
         const double shift = (double)((i + 1) / 2) / PARTS;
@@ -72,16 +47,6 @@ static drape_status make_frame(drape_sim *sim, const drape_state *before, double
         status = check(sim, t);
     }
     return status;
-}
-
-/* Interpolates into sim->frame_velocity. This is not the slope of the interpolated positions, which would
- * contain the overshoot of steps. */
-static void mix_velocities(drape_sim *sim, const drape_state *before, double t)
-{
-    const drape_state *now = drape_sim_state(sim);
-    double s = (t - before->t) / (now->t - before->t);
-    for (size_t i = 0; i < 3 * (size_t)sim->model->node_count; i++)
-        sim->frame_velocity[i] = (1 - s) * before->v[i] + s * now->v[i];
 }
 
 static drape_status emit(drape_sim *sim, double time, const double *x, const double *v)
@@ -106,7 +71,7 @@ static drape_status emit_between(drape_sim *sim, const drape_state *before, doub
         return status;
     if (*late)
         return emit(sim, now->t, now->x, now->v);
-    mix_velocities(sim, before, time);
+    drape_sim_dense_velocities(sim, before, now, time, sim->frame_velocity);
     return emit(sim, time, sim->frame, sim->frame_velocity);
 }
 

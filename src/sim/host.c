@@ -162,6 +162,15 @@ static drape_status read_status(const drape_sim *sim)
     return status == DRAPE_E_STOPPED ? DRAPE_OK : status;
 }
 
+drape_status drape_sim_reactions_at(drape_sim *sim, const drape_point *point, double *forces)
+{
+    drape_system_force(sim->system, point, forces);
+    for (int32_t f = 0; f < sim->model->free_count; f++)
+        for (int k = 0; k < 3; k++)
+            forces[3 * (size_t)sim->model->node_of_free[f] + (size_t)k] = 0;
+    return read_status(sim);
+}
+
 drape_status drape_sim_reactions(drape_sim *sim, double *forces)
 {
     drape_point point;
@@ -173,11 +182,7 @@ drape_status drape_sim_reactions(drape_sim *sim, double *forces)
     status = place(sim, &point);
     if (status)
         return status;
-    drape_system_force(sim->system, &point, forces);
-    for (int32_t f = 0; f < sim->model->free_count; f++)
-        for (int k = 0; k < 3; k++)
-            forces[3 * (size_t)sim->model->node_of_free[f] + (size_t)k] = 0;
-    return read_status(sim);
+    return drape_sim_reactions_at(sim, &point, forces);
 }
 
 static drape_status check_has_contact(const drape_sim *sim, const char *function)

@@ -127,6 +127,15 @@ static uint64_t add_nodes(uint64_t hash, const drape_model *m)
     return add(hash, m->moved_track, (size_t)m->moved_count * sizeof *m->moved_track);
 }
 
+static uint64_t add_event(uint64_t hash, const drape_model_event *event)
+{
+    const int64_t sizes[] = {event->cloth, event->pinned_count, event->direction, event->action, event->once};
+    hash = add_text(hash, event->ops->entry.name);
+    hash = add(hash, sizes, sizeof sizes);
+    hash = add(hash, event->pinned, (size_t)event->pinned_count * sizeof *event->pinned);
+    return add_doubles(hash, event->values, DRAPE_MAX_PARAMS);
+}
+
 static uint64_t model_hash(const drape_model *m)
 {
     const int64_t sizes[] = {m->cloth_count, m->term_count,  m->node_count,     m->triangle_count,
@@ -139,6 +148,8 @@ static uint64_t model_hash(const drape_model *m)
         hash = add_term(hash, &m->terms[i]);
     for (int32_t i = 0; i < m->collider_count; i++)
         hash = add_collider(hash, &m->colliders[i]);
+    for (int32_t i = 0; i < m->event_count; i++)
+        hash = add_event(hash, &m->events[i]);
     return add_contact(add_doubles(hash, m->gravity, 3), &m->contact);
 }
 
@@ -209,7 +220,7 @@ static void archive_hash(drape_archive *a, const char *what, uint64_t hash)
 
 void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
 {
-    const drape_model *m = sim->model;
+    const drape_model *m = drape_sim_base_model(sim);
     if (!sim->identity_known) {
         sim->model_hash = model_hash(m);
         sim->choices_hash = choices_hash(sim);

@@ -1,21 +1,24 @@
 /*
  * place.c: cloth with its pins, and colliders, as a host places them elsewhere by a rigid motion. Nothing is
- * strained by it, so nothing is left to calm down. The new state is built in the one that the next attempt
- * would overwrite, so that a refused placement changes nothing.
+ * strained by it, so nothing is left to calm down. All is checked before anything changes. The new state is
+ * built in the one that the next attempt would overwrite.
  */
 #include "sim/place.h"
+
+#include "base/def.h"
 #include "mesh/mesh.h"
 
 #include <math.h>
 #include <string.h>
 
 #define MAX_DISTANCE 1e9 /* [m] the limit of a track's keys */
+/* The def has had these members since its first version. */
+#define MIN_SIZE sizeof(drape_place_def)
 
 void drape_place_def_init(drape_place_def *def, size_t struct_size)
 {
     const drape_place_def defaults = {.struct_size = struct_size, .cloth_count = -1, .collider_count = -1};
-    memset(def, 0, struct_size);
-    memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 /* ---- What is placed ---- */
@@ -86,8 +89,9 @@ static drape_status check_colliders(const drape_sim *sim, const drape_place_list
             continue;
         if (!place_displacement(sim, c, by, &own))
             return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                              "drape_sim_place: %s is a %s, which cannot turn; only spheres, and planes, "
-                              "capsules and cylinders about their axis, look the same afterwards",
+                              "drape_sim_place: %s is a %s that would not look the same after this rotation, "
+                              "and colliders do not turn: spheres may be turned by any, planes, capsules and "
+                              "cylinders about their axes, boxes by quarter turns that keep their sizes",
                               collider->name, collider->ops->entry.name);
         drape_motion_collider(drape_system_motion(sim->system), c, drape_sim_state(sim)->t, at);
         drape_placement_move(&own, at, at);
@@ -98,10 +102,36 @@ static drape_status check_colliders(const drape_sim *sim, const drape_place_list
     return DRAPE_OK;
 }
 
+static drape_status check_nodes(const drape_sim *sim, const drape_place_list *cloths,
+                                const drape_placement *by)
+{
+    const drape_model *m = sim->model;
+    const double *now = drape_sim_state(sim)->x;
+    for (int32_t c = 0; c < m->cloth_count; c++) {
+        const drape_cloth *cloth = &m->cloths[c];
+        for (int32_t i = 0; has(cloths, c) && i < cloth->mesh.node_count; i++) {
+            double x[3];
+            drape_placement_move(by, now + 3 * (size_t)(cloth->first_node + i), x);
+            if (is_far(x))
+                return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                                  "drape_sim_place: node %d of %s would be beyond %g m", (int)i, cloth->name,
+                                  MAX_DISTANCE);
+        }
+    }
+    return DRAPE_OK;
+}
+
+drape_status drape_sim_check_place(const drape_sim *sim, const drape_place_list *cloths,
+                                   const drape_place_list *colliders, const drape_placement *by)
+{
+    const drape_status status = check_colliders(sim, colliders, by);
+    return status ? status : check_nodes(sim, cloths, by);
+}
+
 /* ---- Placing ---- */
 
-static drape_status place_nodes(const drape_sim *sim, const drape_place_list *cloths,
-                                const drape_placement *by, bool stop, drape_state *to)
+static void place_nodes(const drape_sim *sim, const drape_place_list *cloths, const drape_placement *by,
+                        bool stop, drape_state *to)
 {
     const drape_model *m = sim->model;
     const drape_state *now = drape_sim_state(sim);
@@ -119,13 +149,8 @@ static drape_status place_nodes(const drape_sim *sim, const drape_place_list *cl
             drape_placement_turn(by, v, v);
             if (stop)
                 memset(v, 0, 3 * sizeof *v);
-            if (is_far(x))
-                return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                                  "drape_sim_place: node %d of %s would be beyond %g m", (int)i, cloth->name,
-                                  MAX_DISTANCE);
         }
     }
-    return DRAPE_OK;
 }
 
 /* A spring by which a host drags a node goes with it. */
@@ -158,18 +183,18 @@ static void forget_past(drape_sim *sim)
     sim->before = sim->past[0] = sim->past[1] = -1;
     memset(sim->scratch, 0, sizeof sim->scratch);
     sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+    drape_events_reset(sim);
 }
 
 drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloths,
                                    const drape_place_list *colliders, const drape_placement *by, bool stop)
 {
     drape_state *next = &sim->states[sim->next];
-    drape_status status = check_colliders(sim, colliders, by);
-    if (!status)
-        status = place_nodes(sim, cloths, by, stop, next);
+    const drape_status status = drape_sim_check_place(sim, cloths, colliders, by);
     if (status)
         return status;
     const drape_energy before = drape_sim_energy(sim);
+    place_nodes(sim, cloths, by, stop, next);
     place_drag_spring(sim, cloths, by);
     place_motion(sim, cloths, colliders, by);
     sim->next = sim->now;
@@ -186,7 +211,7 @@ static drape_status read_def(const drape_sim *sim, const drape_place_def *given,
     drape_place_def_init(def, sizeof *def);
     if (!given)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_place: the def is NULL");
-    if (given->struct_size == 0 || given->struct_size > sizeof *def)
+    if (!drape_def_fits(given->struct_size, MIN_SIZE, sizeof *def))
         return drape_fail(
             sim->ctx, DRAPE_E_VERSION,
             "the place def was not initialised by drape_place_def_init of this version: struct_size %zu",

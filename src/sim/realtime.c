@@ -146,11 +146,15 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
 {
     const double deadline = begun + budget;
     drape_status status = drape_sim_emit_frames(sim);
+    if (!status)
+        status = drape_events_resume(sim);
     double t1, h;
     drape_attempt attempt = {.reason = ""};
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
         double start = drape_clock_seconds();
-        if (report->attempts > 0 && start + expected(sim, sim->realtime.effort) > deadline)
+        /* a step that is to end at an event ends there in this call: the next one would begin anew */
+        if (report->attempts > 0 && !sim->schedule.cut &&
+            start + expected(sim, sim->realtime.effort) > deadline)
             break;
         status = drape_sim_check_attempts(sim, &attempt);
         if (!status)
@@ -162,7 +166,7 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
         learn(sim, drape_clock_seconds() - start - sim->further_seconds);
         report->attempts++;
         report->rejected += !attempt.accepted;
-        if (!attempt.accepted)
+        if (!attempt.accepted && !sim->schedule.cut)
             sim->realtime.cap = fmin(sim->realtime.cap, attempt.h / 2);
         report->h = attempt.accepted ? fmax(report->h, attempt.h) : report->h;
         report->residual = attempt.accepted ? fmax(report->residual, attempt.residual) : report->residual;

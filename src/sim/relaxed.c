@@ -52,19 +52,19 @@ int32_t drape_sim_relaxed_now(const drape_sim *sim, double *deepest)
     return set ? set->count : 0;
 }
 
+/* With the times of the summary: nodes are relaxed, and held again, at the beginning of a step. */
 static void log_collider(drape_sim *sim, int32_t collider, bool relaxed)
 {
     const drape_relaxed_total *total = drape_sim_relaxed_total(sim, collider);
-    const double t = drape_sim_state(sim)->t;
     const char *name = drape_sim_relaxed_name(sim, collider);
     if (relaxed)
-        drape_log(sim->ctx, DRAPE_LOG_WARNING, "t=%.9g: no room for the cloth at %s: it is relaxed there", t,
-                  name);
+        drape_log(sim->ctx, DRAPE_LOG_WARNING, "t=%.9g: no room for the cloth at %s: it is relaxed there",
+                  drape_relaxed_since(set_of(sim), collider), name);
     else
         drape_log(
             sim->ctx, DRAPE_LOG_INFO,
-            "t=%.9g: the cloth at %s has room again; it was relaxed for %.4g s so far, up to %.4g m deep", t,
-            name, total->seconds, total->deepest);
+            "t=%.9g: the cloth at %s has room again; it was relaxed for %.4g s so far, up to %.4g m deep",
+            total->last, name, total->seconds, total->deepest);
 }
 
 void drape_sim_log_relaxed(drape_sim *sim)

@@ -17,10 +17,11 @@ void drape_schedule_init(drape_schedule *s, drape_stepping stepping, double dt, 
 
 void drape_schedule_aim(drape_schedule *s, double end)
 {
-    if (s->part > 0 && end != s->end) {
+    if ((s->part > 0 || s->cut) && end != s->end) {
         s->start = s->now;
         s->count = 0;
         s->part = 0;
+        s->cut = false;
     }
     s->end = end;
     s->tries = 0;
@@ -65,8 +66,8 @@ static void open_interval(drape_schedule *s)
 
 static bool next_free(const drape_schedule *s, double *t1, double *h)
 {
-    *t1 = s->end;
-    *h = fmin(s->end - s->now, s->limit);
+    *t1 = s->cut ? s->cut_end : s->end;
+    *h = fmin(*t1 - s->now, s->limit);
     return s->end - s->now > ROUNDING * fabs(s->end);
 }
 
@@ -74,15 +75,16 @@ static bool next_free(const drape_schedule *s, double *t1, double *h)
  * tiny step is left over. */
 static bool next_proposed(const drape_schedule *s, double *t1, double *h)
 {
-    double left = s->end - s->now;
+    const double end = s->cut ? s->cut_end : s->end;
+    double left = end - s->now;
     *h = s->limit >= (1 - JOIN) * left ? left : 2 * s->limit > left ? left / 2 : s->limit;
-    *t1 = *h == left ? s->end : s->now + *h;
-    return left > ROUNDING * fabs(s->end);
+    *t1 = *h == left ? end : s->now + *h;
+    return s->end - s->now > ROUNDING * fabs(s->end);
 }
 
 static bool next_counted(drape_schedule *s, double *t1, double *h)
 {
-    if (s->part == 0) {
+    if (s->part == 0 && !s->cut) {
         double left = s->end - interval_time(s, s->count);
         double least =
             /* before the first step there is none to join */
@@ -123,6 +125,7 @@ static void close_interval(drape_schedule *s)
 {
     s->part = 0;
     s->count++;
+    s->cut = false;
     if (s->anew) {
         s->start = s->interval_end;
         s->count = 0;
@@ -154,6 +157,23 @@ void drape_schedule_accept(drape_schedule *s, double t1, double h_next)
     s->limit = s->stepping == DRAPE_STEPS_PROPOSED ? h_next : INFINITY;
     if (s->stepping == DRAPE_STEPS_COUNTED)
         accept_part(s);
+    else if (t1 >= s->cut_end)
+        s->cut = false;
+}
+
+void drape_schedule_cut(drape_schedule *s, double end)
+{
+    s->tries++;
+    s->cut = true;
+    s->cut_end = end;
+    if (s->stepping != DRAPE_STEPS_COUNTED)
+        return;
+    s->level = 0;
+    s->part = 0;
+    s->anew = true;
+    s->interval_start = s->now;
+    s->interval_end = end;
+    s->interval_size = end - s->now;
 }
 
 void drape_schedule_repeat(drape_schedule *s)

@@ -31,8 +31,10 @@ typedef struct drape_schedule {
     int level;     /* the interval has 2^level parts */
     int64_t part;  /* completed parts of the interval */
     double interval_start, interval_end, interval_size;
-    bool stepped; /* a step was accepted, to which a remainder can be joined */
-    bool anew;    /* the interval does not end at a counted time, so counting restarts at its end */
+    bool stepped;   /* a step was accepted, to which a remainder can be joined */
+    bool anew;      /* the interval does not end at a counted time, so counting restarts at its end */
+    bool cut;       /* the next steps end at cut_end, and an interval that is cut ends there */
+    double cut_end; /* [s] */
     /* Attempts within one dt. They belong to one advance: the next one starts from 0, and checkpoints do
      * not contain them. */
     int64_t tries;
@@ -41,8 +43,8 @@ typedef struct drape_schedule {
 
 void drape_schedule_init(drape_schedule *schedule, drape_stepping stepping, double dt, double start);
 
-/* Sets the end of an advance. A partly completed interval is continued if the end is the same; otherwise it
- * is abandoned, and counting restarts at the present time. */
+/* Sets the end of an advance. A partly completed or cut interval is continued if the end is the same;
+ * otherwise it is abandoned, and counting restarts at the present time. */
 void drape_schedule_aim(drape_schedule *schedule, double end);
 
 /* The next step: its end and its size. False if the end is reached. */
@@ -56,6 +58,10 @@ void drape_schedule_accept(drape_schedule *schedule, double t1, double h_next);
  * not smaller than the rejected step. So a step is never retried at the same size, whatever a controller
  * returns. */
 bool drape_schedule_retry(drape_schedule *schedule, double h_next);
+
+/* A step is not accepted because it shall end at another time, after the present one: the next steps lead
+ * there. Counting then restarts there, as at the end of an advance. */
+void drape_schedule_cut(drape_schedule *schedule, double end);
 
 /* A step was rejected, and the same one is tried again because its equations have changed. */
 void drape_schedule_repeat(drape_schedule *schedule);

@@ -101,6 +101,7 @@ static void start_anew(drape_sim *sim, double t_before)
     memset(sim->scratch, 0, sizeof sim->scratch);
     sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
     drape_sim_leave_realtime(sim);
+    drape_events_reset(sim);
     drape_schedule_init(&sim->schedule, sim->schedule.stepping, sim->schedule.dt, t);
     if (t != t_before) /* otherwise the frame at t may have been emitted already */
         sim->next_frame = first_frame(sim);

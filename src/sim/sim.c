@@ -2,17 +2,20 @@
 #include "sim/sim.h"
 
 #include "base/clock.h"
+#include "base/def.h"
+#include "compile/compile.h"
 
 #include <math.h>
 #include <string.h>
 
 #define MAX_THREADS 256
+/* The shortest def of an older host. */
+#define MIN_SIZE offsetof(drape_sim_def, controller)
 
 void drape_sim_def_init(drape_sim_def *def, size_t struct_size)
 {
     const drape_sim_def defaults = {.struct_size = struct_size, .threads = 1};
-    memset(def, 0, struct_size);
-    memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 /* Reads a def of this version or of an older, shorter one. */
@@ -21,7 +24,7 @@ static drape_status read_def(drape_context *ctx, const drape_sim_def *given, dra
     drape_sim_def_init(def, sizeof *def);
     if (!given)
         return DRAPE_OK;
-    if (given->struct_size == 0 || given->struct_size > sizeof *def)
+    if (!drape_def_fits(given->struct_size, MIN_SIZE, sizeof *def))
         return drape_fail(
             ctx, DRAPE_E_VERSION,
             "the sim def was not initialised by drape_sim_def_init of this version: struct_size %zu",
@@ -156,6 +159,8 @@ static drape_status start_sim(drape_sim *sim, int threads)
         status = create_integrator(sim);
     if (!status)
         status = drape_check_cancel(sim->ctx);
+    if (!status)
+        status = drape_events_create(sim);
     if (status)
         return status;
     note_tolerance(sim);
@@ -167,15 +172,34 @@ static drape_status start_sim(drape_sim *sim, int threads)
     return DRAPE_OK;
 }
 
-drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out)
+/* Replaces the model by one without these pins. */
+static drape_status leave_pins(drape_sim *sim, const uint8_t *released)
+{
+    const size_t nodes = (size_t)sim->model->node_count;
+    const drape_status status = drape_compile_released(sim->ctx, sim->model, released, &sim->own_model);
+    if (status)
+        return status;
+    sim->model = sim->own_model;
+    sim->released = drape_arena_take(sim->arena, nodes, sizeof *sim->released);
+    if (!sim->released)
+        return DRAPE_E_MEMORY;
+    memcpy(sim->released, released, nodes);
+    return DRAPE_OK;
+}
+
+drape_status drape_sim_create_like(const drape_sim *like, const uint8_t *released, drape_sim **out)
 {
     const drape_sim_def def = {.frame_rate = like->frame_rate,
                                .realtime_step = like->realtime.longest_asked,
                                .teleport_speed = like->teleport_speed};
-    drape_status status = open_sim(like->ctx, like->model, &def, out);
+    drape_status status = open_sim(like->ctx, drape_sim_base_model(like), &def, out);
+    if (!status && released)
+        status = leave_pins(*out, released);
     if (!status) {
         (*out)->chosen = like->chosen;
         status = start_sim(*out, drape_pool_threads(drape_system_pool(like->system)));
+        if (!status)
+            status = drape_events_copy(*out, like);
     }
     if (status)
         drape_sim_destroy(out);
@@ -216,6 +240,7 @@ void drape_sim_destroy(drape_sim **out)
     if (sim->integrator && sim->chosen.integrator->destroy)
         sim->chosen.integrator->destroy(&sim->integrator);
     drape_system_destroy(&sim->system);
+    drape_model_destroy(&sim->own_model);
     drape_arena_destroy(&sim->arena);
     drape_free(sim->ctx, sim);
     *out = NULL;
@@ -277,7 +302,7 @@ drape_statistics drape_sim_statistics(const drape_sim *sim)
     if (!sim)
         return (drape_statistics){0};
     drape_statistics s = sim->statistics;
-    drape_work work = sim->chosen.integrator->work(sim->integrator);
+    drape_work work = drape_work_sum(sim->chosen.integrator->work(sim->integrator), &sim->earlier);
     s.newton_iterations = work.newton_iterations;
     s.jacobians = work.jacobians;
     s.factorizations = work.factorizations;

@@ -5,10 +5,12 @@
 #include "base/archive.h"
 #include "base/arena.h"
 #include "sim/choose.h"
+#include "sim/events.h"
 #include "sim/schedule.h"
 
-#define DRAPE_MAX_OBSERVERS 8
-#define DRAPE_MAX_REASONS   32 /* the last one is "other" if there are more */
+#define DRAPE_MAX_OBSERVERS   8
+#define DRAPE_MAX_HOST_EVENTS 64
+#define DRAPE_MAX_REASONS     32 /* the last one is "other" if there are more */
 
 typedef struct drape_reason_total {
     const char *reason; /* static text */
@@ -53,6 +55,9 @@ struct drape_sim {
     drape_arena *arena; /* holds all memory of the sim and stays at its address: see drape_sim_read */
     size_t state_bytes, integrator_bytes; /* in the arena, after create */
     const drape_model *model;
+    drape_model *own_model; /* the model, if it lacks pins that were released; NULL: it is the host's */
+    uint8_t *released;      /* (node_count) 1: its pins were released; NULL: none were */
+    drape_work earlier;     /* done by the integrators that went before, each until pins were released */
     drape_chosen chosen;
     drape_system *system;
     void *integrator;      /* state of chosen.integrator */
@@ -71,9 +76,8 @@ struct drape_sim {
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
     double *query_scratch;          /* (node_count x 3) for queries between steps */
     int64_t attempts;
-    bool *relaxed_logged; /* (collider_count + 1) the last message was that cloth is relaxed; not archived: a
-                             restored sim says so again */
-    int64_t failed;       /* attempts at the present step that failed */
+    bool *relaxed_logged;        /* (collider_count + 1) the last message was that cloth is relaxed there */
+    int64_t failed;              /* attempts at the present step that failed */
     double further_seconds;      /* [s] of the last attempt, see drape_step_info; not archived: it is read at
                                     once */
     drape_statistics statistics; /* counted by the driver; the integrator has the others */
@@ -81,6 +85,7 @@ struct drape_sim {
     int reason_count;
     drape_audit audit;
     drape_realtime_memory realtime;
+    drape_event_set events;
     drape_energy energy, attempted;     /* of the present state; of the last attempted one */
     bool energy_known, attempted_known; /* whether these two are valid */
     drape_warning_cursor warning_cursor;
@@ -99,8 +104,25 @@ struct drape_sim {
  * call comes from one of its observers). */
 drape_status drape_sim_guard(drape_sim *sim, const char *function);
 
-/* Creates a new sim with the same choices, at the beginning. */
-drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out);
+/* Creates a new sim with the same choices, at the beginning. released (node_count): the nodes whose pins were
+ * released; NULL: none. */
+drape_status drape_sim_create_like(const drape_sim *like, const uint8_t *released, drape_sim **out);
+
+/* Exchanges the contents of two sims, except what belongs to the host and stays with `sim`: observers, the
+ * cancel flag, the wind. Afterwards `other` has the former contents of `sim` and is only fit to be
+ * destroyed. */
+void drape_sim_exchange(drape_sim *sim, drape_sim *other);
+
+/* Makes pinned nodes free, which go on with the velocity of their pins. The sim is built anew, for a model
+ * without these pins, and takes the place of the present one if that succeeds. Errors: DRAPE_E_MEMORY,
+ * DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's cancel function); then the sim is unchanged. */
+drape_status drape_sim_release(drape_sim *sim, const uint8_t *nodes);
+
+/* The model of the host, with all pins. */
+static inline const drape_model *drape_sim_base_model(const drape_sim *sim)
+{
+    return sim->model->base ? sim->model->base : sim->model;
+}
 
 /* Writes everything that the next steps, frames and statistics depend on, besides the model and the
  * choices, to an archive or, if the sim was just created, reads it back. */
@@ -128,6 +150,13 @@ double drape_sim_error_bound(const drape_sim *sim);
 /* Whether out has energy that neither the state before nor the work on it can account for, in this step or
  * since the beginning of the run; info->diagnostic then says how much. */
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info);
+
+/* The energies at positions and velocities (node_count x 3) at time t, with the internal variables of the
+ * present state; `dissipated` and `numerical` are 0. */
+drape_energy drape_sim_energy_of(const drape_sim *sim, double t, const double *x, const double *v);
+
+/* drape_sim_reactions at another point. Errors: DRAPE_E_MEMORY. */
+drape_status drape_sim_reactions_at(drape_sim *sim, const drape_point *point, double *forces);
 
 /* drape_sim_energy_density at other positions (node_count x 3), with the internal variables of the present
  * state. */

@@ -65,6 +65,8 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     drape_system_expect(sim->system, t1, may_relax(sim));
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
     drape_sim_add_contact_work(sim);
+    if (drape_system_contact(sim->system) && !sim->chosen.integrator->own_steps)
+        drape_sim_energy(sim); /* for the check, while contact is where the step begins */
     if (!status)
         status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
     if (status == DRAPE_E_STOPPED)
@@ -206,6 +208,24 @@ static void reject(drape_sim *sim, const drape_step_info *info)
     count_reason(sim, info->reason);
 }
 
+/* For an attempt that the controller accepted: whether it is made again, so that it ends at an event, or
+ * given up, because an event acts on the present state. *stop: an event function failed. memory: of the
+ * controller before it judged. */
+static bool must_repeat(drape_sim *sim, const double memory[2], drape_step_info *info, drape_status *stop)
+{
+    drape_system_end_step(sim->system); /* what events evaluate leaves no trace in the next step */
+    const drape_event_verdict verdict = drape_events_examine(sim, next_state(sim), stop);
+    if (verdict == DRAPE_EVENTS_PASS)
+        return false;
+    memcpy(sim->scratch, memory, sizeof sim->scratch);
+    if (sim->chosen.integrator->own_steps) /* it has accepted the step already */
+        sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+    info->reason = drape_reason_name(DRAPE_REASON_EVENT);
+    reject(sim, info);
+    sim->failed--;
+    return true;
+}
+
 /* ---- Messages ---- */
 
 /* "bend.hinge 37 (nodes 4 5 9 10 of sheet): altitude / rest altitude = 3e-09, limit 1e-06" */
@@ -247,11 +267,36 @@ static void describe_nearest(const drape_sim *sim, const drape_attempt *attempt,
         describe_diagnostic(sim->model, &nearest, text, size);
 }
 
+/* Whether bodies leave the cloth no room at the end of a step that was too small, and the choice that makes
+ * the sim go on. Where contact refused the step, the pairs that hold it up are taken for such. */
+static drape_status describe_room(drape_sim *sim, const drape_attempt *attempt, char *text, size_t size)
+{
+    bool lacks = false;
+    text[0] = 0;
+    if (may_relax(sim) || sim->chosen.integrator->projects_contact)
+        return DRAPE_OK;
+    const bool refused = strcmp(attempt->reason, drape_reason_name(DRAPE_REASON_PENETRATION)) == 0 ||
+                         strcmp(attempt->reason, drape_reason_name(DRAPE_REASON_COLLISION)) == 0;
+    const double t1 = attempt->t + fmax(attempt->h, sim->schedule.dt);
+    const drape_status status = drape_system_lacks_room(sim->system, t1, refused, &lacks);
+    if (lacks)
+        snprintf(text, size,
+                 "; bodies leave the cloth no room there: with /contact/no_room \"relax\" they are let into "
+                 "it, and the run goes on");
+    return status;
+}
+
+/* Whether an event, and nothing else, kept an attempt from being accepted. */
+static bool is_event(const drape_attempt *attempt)
+{
+    return attempt->reason == drape_reason_name(DRAPE_REASON_EVENT);
+}
+
 /* Logs what was rejected, and why. */
 static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 {
     char diagnostic[400];
-    if (attempt->accepted || !sim->ctx->def.log)
+    if (attempt->accepted || is_event(attempt) || !sim->ctx->def.log)
         return;
     describe_diagnostic(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
     drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g h=%.4g: step rejected, %s (%s)%s", attempt->t, attempt->h,
@@ -260,8 +305,8 @@ static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
-    char diagnostic[400], nearest[400], residual[100] = "", distortion[200] = "";
-    if (stop == DRAPE_E_MEMORY) /* the allocator set the message */
+    char diagnostic[400], nearest[400], residual[100] = "", distortion[200] = "", room[200] = "";
+    if (stop == DRAPE_E_MEMORY || is_event(attempt)) /* the message is set */
         return stop;
     if (stop == DRAPE_E_STOPPED)
         return drape_sim_check_cancel(sim);
@@ -270,31 +315,35 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
     /* a diagnostic that names only a node may not give the cause, which the distortion may */
     if (attempt->diagnostic.element < 0)
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
+    if (stop == DRAPE_E_STEP_TOO_SMALL && describe_room(sim, attempt, room, sizeof room))
+        return DRAPE_E_MEMORY;
     /* NAN: integrators that bound errors have no residual */
     if (!isnan(attempt->tolerance) && !isnan(attempt->residual))
         snprintf(residual, sizeof residual, ", residual %.4g N for a tolerance of %.4g N", attempt->residual,
                  attempt->tolerance);
-    return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s%s", attempt->t,
+    return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s%s%s", attempt->t,
                       attempt->h, attempt->reason, drape_status_name(attempt->status), attempt->iterations,
-                      residual, diagnostic, nearest, distortion);
+                      residual, diagnostic, nearest, distortion, room);
 }
 
 /* An integrator that chooses its own steps has no dt, and a limit of its own. */
 drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 {
-    char diagnostic[400], nearest[400];
+    char diagnostic[400], nearest[400], room[200];
     const drape_schedule *s = &sim->schedule;
     if (!(s->dt > 0) || (double)s->tries < sim->max_attempts)
         return DRAPE_OK;
     describe_diagnostic(sim->model, &last->diagnostic, diagnostic, sizeof diagnostic);
     describe_nearest(sim, last, nearest, sizeof nearest);
+    if (describe_room(sim, last, room, sizeof room))
+        return DRAPE_E_MEMORY;
     return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
                       "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64
                       " attempts since t=%.9g advanced less than one dt, %.4g s; the controller's "
-                      "max_attempts is %.15g%s%s",
+                      "max_attempts is %.15g%s%s%s",
                       drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status),
                       last->iterations, s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic,
-                      nearest);
+                      nearest, room);
 }
 
 /* ---- One step, and an advance ---- */
@@ -329,17 +378,22 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     drape_step_info info = {.reason = drape_reason_name(DRAPE_REASON_CONVERGED), .h = h, .error = NAN};
     drape_trial trial;
     double t = drape_sim_state(sim)->t;
+    const double memory[2] = {sim->scratch[0], sim->scratch[1]};
     drape_status status = compute_next(sim, t1, h, &info);
     drape_verdict verdict = judge(sim, &info, status, &trial);
     sim->further_seconds = info.further_seconds;
+    *stop = DRAPE_OK;
+    if (verdict == DRAPE_ACCEPT && must_repeat(sim, memory, &info, stop))
+        return record_of(sim, t, &info, DRAPE_RETRY_REJECTED, false);
     bool again = false;
     const drape_status relaxed = verdict == DRAPE_ACCEPT ? DRAPE_OK : relax(sim, t1, status, verdict, &again);
     verdict = again ? DRAPE_RETRY : verdict;
     bool refused = status == DRAPE_OK && verdict != DRAPE_ACCEPT; /* by the controller alone */
     *stop = relaxed ? relaxed : verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
-    if (verdict == DRAPE_ACCEPT)
+    if (verdict == DRAPE_ACCEPT) {
         accept(sim, &info, trial.h_next);
-    else
+        drape_events_commit(sim);
+    } else
         reject(sim, &info);
     if (again)
         drape_schedule_repeat(&sim->schedule);
@@ -368,10 +422,13 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     if (attempt->accepted)
         drape_sim_log_relaxed(sim);
     drape_status notified = notify_attempt(sim, attempt);
+    drape_status reported = drape_events_report(sim);
     drape_status emitted = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
     if (stop)
         return explain(sim, stop, attempt);
-    return notified ? notified : emitted;
+    if (notified || reported || emitted) /* the actions are for the next advance */
+        return notified ? notified : reported ? reported : emitted;
+    return drape_events_act(sim);
 }
 
 drape_status drape_sim_advance(drape_sim *sim, double t_end)
@@ -387,6 +444,8 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
     drape_status status =
         drape_sim_emit_frames(sim); /* the first frame, and those left over when an observer stopped the
                                        run */
+    if (!status)
+        status = drape_events_resume(sim);
     drape_sim_leave_realtime(sim);
     drape_schedule_aim(&sim->schedule, t_end);
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {

@@ -164,28 +164,34 @@ static bool is_sent_too_fast(const drape_sim *sim, const drape_cloth *cloth, int
     return fast;
 }
 
+/* Before any cloth is placed, all placements are checked, so that after an error nothing has changed. That
+ * of a cloth does not depend on the others. */
 drape_status drape_sim_teleport_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
                                      const double *positions, const double *velocities)
 {
     const drape_model *m = sim->model;
+    const drape_place_list none = {NULL, 0};
     drape_status status = DRAPE_OK;
-    for (int32_t c = 0; c < m->cloth_count && !status; c++) {
-        const drape_cloth *cloth = &m->cloths[c];
+    for (int32_t i = 0; i < 2 * m->cloth_count && !status; i++) {
+        const bool checks = i < m->cloth_count;
+        const int32_t c = i % m->cloth_count;
+        const drape_place_list one = {&c, 1};
         double v[3];
-        if (!is_sent_too_fast(sim, cloth, count, nodes, seconds, positions))
+        if (!is_sent_too_fast(sim, &m->cloths[c], count, nodes, seconds, positions))
             continue;
         const pins p = {.model = m,
-                        .cloth = cloth,
+                        .cloth = &m->cloths[c],
                         .from = drape_sim_state(sim)->x,
                         .to = targets(sim, count, nodes, seconds, positions)};
         drape_placement by = fit(&p);
-        mean_velocity(sim, cloth, count, nodes, velocities, &by, v);
+        mean_velocity(sim, p.cloth, count, nodes, velocities, &by, v);
         vec3_add_scaled(-seconds, v, by.shift);
-        drape_log(sim->ctx, DRAPE_LOG_INFO,
-                  "t=%.9g: pins of %s are sent faster than %.4g m/s: it is placed there",
-                  drape_sim_state(sim)->t, cloth->name, sim->teleport_speed);
-        status =
-            drape_sim_place_parts(sim, &(drape_place_list){&c, 1}, &(drape_place_list){NULL, 0}, &by, false);
+        status = checks ? drape_sim_check_place(sim, &one, &none, &by)
+                        : drape_sim_place_parts(sim, &one, &none, &by, false);
+        if (!checks && !status)
+            drape_log(sim->ctx, DRAPE_LOG_INFO,
+                      "t=%.9g: pins of %s are sent faster than %.4g m/s: it is placed there",
+                      drape_sim_state(sim)->t, p.cloth->name, sim->teleport_speed);
     }
     return status;
 }
@@ -205,8 +211,10 @@ drape_status drape_sim_teleport_collider(drape_sim *sim, int32_t collider, doubl
     drape_motion_collider_arrival(motion, collider, t, v);
     vec3_sub(displacement, from, by.shift);
     vec3_add_scaled(-seconds, velocity ? velocity : v, by.shift);
-    drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g: %s is sent faster than %.4g m/s: it is placed there", t,
-              sim->model->colliders[collider].name, sim->teleport_speed);
-    return drape_sim_place_parts(sim, &(drape_place_list){NULL, 0}, &(drape_place_list){&collider, 1}, &by,
-                                 false);
+    const drape_status status = drape_sim_place_parts(sim, &(drape_place_list){NULL, 0},
+                                                      &(drape_place_list){&collider, 1}, &by, false);
+    if (!status)
+        drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g: %s is sent faster than %.4g m/s: it is placed there", t,
+                  sim->model->colliders[collider].name, sim->teleport_speed);
+    return status;
 }

@@ -243,10 +243,10 @@ START_TEST(defs_that_were_not_initialised_are_refused)
     drape_sim_def sim_def = {0};
     drape_model *model = make_sheet(ctx), *no_model = NULL;
     drape_sim *sim = NULL;
-    for (int longer = 0; longer < 2; longer++) {
-        context_def.struct_size = longer ? sizeof context_def + 1 : 0;
-        scene_def.struct_size = longer ? sizeof scene_def + 1 : 0;
-        sim_def.struct_size = longer ? sizeof sim_def + 1 : 0;
+    for (int i = 0; i < 3; i++) { /* not initialised, only its size, longer than this version's */
+        context_def.struct_size = i == 0 ? 0 : i == 1 ? sizeof(size_t) : sizeof context_def + 1;
+        scene_def.struct_size = i == 0 ? 0 : i == 1 ? sizeof(size_t) : sizeof scene_def + 1;
+        sim_def.struct_size = i == 0 ? 0 : i == 1 ? sizeof(size_t) : sizeof sim_def + 1;
         ck_assert_int_lt(drape_context_create(&context_def, &other), 0);
         ck_assert_int_eq(drape_model_create(ctx, &scene_def, &no_model), DRAPE_E_VERSION);
         check_message(ctx, "drape_scene_def_init");
@@ -256,6 +256,25 @@ START_TEST(defs_that_were_not_initialised_are_refused)
     ck_assert(!other && !no_model && !sim);
     drape_model_destroy(&model);
     drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* Nor is anything written beyond the size that the caller gives, were it too short for the size itself. */
+START_TEST(a_def_that_is_not_there_is_not_filled)
+{
+    unsigned char bytes[16];
+    drape_context_def_init(NULL, sizeof(drape_context_def));
+    drape_scene_def_init(NULL, sizeof(drape_scene_def));
+    drape_cloth_def_init(NULL, sizeof(drape_cloth_def));
+    drape_mesh_def_init(NULL, sizeof(drape_mesh_def));
+    drape_pin_def_init(NULL, sizeof(drape_pin_def));
+    drape_collider_def_init(NULL, sizeof(drape_collider_def));
+    drape_sim_def_init(NULL, sizeof(drape_sim_def));
+    drape_place_def_init(NULL, sizeof(drape_place_def));
+    memset(bytes, 0xee, sizeof bytes);
+    drape_context_def_init((drape_context_def *)bytes, 3);
+    for (size_t i = 3; i < sizeof bytes; i++)
+        ck_assert_uint_eq(bytes[i], 0xee);
 }
 END_TEST
 
@@ -390,9 +409,9 @@ START_TEST(defs_in_arrays_are_checked)
     ck_assert_int_eq(drape_model_collider_count(model), 2);
     drape_model_destroy(&model);
     free(older);
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 6; i++) {
         const char *says = i < 2   ? "drape_collider_def_init"
-                           : i < 4 ? "drape_pin_def_init"
+                           : i < 5 ? "drape_pin_def_init"
                                    : "drape_cloth_def_init";
         fill_scene(&s);
         s.scene.colliders = colliders;
@@ -404,7 +423,9 @@ START_TEST(defs_in_arrays_are_checked)
         else if (i == 3)
             s.pins[1].struct_size -= 8;
         else if (i == 4)
-            s.cloth.struct_size = 3;
+            s.pins[0].struct_size = s.pins[1].struct_size = sizeof(size_t);
+        else if (i == 5)
+            s.cloth.struct_size = sizeof(size_t);
         ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_VERSION);
         check_message(ctx, says);
         ck_assert_ptr_null(model);
@@ -2019,7 +2040,7 @@ START_TEST(the_log_of_a_host_gets_rejections)
 END_TEST
 
 SUITE("api", destroying_nothing_is_fine, destroy_writes_null, null_arguments_are_reported,
-      no_model_has_nothing, defs_that_were_not_initialised_are_refused,
+      no_model_has_nothing, defs_that_were_not_initialised_are_refused, a_def_that_is_not_there_is_not_filled,
       shorter_defs_of_older_callers_are_read, every_older_def_is_read, defs_in_arrays_are_checked,
       half_an_allocator_is_refused, sim_defs_are_checked, an_end_that_is_no_time_is_refused,
       zeroed_parts_of_a_scene_are_refused, a_scene_in_memory_is_the_same_as_in_a_file,

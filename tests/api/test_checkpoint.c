@@ -55,8 +55,8 @@ static drape_status count_frames(void *user, const drape_event *event)
  * threads; observers stay registered. */
 START_TEST(a_file_is_taken_by_another_sim)
 {
-    static const char *const integrators[] = {"be", "bdf2", "ida", "verlet"};
-    for (int k = 0; k < 4; k++) {
+    static const char *const integrators[] = {"be", "bdf2", "ida", "verlet", "cvode", "dirk"};
+    for (size_t k = 0; k < sizeof integrators / sizeof *integrators; k++) {
         char path[] = "/tmp/drape-api-XXXXXX";
         int fd = mkstemp(path), frames[2] = {0};
         ck_assert_int_ge(fd, 0);

@@ -177,7 +177,7 @@ static host several(failing_allocator *memory)
         memory,
         "{'drape': 1, 'cloth': [" SMALL("a") ", " SMALL(
             "b") "], 'colliders': [{'type': 'box', "
-                 "'center': [9, 0, 0], 'size': [1, 1, 1], 'name': 'crate'}, {'type': 'sphere', 'center': "
+                 "'center': [9, 0, 0], 'size': [2, 1, 1], 'name': 'crate'}, {'type': 'sphere', 'center': "
                  "[0, -5, 0], 'radius': 1}, {'type': 'capsule', 'a': [5, 1, 0], 'b': [5, 2, 0], 'radius': "
                  "0.1}, "
                  "{'type': 'cylinder', 'a': [6, 1, 0], 'b': [6, 2, 0], 'radius': 0.1}], "
@@ -220,20 +220,30 @@ START_TEST(only_what_is_chosen_is_placed)
 }
 END_TEST
 
-/* A sphere turns about any axis, a capsule and a cylinder about their own or upside down; a box never. */
+/* A sphere turns about any axis, a capsule and a cylinder about their own or upside down; a box by half
+ * turns, and by quarter turns about the axis across which it is square. */
 START_TEST(colliders_turn_if_they_look_the_same)
 {
     failing_allocator memory = {0};
     host h = several(&memory);
-    const int32_t sphere = 1, capsule = 2, cylinder = 3;
+    const int32_t crate = 0, sphere = 1, capsule = 2, cylinder = 3;
     drape_place_def def = place_def();
-    const double upright[4] = {0, 1, 0, 90}, over[4] = {1, 0, 0, 180}, tilt[4] = {0, 0, 1, 10};
+    const double upright[4] = {0, 1, 0, 90}, over[4] = {1, 0, 0, 180}, tilt[4] = {0, 0, 1, 10},
+                 quarter[4] = {1, 0, 0, -90}, half[4] = {0, 1, 0, 180};
     const uint64_t before = drape_sim_hash(h.sim);
     memcpy(def.rotate, upright, sizeof upright);
-    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_ARGUMENT, "crate is a box, which cannot turn");
+    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_ARGUMENT, "crate is a box that would not look the same");
     ck_assert_uint_eq(drape_sim_hash(h.sim), before);
     def.cloth_count = 0;
     def.collider_count = 1;
+    def.colliders = &crate;
+    memcpy(def.rotate, quarter, sizeof quarter);
+    good(&h, drape_sim_place(h.sim, &def)); /* about the line through its middle, which stays */
+    ck_assert(drape_sim_collider(h.sim, crate).displacement[0] == 0);
+    memcpy(def.rotate, half, sizeof half);
+    good(&h, drape_sim_place(h.sim, &def)); /* (9, 0, 0) to (-9, 0, 0) */
+    ck_assert(drape_sim_collider(h.sim, crate).displacement[0] == -18);
+    memcpy(def.rotate, upright, sizeof upright);
     def.colliders = &capsule;
     good(&h, drape_sim_place(h.sim, &def)); /* its middle, (5, 1.5, 0), goes to (0, 1.5, -5) */
     const double to[3] = {0, 1.5, -5}, middle[3] = {5, 1.5, 0};
@@ -244,7 +254,7 @@ START_TEST(colliders_turn_if_they_look_the_same)
     good(&h, drape_sim_place(h.sim, &def)); /* (6, 1.5, 0) to (6, -1.5, 0) */
     ck_assert(drape_sim_collider(h.sim, cylinder).displacement[1] == -3);
     memcpy(def.rotate, tilt, sizeof tilt);
-    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_ARGUMENT, "cannot turn");
+    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_ARGUMENT, "would not look the same");
     def.colliders = &sphere;
     good(&h, drape_sim_place(h.sim, &def)); /* (0, -5, 0) to 5 (sin 10, -cos 10, 0) */
     ck_assert_double_eq_tol(drape_sim_collider(h.sim, sphere).displacement[0], 5 * sin(10 * acos(-1) / 180),
@@ -442,8 +452,10 @@ START_TEST(wrong_placements_are_refused)
     drape_sim_def sim;
     ck_assert_int_eq(drape_sim_place(NULL, &def), e);
     says(&h, drape_sim_place(h.sim, NULL), e, "the def is NULL");
-    def.struct_size = 0;
-    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_VERSION, "drape_place_def_init");
+    for (size_t i = 0; i < 4; i++) { /* not initialised, only its size, a member short, too long */
+        def.struct_size = (const size_t[]){0, 8, sizeof def - 8, sizeof def + 8}[i];
+        says(&h, drape_sim_place(h.sim, &def), DRAPE_E_VERSION, "drape_place_def_init");
+    }
     def = place_def();
     def.rotate[3] = 10;
     says(&h, drape_sim_place(h.sim, &def), e, "axis");
@@ -473,7 +485,64 @@ START_TEST(wrong_placements_are_refused)
 }
 END_TEST
 
+/* Two cloths of 9 nodes each, with the pins 0 and 1. The first is sent 100 m away, the second so far that its
+ * nodes would be beyond the limit although the pin is not. Colliders are sent beyond it by what they would
+ * have covered at their own velocity. */
+static void send_wrongly(host *h)
+{
+    const drape_status e = DRAPE_E_ARGUMENT;
+    const int32_t pins[2] = {0, 9}, free_node[2] = {0, 8}, nowhere[2] = {0, 99};
+    const double near[6] = {0, 0, 0, 0, 0, 0}, far[6] = {100, 0, 0, 1e9, 0, 0},
+                 none[6] = {0, 0, 0, 0, NAN, 0}, beyond[6] = {0, 0, 0, 2e9, 0, 0}, fast[3] = {-1e9, 0, 0};
+    says(h, drape_sim_move_pins(h->sim, 2, free_node, 1, near, NULL), e, "is free");
+    says(h, drape_sim_move_pins(h->sim, 2, nowhere, 1, near, NULL), e, "node 99");
+    says(h, drape_sim_move_pins(h->sim, 2, pins, 0, near, NULL), e, "seconds = 0");
+    says(h, drape_sim_move_pins(h->sim, 2, pins, 1, none, NULL), e, "position and velocity of node 9");
+    says(h, drape_sim_move_pins(h->sim, 2, pins, 1, near, none), e, "position and velocity of node 9");
+    says(h, drape_sim_move_pins(h->sim, 2, pins, 1, beyond, NULL), e, "position and velocity of node 9");
+    says(h, drape_sim_move_pins(h->sim, 2, pins, 1, far, NULL), e, "of b would be beyond");
+    for (int32_t c = 0; c < 4; c++) {
+        says(h, drape_sim_move_collider(h->sim, c, 0, near, NULL), e, "seconds = 0");
+        says(h, drape_sim_move_collider(h->sim, c, 1, none + 3, NULL), e, "displacement and velocity");
+        says(h, drape_sim_move_collider(h->sim, c, 1, near, none + 3), e, "displacement and velocity");
+        says(h, drape_sim_move_collider(h->sim, c, 1, beyond + 3, NULL), e, "displacement and velocity");
+        says(h, drape_sim_move_collider(h->sim, c, 2, far, fast), e, "would be beyond");
+    }
+    drape_place_def def = place_def();
+    def.translate[0] = 1e9;
+    says(h, drape_sim_place(h->sim, &def), e, "would be beyond");
+    def.collider_count = 0;
+    says(h, drape_sim_place(h->sim, &def), e, "would be beyond");
+}
+
+/* After a step, whose beginning is kept for the frames within it, all that a checkpoint contains is the same
+ * byte for byte. */
+START_TEST(what_is_sent_wrongly_changes_nothing)
+{
+    for (int i = 0; i < METHODS; i++) {
+        failing_allocator memory = {0};
+        host h = several(&memory);
+        const int32_t node = 0;
+        const double at[3] = {0.01, 0, 0};
+        use(&h, methods[i], 20);
+        good(&h, drape_sim_move_pins(h.sim, 1, &node, 1, at, NULL));
+        for (int32_t c = 0; c < 4; c++)
+            good(&h, drape_sim_move_collider(h.sim, c, 1, at, NULL));
+        good(&h, drape_sim_advance(h.sim, 3.3 * FRAME));
+        bytes before = bytes_save(h.sim);
+        send_wrongly(&h);
+        bytes after = bytes_save(h.sim);
+        ck_assert_uint_eq(before.size, after.size);
+        ck_assert_msg(memcmp(before.data, after.data, before.size) == 0, "%s", methods[i]);
+        free(before.data);
+        free(after.data);
+        close_scene(&h, &memory);
+    }
+}
+END_TEST
+
 SUITE("place", a_placed_sim_goes_on_as_before, any_rotation_keeps_the_strain, only_what_is_chosen_is_placed,
       colliders_turn_if_they_look_the_same, cloth_placed_into_a_collider_comes_out,
       a_checkpoint_keeps_placements, pins_that_are_sent_far_take_their_cloth_along,
-      colliders_that_are_sent_far_are_there, a_free_rotation_is_not_made, wrong_placements_are_refused)
+      colliders_that_are_sent_far_are_there, a_free_rotation_is_not_made, wrong_placements_are_refused,
+      what_is_sent_wrongly_changes_nothing)

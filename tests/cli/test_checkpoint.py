@@ -88,6 +88,19 @@ def test_no_checkpoint_and_finished():
         equal(file.read(), summary, "the summary that was lost")
 
 
+def test_events():
+    """a run with events that was interrupted stops at the same event, after the same release, and leaves the same files; a finished one stays as it is"""
+    write_scene(duration=2, frame_rate=50, integrator={"dt": 0.0005},
+                events=[{"type": "pin_force", "limit": 0.02, "action": "release", "pins": "pin1"}, {"type": "height", "height": -0.25, "action": "stop"}])
+    good("run", "scene.json", "--out", "whole", "--format", ALL)
+    message = read_json("whole/summary.json")["message"]
+    assert "stopped by event" in message, message
+    equal(stopped(signal.SIGINT, "--out", "out", "--format", ALL), 130)
+    for _ in range(2):
+        good("run", "scene.json", "--out", "out", "--format", ALL, "--resume")
+        same("whole", "out")
+
+
 def test_without_output_formats():
     """runs without frames, an equilibrium, and a new run, which removes the checkpoint of the run before it"""
     write_scene(integrator={"method": "static"})

@@ -204,7 +204,7 @@ def test_realtime():
         equal(realtime["full"] + realtime["fewer"] + realtime["larger"], realtime["frames"])
         assert abs(summary["time"] - (0.1 if rate < 1e6 else 2e-5)) < 1e-12, summary
         assert realtime["worst"] >= realtime["p50"] > 0 and realtime["dropped"] >= 0
-        equal(realtime["still"], int(re.search(r"; (\d+) without a new state; ", text).group(1)))
+        equal(realtime["still"], int(re.search(r"; (\d+) frames without a new state; ", text).group(1)))
         equal(realtime["still"] > 0, rate == 1e6)
         if rate == 1e6:  # no machine keeps up with a microsecond a frame: frames that make a step miss their budget, the others wait
             assert realtime["missed"] > 0 and realtime["larger"] > 0, realtime
@@ -227,22 +227,24 @@ def chosen_by(*options, **changes):
 def test_realtime_chooses():
     """--realtime takes newton_k, as many iterations as fit and the machine's threads, unless these are given; the copy of the scene has it"""
     line, integrator = chosen_by()
-    found = re.fullmatch(r"1 thread of \d+, for 16 nodes; newton_k, as no method is named; ([12]) iterations? or more, "
-                         r"as one takes \S+ ms of a frame of 50 in trial steps", line)
+    found = re.fullmatch(r"threads 1: chosen, for 16 nodes and \d+ processors?; method newton_k: chosen, as none is named; "
+                         r"iterations ([12]): chosen, as one takes \S+ ms of a frame of 50 ms in trial steps", line)
     assert found, line
     equal((integrator["method"], integrator["iterations"], integrator["dt"]), ("newton_k", int(found.group(1)), 0.01))
     # A frame of a microsecond has time for one.
     text = good("run", "scene.json", "--realtime", "--frame-rate", "1e6", "--duration", "2e-5")
-    assert "; 1 iteration or more, as one takes " in text, text
+    assert "; iterations 1: chosen, as one takes " in text, text
     # What the scene or the command line gives stays.
     line, integrator = chosen_by(integrator={"dt": 0.01, "iterations": 3})
-    assert line.endswith("newton_k, as no method is named"), line
+    assert line.endswith("; method newton_k: chosen, as none is named; iterations 3: given"), line
     equal(integrator["iterations"], 3)
     line, integrator = chosen_by("--set", "/integrator/iterations=5", "--threads", "1")
-    equal((line, integrator["iterations"]), ("newton_k, as no method is named", 5))
+    equal((line, integrator["iterations"]), ("threads 1: given; method newton_k: chosen, as none is named; iterations 5: given", 5))
+    line, integrator = chosen_by("--integrator", "newton_k")
+    assert line.endswith("; method newton_k: given by the scene or an option; iterations 1: the default of the method"), line
     for options, changes in (((), {"integrator": {"method": "be", "dt": 0.01}}), (("--integrator", "be"), {}), (("--linear-solver", "klu"), {})):
         line, integrator = chosen_by(*options, **changes)
-        assert line.endswith("; be, by the scene or the options"), line
+        assert line.endswith("; method be: given by the scene or an option; iterations: not a parameter of be"), line
         assert integrator.get("method", "be") == "be" and "iterations" not in integrator, integrator
     assert "chosen" not in good("run", "scene.json")
 
@@ -320,6 +322,43 @@ def test_last_frame():
     write_scene(duration=0.3, frame_rate=7)  # 0, 1/7, 2/7, 0.3
     good("run", "scene.json", "--out", "out", "--format", "npy")
     equal(read_npy("out/positions.npy")[0][0], 4)
+
+
+def test_events():
+    """events are printed and in the summary; a run that one stops has completed, with exit code 0 and the state of the event as last frame"""
+    events = [{"name": "low", "type": "height", "height": -0.02, "action": "stop"}, {"type": "energy", "bound": 1e-4, "direction": "up"},
+              {"name": "never", "type": "height", "height": -9}]
+    write_scene(events=events)
+    text = good("run", "scene.json", "--out", "out", "--format", "npy")
+    assert re.search(r"^status +ok$", text, re.M) and re.search(r"^event +never: did not occur$", text, re.M), text
+    summary = read_json("out/summary.json")
+    low, fast, never = summary["events"]
+    at = low["occurrences"][0]
+    equal((low["name"], low["count"], at["direction"], at["time"]), ("low", 1, "down", summary["time"]))
+    assert abs(at["value"] + 0.02) < 1e-9 and 0 < at["time"] < 0.1, at
+    equal((fast["name"], fast["count"], fast["occurrences"][0]["direction"]), ("event1", 1, "up"))
+    equal((never["count"], never["occurrences"]), (0, []))
+    equal((summary["status"], summary["message"]), ("ok", f't={summary["time"]:.9g}: stopped by event "low"'))
+    assert f'low: down at {at["time"]:.12g} s' in text and f'event1: up at {fast["occurrences"][0]["time"]:.12g} s' in text, text
+    shape, numbers = read_npy("out/positions.npy")
+    assert abs(min(numbers[-48:][1::3]) + 0.02) < 1e-9, "the last frame"
+    rows = read_steps("out")
+    repeated = [row for row in rows if row["reason"] == "event"]
+    equal(len(repeated), summary["steps"]["reasons"]["event"])
+    assert repeated and all(row["accepted"] == "0" for row in repeated)
+    equal(shape[0], summary["frames"])
+
+
+def test_released():
+    """a pin that an event releases is gone, and the run goes on to its end"""
+    write_scene(events=[{"name": "tears", "type": "pin_force", "limit": 0.02, "action": "release"}])
+    text = good("run", "scene.json", "--out", "out", "--format", "npy", "--duration", "0.5")
+    assert re.search(r"^event +tears: up at", text, re.M), text
+    summary = read_json("out/summary.json")
+    equal((summary["status"], summary["message"], summary["time"]), ("ok", "", 0.5))
+    count = summary["nodes"]
+    _, numbers = read_npy("out/positions.npy")
+    assert max(numbers[-3 * count:][1::3]) < -0.05, "all nodes fall"
 
 
 def test_settings():
@@ -696,10 +735,10 @@ def test_every_key_is_everywhere():
             part = part["items"] if step == "N" else next(form["properties"][step] for form in forms(part) if step in form.get("properties", {}))
         return part
 
-    write_scene(colliders=[{"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}])
+    write_scene(colliders=[{"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}], events=[{"type": "height", "height": -1}])
     schema, found, seen = json.loads(good("list", "--schema")), json.loads(good("info", "scene.json", "--json")), set()
     objects = {"/": found, "/output": found, "/cloth/N": found["cloths"][0], "/cloth/N/mesh/transform": found["cloths"][0]["mesh"]["transform"],
-               "/colliders/N": found["colliders"][0]}
+               "/colliders/N": found["colliders"][0], "/events/N": found["events"][0]}
     table = good("list", "--markdown").split("\n### ")[0]
     for place, name, unit, default, takes, what in re.findall(r"^\| `(/.*?)` \| `(.*?)` \|(.*?) \|(.*?) \|(.*?) \| (.*) \|$", table, re.M):
         entry = schema_of(schema, f"{place}/{name}")
@@ -714,7 +753,7 @@ def test_every_key_is_everywhere():
         if place in objects:
             seen.add(name)
             assert name in objects[place], (place, name)
-    assert {"gravity", "frame_rate", "friction", "translate", "up", "formats", "velocity"} <= seen, seen
+    assert {"gravity", "frame_rate", "friction", "translate", "up", "formats", "velocity", "action", "once"} <= seen, seen
 
 
 def test_info_of_contact():
@@ -797,6 +836,14 @@ def variants():
     yield False, scene(self_contact={"thickness": 0})
     yield False, scene(contact={"distance": 0})
     yield False, scene(contact={"friction": 0.5})
+    fall = {"type": "height", "height": -1}
+    for more in ({}, {"name": "a", "cloth": "sheet", "direction": "up", "action": "stop", "once": True}, {"action": "release", "pins": "pin0"}, {"node": 3}):
+        yield True, scene(events=[{**fall, **more}])
+    yield True, scene(events=[{"type": "plane", "normal": [0, 2, 0]}, {"type": "energy", "of": "total", "bound": 0}, {"type": "pin_force", "limit": 1}])
+    for more in ({"height": "1"}, {"type": "heigth"}, {"action": "explode"}, {"direction": 1}, {"once": "maybe"}, {"bound": 1}, {"name": ""}, {"node": 1.5}):
+        yield False, scene(events=[{**fall, **more}])
+    yield False, scene(events=[{"type": "pin_force"}])
+    yield False, scene(events=fall)
     yield False, scene(drape=2)
     yield False, scene(duration=0)
     yield False, scene(duration="5")

@@ -4,6 +4,7 @@ import csv
 import glob
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -232,7 +233,7 @@ def merged_is(whole, folder, merged):
 
 
 def test_recipes():
-    """the recipes for GNU parallel, xargs and a Slurm array give the result of a single run"""
+    """the recipes for GNU parallel, xargs, Snakemake and a Slurm array give the result of a single run"""
     write_scene()
     command = ["stability", "scene.json", *AXES, "--integrators", "be,verlet"]
     recipes = SOURCES + "/examples/sweep/"
@@ -241,6 +242,10 @@ def test_recipes():
         subprocess.run([recipes + "parallel", "5", PROGRAM, *command, "--out", "by_parallel"], check=True, capture_output=True)
         equal(len(glob.glob("by_parallel/cases-*-of-5.jsonl")), 5, "shards")
         merged_is("whole", "by_parallel", "merged_parallel")
+    if shutil.which("snakemake"):
+        subprocess.run(["snakemake", "-q", "-s", recipes + "Snakefile", "--cores", "2", "--config", "shards=3", "out=by_snakemake",
+                        "command=" + shlex.join([PROGRAM, *command])], check=True, capture_output=True)
+        merged_is("whole", "by_snakemake", "merged_snakemake")
     os.mkdir("bin")  # all programs that the recipe needs, except parallel
     for name in ("bash", "seq", "nproc", "xargs", "sed"):
         os.symlink(shutil.which(name), "bin/" + name)

@@ -38,7 +38,7 @@ static void note(all_pairs *all, drape_pair_kind kind, int32_t collider, const i
     pair.distance = collider >= 0
                         ? m->contact.distance
                         : fmin(2 * m->contact.self_thickness, 0.5 * drape_pair_gap_value(&pair, &rest));
-    all->list.all.pairs[all->list.all.count++] = pair;
+    all->list.set[0].pairs[all->list.set[0].count++] = pair;
 }
 
 static void note_own(all_pairs *all)
@@ -69,18 +69,19 @@ static void note_colliders(all_pairs *all)
             note(all, DRAPE_PAIR_TRIANGLE, b->triangle_collider[t], &i, b->triangle + 3 * t);
         for (int32_t k = 0; k < m->collider_count; k++)
             if (m->colliders[k].ops->smooth)
-                all->list.all.pairs[all->list.all.count++] = drape_broad_phase_surface(b, i, k);
+                all->list.set[0].pairs[all->list.set[0].count++] = drape_broad_phase_surface(b, i, k);
     }
 }
 
 static all_pairs list_all(drape_arena *arena, drape_contact *contact)
 {
-    all_pairs all = {.contact = contact, .list = {.broad = &contact->broad}, .active = {.arena = arena}};
-    all.list.all.pairs = drape_arena_take(arena, 40000, sizeof *all.list.all.pairs);
-    ck_assert_ptr_nonnull(all.list.all.pairs);
+    all_pairs all = {
+        .contact = contact, .list = {.broad = &contact->broad, .sets = 1}, .active = {.arena = arena}};
+    all.list.set[0].pairs = drape_arena_take(arena, 40000, sizeof *all.list.set[0].pairs);
+    ck_assert_ptr_nonnull(all.list.set[0].pairs);
     note_own(&all);
     note_colliders(&all);
-    ck_assert_int_lt(all.list.all.count, 40000);
+    ck_assert_int_lt(all.list.set[0].count, 40000);
     return all;
 }
 
@@ -112,9 +113,9 @@ static bool check_fraction(const all_pairs *all, const double *x, const double *
 {
     const drape_keep keep = {.least = 0.5, .below = 0.5};
     double least = 1;
-    for (int32_t i = 0; i < all->list.all.count; i++)
-        if (drape_pair_points(&all->list.all.pairs[i]) > 1)
-            least = fmin(least, drape_pair_step_fraction(&all->list.all.pairs[i], x, y, &keep, least));
+    for (int32_t i = 0; i < all->list.set[0].count; i++)
+        if (drape_pair_points(&all->list.set[0].pairs[i]) > 1)
+            least = fmin(least, drape_pair_step_fraction(&all->list.set[0].pairs[i], x, y, &keep, least));
     ck_assert_double_le(fraction, least);
     return least < 1;
 }
@@ -202,12 +203,12 @@ START_TEST(everything_near_is_found)
         c->press.factor = clean->press.factor; /* which follows from earlier steps, not from candidates */
         compare_forces(c, clean, n, g);
         active += c->active.count;
-        patches += c->step_candidates.patch.known;
+        patches += c->step_candidates.sets > 1;
         memcpy(x, y, n * sizeof *x);
         drape_arena_free(&other);
     }
     printf("# %d pairs, %.1f active, %d of %d paths end at a collision, %d with a patch\n",
-           (int)all.list.all.count, (double)active / ROUNDS, crossing, ROUNDS, patches);
+           (int)all.list.set[0].count, (double)active / ROUNDS, crossing, ROUNDS, patches);
     ck_assert_int_gt(patches, ROUNDS / 10);
     ck_assert_int_gt(active, 5 * ROUNDS);
     ck_assert_int_gt(crossing, ROUNDS / 10);

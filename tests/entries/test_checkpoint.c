@@ -269,9 +269,10 @@ END_TEST
 /* Large enough for solvers that pass small matrices to another solver: 7 edges are 186 unknowns. */
 START_TEST(every_linear_solver_resumes)
 {
-    static const char *const methods[] = {"be", "ida"}, *const newtons[] = {"exact", "modified"};
+    static const char *const methods[] = {"be", "ida", "cvode", "dirk"}, *const newtons[] = {"exact",
+                                                                                             "modified"};
     for (int i = 0; drape_linears[i]; i++)
-        for (size_t k = 0; k < 2; k++)
+        for (size_t k = 0; k < 4; k++)
             for (size_t j = 0; j < (k == 0 ? 2 : 1); j++) {
                 char settings[100];
                 snprintf(settings, sizeof settings, ", 'linear_solver': '%s', 'newton': '%s'",

@@ -231,6 +231,11 @@ static bool in_cube(const double *x)
     return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2]))) < 0.5;
 }
 
+static bool in_post(const double *x)
+{
+    return fmax(fabs(x[0] - 0.1), fabs(x[2] + 0.1)) < 0.3 && fabs(x[1]) < 0.5;
+}
+
 static const struct variant {
     const char *collider, *text;
     inside_function *inside; /* NULL: decided by the winding number of the mesh */
@@ -245,6 +250,7 @@ static const struct variant {
      "{'type': 'box', 'center': [0.1, 0, -0.1], 'size': [1, 0.5, 0.8], 'rotate': [0, 0, 30], 'rounding': "
      "0.1}",
      in_round_box},
+    {"box", "{'type': 'box', 'center': [0.1, 0, -0.1], 'size': [0.6, 1, 0.6]}", in_post},
     {"cylinder", "{'type': 'cylinder', 'a': [-0.3, 0.1, 0.2], 'b': [0.4, -0.2, 0.5], 'radius': 0.3}",
      in_cylinder},
     {"cylinder",
@@ -683,6 +689,7 @@ static void check_turned(const drape_collider *c, const struct variant *v)
     }
     ck_assert_msg(!c->ops->turned || same > 0, "%s", v->text);
     ck_assert(strcmp(c->ops->entry.name, "sphere") != 0 || same == 40);
+    ck_assert(v->inside != in_post || same >= 5); /* three half turns, and both quarter turns about y */
 }
 
 START_TEST(what_looks_the_same_after_a_rotation_does)

@@ -14,7 +14,9 @@ static const char base[] =
     " 'mesh': {'grid': 'square', 'columns': 4, 'rows': 5, 'width': 0.3, 'height': 0.4},"
     " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
     " 'terms': ['stretch.cst', 'bend.midedge'],"
-    " 'pins': [{'nodes': [5, 6], 'track': [[0, [0,0,0]], [1, [0,0.1,0]]]}]}],"
+    " 'pins': [{'nodes': [5, 6], 'track': [[0, [0,0,0]], [1, [0,0.1,0]]]},"
+    "          {'name': 'other', 'nodes': [0]}]}],"
+    " 'events': [{'type': 'height', 'height': -1}],"
     " 'colliders': [{'name': 'ball', 'type': 'sphere', 'center': [0,0,-1], 'radius': 0.1}],"
     " 'self_contact': {'thickness': 0.001}, 'duration': 1}";
 
@@ -38,6 +40,8 @@ static const struct test_case {
     {"/output/up", RESUMES, NULL, "'z'"},
     {"/cloth/0/name", RESUMES, NULL, "'another'"},
     {"/colliders/0/name", RESUMES, NULL, "'another'"},
+    {"/cloth/0/pins/0/name", RESUMES, NULL, "'another'"},
+    {"/events/0/name", RESUMES, NULL, "'another'"},
 
     {"/drape", SKIPPED, NULL, NULL},             /* has only one value */
     {"/cloth/0/mesh/file", SKIPPED, NULL, NULL}, /* its mesh counts, as that of a grid does */
@@ -60,6 +64,9 @@ static const struct test_case {
     {"/cloth/0/pins/0/track", REFUSED, NULL, "[[0, [0,0,0]], [1, [0,0.2,0]]]"},
     {"/colliders/0/type", REFUSED, "/colliders/0", "{'type': 'plane', 'point': [0,0,-1], 'normal': [0,0,1]}"},
     {"/colliders/0/track", REFUSED, NULL, "[[0, [0,0,0]], [1, [0,0.1,0]]]"},
+    {"/events/0/type", REFUSED, "/events/0", "{'type': 'energy', 'bound': 1}"},
+    {"/events/0/cloth", REFUSED, NULL, "'sheet'"},
+    {"/events/0/pins", REFUSED, NULL, "'other'"},
     {"/contact/distance", REFUSED, NULL, "0.002"},
     {"/integrator/method", REFUSED, NULL, "'bdf2'"},
     {"/controller/type", REFUSED, NULL, "'fixed'"},

@@ -303,7 +303,55 @@ START_TEST(no_step_is_tried_again_at_its_size)
 }
 END_TEST
 
-SUITE("schedule", times_are_counted, asking_changes_nothing, halves_fill_the_interval,
-      the_end_cuts_and_tiny_remainders_join, advances_do_not_shift_the_count, a_host_may_add_up_its_frames,
-      an_interval_left_half_done_is_given_up, any_sequence_fills_the_time, many_halvings_stay_small,
-      proposed_steps_reach_the_end, no_step_is_tried_again_at_its_size)
+/* A step that is to end elsewhere: it may also be longer than the one before, and be halved; counting
+ * restarts at its end. */
+START_TEST(a_cut_step_ends_at_its_end)
+{
+    drape_schedule s;
+    double t1, h;
+    begin(&s, 1, 0);
+    drape_schedule_aim(&s, 10);
+    ck_assert(drape_schedule_next(&s, &t1, &h));
+    accept(&s, t1);
+    ck_assert(drape_schedule_next(&s, &t1, &h));
+    drape_schedule_cut(&s, 1.25);
+    ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == 1.25 && h == 0.25);
+    drape_schedule_cut(&s, 1.5);
+    ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == 1.5 && h == 0.5);
+    halve(&s, h);
+    ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == 1.25 && h == 0.25);
+    accept(&s, t1);
+    ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == 1.5 && h == 0.25);
+    accept(&s, t1);
+    ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == 2.5 && h == 1);
+    drape_schedule_cut(&s, 1.75);
+    drape_schedule_aim(&s, 5); /* another advance: the cut is forgotten */
+    ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == 2.5 && h == 1);
+}
+END_TEST
+
+/* Steps that are proposed or free lead to the cut, and go on from there to the end. */
+START_TEST(other_steps_lead_to_the_cut)
+{
+    static const drape_stepping kinds[] = {DRAPE_STEPS_PROPOSED, DRAPE_STEPS_FREE};
+    for (int k = 0; k < 2; k++) {
+        drape_schedule s;
+        double t1, h;
+        drape_schedule_init(&s, kinds[k], 1, 0);
+        drape_schedule_aim(&s, 10);
+        ck_assert(drape_schedule_next(&s, &t1, &h));
+        drape_schedule_cut(&s, 0.25);
+        ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == 0.25 && h == 0.25);
+        drape_schedule_accept(&s, 0.125, 0.125); /* an integrator may stop short of it */
+        ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == 0.25 && h == 0.125);
+        drape_schedule_accept(&s, t1, 1);
+        ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == (k ? 10 : 1.25));
+    }
+}
+END_TEST
+
+SUITE("schedule", a_cut_step_ends_at_its_end, other_steps_lead_to_the_cut, times_are_counted,
+      asking_changes_nothing, halves_fill_the_interval, the_end_cuts_and_tiny_remainders_join,
+      advances_do_not_shift_the_count, a_host_may_add_up_its_frames, an_interval_left_half_done_is_given_up,
+      any_sequence_fills_the_time, many_halvings_stay_small, proposed_steps_reach_the_end,
+      no_step_is_tried_again_at_its_size)

@@ -23,11 +23,16 @@ static const char *const integrators[] = {"newton_k", "be", "ida", "verlet"};
 
 static long jump_each, reads; /* jump_each: calls between two jumps; 0: none */
 static double away;           /* [s] error of the clock */
+static double tick; /* [s] by which it advances each time it is read, and by nothing else; 0: it runs */
 
 int clock_gettime(clockid_t id, struct timespec *t)
 {
     static const double jumps[] = {3600, -7200, 1e-3, -1e-3, 1e9, -1e9};
     int result = (int)syscall(SYS_clock_gettime, id, t);
+    if (tick > 0) {
+        const double now = tick * (double)++reads;
+        *t = (struct timespec){.tv_sec = (time_t)now, .tv_nsec = (long)(1e9 * (now - floor(now)))};
+    }
     if (jump_each && ++reads % jump_each == 0)
         away += jumps[reads / jump_each % (long)(sizeof jumps / sizeof *jumps)];
     if (jump_each)
@@ -89,4 +94,43 @@ START_TEST(a_budget_on_a_jumping_clock_ends)
 }
 END_TEST
 
-SUITE("clock", steps_do_not_depend_on_the_clock, a_budget_on_a_jumping_clock_ends)
+/* Frames in a budget, on a clock that advances by a millisecond each time it is read and not otherwise, so
+ * that a call takes the same time on any machine. newton_k would make 20 further iterations in each step for
+ * an error that it never reaches, or as many as rounding allows. */
+typedef struct timed {
+    int64_t iterations, late;
+    double longest; /* [s] of a call */
+} timed;
+
+static timed run_in(double budget)
+{
+    scene s = scene_open(hung, "newton_k', 'error': 1e-15, 'tolerance': 1e-15, 'corrections': 'factors");
+    timed out = {0};
+    tick = 1e-3;
+    reads = 0;
+    for (int k = 0; k < 20; k++) {
+        drape_realtime report;
+        ck_assert_int_eq(drape_sim_advance_realtime(s.sim, FRAME, budget, &report), DRAPE_OK);
+        out.late += !report.kept;
+        out.longest = fmax(out.longest, report.seconds);
+    }
+    tick = 0;
+    out.iterations = drape_sim_statistics(s.sim).newton_iterations;
+    scene_close(&s);
+    return out;
+}
+
+/* In six tenths of the time that all iterations take, a call makes fewer than all and more than the least,
+ * one a frame; what an iteration takes is known after the first frames, which alone may be late. */
+START_TEST(further_iterations_end_in_time)
+{
+    const timed all = run_in(3600), some = run_in(0.6 * all.longest);
+    printf("# %d iterations in %g s a frame at most; %d in %g s, %d late\n", (int)all.iterations, all.longest,
+           (int)some.iterations, 0.6 * all.longest, (int)some.late);
+    ck_assert(some.iterations < all.iterations && some.iterations > 20);
+    ck_assert_int_le(some.late, 2);
+}
+END_TEST
+
+SUITE("clock", steps_do_not_depend_on_the_clock, a_budget_on_a_jumping_clock_ends,
+      further_iterations_end_in_time)

@@ -18,7 +18,7 @@
 #define STEP       0.01 /* [s] */
 
 /* A scene in which every part has a state to save: contact, friction, an internal variable, a moving pin, the
- * history of steps. */
+ * history of steps, events. */
 static const char sheet[] =
     "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"equilateral\", \"edges\": 2, \"edge_length\": 0.1},"
     "\"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200},"
@@ -26,6 +26,9 @@ static const char sheet[] =
     "\"pins\": [{\"edge\": \"top\", \"track\": [[0, [0, 0, 0]], [1, [0, 0.1, 0]]]}]}],"
     "\"colliders\": [{\"type\": \"sphere\", \"center\": [0.1, -0.12, -0.1], \"radius\": 0.1,"
     "\"friction\": 0.2}], \"self_contact\": {\"thickness\": 0.01}, \"contact\": {\"friction\": \"lagged\"},"
+    "\"events\": [{\"type\": \"height\", \"height\": -0.5, \"action\": \"stop\"},"
+    "{\"type\": \"energy\", \"bound\": 1e-6}, {\"type\": \"pin_force\", \"limit\": 1e3, \"action\": "
+    "\"release\"}],"
     "\"integrator\": {\"method\": \"be\", \"dt\": 0.01}, \"controller\": {\"type\": \"halving\"},"
     "\"duration\": 1, \"frame_rate\": 60}";
 

@@ -99,8 +99,8 @@ static double slide_of(const sliding *p, scene *s, double t)
     return mean_along(p, s, drape_sim_positions(s->sim), INFINITY) - before;
 }
 
-static const char *const methods[] = {"be",  "bdf2",       "midpoint",         "trbdf2",
-                                      "ida", "rosenbrock", "generalized_alpha"};
+static const char *const methods[] = {
+    "be", "bdf2", "midpoint", "trbdf2", "rosenbrock", "generalized_alpha", "cvode", "dirk", "ida"};
 #define METHODS (sizeof methods / sizeof *methods)
 
 /* Whether a method bounds the errors of its steps, not residuals. */

@@ -167,6 +167,7 @@ static void check_stop(const char *policy, bool realtime)
     ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
     const char *message = drape_context_message(s.ctx);
     ck_assert_msg(strstr(message, "left") || strstr(message, "right"), "%s", message);
+    ck_assert_msg(strstr(message, "no room there: with /contact/no_room \"relax\""), "%s", message);
     ck_assert_double_lt(drape_sim_time(s.sim), 0.25);
     ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);
     scene_close(&s);
@@ -208,6 +209,58 @@ START_TEST(test_checkpoint)
 }
 END_TEST
 
+static void keep_line(void *user, drape_log_level level, const char *text)
+{
+    char *lines = user;
+    (void)level;
+    if (strstr(text, "room"))
+        snprintf(lines + strlen(lines), 2000 - strlen(lines), "%s\n", text);
+}
+
+/* The log says once that cloth at a ball is relaxed, and once that it is not any more, with the times of the
+ * summary; also if the run was saved in between and restored. */
+START_TEST(test_log)
+{
+    char lines[2000] = "", line[200];
+    scene s = open_pinch("relax", "newton_k"), other = open_pinch("relax", "newton_k");
+    s.ctx->def.log = other.ctx->def.log = keep_line;
+    s.ctx->def.log_user = other.ctx->def.log_user = lines;
+    scene_advance(&s, 20 * FRAME);
+    bytes saved = bytes_save(s.sim);
+    ck_assert_int_eq(drape_sim_restore_from(other.sim, saved.data, saved.size), DRAPE_OK);
+    scene_advance(&other, 84 * FRAME);
+    int count = 0;
+    for (const char *c = lines; (c = strchr(c, '\n')); c++)
+        count++;
+    ck_assert_msg(count == 4, "%s", lines);
+    for (int32_t c = 0; c < 2; c++) {
+        const drape_relaxed_total *total = drape_sim_relaxed_total(other.sim, c);
+        const char *name = s.model->colliders[c].name;
+        snprintf(line, sizeof line, "t=%.9g: no room for the cloth at %s:", total->first, name);
+        ck_assert_msg(strstr(lines, line), "%s not in %s", line, lines);
+        snprintf(line, sizeof line, "t=%.9g: the cloth at %s has room again;", total->last, name);
+        ck_assert_msg(strstr(lines, line), "%s not in %s", line, lines);
+    }
+    free(saved.data);
+    scene_close(&other);
+    scene_close(&s);
+}
+END_TEST
+
+/* Two bodies close upon the cloth, and part at some time: half a second later nothing is inside them. Closes
+ * the scene. Returns the largest depth. */
+static double check_bodies(scene *s, double part)
+{
+    record seen = run(s, true, 84);
+    ck_assert(seen.named[0] && seen.named[1]);
+    ck_assert_double_lt(seen.strain, 0.1);
+    ck_assert_double_lt(seen.last_inside, part + 0.5);
+    ck_assert_int_eq(drape_sim_relaxed(s->sim, 0, NULL), 0);
+    free(seen.named);
+    scene_close(s);
+    return seen.deepest;
+}
+
 /* A ball that is pressed 3 cm into a table through the cloth on it. */
 START_TEST(test_table)
 {
@@ -217,14 +270,7 @@ START_TEST(test_table)
               " 'friction': 0.3, 'track': [[0.2, [0,0,0]], [0.4, [0,-0.08,0]], [0.7, [0,-0.08,0]],"
               " [0.9, [0,0,0]]]}]," REST,
         "horizontal", 0.005, 0.25, "", "auto", "newton_k");
-    record seen = run(&s, true, 84);
-    ck_assert(seen.named[0] && seen.named[1]);
-    ck_assert_double_le(seen.deepest, 0.04);
-    ck_assert_double_lt(seen.strain, 0.1);
-    ck_assert_double_lt(seen.last_inside, 0.775 + 0.5); /* the ball leaves the table at 0.775 s */
-    ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);
-    free(seen.named);
-    scene_close(&s);
+    ck_assert_double_le(check_bodies(&s, 0.775), 0.04); /* the ball leaves the table then */
 }
 END_TEST
 
@@ -320,13 +366,7 @@ START_TEST(test_boxes)
               " {'name': 'right', 'type': 'box', 'center': [0, 0.25, 0.15], 'size': [0.2, 0.2, 0.2],"
               " 'track': [[0.1, [0,0,0]], [0.3, [0,0,-0.07]], [0.7, [0,0,-0.07]], [0.9, [0,0,0]]]}]," REST,
         "vertical", 0.5, 0.0, CORNERS, "auto", "newton_k");
-    record seen = run(&s, true, 84);
-    ck_assert(seen.named[0] && seen.named[1]);
-    ck_assert_double_lt(seen.strain, 0.1);
-    ck_assert_double_lt(seen.last_inside, 0.757 + 0.5);
-    ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);
-    free(seen.named);
-    scene_close(&s);
+    check_bodies(&s, 0.757);
 }
 END_TEST
 
@@ -366,5 +406,5 @@ START_TEST(test_plates)
 }
 END_TEST
 
-SUITE("no_room", test_pinch, test_stop, test_checkpoint, test_table, test_pins_inside, test_elbow,
+SUITE("no_room", test_pinch, test_stop, test_checkpoint, test_log, test_table, test_pins_inside, test_elbow,
       test_crevice, test_boxes, test_plates)

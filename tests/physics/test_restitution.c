@@ -10,8 +10,8 @@
 #define MASS     (0.2 * 0.2 * 0.2)
 #define PARTS    20000 /* of a quadrature */
 
-static const char *const methods[] = {"be", "bdf2", "trbdf2", "midpoint", "rosenbrock", "generalized_alpha",
-                                      "ida"};
+static const char *const methods[] = {
+    "be", "bdf2", "trbdf2", "midpoint", "rosenbrock", "generalized_alpha", "cvode", "dirk", "ida"};
 #define METHODS (sizeof methods / sizeof *methods)
 
 /* The integral of y / (1 + k f(y)) from 0 to y, f as in contact/restitution.h: m eps^2 of it is the energy
@@ -49,8 +49,8 @@ static scene open_patch(const char *method, double share, double e, double v)
         " 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"
         " 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': [0,1,0], 'restitution': %.17g}],"
         " 'contact': {'distance': %g, 'restitution_velocity': %g}, 'integrator': {'method': '%s',"
-        " 'dt': %.17g, 'tolerance': 1e-9, 'rtol': 1e-6}, 'duration': 100}",
-        -v, e, DISTANCE, EPS, method, share * DISTANCE / v);
+        " 'dt': %.17g, 'max_step': %.17g, 'tolerance': 1e-9, 'rtol': 1e-6}, 'duration': 100}",
+        -v, e, DISTANCE, EPS, method, share * DISTANCE / v, share * DISTANCE / v);
 }
 
 /* Advances over so many times DISTANCE/20 at the speed v, and looks at the forces after each: a floor without

@@ -18,7 +18,7 @@
 #include <sunmatrix/sunmatrix_sparse.h>
 
 #include "assemble/system.h"
-#include "integrators/ida_newton.h"
+#include "integrators/sun_newton.h"
 #include "solvers/sundials_compat.h"
 
 /* As in ida.c. */
@@ -41,7 +41,7 @@ typedef struct ida_full {
     N_Vector y, rate, tolerances;
     SUNMatrix matrix;
     SUNLinearSolver solver;
-    drape_ida_newton newton; /* the ida_full must stay at its address */
+    drape_sun_newton newton; /* the ida_full must stay at its address */
     long residuals, jacobians;
 } ida_full;
 
@@ -103,7 +103,7 @@ static inline int ida_full_jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
             *to++ = f->d[k] + (p->row[k] == j ? cj * ida_full_mass(f, j) : 0);
     }
-    drape_ida_newton_forget(&f->newton);
+    drape_sun_newton_forget(&f->newton);
     f->jacobians++;
     return 0;
 }
@@ -133,7 +133,7 @@ static inline void ida_full_close(ida_full *f)
 {
     if (f->ida)
         IDAFree(&f->ida);
-    drape_ida_newton_free(&f->newton);
+    drape_sun_newton_free(&f->newton);
     if (f->solver)
         SUNLinSolFree(f->solver);
     if (f->matrix)
@@ -187,7 +187,8 @@ static inline bool ida_full_configure(ida_full *f, int max_order, int ordering)
     return !SUNLinSol_KLUSetOrdering(f->solver, ordering) &&
            !IDAInit(f->ida, ida_full_residual, 0, f->y, f->rate) && !IDASetUserData(f->ida, f) &&
            !IDASVtolerances(f->ida, 0, f->tolerances) && !IDASetLinearSolver(f->ida, f->solver, f->matrix) &&
-           drape_ida_newton_attach(&f->newton, f->ida, f->y, f->sun) &&
+           drape_sun_newton_create(&f->newton, f->y, f->sun) &&
+           !IDASetNonlinearSolver(f->ida, f->newton.solver) && drape_sun_newton_set_test(&f->newton) &&
            !IDASetJacFn(f->ida, ida_full_jacobian) && !IDASetMaxOrd(f->ida, max_order) &&
            !IDASetMaxErrTestFails(f->ida, IDA_FULL_FAILS) && !IDASetMaxConvFails(f->ida, IDA_FULL_FAILS) &&
            !IDASetNonlinConvCoef(f->ida, IDA_FULL_NEWTON_SHARE) &&

@@ -402,6 +402,19 @@ START_TEST(test_step_fraction)
 }
 END_TEST
 
+/* A trial state may bring a pair from far beyond the activation distance to a share of it at once, and one
+ * from just beyond it as far as if it were within. */
+START_TEST(test_arrival)
+{
+    const drape_keep trial = {.least = 1, .above = 0.5, .below = 0.5, .arrival = 0.4};
+    ck_assert_double_eq(drape_keep_gap(&trial, 1e-5, 1, 0.01), 0.4 * 0.01);
+    ck_assert_double_eq(drape_keep_gap(&trial, 0.005, 1, 0.01), 0.005); /* never below the least gap */
+    ck_assert_double_eq(drape_keep_gap(&trial, 0, 0.011, 0.02), 0.5 * 0.011);
+    ck_assert_double_eq(drape_keep_gap(&trial, 0, 0.009, 0.01), 0.5 * 0.009);
+    ck_assert_double_eq(drape_keep_gap(&trial, 0, 0.0101, 0.01), 0.4 * 0.01);
+}
+END_TEST
+
 /* A path that ends beyond the other piece is never free, however little the gap is, down to a tenth of the
  * rounding: a pair at the least gap of rounding is not exempt if the rounding becomes larger. */
 START_TEST(test_no_gap_is_exempt)
@@ -571,4 +584,5 @@ START_TEST(test_predicted)
 END_TEST
 
 SUITE("contact", test_predicted, test_triangle, test_segments, test_parallel, test_mollified_away,
-      test_barrier, test_bounded_barrier, test_step_fraction, test_no_gap_is_exempt, test_tree, test_bounds)
+      test_barrier, test_bounded_barrier, test_step_fraction, test_arrival, test_no_gap_is_exempt, test_tree,
+      test_bounds)

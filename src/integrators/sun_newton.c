@@ -1,8 +1,7 @@
-/* ida_newton.c: see ida_newton.h. */
-#include "integrators/ida_newton.h"
+/* sun_newton.c: see sun_newton.h. */
+#include "integrators/sun_newton.h"
 #include "base/elementary.h"
 
-#include <ida/ida.h>
 #include <math.h>
 #include <string.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
@@ -21,12 +20,12 @@
 #define LONGEST         0.5
 #define CHORD_RATE      0.5 /* factors are used again while each correction is at most this of the last one */
 
-static SUNNonlinearSolverContent_Newton content_of(const drape_ida_newton *newton)
+static SUNNonlinearSolverContent_Newton content_of(const drape_sun_newton *newton)
 {
     return newton->solver->content;
 }
 
-static double bound_of(const drape_ida_newton *newton, double tolerance)
+static double bound_of(const drape_sun_newton *newton, double tolerance)
 {
     return newton->strict ? STRICT * tolerance : tolerance;
 }
@@ -37,7 +36,7 @@ static int converged(SUNNonlinearSolver solver, N_Vector y, N_Vector correction,
                      N_Vector weights, void *user)
 {
     (void)y;
-    drape_ida_newton *newton = user;
+    drape_sun_newton *newton = user;
     int done = 0;
     double norm = N_VWrmsNorm(correction, weights);
     double max = bound_of(newton, tolerance);
@@ -60,55 +59,67 @@ static int converged(SUNNonlinearSolver solver, N_Vector y, N_Vector correction,
 /* ---- Damped ---- */
 
 /* correction = -A^-1 F with the present factors, F in newton->residual. */
-static int correct(drape_ida_newton *newton, N_Vector correction, void *ida)
+static int correct(drape_sun_newton *newton, N_Vector correction, void *library)
 {
     N_VScale(-1, newton->residual, correction);
     content_of(newton)->niters++;
-    return content_of(newton)->LSolve(correction, ida);
+    return content_of(newton)->LSolve(correction, library);
 }
 
 /* The same after factoring the matrix at the point of the last residual. */
-static int renew(drape_ida_newton *newton, N_Vector correction, void *ida)
+static int renew(drape_sun_newton *newton, N_Vector correction, void *library)
 {
     newton->bounds = true;
-    int code = content_of(newton)->LSetup(SUNTRUE, &content_of(newton)->jcur, ida);
+    int code = content_of(newton)->LSetup(SUNTRUE, &content_of(newton)->jcur, library);
     newton->bounds = false;
-    return code ? code : correct(newton, correction, ida);
+    return code ? code : correct(newton, correction, library);
+}
+
+/* What makes x' - v, or v' + M^-1 g, of a residual. */
+static double scale_of(const drape_sun_newton *newton, void *library)
+{
+    sunrealtype gamma = 1;
+    if (newton->gamma)
+        newton->gamma(library, &gamma);
+    return 1 / gamma;
 }
 
 /* Begins at the predicted x, with v = x': then every correction has dv = c_j dx, and the residual of
  * M v' + g alone decides how long it should be. */
-static int begin(drape_ida_newton *newton, N_Vector y, void *ida)
+static int begin(drape_sun_newton *newton, N_Vector y, void *library)
 {
     N_VConst(0, y);
-    int code = content_of(newton)->Sys(y, newton->residual, ida);
+    int code = content_of(newton)->Sys(y, newton->residual, library);
     if (code)
         return code;
     const int64_t n = N_VGetLength(y) / 2;
-    memcpy(N_VGetArrayPointer(y) + n, N_VGetArrayPointer(newton->residual), (size_t)n * sizeof(double));
-    return content_of(newton)->Sys(y, newton->residual, ida);
+    const double *f = N_VGetArrayPointer(newton->residual), scale = scale_of(newton, library);
+    double *v = N_VGetArrayPointer(y) + n;
+    for (int64_t i = 0; i < n; i++)
+        v[i] = scale * f[i];
+    return content_of(newton)->Sys(y, newton->residual, library);
 }
 
-/* Work of the residual of M v' + g along a correction. */
-static double work_along(const drape_ida_newton *newton, N_Vector correction)
+/* Work of the residual of M v' + g along a correction; with masses, in a unit that is the same in a step. */
+static double work_along(const drape_sun_newton *newton, N_Vector correction)
 {
     const int64_t n = N_VGetLength(correction) / 2;
     const double *f = N_VGetArrayPointer(newton->residual) + n, *dx = N_VGetArrayPointer(correction);
     double work = 0;
     for (int64_t i = 0; i < n; i++)
-        work += f[i] * dx[i];
+        work += (newton->mass ? newton->mass[i] * f[i] : f[i]) * dx[i];
     return work;
 }
 
 /* Moves y along the correction, as far as contact allows and as the residual does not push back by more
  * than a share of what it pushed at first. */
-static int search(drape_ida_newton *newton, N_Vector y, N_Vector correction, void *ida)
+static int search(drape_sun_newton *newton, N_Vector y, N_Vector correction, void *library)
 {
     const double before = work_along(newton, correction);
     double fraction = 1;
     for (int trial = 0; trial < MAX_TRIALS && before < 0; trial++) {
         N_VLinearSum(1, y, fraction, correction, newton->trial);
-        int code = content_of(newton)->Sys(newton->trial, newton->residual, ida);
+        int code = content_of(newton)->Sys(newton->trial, newton->residual, library);
         if (code < 0)
             return code;
         double after = code ? INFINITY : work_along(newton, correction);
@@ -123,21 +134,21 @@ static int search(drape_ida_newton *newton, N_Vector y, N_Vector correction, voi
 
 /* Its factors serve for the next correction while corrections contract. A correction within the bound is the
  * last one; so is one that would be, by factors that contract: that one is made without a search. */
-static int solve_damped(drape_ida_newton *newton, N_Vector y, N_Vector weights, double max, void *ida)
+static int solve_damped(drape_sun_newton *newton, N_Vector y, N_Vector weights, double max, void *library)
 {
     N_Vector d = newton->correction, next = newton->next;
-    int code = begin(newton, y, ida);
+    int code = begin(newton, y, library);
     if (!code)
-        code = renew(newton, d, ida);
+        code = renew(newton, d, library);
     for (int i = 0; i < MAX_CORRECTIONS && !code; i++) {
         const double size = N_VWrmsNorm(d, weights);
-        if ((code = search(newton, y, d, ida)) || size <= max)
+        if ((code = search(newton, y, d, library)) || size <= max)
             return code;
-        if ((code = correct(newton, next, ida)))
+        if ((code = correct(newton, next, library)))
             return code;
         const double left = N_VWrmsNorm(next, weights);
         if (!(left <= CHORD_RATE * size)) {
-            code = renew(newton, d, ida);
+            code = renew(newton, d, library);
         } else if (left <= max) {
             N_VLinearSum(1, y, 1, next, y);
             return 0;
@@ -150,26 +161,28 @@ static int solve_damped(drape_ida_newton *newton, N_Vector y, N_Vector weights, 
 /* SUNDIALS' iteration; where it fails, the damped one. If old factors fail, SUNDIALS makes new ones and tries
  * again. Without LSetup it does not: where the last new ones failed, the damped iteration comes at once. */
 static int solve(SUNNonlinearSolver solver, N_Vector predicted, N_Vector y, N_Vector weights,
-                 sunrealtype tolerance, int call_setup, void *ida)
+                 sunrealtype tolerance, int call_setup, void *library)
 {
     SUNNonlinearSolverContent_Newton content = solver->content;
-    drape_ida_newton *newton = content->ctest_data;
+    drape_sun_newton *newton = content->ctest_data;
     const SUNNonlinSolLSetupFn setup = content->LSetup;
+    if (newton->is_due)
+        call_setup = newton->is_due(newton->user);
     if (!call_setup && newton->failed)
         content->LSetup = NULL;
     content->jcur = SUNFALSE;
-    int code = newton->undamped(solver, predicted, y, weights, tolerance, call_setup, ida);
+    int code = newton->undamped(solver, predicted, y, weights, tolerance, call_setup, library);
     content->LSetup = setup;
     if (content->jcur)
         newton->failed = code > 0;
-    return code > 0 ? solve_damped(newton, y, weights, bound_of(newton, tolerance), ida) : code;
+    return code > 0 ? solve_damped(newton, y, weights, bound_of(newton, tolerance), library) : code;
 }
 
 /* ---- The object ---- */
 
-bool drape_ida_newton_attach(drape_ida_newton *newton, void *ida, N_Vector like, SUNContext sun)
+bool drape_sun_newton_create(drape_sun_newton *newton, N_Vector like, SUNContext sun)
 {
-    drape_ida_newton_forget(newton);
+    drape_sun_newton_forget(newton);
     newton->residual = N_VClone(like);
     newton->correction = N_VClone(like);
     newton->next = N_VClone(like);
@@ -179,16 +192,20 @@ bool drape_ida_newton_attach(drape_ida_newton *newton, void *ida, N_Vector like,
         return false;
     newton->undamped = newton->solver->ops->solve;
     newton->solver->ops->solve = solve;
-    return !IDASetNonlinearSolver(ida, newton->solver) &&
-           !SUNNonlinSolSetConvTestFn(newton->solver, converged, newton);
+    return true;
 }
 
-void drape_ida_newton_forget(drape_ida_newton *newton)
+bool drape_sun_newton_set_test(drape_sun_newton *newton)
+{
+    return !SUNNonlinSolSetConvTestFn(newton->solver, converged, newton);
+}
+
+void drape_sun_newton_forget(drape_sun_newton *newton)
 {
     newton->left = UNKNOWN;
 }
 
-void drape_ida_newton_archive(drape_ida_newton *newton, drape_archive *a)
+void drape_sun_newton_archive(drape_sun_newton *newton, drape_archive *a)
 {
     drape_archive_double(a, &newton->first);
     drape_archive_double(a, &newton->left);
@@ -196,7 +213,7 @@ void drape_ida_newton_archive(drape_ida_newton *newton, drape_archive *a)
     drape_archive_bool(a, &newton->failed);
 }
 
-void drape_ida_newton_free(drape_ida_newton *newton)
+void drape_sun_newton_free(drape_sun_newton *newton)
 {
     if (newton->solver)
         SUNNonlinSolFree(newton->solver);

@@ -1,0 +1,169 @@
+/* cmd_ivp.c: `drape ivp`: the test set of initial value problems: horizons, references, runs, scores. */
+#include "cli/lab.h"
+#include "cli/signals.h"
+#include "lab/ivp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct ivp_request {
+    cli_lab_request lab; /* its command first */
+    bool check;
+} ivp_request;
+
+#define SECONDS 60 /* [s] CPU that a family of methods may take for a reference */
+
+/* What is done with one scene; the operand after it, if there is one. */
+typedef drape_status ivp_deed(lab_ivp *s, const ivp_request *request, const char *more, bool *good);
+
+static drape_status horizon(lab_ivp *s, const ivp_request *request, const char *more, bool *good)
+{
+    (void)request, (void)more;
+    return lab_ivp_horizon(s, good, stdout);
+}
+
+static drape_status reference(lab_ivp *s, const ivp_request *request, const char *more, bool *good)
+{
+    const double seconds = request->lab.case_seconds > 0 ? request->lab.case_seconds : SECONDS;
+    (void)more, (void)good;
+    return lab_ivp_reference(s, seconds, request->check, stdout);
+}
+
+static drape_status score(lab_ivp *s, const ivp_request *request, const char *more, bool *good)
+{
+    (void)request, (void)good;
+    drape_status status = lab_ivp_read_reference(s);
+    return status ? status : lab_ivp_score(s, more, stdout);
+}
+
+static drape_status export(lab_ivp *s, const ivp_request *request, const char *more, bool *good)
+{
+    (void)more, (void)good;
+    drape_status status = lab_ivp_read_reference(s);
+    return status ? status : lab_ivp_export(s, request->lab.out, stdout);
+}
+
+static const struct {
+    const char *name;
+    ivp_deed *deed;
+    int operands; /* with a scene; 0: any number of scenes */
+    const char *usage;
+} actions[] = {
+    {"run", NULL, 0, "run SCENE..."},
+    {"horizon", horizon, 0, "horizon SCENE..."},
+    {"reference", reference, 0, "reference SCENE..."},
+    {"score", score, 2, "score SCENE POSITIONS.npy"},
+    {"export", export, 1, "export SCENE --out DIR"},
+};
+#define ACTIONS (sizeof actions / sizeof *actions)
+
+/* The methods over the scenes. */
+static int run_scenes(const ivp_request *request)
+{
+    cli_lab_request lab = request->lab;
+    lab.command.operands++;
+    lab.command.operand_count--;
+    lab.command.operand = lab.command.operands[0];
+    return cli_lab_run(&lab, 1, 0);
+}
+
+/* Failures of a scene, of a file that is read and of the output folder are bad input. */
+static int code_of(const cli_command *command, drape_status status)
+{
+    if (status == DRAPE_E_STOPPED)
+        return cli_report_interrupted(command->verb);
+    return cli_report(command,
+                      status == DRAPE_E_SOLVER || status == DRAPE_E_MEMORY ? CLI_FAILED : CLI_BAD_INPUT);
+}
+
+static bool interrupted(void *user)
+{
+    (void)user;
+    return cli_interrupted();
+}
+
+static int do_scene(const ivp_request *request, ivp_deed *deed, const char *scene, const char *more)
+{
+    const cli_command *command = &request->lab.command;
+    drape_arena arena = drape_arena_of(command->ctx);
+    lab_ivp s = {0};
+    bool good = true;
+    drape_status status = lab_ivp_open(&arena, scene, &s);
+    s.cancel = interrupted;
+    if (!status)
+        status = deed(&s, request, more, &good);
+    lab_ivp_close(&s);
+    fflush(stdout);
+    const int code = status ? code_of(command, status) : good ? CLI_GO_ON : CLI_FAILED;
+    drape_arena_free(&arena);
+    return code;
+}
+
+static int do_scenes(const ivp_request *request, size_t action)
+{
+    const cli_command *command = &request->lab.command;
+    int code = CLI_GO_ON, worst = CLI_DONE;
+    const int scenes = actions[action].operands ? 1 : command->operand_count - 1;
+    for (int i = 1; i <= scenes && code != CLI_INTERRUPTED; i++) {
+        if (scenes > 1)
+            printf("%s\n", command->operands[i]);
+        code = do_scene(request, actions[action].deed, command->operands[i],
+                        actions[action].operands == 2 ? command->operands[2] : NULL);
+        worst = code > worst ? code : worst;
+    }
+    return worst;
+}
+
+static int run(const void *given)
+{
+    const ivp_request *request = given;
+    const cli_command *command = &request->lab.command;
+    size_t i = 0;
+    while (i < ACTIONS && strcmp(actions[i].name, command->operand) != 0)
+        i++;
+    if (i == ACTIONS)
+        return cli_misuse("ivp",
+                          "there is no \"%.60s\"; must be one of run, horizon, reference, score, export",
+                          command->operand);
+    const int given_operands = command->operand_count - 1;
+    if (given_operands < 1 || (actions[i].operands && given_operands != actions[i].operands))
+        return cli_misuse("ivp", "usage: drape ivp %s", actions[i].usage);
+    if (actions[i].deed == export && !request->lab.out)
+        return cli_misuse("ivp", "--out is missing: the folder of the export");
+    return actions[i].deed ? do_scenes(request, i) : run_scenes(request);
+}
+
+static const cli_option options[] = {
+    CLI_LAB_OPTIONS,
+    CLI_LAB_OPTION("repeats", CLI_NUMBER, "N",
+                   "runs of a short case, of which the fastest counts (default 3)", repeats, 100),
+    CLI_LAB_OPTION(
+        "budget", CLI_TEXT, "MINUTES",
+        "limit of wall-clock time; the least informative cases are left out and named (default none)", budget,
+        0),
+    {"check", CLI_FLAG, NULL, "reference: compare with the stored one instead of storing it",
+     offsetof(ivp_request, check), 0, NULL},
+};
+
+const drape_verb drape_verb_ivp = {
+    .entry = {.name = "ivp",
+              .summary = "the test set of initial value problems: all integrators against references"},
+    .operand = "ACTION SCENE...",
+    .max_operands = 1000,
+    .details =
+        "drape ivp run SCENE...            every integrator over its dt or rtol: errors, costs, orders, "
+        "tables\n"
+        "drape ivp score SCENE FILE.npy    how far the frames of another program are from the reference\n"
+        "drape ivp export SCENE --out DIR  mesh, masses, pins and reference for another program\n"
+        "drape ivp reference SCENE...      compute references/NAME.npy beside the scene, by unrelated "
+        "methods\n"
+        "drape ivp horizon SCENE...        measure how a perturbation grows, into horizons/NAME.json\n"
+        "The scenes are in examples/ivp. A run of which cases were left out, or that was stopped, continues "
+        "by the\n"
+        "same command. --case-seconds is also the CPU time that a method may take for a reference (default "
+        "60).",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .request_size = sizeof(ivp_request),
+    .run = run,
+};

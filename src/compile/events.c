@@ -1,0 +1,199 @@
+/* events.c: events by name, with their parameters, cloths and pins. */
+#include "events/events.h"
+#include "compile/compile.h"
+#include "compile/stages.h"
+#include "model/scene.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* An event under construction: of a scene, or of a host whose sim has a model already. */
+typedef struct place {
+    drape_context *ctx;
+    drape_arena *arena;
+    const drape_model *model;
+    const char *pointer; /* of the event: "/events/0" */
+} place;
+
+static drape_status refuse(const place *p, const char *key, const char *text)
+{
+    char at[96];
+    snprintf(at, sizeof at, "%s/%s", p->pointer, key);
+    return drape_fail_at(p->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
+}
+
+static drape_status find_cloth(const place *p, const char *name, drape_model_event *to)
+{
+    char text[128];
+    to->cloth = -1;
+    for (int32_t c = 0; name && c < p->model->cloth_count; c++)
+        if (strcmp(p->model->cloths[c].name, name) == 0)
+            to->cloth = c;
+    snprintf(text, sizeof text, "there is no cloth \"%.60s\"", name ? name : "");
+    return !name || to->cloth >= 0 ? DRAPE_OK : refuse(p, "cloth", text);
+}
+
+static bool concerns(const drape_pin *pin, const drape_model_event *event, const char *name)
+{
+    return (event->cloth < 0 || pin->cloth == event->cloth) && (!name || strcmp(pin->name, name) == 0);
+}
+
+/* A node that several of the pins hold is listed once. */
+static drape_status list_nodes(const place *p, drape_model_event *to)
+{
+    const drape_model *m = p->model;
+    int32_t count = 0;
+    drape_arena scratch = drape_arena_of(p->ctx);
+    uint8_t *held = drape_arena_take(&scratch, (size_t)m->node_count, sizeof *held);
+    for (int32_t k = 0; held && k < to->pin_count; k++) {
+        const drape_pin *pin = &m->pins[to->pin[k]];
+        for (int32_t i = 0; i < pin->node_count; i++) {
+            count += !held[pin->node[i]];
+            held[pin->node[i]] = 1;
+        }
+    }
+    to->pinned = drape_arena_take(p->arena, (size_t)count, sizeof *to->pinned);
+    for (int32_t i = 0; held && to->pinned && i < m->node_count; i++)
+        if (held[i])
+            to->pinned[to->pinned_count++] = i;
+    const drape_status status = drape_arena_status(&scratch);
+    drape_arena_free(&scratch);
+    return status ? status : drape_arena_status(p->arena);
+}
+
+static drape_status find_pins(const place *p, const char *name, drape_model_event *to)
+{
+    const drape_model *m = p->model;
+    char text[192];
+    for (int32_t k = 0; k < m->pin_count; k++)
+        to->pin_count += concerns(&m->pins[k], to, name);
+    to->pin = drape_arena_take(p->arena, (size_t)to->pin_count, sizeof *to->pin);
+    if (!to->pin)
+        return DRAPE_E_MEMORY;
+    int32_t count = 0;
+    for (int32_t k = 0; k < m->pin_count; k++)
+        if (concerns(&m->pins[k], to, name))
+            to->pin[count++] = k;
+    snprintf(text, sizeof text, "there are no pins \"%.60s\" in %s%.60s", name ? name : "",
+             to->cloth < 0 ? "any cloth" : "cloth ", to->cloth < 0 ? "" : m->cloths[to->cloth].name);
+    return name && count == 0 ? refuse(p, "pins", text) : list_nodes(p, to);
+}
+
+/* The place of a text among the choices of a key; NULL is the first. */
+static drape_status choose(const place *p, const char *key, const char *text, int *out)
+{
+    const drape_setting setting = {.name = key, .text = text};
+    char at[96];
+    double value = 0;
+    snprintf(at, sizeof at, "%s/%s", p->pointer, key);
+    const drape_status status =
+        text ? drape_param_value(p->ctx, at, &drape_scene_key_of(&drape_form_event, key)->param, &setting,
+                                 &value)
+             : DRAPE_OK;
+    *out = (int)value;
+    return status;
+}
+
+/* The rest shapes of clamped edges contain the directions in which they are held. */
+static drape_status check_release(const place *p, const drape_model_event *to)
+{
+    char text[128];
+    for (int32_t k = 0; k < to->pin_count; k++) {
+        const drape_pin *pin = &p->model->pins[to->pin[k]];
+        snprintf(text, sizeof text, "the pins \"%.60s\" clamp edges; such pins cannot be released",
+                 pin->name);
+        if (pin->clamps)
+            return refuse(p, "action", text);
+    }
+    return to->pinned_count > 0 ? DRAPE_OK : refuse(p, "action", "there are no pins to release");
+}
+
+/* All but the event function. */
+static drape_status resolve(const place *p, const drape_event_def *def, drape_model_event *to)
+{
+    int direction = 0, action = 0;
+    drape_status status = choose(p, "direction", def->direction, &direction);
+    if (!status)
+        status = choose(p, "action", def->action, &action);
+    to->direction = (drape_event_direction)direction;
+    to->action = (drape_event_action)action;
+    to->once = def->once;
+    if (!status)
+        status = find_cloth(p, def->cloth, to);
+    if (!status)
+        status = find_pins(p, def->pins, to);
+    return status || to->action != DRAPE_ACTION_RELEASE ? status : check_release(p, to);
+}
+
+/* ---- Of a scene ---- */
+
+static drape_status name_event(const place *p, const char *given, drape_model *model, drape_model_event *to)
+{
+    char name[32], text[128];
+    const int32_t index = (int32_t)(to - model->events);
+    snprintf(name, sizeof name, "event%d", (int)index);
+    const char *wanted = given ? given : name;
+    snprintf(text, sizeof text, "two events have the name \"%.60s\"", wanted);
+    for (int32_t i = 0; i < index; i++)
+        if (strcmp(model->events[i].name, wanted) == 0)
+            return refuse(p, "name", text);
+    to->name = drape_arena_text(p->arena, wanted);
+    return drape_arena_status(p->arena);
+}
+
+static drape_status find_function(const place *p, const drape_event_def *def, drape_model *model,
+                                  drape_model_event *to)
+{
+    char at[96];
+    int i;
+    snprintf(at, sizeof at, "%s/type", p->pointer);
+    drape_status status = drape_registry_choose(p->ctx, &drape_event_registry, at, def->entry.type, &i);
+    if (status)
+        return status;
+    to->ops = drape_events[i];
+    status = drape_compile_choice(model, &def->entry, "", &to->choice);
+    if (!status)
+        status = drape_params_resolve(p->ctx, p->pointer, to->ops->entry.params, to->ops->entry.param_count,
+                                      def->entry.settings, def->entry.setting_count, to->values);
+    if (!status && to->ops->needs_pins && to->pinned_count == 0)
+        status = refuse(p, "type", "the event is about pins, and there are none");
+    return status || !to->ops->check ? status : to->ops->check(p->ctx, p->pointer, model, to);
+}
+
+static drape_status compile_event(drape_model *model, size_t i, const drape_event_def *def)
+{
+    drape_model_event *to = &model->events[i];
+    char pointer[64];
+    const place p = {.ctx = model->ctx, .arena = &model->arena, .model = model, .pointer = pointer};
+    snprintf(pointer, sizeof pointer, "/events/%zu", i);
+    drape_status status = name_event(&p, def->name, model, to);
+    if (!status)
+        status = resolve(&p, def, to);
+    return status ? status : find_function(&p, def, model, to);
+}
+
+drape_status drape_compile_events(drape_model *model, const drape_scene_def *def)
+{
+    drape_status status = DRAPE_OK;
+    if (def->event_count == 0)
+        return DRAPE_OK;
+    model->events = drape_arena_take(&model->arena, def->event_count, sizeof *model->events);
+    if (!model->events)
+        return DRAPE_E_MEMORY;
+    for (size_t i = 0; !status && i < def->event_count; i++)
+        status = compile_event(model, i, &def->events[i]);
+    model->event_count = status ? 0 : (int32_t)def->event_count;
+    return status;
+}
+
+/* ---- Of a host ---- */
+
+drape_status drape_compile_host_event(drape_context *ctx, drape_arena *arena, const drape_model *model,
+                                      const drape_event_def *def, drape_model_event *to)
+{
+    const place p = {.ctx = ctx, .arena = arena, .model = model, .pointer = "/event"};
+    *to = (drape_model_event){.ops = NULL};
+    to->name = drape_arena_text(arena, def->name);
+    const drape_status status = drape_arena_status(arena);
+    return status ? status : resolve(&p, def, to);
+}

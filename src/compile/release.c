@@ -1,0 +1,71 @@
+/* release.c: a model without some of its pins. What depends on which nodes are free is computed anew: their
+ * numbers, the pattern of the matrix, and the places of elements in it. Everything else is shared. */
+#include "compile/compile.h"
+#include "compile/stages.h"
+
+#include <string.h>
+
+static drape_status copy_terms(drape_model *model)
+{
+    const drape_term *from = model->terms;
+    model->terms = drape_arena_take(&model->arena, (size_t)model->term_count, sizeof *model->terms);
+    if (!model->terms)
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < model->term_count; i++) {
+        drape_term *term = &model->terms[i];
+        *term = from[i];
+        term->block = NULL;
+        if (term->elements.parts)
+            term->elements.parts = &term->parts;
+    }
+    return DRAPE_OK;
+}
+
+/* track_of_node (node_count) */
+static void list_tracks(const drape_model *base, const uint8_t *released, int32_t *track_of_node)
+{
+    for (int32_t i = 0; i < base->node_count; i++)
+        track_of_node[i] = -1;
+    for (int32_t i = 0; i < base->moved_count; i++)
+        if (!released[base->moved_node[i]])
+            track_of_node[base->moved_node[i]] = base->moved_track[i];
+}
+
+static drape_status number(drape_model *model, const uint8_t *released)
+{
+    const drape_model *base = model->base;
+    const size_t nodes = (size_t)model->node_count;
+    int32_t *track_of_node = drape_alloc(model->ctx, nodes, sizeof *track_of_node);
+    model->pinned = drape_arena_take(&model->arena, nodes, sizeof *model->pinned);
+    model->free_of_node = drape_arena_take(&model->arena, nodes, sizeof *model->free_of_node);
+    model->free_count = model->moved_count = 0;
+    drape_status status = track_of_node ? drape_arena_status(&model->arena) : DRAPE_E_MEMORY;
+    if (!status) {
+        for (size_t i = 0; i < nodes; i++)
+            model->pinned[i] = base->pinned[i] && !released[i];
+        list_tracks(base, released, track_of_node);
+        status = drape_compile_number_nodes(model, track_of_node);
+    }
+    drape_free(model->ctx, track_of_node);
+    return status;
+}
+
+drape_status drape_compile_released(drape_context *ctx, const drape_model *base, const uint8_t *released,
+                                    drape_model **out)
+{
+    drape_model *model = *out = drape_alloc(ctx, 1, sizeof *model);
+    if (!model)
+        return DRAPE_E_MEMORY;
+    *model = *base;
+    model->base = base;
+    model->arena = drape_arena_of(ctx);
+    model->ctx = ctx;
+    drape_status status = copy_terms(model);
+    if (!status)
+        status = number(model, released);
+    if (!status)
+        status = drape_compile_pattern(model);
+    if (status)
+        drape_model_destroy(out);
+    return status;
+}

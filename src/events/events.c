@@ -1,0 +1,68 @@
+/* events.c: what event functions share. */
+#include "events/events.h"
+
+#include "base/vec3.h"
+
+#include <stdio.h>
+
+enum { LOWEST, HIGHEST, CENTER };
+const char *const drape_event_nodes[] = {"lowest", "highest", "center", NULL};
+
+drape_status drape_event_check_node(drape_context *ctx, const char *pointer, const drape_model *model,
+                                    drape_model_event *event)
+{
+    const double node = event->values[DRAPE_EVENT_NODE];
+    char at[128];
+    snprintf(at, sizeof at, "%s/node", pointer);
+    if (isnan(node))
+        return DRAPE_OK;
+    if (event->cloth < 0 && model->cloth_count > 1)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at,
+                             "a node is a number within one cloth: \"cloth\" must name one of the %d",
+                             (int)model->cloth_count);
+    const drape_cloth *cloth = &model->cloths[event->cloth < 0 ? 0 : event->cloth];
+    if (node >= cloth->mesh.node_count)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "node %.0f is not in the mesh; its nodes are 0 to %d",
+                             node, (int)cloth->mesh.node_count - 1);
+    return DRAPE_OK;
+}
+
+/* The nodes of the event's cloths: [first, end). */
+static void range_of(const drape_event_point *p, int32_t *first, int32_t *end)
+{
+    *first = 0;
+    *end = p->model->node_count;
+    if (p->event->cloth < 0)
+        return;
+    const drape_cloth *cloth = &p->model->cloths[p->event->cloth];
+    *first = cloth->first_node;
+    *end = *first + cloth->mesh.node_count;
+}
+
+static double center(const drape_event_point *p, const double direction[3], int32_t first, int32_t end)
+{
+    double sum = 0, mass = 0;
+    for (int32_t i = first; i < end; i++) {
+        sum += p->model->mass[i] * vec3_dot(direction, p->x + 3 * (size_t)i);
+        mass += p->model->mass[i];
+    }
+    return sum / mass;
+}
+
+double drape_event_position(const drape_event_point *p, const double direction[3])
+{
+    const double node = p->event->values[DRAPE_EVENT_NODE];
+    const int of = (int)p->event->values[DRAPE_EVENT_OF];
+    int32_t first, end;
+    range_of(p, &first, &end);
+    if (!isnan(node))
+        return vec3_dot(direction, p->x + 3 * ((size_t)first + (size_t)node));
+    if (of == CENTER)
+        return center(p, direction, first, end);
+    double extreme = of == LOWEST ? INFINITY : -INFINITY;
+    for (int32_t i = first; i < end; i++) {
+        const double along = vec3_dot(direction, p->x + 3 * (size_t)i);
+        extreme = of == LOWEST ? fmin(extreme, along) : fmax(extreme, along);
+    }
+    return extreme;
+}

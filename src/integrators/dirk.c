@@ -1,0 +1,379 @@
+/*
+ * dirk: singly diagonally implicit Runge-Kutta methods whose first stage is explicit (ESDIRK), of orders
+ * 2 to 5, with step sizes by the embedded error, by ARKODE's ARKStep (Reynolds, Gardner, Woodward &
+ * Chinomona 2023), for
+ *     y' = (v, -M^-1 g(x, v, t)).
+ * All are L-stable and stiffly accurate: waves that a step does not resolve die out within it, at every
+ * order, unlike in the BDF of order 3 and more. All stages have the same gamma, and so one matrix.
+ * first_order.h has all that does not concern ARKODE alone.
+ *     order 2: TR-BDF2, 3 stages (Bank et al. 1985; Hosea & Shampine 1996)
+ *           3: ESDIRK3(2)I5L[2]SA, 5 stages (Kennedy & Carpenter 2016)
+ *           4: ARK4(3)7L[2]SA1, 7 stages (Kennedy & Carpenter 2019)
+ *           5: ARK5(4)8L[2]SA2, 8 stages (the same)
+ * Among the tables of ARKODE these need the fewest residuals for an error of 1e-3 to 1e-7 of the size, on a
+ * soft and on a stiff sheet.
+ *
+ * A step depends on the state at its beginning, the derivative there, and the size that was chosen for it.
+ * ARKODE is started anew in each step with these, so a checkpoint has all of its history. The derivative is
+ * that of the last stage of the step before, as deduced from the stage equation: an evaluation of the force
+ * would multiply the error of the Newton iteration by the stiffness (Shampine 1980, Implementation of
+ * implicit formulas).
+ *
+ * Between the ends of a step positions are interpolated by Hermite's polynomials: of degree 3 from
+ * positions and velocities at order 2 and 3, of degree 5 with accelerations above. Their local error is
+ * of one order more than the method.
+ */
+#include "base/elementary.h"
+#include "integrators/first_order.h"
+
+#include <arkode/arkode_arkstep.h>
+#include <math.h>
+#include <string.h>
+
+#define LOOSE_ORDER  3
+#define TIGHT_ORDER  5
+#define NEWTON_SHARE 0.1 /* of the error tolerance: bound for the error of the Newton iteration */
+/* The matrix is factored again when gamma changed by more than this; the test of convergence notices
+ * earlier if it must be. */
+#define GAMMA_CHANGE    0.2
+#define MAX_CORRECTIONS 6 /* of the undamped Newton iteration */
+/* The next step, from the estimated local error e of this one and the one before, relative to the
+ * tolerance: h S e^(-I/k) e'^(P/k), k the order of the error (Gustafsson 1991). A growth below KEEP is
+ * not worth a new matrix. */
+#define SAFETY     0.9
+#define INTEGRAL   0.7
+#define PROPORTION 0.3
+#define SHRINK     0.2
+#define GROWTH     5.0
+#define KEEP       1.2
+#define TINY_ERROR 1e-10
+
+static const drape_param params[] = {
+    DRAPE_FIRST_ORDER_PARAMS(DRAPE_INTEGER("order", "1", DRAPE_DERIVED("3 for rtol >= 1e-4, else 5"), 2, 5,
+                                           "order of the method")),
+};
+
+static const struct {
+    ARKODE_DIRKTableID table;
+    int stages;
+    int error_order; /* of h in the estimated local error */
+} methods[] = {
+    [2] = {ARKODE_TRBDF2_3_3_2, 3, 3},
+    [3] = {ARKODE_ESDIRK32I5L2SA_5_2_3, 5, 3},
+    [4] = {ARKODE_ARK437L2SA_DIRK_7_3_4, 7, 4},
+    [5] = {ARKODE_ARK548L2SAb_DIRK_8_4_5, 8, 5},
+};
+
+typedef struct dirk_state {
+    drape_first_order base;       /* y, rate: at the end of the last step */
+    N_Vector before, rate_before; /* at its beginning */
+    N_Vector far;                 /* that stage of the step which is farthest from its beginning: */
+    double far_after, last_after; /* [s] its time, and that of the last stage, after the beginning */
+    double t, h;                  /* [s] that end; size of that step */
+    double next;                  /* [s] size of the next step */
+    double error;                 /* estimated local error of the last step relative to the tolerance */
+    double stop;                  /* [s] steps end there */
+} dirk_state;
+
+static int order_of(const dirk_state *s)
+{
+    return (int)s->base.values[DRAPE_FIRST_ORDER_ORDER];
+}
+
+static int system_matrix(sunrealtype t, N_Vector y, N_Vector rate, SUNMatrix matrix, SUNMatrix mass,
+                         sunbooleantype keep, sunbooleantype *renewed, sunrealtype gamma, void *user,
+                         N_Vector a, N_Vector b, N_Vector c)
+{
+    (void)rate, (void)matrix, (void)mass, (void)keep, (void)a, (void)b, (void)c;
+    *renewed = SUNTRUE;
+    return drape_first_order_jacobian(user, t, 1 / gamma, N_VGetArrayPointer(y));
+}
+
+/* c_j of the factors relative to that of the stage. */
+static double ratio_of(const drape_first_order *f)
+{
+    sunrealtype gamma = 0;
+    ARKStepGetCurrentGamma(f->memory, &gamma);
+    return gamma * f->factored_cj;
+}
+
+/* ARKODE, which is started anew in each step, does not know the factors of the step before. */
+static bool matrix_is_due(void *user)
+{
+    return !(fabs(ratio_of(user) - 1) <= GAMMA_CHANGE);
+}
+
+/* Factors for another gamma make corrections that are too long or too short: their mean over all waves is
+ * corrected, as by SUNDIALS. */
+static int solve(SUNLinearSolver linear_solver, SUNMatrix matrix, N_Vector out, N_Vector in,
+                 sunrealtype tolerance)
+{
+    const drape_sun_linear *linear = linear_solver->content;
+    int status = drape_first_order_solve_rhs(linear_solver, matrix, out, in, tolerance);
+    N_VScale(2 / (1 + ratio_of(linear->owner)), out, out);
+    return status;
+}
+
+/* The derivative at the beginning of the step is known. */
+static int rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user)
+{
+    const dirk_state *s = user;
+    if (t != s->t)
+        return drape_first_order_rhs(t, y, rate, user);
+    N_VScale(1, s->base.rate, rate);
+    return 0;
+}
+
+/* Predicts a stage: Taylor's polynomial at the beginning of the step, with one term more from the farthest
+ * stage. ARKODE's own predictors use earlier steps, which it does not know. y of the stage before is in
+ * f->y. */
+static int predict(sunrealtype t, N_Vector predicted, void *user)
+{
+    dirk_state *s = user;
+    const drape_first_order *f = &s->base;
+    const double c = t - s->t, *y = N_VGetArrayPointer(s->before), *r = N_VGetArrayPointer(s->rate_before),
+                 *z = N_VGetArrayPointer(s->far);
+    double *out = N_VGetArrayPointer(predicted);
+    if (s->last_after > s->far_after) {
+        N_VScale(1, f->y, s->far);
+        s->far_after = s->last_after;
+    }
+    const double d = s->far_after, u = d > 0 ? c / d : 0;
+    for (int64_t i = 0; i < f->n; i++) {
+        const int64_t j = f->n + i;
+        const double x = y[i] + c * (y[j] + c / 2 * r[j]), v = y[j] + c * r[j];
+        out[i] = d > 0 ? x + u * u * u * (z[i] - y[i] - d * (y[j] + d / 2 * r[j])) : x;
+        out[j] = d > 0 ? v + u * u * (z[j] - y[j] - d * r[j]) : v;
+    }
+    s->last_after = c;
+    return 0;
+}
+
+static bool configure(drape_first_order *f)
+{
+    void *m = f->memory;
+    DRAPE_ARKODE_QUIET(m);
+    bool good = !ARKStepSetUserData(m, f) && !ARKStepSVtolerances(m, 0, f->weights) &&
+                !ARKStepSetTableNum(m, methods[order_of((dirk_state *)f)].table, ARKODE_ERK_NONE) &&
+                !ARKStepSetLinearSolver(m, f->linear->solver, f->linear->matrix) &&
+                !ARKStepSetLinSysFn(m, system_matrix) && !ARKStepSetLinearSolutionScaling(m, SUNFALSE) &&
+                !ARKStepSetNonlinearSolver(m, f->newton.solver) && drape_sun_newton_set_test(&f->newton) &&
+                !ARKStepSetDeduceImplicitRhs(m, SUNTRUE) && !ARKStepSetStagePredictFn(m, predict) &&
+                !ARKStepSetMaxNonlinIters(m, MAX_CORRECTIONS) &&
+                !ARKStepSetMaxErrTestFails(m, DRAPE_FIRST_ORDER_ERROR_FAILS) &&
+                !ARKStepSetMaxConvFails(m, DRAPE_FIRST_ORDER_SOLVER_FAILS) &&
+                !ARKStepSetNonlinConvCoef(m, NEWTON_SHARE) && !ARKStepSetMaxHnilWarns(m, -1);
+    if (good && !isnan(f->values[DRAPE_FIRST_ORDER_MAX_STEP]))
+        good = !ARKStepSetMaxStep(m, f->values[DRAPE_FIRST_ORDER_MAX_STEP]);
+    return good;
+}
+
+static bool create_arkode(drape_first_order *f)
+{
+    dirk_state *s = (dirk_state *)f;
+    f->linear->solver->ops->solve = solve;
+    f->newton.mass = f->mass;
+    f->newton.gamma = ARKStepGetCurrentGamma;
+    f->newton.is_due = matrix_is_due;
+    f->newton.user = f;
+    s->before = N_VClone(f->y);
+    s->rate_before = N_VClone(f->y);
+    s->far = N_VClone(f->y);
+    if (!s->before || !s->rate_before || !s->far)
+        return false;
+    N_VConst(0, s->before);
+    N_VConst(0, s->rate_before);
+    f->memory = ARKStepCreate(NULL, rhs, 0, f->y, f->sun);
+    return f->memory && configure(f);
+}
+
+static void destroy_arkode(drape_first_order *f)
+{
+    dirk_state *s = (dirk_state *)f;
+    if (f->memory)
+        ARKStepFree(&f->memory);
+    N_Vector vectors[] = {s->before, s->rate_before, s->far};
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
+        if (vectors[i])
+            N_VDestroy(vectors[i]);
+}
+
+static bool begin(drape_first_order *f, double t, double h)
+{
+    dirk_state *s = (dirk_state *)f;
+    s->t = t;
+    s->next = h > 0 ? h : drape_first_order_first_step(f);
+    s->error = 1;
+    return true;
+}
+
+static bool stop_at(drape_first_order *f, double stop)
+{
+    ((dirk_state *)f)->stop = stop;
+    return true;
+}
+
+static drape_first_order_outcome outcome_of(int code)
+{
+    switch (code) {
+    case ARK_SUCCESS:
+    case ARK_TSTOP_RETURN:
+        return DRAPE_FIRST_ORDER_STEPPED;
+    case ARK_ERR_FAILURE:
+        return DRAPE_FIRST_ORDER_ERROR_TEST;
+    case ARK_TOO_MUCH_ACC:
+        return DRAPE_FIRST_ORDER_ROUND_OFF;
+    case ARK_CONV_FAILURE:
+        return DRAPE_FIRST_ORDER_NEWTON;
+    case ARK_LSETUP_FAIL:
+    case ARK_LSOLVE_FAIL:
+        return DRAPE_FIRST_ORDER_SINGULAR;
+    case ARK_RHSFUNC_FAIL:
+    case ARK_FIRST_RHSFUNC_ERR:
+    case ARK_REPTD_RHSFUNC_ERR:
+    case ARK_UNREC_RHSFUNC_ERR:
+        return DRAPE_FIRST_ORDER_RESIDUAL;
+    default: /* ARK_MEM_NULL, ARK_ILL_INPUT, ARK_LINIT_FAIL, ARK_VECTOROP_ERR ... */
+        return DRAPE_FIRST_ORDER_REFUSED;
+    }
+}
+
+/* After a failed attempt the size does not grow. A step that was cut, to end at a stop, says nothing
+ * against the size that had been chosen. */
+static void choose_next(dirk_state *s)
+{
+    drape_first_order *f = &s->base;
+    const int k = methods[order_of(s)].error_order;
+    long attempts = 0;
+    ARKStepGetNumStepAttempts(f->memory, &attempts);
+    ARKStepGetEstLocalErrors(f->memory, f->between);
+    const double error = fmax(TINY_ERROR, drape_first_order_norm(f, f->between)), chosen = s->next;
+    double growth = SAFETY * drape_pow(error, -INTEGRAL / k) * drape_pow(s->error, PROPORTION / k);
+    growth = fmax(SHRINK, fmin(attempts > 1 ? 1 : GROWTH, growth));
+    if (growth > 1 && growth < KEEP)
+        growth = 1;
+    s->next = growth * s->h;
+    if (attempts == 1 && s->t == s->stop)
+        s->next = fmax(s->next, chosen);
+    s->error = error;
+}
+
+/* That of the last stage, whose state is the end of the step. */
+static bool copy_last_derivative(drape_first_order *f)
+{
+    N_Vector predicted, z, derivative = NULL, data;
+    sunrealtype t, gamma;
+    void *user;
+    if (ARKStepGetNonlinearSystemData(f->memory, &t, &predicted, &z, &derivative, &gamma, &data, &user))
+        return false;
+    N_VScale(1, derivative, f->rate);
+    return true;
+}
+
+static drape_first_order_outcome step(drape_first_order *f, double end, double *t)
+{
+    dirk_state *s = (dirk_state *)f;
+    void *m = f->memory;
+    N_VScale(1, f->y, s->before);
+    N_VScale(1, f->rate, s->rate_before);
+    s->far_after = s->last_after = 0;
+    f->counted = 0; /* ARKODE begins to count */
+    if (ARKStepReInit(m, NULL, rhs, s->t, s->before) || ARKStepSetInitStep(m, s->next) ||
+        ARKStepSetStopTime(m, s->stop))
+        return DRAPE_FIRST_ORDER_REFUSED;
+    const drape_first_order_outcome outcome = outcome_of(ARKStepEvolve(m, end, f->y, t, ARK_ONE_STEP));
+    if (outcome != DRAPE_FIRST_ORDER_STEPPED)
+        return outcome;
+    if (!copy_last_derivative(f))
+        return DRAPE_FIRST_ORDER_REFUSED;
+    s->h = *t - s->t;
+    s->t = *t;
+    choose_next(s);
+    return outcome;
+}
+
+/* Hermite's polynomials. */
+static int dense(drape_first_order *f, double t, N_Vector out)
+{
+    const dirk_state *s = (const dirk_state *)f;
+    const double *y0 = N_VGetArrayPointer(s->before), *y1 = N_VGetArrayPointer(f->y),
+                 *r0 = N_VGetArrayPointer(s->rate_before), *r1 = N_VGetArrayPointer(f->rate), h = s->h,
+                 u = (t - (s->t - h)) / h, w = 1 - u;
+    const bool quintic = order_of(s) > 3;
+    double *y = N_VGetArrayPointer(out);
+    for (int64_t i = 0; i < f->n; i++) {
+        const int64_t j = f->n + i;
+        if (quintic)
+            y[i] = w * w * w *
+                       (y0[i] * (1 + 3 * u + 6 * u * u) + h * u * (y0[j] * (1 + 3 * u) + h * u / 2 * r0[j])) +
+                   u * u * u *
+                       (y1[i] * (1 + 3 * w + 6 * w * w) - h * w * (y1[j] * (1 + 3 * w) - h * w / 2 * r1[j]));
+        else
+            y[i] =
+                w * w * (y0[i] * (1 + 2 * u) + h * u * y0[j]) + u * u * (y1[i] * (1 + 2 * w) - h * w * y1[j]);
+    }
+    return 0;
+}
+
+static bool archive_arkode(drape_first_order *f, drape_archive *a)
+{
+    dirk_state *s = (dirk_state *)f;
+    N_Vector vectors[] = {f->y, f->rate, s->before, s->rate_before};
+    double *const numbers[] = {&s->t, &s->h, &s->next, &s->error};
+    drape_archive_mark(a, "arkode");
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
+        drape_archive_doubles(a, N_VGetArrayPointer(vectors[i]), 2 * (size_t)f->n);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        drape_archive_double(a, numbers[i]);
+    return true;
+}
+
+/* Three here; of the stages, the interpolation, and scratch. */
+static int vectors(const drape_first_order *f)
+{
+    return 3 + methods[order_of((const dirk_state *)f)].stages + 4 + 9;
+}
+
+static const drape_first_order_solver solver = {
+    .name = "ARKODE",
+    .create = create_arkode,
+    .destroy = destroy_arkode,
+    .begin = begin,
+    .stop_at = stop_at,
+    .step = step,
+    .last_step = ARKStepGetLastStep,
+    .current_step = ARKStepGetCurrentStep,
+    .iterations = ARKStepGetNumNonlinSolvIters,
+    .errors = ARKStepGetEstLocalErrors,
+    .dense = dense,
+    .archive = archive_arkode,
+    .vectors = vectors,
+};
+
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
+{
+    dirk_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
+    return s ? drape_first_order_create(&s->base, &solver, arena, system, values, DRAPE_FIRST_ORDER_OWN,
+                                        LOOSE_ORDER, TIGHT_ORDER)
+             : DRAPE_E_MEMORY;
+}
+
+const drape_integrator_ops drape_integrator_dirk = {
+    .entry = {.name = "dirk",
+              .summary = "L-stable Runge-Kutta methods of order 2 to 5 with local error control by ARKODE",
+              .reference = "Kennedy & Carpenter 2016, 2019; Reynolds et al. 2023, ARKODE",
+              DRAPE_PARAMS(params)},
+    .order = 5,
+    .create = create,
+    .own_steps = true,
+    .gain = DRAPE_FIRST_ORDER_GAIN,
+    .smooth_forces = true,
+    .step = drape_first_order_step,
+    .interpolate = drape_first_order_interpolate,
+    .interpolate_velocities = drape_first_order_interpolate_velocities,
+    .restart = drape_first_order_restart,
+    .work = drape_first_order_work,
+    .archive = drape_first_order_archive,
+    .bytes = drape_first_order_bytes,
+    .destroy = drape_first_order_destroy,
+};

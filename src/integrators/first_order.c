@@ -1,0 +1,662 @@
+/* first_order.c: see first_order.h. The callbacks of a solver follow in the order in which it calls them,
+ * then the stages of a step around it. */
+#include "integrators/first_order.h"
+
+#include "base/finite.h"
+#include "base/reason.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
+
+#define FIRST_SHARE    1e-3 /* of the first step; IDA's own */
+#define FIRST_CHANGE   0.5
+#define MAX_EXACT_SPAN 64 /* maximum number of exact matrices in a row if symmetric ones keep failing */
+/* Fraction of the time: steps whose sum ends this near to the end of an advance end there. What is left is
+ * the sum's rounding error, which the schedule does not step over. */
+#define LANDED (1e3 * DBL_EPSILON)
+/* Of the time in which the scene moves by its size. What comes too near crosses the least gap of contact,
+ * 1e-3 of a thickness, in longer steps at any speed that it can have, so steps as short as this, one
+ * after the other, lead nowhere. A few may start the solver. */
+#define LEAST_STEP 1e-10
+#define MAX_TINY   20
+
+const char *const drape_first_order_matrices[] = {
+    [MATRIX_AUTO] = "auto", [MATRIX_SYMMETRIC] = "symmetric", [MATRIX_EXACT] = "exact", NULL};
+/* ---- Between vectors and nodes ---- */
+
+/* Within a step no pin has a kink, so its velocity is the same at any time inside the span. */
+static void place_pins(drape_first_order *s, double t)
+{
+    const drape_motion *m = s->motion;
+    drape_motion_place_pins(m, t, s->x);
+    for (int32_t i = 0; i < m->moved_count; i++)
+        drape_motion_pin_velocity(m, i, t, (s->span[0] + s->span[1]) / 2,
+                                  s->v + 3 * (size_t)m->moved_node[i]);
+}
+
+static drape_point place(drape_first_order *s, double t, const double *y)
+{
+    place_pins(s, t);
+    for (int64_t i = 0; i < s->n; i++) {
+        s->x[drape_first_order_at(s, i)] = y[i];
+        s->v[drape_first_order_at(s, i)] = y[s->n + i];
+    }
+    return (drape_point){
+        .x = s->x, .v = s->v, .internal = s->internal, .t = t, .span = {s->span[0], s->span[1]}};
+}
+
+/* ---- Residual ---- */
+
+void drape_first_order_force(drape_first_order *s, double t, const double *y)
+{
+    const drape_point point = place(s, t, y);
+    drape_system_force(s->system, &point, s->g);
+}
+
+int drape_first_order_judge(drape_first_order *s, double t, const double *out, double start)
+{
+    s->nonfinite = !drape_all_finite(out, 2 * (size_t)s->n);
+    s->crossing =
+        !s->nonfinite && drape_system_crosses(s->system, s->x, t, &s->crossing_reason, &s->crossing_pair);
+    s->crossed |= s->crossing;
+    s->work.residuals++;
+    s->work.residual_seconds += drape_system_clock(s->system) - start;
+    return drape_system_status(s->system) ? -1 : s->nonfinite || s->crossing ? 1 : 0;
+}
+
+int drape_first_order_rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user)
+{
+    drape_first_order *s = user;
+    const double start = drape_system_clock(s->system), *v = N_VGetArrayPointer(y) + s->n;
+    double *out = N_VGetArrayPointer(rate);
+    drape_first_order_force(s, t, N_VGetArrayPointer(y));
+    for (int64_t i = 0; i < s->n; i++) {
+        out[i] = v[i];
+        out[s->n + i] = -s->g[drape_first_order_at(s, i)] / s->mass[i];
+    }
+    return drape_first_order_judge(s, t, out, start);
+}
+
+double drape_first_order_norm(const drape_first_order *s, N_Vector vector)
+{
+    const double *a = N_VGetArrayPointer(vector), *w = N_VGetArrayPointer(s->weights);
+    double sum = 0;
+    for (int64_t i = 0; i < 2 * s->n; i++)
+        sum += a[i] / w[i] * (a[i] / w[i]);
+    return sqrt(sum / (double)(2 * s->n));
+}
+
+double drape_first_order_first_step(const drape_first_order *s)
+{
+    const double h = FIRST_SHARE * (s->span[1] - s->span[0]), norm = drape_first_order_norm(s, s->rate);
+    return norm * h > FIRST_CHANGE ? FIRST_CHANGE / norm : h;
+}
+
+/* ---- Jacobian ---- */
+
+/* Takes the matrices for the system's present pattern. */
+static drape_status renew_matrices(drape_first_order *s)
+{
+    const drape_pattern *pattern = drape_system_pattern(s->system);
+    if (s->dissipated) {
+        drape_arena_release(s->arena, s->damping);
+        s->damping = drape_arena_take(s->arena, (size_t)pattern->nonzeros, sizeof *s->damping);
+        if (!s->damping)
+            return DRAPE_E_MEMORY;
+    }
+    return drape_sun_linear_extend_pattern(s->linear, pattern);
+}
+
+/* Contact may couple new nodes. */
+static drape_status extend_pattern(drape_first_order *s, const drape_point *point)
+{
+    bool changed;
+    drape_status status = drape_system_extend_pattern(s->system, point, &changed);
+    s->linear->stale |= changed;
+    return !status && s->linear->stale ? renew_matrices(s) : status;
+}
+
+/* Excludes contact and the new analysis in extend_pattern, which are timed separately. */
+static double jacobian_clock(const drape_first_order *s)
+{
+    return drape_system_clock(s->system) - s->linear->factor_seconds;
+}
+
+/* Whether the next matrix is the symmetric part. If the iteration failed with a new symmetric matrix, exact
+ * ones are used for a while: twice as many as the last time, or half as many after each symmetric one that
+ * converged. */
+static bool choose_symmetric(drape_first_order *s)
+{
+    const bool failed = s->symmetric && s->newton.failed;
+    if (s->values[DRAPE_FIRST_ORDER_MATRIX] != MATRIX_AUTO)
+        return s->values[DRAPE_FIRST_ORDER_MATRIX] == MATRIX_SYMMETRIC;
+    if (failed)
+        s->exact_remaining = s->exact_span =
+            s->exact_span < MAX_EXACT_SPAN ? 2 * s->exact_span : MAX_EXACT_SPAN;
+    else if (s->exact_remaining > 0)
+        s->exact_remaining--;
+    else if (s->exact_span > 1)
+        s->exact_span /= 2;
+    return s->exact_remaining == 0;
+}
+
+int drape_first_order_jacobian(drape_first_order *s, double t, double cj, const double *y)
+{
+    double start = jacobian_clock(s);
+    drape_point point = place(s, t, y);
+    point.weight = cj;
+    point.contact = s->newton.bounds ? DRAPE_CONTACT_GAUSS_NEWTON : DRAPE_CONTACT_EXACT;
+    s->failure = extend_pattern(s, &point);
+    if (s->failure)
+        return -1;
+    drape_system_jacobian(s->system, &point, cj * cj, 0, s->linear->values);
+    if (!s->newton.bounds)
+        s->symmetric = choose_symmetric(s);
+    if (s->newton.bounds || s->symmetric)
+        drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
+    if (s->damping)
+        drape_system_damping(s->system, &point, s->damping);
+    s->factored_cj = cj;
+    drape_sun_newton_forget(&s->newton);
+    s->work.jacobians++;
+    s->work.jacobian_seconds += jacobian_clock(s) - start;
+    return 0;
+}
+
+/* ---- Solve ---- */
+
+/* reduced += D r */
+static void add_damping(const drape_first_order *s, const double *r)
+{
+    const drape_pattern *p = drape_system_pattern(s->system);
+    if (!s->damping)
+        return;
+    for (int64_t j = 0; j < p->n; j++)
+        for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
+            s->reduced[p->row[k]] += s->damping[k] * r[j];
+}
+
+/* With r2 + c_j M r1 in `reduced`. r1 and dv may be the same. */
+static int solve_reduced(drape_first_order *s, const double *r1, double *dx, double *dv)
+{
+    add_damping(s, r1);
+    drape_status status = drape_sun_linear_solve(s->linear, s->reduced, dx);
+    for (int64_t i = 0; i < s->n; i++)
+        dv[i] = s->factored_cj * dx[i] - r1[i];
+    return status;
+}
+
+int drape_first_order_solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector out, N_Vector in,
+                            sunrealtype tolerance)
+{
+    (void)matrix, (void)tolerance;
+    const drape_sun_linear *linear = solver->content;
+    drape_first_order *s = linear->owner;
+    const double *r1 = N_VGetArrayPointer(in), *r2 = r1 + s->n;
+    double *dx = N_VGetArrayPointer(out), *dv = dx + s->n;
+    for (int64_t i = 0; i < s->n; i++)
+        s->reduced[i] = r2[i] + s->factored_cj * s->mass[i] * r1[i];
+    return solve_reduced(s, r1, dx, dv);
+}
+
+/* r1 = c_j b1, r2 = c_j M b2 */
+int drape_first_order_solve_rhs(SUNLinearSolver solver, SUNMatrix matrix, N_Vector out, N_Vector in,
+                                sunrealtype tolerance)
+{
+    (void)matrix, (void)tolerance;
+    const drape_sun_linear *linear = solver->content;
+    drape_first_order *s = linear->owner;
+    const double *b1 = N_VGetArrayPointer(in), *b2 = b1 + s->n, cj = s->factored_cj;
+    double *dx = N_VGetArrayPointer(out), *dv = dx + s->n;
+    for (int64_t i = 0; i < s->n; i++) {
+        dv[i] = cj * b1[i];
+        s->reduced[i] = cj * s->mass[i] * (b2[i] + dv[i]);
+    }
+    return solve_reduced(s, dv, dx, dv);
+}
+
+/* ---- Work of dissipation, pins and colliders ---- */
+
+/* Power at time t of forces on moving colliders; NULL: no contact. */
+static double collider_power(const drape_first_order *s, double t, const double *force)
+{
+    double power = 0;
+    if (!force)
+        return 0;
+    for (int32_t c = 0; c < s->model->collider_count; c++) {
+        double v[3];
+        drape_motion_collider_velocity(s->motion, c, t, (s->span[0] + s->span[1]) / 2, v);
+        for (int k = 0; k < 3; k++)
+            power += force[3 * c + k] * v[k];
+    }
+    return power;
+}
+
+/* Power at the state in s->x, s->v at time t: of dissipative forces, and of the forces that move pins and
+ * colliders. */
+static void measure_powers(drape_first_order *s, double t, double powers[2])
+{
+    const drape_model *m = s->model;
+    const drape_motion *motion = s->motion;
+    const drape_point point = {
+        .x = s->x, .v = s->v, .internal = s->internal, .t = t, .span = {s->span[0], s->span[1]}};
+    powers[0] = powers[1] = 0;
+    if (s->dissipated) {
+        drape_system_dissipation(s->system, &point, s->dissipated);
+        for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
+            powers[0] += s->dissipated[i] * s->v[i];
+        powers[0] += collider_power(s, t, drape_system_on_colliders(s->system));
+    }
+    if (motion->moved_count > 0 || m->collider_count > 0)
+        drape_system_force(s->system, &point, s->g);
+    powers[1] += collider_power(s, t, drape_system_on_colliders(s->system));
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            size_t at = 3 * (size_t)motion->moved_node[i] + k;
+            powers[1] += s->g[at] * s->v[at];
+        }
+}
+
+/* Adds the work, by the trapezoidal rule. */
+static void audit(drape_first_order *s, const drape_state *in, const drape_state *out, drape_step_info *info)
+{
+    double after[2];
+    measure_powers(s, out->t, after);
+    info->dissipated = 0.5 * (out->t - in->t) * (s->powers[0] + after[0]);
+    info->pin_work = 0.5 * (out->t - in->t) * (s->powers[1] + after[1]);
+    memcpy(s->powers, after, sizeof after);
+}
+
+/* ---- A step ---- */
+
+/* After a failure, reports the degenerate element or the node whose force is not finite; otherwise the node
+ * with the largest weighted error. */
+static void diagnose(drape_first_order *s, drape_step_info *info)
+{
+    if (s->n == 0)
+        return;
+    if (s->nonfinite) {
+        for (int64_t i = 0; i < s->n; i++)
+            s->reduced[i] = s->g[drape_first_order_at(s, i)];
+        info->diagnostic = drape_system_diagnose_dof(s->system, s->reduced, "force [N]", INFINITY);
+        drape_system_check(s->system, s->x, NULL, s->internal, &info->reason, &info->diagnostic);
+        return;
+    }
+    if (s->crossing) {
+        info->diagnostic = s->crossing_pair;
+        return;
+    }
+    if (s->solver->errors(s->memory, s->between))
+        return;
+    const double *e = N_VGetArrayPointer(s->between), *w = N_VGetArrayPointer(s->weights);
+    for (int64_t i = 0; i < s->n; i++)
+        s->reduced[i] = fmax(fabs(e[i]) / w[i], fabs(e[s->n + i]) / w[s->n + i]);
+    info->diagnostic = drape_system_diagnose_dof(s->system, s->reduced, "local error / tolerance", 1);
+}
+
+/* Bounds the work, because steps may follow a degenerate, undamped sheet for ever without a failure. The
+ * bound is a rate, so that it does not depend on how a host divides its advances; steps that end an advance
+ * are the host's choice and are not counted. A host that continues after the failure gets the same number
+ * of steps again. */
+static bool exhausted(drape_first_order *s, const drape_state *in, drape_step_info *info)
+{
+    if (floor(in->t) != s->second)
+        s->steps = 0;
+    s->second = floor(in->t);
+    if (s->steps++ < (int64_t)s->values[DRAPE_FIRST_ORDER_MAX_STEPS])
+        return false;
+    s->steps = 0;
+    info->reason = drape_reason_name(DRAPE_REASON_MAX_STEPS);
+    if (s->n > 0)
+        s->solver->last_step(s->memory, &info->h);
+    diagnose(s, info);
+    return true;
+}
+
+/* Stops a run whose steps have become so small that it no longer moves, as where nothing can yield. */
+static drape_status check_step_size(drape_first_order *s, double h, bool last, drape_step_info *info)
+{
+    s->tiny = h < s->least_step && !last ? s->tiny + 1 : 0;
+    if (s->tiny <= MAX_TINY)
+        return DRAPE_OK;
+    s->tiny = 0;
+    info->h = h;
+    s->crossing = s->crossed;
+    info->reason = s->crossing ? s->crossing_reason : drape_reason_name(DRAPE_REASON_ERROR_TEST);
+    return DRAPE_E_STEP_TOO_SMALL;
+}
+
+/* Restarts with a first step of at most h, or of a size that the solver chooses, for 0. Consistent initial
+ * values need no solve: x' = v, v' = -M^-1 g. */
+static drape_status start(drape_first_order *s, const drape_state *in, double h, drape_step_info *info)
+{
+    double *y = N_VGetArrayPointer(s->y), *rate = N_VGetArrayPointer(s->rate);
+    for (int64_t i = 0; i < s->n; i++) {
+        y[i] = in->x[drape_first_order_at(s, i)];
+        y[s->n + i] = rate[i] = in->v[drape_first_order_at(s, i)];
+    }
+    drape_point point = place(s, in->t, y);
+    drape_system_force(s->system, &point, s->g);
+    s->work.residuals++;
+    for (int64_t i = 0; i < s->n; i++)
+        rate[s->n + i] = -s->g[drape_first_order_at(s, i)] / s->mass[i];
+    s->counted = 0;
+    info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
+    if (!drape_all_finite(rate + s->n, (size_t)s->n)) /* the solver would cut its step ten times for it */
+        return DRAPE_RETRY_NONFINITE;
+    info->reason = drape_reason_name(DRAPE_REASON_SOLVER);
+    return s->solver->begin(s, in->t, h) ? DRAPE_OK : DRAPE_E_SOLVER;
+}
+
+/* Continues from `in` if that is the solver's state; otherwise restarts, with a first step of at most h
+ * if the attempt before was rejected. *t: the next kink or the end, whichever comes first; a scene
+ * without free nodes advances to there. Pinned nodes that do not move keep their positions, and zero
+ * velocity, in s->x and s->v for the whole step. */
+static drape_status prepare(drape_first_order *s, const drape_state *in, double end, double h, double *t,
+                            drape_step_info *info)
+{
+    const size_t nodes = 3 * (size_t)s->model->node_count;
+    double stop = drape_motion_next_kink(s->motion, in->t, end);
+    memcpy(s->x, in->x, nodes * sizeof *s->x);
+    memcpy(s->v, in->v, nodes * sizeof *s->v);
+    s->internal = in->internal;
+    s->span[0] = in->t;
+    s->span[1] = stop;
+    *t = h < end - in->t ? fmin(stop, in->t + h) : stop;
+    if (s->n == 0) {
+        place_pins(s, in->t);
+        measure_powers(s, in->t, s->powers);
+        return DRAPE_OK;
+    }
+    if (s->reached != in->t || drape_motion_at_kink(s->motion, in->t) ||
+        (s->solver->must_begin && s->solver->must_begin(s))) {
+        drape_status status = start(s, in, h < end - in->t ? h : 0, info);
+        if (status)
+            return status;
+        measure_powers(s, in->t, s->powers);
+    }
+    return s->solver->stop_at(s, stop) ? DRAPE_OK : DRAPE_E_SOLVER;
+}
+
+static drape_status status_of(drape_first_order_outcome outcome, bool nonfinite, const char **reason)
+{
+    static const struct {
+        drape_status status;
+        drape_reason reason;
+    } meanings[] = {
+        [DRAPE_FIRST_ORDER_STEPPED] = {DRAPE_OK, DRAPE_REASON_CONVERGED},
+        [DRAPE_FIRST_ORDER_ERROR_TEST] = {DRAPE_RETRY_REJECTED, DRAPE_REASON_ERROR_TEST},
+        [DRAPE_FIRST_ORDER_ROUND_OFF] = {DRAPE_RETRY_REJECTED, DRAPE_REASON_ROUND_OFF},
+        [DRAPE_FIRST_ORDER_NEWTON] = {DRAPE_RETRY_NONLINEAR, DRAPE_REASON_NEWTON},
+        [DRAPE_FIRST_ORDER_SINGULAR] = {DRAPE_RETRY_LINEAR, DRAPE_REASON_SINGULAR},
+        [DRAPE_FIRST_ORDER_RESIDUAL] = {DRAPE_RETRY_NONFINITE, DRAPE_REASON_NONFINITE},
+        [DRAPE_FIRST_ORDER_REFUSED] = {DRAPE_E_SOLVER, DRAPE_REASON_SOLVER},
+    };
+    if (outcome == DRAPE_FIRST_ORDER_NEWTON && nonfinite)
+        outcome = DRAPE_FIRST_ORDER_RESIDUAL;
+    *reason = drape_reason_name(meanings[outcome].reason);
+    return meanings[outcome].status;
+}
+
+/* Makes one step of the solver, at most to `end`; *t: the time that it reached. */
+static drape_status solve(drape_first_order *s, double end, double h, double *t, drape_step_info *info)
+{
+    long iterations = 0;
+    s->crossing = s->crossed = s->nonfinite = false;
+    s->failure = DRAPE_OK;
+    const drape_first_order_outcome outcome = s->solver->step(s, end, t);
+    drape_status status = status_of(outcome, s->nonfinite, &info->reason);
+    if (status > 0 && s->crossing)
+        info->reason = s->crossing_reason;
+    if (drape_system_status(s->system))
+        status = drape_system_status(s->system);
+    if (s->failure < 0 || s->linear->status < 0)
+        status = s->failure < 0 ? s->failure : s->linear->status;
+    s->solver->iterations(s->memory, &iterations);
+    info->iterations = (int)(iterations - s->counted);
+    s->work.newton_iterations += iterations - s->counted;
+    s->counted = iterations;
+    if (status)
+        s->solver->current_step(s->memory, &info->h);
+    /* That may belong to an earlier attempt: half of that would not be a smaller step. */
+    info->h = fmin(info->h, h);
+    return status;
+}
+
+drape_status drape_first_order_step(void *state, const drape_state *in, drape_state *out, double h,
+                                    drape_step_info *info)
+{
+    drape_first_order *s = state;
+    const size_t nodes = 3 * (size_t)s->model->node_count;
+    double end = out->t, t = end;
+    info->tolerance = info->residual = NAN; /* it bounds errors, not residuals */
+    if (exhausted(s, in, info))
+        return DRAPE_E_STEP_TOO_SMALL;
+    /* The sim rejected the last step, which the solver had accepted: mostly because of its energy. */
+    if (in->t == s->from)
+        s->newton.strict = true;
+    s->from = NAN;
+    info->reason = drape_reason_name(DRAPE_REASON_SOLVER);
+    drape_status status = prepare(s, in, end, h, &t, info);
+    if (!status && s->n > 0)
+        status = solve(s, end, h, &t, info);
+    if (!status)
+        status = check_step_size(s, t - in->t, t == s->span[1] || t == end, info);
+    if (end - t <= LANDED * fabs(end))
+        t = end;
+    s->reached = NAN;
+    if (status) {
+        diagnose(s, info);
+        return status;
+    }
+    place(s, t, s->n > 0 ? N_VGetArrayPointer(s->y) : NULL);
+    memcpy(out->x, s->x, nodes * sizeof *out->x);
+    memcpy(out->v, s->v, nodes * sizeof *out->v);
+    out->t = t;
+    info->h = t - in->t;
+    info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
+    audit(s, in, out, info);
+    s->from = in->t;
+    s->reached = t;
+    s->steps -= t == end;
+    return DRAPE_OK;
+}
+
+void drape_first_order_interpolate(void *state, double t, double *x)
+{
+    drape_first_order *s = state;
+    drape_motion_place_pins(s->motion, t, x);
+    if (s->n == 0 || s->solver->dense(s, t, s->between))
+        return;
+    const double *y = N_VGetArrayPointer(s->between);
+    for (int64_t i = 0; i < s->n; i++)
+        x[drape_first_order_at(s, i)] = y[i];
+}
+
+void drape_first_order_interpolate_velocities(void *state, double t, double *v)
+{
+    drape_first_order *s = state;
+    if (s->n == 0 || s->solver->dense(s, t, s->between))
+        return;
+    const double *y = N_VGetArrayPointer(s->between);
+    for (int64_t i = 0; i < s->n; i++)
+        v[drape_first_order_at(s, i)] = y[s->n + i];
+}
+
+void drape_first_order_restart(void *state, const drape_state *from)
+{
+    (void)from;
+    drape_first_order *s = state;
+    s->reached = s->from = NAN;
+    s->newton.strict = s->newton.failed = s->symmetric = false;
+    s->exact_remaining = 0;
+    s->exact_span = 1;
+    drape_sun_newton_forget(&s->newton);
+}
+
+/* ---- Creation and destruction ---- */
+
+static void create_arrays(drape_first_order *s)
+{
+    size_t nodes = 3 * (size_t)s->model->node_count;
+    s->x = drape_arena_take(s->arena, nodes, sizeof *s->x);
+    s->v = drape_arena_take(s->arena, nodes, sizeof *s->v);
+    s->g = drape_arena_take(s->arena, nodes, sizeof *s->g);
+    s->reduced = drape_arena_take(s->arena, (size_t)s->n, sizeof *s->reduced);
+    s->mass = drape_arena_take(s->arena, (size_t)s->n, sizeof *s->mass);
+    for (int64_t i = 0; s->mass && i < s->n; i++)
+        s->mass[i] = s->model->mass[s->model->node_of_free[i / 3]];
+    if (!s->model->has_dissipation)
+        return;
+    s->damping =
+        drape_arena_take(s->arena, (size_t)drape_system_pattern(s->system)->nonzeros, sizeof *s->damping);
+    s->dissipated = drape_arena_take(s->arena, nodes, sizeof *s->dissipated);
+}
+
+/* Derived defaults, and the weights that follow from them. */
+static void set_tolerances(drape_first_order *s, int loose_order, int tight_order)
+{
+    double rtol = s->values[DRAPE_FIRST_ORDER_RTOL], size = NAN, speed = NAN;
+    drape_derive_tolerances(s->model, rtol, &s->values[DRAPE_FIRST_ORDER_ATOL_X],
+                            &s->values[DRAPE_FIRST_ORDER_ATOL_V]);
+    drape_derive_tolerances(s->model, 1, &size, &speed);
+    s->least_step = LEAST_STEP * size / speed;
+    if (isnan(s->values[DRAPE_FIRST_ORDER_ORDER]))
+        s->values[DRAPE_FIRST_ORDER_ORDER] = rtol >= DRAPE_FIRST_ORDER_TIGHT ? loose_order : tight_order;
+    double *w = N_VGetArrayPointer(s->weights);
+    for (int64_t i = 0; i < s->n; i++) {
+        w[i] = s->values[DRAPE_FIRST_ORDER_ATOL_X];
+        w[s->n + i] = s->values[DRAPE_FIRST_ORDER_ATOL_V];
+    }
+}
+
+static drape_status create_vectors(drape_first_order *s)
+{
+    s->y = N_VNew_Serial(2 * s->n, s->sun);
+    s->rate = N_VNew_Serial(2 * s->n, s->sun);
+    s->weights = N_VNew_Serial(2 * s->n, s->sun);
+    s->between = N_VNew_Serial(2 * s->n, s->sun);
+    if (!s->y || !s->rate || !s->weights || !s->between)
+        return drape_fail_memory(s->arena->ctx, 2 * (size_t)s->n * sizeof(double));
+    N_VConst(0, s->y);
+    N_VConst(0, s->rate);
+    return DRAPE_OK;
+}
+
+drape_status drape_first_order_create(drape_first_order *s, const drape_first_order_solver *solver,
+                                      drape_arena *arena, drape_system *system, const double *values,
+                                      int param_count, int loose_order, int tight_order)
+{
+    drape_context *ctx = arena->ctx;
+    s->solver = solver;
+    s->arena = arena;
+    s->system = system;
+    s->model = drape_system_model(system);
+    s->motion = drape_system_motion(system);
+    s->exact_span = 1;
+    s->reached = s->from = NAN;
+    s->n = 3 * (int64_t)s->model->free_count;
+    memcpy(s->values, values, (size_t)param_count * sizeof *values);
+    create_arrays(s);
+    drape_status status = drape_arena_status(arena);
+    if (!status && drape_sundials_context(&s->sun))
+        status = drape_fail_memory(ctx, sizeof(void *));
+    if (!status && s->n > 0)
+        status = create_vectors(s);
+    if (!status && s->n > 0)
+        set_tolerances(s, loose_order, tight_order);
+    if (!status && s->n > 0)
+        status = drape_sun_linear_create(arena, s->sun,
+                                         drape_linears[(int)values[DRAPE_FIRST_ORDER_LINEAR_SOLVER]],
+                                         drape_system_pattern(s->system), drape_system_pool(s->system),
+                                         drape_system_cancel_flag(s->system), &s->linear);
+    if (status || s->n == 0)
+        return status;
+    s->linear->owner = s;
+    if (!drape_sun_newton_create(&s->newton, s->y, s->sun) || !solver->create(s))
+        return drape_fail(ctx, DRAPE_E_MEMORY, "%s cannot be set up for %lld unknowns", solver->name,
+                          (long long)(2 * s->n));
+    return DRAPE_OK;
+}
+
+void drape_first_order_destroy(void **state)
+{
+    drape_first_order *s = *state;
+    if (!s)
+        return;
+    if (s->solver)
+        s->solver->destroy(s);
+    drape_sun_newton_free(&s->newton);
+    drape_sun_linear_destroy(&s->linear);
+    N_Vector vectors[] = {s->y, s->rate, s->weights, s->between};
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
+        if (vectors[i])
+            N_VDestroy(vectors[i]);
+    if (s->sun)
+        SUNContext_Free(&s->sun);
+    *state = NULL;
+}
+
+/* ---- For the table ---- */
+
+drape_work drape_first_order_work(const void *state)
+{
+    const drape_first_order *s = state;
+    drape_work work = s->work;
+    if (s->linear) {
+        work.factorizations = s->linear->factorizations;
+        work.linear_iterations = s->linear->iterations;
+        work.factor_seconds = s->linear->factor_seconds;
+        work.solve_seconds = s->linear->solve_seconds;
+    }
+    return work;
+}
+
+/* Its factors are kept between steps, with c_j and D. */
+static void archive_factors(drape_first_order *s, drape_archive *a)
+{
+    if (drape_archive_has_read(a) && drape_system_pattern(s->system) != s->linear->pattern)
+        drape_archive_note(a, renew_matrices(s));
+    drape_archive_double(a, &s->factored_cj);
+    drape_archive_bool(a, &s->symmetric);
+    drape_archive_int64(a, &s->exact_remaining);
+    drape_archive_int64(a, &s->exact_span);
+    if (s->damping && drape_archive_good(a))
+        drape_archive_doubles(a, s->damping, (size_t)drape_system_pattern(s->system)->nonzeros);
+    drape_sun_linear_archive(s->linear, a, s->factored_cj != 0);
+}
+
+void drape_first_order_archive(void *state, drape_archive *a)
+{
+    drape_first_order *s = state;
+    int64_t counted = s->counted;
+    drape_archive_double(a, &s->reached);
+    drape_archive_double(a, &s->from);
+    drape_sun_newton_archive(&s->newton, a);
+    drape_archive_doubles(a, s->powers, 2);
+    drape_archive_double(a, &s->second);
+    drape_archive_int64(a, &s->tiny);
+    drape_archive_int64(a, &s->steps);
+    drape_archive_int64(a, &counted);
+    if (a->reading && counted < 0)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a negative number of iterations");
+    s->counted = (long)counted;
+    drape_work_archive(&s->work, a);
+    if (s->n == 0)
+        return;
+    archive_factors(s, a);
+    if (!s->solver->archive(s, a) && a->reading)
+        drape_first_order_restart(s, NULL);
+}
+
+size_t drape_first_order_bytes(const void *state)
+{
+    const drape_first_order *s = state;
+    if (s->n == 0)
+        return 0;
+    const size_t vectors = 8 + (size_t)s->solver->vectors(s); /* allocated here; by the library */
+    return 2 * (size_t)s->n * vectors * sizeof(double) + (s->linear ? drape_sun_linear_bytes(s->linear) : 0);
+}

@@ -1,0 +1,207 @@
+/*
+ * first_order.h: solvers of SUNDIALS for systems of first order, from one state of the cloth to the next.
+ *     y = (x, v) of the free nodes,  x' = v,  M v' = -g(x, v, t)
+ *
+ * A solver chooses order and step, predicts, tests errors and iterates. Each of its Newton corrections
+ * solves, for some c_j = 1/(gamma h),
+ *     [c_j I, -I; K, D + c_j M] (dx, dv) = (r1, r2),  K = dg/dx, D = dg/dv.
+ * Eliminating dv = c_j dx - r1 leaves
+ *     (K + c_j D + c_j^2 M) dx = r2 + (D + c_j M) r1:
+ * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers. The
+ * solvers keep matrix and factors while c_j stays near the value that they were computed for; that is
+ * most of their advantage over one factorisation for each iteration. sun_newton.h decides when the
+ * iteration with old factors has converged, and damps one that fails.
+ *
+ * That iteration does not need an exact matrix either. The nonsymmetric parts are those of friction, whose
+ * force follows the normal force, and of dashpots of strains that rotate. Both are small beside c_j^2 M and
+ * c_j D at the step sizes at which they occur. If each off-diagonal pair is replaced by its mean, Cholesky
+ * factors can be used: half of the time or less in most scenes with contact, for as many iterations. Where
+ * much cloth slides, the iteration may fail with them: then some matrices are exact.
+ *
+ * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative
+ * part would make the error depend on where the scene is.
+ *
+ * The motion of pins has kinks at the keys of their tracks, and where a host changes their paths: the
+ * solver stops there and restarts.
+ *
+ * Here is what they share. An entry of the table holds a drape_first_order at the beginning of its state,
+ * its parameters begin with those below, and a drape_first_order_solver calls its library.
+ */
+#ifndef DRAPE_INTEGRATORS_FIRST_ORDER_H
+#define DRAPE_INTEGRATORS_FIRST_ORDER_H
+
+#include "integrators/integrator.h"
+#include "integrators/sun_newton.h"
+#include "integrators/tolerance.h"
+#include "solvers/sun_linear.h"
+
+#include <nvector/nvector_serial.h>
+
+/* The first parameters of every entry, in this order. */
+enum {
+    DRAPE_FIRST_ORDER_RTOL,
+    DRAPE_FIRST_ORDER_ATOL_X,
+    DRAPE_FIRST_ORDER_ATOL_V,
+    DRAPE_FIRST_ORDER_ORDER, /* of the method, or the highest; each entry derives its default */
+    DRAPE_FIRST_ORDER_MAX_STEP,
+    DRAPE_FIRST_ORDER_MAX_STEPS,
+    DRAPE_FIRST_ORDER_LINEAR_SOLVER,
+    DRAPE_FIRST_ORDER_MATRIX,
+    DRAPE_FIRST_ORDER_OWN /* the first of the entry's own */
+};
+#define DRAPE_FIRST_ORDER_MOST (DRAPE_FIRST_ORDER_OWN + 1) /* parameters of an entry */
+
+/* The order is a parameter of the entry. */
+#define DRAPE_FIRST_ORDER_PARAMS(order_param)                                                                \
+    [DRAPE_FIRST_ORDER_RTOL] = DRAPE_RTOL_PARAM, [DRAPE_FIRST_ORDER_ATOL_X] = DRAPE_ATOL_X_PARAM,            \
+    [DRAPE_FIRST_ORDER_ATOL_V] = DRAPE_ATOL_V_PARAM, [DRAPE_FIRST_ORDER_ORDER] = order_param,                \
+    [DRAPE_FIRST_ORDER_MAX_STEP] =                                                                           \
+        DRAPE_NUMBER("max_step", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),           \
+    [DRAPE_FIRST_ORDER_MAX_STEPS] =                                                                          \
+        DRAPE_INTEGER("max_steps", "1/s", 100000, 1, 1e9,                                                    \
+                      "largest number of steps within one second of simulated time, not counting those "     \
+                      "that end an advance; one more ends the run"),                                         \
+    [DRAPE_FIRST_ORDER_LINEAR_SOLVER] =                                                                      \
+        DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver",                     \
+                     .aliases = drape_linears_aliases),                                                      \
+    [DRAPE_FIRST_ORDER_MATRIX] = DRAPE_CHOICE(                                                               \
+        "matrix", 0, drape_first_order_matrices,                                                             \
+        "matrix of Newton's corrections; symmetric: the symmetric part of the exact one, which differs "     \
+        "from it with friction and dashpots; auto: symmetric, and exact for a while if that fails")
+extern const char *const drape_first_order_matrices[];
+
+#define DRAPE_FIRST_ORDER_TIGHT        1e-4 /* rtol below which the higher order is the default */
+#define DRAPE_FIRST_ORDER_ERROR_FAILS  10   /* error test failures in one step */
+#define DRAPE_FIRST_ORDER_SOLVER_FAILS 10   /* convergence failures in one step */
+/* Share of the energy of a scene. At rtol 1e-3 the energy of a smooth fall oscillates by half a percent: a
+ * larger gain means that waves are amplified. */
+#define DRAPE_FIRST_ORDER_GAIN 0.02
+
+typedef struct drape_first_order drape_first_order;
+
+/* How a step of a library ended. */
+typedef enum drape_first_order_outcome {
+    DRAPE_FIRST_ORDER_STEPPED,
+    DRAPE_FIRST_ORDER_ERROR_TEST,
+    DRAPE_FIRST_ORDER_ROUND_OFF,
+    DRAPE_FIRST_ORDER_NEWTON,
+    DRAPE_FIRST_ORDER_SINGULAR,
+    DRAPE_FIRST_ORDER_RESIDUAL, /* it could not be evaluated */
+    DRAPE_FIRST_ORDER_REFUSED   /* no smaller step helps */
+} drape_first_order_outcome;
+
+/* A solver of SUNDIALS. Its functions may assume that there are free DOFs, except `destroy`. */
+typedef struct drape_first_order_solver {
+    const char *name; /* for messages */
+    /* Creates f->memory with all settings, from f->y and f->rate; attaches f->linear and f->newton. */
+    bool (*create)(drape_first_order *f);
+    void (*destroy)(drape_first_order *f);
+    /* Restarts at t from y, y' in f->y, f->rate with a first step of h at most; 0: it chooses. */
+    bool (*begin)(drape_first_order *f, double t, double h);
+    bool (*must_begin)(const drape_first_order *f);     /* it has to restart; NULL: never by itself */
+    bool (*stop_at)(drape_first_order *f, double stop); /* steps end there */
+    /* One step towards end. *t: where it ended, y there in f->y. */
+    drape_first_order_outcome (*step)(drape_first_order *f, double end, double *t);
+    int (*last_step)(void *memory, sunrealtype *h);
+    int (*current_step)(void *memory, sunrealtype *h);
+    int (*iterations)(void *memory, long *count); /* of Newton, since `begin` */
+    int (*errors)(void *memory, N_Vector out);    /* local errors of the last step, per unknown */
+    int (*dense)(drape_first_order *f, double t, N_Vector out); /* y within the last step */
+    /* Its history. False: it cannot be read, and the solver must restart. */
+    bool (*archive)(drape_first_order *f, drape_archive *a);
+    void (*restart)(drape_first_order *f);      /* it must restart; NULL: nothing to forget */
+    int (*vectors)(const drape_first_order *f); /* that the library holds, of 2 n numbers */
+} drape_first_order_solver;
+
+struct drape_first_order {
+    const drape_first_order_solver *solver;
+    drape_arena *arena;
+    drape_system *system;
+    const drape_model *model;
+    const drape_motion *motion;
+    double values[DRAPE_FIRST_ORDER_MOST];
+    int64_t n; /* free DOFs; the system has 2 n unknowns */
+    SUNContext sun;
+    void *memory;                       /* of the library */
+    N_Vector y, rate, weights, between; /* (x, v), (x', v'), absolute tolerances, dense output */
+    drape_sun_linear *linear;
+    drape_sun_newton newton;
+    double *mass;       /* of the free DOFs */
+    double *x, *v, *g;  /* nodes: where the residual was evaluated last; g there */
+    double *damping;    /* D (nonzeros); NULL if nothing dissipates */
+    double *reduced;    /* right-hand side of the reduced system (n) */
+    double *dissipated; /* nodes; NULL if nothing dissipates */
+
+    /* The matrix, kept between steps. */
+    double factored_cj;      /* c_j of the factors */
+    bool symmetric;          /* the last matrix of the undamped iteration was the symmetric part */
+    int64_t exact_remaining; /* exact matrices until the symmetric part is tried again, */
+    int64_t exact_span;      /* of this many in a row */
+
+    /* Kept between steps. */
+    const double *internal; /* of the last accepted state */
+    double span[2];         /* [s] interval without a kink in the motion of pins and colliders */
+    double reached;         /* [s] time of the library's state; NAN: it must restart */
+    double from;            /* [s] time at which the last successful step began; NAN: none */
+    double powers[2];       /* [W] power of dissipation; power of pins; both at the time reached */
+    double second;          /* [s] beginning of the second of simulated time in which steps are counted */
+    double least_step;      /* [s] */
+    int64_t tiny;           /* steps in a row that were shorter than that */
+    int64_t steps;          /* attempted in that second, except those that end an advance */
+    long counted;           /* Newton iterations of the library that `work` contains already */
+    drape_work work;
+
+    /* Why callbacks failed in this step; the libraries keep only the sign. */
+    bool nonfinite, crossing; /* the last residual */
+    bool crossed;             /* some residual; the last that did: */
+    const char *crossing_reason;
+    drape_diagnostic crossing_pair;
+    drape_status failure; /* < 0: the pattern could not be extended */
+};
+
+/* ---- For a solver ---- */
+
+/* Index of free DOF i in arrays of nodes. */
+static inline size_t drape_first_order_at(const drape_first_order *f, int64_t i)
+{
+    return 3 * (size_t)f->model->node_of_free[i / 3] + (size_t)(i % 3);
+}
+/* g at (t, y), into f->g. */
+void drape_first_order_force(drape_first_order *f, double t, const double *y);
+/* To be called with what follows from that force, `out` (2 n). 0; > 0: not finite, or it crosses contact;
+ * < 0: fatal. start: the time at which the evaluation began [s of drape_system_clock]. */
+int drape_first_order_judge(drape_first_order *f, double t, const double *out, double start);
+/* y' = (v, -M^-1 g): a callback of CVODE and ARKODE; user: the drape_first_order. */
+int drape_first_order_rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user);
+/* Weighted root mean square of a vector: 1 is the tolerance. */
+double drape_first_order_norm(const drape_first_order *f, N_Vector vector);
+/* A first step, as IDA chooses it: y, with the rate in f->rate, changes by half of its tolerance; at most a
+ * thousandth of the span without a kink [s]. */
+double drape_first_order_first_step(const drape_first_order *f);
+/* Assembles K + c_j D + c_j^2 M at (t, y), and D; of I - gamma J, c_j = 1/gamma. 0, or < 0: fatal. */
+int drape_first_order_jacobian(drape_first_order *f, double t, double cj, const double *y);
+/* Solves with (r1, r2) as above. Status of the linear solver. */
+int drape_first_order_solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector out, N_Vector in,
+                            sunrealtype tolerance);
+/* Solves (I - gamma J) out = in for 1/gamma = c_j of the factors. */
+int drape_first_order_solve_rhs(SUNLinearSolver solver, SUNMatrix matrix, N_Vector out, N_Vector in,
+                                sunrealtype tolerance);
+
+/* ---- For an entry of the table; `state` begins with a drape_first_order ---- */
+
+/* Fills f, which is zero, with the solver and its parameters. An order that is derived is loose_order for
+ * rtol >= 1e-4, else tight_order. Errors: out of memory; it must be destroyed after one, too. */
+drape_status drape_first_order_create(drape_first_order *f, const drape_first_order_solver *solver,
+                                      drape_arena *arena, drape_system *system, const double *values,
+                                      int param_count, int loose_order, int tight_order);
+drape_status drape_first_order_step(void *state, const drape_state *in, drape_state *out, double h,
+                                    drape_step_info *info);
+void drape_first_order_interpolate(void *state, double t, double *x);
+void drape_first_order_interpolate_velocities(void *state, double t, double *v);
+void drape_first_order_restart(void *state, const drape_state *from);
+drape_work drape_first_order_work(const void *state);
+void drape_first_order_archive(void *state, drape_archive *a);
+size_t drape_first_order_bytes(const void *state);
+void drape_first_order_destroy(void **state);
+
+#endif

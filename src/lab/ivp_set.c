@@ -1,0 +1,294 @@
+/* ivp_set.c: the scenes of the test set and their files; see ivp.h. */
+#include "base/hash.h"
+#include "io/npy.h"
+#include "lab/ivp.h"
+#include "lab/lab.h"
+#include "lab/text.h"
+#include "model/model.h"
+#include "sim/sim.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define MOST_TIMES   1000
+#define STABLE_SHARE 0.25 /* of the stability limit at the start, of an explicit method's step */
+
+/* ---- Scenes ---- */
+
+static drape_status make_times(lab_ivp *s)
+{
+    const double duration = drape_model_duration(s->model), rate = drape_model_frame_rate(s->model);
+    const double count = round(duration * rate);
+    if (!(fabs(duration * rate - count) < 1e-9 * count) || count < 2 || count > MOST_TIMES)
+        return drape_fail(s->arena->ctx, DRAPE_E_ARGUMENT,
+                          "%.300s: duration %g s times frame_rate %g/s must be a whole number, 2 to %d: the "
+                          "frames are the times of the reference",
+                          s->path, duration, rate, MOST_TIMES);
+    s->time_count = (size_t)count;
+    s->interval = duration / count;
+    s->times = drape_arena_take(s->arena, s->time_count, sizeof *s->times);
+    for (size_t i = 0; s->times && i < s->time_count; i++)
+        s->times[i] = i + 1 == s->time_count ? duration : (double)(i + 1) / rate;
+    return s->times ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+static double mean_mass(const drape_model *model)
+{
+    const double *masses = drape_model_masses(model);
+    const int32_t count = drape_model_node_count(model);
+    double sum = 0;
+    for (int32_t i = 0; i < count; i++)
+        sum += masses[i];
+    return sum / count;
+}
+
+drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
+{
+    char *text, *name;
+    size_t length;
+    *s = (lab_ivp){.arena = arena, .path = drape_arena_text(arena, path)};
+    const char *slash = strrchr(path, '/');
+    s->name = name = drape_arena_text(arena, slash ? slash + 1 : path);
+    if (!s->path || !name)
+        return DRAPE_E_MEMORY;
+    name[strrchr(name, '.') ? (size_t)(strrchr(name, '.') - name) : strlen(name)] = 0;
+    drape_status status = drape_model_load(arena->ctx, path, &s->model);
+    if (!status)
+        status = lab_read_text(arena, NULL, path, &text, &length);
+    if (status)
+        return status;
+    snprintf(s->hash, sizeof s->hash, "%016llx",
+             (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, text, length));
+    drape_arena_release(arena, text);
+    s->size = s->model->length;
+    s->node_mass = mean_mass(s->model);
+    s->contact = s->model->collider_count > 0 || s->model->contact.self;
+    return make_times(s);
+}
+
+void lab_ivp_close(lab_ivp *s)
+{
+    drape_model_destroy(&s->model);
+}
+
+bool lab_ivp_admits(const lab_ivp *s, const drape_integrator_ops *integrator)
+{
+    return !integrator->steady_state && !(integrator->projects_contact && s->contact);
+}
+
+/*
+ * A residual r of a node of mass m that has the same sign in all steps displaces it by r/m T^2/2 until the end:
+ * r = c m L/T^2 (h/T)^p displaces by a share c/2 (h/T)^p of the size L, and c = 0.01 makes that small beside
+ * an error of order p. In practice residuals have changing signs, and do less.
+ */
+static double residual_of_size(const lab_ivp *s)
+{
+    const double end = s->times[s->time_count - 1];
+    return s->node_mass * s->size / (end * end);
+}
+
+double lab_ivp_tolerance(const lab_ivp *s, int order, double dt)
+{
+    const double h = dt / s->times[s->time_count - 1];
+    return fmax(1e-2 * residual_of_size(s) * pow(h, order), lab_ivp_least_tolerance(s));
+}
+
+double lab_ivp_least_tolerance(const lab_ivp *s)
+{
+    return 1e-13 * residual_of_size(s);
+}
+
+/* ---- Runs ---- */
+
+drape_status lab_ivp_dt(const lab_ivp *s, const drape_integrator_ops *integrator, int steps, double *dt)
+{
+    drape_sim *sim = NULL;
+    drape_model *model = NULL;
+    drape_stability found = {0};
+    drape_lab_def def;
+    *dt = s->interval / steps;
+    if (!integrator->stability)
+        return DRAPE_OK;
+    drape_lab_def_init(&def, sizeof def);
+    def.scene = s->path;
+    json_t *settings =
+        json_pack("{s:s, s:f}", "/integrator/method", integrator->entry.name, "/integrator/dt", *dt);
+    drape_status status = lab_load(s->arena->ctx, &(lab_request){.def = &def, .settings = settings}, &model);
+    if (!status)
+        status = drape_sim_create(s->arena->ctx, model, NULL, &sim);
+    if (!status)
+        integrator->stability(sim->integrator, drape_sim_state(sim), *dt, &found);
+    while (!status && found.limit > 0 && *dt > STABLE_SHARE * found.limit)
+        *dt /= 2;
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    json_decref(settings);
+    return status;
+}
+
+drape_status lab_ivp_run(const lab_ivp *s, json_t *settings, double seconds, lab_trace *out, json_t **result)
+{
+    drape_lab_def def;
+    drape_lab_def_init(&def, sizeof def);
+    def.scene = s->path;
+    def.cancel = s->cancel;
+    const lab_request request = {.def = &def,
+                                 .settings = settings,
+                                 .times = s->times,
+                                 .time_count = s->time_count,
+                                 .record = out,
+                                 .arena = s->arena,
+                                 .seconds = seconds,
+                                 .repeats = 1};
+    *out = (lab_trace){0};
+    *result = NULL;
+    drape_status status = settings ? lab_run(s->arena->ctx, &request, result)
+                                   : drape_fail(s->arena->ctx, DRAPE_E_MEMORY, "no memory for settings");
+    json_decref(settings);
+    if (status || !lab_is_good(*result)) {
+        drape_arena_release(s->arena, out->x);
+        *out = (lab_trace){0};
+    }
+    return status;
+}
+
+double lab_ivp_distance(const lab_ivp *s, const lab_trace *a, const lab_trace *b)
+{
+    double largest = 0;
+    for (int64_t i = 0; i < a->frames; i++)
+        largest =
+            fmax(largest, lab_distance(s->model, a->x + a->size * (size_t)i, b->x + b->size * (size_t)i));
+    return largest / s->size;
+}
+
+/* ---- Files ---- */
+
+char *lab_ivp_file(const lab_ivp *s, const char *kind, const char *ending)
+{
+    const char *slash = strrchr(s->path, '/');
+    const size_t folder = slash ? (size_t)(slash - s->path) + 1 : 0;
+    const size_t room = folder + strlen(kind) + strlen(s->name) + strlen(ending) + 3;
+    char *path = drape_arena_take(s->arena, room, 1);
+    if (path)
+        snprintf(path, room, "%.*s%s/%s.%s", (int)folder, s->path, kind, s->name, ending);
+    return path;
+}
+
+drape_status lab_ivp_write(const lab_ivp *s, const char *path, const char *head, size_t head_size,
+                           const void *data, size_t size)
+{
+    drape_file file = {0};
+    char *folder = drape_arena_text(s->arena, path);
+    if (!folder)
+        return DRAPE_E_MEMORY;
+    *strrchr(folder, '/') = 0;
+    drape_status status = drape_folder_make(s->arena->ctx, folder);
+    if (!status)
+        status = drape_file_create(s->arena->ctx, strlen(path), &file);
+    if (!status) {
+        drape_file_name(&file, "%s", path);
+        status = drape_file_begin(&file);
+    }
+    if (!status) {
+        drape_file_put(&file, head, head_size);
+        drape_file_put(&file, data, size);
+        status = drape_file_finish(&file);
+    }
+    drape_file_destroy(&file);
+    return status;
+}
+
+drape_status lab_ivp_write_json(const lab_ivp *s, const char *path, const json_t *object)
+{
+    char *text = object ? json_dumps(object, JSON_INDENT(1) | JSON_REAL_PRECISION(9)) : NULL;
+    drape_status status = text ? lab_ivp_write(s, path, text, strlen(text), "\n", 1)
+                               : drape_fail(s->arena->ctx, DRAPE_E_MEMORY, "no memory for \"%.300s\"", path);
+    free(text);
+    return status;
+}
+
+json_t *lab_ivp_provenance(const lab_ivp *s)
+{
+    char date[32];
+    const time_t now = time(NULL);
+    struct tm utc;
+    strftime(date, sizeof date, "%Y-%m-%d", gmtime_r(&now, &utc));
+    return json_pack("{s:s, s:s, s:s, s:s, s:f, s:i}", "scene", s->name, "scene_hash", s->hash, "drape",
+                     drape_version(), "date", date, "size_m", s->size, "nodes",
+                     drape_model_node_count(s->model));
+}
+
+static drape_status read_json(const lab_ivp *s, const char *path, json_t **object)
+{
+    char *text;
+    size_t size;
+    json_error_t fault;
+    drape_status status = lab_read_text(s->arena, NULL, path, &text, &size);
+    *object = status ? NULL : json_loadb(text, size, 0, &fault);
+    if (!status && !*object)
+        status = drape_fail(s->arena->ctx, DRAPE_E_PARSE, "%.400s:%d:%d: %.200s", path, fault.line,
+                            fault.column, fault.text);
+    return status;
+}
+
+/* The positions, whose bytes must be those that the JSON describes. */
+static drape_status read_positions(lab_ivp *s, const char *path, const json_t *about)
+{
+    char *bytes, digits[17];
+    size_t size, data = 0;
+    int64_t frames = 0;
+    int32_t nodes = 0;
+    const int32_t count = drape_model_node_count(s->model);
+    drape_status status = lab_read_text(s->arena, NULL, path, &bytes, &size);
+    if (status)
+        return status;
+    snprintf(digits, sizeof digits, "%016llx",
+             (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, bytes, size));
+    if (strcmp(digits, lab_text(about, "data_hash")) != 0)
+        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+                          "%.400s: damaged: its bytes are not those that %.60s.json beside it describes",
+                          path, s->name);
+    if (!drape_npy_read_header(bytes, size, &frames, &nodes, &data) || nodes != count ||
+        frames != (int64_t)s->time_count || size != data + 24 * (size_t)nodes * (size_t)frames)
+        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+                          "%.400s: not an array of float64 of shape (%zu, %d, 3), C order", path,
+                          s->time_count, count);
+    s->reference = (lab_trace){.size = 3 * (size_t)nodes, .frames = frames, .room = frames};
+    s->reference.x = drape_arena_take(s->arena, s->reference.size * (size_t)frames, sizeof(double));
+    if (!s->reference.x)
+        return DRAPE_E_MEMORY;
+    memcpy(s->reference.x, bytes + data, size - data);
+    drape_arena_release(s->arena, bytes);
+    return DRAPE_OK;
+}
+
+drape_status lab_ivp_read_reference(lab_ivp *s)
+{
+    json_t *about = NULL;
+    const char *path = lab_ivp_file(s, "references", "json"), *data = lab_ivp_file(s, "references", "npy");
+    drape_status status = path && data ? read_json(s, path, &about) : DRAPE_E_MEMORY;
+    if (!status && strcmp(lab_text(about, "scene_hash"), s->hash) != 0)
+        status =
+            drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+                       "%.400s: of another version of the scene; `drape ivp reference %.300s` makes it anew",
+                       path, s->path);
+    s->error = lab_number(about, "error");
+    if (!status && !(s->error >= 0))
+        status = drape_fail(s->arena->ctx, DRAPE_E_PARSE, "%.400s: it has no number \"error\"", path);
+    if (!status)
+        status = read_positions(s, data, about);
+    json_decref(about);
+    return status;
+}
+
+json_t *lab_ivp_read_horizon(const lab_ivp *s)
+{
+    json_t *about = NULL;
+    const char *path = lab_ivp_file(s, "horizons", "json");
+    if (!path || read_json(s, path, &about) || strcmp(lab_text(about, "scene_hash"), s->hash) == 0)
+        return about;
+    json_decref(about);
+    return NULL;
+}

@@ -1,0 +1,221 @@
+/*
+ * test_first_order.c: the integrators that choose their own steps by a local error: they agree when their
+ * tolerances are tight, have the orders that they are set to, end at the ends of their runs, and continue
+ * as they were after a checkpoint; the energy of an oscillator under dirk in closed form.
+ *
+ * The sheet is that of test_order.c: E h = 20 N/m, 2 g a node, dashpots and drag: smooth, with waves that
+ * steps of a millisecond resolve.
+ */
+#include <complex.h>
+
+#include "integrators/integrator.h"
+#include "support/scene.h"
+
+#define END  0.2 /* [s] */
+#define SIZE 0.5 /* [m] diagonal */
+
+#define SHEET                                                                                                \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, 'width': 0.4, 'height': "   \
+    "0.3},"                                                                                                  \
+    "'material': {'young_modulus': 2e4, 'thickness': 1e-3, 'areal_density': 0.2},"                           \
+    "'terms': ['stretch.edge', 'bend.hinge', {'type': 'drag.viscous', 'coefficient': 0.3},"                  \
+    "{'type': 'damp.kelvin_voigt', 'beta': 2e-3}], 'velocity': [0.1, 0, 0.2],"                               \
+    "'pins': [{'corner': 'top-left'}, {'corner': 'top-right'%s}]}],"                                         \
+    "'integrator': {'method': '%s', 'rtol': %g%s}, 'duration': 1}"
+
+#define TRACK                                                                                                \
+    ", 'track': [[0.03, [0, 0, 0]], [0.1, [0, 0.03, 0]], [0.15, [-0.02, 0.03, 0.02]], [1, [-0.02, 0, 0]]]"
+
+/* Whether steps follow from a tolerance of the local error. */
+static bool controls_error(const drape_integrator_ops *ops)
+{
+    return ops->own_steps && drape_param_find(ops->entry.params, ops->entry.param_count, "rtol") >= 0;
+}
+
+static double distance(const scene *a, const scene *b)
+{
+    double sum = 0;
+    for (size_t i = 0; i < 3 * (size_t)a->model->node_count; i++)
+        sum += pow(drape_sim_positions(a->sim)[i] - drape_sim_positions(b->sim)[i], 2);
+    return sqrt(sum / a->model->node_count);
+}
+
+/* rtol 1e-11 of the size a step, in less than 1e3 steps, whose errors do not grow on a sheet with drag:
+ * 1e-8 of the size at most. */
+START_TEST(they_agree_at_tight_tolerances)
+{
+    for (int moved = 0; moved < 2; moved++) {
+        scene first = {NULL};
+        const char *track = moved ? TRACK : "";
+        for (int i = 0; drape_integrators[i]; i++) {
+            if (!controls_error(drape_integrators[i]))
+                continue;
+            scene s = scene_open(SHEET, track, drape_integrators[i]->entry.name, 1e-11, "");
+            scene_advance(&s, END);
+            if (!first.sim) {
+                first = s;
+                continue;
+            }
+            printf("# %s: %.3g m, %lld steps\n", drape_integrators[i]->entry.name, distance(&first, &s),
+                   (long long)drape_sim_statistics(s.sim).steps_accepted);
+            assert_below(distance(&first, &s), 1e-8 * SIZE);
+            scene_close(&s);
+        }
+        scene_close(&first);
+    }
+}
+END_TEST
+
+/* Errors at rtol 1e-4 and 1e-9, as a power of the number of steps: its order, on average over the steps. A
+ * variable order may be higher than its limit where low orders suffice for the loose tolerance. */
+static void check_order(const char *method, const char *setting, int order)
+{
+    char more[40];
+    double error[2];
+    int64_t steps[2];
+    snprintf(more, sizeof more, ", '%s': %d", setting, order);
+    scene reference = scene_open(SHEET, "", "ida", 1e-11, "");
+    scene_advance(&reference, END);
+    for (int k = 0; k < 2; k++) {
+        scene s = scene_open(SHEET, "", method, k ? 1e-9 : 1e-4, more);
+        scene_advance(&s, END);
+        error[k] = distance(&reference, &s);
+        steps[k] = drape_sim_statistics(s.sim).steps_accepted;
+        scene_close(&s);
+    }
+    const double slope = log(error[0] / error[1]) / log((double)steps[1] / (double)steps[0]);
+    printf("# %s, order %d: %lld to %lld steps, %.3g to %.3g m: %.2f\n", method, order, (long long)steps[0],
+           (long long)steps[1], error[0], error[1], slope);
+    ck_assert_double_ge(slope, order - 0.5);
+    scene_close(&reference);
+}
+
+START_TEST(dirk_has_the_order_that_is_set)
+{
+    for (int order = 2; order <= 5; order++)
+        check_order("dirk", "order", order);
+}
+END_TEST
+
+START_TEST(cvode_has_the_order_that_is_set)
+{
+    for (int order = 2; order <= 5; order++)
+        check_order("cvode", "max_order", order);
+}
+END_TEST
+
+/* Thousands of steps end within their rounding errors of the end, but the run ends there, to the last
+ * bit; so do parts of it. */
+START_TEST(runs_end_at_their_ends)
+{
+    for (int i = 0; drape_integrators[i]; i++) {
+        if (!controls_error(drape_integrators[i]))
+            continue;
+        scene s = scene_open(SHEET, TRACK, drape_integrators[i]->entry.name, 1e-3, ", 'max_step': 1e-4");
+        for (double end = 0.1; end < 0.4; end += 0.1) {
+            scene_advance(&s, end);
+            ck_assert_double_eq(drape_sim_time(s.sim), end);
+        }
+        ck_assert_int_ge(drape_sim_statistics(s.sim).steps_accepted, 3000);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* What pins put in comes out, and what dashpots take is counted: the remainder is the error of the
+ * method, and of the trapezoidal rule in two powers, which falls with the tolerance. */
+START_TEST(the_energy_balance_is_kept)
+{
+    for (int i = 0; drape_integrators[i]; i++) {
+        if (!controls_error(drape_integrators[i]))
+            continue;
+        double remainder[2];
+        for (int k = 0; k < 2; k++) {
+            scene s = scene_open(SHEET, TRACK, drape_integrators[i]->entry.name, k ? 1e-7 : 1e-3, "");
+            scene_advance(&s, 0.3);
+            const drape_energy e = drape_sim_energy(s.sim);
+            ck_assert_double_gt(e.dissipated, 1e-4);
+            remainder[k] = fabs(e.numerical) / e.dissipated;
+            scene_close(&s);
+        }
+        printf("# %s: remainder %.3g and %.3g of what is dissipated\n", drape_integrators[i]->entry.name,
+               remainder[0], remainder[1]);
+        assert_below(remainder[1], 0.1 * remainder[0]);
+    }
+}
+END_TEST
+
+/* ---- An oscillator ---- */
+
+#define LENGTH  0.1
+#define MODULUS 1e6
+
+/* The centre of a hexagon of pinned springs, as in test_oscillator.c: linear up to the square of the
+ * strain. */
+static scene oscillator(double max_step, double speed)
+{
+    return scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 2, 'edge_length': %g,"
+                      "'transform': {'translate': [%.17g, 0, %.17g]}},"
+                      "'material': {'young_modulus': %g, 'thickness': 1e-3, 'areal_density': 0.2},"
+                      "'terms': ['stretch.edge'], 'velocity': [%.17g, 0, 0],"
+                      "'pins': [{'nodes': [0, 1, 2, 3, 5, 6, 7, 8]}]}],"
+                      "'gravity': [0, 0, 0], 'integrator': {'method': 'dirk', 'order': 2, 'atol_x': 1e6,"
+                      "'atol_v': 1e6, 'max_step': %.17g}, 'duration': 1}",
+                      LENGTH, -1.5 * LENGTH, 0.8660254037844386 * LENGTH, MODULUS, speed, max_step);
+}
+
+/* |R(i w h)|^2 of TR-BDF2: the trapezoidal rule to g h, g = 2 - sqrt(2), then BDF2. */
+static double factor_of(double phase)
+{
+    const double g = 2 - sqrt(2.0);
+    const double complex z = I * phase, middle = (1 + g / 2 * z) / (1 - g / 2 * z);
+    const double complex end = (middle - (1 - g) * (1 - g)) / (g * (2 - g)) / (1 - (1 - g) / (2 - g) * z);
+    return creal(end * conj(end));
+}
+
+/* Compares the energies of successive steps of one size. */
+typedef struct decay {
+    double h, factor, before, worst;
+    int count;
+} decay;
+
+static drape_status watch_decay(void *user, const drape_event *event)
+{
+    decay *d = user;
+    if (event->kind != DRAPE_EVENT_ATTEMPT || !event->attempt->accepted)
+        return DRAPE_OK;
+    const drape_energy e = drape_sim_energy(event->sim);
+    const double now = e.kinetic + e.elastic;
+    if (d->count > 1 && fabs(event->attempt->h / d->h - 1) < 1e-9)
+        d->worst = fmax(d->worst, fabs(now / d->before / d->factor - 1));
+    d->count = fabs(event->attempt->h / d->h - 1) < 1e-9 ? d->count + 1 : 0;
+    d->before = now;
+    return DRAPE_OK;
+}
+
+/* The tolerance is no bound on the step. Steps grow fivefold up to max_step; after two of that size factors
+ * are those of it. The equations are linear, so one correction solves them up to the square of the strain,
+ * 1e-10, and the rounding of strains, DBL_EPSILON over 1e-5 times the decay so far, 1e-3 at most. */
+START_TEST(energy_factor_of_tr_bdf2)
+{
+    static const double phases[] = {0.3, 1, 3};
+    for (size_t k = 0; k < sizeof phases / sizeof *phases; k++) {
+        const double spring = 3 * 0.8660254037844386 * MODULUS * 1e-3,
+                     mass = 0.2 * 0.8660254037844386 * LENGTH * LENGTH, w = sqrt(spring / mass);
+        decay d = {.h = phases[k] / w, .factor = factor_of(phases[k])};
+        scene s = oscillator(d.h, 1e-5 * LENGTH * w);
+        ck_assert_int_eq(drape_sim_observe(s.sim, watch_decay, &d), DRAPE_OK);
+        scene_advance(&s, 12 * d.h);
+        printf("# w h = %g: the energy falls by %.6f in a step, within %.2g, %d steps\n", phases[k], d.factor,
+               d.worst, d.count);
+        ck_assert_int_ge(drape_sim_statistics(s.sim).steps_accepted, 10);
+        ck_assert_double_gt(d.worst, 0);
+        assert_below(d.worst, 1e-6);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+SUITE("first_order", they_agree_at_tight_tolerances, dirk_has_the_order_that_is_set,
+      cvode_has_the_order_that_is_set, runs_end_at_their_ends, the_energy_balance_is_kept,
+      energy_factor_of_tr_bdf2)
