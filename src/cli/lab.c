@@ -144,6 +144,7 @@ int cli_lab_run(const cli_lab_request *request, int default_jobs, double default
         drape_lab_outcome outcome;
         def.user = &progress;
         cli_progress_begin(&progress, 0, 0);
+        progress.logs = !progress.on;
         drape_status status = drape_lab_run(command->ctx, command->verb, &def, &outcome);
         cli_progress_clear(&progress);
         code = cli_lab_conclude(command, status, &outcome);

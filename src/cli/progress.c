@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #define PERIOD        0.1 /* shortest time between two updates [s] */
-#define LOG_PERIOD    60  /* the same of lines in a log [s] */
+#define LOG_PERIOD    300 /* the same of lines in a log [s] */
 #define DEFAULT_WIDTH 80
 #define MAX_WIDTH     120
 #define BAR           24 /* cells */
@@ -41,8 +41,7 @@ void cli_progress_begin(cli_progress *p, double from, double end)
 {
     *p = (cli_progress){.on = isatty(STDERR_FILENO), .from = from, .end = end, .shown = -INFINITY};
     if (!p->on) {
-        p->logs = end == 0;
-        p->shown = drape_clock_seconds(); /* short sweeps leave no line */
+        p->shown = drape_clock_seconds(); /* short sweeps leave no line in a log */
         return;
     }
     struct winsize size;
@@ -86,7 +85,7 @@ void cli_progress_show(cli_progress *p, double time, int64_t rejected)
     draw(p, line);
 }
 
-/* A line once a minute, where stderr is a file: a sweep of hours must not be silent there. */
+/* A line now and then, where stderr is a file: a sweep of hours must not be silent there. */
 static void log_count(cli_progress *p, int64_t done, int64_t total, double seconds_left)
 {
     char eta[24];

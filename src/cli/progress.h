@@ -1,5 +1,5 @@
-/* progress.h: a line on the terminal that shows the progress of a run. If stderr is not a terminal, sweeps add a
- * line a minute to it, and runs nothing. */
+/* progress.h: a line on the terminal that shows the progress of a run. If stderr is not a terminal, an
+ * experiment adds a line every five minutes to it, and others nothing. */
 #ifndef DRAPE_CLI_PROGRESS_H
 #define DRAPE_CLI_PROGRESS_H
 
@@ -8,7 +8,7 @@
 
 typedef struct cli_progress {
     bool on;             /* stderr is a terminal */
-    bool logs;           /* a sweep, and it is none */
+    bool logs;           /* it is not, and lines are added to it; set by the caller */
     double from, end;    /* simulated time at the beginning and the end [s] */
     double start, shown; /* clock at the beginning and at the last update [s] */
     int width;           /* columns of the line */

@@ -120,8 +120,8 @@ drape_status drape_relaxed_add(drape_relaxed_set *set, int32_t collider, int32_t
         drape_list_grow(set->arena, set->nodes, set->count, &set->room, sizeof *set->nodes);
     if (!nodes)
         return DRAPE_E_MEMORY;
-    const int32_t at = place_of(set, collider, node);
     set->nodes = nodes;
+    const int32_t at = place_of(set, collider, node);
     memmove(nodes + at + 1, nodes + at, (size_t)(set->count - at) * sizeof *nodes);
     nodes[at] = (drape_relaxed_node){.collider = collider,
                                      .node = node,

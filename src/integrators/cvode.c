@@ -158,6 +158,11 @@ static int dense(drape_first_order *f, double t, N_Vector out)
     return CVodeGetDky(f->memory, t, 0, out);
 }
 
+static int errors(drape_first_order *f, N_Vector out)
+{
+    return CVodeGetEstLocalErrors(f->memory, out);
+}
+
 /* After a failure there is nothing to continue. Replayed steps counted no iterations. */
 static bool archive_cvode(drape_first_order *f, drape_archive *a)
 {
@@ -186,7 +191,7 @@ static const drape_first_order_solver solver = {
     .last_step = CVodeGetLastStep,
     .current_step = CVodeGetCurrentStep,
     .iterations = CVodeGetNumNonlinSolvIters,
-    .errors = CVodeGetEstLocalErrors,
+    .errors = errors,
     .dense = dense,
     .archive = archive_cvode,
     .vectors = vectors,

@@ -289,7 +289,7 @@ static void diagnose(drape_first_order *s, drape_step_info *info)
         info->diagnostic = s->crossing_pair;
         return;
     }
-    if (s->solver->errors(s->memory, s->between))
+    if (s->solver->errors(s, s->between))
         return;
     const double *e = N_VGetArrayPointer(s->between), *w = N_VGetArrayPointer(s->weights);
     for (int64_t i = 0; i < s->n; i++)

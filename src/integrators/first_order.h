@@ -104,8 +104,8 @@ typedef struct drape_first_order_solver {
     drape_first_order_outcome (*step)(drape_first_order *f, double end, double *t);
     int (*last_step)(void *memory, sunrealtype *h);
     int (*current_step)(void *memory, sunrealtype *h);
-    int (*iterations)(void *memory, long *count); /* of Newton, since `begin` */
-    int (*errors)(void *memory, N_Vector out);    /* local errors of the last step, per unknown */
+    int (*iterations)(void *memory, long *count);      /* of Newton, since `begin` */
+    int (*errors)(drape_first_order *f, N_Vector out); /* local errors of the last step, per unknown */
     int (*dense)(drape_first_order *f, double t, N_Vector out); /* y within the last step */
     /* Its history. False: it cannot be read, and the solver must restart. */
     bool (*archive)(drape_first_order *f, drape_archive *a);

@@ -119,6 +119,11 @@ static int dense(drape_first_order *s, double t, N_Vector out)
     return IDAGetDky(s->memory, t, 0, out);
 }
 
+static int errors(drape_first_order *s, N_Vector out)
+{
+    return IDAGetEstLocalErrors(s->memory, out);
+}
+
 static bool archive_ida(drape_first_order *s, drape_archive *a)
 {
     return drape_ida_archive(s->memory, a);
@@ -140,7 +145,7 @@ static const drape_first_order_solver solver = {
     .last_step = IDAGetLastStep,
     .current_step = IDAGetCurrentStep,
     .iterations = IDAGetNumNonlinSolvIters,
-    .errors = IDAGetEstLocalErrors,
+    .errors = errors,
     .dense = dense,
     .archive = archive_ida,
     .vectors = vectors,

@@ -48,13 +48,11 @@ static const drape_param params[PARAM_COUNT] = {
         DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,
                      "residual of the free nodes, largest component, below which no iteration is made, at "
                      "most 1 % of their load; not a bound on an accepted state"),
-    [PARAM_RESCUE_ITERATIONS] =
-        DRAPE_INTEGER("rescue_iterations", "1", 20, 0, 100000,
-                      "up to so many further iterations while the estimated distance "
-                      "is above error, or the residual is not "
-                      "below that of the guess, with factors or contact below a "
-                      "tenth of it; a step that then is not nearer than "
-                      "the guess, or further off than the scene is large, is rejected"),
+    [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER(
+        "rescue_iterations", "1", 20, 0, 100000,
+        "up to so many further iterations while the estimated distance is above error, or too much "
+        "is left: with factors and without contact energy, else residual; a step that then "
+        "is not nearer than the guess, or further off than the scene is large, is rejected"),
     [PARAM_EXTRAPOLATION] =
         DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
                      "fraction of the last change of velocity that is added to the guess"),

@@ -28,7 +28,7 @@
  *     nodes and E h = 1e5 N/m takes half of the iterations;
  *   - a limit to the next step by the rate of convergence (Gustafsson & Soederlind 1997, Control strategies
  *     for the iterative solution of nonlinear equations in ODE solvers): where cloth swings fast, the
- *     iteration bounds the steps, not the error.
+ *     iteration bounds the steps, not the error; and after a failure of the iteration, steps grow slowly;
  *   - in contact, K and D of the present state, in every step, and the present velocities as a guess.
  *
  * The energy account integrates the powers by the quadrature of the stages.
@@ -51,10 +51,16 @@ enum { STAGES = 3 };
 /* Of Newton's iteration. */
 #define MAX_ITERATIONS 10
 #define FAST                                                                                                 \
-    1e-2                 /* K and D are kept after a step whose iteration converged at this rate: that
+    1e-2        /* K and D are kept after a step whose iteration converged at this rate: that
                                which LINEAR_TOLERANCE allows; never in contact */
-#define AIM          0.3 /* rate for which the next step is made short enough */
-#define SLOWEST      0.99
+#define AIM 0.3 /* rate for which the next step is made short enough */
+/* Extrapolation, in steps of the last size: one that was cut by the end of an advance may be tiny. */
+#define FARTHEST 8.0
+#define SLOWEST  0.99
+/* Where the iteration failed, the next step is at most this much of that, and from step to step the limit is
+ * relaxed by a factor. With contact this saves a third of the time. */
+#define CEILING      0.5
+#define RELAXATION   1.2
 #define NEWTON_SHARE 0.03 /* of the error's bound: error that the iteration may leave */
 #define ROUNDING     10.0 /* of the sizes of the scene: no smaller error can be asked for */
 /* Residual of the complex system, relative. 1e-3 takes a third more solves and saves a fiftieth of the
@@ -121,6 +127,7 @@ typedef struct radau_state {
     /* Kept between steps. */
     polynomial last, next; /* of the last accepted step; of the one being made */
     double reached;        /* [s] where the last step ended; NAN: the next one starts anew */
+    double ceiling;        /* [s] of the next step; INFINITY: the iteration has not failed lately */
     double hardest;        /* largest rate of the last iteration, of those that mattered */
     double theta;          /* rate of convergence of the last iteration */
     double left;           /* theta/(1 - theta) */
@@ -200,6 +207,13 @@ static void weights_of_position(double p, double w[STAGES + 1])
         w[i] = p / 2 * (left[i] + right[i]);
 }
 
+/* Whether the last polynomial says something about a step of size h. In contact its extrapolation costs more
+ * iterations than it saves. */
+static bool extrapolates(const radau_state *s, double h)
+{
+    return s->last.h > 0 && h <= FARTHEST * s->last.h && !s->touches;
+}
+
 static void interpolate(void *state, double time, double *x)
 {
     radau_state *s = state;
@@ -212,6 +226,19 @@ static void interpolate(void *state, double time, double *x)
     for (int64_t i = 0; i < s->n; i++)
         x[node_at(s, i)] = p->x[i] + p->h * (w[0] * p->v[i] + w[1] * p->stage[0][i] + w[2] * p->stage[1][i] +
                                              w[3] * p->stage[2][i]);
+}
+
+static void interpolate_velocities(void *state, double time, double *v)
+{
+    radau_state *s = state;
+    const polynomial *p = &s->last;
+    double w[STAGES + 1];
+    if (s->n == 0 || p->h == 0)
+        return;
+    weights_of_velocity((time - p->t) / p->h, w);
+    for (int64_t i = 0; i < s->n; i++)
+        v[node_at(s, i)] =
+            w[0] * p->v[i] + w[1] * p->stage[0][i] + w[2] * p->stage[1][i] + w[3] * p->stage[2][i];
 }
 
 /* ---- Forces ---- */
@@ -258,12 +285,12 @@ static double jacobian_clock(const radau_state *s)
 }
 
 /* Where K and D are evaluated: at the last polynomial's extrapolation to the middle of the step, as K at the
- * beginning is twice as far from K at the end; but at the beginning if there is none, if it crosses
- * something, or in contact, whose forces make extrapolation a bad guess. */
+ * beginning is twice as far from K at the end; but at the beginning if there is none, or if it crosses
+ * something. */
 static drape_point choose_matrix_point(radau_state *s, double h)
 {
     const polynomial *p = &s->next, *last = &s->last;
-    if (last->h > 0 && !s->touches) {
+    if (extrapolates(s, h)) {
         double of_x[STAGES + 1], of_v[STAGES + 1], *z = s->rhs, *v = s->correction;
         weights_of_position(1 + h / (2 * last->h), of_x);
         weights_of_velocity(1 + h / (2 * last->h), of_v);
@@ -322,13 +349,11 @@ static void set_guess(radau_state *s, guess kind, double h)
     combine(s->n, coefficients, h, s->rate, s->z);
 }
 
-/* Finds a guess in which nothing passes through anything else, and -F there. In contact an extrapolation
- * costs more iterations than it saves. */
+/* Finds a guess in which nothing passes through anything else, and -F there. */
 static drape_status guess_stages(radau_state *s, double h)
 {
     drape_status status = DRAPE_RETRY_NONLINEAR;
-    for (int kind = s->last.h > 0 && !s->touches ? EXTRAPOLATED : UNIFORM; status > 0 && kind < GUESSES;
-         kind++) {
+    for (int kind = extrapolates(s, h) ? EXTRAPOLATED : UNIFORM; status > 0 && kind < GUESSES; kind++) {
         set_guess(s, (guess)kind, h);
         status = evaluate_stages(s, h);
     }
@@ -584,6 +609,16 @@ static drape_status find_stages(radau_state *s, double h, drape_step_info *info)
     } while (true);
 }
 
+/* Bounds what the error test proposed by what the iteration is likely to manage. */
+static void bound_next_step(radau_state *s, double h)
+{
+    double *proposed = &s->control.made.proposed;
+    if (s->hardest > 0)
+        *proposed = fmin(*proposed, h * AIM / s->hardest);
+    *proposed = fmin(*proposed, s->ceiling);
+    s->ceiling *= RELAXATION;
+}
+
 /* Solves the stages and tests the error. */
 static drape_status attempt(radau_state *s, const drape_local_attempt *a, drape_step_info *info)
 {
@@ -592,13 +627,14 @@ static drape_status attempt(radau_state *s, const drape_local_attempt *a, drape_
         status = estimate_error(s, a);
     if (status) {
         info->retry = info->retry > 0 ? info->retry : a->h / 2;
+        s->ceiling = CEILING * a->h;
         diagnose(s, info);
         return status;
     }
     status = drape_local_error_test(&s->control, a, s->error_x, s->error_v, info);
     s->have_matrix &= status ? s->current : s->theta <= FAST && !s->touches;
-    if (!status && s->hardest > 0)
-        s->control.made.proposed = fmin(s->control.made.proposed, a->h * AIM / s->hardest);
+    if (!status)
+        bound_next_step(s, a->h);
     return status;
 }
 
@@ -650,6 +686,7 @@ static void restart(void *state, const drape_state *from)
     (void)from;
     radau_state *s = state;
     s->reached = NAN;
+    s->ceiling = INFINITY;
     s->have_matrix = false;
     drape_local_error_restart(&s->control);
 }
@@ -761,6 +798,7 @@ static void archive(void *state, drape_archive *a)
     radau_state *s = state;
     drape_local_error_archive(&s->control, a);
     drape_archive_double(a, &s->reached);
+    drape_archive_double(a, &s->ceiling);
     drape_archive_double(a, &s->theta);
     drape_archive_double(a, &s->left);
     drape_archive_bool(a, &s->have_matrix);
@@ -786,6 +824,7 @@ const drape_integrator_ops drape_integrator_radau = {
     .own_steps = true,
     .step = step,
     .interpolate = interpolate,
+    .interpolate_velocities = interpolate_velocities,
     .restart = restart,
     .work = work,
     .archive = archive,

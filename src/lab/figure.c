@@ -115,7 +115,7 @@ static void put_linear_ticks(const lab_axis *a, FILE *out)
                                           : 10 * size;
     const char *comma = "";
     for (double k = ceil(a->from / step - 1e-9); k * step <= a->to + 1e-9 * step; k++, comma = ", ")
-        fprintf(out, "%s'%g' %.9g", comma, k * step, k * step);
+        fprintf(out, "%s'%g' %.9g", comma, k * step + 0.0, k * step); /* not -0 */
 }
 
 static void put_axis(const lab_axis *a, const char *name, FILE *out)

@@ -1,7 +1,7 @@
 /*
- * ivp: every integrator over its dt or rtol on scenes of the test set, compared with their references (ivp.h).
- * The residual that Newton's method may leave falls with dt as fast as the error of the method does. Errors
- * are relative to the size of the scene, and taken at times at which steps end.
+ * ivp: every integrator over its dt or rtol on scenes of the test set, compared with their references
+ * (ivp.h). The residual that Newton's method may leave falls with dt as fast as the error of the method
+ * does. Errors are relative to the size of the scene, and taken at times at which steps end.
  */
 #include "lab/ivp.h"
 #include "base/param.h"
@@ -394,8 +394,8 @@ static bool has_its_steps(const json_t *r)
     return lab_number(r, "rejected") == 0 && !(lab_tag_number(r, "value") > 0.5 * limit);
 }
 
-/* The points of the asymptotic range, from the finest on: those whose orders between neighbours are that of the finest.
- * Points within the reference's error, and cases whose steps were cut, are none. */
+/* The points of the asymptotic range, from the finest on: those whose orders between neighbours are that of
+ * the finest. Points within the reference's error, and cases whose steps were cut, are none. */
 static size_t asymptotic_range(const series *s, double *dt, double *error)
 {
     size_t count = 0;
@@ -495,6 +495,18 @@ static void tabulate_failures(table *t)
 
 /* ---- Scenes and references ---- */
 
+static void horizon_text(const json_t *scene, char *text, size_t size)
+{
+    const json_t *t_s = json_object_get(scene, "t_s");
+    const double last = json_number_value(json_array_get(t_s, json_array_size(t_s) - 1));
+    if (!t_s)
+        snprintf(text, size, "not measured");
+    else if (isnan(lab_number(scene, "horizon_s")))
+        snprintf(text, size, "beyond %.3g", last);
+    else
+        snprintf(text, size, "%.3g", lab_number(scene, "horizon_s"));
+}
+
 static void tabulate_scenes(table *t)
 {
     static const char *const heads[] = {"scene", "nodes", "duration [s]", "horizon [s]",
@@ -503,8 +515,7 @@ static void tabulate_scenes(table *t)
     series list[MAX_SERIES];
     begin_table(t, "Scenes", heads, sizeof heads / sizeof *heads);
     for (size_t i = 0; i < json_array_size(scenes); i++) {
-        const json_t *s = json_array_get(scenes, i), *t_s = json_object_get(s, "t_s");
-        const double last = json_number_value(json_array_get(t_s, json_array_size(t_s) - 1));
+        const json_t *s = json_array_get(scenes, i);
         char text[64];
         double nodes = NAN;
         const size_t count = list_series(t->l, lab_text(s, "name"), list);
@@ -516,12 +527,7 @@ static void tabulate_scenes(table *t)
         put_cell(t, text);
         snprintf(text, sizeof text, "%.3g", lab_number(s, "duration_s"));
         put_cell(t, text);
-        if (!t_s)
-            snprintf(text, sizeof text, "not measured");
-        else if (isnan(lab_number(s, "horizon_s")))
-            snprintf(text, sizeof text, "beyond %.3g", last);
-        else
-            snprintf(text, sizeof text, "%.3g", lab_number(s, "horizon_s"));
+        horizon_text(s, text, sizeof text);
         put_cell(t, text);
         snprintf(text, sizeof text, "%.1e", lab_number(s, "reference_error"));
         put_cell(t, text);
@@ -543,14 +549,15 @@ static const chart charts[] = {
     {"rtol", "rtol", "value", "rtol"},
 };
 
-static drape_status draw(lab *l, const char *scene, const chart *c)
+static drape_status draw(lab *l, const json_t *about, const chart *c)
 {
+    const char *scene = lab_text(about, "name");
     lab_figure f;
     series list[MAX_SERIES];
     const size_t series_count = list_series(l, scene, list);
     size_t count = 0, variant = 0;
     double *xy = drape_arena_take(&l->arena, 2 * l->count, sizeof *xy);
-    char name[96], caption[192];
+    char name[96], caption[320], horizon[64];
     snprintf(name, sizeof name, "%.64s_%s", scene, c->suffix);
     drape_status status = xy ? lab_figure_begin(l, &f, name) : DRAPE_E_MEMORY;
     if (status)
@@ -583,8 +590,11 @@ static drape_status draw(lab *l, const char *scene, const chart *c)
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "error / size");
     if (count > 0)
         lab_figure_fit(&f, xy, count, c->knob && strcmp(c->knob, "dt") == 0);
+    horizon_text(about, horizon, sizeof horizon);
     snprintf(caption, sizeof caption,
-             "%.60s: error, the largest of the times, of the RMS over the nodes, over %s", scene, c->label);
+             "%.60s: error, the largest of the times, of the RMS over the nodes, over %s. The error of the "
+             "reference is %.1e, the horizon %s s, the duration %.3g s.",
+             scene, c->label, lab_number(about, "reference_error"), horizon, lab_number(about, "duration_s"));
     status = lab_figure_end(l, &f, caption);
     drape_arena_release(&l->arena, xy);
     return status;
@@ -652,7 +662,7 @@ static drape_status report(lab *l)
     drape_status status = draw_horizons(l);
     for (size_t i = 0; !status && i < json_array_size(scenes); i++)
         for (size_t k = 0; !status && k < sizeof charts / sizeof *charts; k++)
-            status = draw(l, lab_text(json_array_get(scenes, i), "name"), &charts[k]);
+            status = draw(l, json_array_get(scenes, i), &charts[k]);
     return status ? status : tabulate(l);
 }
 

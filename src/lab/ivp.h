@@ -1,13 +1,13 @@
 /*
- * ivp.h: the test set of initial value problems: scenes with a horizon, up to which they are predictable, and
- * a reference on which two unrelated families of methods agree. Beside DIR/NAME.json of a scene stand
+ * ivp.h: the test set of initial value problems: scenes with a horizon, up to which they are predictable,
+ * and a reference on which two unrelated families of methods agree. Beside DIR/NAME.json of a scene stand
  *
  *     DIR/references/NAME.npy   positions, (times x nodes x 3) float64, at k/frame_rate for k = 1 to the end
  *     DIR/references/NAME.json  {"scene_hash", "data_hash", "times_s", "size_m", "error", "method", ...}
  *     DIR/horizons/NAME.json    {"scene_hash", "horizon_s", "t_s", "growth", ...}
  *
- * The size of a scene, to which errors are relative, is the diagonal of its rest bounding box. Errors are root
- * mean squares over the free nodes of their distances.
+ * The size of a scene, to which errors are relative, is the diagonal of its rest bounding box. Errors are
+ * root mean squares over the free nodes of their distances.
  */
 #ifndef DRAPE_LAB_IVP_H
 #define DRAPE_LAB_IVP_H
@@ -39,8 +39,8 @@ typedef struct lab_ivp {
 drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s);
 void lab_ivp_close(lab_ivp *s);
 
-/* Reads the reference. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (it is of another version of the scene, or its data
- * are not those that its JSON describes). */
+/* Reads the reference. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (it is of another version of the scene, or its
+ * data are not those that its JSON describes). */
 drape_status lab_ivp_read_reference(lab_ivp *s);
 
 /* Reads the horizon as JSON, NULL if there is none for this version of the scene. The caller owns it. */
@@ -66,10 +66,10 @@ drape_status lab_ivp_run(const lab_ivp *s, json_t *settings, double seconds, lab
 /* The largest distance over the times of two motions, relative to the size. */
 double lab_ivp_distance(const lab_ivp *s, const lab_trace *a, const lab_trace *b);
 
-/* Computes the reference with every family of methods that the build has and that admits the scene, and prints
- * what each reached. seconds: CPU time that a family may take. check: compares it with the one that is stored;
- * else stores it. Errors: those of running, DRAPE_E_SOLVER (no two families agree to 1e-8, or with contact to
- * 1e-5, or the stored one differs by more than both errors together), DRAPE_E_FILE. */
+/* Computes the reference with every family of methods that the build has and that admits the scene, and
+ * prints what each reached. seconds: CPU time that a family may take. check: compares it with the one that
+ * is stored; else stores it. Errors: those of running, DRAPE_E_SOLVER (no two families agree to 1e-8, or
+ * with contact to 1e-5, or the stored one differs by more than both errors together), DRAPE_E_FILE. */
 drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out);
 
 /* Measures the growth of a perturbation of 1e-10 of the size over twice the duration, stores it, and

@@ -1,7 +1,7 @@
 /*
- * ivp_horizon.c: how fast a small perturbation of the start grows. The method is explicit where it solves the
- * equations of the scene at bearable cost, because its steps are a smooth function of the state: there is no iteration whose
- * remainder would be taken for growth. Else it is trbdf2, solved to rounding.
+ * ivp_horizon.c: how fast a small perturbation of the start grows. The method is explicit where it solves
+ * the equations of the scene at bearable cost, because its steps are a smooth function of the state: there
+ * is no iteration whose remainder would be taken for growth. Else it is trbdf2, solved to rounding.
  */
 #include "lab/ivp.h"
 #include "lab/lab.h"

@@ -1,8 +1,9 @@
 /*
- * ivp_reference.c: the reference of a scene. Each family of methods is refined until it changes no more, or its
- * time is used up; of those of fixed steps the results of successive dt are extrapolated to dt = 0 (Richardson
- * 1911; Hairer, Norsett & Wanner 1993, II.9). The reference is that of the family with the smallest change at
- * its last refinement, and its error the distance to the nearest result of another family.
+ * ivp_reference.c: the reference of a scene. Each family of methods is refined until it changes no more, or
+ * its time is used up; of those of fixed steps the results of successive dt are extrapolated to dt = 0
+ * (Richardson 1911; Hairer, Norsett & Wanner 1993, II.9). The reference is that of the family with the
+ * smallest change at its last refinement, and its error the distance to the nearest result of another
+ * family.
  */
 #include "base/clock.h"
 #include "base/hash.h"
@@ -15,9 +16,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MAX_LEVELS   8
+#define MAX_LEVELS   10
 #define ENOUGH       1e-2 /* of the goal: no further refinement */
-#define GROWTH       1.7
+#define GROWTH       1.7  /* expected cost of a level over that of the one before, at least */
 #define SMOOTH_GOAL  1e-8 /* of the size: families agree to this, */
 #define CONTACT_GOAL 1e-5 /* or with contact to this */
 #define COARSEST     8    /* steps in an interval at the first level of fixed steps */
@@ -34,7 +35,7 @@ typedef struct family {
 
 static const family families[] = {
     {"Radau", "radau", 1e-6, 0.1, NULL, 0, 1},      {"BDF", "ida", 1e-8, 0.1, "max_order", 5, 1},
-    {"BDF", "cvode", 1e-8, 0.1, "max_order", 5, 1}, {"SDIRK", "dirk", 1e-6, 0.1, NULL, 0, 1},
+    {"BDF", "cvode", 1e-8, 0.1, "max_order", 5, 1}, {"SDIRK", "dirk", 1e-6, 0.1, "order", 5, 1},
     {"SDIRK", "trbdf2", 0, 0.5, NULL, 0, 1},        {"Verlet", "verlet", 0, 0.5, "substeps", 1, 2},
 };
 #define FAMILIES ((int)(sizeof families / sizeof *families))
@@ -247,6 +248,11 @@ drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out
         return status;
     const attempt *best = choose(attempts, count);
     const double error = disagreement(s, attempts, count, best), goal = goal_of(s);
+    if (!isfinite(error))
+        return drape_fail(s->arena->ctx, DRAPE_E_SOLVER,
+                          "%.300s: no reference: no two families of methods completed two levels; more CPU "
+                          "seconds help",
+                          s->path);
     if (!(error <= goal))
         return drape_fail(
             s->arena->ctx, DRAPE_E_SOLVER,

@@ -1,5 +1,5 @@
-/* ivp_score.c: scenes of the test set for other programs: what they need, and how far their motion is from the
- * reference; see ivp.h. */
+/* ivp_score.c: scenes of the test set for other programs: what they need, and how far their motion is from
+ * the reference; see ivp.h. */
 #include "io/export.h"
 #include "io/npy.h"
 #include "lab/ivp.h"

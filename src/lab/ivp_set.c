@@ -79,9 +79,9 @@ bool lab_ivp_admits(const lab_ivp *s, const drape_integrator_ops *integrator)
 }
 
 /*
- * A residual r of a node of mass m that has the same sign in all steps displaces it by r/m T^2/2 until the end:
- * r = c m L/T^2 (h/T)^p displaces by a share c/2 (h/T)^p of the size L, and c = 0.01 makes that small beside
- * an error of order p. In practice residuals have changing signs, and do less.
+ * A residual r of a node of mass m that has the same sign in all steps displaces it by r/m T^2/2 until the
+ * end: r = c m L/T^2 (h/T)^p displaces by a share c/2 (h/T)^p of the size L, and c = 0.01 makes that small
+ * beside an error of order p. In practice residuals have changing signs, and do less.
  */
 static double residual_of_size(const lab_ivp *s)
 {

@@ -23,7 +23,8 @@ void lab_cases_name(const lab *l, char name[64]);
  * destroys it in any case. */
 drape_status lab_begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file);
 
-/* What a case asks for: its settings, and what all cases of the experiment, or it alone, are compared with. */
+/* What a case asks for: its settings, and what all cases of the experiment, or it alone, are compared
+ * with. */
 lab_request lab_request_of(const lab *l, size_t index);
 
 /* Runs the cases of this shard that have no result; each becomes a line as soon as it is done. Errors: those

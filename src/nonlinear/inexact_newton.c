@@ -3,7 +3,7 @@
  *     correct   A p = -F with A near J: by conjugate gradients, or with factors and predicted stress
  *     feasible  p shortened where pieces meet, until nothing passes through anything
  *     advance   d + a p, with the length a where the residual does little work along p
- *     estimate  the distance to the solution, from one more p
+ *     estimate  the distance to the solution, from one more p or by the contraction of an earlier step
  */
 #include "nonlinear/inexact_newton.h"
 
@@ -243,7 +243,7 @@ static void clear_colliders(drape_inexact_newton *s, double *d)
 
 /* Where a pin takes a sheet along, nodes that keep their motion stay behind, and it takes many corrections
  * until the forces of the elements at the pin have reached the others. The equation linearized at the start
- * of the step takes the pull of pins to all nodes at once, as in newton.c, but knows of no contact to come. */
+ * of the step takes the pull of pins to all nodes at once, as in newton.c, but knows of no contact. */
 static drape_status guess_linearized(drape_inexact_newton *s, const drape_inexact_settings *settings,
                                      double *d)
 {
@@ -389,8 +389,9 @@ static double stiffness_share(drape_inexact_newton *s, double *d, bool *adds)
 /* The estimated distance from d to the solution. F was evaluated last at d, as it is on return. corrected:
  * there is a matrix of this solve. Overwrites p.
  *
- * With contact, where returning to d would take another evaluation, p is added to d if it can be: that alone
- * brought cloth on balls a fifth nearer at the same cost. Without contact it gained nothing. */
+ * With contact, where returning to d would take another evaluation, p is added to d if it can be: 32 random
+ * scenes of cloth on balls and floors came a sixth nearer at the same cost, 16 others did not. Without
+ * contact it gained nothing. */
 static double estimate_error(drape_inexact_newton *s, double *d, bool corrected)
 {
     drape_step_equation *e = s->equation;

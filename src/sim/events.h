@@ -5,7 +5,8 @@
  * After each attempt that the controller accepts, and before it is accepted, every event function is
  * evaluated on the dense output of the step (sim/dense.h). A root of an event that is only recorded is
  * located there, and the step stays as it is. At the first root of an event that acts, one that stops the run
- * or releases pins, the step is made again so that it ends there: until the end is a root of the function of
+ * or releases pins, the step ends: in the dense output of an integrator that has its own (step.c), and
+ * otherwise the step is made again with another end: until the end is a root of the function of
  * the state that the integrator itself computes, to within EVENT_TOLERANCE. So the run is that of a host that
  * knew the time and advanced to it.
  */

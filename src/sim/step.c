@@ -6,8 +6,8 @@
 #include "base/clock.h"
 #include "base/finite.h"
 #include "base/reason.h"
+#include "sim/dense.h"
 #include "sim/relaxed.h"
-#include "sim/sim.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -208,13 +208,37 @@ static void reject(drape_sim *sim, const drape_step_info *info)
     count_reason(sim, info->reason);
 }
 
+/* Ends a step of an integrator that has dense output of its own at the time that the schedule was cut to,
+ * where the dense output is its solution. False: it has none, or the state does not pass the checks of a
+ * step. The work of the step is taken to be done evenly. */
+static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
+{
+    const drape_state *now = drape_sim_state(sim);
+    drape_state *next = next_state(sim);
+    const double t = sim->schedule.cut_end, share = (t - now->t) / (next->t - now->t);
+    const double pushed = drape_system_push_work(sim->system, now->x, next->x);
+    if (!sim->chosen.integrator->interpolate_velocities)
+        return false;
+    drape_sim_dense_positions(sim, now, next, t, sim->frame);
+    drape_sim_dense_velocities(sim, now, next, t, sim->frame_velocity);
+    memcpy(next->x, sim->frame, 3 * (size_t)sim->model->node_count * sizeof *next->x);
+    memcpy(next->v, sim->frame_velocity, 3 * (size_t)sim->model->node_count * sizeof *next->v);
+    next->t = t;
+    info->h = t - now->t;
+    info->dissipated *= share;
+    info->pin_work = share * (info->pin_work - pushed) + drape_system_push_work(sim->system, now->x, next->x);
+    return !check(sim, info);
+}
+
 /* For an attempt that the controller accepted: whether it is made again, so that it ends at an event, or
  * given up, because an event acts on the present state. *stop: an event function failed. memory: of the
  * controller before it judged. */
 static bool must_repeat(drape_sim *sim, const double memory[2], drape_step_info *info, drape_status *stop)
 {
     drape_system_end_step(sim->system); /* what events evaluate leaves no trace in the next step */
-    const drape_event_verdict verdict = drape_events_examine(sim, next_state(sim), stop);
+    drape_event_verdict verdict = drape_events_examine(sim, next_state(sim), stop);
+    if (verdict == DRAPE_EVENTS_REPEAT && cut_on_dense_output(sim, info))
+        verdict = drape_events_examine(sim, next_state(sim), stop);
     if (verdict == DRAPE_EVENTS_PASS)
         return false;
     memcpy(sim->scratch, memory, sizeof sim->scratch);

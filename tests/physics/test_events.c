@@ -293,9 +293,9 @@ static drape_status compare(void *user, const drape_event *event)
 }
 
 /* Frames are far closer, 50 us, than the steps of a method of high order, 2 ms. With its own velocities
- * between steps, these and the difference of frames agree to what the tolerance, 1e-7, leaves: some 1e-5 of
- * 3 m/s. Linear velocities would be off by (w h)^2/8 = 5e-4 of that for the oscillations that the fall
- * excites, w = 30/s, and more for faster ones. */
+ * between steps, these and the difference of frames agree to what the tolerance, 1e-7, leaves: 1e-5 of 3 m/s
+ * for most, more where the polynomials of two steps meet at an angle. Linear velocities would be off by (w
+ * h)^2/8 = 4e-4 of that for the oscillations that the fall excites, w = 30/s, and more for faster ones. */
 START_TEST(own_velocities_belong_to_the_motion)
 {
     int checked = 0;
@@ -314,7 +314,7 @@ START_TEST(own_velocities_belong_to_the_motion)
         scene_advance(&s, 0.3);
         printf("# %s: %g of %g m/s, %lld steps\n", name, f.worst, f.fastest,
                (long long)drape_sim_statistics(s.sim).steps_accepted);
-        ck_assert_double_le(f.worst, 3e-5 * f.fastest);
+        ck_assert_double_le(f.worst, 2e-4 * f.fastest);
         scene_close(&s);
         checked++;
     }
@@ -439,15 +439,20 @@ START_TEST(a_released_pin_is_gone)
 }
 END_TEST
 
-/* The sheet is let go as a whole: the center of mass is then in free fall from where and as fast as it was,
- * with nothing lost: the masses of released nodes are part of it. Counts go on. */
+/* The sheet is let go as a whole, while a host pushes it upwards by half of its weight: the center of mass
+ * then falls at g/2 from where and as fast as it was, with nothing lost: the masses of released nodes are
+ * part of it. Counts go on. */
 START_TEST(a_sheet_that_is_let_go_falls)
 {
     scene s = hung("midpoint", both, "{'type': 'energy', 'bound': 0.01, 'action': 'release'}");
+    double lift[75] = {0};
+    for (size_t i = 0; i < 25; i++)
+        lift[3 * i + 1] = s.model->mass[i] * GRAVITY / 2;
+    ck_assert_int_eq(drape_sim_push(s.sim, lift), DRAPE_OK);
     scene_advance(&s, 0.05);
     drape_statistics before = drape_sim_statistics(s.sim);
     double start[2][3] = {{0}}, end[3] = {0}, mass = 0, t = 0;
-    for (int i = 0; i < 60 && drape_sim_model(s.sim) == s.model; i++)
+    for (int i = 0; i < 100 && drape_sim_model(s.sim) == s.model; i++)
         scene_advance(&s, 0.05 + 0.005 * i);
     const drape_model *model = drape_sim_model(s.sim);
     ck_assert_int_eq(model->free_count, model->node_count);
@@ -467,7 +472,7 @@ START_TEST(a_sheet_that_is_let_go_falls)
     for (int k = 0; k < 3; k++)
         /* residuals of 1e-9 N on 25 nodes for 0.3 s move the center of 8 g by 1e-9 25 / 0.008 0.3^2 / 2 */
         ck_assert_double_eq_tol(
-            end[k] / mass, (start[0][k] + 0.3 * start[1][k]) / mass - (k == 1) * GRAVITY / 2 * 0.09, 1.5e-7);
+            end[k] / mass, (start[0][k] + 0.3 * start[1][k]) / mass - (k == 1) * GRAVITY / 4 * 0.09, 1.5e-7);
     const drape_statistics after = drape_sim_statistics(s.sim);
     ck_assert(after.steps_accepted > before.steps_accepted + 30 &&
               after.newton_iterations > before.newton_iterations + 30);
@@ -476,11 +481,14 @@ START_TEST(a_sheet_that_is_let_go_falls)
 END_TEST
 
 /* total + dissipated + numerical is what it was: the released node brings in its kinetic energy, counted as
- * given, and no method gains any at the release. */
+ * given, and no method gains any at the release. The other pin stays on the path on which a host sent it. */
 START_TEST(a_release_gives_no_energy)
 {
     scene s = hung("midpoint", both, tears);
     double numerical = 0;
+    const int32_t held = s.model->pins[0].node[0];
+    const double *rest = s.model->rest + 3 * (size_t)held, to[3] = {rest[0], rest[1] + 0.05, rest[2]};
+    ck_assert_int_eq(drape_sim_move_pins(s.sim, 1, &held, 0.5, to, NULL), DRAPE_OK);
     for (int i = 1; i <= 50; i++) {
         scene_advance(&s, 0.01 * i);
         const drape_energy e = drape_sim_energy(s.sim);
@@ -490,6 +498,7 @@ START_TEST(a_release_gives_no_energy)
         numerical = e.numerical;
     }
     ck_assert_ptr_ne(drape_sim_model(s.sim), s.model);
+    ck_assert_mem_eq(drape_sim_positions(s.sim) + 3 * (size_t)held, to, sizeof to);
     scene_close(&s);
 }
 END_TEST
