@@ -46,8 +46,9 @@ static void archive_states(drape_sim *sim, drape_archive *a)
     int *const places[] = {&sim->now, &sim->next, &sim->before, &sim->past[0], &sim->past[1]};
     drape_archive_mark(a, "states");
     for (int i = 0; i < 5; i++) {
+        const bool kept = i < 3 || i - 3 < sim->chosen.controller->history_depth;
         drape_archive_int(a, places[i]);
-        if (drape_archive_good(a) && !is_place(*places[i], i < 2 ? 0 : -1, count))
+        if (drape_archive_good(a) && !is_place(*places[i], i < 2 ? 0 : -1, kept ? count : 0))
             drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a state %d of %d", *places[i], count);
     }
     if (drape_archive_good(a) &&
