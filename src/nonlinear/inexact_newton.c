@@ -438,7 +438,8 @@ typedef struct progress {
     double start, bound; /* |F|^2 of the guess, and what it must fall below */
     double first, last;  /* [m] RMS of the first and of the last correction */
     double ratio;        /* of the last one to the one before */
-    double seconds;      /* of the last iteration */
+    double begun;        /* [s] clock at the start of the last iteration */
+    double seconds;      /* it took, with its estimate if there was one */
 } progress;
 
 /* Without contact, factors leave so little that the error alone tells whether to go on. */
@@ -447,14 +448,15 @@ static bool goes_by_error(const drape_inexact_newton *s)
     return s->factored && !s->fraction;
 }
 
-/* Whether so little is left that the error is worth an estimate. */
+/* Whether so little is left, or so little time, that the error is worth an estimate. */
 static bool has_fallen(const drape_inexact_newton *s, const drape_inexact_settings *settings,
                        const progress *p, double left)
 {
     if (p->iteration < settings->iterations)
         return false;
     if (goes_by_error(s))
-        return p->iteration == 1 || fmin(1, p->ratio) * p->last < FAR_ABOVE * settings->error;
+        return p->iteration == 1 || fmin(1, p->ratio) * p->last < FAR_ABOVE * settings->error ||
+               !has_time(settings, p->seconds);
     return left < p->bound && (!s->factored || inertial_error(s->equation) <= MAX_DRIFT * s->edge);
 }
 
@@ -515,6 +517,8 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         }
         if (fell || most)
             report->error = estimate_error(s, d, p.iteration > 0);
+        if (fell && p.iteration > 0)
+            p.seconds = drape_clock_seconds() - p.begun;
         if (p.iteration == 1 && fell)
             measure_contraction(s, report->error, p.first);
         const bool lost = report->error > e->model->length; /* nowhere near the solution */
@@ -529,7 +533,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
             report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
             return DRAPE_RETRY_NONLINEAR;
         }
-        const double start = drape_clock_seconds();
+        p.begun = drape_clock_seconds();
         status = correct(s, settings);
         if (status) {
             report->reason = drape_reason_name(status < 0 ? DRAPE_REASON_MEMORY : DRAPE_REASON_SINGULAR);
@@ -547,7 +551,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         predict_stress(s, p.iteration < MAX_PREDICTION);
         if (!advance(s, d))
             return DRAPE_RETRY_NONFINITE;
-        p.seconds = drape_clock_seconds() - start;
+        p.seconds = drape_clock_seconds() - p.begun;
         report->further_seconds += fell ? p.seconds : 0;
         e->work.newton_iterations++;
     }
