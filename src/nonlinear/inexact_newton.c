@@ -438,8 +438,8 @@ typedef struct progress {
     double start, bound; /* |F|^2 of the guess, and what it must fall below */
     double first, last;  /* [m] RMS of the first and of the last correction */
     double ratio;        /* of the last one to the one before */
-    double begun;        /* [s] clock at the start of the last iteration */
-    double seconds;      /* it took, with its estimate if there was one */
+    double seconds;      /* of the last iteration and the last estimate */
+    double estimating;   /* [s] of the last estimate */
 } progress;
 
 /* Without contact, factors leave so little that the error alone tells whether to go on. */
@@ -515,10 +515,13 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
             s->first.steps++;
             return DRAPE_OK;
         }
-        if (fell || most)
+        if (fell || most) {
+            const double start = drape_clock_seconds();
             report->error = estimate_error(s, d, p.iteration > 0);
-        if (fell && p.iteration > 0)
-            p.seconds = drape_clock_seconds() - p.begun;
+            const double took = drape_clock_seconds() - start;
+            p.seconds += took - p.estimating;
+            p.estimating = took;
+        }
         if (p.iteration == 1 && fell)
             measure_contraction(s, report->error, p.first);
         const bool lost = report->error > e->model->length; /* nowhere near the solution */
@@ -533,7 +536,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
             report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
             return DRAPE_RETRY_NONLINEAR;
         }
-        p.begun = drape_clock_seconds();
+        const double start = drape_clock_seconds();
         status = correct(s, settings);
         if (status) {
             report->reason = drape_reason_name(status < 0 ? DRAPE_REASON_MEMORY : DRAPE_REASON_SINGULAR);
@@ -551,8 +554,9 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         predict_stress(s, p.iteration < MAX_PREDICTION);
         if (!advance(s, d))
             return DRAPE_RETRY_NONFINITE;
-        p.seconds = drape_clock_seconds() - p.begun;
+        p.seconds = drape_clock_seconds() - start;
         report->further_seconds += fell ? p.seconds : 0;
+        p.seconds += p.estimating;
         e->work.newton_iterations++;
     }
 }
