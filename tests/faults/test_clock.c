@@ -120,8 +120,8 @@ static timed run_in(double budget)
     return out;
 }
 
-/* In three quarters of the time that all iterations take, a call makes fewer than all and more than the least,
- * one a frame; what an iteration takes is known after the first frames, which alone may be late. */
+/* In three quarters of the time that all iterations take, a call makes fewer than all and more than the
+ * least, one a frame; what an iteration takes is known after the first frames, which alone may be late. */
 START_TEST(further_iterations_end_in_time)
 {
     const timed all = run_in(3600), some = run_in(0.75 * all.longest);
