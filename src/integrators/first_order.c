@@ -624,6 +624,9 @@ static void archive_factors(drape_first_order *s, drape_archive *a)
     drape_archive_bool(a, &s->symmetric);
     drape_archive_int64(a, &s->exact_remaining);
     drape_archive_int64(a, &s->exact_span);
+    if (a->reading && !(s->exact_span >= 1 && s->exact_span <= MAX_EXACT_SPAN && s->exact_remaining >= 0 &&
+                        s->exact_remaining <= s->exact_span))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an impossible number of exact matrices");
     if (s->damping && drape_archive_good(a))
         drape_archive_doubles(a, s->damping, (size_t)drape_system_pattern(s->system)->nonzeros);
     drape_sun_linear_archive(s->linear, a, s->factored_cj != 0);
@@ -641,8 +644,10 @@ void drape_first_order_archive(void *state, drape_archive *a)
     drape_archive_int64(a, &s->tiny);
     drape_archive_int64(a, &s->steps);
     drape_archive_int64(a, &counted);
-    if (a->reading && counted < 0)
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a negative number of iterations");
+    if (a->reading && !(counted >= 0 && s->tiny >= 0 && s->tiny <= MAX_TINY && s->steps >= 0 &&
+                        (double)s->steps <= s->values[DRAPE_FIRST_ORDER_MAX_STEPS]))
+        drape_archive_fail(a, DRAPE_E_PARSE,
+                           "the checkpoint has an impossible number of steps or iterations");
     s->counted = (long)counted;
     drape_work_archive(&s->work, a);
     if (s->n == 0)

@@ -237,4 +237,6 @@ void drape_local_error_archive(drape_local_error *c, drape_archive *a)
     drape_archive_double(a, &c->second);
     drape_archive_int64(a, &c->steps);
     drape_archive_int64(a, &c->tiny);
+    if (a->reading && !(c->steps >= 0 && c->steps <= INT32_MAX && c->tiny >= 0 && c->tiny <= INT32_MAX))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an impossible number of steps");
 }
