@@ -327,12 +327,15 @@ static void put_cheapest(table *t, const series *list, size_t count, double erro
     const json_t *best_at = NULL, *other_at = NULL;
     const series *best = NULL, *next = NULL;
     double least = NAN, second = NAN, base = NAN;
+    bool ran = false; /* the base method */
     char text[160], knob[64];
     for (size_t i = 0; i < count; i++) {
         const json_t *at = NULL;
         const double cost = cost_at(&list[i], error, &at);
-        if (strcmp(list[i].name, BASE_METHOD) == 0)
+        if (strcmp(list[i].name, BASE_METHOD) == 0) {
             base = cost;
+            ran = true;
+        }
         if (!(cost >= least)) {
             if (isnan(cost))
                 continue;
@@ -359,7 +362,11 @@ static void put_cheapest(table *t, const series *list, size_t count, double erro
     put_cell(t, text);
     snprintf(text, sizeof text, next ? "%.2g (%s)" : "", second / least, next ? next->name : "");
     put_cell(t, text);
-    snprintf(text, sizeof text, isnan(base) ? "does not reach it" : "%.2g", base / least);
+    snprintf(text, sizeof text,
+             !ran          ? "was not run"
+             : isnan(base) ? "does not reach it"
+                           : "%.2g",
+             base / least);
     put_cell(t, text);
 }
 

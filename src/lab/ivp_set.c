@@ -65,6 +65,13 @@ drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
     s->size = s->model->length;
     s->node_mass = mean_mass(s->model);
     s->contact = s->model->collider_count > 0 || s->model->contact.self;
+    for (int32_t i = 0; i < s->model->event_count; i++)
+        if (s->model->events[i].action != DRAPE_ACTION_RECORD)
+            return drape_fail(
+                arena->ctx, DRAPE_E_ARGUMENT,
+                "%.300s: /events/%d/action: must be \"record\": a reference is of a motion that "
+                "nothing ends or changes",
+                path, (int)i);
     return make_times(s);
 }
 

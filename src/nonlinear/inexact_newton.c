@@ -567,6 +567,13 @@ drape_status drape_inexact_newton_solve(drape_inexact_newton *s, const drape_ine
     drape_step_equation *e = s->equation;
     *report =
         (drape_solve_report){.tolerance = NAN, .error = NAN}; /* the residual is reported but not bounded */
+    if (e->dofs == 0) {
+        begin(s, settings->follows);
+        drape_step_equation_evaluate(e, d);
+        report->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
+        report->error = report->residual = 0;
+        return drape_system_status(e->system);
+    }
     drape_status status = iterate(s, settings, d, report);
     report->residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
     report->diagnostic = drape_step_equation_diagnose(e, settings->tolerance);

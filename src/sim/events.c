@@ -300,7 +300,8 @@ static double change_in_tolerance(const drape_watch *w, double h, double t)
     return fabs(w->sample[3] - w->sample[2]) / (h / 3) * tolerance_at(t);
 }
 
-/* Events that act and would have their root less than the tolerance after the end have it at the end. */
+/* Events that would have their root less than the tolerance after the end have it at the end: so one that is
+ * recorded is, also where another one stops the run. */
 static void take_near_roots(drape_sim *sim, const drape_state *next, int32_t also)
 {
     drape_event_set *e = &sim->events;
@@ -309,7 +310,7 @@ static void take_near_roots(drape_sim *sim, const drape_state *next, int32_t als
         drape_watch *w = &e->watches[i];
         const double f = w->sample[3];
         const bool comes = (f - w->sample[2]) * f <= 0 && fabs(f) <= change_in_tolerance(w, h, next->t);
-        if (!acts(w) || is_over(w) || w->found > 0 || sign_of(f) != w->side_after || w->side_after == 0 ||
+        if (is_over(w) || w->found > 0 || sign_of(f) != w->side_after || w->side_after == 0 ||
             !(comes || i == also))
             continue;
         w->side_after = -w->side_after;
@@ -340,7 +341,7 @@ static drape_event_verdict end_before(drape_sim *sim)
     int32_t kept = 0;
     for (int32_t i = 0; i < e->pending_count; i++) {
         drape_watch *w = &e->watches[e->pending[i].event];
-        if (!acts(w) || e->pending[i].root.t - t > tolerance_at(t))
+        if (e->pending[i].root.t - t > tolerance_at(t))
             continue;
         e->pending[kept] = e->pending[i];
         e->pending[kept].root.t = t;

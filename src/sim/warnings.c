@@ -17,6 +17,7 @@
 #define MANY   3.0  /* Newton iterations an attempt */
 #define THIN   5.0  /* activation distances in a step of a collider */
 #define LARGE  20.0 /* [m] across */
+#define SLOW   0.1  /* of the simulated time: dropped */
 #define INSIDE 1e-9 /* [m] a node less deep than this is not inside: contact allows it */
 
 /* A cloth of which nothing but its weight is modelled falls like dust. */
@@ -228,6 +229,19 @@ static bool is_inaccurate(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
+/* Advances with a time budget that fall behind: the cloth moves in slow motion. */
+static bool drops_time(drape_sim *sim, char *text, size_t size)
+{
+    const double dropped = sim->realtime.dropped, motion = drape_sim_time(sim);
+    if (!(dropped > SLOW * motion))
+        return false;
+    snprintf(text, size,
+             "steps did not fit the time budget: %.3g s of simulated time were dropped, beside %.3g s that "
+             "were simulated: a larger budget, fewer nodes, a thicker cloth or slower bodies keep up",
+             dropped, motion);
+    return true;
+}
+
 /* Bodies that cross the scene's activation distance in a small part of a step accelerate cloth all at once. A
  * hung sheet under newton_k at 1/60 s, swept by a ball at 2 m/s, 33 mm a step, had 58 % strain and 5 rejected
  * steps in 2 s at a distance of 10 mm, and 203 % and 27 at 3 mm. */
@@ -257,7 +271,8 @@ static const struct {
               {"numerical_dissipation", dissipates_most},
               {"slow_contact", is_contact_slow},
               {"contact_distance", is_contact_thin},
-              {"inaccurate", is_inaccurate}};
+              {"inaccurate", is_inaccurate},
+              {"time_dropped", drops_time}};
 
 bool drape_sim_take_warning_failure(drape_sim *sim)
 {

@@ -367,6 +367,27 @@ START_TEST(the_message_of_an_earlier_failure_is_not_repeated)
 }
 END_TEST
 
+/* There is nothing to solve, and pins follow their tracks: node 3 rises by 0.05 m in 0.5 s. */
+START_TEST(without_free_nodes_pins_move)
+{
+    for (int i = 0; drape_integrators[i]; i++) {
+        if (drape_integrators[i]->steady_state)
+            continue;
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 1, 'edge_length': 0.1},"
+            "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': "
+            "['stretch.edge'],"
+            "'pins': [{'nodes': [0, 1, 2]}, {'nodes': [3], 'track': [[0, [0, 0, 0]], [0.5, [0, 0.05, 0]],"
+            "[1, [0, 0.01, 0]]]}]}], 'integrator': {'method': '%s'}, 'duration': 2}",
+            drape_integrators[i]->entry.name);
+        const double before = drape_sim_positions(s.sim)[10];
+        scene_advance(&s, 0.5);
+        ck_assert_double_lt(fabs(drape_sim_positions(s.sim)[10] - before - 0.05), 1e-15);
+        scene_close(&s);
+    }
+}
+END_TEST
+
 /* Without free nodes ida has no equations to solve, but still stops at the keys of the tracks. */
 START_TEST(ida_without_free_nodes_stops_at_kinks)
 {
@@ -923,9 +944,9 @@ START_TEST(a_start_below_the_limit_is_left)
 END_TEST
 
 SUITE("rejection", a_nan_residual_is_not_printed, the_message_of_an_earlier_failure_is_not_repeated,
-      ida_without_free_nodes_stops_at_kinks, the_error_controller_starts_at_tight_tolerances,
-      a_run_with_rejections_is_the_run_of_its_accepted_steps, parts_fill_their_interval_exactly,
-      nominal_times_are_met_to_the_bit, sizes_are_halved_and_grow_back,
+      without_free_nodes_pins_move, ida_without_free_nodes_stops_at_kinks,
+      the_error_controller_starts_at_tight_tolerances, a_run_with_rejections_is_the_run_of_its_accepted_steps,
+      parts_fill_their_interval_exactly, nominal_times_are_met_to_the_bit, sizes_are_halved_and_grow_back,
       a_step_that_gets_too_small_names_time_reason_and_element,
       a_bound_on_attempts_ends_the_advance_and_changes_no_bit, a_run_without_rejections_never_meets_the_bound,
       a_residual_of_rounding_is_converged, strain_names_the_edge_or_the_node_that_went_too_far,

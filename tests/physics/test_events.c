@@ -76,6 +76,29 @@ START_TEST(free_fall_stops_at_its_height)
 }
 END_TEST
 
+/* An event that is recorded where another one stops the run has its root at the same time, and is reported. */
+START_TEST(an_event_is_recorded_where_another_stops)
+{
+    for (int i = 0; method(i); i++)
+        for (int k = 0; k < 6; k++) {
+            const char *name = method(i)->entry.name;
+            char events[200];
+            snprintf(events, sizeof events,
+                     "{'type': 'height', 'height': %g}, {'type': 'height', 'height': %g, 'action': 'stop'}",
+                     -0.05 - 0.0137 * k, -0.05 - 0.0137 * k);
+            scene s = fall(name, "[0, 0, 0]", events);
+            ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STOPPED);
+            drape_event_record recorded, stop;
+            drape_sim_event(s.sim, 0, &recorded);
+            drape_sim_event(s.sim, 1, &stop);
+            ck_assert_msg(recorded.count == 1 && stop.count == 1, "%s %d: %d and %d times", name, k,
+                          (int)recorded.count, (int)stop.count);
+            ck_assert_double_le(fabs(recorded.last - stop.last), PROMISE);
+            scene_close(&s);
+        }
+}
+END_TEST
+
 /* A recorded event is at the same time as far as dense output is exact. Where it is on free fall, so is its
  * kinetic energy, m g^2 t^2 / 2. */
 START_TEST(recorded_events_are_located_on_dense_output)
@@ -543,8 +566,8 @@ START_TEST(a_release_is_in_checkpoints)
 }
 END_TEST
 
-SUITE("events", free_fall_stops_at_its_height, recorded_events_are_located_on_dense_output,
-      a_height_is_passed_twice_in_a_step, recording_changes_no_bit, a_stop_is_a_state_of_the_run_at_the_root,
-      own_velocities_belong_to_the_motion, an_event_may_follow_a_step_closely,
-      a_restored_sim_has_the_same_events, a_released_pin_is_gone, a_sheet_that_is_let_go_falls,
-      a_release_gives_no_energy, a_release_is_in_checkpoints)
+SUITE("events", free_fall_stops_at_its_height, an_event_is_recorded_where_another_stops,
+      recorded_events_are_located_on_dense_output, a_height_is_passed_twice_in_a_step,
+      recording_changes_no_bit, a_stop_is_a_state_of_the_run_at_the_root, own_velocities_belong_to_the_motion,
+      an_event_may_follow_a_step_closely, a_restored_sim_has_the_same_events, a_released_pin_is_gone,
+      a_sheet_that_is_let_go_falls, a_release_gives_no_energy, a_release_is_in_checkpoints)

@@ -325,6 +325,26 @@ START_TEST(the_level_degrades_and_recovers)
 }
 END_TEST
 
+/* A frame of 0.3 s is one that no step covers: of what is left, all but the longest step, 4/60 s, is dropped.
+ * After one such frame in 0.1 s that is more than a tenth, after 3 s with none it is less. */
+START_TEST(dropped_time_has_a_warning)
+{
+    scene s = scene_open(HUNG, "", "newton_k", "");
+    for (int k = 0; k < 2; k++) {
+        drape_warning w;
+        bool warned = false;
+        for (int i = 0; i < (k ? 180 : 6); i++)
+            advance(&s, 1.0 / 60, PLENTY);
+        if (k == 0)
+            ck_assert_double_gt(advance(&s, 0.3, NOTHING).dropped, 0.1);
+        for (int i = 0; drape_sim_warning(s.sim, i, &w); i++)
+            warned |= strcmp(w.name, "time_dropped") == 0;
+        ck_assert_msg(warned == (k == 0), "%d", k);
+    }
+    scene_close(&s);
+}
+END_TEST
+
 /* A single frame that is owed does not delay the next ones: one slow step in a hundred. */
 START_TEST(a_single_late_frame_is_made_up_for)
 {
@@ -492,7 +512,7 @@ SUITE("realtime", few_iterations_are_near_the_converged_step, light_cloth_is_nea
       with_many_iterations_the_step_is_backward_euler, the_step_includes_contact_and_damping,
       measured_fabrics_fall, stiff_sheets_fall, contact_holds_back_only_what_it_touches,
       a_ball_that_moves_does_not_stop_it, frame_rates_differ_by_the_order_of_the_method,
-      rest_does_not_depend_on_the_frame_rate, the_level_degrades_and_recovers,
+      rest_does_not_depend_on_the_frame_rate, the_level_degrades_and_recovers, dropped_time_has_a_warning,
       a_single_late_frame_is_made_up_for, every_integrator_with_a_time_takes_frames,
       a_fast_body_is_served_by_the_default_distance, a_distance_that_is_given_is_kept,
       a_rejected_step_is_retried_by_the_next_call, steps_in_contact_are_not_longer_than_dt,
