@@ -137,11 +137,9 @@ def test_bad_input():
     refused("ivp", "score", "set/swing.json", says="usage: drape ivp score SCENE POSITIONS.npy")
     refused("ivp", "run", says="usage: drape ivp run SCENE...")
     refused("ivp", "export", "set/swing.json", says="--out is missing")
-    scene = read_json("set/swing.json")
-    scene["events"] = [{"type": "height", "height": -0.1, "action": "stop"}]
-    with open("stops.json", "w", encoding="utf-8") as file:
-        json.dump(scene, file)
-    refused("ivp", "reference", "stops.json", says='/events/0/action: must be "record"')
+    write_scene(duration=0.1, frame_rate=20, events=[{"type": "height", "height": -0.1, "action": "stop"}])
+    refused("ivp", "reference", "scene.json", says='/events/0/action: must be "record"')
+    write_scene(duration=0.1, frame_rate=33)
     for name, says in (("short", "its shape is (5, 81, 3); it must be (6, 81, 3)"), ("cut", "not as long as its header says"),
                        ("nan", "not a finite number"), ("text", "not an array of float64")):
         refused("ivp", "score", "set/swing.json", name + ".npy", says=says)

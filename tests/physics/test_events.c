@@ -76,7 +76,8 @@ START_TEST(free_fall_stops_at_its_height)
 }
 END_TEST
 
-/* An event that is recorded where another one stops the run has its root at the same time, and is reported. */
+/* An event that is recorded where another one stops the run has its root at the same time, and is reported.
+ */
 START_TEST(an_event_is_recorded_where_another_stops)
 {
     for (int i = 0; method(i); i++)
