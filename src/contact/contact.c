@@ -347,8 +347,7 @@ static double smallest_gap(const drape_contact *c, bool *last)
     return least;
 }
 
-/* Makes contact stiffer where gaps shrink, and softer again. The energy that this adds to present contacts is
- * the work of whoever presses. */
+/* Makes contact stiffer where gaps shrink, and softer again. */
 static void adapt_stiffness(drape_contact *c, double t, bool retry)
 {
     drape_press *press = &c->press;
@@ -364,8 +363,6 @@ static void adapt_stiffness(drape_contact *c, double t, bool retry)
         press->factor = fmax(before * drape_pow(0.5, (t - press->t) / HALVED), 1);
     }
     press->t = t;
-    if (press->factor != before)
-        press->work += (1 - before / press->factor) * drape_contact_potential(c);
 }
 
 double drape_contact_take_work(drape_contact *c)
@@ -404,8 +401,7 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
 /* Contact with a fast collider over a distance that it crosses in a small part of a step is hard to solve: in
  * a step it accelerates the cloth all at once. So the activation distance grows to a share of the path of a
  * step, and falls again to that of the scene when the collider rests. It changes by powers of two, one a
- * step, because each change needs a search and changes the contact energy: by the work of whoever moves the
- * collider. */
+ * step, because each change needs a search and changes the contact energy. */
 static drape_status adapt_distances(drape_contact *c, double t, bool retry)
 {
     const drape_configuration now = drape_contact_configuration(c);
@@ -429,11 +425,7 @@ static drape_status adapt_distances(drape_contact *c, double t, bool retry)
     }
     if (!changed)
         return DRAPE_OK;
-    const double before = drape_contact_potential(c);
-    const drape_status status = drape_contact_list(c, &now);
-    if (!status)
-        c->press.work += drape_contact_potential(c) - before;
-    return status;
+    return drape_contact_list(c, &now);
 }
 
 /* A step that is tried again begins where it did. */
@@ -463,23 +455,18 @@ static drape_status lag_at(drape_contact *c, const double *v, double t)
 }
 
 /* Looks for room at the end of the step, where some cloth has none already, and holds again what has come
- * out. What the forces do not have any more, or have from now on, is the work of whoever presses. */
+ * out. */
 static drape_status update_relaxed(drape_contact *c, const drape_contact_at *at)
 {
     bool changed = false;
     int32_t added = 0;
     if (c->relaxed.count == 0)
         return DRAPE_OK;
-    const double before = drape_contact_potential(c);
     drape_status status = drape_room_review(c, at->t, &changed);
     if (!status && c->ahead_t > at->t)
         status = drape_room_look_ahead(c, at->x, at->t, c->ahead_t, c->may_relax, &added);
     c->listed = c->listed && !changed;
-    if (!status)
-        status = drape_contact_update(c, at);
-    if (!status)
-        c->press.work += drape_contact_potential(c) - before;
-    return status;
+    return status ? status : drape_contact_update(c, at);
 }
 
 void drape_contact_expect(drape_contact *c, double t1, bool may_relax)
@@ -493,12 +480,16 @@ const drape_relaxed_set *drape_contact_relaxed(const drape_contact *c)
     return &c->relaxed;
 }
 
+/* What changes between steps are the laws of contacts: which cloth is relaxed and how hard it is pushed,
+ * activation distances, which pairs are inside, the stiffness. What that adds to the energy of the present
+ * contacts, or takes from it, is the work of whoever presses. */
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
     const double start = drape_clock_seconds();
     c->between_steps = false;
     const drape_contact_at at = {.x = x, .v = v, .t = t, .span = {t, t}};
     drape_status status = drape_contact_update(c, &at);
+    const double before = status ? 0 : drape_contact_potential(c);
     if (!status)
         status = update_relaxed(c, &at);
     c->ahead_t = NAN;
@@ -509,10 +500,11 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
         status = adapt_distances(c, t, retry);
     if (!status)
         status = update_inside(c);
-    if (!status)
+    if (!status) {
         adapt_stiffness(c, t, retry);
-    if (!status)
+        c->press.work += drape_contact_potential(c) - before;
         status = lag_at(c, v, t);
+    }
     drape_predictions_clear(&c->predicted);
     if (!status) {
         drape_contact_measure_start(c);

@@ -303,7 +303,7 @@ drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, 
         if (is_sharp(&c->model->colliders[k]))
             status = block_pierced(c, k, t, may_relax, added);
     }
-    c->listed = c->listed && *added == 0; /* the laws of contacts have changed */
+    c->listed = false; /* which faces act depends on what is blocked, and their laws on what is relaxed */
     return status;
 }
 
@@ -370,7 +370,7 @@ drape_status drape_contact_relax(drape_contact *c, double t1, bool all, int32_t 
     const double before = status ? 0 : drape_contact_potential(c);
     if (!status)
         status = relax(c, t1, all, added);
-    if (!status && *added > 0 && !(status = go_to(c, c->start, c->start_t)))
+    if (!status && !(status = go_to(c, c->start, c->start_t)))
         c->press.work += drape_contact_potential(c) - before;
     c->seconds += drape_clock_seconds() - clock;
     return status;
@@ -458,11 +458,13 @@ static bool is_out(void *user, const drape_relaxed_node *node)
            !is_pierced(c, node);
 }
 
-/* With this factor the pressure is that of the pairs which are held, at the margin. */
+/* With this factor the pressure is that of the pairs which are held, at the margin and with the scene's
+ * stiffness. With that of the present, which bodies that close upon cloth have raised, by up to ten thousand,
+ * the pressure would tear at cloth that hangs over the edge of a body, long after they have parted. */
 static double max_factor(const drape_contact *c)
 {
     const drape_contact_def *def = &c->model->contact;
-    return -drape_barrier_log(MARGIN).db * c->press.factor * def->stiffness / def->relaxed_pressure;
+    return -drape_barrier_log(MARGIN).db * def->stiffness / def->relaxed_pressure;
 }
 
 drape_status drape_room_review(drape_contact *c, double t, bool *changed)
