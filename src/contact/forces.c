@@ -9,16 +9,19 @@
 
 #define OUT_SPEED 0.2 /* of the size of the scene in a second: at most so fast is cloth pushed out */
 
-/* Pairs that bodies leave no room: a bounded pressure, and no rebound. */
+/* Pairs that bodies leave no room: a bounded pressure, and no rebound. What pushes cloth out in addition to
+ * that, once it has room, does not rub: with friction in proportion it would hold fast what it pushes. */
 static drape_contact_law relaxed_law(const drape_contact *c, const drape_active_contact *contact)
 {
     const drape_contact_def *def = &c->model->contact;
     const drape_pair *pair = &contact->pair;
+    const double friction =
+        pair->collider >= 0 ? c->model->colliders[pair->collider].friction : def->self_friction;
     return (drape_contact_law){
         .distance = pair->distance,
         .low = DRAPE_BARRIER_BOUNDED,
         .stiffness = contact->relaxed * def->relaxed_pressure * pair->area,
-        .friction = pair->collider >= 0 ? c->model->colliders[pair->collider].friction : def->self_friction,
+        .friction = friction / contact->relaxed,
         .velocity = def->friction_velocity,
         .damping = 1,
         .restitution_velocity = fmax(def->restitution_velocity, OUT_SPEED * c->model->length)};

@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#define DEEPER  1e-9 /* of the radius: rounding */
 #define DOUBLED 0.02 /* [s] in which the pressure on a node that has room doubles, and falls by half */
 
 /* A shape without points may have no end, as a plane; inscribed ones are inside of it. */
@@ -23,6 +24,16 @@ static void bound(const drape_collider_shape *shape, double out[4])
     out[3] = radius + shape->radius;
 }
 
+/* Parts without a radius, or such that enclose more than what is within their radius: the middle is deeper. */
+static bool is_solid(const drape_collider *collider, const double middle[3])
+{
+    static const drape_collider_pose rest = {.displacement = {0}};
+    const drape_collider_shape *shape = &collider->shape;
+    return shape->point_count > 0 &&
+           (!(shape->radius > 0) ||
+            drape_collider_distance(collider, &rest, middle, NULL, NULL) < -(1 + DEEPER) * shape->radius);
+}
+
 drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, drape_relaxed_set *set)
 {
     const size_t nodes = (size_t)model->node_count, colliders = (size_t)model->collider_count;
@@ -32,9 +43,12 @@ drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, 
     set->reach = drape_arena_take(arena, nodes, sizeof *set->reach);
     set->pins = drape_arena_take(arena, colliders, sizeof *set->pins);
     set->bound = drape_arena_take(arena, colliders, 4 * sizeof *set->bound);
+    set->solid = drape_arena_take(arena, colliders, sizeof *set->solid);
     set->total = drape_arena_take(arena, colliders + 1, sizeof *set->total);
-    for (size_t i = 0; set->bound && i < colliders; i++)
+    for (size_t i = 0; set->bound && set->solid && i < colliders; i++) {
         bound(&model->colliders[i].shape, set->bound + 4 * i);
+        set->solid[i] = is_solid(&model->colliders[i], set->bound + 4 * i);
+    }
     return drape_arena_status(arena);
 }
 

@@ -40,6 +40,8 @@ typedef struct drape_relaxed_set {
     double *reach;    /* (node_count) scratch */
     bool *pins;       /* (collider_count) scratch */
     double *bound;    /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none */
+    bool *solid; /* (collider_count) its parts enclose a volume: inside, they push to whichever side the cloth
+                    is on, and only the distance from the whole tells the way out */
     drape_relaxed_total *total; /* (collider_count + 1) the last one: of pinned pieces of cloth */
     double t;                   /* [s] of the last update */
     bool counting; /* nodes that would be relaxed are counted, and nothing changes; during one search */

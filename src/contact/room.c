@@ -27,11 +27,6 @@ static bool may_be_near(const drape_contact *c, const drape_collider_pose *pose,
 
 /* ---- Contacts of relaxed cloth ---- */
 
-static bool is_sharp(const drape_collider *collider)
-{
-    return collider->shape.point_count > 0 && !(collider->shape.radius > 0);
-}
-
 /* The gap between a point of a face and the surface of a collider. */
 static bool find_face_gap(const drape_contact *c, const drape_configuration *at, int32_t collider,
                           const double share[3], drape_active_contact *contact)
@@ -92,7 +87,7 @@ drape_status drape_room_add_surfaces(drape_contact *c, const drape_configuration
     }
     for (int32_t k = 0; !status && k < c->model->collider_count; k++)
         for (int32_t f = 0; !status && f < c->model->triangle_count; f++)
-            if (drape_relaxed_count(&c->relaxed, k) > 0 && is_sharp(&c->model->colliders[k]))
+            if (c->relaxed.solid[k] && drape_relaxed_count(&c->relaxed, k) > 0)
                 status = add_face(c, at, k, f);
     return status;
 }
@@ -237,8 +232,8 @@ static drape_status block_between(drape_contact *c, int32_t collider, const clot
     return status;
 }
 
-/* A face that is pierced by a feature without a radius is not near it any more, and its nodes may be outside:
- * points of the face are looked at, between which a tip may be missed. */
+/* A face that is pierced by parts which enclose a volume may not be near them any more, and its nodes may be
+ * outside: points of the face are looked at, between which a tip may be missed. */
 static drape_status block_pierced(drape_contact *c, int32_t collider, double t, bool may_relax,
                                   int32_t *added)
 {
@@ -300,7 +295,7 @@ drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, 
             status = block_between(c, collider, &p, margin, t, may_relax, added);
     }
     for (int32_t k = 0; !status && k < c->model->collider_count; k++) {
-        if (is_sharp(&c->model->colliders[k]))
+        if (c->relaxed.solid[k])
             status = block_pierced(c, k, t, may_relax, added);
     }
     c->listed = false; /* which faces act depends on what is blocked, and their laws on what is relaxed */
@@ -425,14 +420,15 @@ static bool cross(const drape_contact *c, int32_t collider, const int32_t *face,
     return found;
 }
 
-/* Features without a radius push to whichever side the cloth is on: a node is out only if none pierces its
+/* Parts that enclose a volume push to whichever side the cloth is on: a node is out only if none pierces its
  * faces. */
 static bool is_pierced(const drape_contact *c, const drape_relaxed_node *node)
 {
-    const drape_collider_shape *shape = node->collider >= 0 ? &c->model->colliders[node->collider].shape
-                                                            : &(drape_collider_shape){.radius = 1};
     bool found = false;
-    for (int32_t f = 0; !(shape->radius > 0) && !found && f < c->model->triangle_count; f++) {
+    if (node->collider < 0 || !c->relaxed.solid[node->collider])
+        return false;
+    const drape_collider_shape *shape = &c->model->colliders[node->collider].shape;
+    for (int32_t f = 0; !found && f < c->model->triangle_count; f++) {
         const int32_t *n = c->model->triangle + 3 * (size_t)f;
         if (n[0] != node->node && n[1] != node->node && n[2] != node->node)
             continue;
@@ -449,11 +445,12 @@ static bool is_out(void *user, const drape_relaxed_node *node)
 {
     const drape_contact *c = user;
     const drape_contact_def *def = &c->model->contact;
-    const double distance = node->collider >= 0 ? def->distance : 2 * def->self_thickness,
+    const double distance = node->collider >= 0 ? c->broad.distance[node->collider] : 2 * def->self_thickness,
                  s = node->gap / distance;
     if (node->blocked || node->fresh || s < DRAPE_BARRIER_GENTLE)
         return false;
-    const double pressure = -drape_barrier_at(s, DRAPE_BARRIER_GENTLE).db * c->press.factor * def->stiffness;
+    const double pressure = -drape_barrier_at(s, DRAPE_BARRIER_GENTLE).db * c->press.factor * def->stiffness *
+                            (def->distance / distance);
     return (pressure <= node->factor * def->relaxed_pressure || c->model->pinned[node->node]) &&
            !is_pierced(c, node);
 }
