@@ -237,6 +237,44 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
     return true;
 }
 
+/* The mean velocity of the free nodes, by mass, and their kinetic energy relative to it. */
+static double internal_kinetic(const drape_model *m, const double *v, double mean[3])
+{
+    double mass = 0, moving = 0;
+    for (int32_t f = 0; f < m->free_count; f++) {
+        const size_t i = (size_t)m->node_of_free[f];
+        mass += m->mass[i];
+        for (size_t k = 0; k < 3; k++)
+            mean[k] += m->mass[i] * v[3 * i + k];
+    }
+    for (size_t k = 0; k < 3; k++) {
+        mean[k] /= mass;
+        moving += 0.5 * mass * mean[k] * mean[k];
+    }
+    return kinetic(m, v) - moving;
+}
+
+void drape_sim_take_back(drape_sim *sim, drape_state *out, const drape_step_info *info)
+{
+    const drape_model *m = sim->model;
+    const drape_audit *audit = &sim->audit;
+    const double left = audit->residual_work + info->residual_work;
+    if (!(left > 0) || m->free_count == 0)
+        return;
+    const drape_energy e = measure(sim, out, drape_sim_state(sim)->internal,
+                                   audit->dissipated + info->dissipated, audit->pin_work + info->pin_work);
+    double mean[3] = {0};
+    const double made = fmin(audit->best - e.numerical, left), motion = internal_kinetic(m, out->v, mean);
+    if (!(made > 0) || !(motion > 0))
+        return;
+    const double share = sqrt(fmax(0, 1 - made / motion));
+    for (int32_t f = 0; f < m->free_count; f++) {
+        double *v = out->v + 3 * (size_t)m->node_of_free[f];
+        for (int k = 0; k < 3; k++)
+            v[k] = mean[k] + share * (v[k] - mean[k]);
+    }
+}
+
 void drape_sim_add_contact_work(drape_sim *sim)
 {
     const double work = drape_system_take_contact_work(sim->system);

@@ -151,6 +151,10 @@ double drape_sim_error_bound(const drape_sim *sim);
  * since the beginning of the run; info->diagnostic then says how much. */
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
+/* Takes from the motion of the nodes about their mean what a step to out and those before it made of energy
+ * out of nothing, as far as the residuals that they left account for it. */
+void drape_sim_take_back(drape_sim *sim, drape_state *out, const drape_step_info *info);
+
 /* The energies at positions and velocities (node_count x 3) at time t, with the internal variables of the
  * present state; `dissipated` and `numerical` are 0. */
 drape_energy drape_sim_energy_of(const drape_sim *sim, double t, const double *x, const double *v);

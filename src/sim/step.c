@@ -27,7 +27,7 @@ static drape_state *next_state(drape_sim *sim)
 
 static drape_status check(drape_sim *sim, drape_step_info *info)
 {
-    const drape_state *next = next_state(sim);
+    drape_state *next = next_state(sim);
     size_t n = 3 * (size_t)sim->model->node_count;
     if (!drape_all_finite(next->x, n) || !drape_all_finite(next->v, n)) {
         info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
@@ -35,6 +35,8 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
     }
     if (info->committed)
         return DRAPE_OK;
+    if (sim->realtime.active)
+        drape_sim_take_back(sim, next, info);
     if (!info->lenient && drape_sim_ran_away(sim, next, info)) {
         info->reason = drape_reason_name(DRAPE_REASON_ENERGY);
         return DRAPE_RETRY_REJECTED;
