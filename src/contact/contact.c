@@ -54,6 +54,7 @@ static drape_status take_arrays(drape_arena *arena, drape_contact *c)
     for (size_t i = 0; i < sizeof poses / sizeof *poses; i++)
         *poses[i] = drape_arena_take(arena, colliders, sizeof **poses[i]);
     c->start_least = drape_arena_take(arena, colliders, sizeof *c->start_least);
+    c->distance_before = drape_arena_take(arena, colliders, sizeof *c->distance_before);
     c->on_collider = drape_arena_take(arena, colliders, 3 * sizeof *c->on_collider);
     return drape_arena_status(arena);
 }
@@ -398,34 +399,69 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
     return vec3_norm(to);
 }
 
+/* Sets the activation distance of a collider. */
+static void set_distance(drape_contact *c, int32_t collider, double distance)
+{
+    c->broad.distance[collider] = distance;
+    drape_candidates_forget_collider(&c->step_candidates, collider);
+    drape_candidates_forget_collider(&c->query_candidates, collider);
+}
+
+static bool is_active(const drape_contact *c, int32_t collider)
+{
+    bool found = false;
+    for (int32_t i = 0; i < c->active.count && !found; i++)
+        found = c->active.contacts[i].pair.collider == collider;
+    return found;
+}
+
+/* The distances that were widened beyond twice what they were go back to that where cloth is near already.
+ * Returns whether there are any. */
+static bool narrow_distances(drape_contact *c)
+{
+    bool any = false;
+    for (int32_t i = 0; i < c->model->collider_count; i++) {
+        if (!(c->broad.distance[i] > 2 * c->distance_before[i]) || !is_active(c, i))
+            continue;
+        set_distance(c, i, 2 * c->distance_before[i]);
+        any = true;
+    }
+    return any;
+}
+
 /* Contact with a fast collider over a distance that it crosses in a small part of a step is hard to solve: in
  * a step it accelerates the cloth all at once. So the activation distance grows to a share of the path of a
- * step, and falls again to that of the scene when the collider rests. It changes by powers of two, one a
- * step, because each change needs a search and changes the contact energy. */
+ * step, and falls again to that of the scene when the collider rests. It changes by powers of two, because
+ * each change needs a search, and where cloth is near by one a step, because it changes the contact energy. A
+ * body that has just begun to move, or that comes out of nothing at the start of a run, has the whole
+ * distance before it reaches the cloth. */
 static drape_status adapt_distances(drape_contact *c, double t, bool retry)
 {
     const drape_configuration now = drape_contact_configuration(c);
     const double least = c->model->contact.distance;
     bool changed = false;
     for (int32_t i = 0; c->dt > 0 && !retry && i < c->model->collider_count; i++) {
-        double *distance = &c->broad.distance[i];
-        const double path = path_of(c, i, t), before = *distance;
+        const double path = path_of(c, i, t), before = c->broad.distance[i];
+        double distance = before;
+        c->distance_before[i] = before;
         c->longest_path = fmax(c->longest_path, path);
         if (c->model->contact.distance_given)
             continue;
-        if (GROWTH * path > before)
-            *distance = 2 * before;
-        else if (GROWTH * path < 0.25 * before && before > least)
-            *distance = 0.5 * before;
-        if (*distance == before)
+        while (GROWTH * path > distance)
+            distance *= 2;
+        if (GROWTH * path < 0.25 * before && before > least)
+            distance = 0.5 * before;
+        if (distance == before)
             continue;
         changed = true;
-        drape_candidates_forget_collider(&c->step_candidates, i);
-        drape_candidates_forget_collider(&c->query_candidates, i);
+        set_distance(c, i, distance);
     }
     if (!changed)
         return DRAPE_OK;
-    return drape_contact_list(c, &now);
+    drape_status status = drape_contact_list(c, &now);
+    if (!status && narrow_distances(c))
+        status = drape_contact_list(c, &now);
+    return status;
 }
 
 /* A step that is tried again begins where it did. */

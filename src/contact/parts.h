@@ -55,6 +55,7 @@ struct drape_contact {
     drape_inside_pairs inside;       /* at its beginning */
     double *start_least;             /* (collider_count) the smallest gap with each collider at its beginning,
                                         at most 0 [m] */
+    double *distance_before;         /* (collider_count) scratch: activation distances [m] */
     drape_press press;
     drape_relaxed_set relaxed;
     double ahead_t; /* [s] the end of the step that begins next; NAN: unknown. Set before each step */
