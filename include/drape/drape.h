@@ -409,6 +409,8 @@ typedef struct drape_realtime {
     double error_bound;       /* [m] see drape_statistics; NaN: the integrator estimates no error */
     bool accurate;            /* whether `error` is at most that; true if there is no estimate */
     int64_t inaccurate_total; /* calls since the sim was created that were not accurate */
+    int held; /* steps in which the cloth was held where it was, without velocity, because none could be made
+                 otherwise */
 } drape_realtime;
 
 /* Advances by one frame within a wall-clock budget, for games, previews and anything else that must show a
@@ -690,6 +692,7 @@ typedef struct drape_statistics {
     double error_max;          /* [m] largest of the accepted steps; NaN before the first */
     double error_last;         /* [m] of the last accepted step */
     int64_t steps_above_error; /* accepted steps whose error is above the bound */
+    int64_t steps_held; /* accepted steps in which the cloth was held where it was: drape_realtime.held */
 } drape_statistics;
 
 /* Returns a copy of the counts so far. */

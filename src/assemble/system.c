@@ -242,16 +242,21 @@ void drape_system_expect(drape_system *system, double t1, bool may_relax)
         drape_contact_expect(system->contact, t1, may_relax);
 }
 
-drape_status drape_system_relax(drape_system *system, double t1, bool all, int32_t *added)
+drape_status drape_system_relax(drape_system *system, double t1, drape_relax_extent extent, int32_t *added)
 {
     *added = 0;
-    return system->contact ? drape_contact_relax(system->contact, t1, all, added) : DRAPE_OK;
+    return system->contact ? drape_contact_relax(system->contact, t1, extent, added) : DRAPE_OK;
 }
 
-drape_status drape_system_lacks_room(drape_system *system, double t1, bool all, bool *lacks)
+drape_status drape_system_lacks_room(drape_system *system, double t1, drape_relax_extent extent, bool *lacks)
 {
     *lacks = false;
-    return system->contact ? drape_contact_lacks_room(system->contact, t1, all, lacks) : DRAPE_OK;
+    return system->contact ? drape_contact_lacks_room(system->contact, t1, extent, lacks) : DRAPE_OK;
+}
+
+drape_status drape_system_let_in(drape_system *system, const double *x, double t1)
+{
+    return system->contact ? drape_contact_let_in(system->contact, x, t1) : DRAPE_OK;
 }
 
 bool drape_system_nearest(const drape_system *system, drape_diagnostic *diagnostic)

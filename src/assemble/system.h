@@ -98,10 +98,12 @@ drape_status drape_system_continue(drape_system *system, drape_system *from);
 /* Begins a step at a state, against which contact compares until the next call. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
 
-/* drape_contact_expect, drape_contact_relax and drape_contact_lacks_room; without contact nothing. */
+/* drape_contact_expect, drape_contact_relax, drape_contact_lacks_room and drape_contact_let_in; without
+ * contact nothing. */
 void drape_system_expect(drape_system *system, double t1, bool may_relax);
-drape_status drape_system_relax(drape_system *system, double t1, bool all, int32_t *added);
-drape_status drape_system_lacks_room(drape_system *system, double t1, bool all, bool *lacks);
+drape_status drape_system_relax(drape_system *system, double t1, drape_relax_extent extent, int32_t *added);
+drape_status drape_system_lacks_room(drape_system *system, double t1, drape_relax_extent extent, bool *lacks);
+drape_status drape_system_let_in(drape_system *system, const double *x, double t1);
 
 /* Ends the step, so that queries between steps leave no trace in the next one. */
 void drape_system_end_step(drape_system *system);

@@ -32,14 +32,27 @@ double drape_contact_search_seconds(const drape_contact *contact); /* part of it
  * (relaxed.h). Without it, no cloth is, and what is relaxed stays so. */
 void drape_contact_expect(drape_contact *contact, double t1, bool may_relax);
 
-/* After a step to t1 that failed: relaxes cloth that has no room, or, if there is none and `all` is set,
- * the pair that refused the step and those whose gaps are hardly above the least. *added: nodes that are
- * relaxed from now on; if there are any, the same step may succeed. Errors: DRAPE_E_MEMORY. */
-drape_status drape_contact_relax(drape_contact *contact, double t1, bool all, int32_t *added);
+/* What is relaxed after a step that failed, if no cloth is found that has no room. */
+typedef enum drape_relax_extent {
+    DRAPE_RELAX_NONE,
+    DRAPE_RELAX_PAIR, /* the pair that refused the step */
+    DRAPE_RELAX_NEAR  /* also those whose gaps are hardly above the least */
+} drape_relax_extent;
+
+/* After a step to t1 that failed: relaxes cloth that has no room, or, if there is none, what extent says.
+ * *added: nodes that are relaxed from now on; if there are any, the same step may succeed. Errors:
+ * DRAPE_E_MEMORY. */
+drape_status drape_contact_relax(drape_contact *contact, double t1, drape_relax_extent extent,
+                                 int32_t *added);
 
 /* After a step that failed: whether drape_contact_relax would relax any cloth in a step to t1. Relaxes none.
  * *lacks stays as it is if no step has begun. Errors: DRAPE_E_MEMORY. */
-drape_status drape_contact_lacks_room(drape_contact *contact, double t1, bool all, bool *lacks);
+drape_status drape_contact_lacks_room(drape_contact *contact, double t1, drape_relax_extent extent,
+                                      bool *lacks);
+
+/* In a step that has begun: relaxes cloth until nothing refuses an end of the step at x, t1 where free nodes
+ * are where the step began, as far as pairs can be relaxed. Errors: DRAPE_E_MEMORY. */
+drape_status drape_contact_let_in(drape_contact *contact, const double *x, double t1);
 
 /* The nominal step [s], unless the integrator has none: where the scene gives no activation distance, that of
  * a moving collider grows with its path in such a step. */

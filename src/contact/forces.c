@@ -17,14 +17,14 @@ static drape_contact_law relaxed_law(const drape_contact *c, const drape_active_
     const drape_pair *pair = &contact->pair;
     const double friction =
         pair->collider >= 0 ? c->model->colliders[pair->collider].friction : def->self_friction;
-    return (drape_contact_law){
-        .distance = pair->distance,
-        .low = DRAPE_BARRIER_BOUNDED,
-        .stiffness = contact->relaxed * def->relaxed_pressure * pair->area,
-        .friction = friction / contact->relaxed,
-        .velocity = def->friction_velocity,
-        .damping = 1,
-        .restitution_velocity = fmax(def->restitution_velocity, OUT_SPEED * c->model->length)};
+    return (drape_contact_law){.distance = pair->distance,
+                               .low = DRAPE_BARRIER_BOUNDED,
+                               .stiffness = contact->relaxed * def->relaxed_pressure * pair->area,
+                               .friction = friction / contact->relaxed,
+                               .velocity = def->friction_velocity,
+                               .damping = 1,
+                               .restitution_velocity =
+                                   fmax(def->restitution_velocity, OUT_SPEED * c->model->length)};
 }
 
 /* The energy of a gap that closes is proportional to K d (force.h). K is proportional to 1/d, so that pairs

@@ -325,49 +325,75 @@ static drape_status relax_pair(drape_contact *c, const drape_pair *pair, double 
 }
 
 /* The pair that refused the step, and those that are as near as it before the step. */
-static drape_status relax_blockers(drape_contact *c, int32_t *added)
+static drape_status relax_blockers(drape_contact *c, drape_relax_extent extent, int32_t *added)
 {
     drape_status status = go_to(c, c->start, c->start_t);
     if (!status && c->refused)
         status = relax_pair(c, &c->refusing, c->start_t, added);
-    const int32_t near_count = c->active.near_count;
+    const int32_t near_count = extent == DRAPE_RELAX_NEAR ? c->active.near_count : 0;
     for (int32_t i = 0; !status && i < near_count; i++)
         status = relax_pair(c, &c->active.near[i].pair, c->start_t, added);
     return status;
 }
 
-static drape_status relax(drape_contact *c, double t1, bool all, int32_t *added)
+static drape_status relax(drape_contact *c, double t1, drape_relax_extent extent, int32_t *added)
 {
     drape_status status = drape_room_look_ahead(c, c->start, c->start_t, t1, true, added);
-    if (!status && *added == 0 && all)
-        status = relax_blockers(c, added);
+    if (!status && *added == 0 && extent != DRAPE_RELAX_NONE)
+        status = relax_blockers(c, extent, added);
     c->listed = false;
     return status;
 }
 
-drape_status drape_contact_lacks_room(drape_contact *c, double t1, bool all, bool *lacks)
+drape_status drape_contact_lacks_room(drape_contact *c, double t1, drape_relax_extent extent, bool *lacks)
 {
     int32_t found = 0;
     if (!c->begun)
         return DRAPE_OK;
     c->relaxed.counting = true;
-    const drape_status status = relax(c, t1, all, &found);
+    const drape_status status = relax(c, t1, extent, &found);
     c->relaxed.counting = false;
     *lacks = found > 0;
     return status;
 }
 
-drape_status drape_contact_relax(drape_contact *c, double t1, bool all, int32_t *added)
+drape_status drape_contact_relax(drape_contact *c, double t1, drape_relax_extent extent, int32_t *added)
 {
     const double clock = drape_clock_seconds();
     *added = 0;
     drape_status status = go_to(c, c->start, c->start_t);
     const double before = status ? 0 : drape_contact_potential(c);
     if (!status)
-        status = relax(c, t1, all, added);
+        status = relax(c, t1, extent, added);
     if (!status && !(status = go_to(c, c->start, c->start_t)))
         c->press.work += drape_contact_potential(c) - before;
     c->seconds += drape_clock_seconds() - clock;
+    return status;
+}
+
+/* All that is too near at the end, and then pair by pair what refuses the path to there. */
+drape_status drape_contact_let_in(drape_contact *c, const double *x, double t1)
+{
+    const char *reason = "";
+    drape_diagnostic diagnostic;
+    int32_t added = 1;
+    drape_status status = go_to(c, c->start, c->start_t);
+    const double before = status ? 0 : drape_contact_potential(c);
+    if (!status)
+        status = go_to(c, x, t1);
+    for (int32_t i = 0; !status && i < c->active.near_count; i++)
+        status = relax_pair(c, &c->active.near[i].pair, c->start_t, &added);
+    while (!status && added > 0) {
+        added = 0;
+        c->listed = false;
+        const drape_status refused = drape_contact_check(c, x, t1, &reason, &diagnostic);
+        status = refused < 0 ? refused : DRAPE_OK;
+        if (refused > 0)
+            status = relax_pair(c, &c->refusing, c->start_t, &added);
+    }
+    c->listed = false;
+    if (!status && !(status = go_to(c, c->start, c->start_t)))
+        c->press.work += drape_contact_potential(c) - before;
     return status;
 }
 

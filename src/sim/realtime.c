@@ -13,6 +13,7 @@
  */
 #include "base/clock.h"
 #include "base/elementary.h"
+#include "base/reason.h"
 #include "sim/relaxed.h"
 #include "sim/sim.h"
 
@@ -166,8 +167,9 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
         learn(sim, drape_clock_seconds() - start - sim->further_seconds);
         report->attempts++;
         report->rejected += !attempt.accepted;
+        report->held += attempt.accepted && attempt.reason == drape_reason_name(DRAPE_REASON_HELD);
         if (!attempt.accepted && !sim->schedule.cut)
-            sim->realtime.cap = fmin(sim->realtime.cap, attempt.h / 2);
+            sim->realtime.cap = sim->relaxed_again ? INFINITY : fmin(sim->realtime.cap, attempt.h / 2);
         report->h = attempt.accepted ? fmax(report->h, attempt.h) : report->h;
         report->residual = attempt.accepted ? fmax(report->residual, attempt.residual) : report->residual;
         report->error = attempt.accepted ? fmax(report->error, attempt.error) : report->error;

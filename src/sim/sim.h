@@ -76,9 +76,12 @@ struct drape_sim {
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
     double *query_scratch;          /* (node_count x 3) for queries between steps */
     int64_t attempts;
-    bool *relaxed_logged;        /* (collider_count + 1) the last message was that cloth is relaxed there */
-    int64_t failed;              /* attempts at the present step that failed */
-    double further_seconds;      /* [s] of the last attempt, see drape_step_info; not archived: it is read at
+    bool *relaxed_logged;   /* (collider_count + 1) the last message was that cloth is relaxed there */
+    int64_t failed;         /* attempts at the present step that failed */
+    int64_t held_up;        /* attempts that failed since held_up_from */
+    double held_up_from;    /* [s] from there on no whole dt was made */
+    bool relaxed_again;     /* after the last attempt cloth was relaxed; not archived: it is read at once */
+    double further_seconds; /* [s] of the last attempt, see drape_step_info; not archived: it is read at
                                     once */
     drape_statistics statistics; /* counted by the driver; the integrator has the others */
     drape_reason_total reasons[DRAPE_MAX_REASONS];

@@ -7,6 +7,7 @@
 #include "base/finite.h"
 #include "base/reason.h"
 #include "sim/dense.h"
+#include "sim/hold.h"
 #include "sim/relaxed.h"
 
 #include <inttypes.h>
@@ -17,6 +18,9 @@
 /* Attempts that fail in a row, or halvings of a step, after which the pairs that hold it up are relaxed:
  * impacts on cloth that has room take some. */
 #define PATIENCE 6
+/* In advances with a time budget, where each of these attempts may be that of a frame: attempts that fail
+ * before a whole nominal step is made, after which the pair that refuses the next one is relaxed. */
+#define SHORT_PATIENCE 3
 
 /* ---- Compute and check ---- */
 
@@ -112,12 +116,14 @@ static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status s
 static drape_status relax(drape_sim *sim, double t1, drape_status failure, drape_verdict verdict, bool *again)
 {
     int32_t added = 0;
-    const bool all = verdict == DRAPE_STOP || sim->failed >= PATIENCE || sim->schedule.level >= PATIENCE;
+    const bool all = verdict == DRAPE_STOP || sim->failed >= PATIENCE || sim->schedule.level >= PATIENCE,
+               one = sim->realtime.active && sim->held_up >= SHORT_PATIENCE;
+    const drape_relax_extent extent = all ? DRAPE_RELAX_NEAR : one ? DRAPE_RELAX_PAIR : DRAPE_RELAX_NONE;
     const bool may_help =
         failure > 0 || failure == DRAPE_E_STEP_TOO_SMALL; /* of integrators with steps of their own */
     const drape_status status =
-        may_help && may_relax(sim) ? drape_system_relax(sim->system, t1, all, &added) : DRAPE_OK;
-    *again = !status && added > 0;
+        may_help && may_relax(sim) ? drape_system_relax(sim->system, t1, extent, &added) : DRAPE_OK;
+    *again = sim->relaxed_again = !status && added > 0;
     return status;
 }
 
@@ -171,6 +177,10 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
 {
     drape_statistics *s = &sim->statistics;
     sim->failed = 0;
+    if (!(next_state(sim)->t - sim->held_up_from < sim->schedule.dt)) {
+        sim->held_up = 0;
+        sim->held_up_from = next_state(sim)->t;
+    }
     if (!info->committed)
         drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
     rotate_states(sim);
@@ -207,6 +217,7 @@ static void reject(drape_sim *sim, const drape_step_info *info)
         sim->before = -1;
     sim->statistics.steps_rejected++;
     sim->failed++;
+    sim->held_up++;
     count_reason(sim, info->reason);
 }
 
@@ -249,6 +260,7 @@ static bool must_repeat(drape_sim *sim, const double memory[2], drape_step_info 
     info->reason = drape_reason_name(DRAPE_REASON_EVENT);
     reject(sim, info);
     sim->failed--;
+    sim->held_up--;
     return true;
 }
 
@@ -304,7 +316,8 @@ static drape_status describe_room(drape_sim *sim, const drape_attempt *attempt, 
     const bool refused = strcmp(attempt->reason, drape_reason_name(DRAPE_REASON_PENETRATION)) == 0 ||
                          strcmp(attempt->reason, drape_reason_name(DRAPE_REASON_COLLISION)) == 0;
     const double t1 = attempt->t + fmax(attempt->h, sim->schedule.dt);
-    const drape_status status = drape_system_lacks_room(sim->system, t1, refused, &lacks);
+    const drape_status status =
+        drape_system_lacks_room(sim->system, t1, refused ? DRAPE_RELAX_NEAR : DRAPE_RELAX_NONE, &lacks);
     if (lacks)
         snprintf(text, size,
                  "; bodies leave the cloth no room there: with /contact/no_room \"relax\" they are let into "
@@ -397,6 +410,36 @@ static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *
                            .error = info->error};
 }
 
+/* After an attempt that failed: holds the cloth, if that is the last resort and possible. The step is then
+ * accepted, unless it is to end at an event: then the next attempt ends there. *stop as in try_step. Returns
+ * whether the verdict on the attempt was replaced. */
+static bool hold(drape_sim *sim, drape_status failure, bool stopped, drape_step_info *info,
+                 drape_status *stop)
+{
+    drape_step_info held;
+    if (!drape_sim_must_hold(sim, failure, stopped))
+        return false;
+    drape_status status = drape_sim_hold(sim, next_state(sim), &held);
+    drape_system_end_step(sim->system);
+    if (!status && drape_events_examine(sim, next_state(sim), &status) != DRAPE_EVENTS_PASS)
+        status = status ? status : DRAPE_RETRY_REJECTED;
+    if (status < 0)
+        *stop = status;
+    if (status)
+        return false;
+    drape_log(sim->ctx, DRAPE_LOG_WARNING,
+              "t=%.9g h=%.4g: no step can be made (%s), and the cloth is held where it is",
+              drape_sim_time(sim), held.h, info->reason);
+    *info = held;
+    *stop = DRAPE_OK;
+    drape_schedule_cut(&sim->schedule, next_state(sim)->t);
+    accept(sim, info, sim->schedule.dt);
+    drape_events_commit(sim);
+    sim->statistics.steps_held++;
+    sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+    return true;
+}
+
 /* Makes one attempt, from proposal to verdict. *stop: the negative status that ends the advance; 0:
  * continue. */
 static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status *stop)
@@ -416,6 +459,9 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     verdict = again ? DRAPE_RETRY : verdict;
     bool refused = status == DRAPE_OK && verdict != DRAPE_ACCEPT; /* by the controller alone */
     *stop = relaxed ? relaxed : verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
+    if (verdict != DRAPE_ACCEPT && !again && !relaxed &&
+        hold(sim, refused ? DRAPE_RETRY_REJECTED : status, verdict == DRAPE_STOP, &info, stop))
+        return record_of(sim, t, &info, refused ? DRAPE_RETRY_REJECTED : status, true);
     if (verdict == DRAPE_ACCEPT) {
         accept(sim, &info, trial.h_next);
         drape_events_commit(sim);

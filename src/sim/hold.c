@@ -1,0 +1,75 @@
+/* hold.c: see hold.h. */
+#include "sim/hold.h"
+
+#include "base/finite.h"
+#include "base/reason.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Attempts at a step that fail in a row, and within one nominal step of time, after which cloth is held. */
+#define MOST_IN_A_ROW  10
+#define MOST_IN_A_STEP 24
+
+bool drape_sim_must_hold(const drape_sim *sim, drape_status failure, bool stopped)
+{
+    const bool worn_out = stopped || sim->failed >= MOST_IN_A_ROW || sim->held_up >= MOST_IN_A_STEP;
+    const bool may_help = failure > 0 || failure == DRAPE_E_STEP_TOO_SMALL;
+    return worn_out && may_help && sim->realtime.active && !sim->chosen.integrator->own_steps &&
+           sim->model->contact.no_room != DRAPE_NO_ROOM_STOP;
+}
+
+/* The rest of the interval that could not be stepped through, at most a nominal step. */
+static double end_of_hold(const drape_sim *sim)
+{
+    const drape_schedule *s = &sim->schedule;
+    const double next = s->stepping == DRAPE_STEPS_COUNTED ? s->interval_end : s->now + s->dt;
+    return fmin(next, s->cut ? s->cut_end : s->end);
+}
+
+/* Pins and colliders do all the work: the free nodes, and with them inertia and damping, rest. */
+static double potential(const drape_energy *e)
+{
+    return e->elastic + e->gravity + e->contact;
+}
+
+drape_status drape_sim_hold(drape_sim *sim, drape_state *next, drape_step_info *info)
+{
+    const drape_state *now = drape_sim_state(sim);
+    const drape_model *m = sim->model;
+    const size_t n = 3 * (size_t)m->node_count;
+    const double t1 = end_of_hold(sim), h = t1 - now->t;
+    if (!(h > 0))
+        return DRAPE_RETRY_REJECTED;
+    *info = (drape_step_info){.reason = drape_reason_name(DRAPE_REASON_HELD),
+                              .h = h,
+                              .residual = NAN,
+                              .tolerance = NAN,
+                              .error = NAN};
+    info->diagnostic =
+        (drape_diagnostic){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
+    memcpy(next->x, now->x, n * sizeof *next->x);
+    memset(next->v, 0, n * sizeof *next->v);
+    next->t = t1;
+    drape_motion_place_pins(drape_system_motion(sim->system), t1, next->x);
+    for (size_t i = 0; i < n; i++)
+        next->v[i] = m->pinned[i / 3] ? (next->x[i] - now->x[i]) / h : 0;
+    drape_system_expect(sim->system, t1, true);
+    drape_status status = drape_system_begin(sim->system, now);
+    if (!status)
+        status = drape_system_let_in(sim->system, next->x, t1);
+    drape_sim_add_contact_work(sim);
+    const drape_energy before = drape_sim_energy(sim);
+    if (!status)
+        status = drape_system_check_contact(sim->system, next->x, t1, &info->reason, &info->diagnostic);
+    if (!status)
+        status =
+            drape_system_check(sim->system, next->x, now->x, now->internal, &info->reason, &info->diagnostic);
+    if (!status && !drape_all_finite(next->x, n))
+        status = DRAPE_RETRY_NONFINITE;
+    if (status)
+        return status;
+    const drape_energy after = drape_sim_energy_of(sim, t1, next->x, next->v);
+    info->pin_work = potential(&after) - potential(&before);
+    return DRAPE_OK;
+}
