@@ -51,6 +51,9 @@
 /* Limits of the share m in the estimate of the error: beyond them forces are far from linear along p. */
 #define MIN_SHARE 0.05
 #define MAX_SHARE 4
+/* Of corrections that hardly contract: nine more like the last one are expected. Of how many it is measured. */
+#define MAX_CONTRACTION 0.9
+#define STEPS_KEPT      4
 /* Power of the error if nothing but inertia resisted it, and with contact, whose matrix is stiffer. */
 #define INERTIAL         0.08
 #define INERTIAL_CONTACT 0.2
@@ -76,6 +79,8 @@ struct drape_inexact_newton {
     double share;                     /* of the positive parts in the next matrix; with factors */
     double used_share, repair_share;  /* in the last matrix; in the last one that was indefinite without */
     bool indefinite;                  /* one in this solve was */
+    bool shortened;                   /* a correction of this solve was, by the line search */
+    double length;                    /* that the line search gave the last correction */
     double edge;                      /* [m] mean length of an edge */
     contraction first;                /* of the first correction */
     bool nonlinear;                   /* forces are, along the correction of the last estimate */
@@ -142,7 +147,7 @@ static void begin(drape_inexact_newton *s, bool follows)
     s->share = 1;
     if (!follows || s->first.mass_weight != e->mass_weight)
         s->first = (contraction){0};
-    s->indefinite = false;
+    s->indefinite = s->shortened = false;
     drape_step_equation_predict_contact(e, NULL);
     if (!s->factored || (follows && s->predictor.valid))
         return;
@@ -327,6 +332,8 @@ static bool advance(drape_inexact_newton *s, double *d)
     if (!finite)
         return false;
     memcpy(d, s->trial, e->dofs * sizeof *d);
+    s->length = a;
+    s->shortened |= a < 1;
     s->share = a < SHORT_STEP ? 1 : 0;
     if (a != 1)
         drape_stress_predictor_forget(&s->predictor);
@@ -435,11 +442,13 @@ static bool has_time(const drape_inexact_settings *settings, double seconds)
 /* Of one solve. */
 typedef struct progress {
     int iteration;
-    double start, bound; /* |F|^2 of the guess, and what it must fall below */
-    double first, last;  /* [m] RMS of the first and of the last correction */
-    double ratio;        /* of the last one to the one before */
-    double seconds;      /* of the last iteration and the last estimate */
-    double estimating;   /* [s] of the last estimate */
+    double start, bound;     /* |F|^2 of the guess, and what it must fall below */
+    double first, last;      /* [m] RMS of the first and of the last correction */
+    double ratio;            /* of the last one to the one before */
+    double step[STEPS_KEPT]; /* [m] RMS of the last corrections as they were made, the last one first */
+    double near;             /* [m] last estimate from one more correction */
+    double seconds;          /* of the last iteration and the last estimate */
+    double estimating;       /* [s] of the last estimate */
 } progress;
 
 /* Without contact, factors leave so little that the error alone tells whether to go on. */
@@ -448,15 +457,36 @@ static bool goes_by_error(const drape_inexact_newton *s)
     return s->factored && !s->fraction;
 }
 
+/* The error as the corrections contract, where the line search has shortened one: a sheet that buckles, or
+ * that turns by more than its stiff elements let one correction turn it, comes nearer by many small ones of
+ * nearly the same length. Each alone is a small part of the error. The contraction is taken over pairs of
+ * corrections, because their lengths alternate. 0: none was shortened. */
+static double slow_error(const drape_inexact_newton *s, const progress *p)
+{
+    const double *step = p->step;
+    double share = MAX_CONTRACTION;
+    if (!s->shortened || !goes_by_error(s))
+        return 0;
+    if (p->iteration == 2)
+        share = step[0] / step[1];
+    if (p->iteration == 3)
+        share = sqrt(step[0] / step[2]);
+    if (p->iteration > 3)
+        share = sqrt((step[0] + step[1]) / (step[2] + step[3]));
+    share = fmin(share, MAX_CONTRACTION);
+    return step[0] * share / (1 - share);
+}
+
 /* Whether so little is left, or so little time, that the error is worth an estimate. */
 static bool has_fallen(const drape_inexact_newton *s, const drape_inexact_settings *settings,
                        const progress *p, double left)
 {
     if (p->iteration < settings->iterations)
         return false;
-    if (goes_by_error(s))
-        return p->iteration == 1 || fmin(1, p->ratio) * p->last < FAR_ABOVE * settings->error ||
-               !has_time(settings, p->seconds);
+    if (goes_by_error(s)) {
+        const bool near = p->iteration == 1 || fmin(1, p->ratio) * p->last < FAR_ABOVE * settings->error;
+        return (near && slow_error(s, p) <= settings->error) || !has_time(settings, p->seconds);
+    }
     return left < p->bound && (!s->factored || inertial_error(s->equation) <= MAX_DRIFT * s->edge);
 }
 
@@ -478,7 +508,7 @@ static void measure_contraction(drape_inexact_newton *s, double error, double fi
 static double expected_error(const drape_inexact_newton *s, const progress *p)
 {
     const contraction *c = &s->first;
-    if (p->iteration != 1 || s->fraction || !(c->share > 0) || c->steps >= MAX_STEPS)
+    if (p->iteration != 1 || s->shortened || s->fraction || !(c->share > 0) || c->steps >= MAX_STEPS)
         return INFINITY;
     return c->share * p->first * fmax(1, p->first / c->along);
 }
@@ -517,7 +547,8 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         }
         if (fell || most) {
             const double start = drape_clock_seconds();
-            report->error = estimate_error(s, d, p.iteration > 0);
+            p.near = estimate_error(s, d, p.iteration > 0);
+            report->error = fmax(p.near, slow_error(s, &p));
             const double took = drape_clock_seconds() - start;
             p.seconds += took - p.estimating;
             p.estimating = took;
@@ -531,7 +562,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         if (converged || (fell && !lost && ends && is_quiet(s, report->error)))
             return DRAPE_OK;
         if (most) {
-            if (!lost && (left < p.start || report->error < p.first))
+            if (!lost && (left < p.start || p.near < p.first))
                 return DRAPE_OK;
             report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
             return DRAPE_RETRY_NONLINEAR;
@@ -554,6 +585,8 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         predict_stress(s, p.iteration < MAX_PREDICTION);
         if (!advance(s, d))
             return DRAPE_RETRY_NONFINITE;
+        memmove(p.step + 1, p.step, (STEPS_KEPT - 1) * sizeof *p.step);
+        p.step[0] = s->length * now;
         p.seconds = drape_clock_seconds() - start;
         report->further_seconds += fell ? p.seconds : 0;
         p.seconds += p.estimating;

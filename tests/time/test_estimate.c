@@ -24,6 +24,9 @@
 #define SWUNG                                                                                                \
     "'pins': [{'corner': 'top-left', 'track': [[0, [0, 0, 0]], [0.2, [0.4, 0.2, 0]]]},"                      \
     "{'corner': 'top-right', 'track': [[0, [0, 0, 0]], [0.2, [0.4, 0.2, 0]]]}]"
+#define JERKED                                                                                               \
+    "'pins': [{'corner': 'top-left', 'track': [[0, [0, 0, 0]], [1, [3, 0, 0]]]},"                            \
+    "{'corner': 'top-right', 'track': [[0, [0, 0, 0]], [1, [3, 0, 0]]]}]"
 #define BALL "'colliders': [{'type': 'sphere', 'center': [0, 0, 0], 'radius': 0.3}],"
 
 typedef struct source {
@@ -106,6 +109,53 @@ START_TEST(the_estimate_is_near_the_true_error)
             drape_sim_destroy(&p.error.exact);
             scene_close(&s);
         }
+}
+END_TEST
+
+typedef struct first_step {
+    step_error error;
+    double x[3 * 256], v[3 * 256];
+    double estimate, distance;
+} first_step;
+
+static drape_status compare_first(void *user, const drape_event *event)
+{
+    first_step *s = user;
+    if (event->kind != DRAPE_EVENT_ATTEMPT || !event->attempt->accepted)
+        return DRAPE_OK;
+    s->estimate = event->attempt->error;
+    s->distance = step_error_of(&s->error, event);
+    return DRAPE_OK;
+}
+
+/* Corners of stiff sheets that lie flat are jerked sideways at 3 m/s. The sheets turn and buckle, and the line
+ * search shortens the corrections, so that each is a small part of the error: the length of one more of them
+ * is a fiftieth to a sixth of it. The step goes on until little is left, or says that much is: the
+ * estimate is above a quarter of the true error, which is below 3 mm, twice the bound (with the estimate by one
+ * more correction alone the first sheet was 20 mm off and estimated at 0.4 mm). */
+START_TEST(shortened_corrections_are_not_the_error)
+{
+    static const struct {
+        int side;
+        const char *young, *thickness, *terms;
+    } sheets[] = {{10, "3e8", "0.002", FACES}, {12, "3e8", "0.002", FACES}, {10, "3e8", "0.001", EDGES}};
+    for (size_t i = 0; i < sizeof sheets / sizeof *sheets; i++) {
+        char material[128];
+        snprintf(material, sizeof material, "'young_modulus': %s, 'thickness': %s, 'areal_density': 0.3",
+                 sheets[i].young, sheets[i].thickness);
+        const source plate = {"", sheets[i].side, material, sheets[i].terms, JERKED};
+        scene s = open(&plate, "newton_k", ""), be = open(&plate, "be", ", 'max_iterations': 100");
+        first_step f = {.error = {.exact = be.sim, .n = 3 * (size_t)s.model->node_count}};
+        f.error.x = f.x;
+        f.error.v = f.v;
+        step_error_keep(&f.error, s.sim);
+        ck_assert_int_eq(drape_sim_observe(s.sim, compare_first, &f), DRAPE_OK);
+        scene_advance(&s, DT);
+        ck_assert_msg(f.estimate > 0.25 * f.distance && f.distance < 3e-3, "sheet %zu: %g m, estimate %g m",
+                      i, f.distance, f.estimate);
+        scene_close(&s);
+        scene_close(&be);
+    }
 }
 END_TEST
 
@@ -309,12 +359,12 @@ START_TEST(what_a_correction_leaves_is_archived)
 END_TEST
 
 /* Where pins jump to 2 m/s, by a third of an edge in the first step, the linearized equation leads to a guess
- * from which two iterations are enough. */
+ * from which two iterations are enough, and a third shows it, because one of them is shortened. */
 START_TEST(pins_that_jump_take_the_sheet_along)
 {
     drape_statistics done;
     ck_assert_double_lt(off_after(&denim, "", 1, &done), 1e-3 * SIZE);
-    ck_assert_int_le(done.newton_iterations, 2);
+    ck_assert_int_le(done.newton_iterations, 3);
 }
 END_TEST
 
@@ -330,8 +380,8 @@ START_TEST(an_estimate_in_contact_is_added)
 }
 END_TEST
 
-SUITE("estimate", the_estimate_is_near_the_true_error, iterations_follow_while_it_is_above_the_bound,
-      the_default_bound_is_a_thousandth_of_the_size, a_budget_limits_the_iterations,
-      a_step_that_is_lost_is_rejected, an_inaccurate_run_has_a_warning,
+SUITE("estimate", the_estimate_is_near_the_true_error, shortened_corrections_are_not_the_error,
+      iterations_follow_while_it_is_above_the_bound, the_default_bound_is_a_thousandth_of_the_size,
+      a_budget_limits_the_iterations, a_step_that_is_lost_is_rejected, an_inaccurate_run_has_a_warning,
       steps_without_contact_take_one_iteration, what_a_correction_leaves_is_archived,
       pins_that_jump_take_the_sheet_along, an_estimate_in_contact_is_added)
