@@ -61,6 +61,10 @@ typedef struct drape_lab_def {
     const char *const *scenes; /* ivp: names of scene files, each with a reference, the first that of `scene`;
                                      NULL: `scene` alone */
     size_t scene_count;        /* length of scenes */
+    const char *const *results; /* stability: names of results that maps show in colours, and curves over a
+                                   single axis, such as "energy_drift" or "iterations_per_step"; default:
+                                   none, over a single axis "energy_drift" */
+    size_t result_count;        /* length of results */
 } drape_lab_def;
 
 /* Fills *def with the defaults. Pass the caller's sizeof(drape_lab_def) as struct_size. Nothing if def is

@@ -7,7 +7,7 @@
 /* The command line of an experiment; each verb has options for the members that it uses. */
 typedef struct cli_lab_request {
     cli_command command;
-    const char *out, *shard, *integrators, *levels, *budget;
+    const char *out, *shard, *integrators, *levels, *budget, *results;
     cli_texts axes;
     int jobs, repeats; /* 0: not given */
     bool space;

@@ -265,7 +265,7 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", label);
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "change to the next level [m]");
     if (points > 0)
-        lab_figure_fit(&f, xy, points, strcmp(knob, "rtol") != 0);
+        lab_figure_fit(&f, xy, points, strcmp(knob, "rtol") != 0 ? 2 : 1);
     return lab_figure_end(
         l, &f, "How far the end moves with each refinement (root mean square); in brackets the order");
 }

@@ -596,7 +596,7 @@ static drape_status draw(lab *l, const json_t *about, const chart *c)
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->label);
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "error / size");
     if (count > 0)
-        lab_figure_fit(&f, xy, count, c->knob && strcmp(c->knob, "dt") == 0);
+        lab_figure_fit(&f, xy, count, !c->knob ? 0 : strcmp(c->knob, "dt") == 0 ? 2 : 1);
     horizon_text(about, horizon, sizeof horizon);
     snprintf(caption, sizeof caption,
              "%.60s: error, the largest of the times, of the RMS over the nodes, over %s. The error of the "

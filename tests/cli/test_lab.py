@@ -102,6 +102,81 @@ def test_one_axis():
     page_is_alone("s/report.html")
 
 
+def test_results_in_figures():
+    """figures of stability show any result by name: curves over one axis, maps over two; other results need no run"""
+    write_scene(duration=0.3)
+    one = ["stability", "scene.json", "--axis", "/integrator/dt=1e-3:3e-1:6log", "--integrators", "be,verlet", "--out", "s"]
+    good(*one)
+    equal(sorted(os.path.basename(path) for path in glob.glob("s/*.svg")), ["curve_energy_drift.svg", "map.svg"], "figures of one axis")
+    with open("s/curve_energy_drift.gp", encoding="utf-8") as file:
+        script = file.read()
+    # A curve for each method; open markers where it took fewer than 20 steps, a row of crosses for verlet where it exploded.
+    blocks = [block.split() for block in re.findall(r"\$d\d+ << EOD\n(.*?)EOD", script, re.S)]
+    by_method = {}
+    for result in lines("s").values():
+        by_method.setdefault(result["tags"]["integrator"], []).append(result)
+    few = [r for r in by_method["be"] if r["accepted"] < 20]
+    failed = [r for r in by_method["verlet"] if r["status"] != "ok"]
+    assert few and failed and len(few) < 6 and len(failed) < 6, (few, failed)
+    sizes = [len(block) // 2 for block in blocks]
+    assert 6 - len(few) in sizes and len(few) in sizes and len(failed) in sizes, sizes
+    for text in ("fewer than 20 steps", "stopped or exploded"):
+        assert f"set label '{text}'" in script, text
+    heights = {float(y) for block in blocks for y in block[1::2]}
+    drifts = {abs(r["energy_drift"]) for r in by_method["be"]}
+    assert all(min(abs(h / d - 1) for h in heights) < 1e-6 for d in drifts), (drifts, heights)
+    # Other results are drawn from the same lines.
+    with open("s/cases.jsonl", encoding="utf-8") as file:
+        before = sorted(file.read().splitlines())
+    good(*one, "--results", "iterations_per_step,strain_max")
+    with open("s/cases.jsonl", encoding="utf-8") as file:
+        equal(sorted(file.read().splitlines()) == before, True, "the same lines, with their CPU times")
+    equal(read_json("s/experiment.json")["results"], ["iterations_per_step", "strain_max"], "results of the experiment")
+    assert os.path.exists("s/curve_strain_max.svg") and os.path.exists("s/curve_iterations_per_step.svg")
+    # Over two axes, also of shards that are merged: one scale for all maps, hatches over what was too short to be judged.
+    two = ["stability", "scene.json", *AXES, "--integrators", "be,verlet", "--results", "energy_drift"]
+    for shard in ("1/2", "2/2"):
+        good(*two, "--shard", shard, "--out", "parts")
+    good("merge", "parts", "--out", "m")
+    scales, hatched = set(), False
+    for name in ("be", "verlet"):
+        with open(f"m/map_{name}_energy_drift.gp", encoding="utf-8") as file:
+            script = file.read()
+        scales.add(re.search(r"set cbrange .*", script).group())
+        hatched |= "pattern 5 noborder lc rgb" in script
+    equal((len(scales), hatched), (1, True), "scales, hatches")
+    refused("stability", "scene.json", *AXES, "--results", "energy_drif", "--out", "x", says='did you mean "energy_drift"')
+    # Every name is a column of results.csv.
+    names = refused("stability", "scene.json", *AXES, "--results", "?", "--out", "x", says="there are").split("there are ")[1]
+    with open("m/results.csv", encoding="utf-8") as file:
+        columns = file.readline().strip().split(",")
+    missing = [name for name in re.findall(r"\w+", names) if name not in columns]
+    equal(missing, [], f"columns {columns}")
+
+
+def test_short_runs_are_hatched():
+    """runs of fewer than 20 steps are hatched, whatever else is said of them; those over budget are named with the budget"""
+    write_scene(duration=0.3)
+    good("stability", "scene.json", "--axis", "/integrator/dt=1e-3:3e-1:6log", "--axis", "/cloth/0/material/young_modulus=1e2:1e5:2log",
+         "--integrators", "be", "--strain-limit", "1e-6", "--out", "s")
+    with open("s/map_be.gp", encoding="utf-8") as file:
+        script = file.read()
+    found = lines("s").values()
+    assert all(r["strain_max"] > 1e-6 for r in found), found
+    short = {r["tags"]["/integrator/dt"] for r in found if r["accepted"] < 20}
+    assert short and "unphysical strain" in script and "fewer than 20 steps" in script, script
+    # The boxes that are hatched begin where the first of these cells does, half a step below its dt.
+    boxes = re.search(r"pattern 5 noborder lc rgb '#000000'", script) and re.findall(r"\$d(\d+) using 1:2:3:4:5:6 with", script)[0]
+    rows = re.search(rf"\$d{boxes} << EOD\n(.*?)EOD", script, re.S).group(1).splitlines()
+    half = 300 ** (0.5 / 5)
+    for row in rows:
+        assert abs(float(row.split()[2]) * half / min(short) - 1) < 1e-6, (row, short)
+    write_scene(duration=1000)
+    good("stability", "scene.json", "--axis", "/cloth/0/material/density=100:200:2", "--integrators", "be", "--case-seconds", "0.05", "--out", "late")
+    with open("late/map.gp", encoding="utf-8") as file:
+        assert "set label 'over budget (0.05 s)'" in file.read()
+
+
 def test_message_over_budget():
     """a case that takes more than its CPU time says so"""
     write_scene(duration=1000)
