@@ -16,7 +16,6 @@
 
 #define RESOLVED    10.0 /* times the reference's error: smaller errors cannot be distinguished from it */
 #define LARGEST     0.1  /* of the size: larger errors have no order */
-#define SAME_ORDER  0.1  /* by which orders between neighbours may differ from that of the finest two */
 #define BASE_METHOD "be"
 #define LEVELS      11 /* of dt */
 #define MAX_SERIES  64 /* of a scene */
@@ -406,24 +405,17 @@ static bool has_its_steps(const json_t *r)
 static size_t asymptotic_range(const series *s, double *dt, double *error)
 {
     size_t count = 0;
-    double order = NAN;
     for (size_t i = s->count; i-- > 0;) {
         const json_t *r = s->results[i];
-        const double e = resolved_error(r), at = lab_tag_number(r, "value");
+        const double e = resolved_error(r);
         if (isnan(e) && count == 0)
             continue;
         if (!(e < LARGEST) || !has_its_steps(r))
             break;
-        if (count > 0) {
-            const double here = log(e / error[count - 1]) / log(at / dt[count - 1]);
-            if (count > 1 && !(fabs(here - order) < SAME_ORDER))
-                break;
-            order = count > 1 ? order : here;
-        }
-        dt[count] = at;
+        dt[count] = lab_tag_number(r, "value");
         error[count++] = e;
     }
-    return count;
+    return lab_same_order(dt, error, count);
 }
 
 static void tabulate_orders(table *t)

@@ -712,7 +712,7 @@ static bool is_mark(const lab *l, const shade *sh, mark kind, size_t i)
     return kind == (late ? OVER_BUDGET : blank ? NO_RESULT : is_short(l->results[i]) ? FEW_STEPS : ON_CURVE);
 }
 
-/* The marks of a kind of one integrator; missing values break the curve. height: of those without a result. */
+/* The marks of a kind of one integrator; missing values break the curve. height: of those without results. */
 static int write_marks(lab *l, const space *s, const shade *sh, size_t first, mark kind, double height,
                        lab_figure *f, int *block)
 {

@@ -7,6 +7,19 @@
 
 #define MAX_POINTS 64
 #define CONFIDENCE 0.975 /* two-sided 95 % */
+#define SAME_ORDER 0.1   /* by which orders between neighbours may differ from that of the finest two */
+
+size_t lab_same_order(const double *x, const double *y, size_t count)
+{
+    double order = NAN;
+    for (size_t i = 1; i < count; i++) {
+        const double here = log(y[i] / y[i - 1]) / log(x[i] / x[i - 1]);
+        if (i > 1 && !(fabs(here - order) < SAME_ORDER))
+            return i;
+        order = i > 1 ? order : here;
+    }
+    return count;
+}
 
 lab_line lab_fit_power(const double *x, const double *y, size_t count)
 {

@@ -245,11 +245,14 @@ def test_converge():
     for integrator, order in (("be", 1), ("bdf2", 2), ("trbdf2", 2)):
         assert abs(float(orders[integrator]) - order) < 0.1, out
     page_is_alone("c/report.html")
-    # A line is fitted through runs of one limit of the order of ida only.
+    # ida chooses its order with rtol: no line is fitted across that, for any limit of the order.
     out = good("converge", "scene.json", "--integrators", "ida", "--levels", "5", "--out", "ida")
-    equal(re.findall(r"^(ida.*): order", out, re.M), ["ida, order 2", "ida, order 5"], "series")
+    equal(re.findall(r"^(ida.*): no order, as it chooses its order", out, re.M), ["ida, order 2", "ida, order 5"], "series")
     out = good("converge", "scene.json", "--integrators", "ida", "--levels", "4", "--set", "/integrator/max_order=3", "--out", "three")
-    equal(re.findall(r"^(ida.*): order", out, re.M), ["ida"], "series at an order that the user chose")
+    equal(re.findall(r"^(ida.*): no order", out, re.M), ["ida"], "series at an order that the user chose")
+    # A method of one order has a slope over rtol, which is not called an order.
+    out = good("converge", "scene.json", "--integrators", "rosenbrock", "--levels", "5", "--out", "ros")
+    assert re.search(r"^rosenbrock: change proportional to rtol\^[\d.]+ \(95 % confidence", out, re.M) and "order" not in out, out
     # Unless they are fixed, verlet takes as many substeps as its stability limit needs, and dt does not refine them.
     out = good("converge", "scene.json", "--integrators", "verlet", "--levels", "4", "--out", "v")
     assert "verlet: no order, as it chooses its own substeps" in out, out
@@ -260,9 +263,31 @@ def test_converge():
     # Within a second folds grow and the refinements do not converge: the output says so, and only then.
     for duration, uncertain in ((0.3, False), (1, True)):
         write_scene(duration=duration)
-        out = good("converge", "scene.json", "--integrators", "midpoint", "--levels", "4", "--out", f"i{duration}")
-        low = re.search(r"^midpoint: order .*confidence (\S+) to", out, re.M).group(1)
-        equal((float(low) <= 0, "so the order is not determined" in out), (uncertain, uncertain), out)
+        out = good("converge", "scene.json", "--integrators", "midpoint", "--levels", "6", "--out", f"i{duration}")
+        equal("the order is not determined" in out, uncertain, out)
+
+
+def test_one_order_is_fitted():
+    """converge fits a line through the finest refinements of one order, and says how many; a merge of changed lines shows it"""
+    write_scene(duration=0.3)
+    command = ["converge", "scene.json", "--integrators", "be", "--levels", "7", "--out", "c"]
+    good(*command)
+    # The ends of the runs are replaced: they move by 4^-k from dt 1/60/2^k on for k < 3, then by 2^-k.
+    moves = [1, 1 / 4, 1 / 16, 1 / 32, 1 / 64, 1 / 128]
+    with open("c/cases.jsonl", encoding="utf-8") as file:
+        cases = [json.loads(line) for line in file]
+    for case in cases:
+        at = sum(moves[:case["case"]])
+        case["positions"] = [at] * len(case["positions"])
+    with open("c/cases.jsonl", "w", encoding="utf-8") as file:
+        file.write("".join(json.dumps(case) + "\n" for case in cases))
+    claim("c", "cases.jsonl")
+    out = good(*command)
+    assert "be: order 1 in dt" in out and "of the last 4 of 6 refinements, as the order of the others is another one" in out, out
+    with open("c/converge_dt.gp", encoding="utf-8") as file:
+        script = file.read()
+    sizes = [len(block.split()) // 2 for block in re.findall(r"\$d\d+ << EOD\n(.*?)EOD", script, re.S)]
+    assert sizes[:2] == [2, 4] and "set label 'be (1.00)'" in script and "set label 'not fitted'" in script, script
 
 
 def test_converge_in_space():
