@@ -112,6 +112,7 @@ static int make_def(const cli_lab_request *request, int default_jobs, double def
     def->setting_count = command->setting_count;
     def->integrators = integrators;
     def->results = results;
+    def->plan = request->plan;
     def->axes = request->axes.items;
     def->axis_count = request->axes.count;
     def->space = request->space;

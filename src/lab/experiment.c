@@ -5,6 +5,7 @@
 #include "base/def.h"
 #include "base/hash.h"
 #include "base/param.h"
+#include "lab/plan.h"
 #include "lab/run.h"
 #include "lab/sweep.h"
 #include "lab/text.h"
@@ -259,7 +260,8 @@ static bool writes(const void *user, const char *name)
     lab_cases_name(user, cases);
     return strcmp(name, ABOUT) == 0 || strcmp(name, cases) == 0 || strcmp(name, "results.csv") == 0 ||
            strcmp(name, "report.html") == 0 || strncmp(name, "reference", 9) == 0 || ends_in(name, ".svg") ||
-           ends_in(name, ".pdf") || ends_in(name, ".gp") || strcmp(name, "tables.md") == 0;
+           ends_in(name, ".pdf") || ends_in(name, ".gp") || strcmp(name, "tables.md") == 0 ||
+           strcmp(name, "plan.json") == 0;
 }
 
 /* Shards may write into one folder at the same time. */
@@ -392,6 +394,8 @@ static drape_status report(lab *l)
             (long long)outcome->done, (long long)outcome->cases, (long long)outcome->failed,
             (long long)outcome->rejected);
     drape_status status = shard ? DRAPE_OK : lab_write_csv(l);
+    if (!status && l->def->plan > 0)
+        return lab_write_plan(l);
     outcome->left_out = status || shard ? 0 : list_left_out(l);
     if (status || shard || outcome->done + outcome->left_out < outcome->cases) {
         fprintf(l->summary,
@@ -471,6 +475,8 @@ static drape_status check_def(drape_context *ctx, const drape_lab_def *def)
     if (!(def->budget_seconds >= 0))
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "budget_seconds = %g; must be 0 (none) or more",
                           def->budget_seconds);
+    if (def->plan < 0)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "plan = %d; must be 0 (none) or more", def->plan);
     if (!(def->case_seconds > 0) || def->repeats < 1 || !(def->strain_limit > 0))
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
                           "case_seconds, repeats and strain_limit must be above 0: %g, %d, %g",

@@ -9,6 +9,11 @@
 #define CONFIDENCE 0.975 /* two-sided 95 % */
 #define SAME_ORDER 0.1   /* by which orders between neighbours may differ from that of the finest two */
 
+double lab_student(double degrees_of_freedom)
+{
+    return gsl_cdf_tdist_Pinv(CONFIDENCE, degrees_of_freedom);
+}
+
 size_t lab_same_order(const double *x, const double *y, size_t count)
 {
     double order = NAN;
@@ -34,7 +39,7 @@ lab_line lab_fit_power(const double *x, const double *y, size_t count)
     }
     gsl_fit_linear(u, 1, v, 1, n, &line.intercept, &line.slope, &cov00, &cov01, &cov11, &squares);
     if (n > 2) {
-        double half = gsl_cdf_tdist_Pinv(CONFIDENCE, (double)n - 2) * sqrt(cov11);
+        double half = lab_student((double)n - 2) * sqrt(cov11);
         line.low = line.slope - half;
         line.high = line.slope + half;
     }

@@ -25,7 +25,7 @@ def lines(folder):
         with open(path, encoding="utf-8") as file:
             for line in file:
                 result = json.loads(line)
-                for key in ("cpu_s", "wall_s"):
+                for key in ("cpu_s", "wall_s", "case_cpu_s"):
                     del result[key]
                 results[result["case"]] = result
     return results
@@ -177,6 +177,47 @@ def test_short_runs_are_hatched():
         assert "set label 'over budget (0.05 s)'" in file.read()
 
 
+def test_plan():
+    """a plan runs a part of the cases, spread over all, and scales their costs up by integrator; the whole run keeps them"""
+    write_scene()
+    command = ["stability", "scene.json", "--axis", "/integrator/dt=1e-3:1e-1:20log", "--axis", "/cloth/0/material/young_modulus=1e4:1e6:10log",
+               "--integrators", "be,verlet", "--out", "s"]
+    out = good(*command, "--plan", "40")
+    assert "plan      from 40 of 400 cases" in out and "report" not in out, out
+    sample = lines("s")
+    equal(len(sample), 40, "cases that were run")
+    # Spread evenly: half of them are of each integrator up to one, no more than 4 in any of 20 equal parts of the numbers, which would have 2 each.
+    equal(abs(sum(r["tags"]["integrator"] == "be" for r in sample.values()) - 20) <= 1, True, "cases of be")
+    equal(max(sum(i // 20 == part for i in sample) for part in range(20)) <= 4, True, sorted(sample))
+    # Costs that are known give totals that are known, without an interval as they do not scatter: 200 x 2 s + 200 x 1/4 s.
+    with open("s/cases.jsonl", encoding="utf-8") as file:
+        cases = [json.loads(line) for line in file]
+    for case in cases:
+        case["case_cpu_s"] = 2 if case["tags"]["integrator"] == "be" else 0.25
+    with open("s/cases.jsonl", "w", encoding="utf-8") as file:
+        file.write("".join(json.dumps(case) + "\n" for case in cases))
+    claim("s", "cases.jsonl")
+    good(*command, "--plan", "40", "--jobs", "1")
+    plan = read_json("s/plan.json")
+    for key, value in (("cases", 400), ("sampled", 40), ("cpu_s", 450), ("cpu_low_s", 450), ("cpu_high_s", 450), ("elapsed_s", 450), ("jobs", 1)):
+        assert abs(plan[key] / value - 1) < 1e-5, (key, plan)
+    equal(lines("s"), sample, "the sample of a second plan")
+    # The whole run continues, and is as large as was planned: lines differ by the digits of their numbers.
+    good(*command)
+    found = lines("s")
+    equal(len(found), 400, "cases of the whole run")
+    equal({i: found[i] for i in sample}, sample, "cases of the plan")
+    size = sum(os.path.getsize("s/" + name) for name in ("experiment.json", "cases.jsonl", "results.csv"))
+    assert abs(plan["disk_bytes"] / size - 1) < 0.1, (plan, size)
+    assert plan["memory_bytes"] > 1e6, plan
+    # A plan of more cases than there are runs all; other experiments have plans, too.
+    out = good("converge", "scene.json", "--integrators", "be", "--levels", "3", "--plan", "100", "--out", "c")
+    assert "plan      from 3 of 3 cases" in out and not os.path.exists("c/report.html"), out
+    out = good("tradeoff", "scene.json", "--integrators", "be,ida", "--plan", "4", "--shard", "1/2", "--out", "t")
+    assert "plan      from 4 of " in out, out
+    refused("converge", "scene.json", "--plan", "0", "--out", "d", says="--plan")
+
+
 def test_message_over_budget():
     """a case that takes more than its CPU time says so"""
     write_scene(duration=1000)
@@ -324,7 +365,7 @@ def merged_is(whole, folder, merged):
     """Checks that the lines and the table of the shards are those of a single run."""
     good("merge", folder, "--out", merged)
     equal(lines(merged), lines(whole), "results of " + folder)
-    numbers = ("cpu_s", "wall_s")
+    numbers = ("cpu_s", "wall_s", "case_cpu_s")
     tables = []
     for name in (merged, whole):
         with open(name + "/results.csv", encoding="utf-8", newline="") as file:
