@@ -1,9 +1,9 @@
 /*
  * plan.c: see plan.h.
  *
- * The sample is a Weyl sequence of the golden ratio over the numbers of the cases: its first points are spread
- * as evenly as any number of points can be (Knuth, The Art of Computer Programming 3, 6.4), also over each
- * axis of a map, whose length a constant stride might divide.
+ * The sample is a Weyl sequence of the golden ratio over the numbers of the cases: its first points are
+ * spread as evenly as any number of points can be (Knuth, The Art of Computer Programming 3, 6.4), also over
+ * each axis of a map, whose length a constant stride might divide.
  *
  * Costs differ most between integrators and scenes. So each of these is a stratum, whose total is the number
  * of its cases times the mean of its sample (Cochran, Sampling Techniques, 1977, 5.3); the strata of which
