@@ -61,6 +61,12 @@ typedef struct drape_lab_def {
     const char *const *scenes; /* ivp: names of scene files, each with a reference, the first that of `scene`;
                                      NULL: `scene` alone */
     size_t scene_count;        /* length of scenes */
+    const char *const *results; /* stability: names of results that maps show in colours, and curves over a
+                                   single axis, such as "energy_drift" or "iterations_per_step"; default:
+                                   none, over a single axis "energy_drift" */
+    size_t result_count;        /* length of results */
+    int plan; /* > 0: run only so many cases, spread over all of them, and write what all of them will take,
+                 into plan.json and the text of the outcome; default 0 */
 } drape_lab_def;
 
 /* Fills *def with the defaults. Pass the caller's sizeof(drape_lab_def) as struct_size. Nothing if def is
@@ -85,7 +91,8 @@ DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
 /* Runs "tradeoff", "stability", "converge" or "ivp" and writes cases.jsonl, experiment.json, results.csv,
  * figures (SVG and PDF) and report.html into the folder. A shard, whose folder other shards may share,
  * writes only experiment.json and cases-1-of-4.jsonl; the merge writes the rest. Existing results of the
- * same experiment are kept as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, an invalid def, a
+ * same experiment are kept as they are. With def->plan it runs a sample and writes plan.json, and no figures
+ * and page. Errors: DRAPE_E_ARGUMENT (no such experiment, an invalid def, a
  * setting that no case uses, a folder that holds another experiment), those of loading the scene,
  * DRAPE_E_FILE, DRAPE_E_SOLVER (the reference could not be computed: the folder is left as it was, but for
  * levels of the reference, with which the same call with a larger budget_seconds continues), DRAPE_E_MEMORY,

@@ -8,7 +8,7 @@
 
 typedef struct ivp_request {
     cli_lab_request lab; /* its command first */
-    bool check;
+    bool check, json;
 } ivp_request;
 
 #define SECONDS 60 /* [s] CPU that a family of methods may take for a reference */
@@ -31,9 +31,9 @@ static drape_status reference(lab_ivp *s, const ivp_request *request, const char
 
 static drape_status score(lab_ivp *s, const ivp_request *request, const char *more, bool *good)
 {
-    (void)request, (void)good;
+    (void)good;
     drape_status status = lab_ivp_read_reference(s);
-    return status ? status : lab_ivp_score(s, more, stdout);
+    return status ? status : lab_ivp_score(s, more, request->json, stdout);
 }
 
 static drape_status export(lab_ivp *s, const ivp_request *request, const char *more, bool *good)
@@ -128,6 +128,8 @@ static int run(const void *given)
     const int given_operands = command->operand_count - 1;
     if (given_operands < 1 || (actions[i].operands && given_operands != actions[i].operands))
         return cli_misuse("ivp", "usage: drape ivp %s", actions[i].usage);
+    if (request->json && actions[i].deed != score)
+        return cli_misuse("ivp", "--json has no effect: only score prints JSON");
     if (actions[i].deed == export && !request->lab.out)
         return cli_misuse("ivp", "--out is missing: the folder of the export");
     return actions[i].deed ? do_scenes(request, i) : run_scenes(request);
@@ -143,6 +145,7 @@ static const cli_option options[] = {
         0),
     {"check", CLI_FLAG, NULL, "reference: compare with the stored one instead of storing it",
      offsetof(ivp_request, check), 0, NULL},
+    {"json", CLI_FLAG, NULL, "score: print JSON", offsetof(ivp_request, json), 0, NULL},
 };
 
 const drape_verb drape_verb_ivp = {

@@ -6,6 +6,10 @@
 static const cli_option options[] = {
     CLI_LAB_OPTION("axis", CLI_TEXTS, "/POINTER=FROM:TO:N[log]", "an axis of the map; give 1 to 3", axes, 0),
     CLI_LAB_OPTIONS,
+    CLI_LAB_OPTION("results", CLI_TEXT, "A,B",
+                   "results that the figures show besides what happened, such as energy_drift, strain_max, "
+                   "iterations_per_step, rejected_share, cpu_s (default over one axis energy_drift)",
+                   results, 0),
     CLI_LAB_OPTION("strain-limit", CLI_REAL, "E",
                    "a run with a larger strain of an edge counts as overstretched (default 0.2)",
                    strain_limit, 0),

@@ -69,6 +69,19 @@ static int read_levels(const cli_lab_request *request, drape_lab_def *def)
     return CLI_GO_ON;
 }
 
+/* The names of a list "a,b"; NULL: none. Returns their number. */
+static size_t split(drape_arena *arena, const char *list, const char ***names)
+{
+    char *text = drape_arena_text(arena, list ? list : ""), *rest;
+    size_t count = 0;
+    *names = drape_arena_take(arena, text ? strlen(text) + 1 : 1, sizeof **names);
+    if (drape_arena_status(arena))
+        return 0;
+    for (char *word = strtok_r(text, ",", &rest); word; word = strtok_r(NULL, ",", &rest))
+        (*names)[count++] = word;
+    return count;
+}
+
 /* Fills the def; its texts and arrays are those of the request or in the arena. */
 static int make_def(const cli_lab_request *request, int default_jobs, double default_minutes,
                     drape_arena *arena, drape_lab_def *def)
@@ -77,15 +90,16 @@ static int make_def(const cli_lab_request *request, int default_jobs, double def
     const char *slash = strrchr(command->operand, '/'), *name = slash ? slash + 1 : command->operand,
                *dot = strrchr(name, '.');
     const size_t room = strlen(name) + strlen(command->verb) + 2;
-    char *text = drape_arena_text(arena, request->integrators ? request->integrators : ""), *rest;
-    const char **integrators = drape_arena_take(arena, text ? strlen(text) + 1 : 1, sizeof *integrators);
+    const char **integrators = NULL, **results = NULL;
     char *folder = drape_arena_take(arena, room, 1);
     drape_lab_setting *settings = drape_arena_take(arena, command->setting_count, sizeof *settings);
     if (drape_arena_status(arena))
         return cli_misuse(command->verb, "out of memory");
     drape_lab_def_init(def, sizeof *def);
-    for (char *word = strtok_r(text, ",", &rest); word; word = strtok_r(NULL, ",", &rest))
-        integrators[def->integrator_count++] = word;
+    def->integrator_count = split(arena, request->integrators, &integrators);
+    def->result_count = split(arena, request->results, &results);
+    if (drape_arena_status(arena))
+        return cli_misuse(command->verb, "out of memory");
     for (size_t i = 0; i < command->setting_count; i++)
         settings[i] = (drape_lab_setting){command->settings[i].pointer, command->settings[i].value};
     /* scenes/flag.json, tradeoff -> flag.tradeoff */
@@ -97,6 +111,8 @@ static int make_def(const cli_lab_request *request, int default_jobs, double def
     def->settings = settings;
     def->setting_count = command->setting_count;
     def->integrators = integrators;
+    def->results = results;
+    def->plan = request->plan;
     def->axes = request->axes.items;
     def->axis_count = request->axes.count;
     def->space = request->space;

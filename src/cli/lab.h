@@ -7,9 +7,9 @@
 /* The command line of an experiment; each verb has options for the members that it uses. */
 typedef struct cli_lab_request {
     cli_command command;
-    const char *out, *shard, *integrators, *levels, *budget;
+    const char *out, *shard, *integrators, *levels, *budget, *results;
     cli_texts axes;
-    int jobs, repeats; /* 0: not given */
+    int jobs, repeats, plan; /* 0: not given */
     bool space;
     double case_seconds, strain_limit; /* 0: not given */
 } cli_lab_request;
@@ -29,6 +29,9 @@ typedef struct cli_lab_request {
         CLI_LAB_OPTION("jobs", CLI_NUMBER, "N", "number of cases at a time, each in a thread", jobs, 256),   \
         CLI_LAB_OPTION("case-seconds", CLI_REAL, "S", "CPU time after which a case is stopped (default 30)", \
                        case_seconds, 0),                                                                     \
+        CLI_LAB_OPTION("plan", CLI_NUMBER, "N",                                                              \
+                       "run only N cases, spread over all, and say what all take: time, memory, disk", plan, \
+                       1000000),                                                                             \
         CLI_LAB_OPTION("shard", CLI_TEXT, "I/N",                                                             \
                        "run only part I of N of the cases; `drape merge` merges the parts", shard, 0)
 

@@ -235,7 +235,7 @@ static void write_attempt(drape_recorder *r, const drape_attempt *attempt)
 {
     drape_energy energy = drape_sim_energy(r->sim);
     r->moved = r->moved || attempt->accepted;
-    note(r, drape_steps_write(&r->steps, attempt, &energy));
+    note(r, drape_steps_write(&r->steps, attempt, &energy, &r->sim->events));
 }
 
 static void write_due_checkpoint(drape_recorder *r)

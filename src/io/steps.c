@@ -13,7 +13,7 @@
 static const char columns[] = "attempt,t,h,accepted,status,reason,iterations,residual,tolerance,"
                               "kinetic,elastic,gravity,contact,dissipated,numerical,"
                               "worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit,"
-                              "error\n";
+                              "error,events\n";
 
 drape_status drape_steps_open(drape_context *ctx, drape_folder *folder, bool resumes, drape_file *file)
 {
@@ -54,7 +54,25 @@ static void put_worst(drape_file *file, const drape_diagnostic *diagnostic)
     drape_csv_put_number(file, diagnostic->limit);
 }
 
-drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, const drape_energy *energy)
+/* "heavy@0.12126511814700001;down@0.239389200361": the events that are reported after the attempt. */
+static void put_events(drape_file *file, const drape_event_set *events)
+{
+    drape_file_put_text(file, ",");
+    if (!events || events->reported >= events->pending_count)
+        return;
+    drape_file_put_text(file, "\"");
+    for (int32_t i = events->reported; i < events->pending_count; i++) {
+        const drape_pending_root *p = &events->pending[i];
+        drape_file_put_text(file, i > events->reported ? ";" : "");
+        for (const char *c = events->watches[p->event].event->name; *c; c++)
+            drape_file_put_text(file, *c == '"' ? "\"\"" : (char[]){*c, 0});
+        drape_file_print(file, "@%.17g", p->root.t);
+    }
+    drape_file_put_text(file, "\"");
+}
+
+drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, const drape_energy *energy,
+                               const drape_event_set *events)
 {
     drape_file_print(file, "%" PRId64, attempt->index);
     drape_csv_put_number(file, attempt->t);
@@ -68,6 +86,7 @@ drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, c
     put_energy(file, energy);
     put_worst(file, &attempt->diagnostic);
     drape_csv_put_number(file, attempt->error);
+    put_events(file, events);
     drape_file_put_text(file, "\n");
     return drape_file_keep(file);
 }

@@ -3,6 +3,10 @@
  * between the ends of successive runs fall like a power of it, whose exponent is the order: straight lines in
  * logarithms. In time dt is halved (integrators that choose their steps: rtol is cut to a tenth), in space
  * the edges of every grid, with positions compared at the nodes of the coarsest mesh.
+ *
+ * A line is fitted through refinements of one order only: from the finest on, as long as the orders between
+ * neighbours agree. Over rtol the slope is that of the error control, 1 where the error is proportional to
+ * the tolerance; a method that chooses its order takes another one at another rtol, and no line is fitted.
  */
 #include "base/param.h"
 #include "lab/figure.h"
@@ -22,6 +26,7 @@
 #define MAX_LEVELS   12
 #define OWN          "dt, with own substeps" /* the knob of an integrator that dt does not refine */
 #define ROUNDING     1e-12                   /* [m]: smaller distances are rounding */
+#define MIN_FITTED   3                       /* refinements that show that there is one order */
 
 /* ---- The cases ---- */
 
@@ -147,11 +152,39 @@ typedef struct sequence {
     const char *series, *integrator, *knob;
     double value[MAX_LEVELS], moved[MAX_LEVELS]; /* of the coarser of two, [m] */
     size_t count;
+    size_t fitted; /* the last so many of them, by the line */
     int failed;
-    int64_t rejected; /* steps that the controller cut: there dt was not that of the case */
-    bool unrefined;   /* the knob does not refine it: there is no order */
-    lab_line line;
+    int64_t rejected;   /* steps that the controller cut: there dt was not that of the case */
+    size_t cut;         /* the last refinement with such steps, counted from 1; 0: none */
+    bool unrefined;     /* the knob does not refine it: there is no order */
+    bool chooses_order; /* with the knob */
+    lab_line line;      /* NaN: fewer than 3 refinements have one order */
 } sequence;
+
+static bool is_tolerance(const sequence *s)
+{
+    return strcmp(s->knob, "rtol") == 0;
+}
+
+/* Fits a line through the finest refinements of one order. */
+static void fit(sequence *s)
+{
+    double x[MAX_LEVELS], y[MAX_LEVELS];
+    size_t count = 0;
+    s->line = (lab_line){NAN, NAN, NAN, NAN};
+    if (s->unrefined || s->chooses_order)
+        return;
+    for (size_t i = s->count; i-- > s->cut; count++) {
+        x[count] = s->value[i];
+        y[count] = s->moved[i];
+    }
+    /* Error control scatters too much for orders between neighbours. */
+    s->fitted = is_tolerance(s) ? count : lab_same_order(x, y, count);
+    if (s->fitted >= MIN_FITTED || (s->fitted == 2 && s->count == 2)) /* of two at all: without confidence */
+        s->line = lab_fit_power(x, y, s->fitted);
+    else
+        s->fitted = 0;
+}
 
 static double distance(const json_t *a, const json_t *b)
 {
@@ -163,6 +196,12 @@ static double distance(const json_t *a, const json_t *b)
         sum += d * d;
     }
     return size > 0 && size == json_array_size(y) ? sqrt(sum / ((double)size / 3)) : NAN;
+}
+
+static bool chooses_order(const drape_integrator_ops *integrator)
+{
+    return integrator &&
+           drape_param_find(integrator->entry.params, integrator->entry.param_count, "max_order") >= 0;
 }
 
 static void read_sequence(const lab *l, size_t first, sequence *s)
@@ -181,11 +220,14 @@ static void read_sequence(const lab *l, size_t first, sequence *s)
         if (moved > ROUNDING && s->count < MAX_LEVELS) {
             s->value[s->count] = lab_tag_number(before, "value");
             s->moved[s->count++] = moved;
+            if (lab_number(before, "rejected") > 0 || lab_number(r, "rejected") > 0)
+                s->cut = is_tolerance(s) ? 0 : s->count;
         }
         before = good ? r : NULL;
     }
     s->unrefined = strcmp(s->knob, OWN) == 0;
-    s->line = lab_fit_power(s->value, s->moved, s->count);
+    s->chooses_order = is_tolerance(s) && chooses_order(lab_find_integrator(s->integrator));
+    fit(s);
 }
 
 /* The order between a refinement and the one before. */
@@ -194,19 +236,58 @@ static double local_order(const sequence *s, size_t i)
     return log(s->moved[i - 1] / s->moved[i]) / log(s->value[i - 1] / s->value[i]);
 }
 
+/* The range of the orders between neighbours. */
+static void order_range(const sequence *s, double *low, double *high)
+{
+    *low = INFINITY;
+    *high = -INFINITY;
+    for (size_t i = 1; i < s->count; i++) {
+        *low = fmin(*low, local_order(s, i));
+        *high = fmax(*high, local_order(s, i));
+    }
+}
+
+/* Why there is no line. */
+static void report_no_order(const sequence *s, FILE *out)
+{
+    double low, high;
+    order_range(s, &low, &high);
+    fprintf(out, "no order, as ");
+    if (s->unrefined)
+        fprintf(out, "it chooses its own substeps and dt does not refine them; a value of "
+                     "/integrator/substeps fixes them");
+    else if (s->count < 2)
+        fprintf(out, "too few of its refinements moved the end");
+    else if (s->chooses_order)
+        fprintf(
+            out,
+            "it chooses its order, and another one at another rtol; a tenth of rtol divides the change by "
+            "%.2g to %.2g",
+            pow(10, low), pow(10, high));
+    else
+        fprintf(
+            out,
+            "it changes from refinement to refinement, between %.2g and %.2g, %.2g at the last: the order "
+            "is not determined; try more levels, or a shorter duration, before small differences grow",
+            low, high, local_order(s, s->count - 1));
+}
+
 static void report_order(const sequence *s, FILE *out)
 {
     fprintf(out, "%s: ", s->series);
-    if (s->unrefined)
-        fprintf(out, "no order, as it chooses its own substeps and dt does not refine them; "
-                     "a value of /integrator/substeps fixes them");
-    else if (isnan(s->line.slope))
-        fprintf(out, "no order, as too few of its refinements moved the end");
+    if (isnan(s->line.slope))
+        report_no_order(s, out);
     else {
-        fprintf(out, "order %.3g in %s", s->line.slope, s->knob);
+        if (is_tolerance(s))
+            fprintf(out, "change proportional to %s^%.3g", s->knob, s->line.slope);
+        else
+            fprintf(out, "order %.3g in %s", s->line.slope, s->knob);
         if (!isnan(s->line.low))
             fprintf(out, " (95 %% confidence %.3g to %.3g)", s->line.low, s->line.high);
         fprintf(out, ", %.3g at the last refinement", local_order(s, s->count - 1));
+        if (s->fitted < s->count)
+            fprintf(out, "; of the last %zu of %zu refinements, as the order of the others is another one",
+                    s->fitted, s->count);
         if (s->line.low <= 0)
             fprintf(out, ": not wholly above 0, so the order is not determined; try more levels, or a "
                          "shorter duration, before small differences grow");
@@ -230,15 +311,25 @@ static size_t count_before(const sequence *sequences, size_t k)
     return count;
 }
 
-static void draw_sequence(lab_figure *f, const sequence *s, size_t variant)
+/* The refinements that the line is fitted through are filled markers, or all, if there is none; others are
+ * open. Returns whether there are others. */
+static bool draw_sequence(lab_figure *f, const sequence *s, size_t variant)
 {
     char text[96];
-    const int block = lab_figure_data(f);
-    for (size_t i = 0; i < s->count; i++)
-        fprintf(f->script, "%.9g %.9g\n", s->value[i], s->moved[i]);
-    lab_figure_data_end(f);
-    snprintf(text, sizeof text, isnan(s->line.slope) ? "%s" : "%s (%.2f)", s->series, s->line.slope);
-    lab_figure_curve(f, block, lab_style_of(s->integrator, variant), text);
+    const lab_style style = lab_style_of(s->integrator, variant), open = lab_style_of(s->integrator, 1);
+    const size_t first = s->fitted ? s->count - s->fitted : 0;
+    for (int fitted = 0; fitted < 2; fitted++) {
+        const int block = lab_figure_data(f);
+        for (size_t i = fitted ? first : 0; i < (fitted ? s->count : first); i++)
+            fprintf(f->script, "%.9g %.9g\n", s->value[i], s->moved[i]);
+        lab_figure_data_end(f);
+        snprintf(text, sizeof text, isnan(s->line.slope) ? "%s" : "%s (%.2f)", s->series, s->line.slope);
+        if (fitted)
+            lab_figure_curve(f, block, style, text);
+        else if (first > 0)
+            lab_figure_curve(f, block, (lab_style){style.colour, 0, open.point}, NULL);
+    }
+    return first > 0;
 }
 
 /* The sequences over one knob. */
@@ -247,6 +338,7 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
     lab_figure f;
     char name[64];
     size_t points = 0;
+    bool others = false;
     double *xy = drape_arena_take(&l->arena, 2 * MAX_LEVELS * count, sizeof *xy);
     snprintf(name, sizeof name, "converge_%s", knob);
     drape_status status = xy ? lab_figure_begin(l, &f, name) : DRAPE_E_MEMORY;
@@ -256,7 +348,7 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
         const sequence *s = &sequences[k];
         if (s->count == 0 || strcmp(s->knob, knob) != 0)
             continue;
-        draw_sequence(&f, s, count_before(sequences, k));
+        others |= draw_sequence(&f, s, count_before(sequences, k));
         for (size_t i = 0; i < s->count; i++, points++) {
             xy[2 * points] = s->value[i];
             xy[2 * points + 1] = s->moved[i];
@@ -264,10 +356,14 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
     }
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", label);
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "change to the next level [m]");
+    if (others)
+        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, 6}, "not fitted");
     if (points > 0)
-        lab_figure_fit(&f, xy, points, strcmp(knob, "rtol") != 0);
+        lab_figure_fit(&f, xy, points, strcmp(knob, "rtol") != 0 ? 2 : 1);
     return lab_figure_end(
-        l, &f, "How far the end moves with each refinement (root mean square); in brackets the order");
+        l, &f,
+        "How far the end moves with each refinement (root mean square); in brackets the slope of a line "
+        "through the filled markers");
 }
 
 static void write_table(lab *l, const sequence *s)

@@ -5,6 +5,7 @@
 #include "base/def.h"
 #include "base/hash.h"
 #include "base/param.h"
+#include "lab/plan.h"
 #include "lab/run.h"
 #include "lab/sweep.h"
 #include "lab/text.h"
@@ -225,6 +226,27 @@ static drape_status parse_about(lab *l, const char *folder, json_t **about)
                                fault.column, fault.text);
 }
 
+/* Whether the cases are the same: what the figures show may differ. */
+static bool is_same(const json_t *a, const json_t *b)
+{
+    json_t *x = json_copy((json_t *)(uintptr_t)a), *y = json_copy((json_t *)(uintptr_t)b);
+    json_object_del(x, "results");
+    json_object_del(y, "results");
+    const bool same = json_equal(x, y);
+    json_decref(x);
+    json_decref(y);
+    return same;
+}
+
+static drape_status write_about(lab *l)
+{
+    char *text = json_dumps(l->about, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    drape_status status = text ? lab_write_text(l, ABOUT, text, strlen(text))
+                               : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for " ABOUT);
+    free(text);
+    return status;
+}
+
 static bool ends_in(const char *name, const char *ending)
 {
     const size_t length = strlen(name), end = strlen(ending);
@@ -238,7 +260,8 @@ static bool writes(const void *user, const char *name)
     lab_cases_name(user, cases);
     return strcmp(name, ABOUT) == 0 || strcmp(name, cases) == 0 || strcmp(name, "results.csv") == 0 ||
            strcmp(name, "report.html") == 0 || strncmp(name, "reference", 9) == 0 || ends_in(name, ".svg") ||
-           ends_in(name, ".pdf") || ends_in(name, ".gp") || strcmp(name, "tables.md") == 0;
+           ends_in(name, ".pdf") || ends_in(name, ".gp") || strcmp(name, "tables.md") == 0 ||
+           strcmp(name, "plan.json") == 0;
 }
 
 /* Shards may write into one folder at the same time. */
@@ -266,23 +289,21 @@ static drape_status claim_folder(lab *l)
     if (access(path, F_OK) == 0) {
         json_t *there = NULL;
         status = parse_about(l, l->folder, &there);
-        if (!status && !json_equal(there, l->about))
+        if (!status && !is_same(there, l->about))
             status = drape_fail(l->ctx, DRAPE_E_ARGUMENT,
                                 "\"%.400s\" holds another experiment, or this one of another scene or "
                                 "version; name another folder, or remove it",
                                 l->folder);
+        const bool changed = !status && !json_equal(there, l->about);
         json_decref(there);
         l->input_is_good = !status;
-        return status ? status : drape_folder_begin(l->out, NULL, NULL);
+        if (!status)
+            status = drape_folder_begin(l->out, NULL, NULL);
+        return status || !changed ? status : write_about(l);
     }
     l->claimed = true;
-    char *text = json_dumps(l->about, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
-    status = text ? drape_folder_begin(l->out, NULL, NULL)
-                  : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for " ABOUT);
-    if (!status)
-        status = lab_write_text(l, ABOUT, text, strlen(text));
-    free(text);
-    return status;
+    status = drape_folder_begin(l->out, NULL, NULL);
+    return status ? status : write_about(l);
 }
 
 static bool is_about(const void *user, const char *name)
@@ -373,6 +394,8 @@ static drape_status report(lab *l)
             (long long)outcome->done, (long long)outcome->cases, (long long)outcome->failed,
             (long long)outcome->rejected);
     drape_status status = shard ? DRAPE_OK : lab_write_csv(l);
+    if (!status && l->def->plan > 0)
+        return lab_write_plan(l);
     outcome->left_out = status || shard ? 0 : list_left_out(l);
     if (status || shard || outcome->done + outcome->left_out < outcome->cases) {
         fprintf(l->summary,
@@ -432,6 +455,9 @@ static drape_status find(lab *l, const char *name)
     if (!status && l->def->budget_seconds > 0 && !l->experiment->partial)
         status = drape_fail(l->ctx, DRAPE_E_ARGUMENT, "budget_seconds = %g: %s needs all of its cases",
                             l->def->budget_seconds, name);
+    if (!status && l->def->result_count > 0 && !l->experiment->shows_results)
+        status = drape_fail(l->ctx, DRAPE_E_ARGUMENT, "results: the figures of %s show the same ones always",
+                            name);
     return status;
 }
 
@@ -449,6 +475,8 @@ static drape_status check_def(drape_context *ctx, const drape_lab_def *def)
     if (!(def->budget_seconds >= 0))
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "budget_seconds = %g; must be 0 (none) or more",
                           def->budget_seconds);
+    if (def->plan < 0)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "plan = %d; must be 0 (none) or more", def->plan);
     if (!(def->case_seconds > 0) || def->repeats < 1 || !(def->strain_limit > 0))
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
                           "case_seconds, repeats and strain_limit must be above 0: %g, %d, %g",
@@ -491,7 +519,7 @@ static drape_status read_folders(lab *l, const char *const *folders, size_t coun
     for (size_t i = 0; !status && i < count; i++) {
         json_t *about = NULL;
         status = parse_about(l, folders[i], &about);
-        if (!status && !json_equal(about, l->about))
+        if (!status && !is_same(about, l->about))
             status =
                 drape_fail(l->ctx, DRAPE_E_ARGUMENT, "\"%.300s\" and \"%.300s\" hold different experiments",
                            folders[0], folders[i]);

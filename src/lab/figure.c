@@ -28,12 +28,17 @@ extern char **environ;
 #define LINE        3.6 /* of the legend */
 #define SAMPLE      7.0 /* of a line or swatch in the legend, with the space after it */
 #define GAP         3.0 /* between columns of the legend */
+#define BAR         2.6 /* height of the scale of colours */
 #define THICK       1.2 /* [pixel] of curves */
 
 /* ---- Styles ---- */
 
-/* Okabe and Ito 2008, without yellow, which is too pale for lines on white. */
-static const int colours[] = {LAB_BLUE, LAB_RED, 0x009e73, LAB_BLACK, LAB_ORANGE, 0x56b4e9, LAB_PURPLE};
+/* Okabe and Ito 2008, without yellow, which is too pale for lines on white, and five colours found by a
+ * search for those that differ most from these, from each other, from white and from the grey of reference
+ * lines: by 26 or more in CIELAB, also as people with deuteranopia and protanopia see them (Machado et al.
+ * 2009). */
+static const int colours[] = {LAB_BLUE,   LAB_RED,  0x009e73, LAB_BLACK, LAB_ORANGE, 0x56b4e9,
+                              LAB_PURPLE, 0x440099, 0x663311, 0x88bb66,  0x225555,   0x2255ee};
 static const int points[] = {7, 5, 9, 13, 11, 15, 2}; /* gnuplot's filled markers; one less: the open one */
 
 lab_style lab_style_of(const char *integrator, size_t variant)
@@ -43,8 +48,15 @@ lab_style lab_style_of(const char *integrator, size_t variant)
     for (int i = 0; drape_integrators[i] && strcmp(drape_integrators[i]->entry.name, integrator) != 0; i++)
         k += !drape_integrators[i]->steady_state;
     return (lab_style){colours[k % colour_count], 1 + (int)variant % 5,
-                       points[(k + k / colour_count) % point_count] - (variant > 0)};
+                       points[(k + k / point_count) % point_count] - (variant > 0)};
 }
+
+/* From dark blue to the yellow of Okabe and Ito: lightness rises evenly, by 9 of CIELAB a colour, so that
+ * the order of values is seen without hues and in print without colours, too. The colours of verdicts that
+ * stand on the same map (orange, red, dark grey) differ from all of it by more than 15, for people with
+ * deuteranopia and protanopia as well. */
+static const int scale_colours[] = {0x102070, 0x1d3b77, 0x2e557b, 0x446e7d, 0x5e877b,
+                                    0x7d9f75, 0x9fb76b, 0xc5ce5c, 0xf0e442};
 
 /* ---- Text ---- */
 
@@ -145,7 +157,7 @@ static double ticks_width(const lab_axis *a)
     return widest;
 }
 
-void lab_figure_fit(lab_figure *f, const double *xy, size_t count, bool slopes)
+void lab_figure_fit(lab_figure *f, const double *xy, size_t count, int orders)
 {
     lab_axis *x = &f->axes[0], *y = &f->axes[1];
     const double margin = 0.04;
@@ -164,7 +176,7 @@ void lab_figure_fit(lab_figure *f, const double *xy, size_t count, bool slopes)
         a->from /= widen;
         a->to *= widen;
     }
-    if (!slopes)
+    if (orders == 0)
         return;
     /* The lines of orders 1 and 2 begin at (left, low); their ends, and the numbers at these, are 4 mm
      * apart. */
@@ -174,14 +186,17 @@ void lab_figure_fit(lab_figure *f, const double *xy, size_t count, bool slopes)
     for (size_t i = 0; i < count; i++) /* a point to the left counts, too: from there a line may come down */
         top = xy[2 * i] > left / 2.5 ? fmin(top, xy[2 * i + 1]) : top;
     const double space = pow(10, 3.5 / f->plot_height * ends_ratio(y));
-    const double low = top / space * pow(10, -2 * span);
+    const double low = top / space * pow(10, -orders * span);
     y->from = fmin(y->from, low / space);
-    for (int order = 1; order <= 2; order++) {
+    for (int order = 1; order <= orders; order++) {
         const double end = low * pow(10, order * span);
         const int block = lab_figure_data(f);
         fprintf(f->script, "%.9g %.9g\n%.9g %.9g\n", left, low, right, end);
         lab_figure_data_end(f);
-        lab_figure_curve(f, block, (lab_style){LAB_GREY, 2, 0}, order == 1 ? "slopes 1 and 2" : NULL);
+        lab_figure_curve(f, block, (lab_style){LAB_GREY, 2, 0},
+                         order > 1     ? NULL
+                         : orders == 1 ? "slope 1"
+                                       : "slopes 1 and 2");
         fprintf(f->script, "set label '%d' at first %.9g,%.9g offset 0.4,0 left\n", order, right, end);
     }
 }
@@ -228,16 +243,25 @@ static void add_entry(lab_figure *f, const lab_entry *entry)
  * first: each kind of dashes has a width of its own. */
 static void put_style(FILE *out, lab_style s)
 {
-    fprintf(out, "lw %.2f dt %d lc rgb '#%06x'", THICK + 0.01 * (s.dash - 1), s.dash, (unsigned)s.colour);
+    if (s.dash == 0)
+        fprintf(out, "lw %.2f lc rgb '#%06x'", THICK, (unsigned)s.colour);
+    else
+        fprintf(out, "lw %.2f dt %d lc rgb '#%06x'", THICK + 0.01 * (s.dash - 1), s.dash, (unsigned)s.colour);
+}
+
+/* Markers without a line are larger: nothing else shows where they are. */
+static double point_size(lab_style s)
+{
+    return s.dash ? 0.35 : 0.5;
 }
 
 void lab_figure_curve(lab_figure *f, int block, lab_style style, const char *text)
 {
     add_element(f, block);
-    fputs(style.point ? "with linespoints " : "with lines ", f->plot);
+    fputs(style.dash == 0 ? "with points " : style.point ? "with linespoints " : "with lines ", f->plot);
     put_style(f->plot, style);
     if (style.point)
-        fprintf(f->plot, " pt %d ps 0.35", style.point);
+        fprintf(f->plot, " pt %d ps %.2f", style.point, point_size(style));
     if (!text)
         return;
     lab_entry entry = {.style = style};
@@ -251,9 +275,29 @@ void lab_figure_boxes(lab_figure *f, int block)
     fputs("using 1:2:3:4:5:6:7 with boxxyerror fs solid 1 noborder lc rgb variable", f->plot);
 }
 
-void lab_figure_swatch(lab_figure *f, int colour, const char *text)
+void lab_figure_values(lab_figure *f, int block)
 {
-    lab_entry entry = {.style = {.colour = colour}, .swatch = true};
+    add_element(f, block);
+    fputs("using 1:2:3:4:5:6:7 with boxxyerror fs solid 1 noborder lc palette", f->plot);
+}
+
+void lab_figure_hatch(lab_figure *f, int block, int colour)
+{
+    add_element(f, block);
+    fprintf(f->plot, "using 1:2:3:4:5:6 with boxxyerror fs transparent pattern 5 noborder lc rgb '#%06x'",
+            (unsigned)colour);
+}
+
+void lab_figure_marker(lab_figure *f, lab_style style, const char *text)
+{
+    lab_entry entry = {.style = style};
+    snprintf(entry.text, sizeof entry.text, "%s", text);
+    add_entry(f, &entry);
+}
+
+void lab_figure_swatch(lab_figure *f, int colour, bool hatched, const char *text)
+{
+    lab_entry entry = {.style = {.colour = colour}, .swatch = true, .hatched = hatched};
     snprintf(entry.text, sizeof entry.text, "%s", text);
     add_entry(f, &entry);
 }
@@ -263,9 +307,16 @@ void lab_figure_swatch(lab_figure *f, int colour, const char *text)
 /* The frame and the legend below it: as many columns as fit. */
 typedef struct layout {
     double left, bottom, height; /* of the frame: its corner; of the whole */
+    double scale;                /* bottom of the bar of the scale */
+    double legend;               /* height of the legend */
     double column;               /* width */
     int columns, rows;
 } layout;
+
+static bool has_scale(const lab_figure *f)
+{
+    return f->scale.to > f->scale.from;
+}
 
 static layout lay_out(const lab_figure *f)
 {
@@ -276,7 +327,10 @@ static layout lay_out(const lab_figure *f)
     at.columns = (int)fmax(1, fmin(f->entries, floor((WIDTH - 2 + GAP) / at.column)));
     at.rows = (f->entries + at.columns - 1) / at.columns;
     at.left = (*f->axes[1].label ? EM + 1.5 : 1) + ticks_width(&f->axes[1]) + TICK + 1;
-    at.bottom = TICK + 1.5 * EM + (*f->axes[0].label ? EM + 1 : 0) + LINE * at.rows + 1;
+    at.legend = LINE * at.rows + 1;
+    at.scale = at.legend + EM + 1 + 1.5 * EM + TICK;
+    at.bottom =
+        TICK + 1.5 * EM + (*f->axes[0].label ? EM + 1 : 0) + (has_scale(f) ? at.scale + BAR : at.legend);
     at.height = at.bottom + f->plot_height + TOP + (*f->title ? TITLE : 0);
     return at;
 }
@@ -288,6 +342,14 @@ static void put_label(FILE *out, const layout *at, double x, double y, const cha
     fprintf(out, " at screen %.5f,%.5f %s noenhanced\n", x / WIDTH, y / at->height, how);
 }
 
+static void put_swatch(FILE *out, double left, double bottom, double right, double top, const char *fill,
+                       int colour)
+{
+    fprintf(out,
+            "set object rectangle from screen %.5f,%.5f to screen %.5f,%.5f fs %s noborder fc rgb '#%06x'\n",
+            left, bottom, right, top, fill, (unsigned)colour);
+}
+
 static void put_legend(const lab_figure *f, const layout *at, FILE *out)
 {
     for (int i = 0; i < f->entries; i++) {
@@ -295,22 +357,40 @@ static void put_legend(const lab_figure *f, const layout *at, FILE *out)
         const double x = 1 + at->column * (i / at->rows),
                      y = 1 + LINE * (at->rows - 1 - i % at->rows) + 0.5 * LINE;
         const double from = x / WIDTH, to = (x + SAMPLE - 1.2) / WIDTH, middle = y / at->height;
-        if (e->swatch)
-            fprintf(out,
-                    "set object rectangle from screen %.5f,%.5f to screen %.5f,%.5f fs solid 1 noborder fc "
-                    "rgb '#%06x'\n",
-                    from, (y - 0.9) / at->height, to, (y + 0.9) / at->height, (unsigned)e->style.colour);
-        else {
+        if (e->swatch) {
+            put_swatch(out, from, (y - 0.9) / at->height, to, (y + 0.9) / at->height, "solid 1",
+                       e->style.colour);
+            if (e->hatched)
+                put_swatch(out, from, (y - 0.9) / at->height, to, (y + 0.9) / at->height,
+                           "transparent pattern 5", LAB_BLACK);
+        } else if (e->style.dash) {
             fprintf(out, "set arrow from screen %.5f,%.5f to screen %.5f,%.5f nohead ", from, middle, to,
                     middle);
             put_style(out, e->style);
             fputc('\n', out);
         }
         if (!e->swatch && e->style.point)
-            fprintf(out, "set label '' at screen %.5f,%.5f point pt %d ps 0.35 lw %.2g lc rgb '#%06x'\n",
-                    (from + to) / 2, middle, e->style.point, THICK, (unsigned)e->style.colour);
+            fprintf(out, "set label '' at screen %.5f,%.5f point pt %d ps %.2f lw %.2g lc rgb '#%06x'\n",
+                    (from + to) / 2, middle, e->style.point, point_size(e->style), THICK,
+                    (unsigned)e->style.colour);
         put_label(out, at, x + SAMPLE, y, e->text, "left");
     }
+}
+
+/* The bar of colours, with numbers and label below it. */
+static void put_scale(const lab_figure *f, const layout *at, FILE *out)
+{
+    const int count = sizeof scale_colours / sizeof *scale_colours;
+    fputs("set palette defined (", out);
+    for (int i = 0; i < count; i++)
+        fprintf(out, "%s%d '#%06x'", i ? ", " : "", i, (unsigned)scale_colours[i]);
+    fprintf(out,
+            ") maxcolors %d\nset colorbox horizontal user origin screen %.5f,%.5f size screen %.5f,%.5f\n",
+            LAB_SHADES, at->left / WIDTH, at->scale / at->height, 1 - (RIGHT + at->left) / WIDTH,
+            BAR / at->height);
+    put_axis(&f->scale, "cb", out);
+    fputs("set cbtics scale 0.5,0.25 offset 0,0.3\n", out);
+    put_label(out, at, 0.5 * (at->left + WIDTH - RIGHT), at->legend + 0.6 * EM, f->scale.label, "center");
 }
 
 static void put_script(const lab_figure *f, FILE *out)
@@ -325,8 +405,10 @@ static void put_script(const lab_figure *f, FILE *out)
             f->name, at.left / WIDTH, 1 - RIGHT / WIDTH, at.bottom / at.height, top / at.height);
     put_axis(&f->axes[0], "x", out);
     put_axis(&f->axes[1], "y", out);
-    put_label(out, &at, 0.5 * (at.left + WIDTH - RIGHT), LINE * at.rows + 1 + 0.6 * EM, f->axes[0].label,
-              "center");
+    put_label(out, &at, 0.5 * (at.left + WIDTH - RIGHT),
+              (has_scale(f) ? at.scale + BAR : at.legend) + 0.6 * EM, f->axes[0].label, "center");
+    if (has_scale(f))
+        put_scale(f, &at, out);
     put_label(out, &at, 0.7 * EM, 0.5 * (at.bottom + top), f->axes[1].label, "center rotate by 90");
     put_label(out, &at, 0.5 * (at.left + WIDTH - RIGHT), top + 0.5 * TITLE, f->title, "center");
     put_legend(f, &at, out);

@@ -3,8 +3,8 @@
  * as SVG and as PDF with its font embedded. gnuplot draws them; where text stands is computed here,
  * from the widths of its characters, so that legends and labels touch nothing.
  *
- * Colours are those of Okabe and Ito, Color Universal Design (2008), which people with any form of
- * colour blindness tell apart. An integrator has the same colour and marker in every figure.
+ * Colours are those of Okabe and Ito, Color Universal Design (2008), and five more, which people with any
+ * form of colour blindness tell apart. An integrator has the same colour and marker in every figure.
  */
 #ifndef DRAPE_LAB_FIGURE_H
 #define DRAPE_LAB_FIGURE_H
@@ -12,6 +12,7 @@
 #include "lab/lab.h"
 
 #define LAB_MAX_ENTRIES 64
+#define LAB_SHADES      64 /* different colours of a scale */
 
 /* Colours that are not those of an integrator. */
 #define LAB_BLACK  0x000000
@@ -26,7 +27,7 @@
 
 typedef struct lab_style {
     int colour;
-    int dash;  /* 1: solid */
+    int dash;  /* 1: solid; 0: no line, markers only */
     int point; /* a marker of gnuplot's; 0: none */
 } lab_style;
 
@@ -46,7 +47,8 @@ typedef struct lab_axis {
 typedef struct lab_entry {
     char text[96];
     lab_style style;
-    bool swatch; /* an area; otherwise a line with a marker */
+    bool swatch;  /* an area; otherwise a line with a marker */
+    bool hatched; /* the area */
 } lab_entry;
 
 /* A figure while it is made. */
@@ -54,6 +56,7 @@ typedef struct lab_figure {
     char name[96];
     char title[160]; /* "": none */
     lab_axis axes[2];
+    lab_axis scale;         /* of the colours of lab_figure_values, drawn below the frame; to <= from: none */
     double plot_height;     /* [mm] of the frame; default 52 */
     FILE *script;           /* data: between lab_figure_data and lab_figure_data_end a point a line */
     FILE *plot;             /* the elements of the plot */
@@ -77,12 +80,22 @@ void lab_figure_curve(lab_figure *f, int block, lab_style style, const char *tex
 /* Boxes of a block: x y left right bottom top colour. */
 void lab_figure_boxes(lab_figure *f, int block);
 
-/* A swatch in the legend. */
-void lab_figure_swatch(lab_figure *f, int colour, const char *text);
+/* The same with a value of the scale in place of the colour: from dark blue to yellow. Values beyond the ends
+ * of the scale have the colours of these. */
+void lab_figure_values(lab_figure *f, int block);
 
-/* Widens logarithmic axes, on which the curves end, by a margin; slopes: makes room below the curves
- * (points: x, y in turn) and draws reference lines of orders 1 and 2 there. */
-void lab_figure_fit(lab_figure *f, const double *points, size_t count, bool slopes);
+/* Hatches boxes of a block, which may have any seventh column, with lines of that colour. */
+void lab_figure_hatch(lab_figure *f, int block, int colour);
+
+/* A marker in the legend, without a line. */
+void lab_figure_marker(lab_figure *f, lab_style style, const char *text);
+
+/* A swatch in the legend; hatched in black or plain. */
+void lab_figure_swatch(lab_figure *f, int colour, bool hatched, const char *text);
+
+/* Widens logarithmic axes, on which the curves end, by a margin; orders > 0: makes room below the curves
+ * (points: x, y in turn) and draws reference lines of slopes 1 to orders there, 2 at most. */
+void lab_figure_fit(lab_figure *f, const double *points, size_t count, int orders);
 
 /* Writes name.gp, has gnuplot make name.svg and name.pdf, and adds the figure with its caption to the
  * page. Without an element there is no figure. If gnuplot is missing or fails, only the summary says so.

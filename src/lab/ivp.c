@@ -16,7 +16,6 @@
 
 #define RESOLVED    10.0 /* times the reference's error: smaller errors cannot be distinguished from it */
 #define LARGEST     0.1  /* of the size: larger errors have no order */
-#define SAME_ORDER  0.1  /* by which orders between neighbours may differ from that of the finest two */
 #define BASE_METHOD "be"
 #define LEVELS      11 /* of dt */
 #define MAX_SERIES  64 /* of a scene */
@@ -406,24 +405,17 @@ static bool has_its_steps(const json_t *r)
 static size_t asymptotic_range(const series *s, double *dt, double *error)
 {
     size_t count = 0;
-    double order = NAN;
     for (size_t i = s->count; i-- > 0;) {
         const json_t *r = s->results[i];
-        const double e = resolved_error(r), at = lab_tag_number(r, "value");
+        const double e = resolved_error(r);
         if (isnan(e) && count == 0)
             continue;
         if (!(e < LARGEST) || !has_its_steps(r))
             break;
-        if (count > 0) {
-            const double here = log(e / error[count - 1]) / log(at / dt[count - 1]);
-            if (count > 1 && !(fabs(here - order) < SAME_ORDER))
-                break;
-            order = count > 1 ? order : here;
-        }
-        dt[count] = at;
+        dt[count] = lab_tag_number(r, "value");
         error[count++] = e;
     }
-    return count;
+    return lab_same_order(dt, error, count);
 }
 
 static void tabulate_orders(table *t)
@@ -596,7 +588,7 @@ static drape_status draw(lab *l, const json_t *about, const chart *c)
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->label);
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "error / size");
     if (count > 0)
-        lab_figure_fit(&f, xy, count, c->knob && strcmp(c->knob, "dt") == 0);
+        lab_figure_fit(&f, xy, count, !c->knob ? 0 : strcmp(c->knob, "dt") == 0 ? 2 : 1);
     horizon_text(about, horizon, sizeof horizon);
     snprintf(caption, sizeof caption,
              "%.60s: error, the largest of the times, of the RMS over the nodes, over %s. The error of the "

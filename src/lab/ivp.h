@@ -78,8 +78,9 @@ drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out
 drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out);
 
 /* Compares positions in an NPY file, (times x nodes x 3) float64 at the times of the reference, or with the
- * start before, with the reference, and prints their errors. Errors: DRAPE_E_FILE, DRAPE_E_PARSE. */
-drape_status lab_ivp_score(const lab_ivp *s, const char *path, FILE *out);
+ * start before, with the reference, and prints their errors, as text or as JSON. Errors: DRAPE_E_FILE,
+ * DRAPE_E_PARSE (another shape or type), DRAPE_E_MEMORY. */
+drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *out);
 
 /* Writes what another program needs into a folder: start.obj, nodes.csv, pins.csv, times.csv, scene.json,
  * reference.npy. Errors: DRAPE_E_FILE, DRAPE_E_ARGUMENT (the folder has files of others). */

@@ -1,6 +1,7 @@
 /* ivp_score.c: scenes of the test set for other programs: what they need, and how far their motion is from
  * the reference; see ivp.h. */
 #include "io/export.h"
+#include "io/json.h"
 #include "io/npy.h"
 #include "lab/ivp.h"
 #include "lab/lab.h"
@@ -12,66 +13,140 @@
 
 /* ---- Score ---- */
 
+/* Refuses an array of another kind or shape, and says which would be right. */
+static drape_status check_array(const lab_ivp *s, const char *path, const drape_npy *array)
+{
+    char shape[160];
+    const int32_t nodes = drape_model_node_count(s->model);
+    const int64_t times = (int64_t)s->time_count;
+    drape_npy_shape_text(array, shape, sizeof shape);
+    if (strcmp(array->type, "<f8") != 0)
+        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+                          "%.300s: its numbers are '%s'; they must be float64, '<f8': numpy's astype(float)",
+                          path, array->type);
+    if (array->fortran)
+        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+                          "%.300s: it is in Fortran order; it must be in C order: numpy's ascontiguousarray",
+                          path);
+    if (array->dims != 3 || array->shape[2] != 3 || array->shape[1] != nodes ||
+        (array->shape[0] != times && array->shape[0] != times + 1))
+        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+                          "%.300s: its shape is %s; it must be (%" PRId64 ", %" PRId32
+                          ", 3), frames x nodes x "
+                          "(x, y, z), a frame every %.9g s, or one more with the start",
+                          path, shape, times, nodes, s->interval);
+    return DRAPE_OK;
+}
+
 /* Frames of another program; the start may come before them. */
 static drape_status read_frames(const lab_ivp *s, const char *path, const double **x)
 {
     char *bytes;
-    size_t size, data = 0;
-    int64_t frames = 0;
-    int32_t nodes = 0;
-    const int32_t count = drape_model_node_count(s->model);
-    const int64_t times = (int64_t)s->time_count;
+    size_t size;
+    drape_npy array;
     drape_status status = lab_read_text(s->arena, NULL, path, &bytes, &size);
     if (status)
         return status;
-    if (!drape_npy_read_header(bytes, size, &frames, &nodes, &data))
+    if (!drape_npy_read(bytes, size, &array))
         return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
-                          "%.400s: not an array of float64, times x nodes x 3, C order (numpy.save)", path);
-    if (nodes != count || (frames != times && frames != times + 1))
+                          "%.400s: not an array as numpy.save writes it: its header cannot be read", path);
+    status = check_array(s, path, &array);
+    if (status)
+        return status;
+    const size_t frame = 24 * (size_t)array.shape[1], before = (size_t)array.shape[0] - s->time_count;
+    if (size != array.data + frame * (size_t)array.shape[0])
         return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
-                          "%.300s: its shape is (%" PRId64 ", %" PRId32 ", 3); it must be (%" PRId64
-                          ", %" PRId32 ", 3), a frame every %.9g s, or one more with the start",
-                          path, frames, nodes, times, count, s->interval);
-    const size_t frame = 24 * (size_t)nodes;
-    if (size != data + frame * (size_t)frames)
-        return drape_fail(s->arena->ctx, DRAPE_E_PARSE, "%.400s: its data are not as long as its header says",
-                          path);
+                          "%.400s: its data are not as long as its header says: %zu bytes instead of %zu",
+                          path, size - (size < array.data ? size : array.data),
+                          frame * (size_t)array.shape[0]);
     double *copy = drape_arena_take(s->arena, s->time_count, frame);
     if (!copy)
         return DRAPE_E_MEMORY;
-    memcpy(copy, bytes + data + frame * (size_t)(frames - times), frame * s->time_count);
+    memcpy(copy, bytes + array.data + frame * before, frame * s->time_count);
     drape_arena_release(s->arena, bytes);
     *x = copy;
     for (size_t i = 0; i < s->reference.size * s->time_count; i++)
         if (!isfinite(copy[i]))
-            return drape_fail(s->arena->ctx, DRAPE_E_PARSE, "%.400s: a position is not a finite number",
-                              path);
+            return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+                              "%.400s: frame %zu, node %zu: %g is not a finite number", path,
+                              i / s->reference.size + before, i % s->reference.size / 3, copy[i]);
     return DRAPE_OK;
 }
 
-drape_status lab_ivp_score(const lab_ivp *s, const char *path, FILE *out)
+/* The error of a frame, relative to the size, and the largest of a node. */
+static double frame_error(const lab_ivp *s, const double *x, size_t i, double *largest)
+{
+    const double *a = x + s->reference.size * i, *b = s->reference.x + s->reference.size * i;
+    double far = 0;
+    for (size_t k = 0; k < s->reference.size; k += 3)
+        far = fmax(far, hypot(hypot(a[k] - b[k], a[k + 1] - b[k + 1]), a[k + 2] - b[k + 2]));
+    *largest = far / s->size;
+    return lab_distance(s->model, a, b) / s->size;
+}
+
+/* {"scene", "scene_hash", "size_m", "times_s": [...], "error": [...], "error_largest": [...], "error_end",
+ * "error_max", "mescd", "reference_error", "resolved"} */
+static drape_status print_json(const lab_ivp *s, const double *x, json_t *score, FILE *out)
+{
+    json_t *errors = json_array(), *largest = json_array();
+    for (size_t i = 0; i < s->time_count; i++) {
+        double far;
+        errors = drape_json_append(errors, json_real(frame_error(s, x, i, &far)));
+        largest = drape_json_append(largest, json_real(far));
+    }
+    json_t *all = drape_json_with(json_object(), "scene", drape_json_text(s->name));
+    all = drape_json_with(all, "scene_hash", json_string(s->hash));
+    all = drape_json_with(all, "size_m", json_real(s->size));
+    all = drape_json_with(all, "times_s", drape_json_numbers(s->times, s->time_count));
+    all = drape_json_with(all, "error", errors);
+    all = drape_json_with(all, "error_largest", largest);
+    const bool failed = !all || json_object_update(all, score) ||
+                        json_dumpf(all, out, JSON_INDENT(2) | JSON_REAL_PRECISION(15));
+    fputs("\n", out);
+    json_decref(all);
+    return failed ? drape_fail(s->arena->ctx, DRAPE_E_MEMORY, "the score cannot be printed") : DRAPE_OK;
+}
+
+static void print_text(const lab_ivp *s, const double *x, const json_t *score, FILE *out)
+{
+    fprintf(out, "time_s,error,error_largest\n");
+    for (size_t i = 0; i < s->time_count; i++) {
+        double far;
+        const double error = frame_error(s, x, i, &far);
+        fprintf(out, "%.9g,%.6g,%.6g\n", s->times[i], error, far);
+    }
+    fprintf(out, "error_end %.6g\nerror_max %.6g\nmescd %.4g\nreference_error %.2g\n",
+            lab_number(score, "error_end"), lab_number(score, "error_max"),
+            json_is_null(json_object_get(score, "mescd")) ? INFINITY : lab_number(score, "mescd"), s->error);
+    if (!json_boolean_value(json_object_get(score, "resolved")))
+        fprintf(out, "The error cannot be distinguished from that of the reference.\n");
+}
+
+drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *out)
 {
     const double *x = NULL;
-    double worst = 0, digits = INFINITY, error = 0;
+    double worst = 0, error = 0, far;
     drape_status status = read_frames(s, path, &x);
     if (status)
         return status;
-    fprintf(out, "time_s,error,error_largest\n");
     for (size_t i = 0; i < s->time_count; i++) {
-        const double *a = x + s->reference.size * i, *b = s->reference.x + s->reference.size * i;
-        double far = 0;
-        error = lab_distance(s->model, a, b) / s->size;
-        digits = lab_correct_digits(s->model, a, b);
+        error = frame_error(s, x, i, &far);
         worst = fmax(worst, error);
-        for (size_t k = 0; k < s->reference.size; k += 3)
-            far = fmax(far, hypot(hypot(a[k] - b[k], a[k + 1] - b[k + 1]), a[k + 2] - b[k + 2]));
-        fprintf(out, "%.9g,%.6g,%.6g\n", s->times[i], error, far / s->size);
     }
-    fprintf(out, "error_end %.6g\nerror_max %.6g\nmescd %.4g\nreference_error %.2g\n", error, worst, digits,
-            s->error);
-    if (worst < s->error)
-        fprintf(out, "The error cannot be distinguished from that of the reference.\n");
-    return DRAPE_OK;
+    /* Infinitely many digits, of the reference itself, are null in JSON. */
+    json_t *score =
+        json_pack("{s:f, s:f, s:o, s:f, s:b}", "error_end", error, "error_max", worst, "mescd",
+                  drape_json_number(lab_correct_digits(s->model, x + s->reference.size * (s->time_count - 1),
+                                                       lab_trace_end(&s->reference))),
+                  "reference_error", s->error, "resolved", !(worst < s->error));
+    if (!score)
+        status = drape_fail(s->arena->ctx, DRAPE_E_MEMORY, "no memory for the score");
+    else if (json)
+        status = print_json(s, x, score, out);
+    else
+        print_text(s, x, score, out);
+    json_decref(score);
+    return status;
 }
 
 /* ---- Export ---- */

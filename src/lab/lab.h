@@ -4,7 +4,8 @@
  * experiment.json and of the lines, so results of other machines or earlier runs need no exception.
  *
  *     experiment.json   {"experiment", "drape", "scene", "scene_hash", "settings", "arguments",
- *                        "cases": [case...]}
+ *                        "cases": [case...]}, and "results": [names] of what its figures show, which does
+ *                        not distinguish experiments
  *     case              {"tags": {names and values that identify it}, "settings": {pointer: value}}, and
  *                       "same_as": N if the integrator ignores all that distinguishes it from case N
  *     cases.jsonl       a result a line: {"case": N, "tags": {...}, "status": ..., what was measured}
@@ -45,6 +46,7 @@ typedef struct lab_experiment_ops {
      * results; with `partial`, any of them may be missing. */
     drape_status (*report)(lab *l);
     bool partial; /* a def may have a budget, after which the cases with the highest ranks are left out */
+    bool shows_results; /* a def may name results that the figures show */
 } lab_experiment_ops;
 
 extern const lab_experiment_ops *const lab_experiments[]; /* NULL-ended */

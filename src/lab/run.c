@@ -182,6 +182,7 @@ static json_t *describe(const run *r, drape_sim *sim)
     const drape_statistics s = drape_sim_statistics(sim);
     const double *x = drape_sim_positions(sim), numerical = drape_sim_energy(sim).numerical;
     const bool compares = request->reference && request->reference->frames;
+    const double accepted = (double)s.steps_accepted, rejected = (double)s.steps_rejected;
     const struct {
         const char *key;
         double value;
@@ -196,6 +197,8 @@ static json_t *describe(const run *r, drape_sim *sim)
         {"energy_drift", r->kinetic > 0 ? numerical / r->kinetic : NAN},
         {"strain_min", s.steps_accepted ? s.strain_min : NAN},
         {"strain_max", s.steps_accepted ? s.strain_max : NAN},
+        {"rejected_share", accepted + rejected > 0 ? rejected / (accepted + rejected) : NAN},
+        {"iterations_per_step", accepted > 0 ? (double)s.newton_iterations / accepted : NAN},
         {"h_min_s", s.h_min},
         {"h_max_s", s.h_max},
         {"explicit_limit_s", r->explicit_limit}};

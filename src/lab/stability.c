@@ -1,11 +1,13 @@
 /*
  * stability: maps. Values of the scene over one to three axes, every point with every integrator asked
- * for: the outcome is one of a few, each with a colour. Over a single axis all integrators share one
- * figure, a row each. Where the first or second axis is the step of an explicit integrator, its
- * stability limit, as estimated at the start of each run, is drawn over the map.
+ * for: the outcome is one of a few, each with a colour. Further figures show results in colours. Over a
+ * single axis all integrators share one figure, a row each, and results are curves. Where the first or second
+ * axis is the step of an explicit integrator, its stability limit, as estimated at the start of each run, is
+ * drawn over the map.
  */
 #include "base/param.h"
 #include "lab/figure.h"
+#include "lab/quantity.h"
 #include "lab/sweep.h"
 #include "lab/text.h"
 #include "sim/warnings.h"
@@ -232,6 +234,22 @@ static bool is_default(const char *integrator)
     return false;
 }
 
+/* The results that the figures show. */
+static drape_status plan_results(lab *l, const space *s)
+{
+    json_t *results = json_array();
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < l->def->result_count; i++) {
+        int k;
+        status = drape_registry_choose(l->ctx, &lab_quantity_registry, "", l->def->results[i], &k);
+        json_array_append_new(results, json_string(l->def->results[i]));
+    }
+    if (l->def->result_count == 0 && s->count == 1)
+        json_array_append_new(results, json_string("energy_drift"));
+    json_object_set_new(l->about, "results", results);
+    return status;
+}
+
 static drape_status plan(lab *l)
 {
     space s;
@@ -246,6 +264,7 @@ static drape_status plan(lab *l)
     json_object_set_new(l->arguments, "axes", axes);
     json_object_set_new(l->arguments, "strain_limit", json_real(l->def->strain_limit));
     json_object_set_new(l->arguments, "case_seconds", json_real(l->def->case_seconds));
+    status = plan_results(l, &s);
     for (int i = 0; !status && drape_integrators[i]; i++) {
         const drape_integrator_ops *integrator = drape_integrators[i];
         const size_t first = json_array_size(l->cases);
@@ -266,7 +285,7 @@ typedef enum verdict { CLEAN, FEW, SOME, MANY, SHORT, STRAINED, STOPPED, EXPLODE
 #define TEXT(x)   #x
 #define NUMBER(x) TEXT(x)
 
-/* Without rejections, and with ever more of them: shades of one blue. */
+/* Without rejections, and with ever more of them: shades of one blue. Those up to STRAINED got to the end. */
 static const struct {
     const char *name;
     int colour;
@@ -275,12 +294,19 @@ static const struct {
     [FEW] = {"up to 1/100 rejected", 0x4c9ccb},
     [SOME] = {"up to 1/10 rejected", 0x93c4e2},
     [MANY] = {"over 1/10 rejected", 0xd3e6f3},
-    [SHORT] = {"fewer than " NUMBER(DRAPE_FEW_STEPS) " steps", LAB_YELLOW},
+    [SHORT] = {"fewer than " NUMBER(DRAPE_FEW_STEPS) " steps", LAB_WHITE}, /* hatched */
     [STRAINED] = {"unphysical strain", LAB_PURPLE},
     [STOPPED] = {"stopped", LAB_ORANGE},
     [EXPLODED] = {"exploded", LAB_RED},
     [LATE] = {"over budget", LAB_DARK},
 };
+
+/* Whether a run completed in so few steps that nothing had the time to grow: it is hatched, whatever else is
+ * said of it. */
+static bool is_short(const json_t *result)
+{
+    return lab_is_good(result) && lab_number(result, "accepted") < DRAPE_FEW_STEPS;
+}
 
 static verdict judge(const lab *l, const json_t *result)
 {
@@ -293,22 +319,101 @@ static verdict judge(const lab *l, const json_t *result)
         return integrator && integrator->stability ? EXPLODED : STOPPED;
     if (lab_number(result, "strain_max") > lab_number(l->arguments, "strain_limit"))
         return STRAINED;
-    if (accepted < DRAPE_FEW_STEPS) /* what grows has no time to */
+    if (is_short(result))
         return SHORT;
     return share <= 0 ? CLEAN : share <= 0.01 ? FEW : share <= 0.1 ? SOME : MANY;
 }
 
-/* ---- Figures ---- */
+/* ---- Colours of results ---- */
 
-/* What one figure shows: the cells of an integrator, at an index on the third axis, or those of all
- * integrators over a single axis. */
+/* A result and the scale of its values over all cases, so that the figures of all integrators can be
+ * compared. */
+typedef struct shade {
+    const lab_quantity *quantity; /* NULL: none, colours are those of the verdicts */
+    lab_axis axis;
+    bool magnitude; /* values are those without their sign */
+} shade;
+
+#define DECADES     8  /* that a logarithmic scale has at most, below its largest value */
+#define LOGARITHMIC 30 /* a scale of values of larger ratios is logarithmic */
+
+/* Whether a run got to its end: its results can be shown. */
+static bool has_results(verdict v)
+{
+    return v <= STRAINED;
+}
+
+/* A result as the scale has it. NaN: the run has none. */
+static double shown_value(const lab *l, const shade *sh, size_t i)
+{
+    const double value = lab_number(l->results[i], sh->quantity->entry.name);
+    return !has_results(judge(l, l->results[i])) ? NAN : sh->magnitude ? fabs(value) : value;
+}
+
+/* The range of the values: logarithmic, of magnitudes, if these differ much. Values that are zero are at the
+ * low end then, below all others. */
+static shade make_shade(const lab *l, const lab_quantity *quantity)
+{
+    shade sh = {.quantity = quantity};
+    double low = INFINITY, high = -INFINITY, least = INFINITY, most = 0;
+    bool zeros = false;
+    for (size_t i = 0; i < l->count; i++) {
+        const double value = shown_value(l, &sh, i), size = fabs(value);
+        if (isnan(value))
+            continue;
+        low = fmin(low, value);
+        high = fmax(high, value);
+        most = fmax(most, size);
+        least = size > 0 ? fmin(least, size) : least;
+        zeros |= size == 0;
+    }
+    sh.axis.log = most > LOGARITHMIC * least;
+    sh.magnitude = sh.axis.log && low < 0;
+    const char *bars = sh.magnitude ? "|" : "", *unit = quantity->unit;
+    snprintf(sh.axis.label, sizeof sh.axis.label, *unit ? "%s%s%s [%s]" : "%s%s%s", bars,
+             quantity->entry.name, bars, unit);
+    if (sh.axis.log) {
+        const double floor = most * pow(10, -DECADES);
+        sh.axis.to = most;
+        sh.axis.from = least < floor ? floor : zeros ? fmax(floor, least / 3) : least;
+    } else if (high >= low) {
+        const double margin = high > low ? 0 : fmax(0.5 * fabs(high), 1e-3);
+        sh.axis.from = low - margin;
+        sh.axis.to = high + margin;
+    }
+    return sh;
+}
+
+/* Of LAB_SHADES equal parts of the scale. */
+static int shade_of(const shade *sh, double value)
+{
+    const lab_axis *a = &sh->axis;
+    const double share = !a->log     ? (value - a->from) / (a->to - a->from)
+                         : value > 0 ? log(value / a->from) / log(a->to / a->from)
+                                     : 0;
+    return (int)fmin(LAB_SHADES - 1, fmax(0, floor(LAB_SHADES * share)));
+}
+
+static double shade_value(const shade *sh, int k)
+{
+    const lab_axis *a = &sh->axis;
+    const double share = (k + 0.5) / LAB_SHADES;
+    return a->log ? a->from * pow(a->to / a->from, share) : a->from + share * (a->to - a->from);
+}
+
+/* ---- Maps ---- */
+
+/* What one map shows: the cells of an integrator, at an index on the third axis, or those of all
+ * integrators over a single axis, a row each. */
 typedef struct map {
     const lab *l;
     const space *s;
+    shade shade;
     size_t first; /* case */
     int third;
-    bool seen[VERDICTS];
-    int limits; /* drawn so far */
+    int rows;
+    bool seen[VERDICTS], blank; /* verdicts, and runs without that result, on the map */
+    int limits;                 /* drawn so far */
     lab_figure f;
 } map;
 
@@ -319,22 +424,108 @@ static bool is_on(const map *m, size_t cell, int *index)
     return m->s->count < MAX_AXES || index[2] == m->third;
 }
 
-/* A row of cells, in which neighbours of one colour are one box. first: its first case. */
-static void write_row(map *m, size_t first, double bottom, double top)
+/* The first case of a row, and the ends of the row on the y axis. */
+static size_t row_of(const map *m, int row, double *bottom, double *top)
+{
+    const size_t columns = (size_t)m->s->axes[0].count;
+    if (m->s->count == 1) { /* the first integrator on top */
+        *bottom = m->rows - 1 - row - 0.45;
+        *top = *bottom + 0.9;
+        return columns * (size_t)row;
+    }
+    cell_bounds(&m->s->axes[1], row, bottom, top);
+    return m->first + columns * (size_t)(row + m->third * m->rows);
+}
+
+/* The layers of a map, each a kind of boxes. */
+typedef enum layer { FLAT, SHADED, HATCHED_DARK, HATCHED_LIGHT, LAYERS } layer;
+
+/* How a case looks in a layer: cells that look alike can be one box. */
+typedef struct look {
+    bool there;
+    double fill; /* a colour, or a value of the scale */
+} look;
+
+static look look_at(const map *m, layer kind, size_t i)
+{
+    const verdict v = judge(m->l, m->l->results[i]);
+    const double value = m->shade.quantity ? shown_value(m->l, &m->shade, i) : NAN;
+    const bool shows = m->shade.quantity && has_results(v), shaded = shows && !isnan(value);
+    const int k = shaded ? shade_of(&m->shade, value) : LAB_SHADES - 1;
+    switch (kind) {
+    case FLAT:
+        return (look){!shaded, shows ? LAB_GREY : verdicts[v].colour};
+    case SHADED:
+        return (look){shaded, shade_value(&m->shade, k)};
+    case HATCHED_DARK:
+        return (look){is_short(m->l->results[i]) && k >= LAB_SHADES / 2, LAB_BLACK};
+    case HATCHED_LIGHT:
+    default:
+        return (look){is_short(m->l->results[i]) && k < LAB_SHADES / 2, LAB_WHITE};
+    }
+}
+
+/* A row of cells, in which neighbours that look alike are one box. Returns the number of boxes. */
+static int write_row(map *m, layer kind, int row)
 {
     const axis *x = &m->s->axes[0];
-    double left, right, from = 0;
+    double left, right, from = 0, bottom, top;
+    int boxes = 0;
+    const size_t first = row_of(m, row, &bottom, &top);
+    look before = {0};
     for (int i = 0; i < x->count; i++) {
-        const verdict v = judge(m->l, m->l->results[first + (size_t)i]);
-        const bool begins = i == 0 || v != judge(m->l, m->l->results[first + (size_t)i - 1]);
-        const bool ends = i + 1 == x->count || v != judge(m->l, m->l->results[first + (size_t)i + 1]);
+        const look here = look_at(m, kind, first + (size_t)i);
+        const look next = i + 1 < x->count ? look_at(m, kind, first + (size_t)i + 1) : (look){.there = false};
         cell_bounds(x, i, &left, &right);
-        from = begins ? left : from;
-        m->seen[v] = true;
-        if (ends)
-            fprintf(m->f.script, "%.9g %.9g %.9g %.9g %.9g %.9g %d\n", from, bottom, from, right, bottom, top,
-                    verdicts[v].colour);
+        if (!(before.there && before.fill == here.fill))
+            from = left;
+        before = here;
+        if (!here.there || (next.there && next.fill == here.fill))
+            continue;
+        fprintf(m->f.script, "%.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", from, bottom, from, right, bottom, top,
+                here.fill);
+        boxes++;
     }
+    return boxes;
+}
+
+static void write_layer(map *m, layer kind)
+{
+    int boxes = 0;
+    const int block = lab_figure_data(&m->f);
+    for (int row = 0; row < m->rows; row++)
+        boxes += write_row(m, kind, row);
+    lab_figure_data_end(&m->f);
+    if (boxes == 0)
+        return;
+    if (kind == FLAT)
+        lab_figure_boxes(&m->f, block);
+    else if (kind == SHADED)
+        lab_figure_values(&m->f, block);
+    else
+        lab_figure_hatch(&m->f, block, kind == HATCHED_DARK ? LAB_BLACK : LAB_WHITE);
+}
+
+static void note_verdicts(map *m)
+{
+    double bottom, top;
+    for (int row = 0; row < m->rows; row++) {
+        const size_t first = row_of(m, row, &bottom, &top);
+        for (size_t i = first; i < first + (size_t)m->s->axes[0].count; i++) {
+            m->seen[judge(m->l, m->l->results[i])] = true;
+            m->seen[SHORT] |= is_short(m->l->results[i]);
+            m->blank |= look_at(m, FLAT, i).there && has_results(judge(m->l, m->l->results[i]));
+        }
+    }
+}
+
+static void write_cells(map *m)
+{
+    for (layer kind = FLAT; kind < LAYERS; kind++)
+        write_layer(m, kind);
+    note_verdicts(m);
+    if (m->shade.quantity)
+        m->f.scale = m->shade.axis;
 }
 
 static const char *axis_name(const axis *a)
@@ -356,11 +547,10 @@ static void set_axis(const axis *a, lab_axis *out)
 }
 
 /* A black line on a white one is seen on every colour. */
-static void draw_limit(map *m, int block)
+static void draw_limit(lab_figure *f, int block, bool first)
 {
-    lab_figure_curve(&m->f, block, (lab_style){LAB_WHITE, 1, 0}, NULL);
-    lab_figure_curve(&m->f, block, (lab_style){LAB_BLACK, 2, 0},
-                     m->limits++ ? NULL : "explicit limit 2/omega");
+    lab_figure_curve(f, block, (lab_style){LAB_WHITE, 1, 0}, NULL);
+    lab_figure_curve(f, block, (lab_style){LAB_BLACK, 2, 0}, first ? "explicit limit 2/omega" : NULL);
 }
 
 /* The index of the axis that is the step; -1: none is. */
@@ -392,82 +582,252 @@ static void add_limit(map *m)
     }
     lab_figure_data_end(&m->f);
     if (any)
-        draw_limit(m, block);
+        draw_limit(&m->f, block, m->limits++ == 0);
 }
 
-/* A swatch for each verdict that is on the figure. */
+/* Over a single axis that is the step, the limit of a case is a line from bottom to top. */
+static void add_limit_at(lab_figure *f, const json_t *result, double bottom, double top, int *limits)
+{
+    const double limit = lab_number(result, "explicit_limit_s");
+    if (isnan(limit))
+        return;
+    const int line = lab_figure_data(f);
+    fprintf(f->script, "%.9g %.9g\n%.9g %.9g\n", limit, bottom, limit, top);
+    lab_figure_data_end(f);
+    draw_limit(f, line, (*limits)++ == 0);
+}
+
+/* The name of a verdict in a legend. */
+static void verdict_text(const lab *l, int v, char text[96])
+{
+    snprintf(text, 96, v == LATE ? "%s (%.3g s)" : "%s", verdicts[v].name,
+             lab_number(l->arguments, "case_seconds"));
+}
+
+/* A swatch for each verdict that is on the figure; with a scale, of those that hide it. */
 static drape_status end_map(lab *l, map *m, const char *caption)
 {
+    char text[96];
     for (int v = 0; v < VERDICTS; v++)
-        if (m->seen[v])
-            lab_figure_swatch(&m->f, verdicts[v].colour, verdicts[v].name);
+        if (m->seen[v] && (!m->shade.quantity || v == SHORT || !has_results((verdict)v))) {
+            verdict_text(l, v, text);
+            lab_figure_swatch(&m->f, verdicts[v].colour, v == SHORT, text);
+        }
+    if (m->blank && m->shade.quantity)
+        lab_figure_swatch(&m->f, LAB_GREY, false, "no value");
     return lab_figure_end(l, &m->f, caption);
 }
 
-static drape_status draw_map(lab *l, const space *s, size_t first, int third)
+/* quantity NULL: what happened. */
+static drape_status draw_map(lab *l, const space *s, const shade *sh, size_t first, int third)
 {
     const char *integrator = lab_tag_text(l->results[first], "integrator");
-    const axis *y = &s->axes[1];
-    char name[96];
-    map m = {.l = l, .s = s, .first = first, .third = third};
-    snprintf(name, sizeof name, s->count == MAX_AXES ? "map_%s_%d" : "map_%s", integrator, third);
+    const lab_quantity *quantity = sh->quantity;
+    const axis *last = &s->axes[s->count - 1];
+    char name[96], caption[256], number[16];
+    map m = {.l = l, .s = s, .shade = *sh, .first = first, .third = third, .rows = s->axes[1].count};
+    snprintf(number, sizeof number, s->count == MAX_AXES ? "_%d" : "", third);
+    snprintf(name, sizeof name, "map_%s%s%s%s", integrator, number, quantity ? "_" : "",
+             quantity ? quantity->entry.name : "");
     drape_status status = lab_figure_begin(l, &m.f, name);
     if (status)
         return status;
     snprintf(m.f.title, sizeof m.f.title, s->count == MAX_AXES ? "%s, %.80s = %.4g %s" : "%s", integrator,
-             axis_name(&s->axes[s->count - 1]), axis_value(&s->axes[s->count - 1], third),
-             lab_unit(s->axes[s->count - 1].pointer));
+             axis_name(last), axis_value(last, third), lab_unit(last->pointer));
+    snprintf(caption, sizeof caption, "%s%s%s", m.f.title, quantity ? ": " : "",
+             quantity ? quantity->entry.summary : "");
     set_axis(&s->axes[0], &m.f.axes[0]);
-    set_axis(y, &m.f.axes[1]);
-    const int block = lab_figure_data(&m.f);
-    for (int row = 0; row < y->count; row++) {
-        double bottom, top;
-        cell_bounds(y, row, &bottom, &top);
-        write_row(&m, first + (size_t)s->axes[0].count * (size_t)(row + third * y->count), bottom, top);
-    }
-    lab_figure_data_end(&m.f);
-    lab_figure_boxes(&m.f, block);
+    set_axis(&s->axes[1], &m.f.axes[1]);
+    write_cells(&m);
     add_limit(&m);
-    return end_map(l, &m, m.f.title);
+    return end_map(l, &m, caption);
 }
 
 /* All integrators over a single axis, a row each, the first on top. */
 static drape_status draw_rows(lab *l, const space *s)
 {
-    const size_t rows = l->count / s->cells;
-    map m = {.l = l, .s = s};
-    const char **names = drape_arena_take(&l->arena, rows, sizeof *names);
+    const int rows = (int)(l->count / s->cells);
+    map m = {.l = l, .s = s, .rows = rows};
+    const char **names = drape_arena_take(&l->arena, (size_t)rows, sizeof *names);
     drape_status status = names ? lab_figure_begin(l, &m.f, "map") : DRAPE_E_MEMORY;
     if (status)
         return status;
     set_axis(&s->axes[0], &m.f.axes[0]);
-    m.f.axes[1] = (lab_axis){.from = -0.5, .to = (double)rows - 0.5, .names = names, .name_count = (int)rows};
-    m.f.plot_height = 6.0 * (double)rows;
-    const int block = lab_figure_data(&m.f);
-    for (size_t k = 0; k < rows; k++) {
-        names[rows - 1 - k] = lab_tag_text(l->results[k * s->cells], "integrator");
-        const double y = (double)(rows - 1 - k);
-        write_row(&m, k * s->cells, y - 0.45, y + 0.45);
-    }
-    lab_figure_data_end(&m.f);
-    lab_figure_boxes(&m.f, block);
-    for (size_t k = 0; k < rows && step_axis(s) == 0; k++) {
-        const double limit = lab_number(l->results[k * s->cells], "explicit_limit_s"),
-                     y = (double)(rows - 1 - k);
-        if (isnan(limit))
-            continue;
-        const int line = lab_figure_data(&m.f);
-        fprintf(m.f.script, "%.9g %.9g\n%.9g %.9g\n", limit, y - 0.45, limit, y + 0.45);
-        lab_figure_data_end(&m.f);
-        draw_limit(&m, line);
+    m.f.axes[1] = (lab_axis){.from = -0.5, .to = rows - 0.5, .names = names, .name_count = rows};
+    m.f.plot_height = 6.0 * rows;
+    write_cells(&m);
+    for (int row = 0; row < rows; row++) {
+        double bottom, top;
+        const size_t first = row_of(&m, row, &bottom, &top);
+        names[rows - 1 - row] = lab_tag_text(l->results[first], "integrator");
+        if (step_axis(s) == 0)
+            add_limit_at(&m.f, l->results[first], bottom, top, &m.limits);
     }
     return end_map(l, &m, "what happened to each integrator");
 }
 
-/* A summary and the maps of each integrator. The axes are those of experiment.json: a merge has no def. */
+/* ---- Curves over a single axis ---- */
+
+#define FAILED_ROOM 2.4 /* [mm] above the curves, for the runs of an integrator that have no results */
+#define CURVE_ROOM  46.0
+
+/* A value of the curve's axis, which shows no zeros if it is logarithmic. */
+static double curve_value(const shade *sh, double value)
+{
+    return sh->axis.log ? fmax(value, sh->axis.from) : value;
+}
+
+/* The ends of the y axis: the scale with margins, and room above for `failed` lines of markers. Returns the
+ * height of the first of these lines as a share of the frame. */
+static void set_curve_axis(lab_figure *f, const shade *sh, int failed)
+{
+    lab_axis *y = &f->axes[1];
+    *y = sh->axis;
+    f->plot_height = CURVE_ROOM + FAILED_ROOM * failed;
+    const double below = 0.04, above = 0.04 + FAILED_ROOM * failed / CURVE_ROOM;
+    if (y->log) {
+        const double ratio = y->to / y->from;
+        y->from /= pow(ratio, below);
+        y->to *= pow(ratio, above);
+    } else {
+        const double span = y->to - y->from;
+        y->from -= below * span;
+        y->to += above * span;
+    }
+}
+
+static double at_height(const lab_figure *f, double mm)
+{
+    const lab_axis *y = &f->axes[1];
+    const double share = mm / f->plot_height;
+    return y->log ? y->from * pow(y->to / y->from, share) : y->from + share * (y->to - y->from);
+}
+
+/* Whether the case belongs to one of the kinds of marks on a curve. */
+typedef enum mark { ON_CURVE, FEW_STEPS, NO_RESULT, OVER_BUDGET, MARKS } mark;
+
+static bool is_mark(const lab *l, const shade *sh, mark kind, size_t i)
+{
+    const bool late = judge(l, l->results[i]) == LATE, blank = isnan(shown_value(l, sh, i));
+    return kind == (late ? OVER_BUDGET : blank ? NO_RESULT : is_short(l->results[i]) ? FEW_STEPS : ON_CURVE);
+}
+
+/* The marks of a kind of one integrator; missing values break the curve. height: of those without results. */
+static int write_marks(lab *l, const space *s, const shade *sh, size_t first, mark kind, double height,
+                       lab_figure *f, int *block)
+{
+    int count = 0;
+    *block = lab_figure_data(f);
+    for (int k = 0; k < s->axes[0].count; k++) {
+        const size_t i = first + (size_t)k;
+        if (is_mark(l, sh, kind, i)) {
+            fprintf(f->script, "%.9g %.9g\n", axis_value(&s->axes[0], k),
+                    kind >= NO_RESULT ? height : curve_value(sh, shown_value(l, sh, i)));
+            count++;
+        } else if (count > 0)
+            fputs("\n", f->script);
+    }
+    lab_figure_data_end(f);
+    return count;
+}
+
+static bool lacks_results(const lab *l, const space *s, const shade *sh, size_t first)
+{
+    for (size_t i = first; i < first + s->cells; i++)
+        if (is_mark(l, sh, NO_RESULT, i) || is_mark(l, sh, OVER_BUDGET, i))
+            return true;
+    return false;
+}
+
+/* Markers of gnuplot's. */
+#define PLUS  1
+#define CROSS 2
+#define OPEN  6
+
+static lab_style mark_style(const char *integrator, mark kind)
+{
+    const lab_style filled = lab_style_of(integrator, 0), open = lab_style_of(integrator, 1);
+    return kind == ON_CURVE    ? filled
+           : kind == FEW_STEPS ? (lab_style){open.colour, 0, open.point}
+                               : (lab_style){open.colour, 0, kind == OVER_BUDGET ? PLUS : CROSS};
+}
+
+/* Values over a single axis, a curve for each integrator. Runs of few steps are open markers off the curve,
+ * and those without a result a row of crosses above the curves. */
+static drape_status draw_curves(lab *l, const space *s, const shade *sh)
+{
+    const size_t rows = l->count / s->cells;
+    char name[96], text[96];
+    int failed = 0, block, limits = 0;
+    bool seen[MARKS] = {false};
+    lab_figure f;
+    snprintf(name, sizeof name, "curve_%s", sh->quantity->entry.name);
+    drape_status status = lab_figure_begin(l, &f, name);
+    if (status)
+        return status;
+    set_axis(&s->axes[0], &f.axes[0]);
+    for (size_t r = 0; r < rows; r++)
+        failed += lacks_results(l, s, sh, r * s->cells);
+    set_curve_axis(&f, sh, failed);
+    for (size_t r = 0; r < rows && step_axis(s) == 0; r++)
+        add_limit_at(&f, l->results[r * s->cells], f.axes[1].from, f.axes[1].to, &limits);
+    for (size_t r = 0; r < rows; r++) {
+        const size_t first = r * s->cells;
+        const char *integrator = lab_tag_text(l->results[first], "integrator");
+        const double height = at_height(&f, f.plot_height - FAILED_ROOM * (failed - 0.5));
+        for (mark kind = ON_CURVE; kind < MARKS; kind++) {
+            if (!write_marks(l, s, sh, first, kind, height, &f, &block))
+                continue;
+            seen[kind] = true;
+            lab_figure_curve(&f, block, mark_style(integrator, kind), kind == ON_CURVE ? integrator : NULL);
+        }
+        failed -= lacks_results(l, s, sh, first);
+    }
+    verdict_text(l, LATE, text);
+    if (seen[FEW_STEPS])
+        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, OPEN}, verdicts[SHORT].name);
+    if (seen[NO_RESULT])
+        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, CROSS}, "stopped or exploded");
+    if (seen[OVER_BUDGET])
+        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, PLUS}, text);
+    return lab_figure_end(l, &f, sh->quantity->entry.summary);
+}
+
+/* ---- The report ---- */
+
+/* What happened, and each of the results that the experiment shows. */
+static drape_status draw(lab *l, const space *s, const shade *sh)
+{
+    drape_status status = DRAPE_OK;
+    if (s->count == 1)
+        return sh->quantity ? draw_curves(l, s, sh) : draw_rows(l, s);
+    const int thirds = s->count == MAX_AXES ? s->axes[2].count : 1;
+    for (size_t first = 0; !status && first + s->cells <= l->count; first += s->cells)
+        for (int third = 0; third < thirds && !status; third++)
+            status = draw_map(l, s, sh, first, third);
+    return status;
+}
+
+static void summarise(lab *l, const space *s, size_t first)
+{
+    int64_t count[VERDICTS] = {0};
+    const char *comma = "";
+    for (size_t cell = 0; cell < s->cells; cell++)
+        count[judge(l, l->results[first + cell])]++;
+    fprintf(l->summary, "%s:", lab_tag_text(l->results[first], "integrator"));
+    for (int v = 0; v < VERDICTS; v++)
+        if (count[v]) {
+            fprintf(l->summary, "%s %lld %s", comma, (long long)count[v], verdicts[v].name);
+            comma = ",";
+        }
+    fprintf(l->summary, "\n");
+}
+
+/* A summary and the figures. Axes and results are those of experiment.json: a merge has no def. */
 static drape_status report(lab *l)
 {
-    const json_t *axes = json_object_get(l->arguments, "axes");
+    const json_t *axes = json_object_get(l->arguments, "axes"),
+                 *results = json_object_get(l->about, "results");
     space s = {.count = (int)json_array_size(axes)};
     const char *texts[MAX_AXES];
     if (s.count < 1 || s.count > MAX_AXES)
@@ -477,29 +837,28 @@ static drape_status report(lab *l)
         texts[a] = text ? text : "";
     }
     drape_status status = read_axes(l, texts, &s);
-    for (size_t first = 0; !status && first + s.cells <= l->count; first += s.cells) {
-        const char *integrator = lab_tag_text(l->results[first], "integrator"), *comma = "";
-        int64_t count[VERDICTS] = {0};
-        for (size_t cell = 0; cell < s.cells; cell++)
-            count[judge(l, l->results[first + cell])]++;
-        fprintf(l->summary, "%s:", integrator);
-        for (int v = 0; v < VERDICTS; v++)
-            if (count[v]) {
-                fprintf(l->summary, "%s %lld %s", comma, (long long)count[v], verdicts[v].name);
-                comma = ",";
-            }
-        fprintf(l->summary, "\n");
-        if (s.count > 1)
-            lab_page_heading(l, integrator);
-        for (int third = 0; s.count > 1 && third < (s.count == MAX_AXES ? s.axes[2].count : 1) && !status;
-             third++)
-            status = draw_map(l, &s, first, third);
+    for (size_t first = 0; !status && first + s.cells <= l->count; first += s.cells)
+        summarise(l, &s, first);
+    if (!status) {
+        lab_page_heading(l, "What happened");
+        status = draw(l, &s, &(shade){.quantity = NULL});
     }
-    return !status && s.count == 1 ? draw_rows(l, &s) : status;
+    for (size_t i = 0; !status && i < json_array_size(results); i++) {
+        const char *name = json_string_value(json_array_get(results, i));
+        int k;
+        status = drape_registry_choose(l->ctx, &lab_quantity_registry, "", name ? name : "", &k);
+        if (!status) {
+            const shade sh = make_shade(l, lab_quantity_at(k));
+            lab_page_heading(l, lab_quantity_at(k)->entry.name);
+            status = draw(l, &s, &sh);
+        }
+    }
+    return status;
 }
 
 const lab_experiment_ops lab_experiment_stability = {
     .entry = {.name = "stability", .summary = "maps of what happens over one to three values of the scene"},
     .plan = plan,
     .report = report,
+    .shows_results = true,
 };

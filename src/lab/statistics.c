@@ -7,6 +7,24 @@
 
 #define MAX_POINTS 64
 #define CONFIDENCE 0.975 /* two-sided 95 % */
+#define SAME_ORDER 0.1   /* by which orders between neighbours may differ from that of the finest two */
+
+double lab_student(double degrees_of_freedom)
+{
+    return gsl_cdf_tdist_Pinv(CONFIDENCE, degrees_of_freedom);
+}
+
+size_t lab_same_order(const double *x, const double *y, size_t count)
+{
+    double order = NAN;
+    for (size_t i = 1; i < count; i++) {
+        const double here = log(y[i] / y[i - 1]) / log(x[i] / x[i - 1]);
+        if (i > 1 && !(fabs(here - order) < SAME_ORDER))
+            return i;
+        order = i > 1 ? order : here;
+    }
+    return count;
+}
 
 lab_line lab_fit_power(const double *x, const double *y, size_t count)
 {
@@ -21,7 +39,7 @@ lab_line lab_fit_power(const double *x, const double *y, size_t count)
     }
     gsl_fit_linear(u, 1, v, 1, n, &line.intercept, &line.slope, &cov00, &cov01, &cov11, &squares);
     if (n > 2) {
-        double half = gsl_cdf_tdist_Pinv(CONFIDENCE, (double)n - 2) * sqrt(cov11);
+        double half = lab_student((double)n - 2) * sqrt(cov11);
         line.low = line.slope - half;
         line.high = line.slope + half;
     }

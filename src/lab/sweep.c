@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "io/export.h"
+#include "lab/plan.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -97,7 +98,8 @@ typedef struct sweep {
     drape_file file;
     pthread_mutex_t lock;
     atomic_bool given_up;
-    size_t *order;       /* (l->count) the cases, those of low rank first; in l->arena */
+    size_t *order;       /* the cases, those of low rank first; in l->arena */
+    size_t count;        /* of these */
     size_t next;         /* in that order, the first case that no thread has taken yet */
     double deadline;     /* [s] wall: when the budget is used up; 0: never */
     int64_t done, total; /* of this shard */
@@ -105,12 +107,6 @@ typedef struct sweep {
     double start;        /* [s] wall */
     drape_status status; /* the first failure; its message is set on l->ctx */
 } sweep;
-
-static bool is_ours(const lab *l, size_t i)
-{
-    return i % (size_t)l->def->shards == (size_t)(l->def->shard - 1) &&
-           !json_object_get(json_array_get(l->cases, i), "same_as");
-}
 
 /* Under the lock. */
 static void stop(sweep *s, drape_status status)
@@ -127,7 +123,8 @@ static drape_status put_in_order(sweep *s)
     s->order = drape_arena_take(&s->l->arena, l->count, sizeof *s->order);
     if (!s->order)
         return DRAPE_E_MEMORY;
-    for (json_int_t rank = 0; done < l->count; rank++)
+    s->count = l->def->plan ? lab_plan_sample(l, s->order) : l->count;
+    for (json_int_t rank = 0; !l->def->plan && done < l->count; rank++)
         for (size_t i = 0; i < l->count; i++)
             if (json_integer_value(json_object_get(json_array_get(l->cases, i), "rank")) == rank)
                 s->order[done++] = i;
@@ -145,9 +142,9 @@ static size_t take_case(sweep *s)
 {
     lab *l = s->l;
     pthread_mutex_lock(&s->lock);
-    while (s->next < l->count && (!is_ours(l, s->order[s->next]) || l->results[s->order[s->next]]))
+    while (s->next < s->count && (!lab_is_ours(l, s->order[s->next]) || l->results[s->order[s->next]]))
         s->next++;
-    const size_t mine = s->status || s->next >= l->count || is_late(s) ? l->count : s->order[s->next++];
+    const size_t mine = s->status || s->next >= s->count || is_late(s) ? l->count : s->order[s->next++];
     pthread_mutex_unlock(&s->lock);
     return mine;
 }
@@ -199,10 +196,13 @@ static void *work(void *user)
     }
     for (size_t i = ctx ? take_case(s) : l->count; i < l->count; i = take_case(s)) {
         json_t *result = NULL;
+        const double start = drape_clock_thread_seconds();
         lab_request request = lab_request_of(l, i);
         request.deadline = s->deadline;
         request.given_up = &s->given_up;
         drape_status status = lab_run(ctx, &request, &result);
+        if (result)
+            json_object_set_new(result, "case_cpu_s", json_real(drape_clock_thread_seconds() - start));
         pthread_mutex_lock(&s->lock);
         if (!status && result)
             keep(s, i, result);
@@ -237,10 +237,10 @@ drape_status lab_sweep(lab *l)
     lab_cases_name(l, name);
     pthread_mutex_init(&s.lock, NULL);
     atomic_init(&s.given_up, false);
-    for (size_t i = 0; i < l->count; i++)
-        if (is_ours(l, i)) {
+    for (size_t k = 0; k < s.count; k++)
+        if (lab_is_ours(l, s.order[k])) {
             s.total++;
-            s.before += l->results[i] != NULL;
+            s.before += l->results[s.order[k]] != NULL;
         }
     s.done = s.before;
     s.status = lab_begin_lines(l, name, l->def->shard, l->def->shards, &s.file);

@@ -332,7 +332,7 @@ static drape_status draw(lab *l, const chart *c)
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->x_label);
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "%s", c->y_label);
     if (count > 0)
-        lab_figure_fit(&f, xy, count, false);
+        lab_figure_fit(&f, xy, count, 0);
     return lab_figure_end(l, &f, c->y_label);
 }
 

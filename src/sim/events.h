@@ -16,6 +16,8 @@
 #include "base/archive.h"
 #include "events/events.h"
 
+struct drape_state;
+
 #define DRAPE_EVENT_SAMPLES 4  /* evaluations in each step: both ends, and thirds */
 #define DRAPE_EVENT_TIMES   32 /* the first roots of an event whose times are kept */
 

@@ -347,6 +347,18 @@ def test_events():
     equal(len(repeated), summary["steps"]["reasons"]["event"])
     assert repeated and all(row["accepted"] == "0" for row in repeated)
     equal(shape[0], summary["frames"])
+    # The rows have the same times, in the step in which they lie.
+    found = {}
+    for row in rows:
+        for word in filter(None, row["events"].split(";")):
+            name, time = word.rsplit("@", 1)
+            found[name] = float(time)
+            assert float(row["t"]) <= float(time) <= float(row["t"]) + float(row["h"]) * (1 + 1e-12) and row["accepted"] == "1", row
+    equal(found, {"low": at["time"], "event1": fast["occurrences"][0]["time"]}, "events in steps.csv")
+    # A name may have what a table needs quotes for.
+    write_scene(events=[{"name": 'low, "so"', "type": "height", "height": -0.02}])
+    good("run", "scene.json", "--out", "quoted")
+    equal([row["events"].rsplit("@", 1)[0] for row in read_steps("quoted") if row["events"]], ['low, "so"'], "a name with quotes")
 
 
 def test_released():

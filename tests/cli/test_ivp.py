@@ -30,10 +30,11 @@ def scores(*args):
     return values, [[float(cell) for cell in line.split(",")] for line in lines[1:] if "," in line]
 
 
-def write_npy(path, shape, numbers):
-    head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+def write_npy(path, shape, numbers, kind="<f8", fortran=False, version=1):
+    head = f"{{'descr': '{kind}', 'fortran_order': {fortran}, 'shape': {shape}, }}".ljust(117 if version == 1 else 115) + "\n"
     with open(path, "wb") as file:
-        file.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head.encode() + struct.pack(f"<{len(numbers)}d", *numbers))
+        file.write(b"\x93NUMPY" + bytes((version, 0)) + struct.pack("<H" if version == 1 else "<I", len(head)) + head.encode())
+        file.write(struct.pack(f"<{len(numbers)}{'f' if kind == '<f4' else 'd'}", *numbers))
 
 
 def test_every_scene_has_its_reference():
@@ -140,8 +141,19 @@ def test_bad_input():
     write_scene(duration=0.1, frame_rate=20, events=[{"type": "height", "height": -0.1, "action": "stop"}])
     refused("ivp", "reference", "scene.json", says='/events/0/action: must be "record"')
     write_scene(duration=0.1, frame_rate=33)
-    for name, says in (("short", "its shape is (5, 81, 3); it must be (6, 81, 3)"), ("cut", "not as long as its header says"),
-                       ("nan", "not a finite number"), ("text", "not an array of float64")):
+    for name, other in (("four", (6, 81, 3, 1)), ("flat", (6 * 81 * 3,)), ("rows", (6, 243)), ("turned", (3, 81, 6)), ("empty", ()), ("large", (2 ** 62, 81, 3)),
+                        ("many", (6, 81, 3, 1, 1, 1, 1, 1, 1)), ("minus", (-6, 81, 3))):
+        write_npy(name + ".npy", other, numbers)
+    write_npy("single.npy", shape, numbers, kind="<f4")
+    write_npy("big.npy", shape, numbers, kind=">f8")
+    write_npy("fortran.npy", shape, numbers, fortran=True)
+    right = "; it must be (6, 81, 3), frames x nodes x (x, y, z), a frame every 0.05 s, or one more with the start"
+    for name, says in (("short", "its shape is (5, 81, 3); it must be (6, 81, 3)"), ("cut", "not as long as its header says: 11656 bytes instead of 11664"),
+                       ("nan", "frame 0, node 0: nan is not a finite number"), ("text", "its header cannot be read"),
+                       ("four", "its shape is (6, 81, 3, 1)" + right), ("flat", "its shape is (1458,)" + right), ("rows", "its shape is (6, 243)" + right),
+                       ("turned", "its shape is (3, 81, 6)" + right), ("empty", "its shape is ()" + right), ("large", "its shape is (4611686018427387904, 81, 3)" + right),
+                       ("many", "its header cannot be read"), ("minus", "its header cannot be read"), ("single", "its numbers are '<f4'"), ("big", "its numbers are '>f8'"),
+                       ("fortran", "Fortran order")):
         refused("ivp", "score", "set/swing.json", name + ".npy", says=says)
     refused("ivp", "score", "set/swing.json", "none.npy", says="cannot read")
     refused("ivp", "horizon", "scene.json", says="must be a whole number")
@@ -155,6 +167,29 @@ def test_bad_input():
     write_npy("more.npy", (shape[0] + 1, *shape[1:]), (*[0.0] * (shape[1] * 3), *numbers))
     equal(scores("set/swing.json", "more.npy")[0]["error_max"], 0, "error of the reference with a start")
     equal(drape("ivp", "--help").returncode, 0, "help")
+    # Version 2 of the format has a longer length; numpy writes it for long headers.
+    write_npy("two.npy", shape, numbers, version=2)
+    equal(scores("set/swing.json", "two.npy")[0]["error_max"], 0, "error of the reference in version 2")
+
+
+def test_score_as_json():
+    """score --json has the numbers of the text, with the scene that they are of"""
+    take_set("swing")
+    shape, numbers = read_npy("set/references/swing.npy")
+    write_npy("off.npy", shape, [x + 1e-3 * (i % 3 == 0) for i, x in enumerate(numbers)])
+    values, rows = scores("set/swing.json", "off.npy")
+    found = json.loads(good("ivp", "score", "set/swing.json", "off.npy", "--json"))
+    equal((found["scene"], found["scene_hash"], found["resolved"]), ("swing", read_json("set/references/swing.json")["scene_hash"], True), "scene")
+    equal(len(found["times_s"]), shape[0], "times")
+    for key in ("error_end", "error_max", "mescd", "reference_error"):
+        assert abs(values[key] / found[key] - 1) < 0.05, key  # the text has two digits and more
+    # Every node is off by 1 mm: so are the mean and the largest, whatever the time. Pinned nodes are not counted in the mean.
+    for k, row in enumerate(rows):
+        for name, column in (("error", 1), ("error_largest", 2)):
+            assert abs(found[name][k] * found["size_m"] - 1e-3) < 1e-12 and abs(row[column] / found[name][k] - 1) < 1e-5, (name, k)
+    found = json.loads(good("ivp", "score", "set/swing.json", "set/references/swing.npy", "--json"))
+    equal((found["error_max"], found["mescd"], found["resolved"]), (0, None, False), "of the reference itself")
+    refused("ivp", "horizon", "set/swing.json", "--json", says="--json has no effect")
 
 
 sys.exit(run_tests(globals()))

@@ -25,7 +25,7 @@ def lines(folder):
         with open(path, encoding="utf-8") as file:
             for line in file:
                 result = json.loads(line)
-                for key in ("cpu_s", "wall_s"):
+                for key in ("cpu_s", "wall_s", "case_cpu_s"):
                     del result[key]
                 results[result["case"]] = result
     return results
@@ -102,6 +102,122 @@ def test_one_axis():
     page_is_alone("s/report.html")
 
 
+def test_results_in_figures():
+    """figures of stability show any result by name: curves over one axis, maps over two; other results need no run"""
+    write_scene(duration=0.3)
+    one = ["stability", "scene.json", "--axis", "/integrator/dt=1e-3:3e-1:6log", "--integrators", "be,verlet", "--out", "s"]
+    good(*one)
+    equal(sorted(os.path.basename(path) for path in glob.glob("s/*.svg")), ["curve_energy_drift.svg", "map.svg"], "figures of one axis")
+    with open("s/curve_energy_drift.gp", encoding="utf-8") as file:
+        script = file.read()
+    # A curve for each method; open markers where it took fewer than 20 steps, a row of crosses for verlet where it exploded.
+    blocks = [block.split() for block in re.findall(r"\$d\d+ << EOD\n(.*?)EOD", script, re.S)]
+    by_method = {}
+    for result in lines("s").values():
+        by_method.setdefault(result["tags"]["integrator"], []).append(result)
+    few = [r for r in by_method["be"] if r["accepted"] < 20]
+    failed = [r for r in by_method["verlet"] if r["status"] != "ok"]
+    assert few and failed and len(few) < 6 and len(failed) < 6, (few, failed)
+    sizes = [len(block) // 2 for block in blocks]
+    assert 6 - len(few) in sizes and len(few) in sizes and len(failed) in sizes, sizes
+    for text in ("fewer than 20 steps", "stopped or exploded"):
+        assert f"set label '{text}'" in script, text
+    heights = {float(y) for block in blocks for y in block[1::2]}
+    drifts = {abs(r["energy_drift"]) for r in by_method["be"]}
+    assert all(min(abs(h / d - 1) for h in heights) < 1e-6 for d in drifts), (drifts, heights)
+    # Other results are drawn from the same lines.
+    with open("s/cases.jsonl", encoding="utf-8") as file:
+        before = sorted(file.read().splitlines())
+    good(*one, "--results", "iterations_per_step,strain_max")
+    with open("s/cases.jsonl", encoding="utf-8") as file:
+        equal(sorted(file.read().splitlines()) == before, True, "the same lines, with their CPU times")
+    equal(read_json("s/experiment.json")["results"], ["iterations_per_step", "strain_max"], "results of the experiment")
+    assert os.path.exists("s/curve_strain_max.svg") and os.path.exists("s/curve_iterations_per_step.svg")
+    # Over two axes, also of shards that are merged: one scale for all maps, hatches over what was too short to be judged.
+    two = ["stability", "scene.json", *AXES, "--integrators", "be,verlet", "--results", "energy_drift"]
+    for shard in ("1/2", "2/2"):
+        good(*two, "--shard", shard, "--out", "parts")
+    good("merge", "parts", "--out", "m")
+    scales, hatched = set(), False
+    for name in ("be", "verlet"):
+        with open(f"m/map_{name}_energy_drift.gp", encoding="utf-8") as file:
+            script = file.read()
+        scales.add(re.search(r"set cbrange .*", script).group())
+        hatched |= "pattern 5 noborder lc rgb" in script
+    equal((len(scales), hatched), (1, True), "scales, hatches")
+    refused("stability", "scene.json", *AXES, "--results", "energy_drif", "--out", "x", says='did you mean "energy_drift"')
+    # Every name is a column of results.csv.
+    names = refused("stability", "scene.json", *AXES, "--results", "?", "--out", "x", says="there are").split("there are ")[1]
+    with open("m/results.csv", encoding="utf-8") as file:
+        columns = file.readline().strip().split(",")
+    missing = [name for name in re.findall(r"\w+", names) if name not in columns]
+    equal(missing, [], f"columns {columns}")
+
+
+def test_short_runs_are_hatched():
+    """runs of fewer than 20 steps are hatched, whatever else is said of them; those over budget are named with the budget"""
+    write_scene(duration=0.3)
+    good("stability", "scene.json", "--axis", "/integrator/dt=1e-3:3e-1:6log", "--axis", "/cloth/0/material/young_modulus=1e2:1e5:2log",
+         "--integrators", "be", "--strain-limit", "1e-6", "--out", "s")
+    with open("s/map_be.gp", encoding="utf-8") as file:
+        script = file.read()
+    found = lines("s").values()
+    assert all(r["strain_max"] > 1e-6 for r in found), found
+    short = {r["tags"]["/integrator/dt"] for r in found if r["accepted"] < 20}
+    assert short and "unphysical strain" in script and "fewer than 20 steps" in script, script
+    # The boxes that are hatched begin where the first of these cells does, half a step below its dt.
+    boxes = re.search(r"pattern 5 noborder lc rgb '#000000'", script) and re.findall(r"\$d(\d+) using 1:2:3:4:5:6 with", script)[0]
+    rows = re.search(rf"\$d{boxes} << EOD\n(.*?)EOD", script, re.S).group(1).splitlines()
+    half = 300 ** (0.5 / 5)
+    for row in rows:
+        assert abs(float(row.split()[2]) * half / min(short) - 1) < 1e-6, (row, short)
+    write_scene(duration=1000)
+    good("stability", "scene.json", "--axis", "/cloth/0/material/density=100:200:2", "--integrators", "be", "--case-seconds", "0.05", "--out", "late")
+    with open("late/map.gp", encoding="utf-8") as file:
+        assert "set label 'over budget (0.05 s)'" in file.read()
+
+
+def test_plan():
+    """a plan runs a part of the cases, spread over all, and scales their costs up by integrator; the whole run keeps them"""
+    write_scene()
+    command = ["stability", "scene.json", "--axis", "/integrator/dt=1e-3:1e-1:20log", "--axis", "/cloth/0/material/young_modulus=1e4:1e6:10log",
+               "--integrators", "be,verlet", "--out", "s"]
+    out = good(*command, "--plan", "40")
+    assert "plan      from 40 of 400 cases" in out and "report" not in out, out
+    sample = lines("s")
+    equal(len(sample), 40, "cases that were run")
+    # Spread evenly: half of them are of each integrator up to one, no more than 4 in any of 20 equal parts of the numbers, which would have 2 each.
+    equal(abs(sum(r["tags"]["integrator"] == "be" for r in sample.values()) - 20) <= 1, True, "cases of be")
+    equal(max(sum(i // 20 == part for i in sample) for part in range(20)) <= 4, True, sorted(sample))
+    # Costs that are known give totals that are known, without an interval as they do not scatter: 200 x 2 s + 200 x 1/4 s.
+    with open("s/cases.jsonl", encoding="utf-8") as file:
+        cases = [json.loads(line) for line in file]
+    for case in cases:
+        case["case_cpu_s"] = 2 if case["tags"]["integrator"] == "be" else 0.25
+    with open("s/cases.jsonl", "w", encoding="utf-8") as file:
+        file.write("".join(json.dumps(case) + "\n" for case in cases))
+    claim("s", "cases.jsonl")
+    good(*command, "--plan", "40", "--jobs", "1")
+    plan = read_json("s/plan.json")
+    for key, value in (("cases", 400), ("sampled", 40), ("cpu_s", 450), ("cpu_low_s", 450), ("cpu_high_s", 450), ("elapsed_s", 450), ("jobs", 1)):
+        assert abs(plan[key] / value - 1) < 1e-5, (key, plan)
+    equal(lines("s"), sample, "the sample of a second plan")
+    # The whole run continues, and is as large as was planned: lines differ by the digits of their numbers.
+    good(*command)
+    found = lines("s")
+    equal(len(found), 400, "cases of the whole run")
+    equal({i: found[i] for i in sample}, sample, "cases of the plan")
+    size = sum(os.path.getsize("s/" + name) for name in ("experiment.json", "cases.jsonl", "results.csv"))
+    assert abs(plan["disk_bytes"] / size - 1) < 0.1, (plan, size)
+    assert plan["memory_bytes"] > 1e6, plan
+    # A plan of more cases than there are runs all; other experiments have plans, too.
+    out = good("converge", "scene.json", "--integrators", "be", "--levels", "3", "--plan", "100", "--out", "c")
+    assert "plan      from 3 of 3 cases" in out and not os.path.exists("c/report.html"), out
+    out = good("tradeoff", "scene.json", "--integrators", "be,ida", "--plan", "4", "--shard", "1/2", "--out", "t")
+    assert "plan      from 4 of " in out, out
+    refused("converge", "scene.json", "--plan", "0", "--out", "d", says="--plan")
+
+
 def test_message_over_budget():
     """a case that takes more than its CPU time says so"""
     write_scene(duration=1000)
@@ -170,11 +286,14 @@ def test_converge():
     for integrator, order in (("be", 1), ("bdf2", 2), ("trbdf2", 2)):
         assert abs(float(orders[integrator]) - order) < 0.1, out
     page_is_alone("c/report.html")
-    # A line is fitted through runs of one limit of the order of ida only.
+    # ida chooses its order with rtol: no line is fitted across that, for any limit of the order.
     out = good("converge", "scene.json", "--integrators", "ida", "--levels", "5", "--out", "ida")
-    equal(re.findall(r"^(ida.*): order", out, re.M), ["ida, order 2", "ida, order 5"], "series")
+    equal(re.findall(r"^(ida.*): no order, as it chooses its order", out, re.M), ["ida, order 2", "ida, order 5"], "series")
     out = good("converge", "scene.json", "--integrators", "ida", "--levels", "4", "--set", "/integrator/max_order=3", "--out", "three")
-    equal(re.findall(r"^(ida.*): order", out, re.M), ["ida"], "series at an order that the user chose")
+    equal(re.findall(r"^(ida.*): no order", out, re.M), ["ida"], "series at an order that the user chose")
+    # A method of one order has a slope over rtol, which is not called an order.
+    out = good("converge", "scene.json", "--integrators", "rosenbrock", "--levels", "5", "--out", "ros")
+    assert re.search(r"^rosenbrock: change proportional to rtol\^[\d.]+ \(95 % confidence", out, re.M) and "order" not in out, out
     # Unless they are fixed, verlet takes as many substeps as its stability limit needs, and dt does not refine them.
     out = good("converge", "scene.json", "--integrators", "verlet", "--levels", "4", "--out", "v")
     assert "verlet: no order, as it chooses its own substeps" in out, out
@@ -185,9 +304,31 @@ def test_converge():
     # Within a second folds grow and the refinements do not converge: the output says so, and only then.
     for duration, uncertain in ((0.3, False), (1, True)):
         write_scene(duration=duration)
-        out = good("converge", "scene.json", "--integrators", "midpoint", "--levels", "4", "--out", f"i{duration}")
-        low = re.search(r"^midpoint: order .*confidence (\S+) to", out, re.M).group(1)
-        equal((float(low) <= 0, "so the order is not determined" in out), (uncertain, uncertain), out)
+        out = good("converge", "scene.json", "--integrators", "midpoint", "--levels", "6", "--out", f"i{duration}")
+        equal("the order is not determined" in out, uncertain, out)
+
+
+def test_one_order_is_fitted():
+    """converge fits a line through the finest refinements of one order, and says how many; a merge of changed lines shows it"""
+    write_scene(duration=0.3)
+    command = ["converge", "scene.json", "--integrators", "be", "--levels", "7", "--out", "c"]
+    good(*command)
+    # The ends of the runs are replaced: they move by 4^-k from dt 1/60/2^k on for k < 3, then by 2^-k.
+    moves = [1, 1 / 4, 1 / 16, 1 / 32, 1 / 64, 1 / 128]
+    with open("c/cases.jsonl", encoding="utf-8") as file:
+        cases = [json.loads(line) for line in file]
+    for case in cases:
+        at = sum(moves[:case["case"]])
+        case["positions"] = [at] * len(case["positions"])
+    with open("c/cases.jsonl", "w", encoding="utf-8") as file:
+        file.write("".join(json.dumps(case) + "\n" for case in cases))
+    claim("c", "cases.jsonl")
+    out = good(*command)
+    assert "be: order 1 in dt" in out and "of the last 4 of 6 refinements, as the order of the others is another one" in out, out
+    with open("c/converge_dt.gp", encoding="utf-8") as file:
+        script = file.read()
+    sizes = [len(block.split()) // 2 for block in re.findall(r"\$d\d+ << EOD\n(.*?)EOD", script, re.S)]
+    assert sizes[:2] == [2, 4] and "set label 'be (1.00)'" in script and "set label 'not fitted'" in script, script
 
 
 def test_converge_in_space():
@@ -224,7 +365,7 @@ def merged_is(whole, folder, merged):
     """Checks that the lines and the table of the shards are those of a single run."""
     good("merge", folder, "--out", merged)
     equal(lines(merged), lines(whole), "results of " + folder)
-    numbers = ("cpu_s", "wall_s")
+    numbers = ("cpu_s", "wall_s", "case_cpu_s")
     tables = []
     for name in (merged, whole):
         with open(name + "/results.csv", encoding="utf-8", newline="") as file:
