@@ -9,6 +9,8 @@
 #include <math.h>
 #include <string.h>
 
+#define ARRIVAL 1e-9 /* of the time of a path */
+
 /* ---- Creation ---- */
 
 static size_t pinned_count(const drape_model *m)
@@ -234,14 +236,20 @@ static bool at_kink_of(const course *c, double t)
     return false;
 }
 
+/* Whether a path has just come to its end: the next moment that a host computes may differ by rounding. */
+static bool has_arrived(const drape_path *path, double t)
+{
+    return t >= path->t[1] && t - path->t[1] <= ARRIVAL * (path->t[1] - path->t[0]);
+}
+
 /* Writes the velocity that leads to the position at t. Returns whether it is known: it is not at a key of a
  * track, nor where the host replaces a path at the moment at which it began. */
 static bool leading_velocity(const course *c, double t, double v[3])
 {
     const drape_path *path = c->path;
-    if (path->given && (t == path->t[0] || t == path->t[1])) {
-        memcpy(v, path->v[t == path->t[1]], 3 * sizeof *v);
-        return t == path->t[1] || path->smooth;
+    if (path->given && (t == path->t[0] || has_arrived(path, t))) {
+        memcpy(v, path->v[has_arrived(path, t)], 3 * sizeof *v);
+        return has_arrived(path, t) || path->smooth;
     }
     velocity_on(c, t, t, v);
     return path->given || !c->track || c->track->key_count == 0;
@@ -252,11 +260,11 @@ static bool leading_spin(const course *c, double t, double w[3])
 {
     const drape_path *path = c->path;
     double turn[3], rate[3];
-    if (!path->given || t != path->t[1]) {
+    if (!path->given || !has_arrived(path, t)) {
         spin_on(c, t, t, w);
         return path->given ? t != path->t[0] || path->smooth : c->turns->key_count == 0;
     }
-    turn_vector(c, t, path->t[0], turn, rate);
+    turn_vector(c, path->t[1], path->t[0], turn, rate);
     drape_rotation_velocity(turn, rate, w);
     return true;
 }
