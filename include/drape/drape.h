@@ -182,6 +182,32 @@ typedef struct drape_cloth_def {
     double velocity[3];           /* initial velocity of every node [m/s] */
 } drape_cloth_def;
 
+/* One side of a seam: nodes of one cloth, in the order in which they are joined. They are selected as those of a
+ * pin, by exactly one of nodes, corner, edge, row (>= 0) and has_box. An edge or a row runs along ascending
+ * columns or rows of the grid; the nodes of a box are sorted along the longest side of their own bounding box.
+ * It is embedded in drape_seam_def, so it can grow only into its reserved members. */
+typedef struct drape_seam_side_def {
+    const char *cloth;             /* name of the cloth; required */
+    const int32_t *nodes;          /* node_count node numbers, local to this cloth */
+    size_t node_count;             /* length of nodes */
+    const char *corner;            /* as in drape_pin_def */
+    const char *edge;              /* as in drape_pin_def */
+    int32_t row;                   /* as in drape_pin_def; -1: not selected by row */
+    bool has_box;                  /* whether box_min and box_max are set */
+    double box_min[3], box_max[3]; /* [m], as in drape_pin_def */
+    bool reverse;                  /* the order of the nodes is reversed */
+    void *reserved[4];             /* must be NULL */
+} drape_seam_side_def;
+
+/* A seam: joins the nodes of a to those of b, one by one. Both have the same number of nodes. Initialise with
+ * drape_seam_def_init. */
+typedef struct drape_seam_def {
+    size_t struct_size;       /* set by drape_seam_def_init */
+    drape_entry_def entry;    /* the seam: "stitch", or a term of the host with build_seam (extend.h) */
+    const char *name;         /* unique name; NULL: "seam0", "seam1" ... */
+    drape_seam_side_def a, b; /* its two sides */
+} drape_seam_def;
+
 /* A rigid obstacle: a collider with its parameters. Initialise with drape_collider_def_init. */
 typedef struct drape_collider_def {
     size_t struct_size;           /* set by drape_collider_def_init */
@@ -236,6 +262,8 @@ typedef struct drape_scene_def {
     const char *up; /* axis that points up in frames written by `drape run`: "y" or "z"; NULL: "y" */
     const drape_event_def *events; /* at most 256 */
     size_t event_count;            /* length of events */
+    const drape_seam_def *seams;   /* at most 4096; NULL: none */
+    size_t seam_count;             /* length of seams */
 } drape_scene_def;
 
 /* Fill a def with the defaults documented above. Pass the caller's sizeof of the def as struct_size. Nothing
@@ -245,6 +273,7 @@ DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
 DRAPE_API void drape_pin_def_init(drape_pin_def *def, size_t struct_size);
 DRAPE_API void drape_event_def_init(drape_event_def *def, size_t struct_size);
+DRAPE_API void drape_seam_def_init(drape_seam_def *def, size_t struct_size);
 DRAPE_API void drape_collider_def_init(drape_collider_def *def, size_t struct_size);
 
 /* ---- Scene from text ---- */

@@ -356,10 +356,20 @@ static void evaluate_measures(const drape_term *term, const drape_request *want,
 
 /* ---- Energies and dissipations, element by element ---- */
 
+/* The elements as energies and dissipations see them. */
+static drape_elements elements_at(const drape_term *term, const drape_point *point)
+{
+    drape_elements el = term->elements;
+    el.time = point->t;
+    el.stiffest = point->stiffest;
+    return el;
+}
+
 static void evaluate_energies(const drape_term *term, const drape_request *want, drape_block *b)
 {
+    const drape_elements el = elements_at(term, want->point);
     const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
-    term->ops->energy(&term->elements, b->first, b->count, want->point->x, internal, b->energy, b->gradient,
+    term->ops->energy(&el, b->first, b->count, want->point->x, internal, b->energy, b->gradient,
                       want->hessian ? b->hessian : NULL);
 }
 
@@ -382,10 +392,10 @@ static void evaluate_dissipations(const drape_term *term, const drape_request *w
 {
     const int d = 3 * term->elements.nodes;
     const bool hessian = want->hessian, wind = want->against && term->ops->in_medium;
+    const drape_elements el = elements_at(term, want->point);
     memset(b->energy, 0, (size_t)b->count * sizeof *b->energy);
-    term->ops->dissipation(&term->elements, b->first, b->count, want->point->x,
-                           wind ? want->against : want->point->v, b->gradient, hessian ? b->hessian : NULL,
-                           hessian ? b->scratch : NULL);
+    term->ops->dissipation(&el, b->first, b->count, want->point->x, wind ? want->against : want->point->v,
+                           b->gradient, hessian ? b->hessian : NULL, hessian ? b->scratch : NULL);
     for (int32_t i = 0; wind && hessian && !want->velocity && i < b->count; i++)
         carry_wind(term, want->wind_gradient, b->scratch + (size_t)i * (size_t)(d * d), b->first + i,
                    b->hessian + (size_t)i * (size_t)(d * d));
@@ -422,9 +432,9 @@ void drape_block_evaluate(const drape_term *term, const drape_request *want, dra
     else
         evaluate_dissipations(term, want, b);
     const int d = 3 * term->elements.nodes;
-    /* Of measures the positive part is taken already. Drag has none: it is not symmetric, and much of what
+    /* Of measures the positive part is taken already, and convex energies are their own. Drag has none: it is not symmetric, and much of what
      * neighbouring triangles add cancels. Positive parts would not, and would hold light cloth fast. */
-    const bool given = term->ops->measure || term->ops->in_medium;
+    const bool given = term->ops->measure || term->ops->in_medium || term->ops->convex;
     for (int32_t i = 0; want->hessian && want->positive_share > 0 && !given && i < b->count; i++)
         project(d, want->positive_share, b->hessian + (size_t)i * (size_t)(d * d), b->scratch);
 }
