@@ -241,8 +241,10 @@ DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, cons
  * in contact, and do not count as intersections. */
 DRAPE_API void drape_term_sew(drape_term_builder *builder, int32_t a, int32_t b);
 
-/* Of an energy: declares that it changes with el->time from one time to another [s], and at no other time. What
- * it gains or loses by that is work, which is accounted as the work of moving pins is. */
+/* Of an energy: declares that it depends on el->progress, which goes smoothly from 0 to 1 while the time goes from
+ * one to another [s]: s^2 (3 - 2 s). What the energy gains or loses by that is work, which is accounted as the
+ * work of moving pins is. If the stiffness changes too, it must be largest at progress 1, where the stable step
+ * of explicit integrators is estimated. */
 DRAPE_API void drape_term_timed(drape_term_builder *builder, double from, double to);
 
 /* Rejects the cloth or the seam: the reason is reported at the place of the term in the scene. Returns
@@ -276,8 +278,8 @@ typedef struct drape_parts {
     const int32_t *user;       /* (link_count) numbers of links */
 } drape_parts;
 
-/* The elements of one term on one cloth or one seam; constant after the model is compiled, but for time and
- * stiffest. Allocated by the library alone: it may grow at its end. */
+/* The elements of one term on one cloth or one seam; constant after the model is compiled, but for
+ * progress. Allocated by the library alone: it may grow at its end. */
 typedef struct drape_elements {
     int32_t count;            /* number of elements */
     int nodes;                /* nodes per element */
@@ -287,10 +289,7 @@ typedef struct drape_elements {
     const double *params;     /* values in the order of the term's parameters */
     const drape_parts *parts; /* NULL: the term has none */
     void *user;               /* of the term's ops */
-    double time;              /* for the functions energy and dissipation: the time of x [s]; else 0 */
-    bool stiffest;            /* for energy: the stable step of an explicit integrator is estimated, so an
-                                 energy whose stiffness comes and goes, as that of a thread that may be slack,
-                                 is taken where it is stiffest */
+    double progress;          /* for the function energy of a term with drape_term_timed: 0 to 1; else 0 */
 } drape_elements;
 
 /* The fault that a check found, for the message of a rejected step. */

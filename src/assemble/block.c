@@ -356,12 +356,11 @@ static void evaluate_measures(const drape_term *term, const drape_request *want,
 
 /* ---- Energies and dissipations, element by element ---- */
 
-/* The elements as energies and dissipations see them. */
+/* The elements as energies see them. */
 static drape_elements elements_at(const drape_term *term, const drape_point *point)
 {
     drape_elements el = term->elements;
-    el.time = point->t;
-    el.stiffest = point->stiffest;
+    el.progress = point->done ? 1 : drape_term_progress(term, point->t) + point->progressed;
     return el;
 }
 
@@ -392,10 +391,10 @@ static void evaluate_dissipations(const drape_term *term, const drape_request *w
 {
     const int d = 3 * term->elements.nodes;
     const bool hessian = want->hessian, wind = want->against && term->ops->in_medium;
-    const drape_elements el = elements_at(term, want->point);
     memset(b->energy, 0, (size_t)b->count * sizeof *b->energy);
-    term->ops->dissipation(&el, b->first, b->count, want->point->x, wind ? want->against : want->point->v,
-                           b->gradient, hessian ? b->hessian : NULL, hessian ? b->scratch : NULL);
+    term->ops->dissipation(&term->elements, b->first, b->count, want->point->x,
+                           wind ? want->against : want->point->v, b->gradient, hessian ? b->hessian : NULL,
+                           hessian ? b->scratch : NULL);
     for (int32_t i = 0; wind && hessian && !want->velocity && i < b->count; i++)
         carry_wind(term, want->wind_gradient, b->scratch + (size_t)i * (size_t)(d * d), b->first + i,
                    b->hessian + (size_t)i * (size_t)(d * d));

@@ -9,10 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Of dE/dt of a term that depends on time: the step of its difference, as a fraction of the step, and the number
- * of samples of what begins and ends within it. */
-#define POWER_STEP    1e-6
-#define POWER_SAMPLES 16
+#define PROGRESS_STEP 1e-6 /* of the difference that is dE/dprogress of a term that depends on time */
 
 struct drape_system {
     drape_arena *arena;
@@ -27,8 +24,7 @@ struct drape_system {
     drape_status status;          /* of drape_system_status */
     drape_motion *motion;
     drape_drag_spring drag;
-    double *push;    /* (node_count x 3) [N], if pushed */
-    double *between; /* (node_count x 3) scratch; NULL: no term depends on time */
+    double *push; /* (node_count x 3) [N], if pushed */
     bool pushed;
     drape_wind wind;
     const atomic_bool *cancel; /* NULL: there is no flag to watch */
@@ -45,8 +41,6 @@ drape_status drape_system_create(drape_arena *arena, const drape_model *model, i
     *system = (drape_system){
         .arena = arena, .model = model, .pattern = &model->pattern, .extension = drape_arena_within(arena)};
     system->push = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->push);
-    if (drape_system_is_timed(system))
-        system->between = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->between);
     drape_status status = drape_pool_create(arena, threads, &system->pool);
     if (!status)
         status = drape_summer_create(arena, model, system->pool, &system->summer);
@@ -523,64 +517,52 @@ bool drape_system_is_timed(const drape_system *system)
     return false;
 }
 
-/* A step of a term that depends on time: from x at t0 to y at t1, of which only the part from `begin` to `end`
- * counts. */
-typedef struct timed_step {
-    drape_system *system;
-    const drape_term *term;
-    const double *internal, *x, *y;
-    double t0, t1, begin, end;
-} timed_step;
-
-/* dE/dt at time t, where the nodes are on the straight path then. */
-static double power_at(const timed_step *s, double t)
+/* dE/dprogress of a term at a point. */
+static double by_progress(drape_system *system, const drape_term *term, const drape_point *at)
 {
-    const drape_request base = {.energy = true, .conservative = true};
-    const double ahead = POWER_STEP * (s->end - s->begin),
-                 at[2] = {fmax(t - ahead, s->begin), fmin(t + ahead, s->end)},
-                 share = (t - s->t0) / (s->t1 - s->t0);
-    double energy[2] = {0, 0}, *z = s->system->between;
-    for (size_t i = 0; i < 3 * (size_t)s->system->model->node_count; i++)
-        z[i] = s->x[i] + share * (s->y[i] - s->x[i]);
+    const double progress = drape_term_progress(term, at->t), back = fmin(PROGRESS_STEP, progress),
+                 ahead = fmin(PROGRESS_STEP, 1 - progress);
+    double energy[2] = {0, 0};
     for (int k = 0; k < 2; k++) {
-        const drape_point point = {.x = z, .internal = s->internal, .t = at[k]};
-        drape_request want = base;
-        want.point = &point;
-        drape_summer_add_term(s->system->summer, s->term, &want, &(drape_sums){0}, &energy[k]);
+        drape_point point = *at;
+        point.progressed = k == 0 ? -back : ahead;
+        const drape_request want = {.point = &point, .energy = true, .conservative = true};
+        drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy[k]);
     }
-    return (energy[1] - energy[0]) / (at[1] - at[0]);
+    return (energy[1] - energy[0]) / (back + ahead);
 }
 
-/* By the trapezoidal rule, at whose ends the nodes are where the step has them: between them, the straight path
- * is far from the nodes' in comparison with what a stiff term is strained. A change that begins and ends within
- * the step is sampled, as it may be a jump. */
-static double timed_work(const timed_step *s, bool within)
+/* By the trapezoidal rule over the progress, at whose ends the nodes are where the step has them: between them, a
+ * straight path is far from theirs in comparison with what a stiff term is strained. What begins and ends within
+ * the step is a jump, and is taken where the step begins. */
+static double timed_work(drape_system *system, const drape_term *term, const drape_point *from,
+                         const drape_point *to)
 {
-    const double span = s->end - s->begin;
-    double sum = 0;
-    for (int i = 0; within && i < POWER_SAMPLES; i++)
-        sum += power_at(s, s->begin + (i + 0.5) / POWER_SAMPLES * span) / POWER_SAMPLES;
-    return span * (within ? sum : (power_at(s, s->begin) + power_at(s, s->end)) / 2);
+    const double done = drape_term_progress(term, to->t) - drape_term_progress(term, from->t);
+    if (done == 0)
+        return 0;
+    if (done < 1)
+        return done * (by_progress(system, term, from) + by_progress(system, term, to)) / 2;
+    drape_point after = *from;
+    double energy[2] = {0, 0};
+    after.done = true;
+    for (int k = 0; k < 2; k++) {
+        const drape_request want = {.point = k ? &after : from, .energy = true, .conservative = true};
+        drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy[k]);
+    }
+    return energy[1] - energy[0];
 }
 
 double drape_system_timed_work(drape_system *system, const double *internal, const double *x, double t0,
                                const double *y, double t1)
 {
+    const drape_point from = {.x = x, .internal = internal, .t = t0},
+                      to = {.x = y, .internal = internal, .t = t1};
     double work = 0;
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
-        const double *timed = term->timed;
-        const timed_step s = {.system = system,
-                              .term = term,
-                              .internal = internal,
-                              .x = x,
-                              .y = y,
-                              .t0 = t0,
-                              .t1 = t1,
-                              .begin = fmax(t0, timed[0]),
-                              .end = fmin(t1, timed[1])};
-        if (drape_term_is_timed(term) && s.begin < s.end && has_energy(system, term))
-            work += timed_work(&s, timed[0] > t0 && timed[1] < t1);
+        if (drape_term_is_timed(term) && has_energy(system, term))
+            work += timed_work(system, term, &from, &to);
     }
     return work;
 }

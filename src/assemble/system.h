@@ -29,7 +29,8 @@ typedef struct drape_point {
     const double *history;  /* (measure_count) [q/s]; NULL: q' = grad q . v, as in continuous time */
     const double *stress;   /* (measure_count) the f before ddq in a Jacobian; NULL: the forces here */
     double t;               /* [s] time of the colliders' poses, and of terms that depend on it */
-    bool stiffest;          /* energies whose stiffness comes and goes are taken where they are stiffest */
+    bool done;              /* energies that depend on time are taken at progress 1 */
+    double progressed;      /* added to their progress, for differences */
     double span[2]; /* [s] over which the velocities of colliders are taken; equal: they are at rest */
     drape_contact_derivatives contact; /* of contact in a Jacobian without positive parts */
 } drape_point;
@@ -62,8 +63,7 @@ drape_motion *drape_system_steer(drape_system *system);
 void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
 
-/* Whether a term depends on time, and the work that this does in a step from nodes x at t0 to y at t1 [J]: the
- * integral of dE/dt. internal: of the state at t0. */
+/* Whether a term depends on time, and the work that this does in a step from nodes x at t0 to y at t1 [J]. internal: of the state at t0. */
 bool drape_system_is_timed(const drape_system *system);
 double drape_system_timed_work(drape_system *system, const double *internal, const double *x, double t0,
                                const double *y, double t1);

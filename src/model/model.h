@@ -42,6 +42,15 @@ static inline bool drape_term_is_timed(const drape_term *term)
     return term->timed[0] < term->timed[1];
 }
 
+/* From 0 at the beginning of this time to 1 at its end, with rate 0 at both. */
+static inline double drape_term_progress(const drape_term *term, double t)
+{
+    const double s = (t - term->timed[0]) / (term->timed[1] - term->timed[0]);
+    if (!drape_term_is_timed(term) || s >= 1)
+        return 1;
+    return s > 0 ? s * s * (3 - 2 * s) : 0;
+}
+
 /* Whether the term has a Hessian, so that it couples the nodes of an element. */
 static inline bool drape_term_couples(const drape_term *term)
 {

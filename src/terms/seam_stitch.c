@@ -1,6 +1,6 @@
 /*
  * stitch: a thread from each node of one side to that of the other, of which no more than r(t) is left:
- *     E = 1/2 k max(0, l - r)^2,    r = gap (1 - s^2 (3 - 2 s)),    s = (t - start)/closing within [0, 1].
+ *     E = 1/2 k max(0, l - r)^2,    r = gap (1 - progress).
  * It pulls and never pushes, so that E is convex in every state and, once r is 0, E = 1/2 k d.d is smooth where
  * the nodes meet. A thread has no dashpot: a force along the relative velocity of two nodes that are apart would
  * resist a rotation of both, and one along the thread has no direction where they meet.
@@ -52,21 +52,11 @@ static drape_status build(const drape_seam_view *seam, const double *values, dra
     return status;
 }
 
-/* The share of the gap that threads have left. */
-static double share_left(const drape_elements *el)
-{
-    const double since = el->time - el->params[START], closing = el->params[CLOSING];
-    if (el->stiffest || since >= closing)
-        return 0;
-    const double s = fmax(since / closing, 0);
-    return 1 - s * s * (3 - 2 * s);
-}
-
 static void stitch(const drape_elements *el, int32_t element, const double *x, double *e, double *g,
                    double *hess)
 {
     const double k = drape_rest_of(el, REST_STIFFNESS, element),
-                 r = drape_rest_of(el, REST_GAP, element) * share_left(el);
+                 r = drape_rest_of(el, REST_GAP, element) * (1 - el->progress);
     double d[3];
     vec3_sub(x + 3, x, d);
     const double l = vec3_norm(d);
