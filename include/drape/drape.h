@@ -667,6 +667,25 @@ DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_contact_forces(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3]);
 
+/* A seam in the last accepted state. */
+typedef struct drape_seam_report {
+    const char *name;         /* as in the scene, or "seam0", "seam1" ...; valid as long as the model */
+    const char *type;         /* name of its entry, such as "stitch" */
+    int32_t cloth[2];         /* numbers of the cloths of its sides a and b */
+    int32_t pairs;            /* how many pairs of nodes it joins */
+    double gap_mean, gap_max; /* [m] distance of joined nodes, over the pairs */
+    double force[3];          /* [N] of the seam on the nodes of side a: what it carries */
+    double tension;           /* [N] the sum of the magnitudes of the forces on these nodes */
+    double tension_max;       /* [N] the largest one */
+    int32_t node;             /* where it is largest: number in the model of the node of side a */
+} drape_seam_report;
+
+/* The number of seams and, if out is not NULL and index is that of a seam in scene order, its report. The forces
+ * are conservative ones and those that depend on velocities. A node that is in both sides of a seam counts with
+ * the sum of the forces on it. Thread-safety: as the sim. Must not be called by an observer: then nothing is
+ * written. */
+DRAPE_API int32_t drape_sim_seam(drape_sim *sim, int32_t index, drape_seam_report *out);
+
 /* The position of a collider in the last accepted state, as drape_model_collider, but including moves by the
  * host. */
 DRAPE_API drape_collider_motion drape_sim_collider(const drape_sim *sim, int32_t collider);

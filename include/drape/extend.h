@@ -426,6 +426,26 @@ typedef struct drape_term_ops {
  * 32), DRAPE_E_VERSION (struct_size). */
 DRAPE_API drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops);
 
+/* One comparison of analytic derivatives with central differences. */
+typedef struct drape_check_result {
+    const char
+        *term; /* name of a term, "contact", "self_contact" or "assembled"; valid as long as the model */
+    const char *what; /* "gradient", "Hessian", "force by rate" ...; static */
+    double error;     /* relative, the largest in the sample */
+    double limit;     /* beyond which it fails */
+    bool pass;        /* error <= limit */
+} drape_check_result;
+
+/* Compares every analytic derivative of a model with differences, at a deformed, rotated, moving state: of its
+ * terms, element by element, of the assembled Jacobian, and of contact. This is what `drape check` prints, for
+ * the tests of a term. seed: of the random deformation. results (room) receives the first comparisons; *count
+ * their number, which may be larger than room. A comparison that fails is not an error. Errors: DRAPE_E_ARGUMENT
+ * (NULL), DRAPE_E_MEMORY, DRAPE_E_STOPPED (the context's cancel function). Thread-safety: as functions of the
+ * context. */
+DRAPE_API drape_status drape_model_check_derivatives(const drape_model *model, unsigned seed,
+                                                     drape_check_result *results, int32_t room,
+                                                     int32_t *count);
+
 /* Makes a range function out of a function for one element. x (d) are local coordinates; outputs that are
  * NULL are not written. Use:
  *

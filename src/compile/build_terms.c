@@ -307,7 +307,7 @@ static const double *own_damping(const drape_term *term)
 /* Builds the term that joins the nodes of a seam. */
 static drape_status build_seam(drape_model *model, int32_t s, const drape_entry_def *def)
 {
-    drape_seam *seam = &model->seams[s];
+    drape_model_seam *seam = &model->seams[s];
     const drape_cloth *side[2] = {&model->cloths[seam->cloth[0]], &model->cloths[seam->cloth[1]]};
     const drape_term_ops *ops;
     char pointer[64], at[80];

@@ -135,7 +135,8 @@ static drape_status list_side(side *s, drape_arena *scratch)
 
 /* ---- A seam ---- */
 
-static drape_status name_seam(drape_model *model, const char *pointer, const char *given, drape_seam *to)
+static drape_status name_seam(drape_model *model, const char *pointer, const char *given,
+                              drape_model_seam *to)
 {
     char name[32], at[96];
     const int32_t index = (int32_t)(to - model->seams);
@@ -150,7 +151,7 @@ static drape_status name_seam(drape_model *model, const char *pointer, const cha
     return drape_arena_status(&model->arena);
 }
 
-static drape_status join(drape_model *model, const char *pointer, const side sides[2], drape_seam *to)
+static drape_status join(drape_model *model, const char *pointer, const side sides[2], drape_model_seam *to)
 {
     const side *a = &sides[0], *b = &sides[1];
     if (a->count != b->count)
@@ -176,7 +177,7 @@ static drape_status join(drape_model *model, const char *pointer, const side sid
 
 static drape_status compile_seam(drape_model *model, size_t i, const drape_seam_def *def)
 {
-    drape_seam *to = &model->seams[i];
+    drape_model_seam *to = &model->seams[i];
     drape_arena scratch = drape_arena_of(model->ctx);
     side sides[2] = {{.model = model, .def = &def->a}, {.model = model, .def = &def->b}};
     char pointer[48];

@@ -180,14 +180,14 @@ typedef struct drape_pin {
 } drape_pin;
 
 /* Nodes that are joined, one by one. */
-typedef struct drape_seam {
+typedef struct drape_model_seam {
     char *name;
     drape_choice choice; /* the choice of the scene */
     int32_t term;        /* that joins them */
     int32_t cloth[2];    /* of its sides a and b */
     int32_t *pair;       /* (pair_count x 2) node numbers of the model: of a, of b */
     int32_t pair_count;
-} drape_seam;
+} drape_model_seam;
 
 /* What happens at an event, beside that it is recorded and reported. */
 typedef enum drape_event_action {
@@ -264,7 +264,7 @@ struct drape_model {
     int32_t pin_count;
     drape_model_event *events; /* (event_count) in scene order */
     int32_t event_count;
-    drape_seam *seams; /* (seam_count) in scene order */
+    drape_model_seam *seams; /* (seam_count) in scene order */
     int32_t seam_count;
     int32_t *sewn; /* (node_count) the first of the nodes that a node is sewn to, or itself; NULL: no seams */
 };
