@@ -182,10 +182,10 @@ typedef struct drape_cloth_def {
     double velocity[3];           /* initial velocity of every node [m/s] */
 } drape_cloth_def;
 
-/* One side of a seam: nodes of one cloth, in the order in which they are joined. They are selected as those of a
- * pin, by exactly one of nodes, corner, edge, row (>= 0) and has_box. An edge or a row runs along ascending
- * columns or rows of the grid; the nodes of a box are sorted along the longest side of their own bounding box.
- * It is embedded in drape_seam_def, so it can grow only into its reserved members. */
+/* One side of a seam: nodes of one cloth, in the order in which they are joined. They are selected as
+ * those of a pin, by exactly one of nodes, corner, edge, row (>= 0) and has_box. An edge or a row runs
+ * along ascending columns or rows of the grid; the nodes of a box are sorted along the longest side of
+ * their own bounding box. It is embedded in drape_seam_def, so it can grow only into its reserved members. */
 typedef struct drape_seam_side_def {
     const char *cloth;             /* name of the cloth; required */
     const int32_t *nodes;          /* node_count node numbers, local to this cloth */
@@ -680,10 +680,10 @@ typedef struct drape_seam_report {
     int32_t node;             /* where it is largest: number in the model of the node of side a */
 } drape_seam_report;
 
-/* The number of seams and, if out is not NULL and index is that of a seam in scene order, its report. The forces
- * are conservative ones and those that depend on velocities. A node that is in both sides of a seam counts with
- * the sum of the forces on it. Thread-safety: as the sim. Must not be called by an observer: then nothing is
- * written. */
+/* The number of seams and, if out is not NULL and index is that of a seam in scene order, its report. The
+ * forces are conservative ones and those that depend on velocities. A node that is in both sides of a seam
+ * counts with the sum of the forces on it. Thread-safety: as the sim. Must not be called by an observer:
+ * then nothing is written. */
 DRAPE_API int32_t drape_sim_seam(drape_sim *sim, int32_t index, drape_seam_report *out);
 
 /* The position of a collider in the last accepted state, as drape_model_collider, but including moves by the

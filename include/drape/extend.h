@@ -2,8 +2,8 @@
  * extend.h: everything an author of a term or a collider needs: parameter lists, the view of a cloth, the
  * function table of a term, the shape and the function table of a collider.
  *
- * A term is a sum over elements of one cloth, or of a seam: of two cloths that it joins. Its author writes one
- * of the following, for a range of elements in local coordinates:
+ * A term is a sum over elements of one cloth, or of a seam: of two cloths that it joins. Its author writes
+ * one of the following, for a range of elements in local coordinates:
  *
  *   - measure: a scalar strain measure q(x) with gradient and Hessian, from which the library makes the
  *     energy E = 1/2 k (q - q0)^2
@@ -230,9 +230,9 @@ DRAPE_API void drape_term_link(drape_term_builder *builder, int32_t element, int
  * torque. */
 DRAPE_API void drape_term_anchor(drape_term_builder *builder);
 
-/* Sets element number `element`: its nodes (local to the cloth; of a seam, numbers of the model, of either
- * cloth) and its rest data. Measures keep k [J/q2] in rest[0] and q0 in rest[1]; terms with `damped` keep c >=
- * 0 [J s/q2] in rest[2]. */
+/* Sets element number `element`: its nodes (local to the cloth; of a seam, numbers of the model, of
+ * either cloth) and its rest data. Measures keep k [J/q2] in rest[0] and q0 in rest[1]; terms with
+ * `damped` keep c >= 0 [J s/q2] in rest[2]. */
 DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes,
                               const double *rest);
 
@@ -241,10 +241,10 @@ DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, cons
  * in contact, and do not count as intersections. */
 DRAPE_API void drape_term_sew(drape_term_builder *builder, int32_t a, int32_t b);
 
-/* Of an energy: declares that it depends on el->progress, which goes smoothly from 0 to 1 while the time goes from
- * one to another [s]: s^2 (3 - 2 s). What the energy gains or loses by that is work, which is accounted as the
- * work of moving pins is. If the stiffness changes too, it must be largest at progress 1, where the stable step
- * of explicit integrators is estimated. */
+/* Of an energy: declares that it depends on el->progress, which goes smoothly from 0 to 1 while the time
+ * goes from one to another [s]: s^2 (3 - 2 s). What the energy gains or loses by that is work, which is
+ * accounted as the work of moving pins is. If the stiffness changes too, it must be largest at progress 1,
+ * where the stable step of explicit integrators is estimated. */
 DRAPE_API void drape_term_timed(drape_term_builder *builder, double from, double to);
 
 /* Rejects the cloth or the seam: the reason is reported at the place of the term in the scene. Returns
@@ -436,12 +436,12 @@ typedef struct drape_check_result {
     bool pass;        /* error <= limit */
 } drape_check_result;
 
-/* Compares every analytic derivative of a model with differences, at a deformed, rotated, moving state: of its
- * terms, element by element, of the assembled Jacobian, and of contact. This is what `drape check` prints, for
- * the tests of a term. seed: of the random deformation. results (room) receives the first comparisons; *count
- * their number, which may be larger than room. A comparison that fails is not an error. Errors: DRAPE_E_ARGUMENT
- * (NULL), DRAPE_E_MEMORY, DRAPE_E_STOPPED (the context's cancel function). Thread-safety: as functions of the
- * context. */
+/* Compares every analytic derivative of a model with differences, at a deformed, rotated, moving state: of
+ * its terms, element by element, of the assembled Jacobian, and of contact. This is what `drape check`
+ * prints, for the tests of a term. seed: of the random deformation. results (room) receives the first
+ * comparisons; *count their number, which may be larger than room. A comparison that fails is not an
+ * error. Errors: DRAPE_E_ARGUMENT (NULL), DRAPE_E_MEMORY, DRAPE_E_STOPPED (the context's cancel function).
+ * Thread-safety: as functions of the context. */
 DRAPE_API drape_status drape_model_check_derivatives(const drape_model *model, unsigned seed,
                                                      drape_check_result *results, int32_t room,
                                                      int32_t *count);

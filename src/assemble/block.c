@@ -431,8 +431,9 @@ void drape_block_evaluate(const drape_term *term, const drape_request *want, dra
     else
         evaluate_dissipations(term, want, b);
     const int d = 3 * term->elements.nodes;
-    /* Of measures the positive part is taken already, and convex energies are their own. Drag has none: it is not symmetric, and much of what
-     * neighbouring triangles add cancels. Positive parts would not, and would hold light cloth fast. */
+    /* Of measures the positive part is taken already, and convex energies are their own. Drag has none: it is
+     * not symmetric, and much of what neighbouring triangles add cancels. Positive parts would not, and would
+     * hold light cloth fast. */
     const bool given = term->ops->measure || term->ops->in_medium || term->ops->convex;
     for (int32_t i = 0; want->hessian && want->positive_share > 0 && !given && i < b->count; i++)
         project(d, want->positive_share, b->hessian + (size_t)i * (size_t)(d * d), b->scratch);

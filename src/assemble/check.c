@@ -300,8 +300,8 @@ static void check_elements(checker *c, const drape_term *term)
     report(c, term->ops->entry.name, "symmetry", max.symmetry, INVARIANCE_LIMIT);
 }
 
-/* Net force and net torque of a term with a measure or of a seam, over the sum of magnitudes: internal forces have
- * neither. */
+/* Net force and net torque of a term with a measure or of a seam, over the sum of magnitudes: internal
+ * forces have neither. */
 static void check_invariance(checker *c, int32_t t)
 {
     const drape_term *term = &c->model->terms[t];

@@ -532,9 +532,9 @@ static double by_progress(drape_system *system, const drape_term *term, const dr
     return (energy[1] - energy[0]) / (back + ahead);
 }
 
-/* By the trapezoidal rule over the progress, at whose ends the nodes are where the step has them: between them, a
- * straight path is far from theirs in comparison with what a stiff term is strained. What begins and ends within
- * the step is a jump, and is taken where the step begins. */
+/* By the trapezoidal rule over the progress, at whose ends the nodes are where the step has them: between
+ * them, a straight path is far from theirs in comparison with what a stiff term is strained. What begins
+ * and ends within the step is a jump, and is taken where the step begins. */
 static double timed_work(drape_system *system, const drape_term *term, const drape_point *from,
                          const drape_point *to)
 {

@@ -63,7 +63,8 @@ drape_motion *drape_system_steer(drape_system *system);
 void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
 
-/* Whether a term depends on time, and the work that this does in a step from nodes x at t0 to y at t1 [J]. internal: of the state at t0. */
+/* Whether a term depends on time, and the work that this does in a step from nodes x at t0 to y at t1 [J].
+ * internal: of the state at t0. */
 bool drape_system_is_timed(const drape_system *system);
 double drape_system_timed_work(drape_system *system, const double *internal, const double *x, double t0,
                                const double *y, double t1);

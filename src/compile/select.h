@@ -25,7 +25,7 @@ typedef struct drape_selection {
 } drape_selection;
 
 /* Takes each selected node: of a list in its order, else in ascending order. Errors: DRAPE_E_ARGUMENT (a node
- * that is not in the mesh, nothing selected, more than one way), those of take. */
+ * that is not in the mesh, nothing selected, or by more than one key), those of take. */
 drape_status drape_select_nodes(const drape_selection *selection);
 
 #endif

@@ -269,8 +269,8 @@ struct drape_model {
     int32_t *sewn; /* (node_count) the first of the nodes that a node is sewn to, or itself; NULL: no seams */
 };
 
-/* Nodes that are sewn together count as one where the neighbours of a node are concerned: pieces that have one
- * of these are not in contact, and may pass through each other at the seam. */
+/* Nodes that are sewn together count as one where the neighbours of a node are concerned: pieces that have
+ * one of these are not in contact, and may pass through each other at the seam. */
 static inline int32_t drape_model_sewn(const drape_model *model, int32_t node)
 {
     return model->sewn ? model->sewn[node] : node;

@@ -1,5 +1,6 @@
-/* terms.h: the tables of terms and seams, and what their files share. A term is the constant drape_term_<name>
- * of term_<name>.c, a seam drape_seam_<name> of seam_<name>.c; their interface is drape/extend.h. */
+/* terms.h: the tables of terms and seams, and what their files share. A term is the constant
+ * drape_term_<name> of term_<name>.c, a seam drape_seam_<name> of seam_<name>.c; their interface is
+ * drape/extend.h. */
 #ifndef DRAPE_TERMS_TERMS_H
 #define DRAPE_TERMS_TERMS_H
 

@@ -10,8 +10,8 @@
 
 #define ROOM 256
 
-/* Two panels of 0.2 m x 0.2 m, the upper one pinned at its upper edge. %g: the gap between them, the integrator,
- * and further keys. */
+/* Two panels of 0.2 m x 0.2 m, the upper one pinned at its upper edge. %g: the gap between them, the
+ * integrator, and further keys. */
 #define PANEL                                                                                                \
     "'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.2, 'height': 0.2, 'orientation': "       \
     "'vertical', 'transform': {'translate': [0, %g, %g]}}, 'material': {'young_modulus': 1e5, "              \
@@ -32,8 +32,8 @@ static scene open_panels(double gap, double aside, const char *stitch, const cha
 
 /* ---- Forces ---- */
 
-/* At rest a closed seam carries the weight of what hangs from it, and opens by what its threads give: the forces
- * on the lower panel balance up to the residuals of its 75 unknowns, of at most 1e-9 N each. */
+/* At rest a closed seam carries the weight of what hangs from it, and opens by what its threads give: the
+ * forces on the lower panel balance up to the residuals of its 75 unknowns, of at most 1e-9 N each. */
 START_TEST(carries_a_known_load)
 {
     scene s = open_panels(0, 0, ", 'closing': 0, 'stiffness': 37", "'method': 'static', 'tolerance': 1e-9");
@@ -49,7 +49,8 @@ START_TEST(carries_a_known_load)
     assert_below(fabs(seam.force[1] + WEIGHT), 75 * 1e-9);
     assert_below(fabs(seam.force[0]), 75 * 1e-9);
     assert_below(fabs(seam.force[2]), 75 * 1e-9);
-    /* E = 1/2 k l^2: the forces have the magnitude k l; sums of five with rounding of coordinates up to 0.5 m */
+    /* E = 1/2 k l^2: the forces have the magnitude k l; sums of five with rounding of coordinates up to
+     * 0.5 m */
     assert_below(fabs(seam.tension - 5 * 37 * seam.gap_mean), 5 * 37 * 8 * DBL_EPSILON);
     assert_below(fabs(seam.tension_max - 37 * seam.gap_max), 37 * 8 * DBL_EPSILON);
     /* threads hang within 1 degree of the vertical: the sum of magnitudes is that of the vertical parts */
@@ -75,11 +76,12 @@ END_TEST
 
 /* ---- Closing ---- */
 
-/* Two panels, 5 cm and 3 cm apart, are pulled together by every method; nothing passes through anything, and
- * in the end the seam carries the weight, but for the swings of methods that do not dissipate: by the largest
- * acceleration of the pull, 6 x 0.058 m/(0.5 s)^2 = 0.14 g, and by 3/2 (0.03/0.2)^2 = 0.03 of a pendulum. The account of energy closes: what threads give when they are shortened
- * is the work that lifts the lower panel by the gap. Without it the energy would be off by that work,
- * WEIGHT 0.05 m. Methods differ by what they dissipate, and by their tolerance in positions, 1e-5 of the scene. */
+/* Two panels, 5 cm and 3 cm apart, are pulled together by every method; nothing passes through anything,
+ * and in the end the seam carries the weight, but for the swings of methods that do not dissipate: by the
+ * largest acceleration of the pull, 6 x 0.058 m/(0.5 s)^2 = 0.14 g, and by 3/2 (0.03/0.2)^2 = 0.03 of a
+ * pendulum. The account of energy closes: what threads give when they are shortened is the work that
+ * lifts the lower panel by the gap. Without it the energy would be off by that work, WEIGHT 0.05 m.
+ * Methods differ by what they dissipate, and by their tolerance in positions, 1e-5 of the scene. */
 static void close_by(const char *method)
 {
     char integrator[96];
@@ -339,7 +341,8 @@ static drape_status compile(drape_context *ctx, const char *type, int list, drap
     return drape_model_create(ctx, &def, model);
 }
 
-/* The term has its user pointer everywhere, exact derivatives, and forces on both cloths, by structs alone. */
+/* The term has its user pointer everywhere, exact derivatives, and forces on both cloths, by structs
+ * alone. */
 START_TEST(term_of_a_host)
 {
     scene s = scene_empty();
