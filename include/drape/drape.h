@@ -193,6 +193,32 @@ typedef struct drape_cloth_def {
     double velocity[3];           /* initial velocity of every node [m/s] */
 } drape_cloth_def;
 
+/* One side of a seam: nodes of one cloth, in the order in which they are joined. They are selected as
+ * those of a pin, by exactly one of nodes, corner, edge, row (>= 0) and has_box. An edge or a row runs
+ * along ascending columns or rows of the grid; the nodes of a box are sorted along the longest side of
+ * their own bounding box. It is embedded in drape_seam_def, so it can grow only into its reserved members. */
+typedef struct drape_seam_side_def {
+    const char *cloth;             /* name of the cloth; required */
+    const int32_t *nodes;          /* node_count node numbers, local to this cloth */
+    size_t node_count;             /* length of nodes */
+    const char *corner;            /* as in drape_pin_def */
+    const char *edge;              /* as in drape_pin_def */
+    int32_t row;                   /* as in drape_pin_def; -1: not selected by row */
+    bool has_box;                  /* whether box_min and box_max are set */
+    double box_min[3], box_max[3]; /* [m], as in drape_pin_def */
+    bool reverse;                  /* the order of the nodes is reversed */
+    void *reserved[4];             /* must be NULL */
+} drape_seam_side_def;
+
+/* A seam: joins the nodes of a to those of b, one by one. Both have the same number of nodes. Initialise with
+ * drape_seam_def_init. */
+typedef struct drape_seam_def {
+    size_t struct_size;       /* set by drape_seam_def_init */
+    drape_entry_def entry;    /* the seam: "stitch", or a term of the host with build_seam (extend.h) */
+    const char *name;         /* unique name; NULL: "seam0", "seam1" ... */
+    drape_seam_side_def a, b; /* its two sides */
+} drape_seam_def;
+
 /* A rigid obstacle: a collider with its parameters. Initialise with drape_collider_def_init. */
 typedef struct drape_collider_def {
     size_t struct_size;           /* set by drape_collider_def_init */
@@ -252,6 +278,8 @@ typedef struct drape_scene_def {
     const char *up; /* axis that points up in frames written by `drape run`: "y" or "z"; NULL: "y" */
     const drape_event_def *events; /* at most 256 */
     size_t event_count;            /* length of events */
+    const drape_seam_def *seams;   /* at most 4096; NULL: none */
+    size_t seam_count;             /* length of seams */
 } drape_scene_def;
 
 /* Fill a def with the defaults documented above. Pass the caller's sizeof of the def as struct_size. Nothing
@@ -261,6 +289,7 @@ DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
 DRAPE_API void drape_pin_def_init(drape_pin_def *def, size_t struct_size);
 DRAPE_API void drape_event_def_init(drape_event_def *def, size_t struct_size);
+DRAPE_API void drape_seam_def_init(drape_seam_def *def, size_t struct_size);
 DRAPE_API void drape_collider_def_init(drape_collider_def *def, size_t struct_size);
 
 /* ---- Scene from text ---- */
@@ -666,6 +695,25 @@ DRAPE_API drape_status drape_sim_contact_forces(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3]);
 DRAPE_API drape_status drape_sim_collider_torque(drape_sim *sim, int32_t collider, const double *about,
                                                  double torque[3]);
+
+/* A seam in the last accepted state. */
+typedef struct drape_seam_report {
+    const char *name;         /* as in the scene, or "seam0", "seam1" ...; valid as long as the model */
+    const char *type;         /* name of its entry, such as "stitch" */
+    int32_t cloth[2];         /* numbers of the cloths of its sides a and b */
+    int32_t pairs;            /* how many pairs of nodes it joins */
+    double gap_mean, gap_max; /* [m] distance of joined nodes, over the pairs */
+    double force[3];          /* [N] of the seam on the nodes of side a: what it carries */
+    double tension;           /* [N] the sum of the magnitudes of the forces on these nodes */
+    double tension_max;       /* [N] the largest one */
+    int32_t node;             /* where it is largest: number in the model of the node of side a */
+} drape_seam_report;
+
+/* The number of seams and, if out is not NULL and index is that of a seam in scene order, its report. The
+ * forces are conservative ones and those that depend on velocities. A node that is in both sides of a seam
+ * counts with the sum of the forces on it. Thread-safety: as the sim. Must not be called by an observer:
+ * then nothing is written. */
+DRAPE_API int32_t drape_sim_seam(drape_sim *sim, int32_t index, drape_seam_report *out);
 
 /* The position of a collider in the last accepted state, as drape_model_collider, but including moves by the
  * host: the displacement and the velocity of its pivot. */

@@ -2,8 +2,8 @@
  * extend.h: everything an author of a term or a collider needs: parameter lists, the view of a cloth, the
  * function table of a term, the shape and the function table of a collider.
  *
- * A term is a sum over elements of one cloth. Its author writes one of the following, for a range of elements
- * in local coordinates:
+ * A term is a sum over elements of one cloth, or of a seam: of two cloths that it joins. Its author writes
+ * one of the following, for a range of elements in local coordinates:
  *
  *   - measure: a scalar strain measure q(x) with gradient and Hessian, from which the library makes the
  *     energy E = 1/2 k (q - q0)^2
@@ -14,8 +14,9 @@
  * The library provides the loops, sparsity, assembly, projection, boundary conditions and threads.
  *
  * Thread-safety: every function of a term may be called from several threads at once on different ranges; it
- * must not allocate memory and must read nothing but its arguments. The exception is build, which is called
- * once per cloth while a model is compiled.
+ * must not allocate memory and must read nothing but its arguments and what `user` points to, which must not
+ * change while a sim runs. The exceptions are build and build_seam, which are called once per cloth or seam
+ * while a model is compiled.
  */
 #ifndef DRAPE_EXTEND_H
 #define DRAPE_EXTEND_H
@@ -183,7 +184,19 @@ typedef struct drape_cloth_view {
     const drape_material *material;       /* of the sheet */
     double gravity[3];                    /* [m/s2] */
     const drape_woven *tension, *bending; /* of a measured fabric; NULL: use material */
+    void *user;                           /* of the term's ops */
 } drape_cloth_view;
+
+/* A seam at rest: two sides, each a list of nodes of one cloth, which may be the same cloth. Nodes of equal
+ * place in the lists are joined. Node numbers are those of the whole model: node i of side s's cloth has the
+ * number first_node[s] + i. All arrays are const and valid while the model is compiled. */
+typedef struct drape_seam_view {
+    const drape_cloth_view *cloth[2]; /* of the sides a and b */
+    int32_t first_node[2];            /* number in the model of the first node of each of these cloths */
+    int32_t pair_count;               /* length of pair */
+    const int32_t *pair;              /* (pair_count x 2) the node of a, the node of b */
+    void *user;                       /* of the term's ops */
+} drape_seam_view;
 
 /* Receives the elements of a term while its cloth is compiled. Opaque. */
 typedef struct drape_term_builder drape_term_builder;
@@ -217,13 +230,25 @@ DRAPE_API void drape_term_link(drape_term_builder *builder, int32_t element, int
  * torque. */
 DRAPE_API void drape_term_anchor(drape_term_builder *builder);
 
-/* Sets element number `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J/q2] in
- * rest[0] and q0 in rest[1]; terms with `damped` keep c >= 0 [J s/q2] in rest[2]. */
+/* Sets element number `element`: its nodes (local to the cloth; of a seam, numbers of the model, of
+ * either cloth) and its rest data. Measures keep k [J/q2] in rest[0] and q0 in rest[1]; terms with
+ * `damped` keep c >= 0 [J s/q2] in rest[2]. */
 DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes,
                               const double *rest);
 
-/* Rejects the cloth: the reason is reported at the place of the term in the scene. Returns DRAPE_E_ARGUMENT,
- * which build must return. */
+/* Of a seam: declares that it holds two nodes (numbers of the model) together, as it does or after it has
+ * closed. Pieces of cloth that have one of them are then neighbours, as those that share a node: they are not
+ * in contact, and do not count as intersections. */
+DRAPE_API void drape_term_sew(drape_term_builder *builder, int32_t a, int32_t b);
+
+/* Of an energy: declares that it depends on el->progress, which goes smoothly from 0 to 1 while the time
+ * goes from one to another [s]: s^2 (3 - 2 s). What the energy gains or loses by that is work, which is
+ * accounted as the work of moving pins is. If the stiffness changes too, it must be largest at progress 1,
+ * where the stable step of explicit integrators is estimated. */
+DRAPE_API void drape_term_timed(drape_term_builder *builder, double from, double to);
+
+/* Rejects the cloth or the seam: the reason is reported at the place of the term in the scene. Returns
+ * DRAPE_E_ARGUMENT, which build or build_seam must return. */
 DRAPE_API drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
     DRAPE_PRINTF(2, 3);
 
@@ -253,8 +278,8 @@ typedef struct drape_parts {
     const int32_t *user;       /* (link_count) numbers of links */
 } drape_parts;
 
-/* The elements of one term on one cloth; constant after the model is compiled. Allocated by the library
- * alone: it may grow at its end. */
+/* The elements of one term on one cloth or one seam; constant after the model is compiled, but for
+ * progress. Allocated by the library alone: it may grow at its end. */
 typedef struct drape_elements {
     int32_t count;            /* number of elements */
     int nodes;                /* nodes per element */
@@ -263,6 +288,8 @@ typedef struct drape_elements {
     const double *rest;       /* (rest_count x count): item k of element e is rest[k * count + e] */
     const double *params;     /* values in the order of the term's parameters */
     const drape_parts *parts; /* NULL: the term has none */
+    void *user;               /* of the term's ops */
+    double progress;          /* for the function energy of a term with drape_term_timed: 0 to 1; else 0 */
 } drape_elements;
 
 /* The fault that a check found, for the message of a rejected step. */
@@ -295,7 +322,8 @@ typedef struct drape_term_ops {
     bool linear;              /* energy: its Hessian is zero and needs no sparsity */
     bool external;     /* energy: the potential of an external load. It is counted under the energy of gravity
                       instead of the elastic energy, and its forces may have a resultant and a torque */
-    bool convex;       /* measure: its Hessian ddq is positive semidefinite, as that of a length is */
+    bool convex;       /* its Hessian is positive semidefinite in every state: of a measure, ddq, as that of a
+                          length; of an energy, hess */
     bool has_internal; /* each element has internal variables */
     int internal_count; /* internal variables per element, stored consecutively; 0 means 1 */
     bool constraint; /* an energy that enforces a limit; integrators that enforce limits by moving nodes omit
@@ -380,6 +408,16 @@ typedef struct drape_term_ops {
      * parts: internal is indexed by part, and the ranges of commit and initial are parts. */
     void (*part)(const drape_elements *el, const int32_t *part, const double *x, const double *internal,
                  double *s, double *ds, double *dds);
+
+    /* Beside build or instead of it: adds the elements of a seam of the scene, which may have nodes of both
+     * of its cloths. Called once per seam whose "type" is this term. For a measure, an energy or a
+     * dissipation without parts; the laws of a cloth do not act on seams. */
+    drape_status (*build_seam)(const drape_seam_view *seam, const double *params,
+                               drape_term_builder *builder);
+
+    /* Passed on unchanged to build, build_seam and, in el, to all others but law. It must outlive the context
+     * and every model compiled with it, and must not change while sims run: they do not know. */
+    void *user;
 } drape_term_ops;
 
 /* Registers a user-defined term, which scenes compiled with this context may then use by name. *ops is
@@ -387,6 +425,26 @@ typedef struct drape_term_ops {
  * of an older version is accepted. Errors: DRAPE_E_ARGUMENT (not well formed, name already in use, more than
  * 32), DRAPE_E_VERSION (struct_size). */
 DRAPE_API drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops);
+
+/* One comparison of analytic derivatives with central differences. */
+typedef struct drape_check_result {
+    const char
+        *term; /* name of a term, "contact", "self_contact" or "assembled"; valid as long as the model */
+    const char *what; /* "gradient", "Hessian", "force by rate" ...; static */
+    double error;     /* relative, the largest in the sample */
+    double limit;     /* beyond which it fails */
+    bool pass;        /* error <= limit */
+} drape_check_result;
+
+/* Compares every analytic derivative of a model with differences, at a deformed, rotated, moving state: of
+ * its terms, element by element, of the assembled Jacobian, and of contact. This is what `drape check`
+ * prints, for the tests of a term. seed: of the random deformation. results (room) receives the first
+ * comparisons; *count their number, which may be larger than room. A comparison that fails is not an
+ * error. Errors: DRAPE_E_ARGUMENT (NULL), DRAPE_E_MEMORY, DRAPE_E_STOPPED (the context's cancel function).
+ * Thread-safety: as functions of the context. */
+DRAPE_API drape_status drape_model_check_derivatives(const drape_model *model, unsigned seed,
+                                                     drape_check_result *results, int32_t room,
+                                                     int32_t *count);
 
 /* Makes a range function out of a function for one element. x (d) are local coordinates; outputs that are
  * NULL are not written. Use:
@@ -435,6 +493,7 @@ typedef struct drape_collider_shape {
     bool inscribed;    /* of a convex body: its points and segments stay inside a curved surface */
     const void *kept;  /* data that the collider keeps for its distance, from drape_shape_take; NULL: none */
     struct drape_shape_builder *builder; /* used by the functions below; NULL outside the function shape */
+    void *user;                          /* of the collider's ops */
 } drape_collider_shape;
 
 /* Allocates the arrays of a shape, which live as long as the model. Call it once. Errors: DRAPE_E_MEMORY. */
@@ -481,6 +540,9 @@ typedef struct drape_collider_ops {
      * outside. Nodes of the cloth then meet the surface through distance; otherwise they meet the triangles
      * of the shape. */
     bool smooth;
+
+    /* Passed on unchanged in shape->user. As for terms, it must outlive the context and every model. */
+    void *user;
 } drape_collider_ops;
 
 /* Registers a user-defined collider, as drape_context_add_term does for a term. Errors: DRAPE_E_ARGUMENT (not

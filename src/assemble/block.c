@@ -356,10 +356,19 @@ static void evaluate_measures(const drape_term *term, const drape_request *want,
 
 /* ---- Energies and dissipations, element by element ---- */
 
+/* The elements as energies see them. */
+static drape_elements elements_at(const drape_term *term, const drape_point *point)
+{
+    drape_elements el = term->elements;
+    el.progress = point->done ? 1 : drape_term_progress(term, point->t) + point->progressed;
+    return el;
+}
+
 static void evaluate_energies(const drape_term *term, const drape_request *want, drape_block *b)
 {
+    const drape_elements el = elements_at(term, want->point);
     const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
-    term->ops->energy(&term->elements, b->first, b->count, want->point->x, internal, b->energy, b->gradient,
+    term->ops->energy(&el, b->first, b->count, want->point->x, internal, b->energy, b->gradient,
                       want->hessian ? b->hessian : NULL);
 }
 
@@ -422,9 +431,10 @@ void drape_block_evaluate(const drape_term *term, const drape_request *want, dra
     else
         evaluate_dissipations(term, want, b);
     const int d = 3 * term->elements.nodes;
-    /* Of measures the positive part is taken already. Drag has none: it is not symmetric, and much of what
-     * neighbouring triangles add cancels. Positive parts would not, and would hold light cloth fast. */
-    const bool given = term->ops->measure || term->ops->in_medium;
+    /* Of measures the positive part is taken already, and convex energies are their own. Drag has none: it is
+     * not symmetric, and much of what neighbouring triangles add cancels. Positive parts would not, and would
+     * hold light cloth fast. */
+    const bool given = term->ops->measure || term->ops->in_medium || term->ops->convex;
     for (int32_t i = 0; want->hessian && want->positive_share > 0 && !given && i < b->count; i++)
         project(d, want->positive_share, b->hessian + (size_t)i * (size_t)(d * d), b->scratch);
 }

@@ -49,6 +49,7 @@ typedef struct checker {
     drape_arena *arena;
     drape_check_result *results;
     int result_count;
+    double progress; /* of terms that depend on time, when they are checked element by element */
 } checker;
 
 /* In [-1, 1]; a linear congruential generator (Knuth's MMIX), so that every machine sees the same state. */
@@ -131,18 +132,20 @@ typedef struct local {
     double scalar, gradient[D], hessian[D * D], velocity[D * D];
 } local;
 
-static void evaluate(const drape_term *term, int32_t e, const double *x, const double *v,
-                     const double *internal, local *out)
+static void evaluate(const checker *c, const drape_term *term, int32_t e, local *out)
 {
+    const double *x = c->x, *v = c->v, *internal = c->internal;
+    drape_elements el = term->elements;
+    el.progress = c->progress;
     const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
     memset(out, 0, sizeof *out);
     if (term->ops->measure)
-        term->ops->measure(&term->elements, e, 1, x, own, &out->scalar, out->gradient, out->hessian);
+        term->ops->measure(&el, e, 1, x, own, &out->scalar, out->gradient, out->hessian);
     else if (term->ops->energy)
-        term->ops->energy(&term->elements, e, 1, x, own, &out->scalar, out->gradient,
+        term->ops->energy(&el, e, 1, x, own, &out->scalar, out->gradient,
                           term->ops->linear ? NULL : out->hessian);
     else
-        term->ops->dissipation(&term->elements, e, 1, x, v, out->gradient, out->hessian, out->velocity);
+        term->ops->dissipation(&el, e, 1, x, v, out->gradient, out->hessian, out->velocity);
 }
 
 /* The first local index of the node with local index a: an element may contain a node twice. */
@@ -186,9 +189,9 @@ static void evaluate_beside(const checker *c, const drape_term *term, int32_t e,
                 (size_t)(i % 3);
     double kept = array[at];
     array[at] = kept + step;
-    evaluate(term, e, c->x, c->v, c->internal, plus);
+    evaluate(c, term, e, plus);
     array[at] = kept - step;
-    evaluate(term, e, c->x, c->v, c->internal, minus);
+    evaluate(c, term, e, minus);
     array[at] = kept;
     gather_copies(&term->elements, e, plus);
     gather_copies(&term->elements, e, minus);
@@ -224,7 +227,7 @@ static errors compare_once(const checker *c, const drape_term *term, int32_t e, 
     int d = 3 * term->elements.nodes;
     local here, plus, minus;
     double dg[D], dh[D * D], dv[D * D] = {0}, symmetry = 0;
-    evaluate(term, e, c->x, c->v, c->internal, &here);
+    evaluate(c, term, e, &here);
     gather_copies(&term->elements, e, &here);
     for (int i = 0; i < d; i++) {
         dg[i] = 0;
@@ -269,7 +272,7 @@ static errors min_scale(const checker *c, const drape_term *term, int32_t stride
     errors max = {0};
     for (int32_t e = 0; e < term->elements.count; e += stride) {
         local here;
-        evaluate(term, e, c->x, c->v, c->internal, &here);
+        evaluate(c, term, e, &here);
         max = largest_of(max, size_of(c, term, &here));
     }
     return (errors){MIN_SCALE * max.gradient, MIN_SCALE * max.hessian, MIN_SCALE * max.velocity,
@@ -280,9 +283,11 @@ static void check_elements(checker *c, const drape_term *term)
 {
     errors max = {0};
     int32_t stride = term->elements.count / SAMPLE + 1;
-    const errors min = min_scale(c, term, stride);
-    for (int32_t e = 0; e < term->elements.count; e += stride)
-        max = largest_of(max, compare_element(c, term, e, min));
+    for (c->progress = drape_term_is_timed(term) ? 0 : 1; c->progress <= 1; c->progress += 0.5) {
+        const errors min = min_scale(c, term, stride);
+        for (int32_t e = 0; e < term->elements.count; e += stride)
+            max = largest_of(max, compare_element(c, term, e, min));
+    }
     if (term->ops->dissipation) {
         report(c, term->ops->entry.name, "force by position", max.hessian, HESSIAN_LIMIT);
         report(c, term->ops->entry.name, "force by velocity", max.velocity, HESSIAN_LIMIT);
@@ -295,8 +300,8 @@ static void check_elements(checker *c, const drape_term *term)
     report(c, term->ops->entry.name, "symmetry", max.symmetry, INVARIANCE_LIMIT);
 }
 
-/* Net force and net torque of a term with a measure, over the sum of magnitudes: internal forces have
- * neither. */
+/* Net force and net torque of a term with a measure or of a seam, over the sum of magnitudes: internal
+ * forces have neither. */
 static void check_invariance(checker *c, int32_t t)
 {
     const drape_term *term = &c->model->terms[t];
@@ -564,7 +569,7 @@ static drape_status check_terms(drape_context *ctx, checker *c)
             check_law(c, term);
         else
             check_elements(c, term);
-        if (term->ops->measure)
+        if (term->ops->measure || (term->seam >= 0 && term->ops->energy && !term->ops->external))
             check_invariance(c, t);
     }
     return status;
@@ -595,6 +600,28 @@ drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, u
     if (!status)
         status = check_contact(&c, &rest);
     *result_count = c.result_count;
+    drape_arena_free(&arena);
+    return status;
+}
+
+drape_status drape_model_check_derivatives(const drape_model *model, unsigned seed,
+                                           drape_check_result *results, int32_t room, int32_t *count)
+{
+    if (!model || !count || room < 0 || (room > 0 && !results))
+        return DRAPE_E_ARGUMENT;
+    drape_arena arena = drape_arena_of(model->ctx);
+    drape_check_result *all = drape_arena_take(&arena, DRAPE_MAX_CHECK_RESULTS, sizeof *all);
+    drape_system *system = NULL;
+    int done = 0;
+    drape_status status = all ? drape_system_create(&arena, model, 1, &system) : DRAPE_E_MEMORY;
+    if (!status && (model->collider_count > 0 || model->contact.self))
+        status = drape_system_add_contact(system);
+    if (!status)
+        status = drape_check_derivatives(model->ctx, system, seed, all, &done);
+    for (int32_t i = 0; i < done && i < room; i++)
+        results[i] = all[i];
+    *count = done;
+    drape_system_destroy(&system);
     drape_arena_free(&arena);
     return status;
 }

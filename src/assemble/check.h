@@ -5,14 +5,6 @@
 
 #include "assemble/system.h"
 
-typedef struct drape_check_result {
-    const char *term; /* name of a term, "contact", "self_contact" or "assembled" */
-    const char *what; /* "gradient", "Hessian", "force by rate" ... */
-    double error;     /* relative, the largest in the sample */
-    double limit;
-    bool pass;
-} drape_check_result;
-
 #define DRAPE_MAX_CHECK_RESULTS 1024
 
 /* Compares the derivatives of all terms of the system's model, and of its contact; results

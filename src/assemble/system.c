@@ -9,6 +9,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#define PROGRESS_STEP 1e-6 /* of the difference that is dE/dprogress of a term that depends on time */
+
 struct drape_system {
     drape_arena *arena;
     const drape_model *model;
@@ -512,6 +514,64 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
         *(term->ops->external ? gravity : elastic) += energy;
     }
     *elastic += drape_drag_spring_energy(&system->drag, point->x);
+}
+
+bool drape_system_is_timed(const drape_system *system)
+{
+    for (int32_t i = 0; i < system->model->term_count; i++)
+        if (drape_term_is_timed(&system->model->terms[i]))
+            return true;
+    return false;
+}
+
+/* dE/dprogress of a term at a point. */
+static double by_progress(drape_system *system, const drape_term *term, const drape_point *at)
+{
+    const double progress = drape_term_progress(term, at->t), back = fmin(PROGRESS_STEP, progress),
+                 ahead = fmin(PROGRESS_STEP, 1 - progress);
+    double energy[2] = {0, 0};
+    for (int k = 0; k < 2; k++) {
+        drape_point point = *at;
+        point.progressed = k == 0 ? -back : ahead;
+        const drape_request want = {.point = &point, .energy = true, .conservative = true};
+        drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy[k]);
+    }
+    return (energy[1] - energy[0]) / (back + ahead);
+}
+
+/* By the trapezoidal rule over the progress, at whose ends the nodes are where the step has them: between
+ * them, a straight path is far from theirs in comparison with what a stiff term is strained. What begins
+ * and ends within the step is a jump, and is taken where the step begins. */
+static double timed_work(drape_system *system, const drape_term *term, const drape_point *from,
+                         const drape_point *to)
+{
+    const double done = drape_term_progress(term, to->t) - drape_term_progress(term, from->t);
+    if (done == 0)
+        return 0;
+    if (done < 1)
+        return done * (by_progress(system, term, from) + by_progress(system, term, to)) / 2;
+    drape_point after = *from;
+    double energy[2] = {0, 0};
+    after.done = true;
+    for (int k = 0; k < 2; k++) {
+        const drape_request want = {.point = k ? &after : from, .energy = true, .conservative = true};
+        drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy[k]);
+    }
+    return energy[1] - energy[0];
+}
+
+double drape_system_timed_work(drape_system *system, const double *internal, const double *x, double t0,
+                               const double *y, double t1)
+{
+    const drape_point from = {.x = x, .internal = internal, .t = t0},
+                      to = {.x = y, .internal = internal, .t = t1};
+    double work = 0;
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        if (drape_term_is_timed(term) && has_energy(system, term))
+            work += timed_work(system, term, &from, &to);
+    }
+    return work;
 }
 
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy)

@@ -28,7 +28,9 @@ typedef struct drape_point {
     double weight;          /* w [1/s]: v = w x + const, and q' = w q + history */
     const double *history;  /* (measure_count) [q/s]; NULL: q' = grad q . v, as in continuous time */
     const double *stress;   /* (measure_count) the f before ddq in a Jacobian; NULL: the forces here */
-    double t;               /* [s] time of the colliders' poses */
+    double t;               /* [s] time of the colliders' poses, and of terms that depend on it */
+    bool done;              /* energies that depend on time are taken at progress 1 */
+    double progressed;      /* added to their progress, for differences */
     double span[2]; /* [s] over which the velocities of colliders are taken; equal: they are at rest */
     bool instant;   /* those that turn have their velocities of time t instead, as the pins of methods that
                        follow the solution between the kinks of the motion, at the ends of span */
@@ -62,6 +64,12 @@ drape_motion *drape_system_steer(drape_system *system);
  * They do not depend on x. They have no energy; drape_system_push_work returns their work from x to y [J]. */
 void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
+
+/* Whether a term depends on time, and the work that this does in a step from nodes x at t0 to y at t1 [J].
+ * internal: of the state at t0. */
+bool drape_system_is_timed(const drape_system *system);
+double drape_system_timed_work(drape_system *system, const double *internal, const double *x, double t0,
+                               const double *y, double t1);
 
 /* From now on the medium moves with this field, if the model has a term that feels it; NULL: it is at
  * rest. */

@@ -143,9 +143,26 @@ drape_status drape_fail(drape_context *ctx, drape_status status, const char *for
     return status;
 }
 
+const drape_term_ops *drape_context_term_ops(const drape_context *ctx, bool of_seams, int index)
+{
+    for (int i = 0; i < ctx->host_term_count; i++) {
+        const drape_term_ops *ops = &ctx->host_terms[i];
+        if ((of_seams ? ops->build_seam != NULL : ops->build || ops->law) && index-- == 0)
+            return ops;
+    }
+    return NULL;
+}
+
 const drape_entry *drape_context_term(const drape_context *ctx, int index)
 {
-    return index < ctx->host_term_count ? &ctx->host_terms[index].entry : NULL;
+    const drape_term_ops *ops = drape_context_term_ops(ctx, false, index);
+    return ops ? &ops->entry : NULL;
+}
+
+const drape_entry *drape_context_seam(const drape_context *ctx, int index)
+{
+    const drape_term_ops *ops = drape_context_term_ops(ctx, true, index);
+    return ops ? &ops->entry : NULL;
 }
 
 const drape_entry *drape_context_collider(const drape_context *ctx, int index)

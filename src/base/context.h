@@ -23,8 +23,11 @@ struct drape_context {
     int host_collider_count;
 };
 
-/* User-defined entry number `index` of the context; NULL past the last. */
+/* User-defined entry number `index` of the context, of the terms that cloths or seams may have; NULL past the
+ * last. */
+const drape_term_ops *drape_context_term_ops(const drape_context *ctx, bool of_seams, int index);
 const drape_entry *drape_context_term(const drape_context *ctx, int index);
+const drape_entry *drape_context_seam(const drape_context *ctx, int index);
 const drape_entry *drape_context_collider(const drape_context *ctx, int index);
 
 /* Allocates count x size bytes, zeroed and aligned for any type. Returns NULL with a message on failure or

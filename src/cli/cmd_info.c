@@ -76,6 +76,11 @@ const char *cli_text_of(const drape_choice *choice, const char *name)
     return "";
 }
 
+const char *cli_owner(const drape_model *model, const drape_term *term)
+{
+    return term->seam < 0 ? model->cloths[term->cloth].name : model->seams[term->seam].name;
+}
+
 double cli_share(const cli_info *info, double seconds)
 {
     double whole = drape_profile_seconds(&info->profile);

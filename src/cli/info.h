@@ -63,6 +63,9 @@ const char *cli_text_of(const drape_choice *choice, const char *name);
 /* A share of the residual, Jacobian, factor and solve of one Newton iteration [1]. */
 double cli_share(const cli_info *info, double seconds);
 
+/* The name of the cloth or the seam whose term it is. */
+const char *cli_owner(const drape_model *model, const drape_term *term);
+
 /* The time of assembling besides the terms: clearing, masses. */
 double cli_other_residual_seconds(const cli_info *info);
 double cli_other_jacobian_seconds(const cli_info *info);

@@ -261,7 +261,8 @@ static json_t *term(const cli_info *info, int32_t i)
     const drape_term *from = &info->model->terms[i];
     const drape_profile_term *cost = &info->profile.terms[i];
     json_t *object = drape_json_with(json_object(), "name", json_string(from->ops->entry.name));
-    object = drape_json_with(object, "cloth", drape_json_text(info->model->cloths[from->cloth].name));
+    object = drape_json_with(object, from->seam < 0 ? "cloth" : "seam",
+                             drape_json_text(cli_owner(info->model, from)));
     if (from->ops->law)
         object = drape_json_with(object, "acts_on", count(cost->acts_on));
     object = drape_json_with(object, "element", json_string(from->ops->element_name));
@@ -319,6 +320,21 @@ static json_t *stability(const drape_stability *s)
     return drape_json_with(object, "share", drape_json_number(s->substep / s->limit));
 }
 
+static json_t *with_seams(json_t *object, const drape_model *model)
+{
+    json_t *list = json_array();
+    for (int32_t i = 0; i < model->seam_count; i++) {
+        const drape_model_seam *seam = &model->seams[i];
+        json_t *one = drape_json_with(json_object(), "name", drape_json_text(seam->name));
+        one = drape_json_with(one, "type", json_string(model->terms[seam->term].ops->entry.name));
+        one = drape_json_with(one, "pairs", count(seam->pair_count));
+        for (int k = 0; k < 2; k++)
+            one = drape_json_with(one, k ? "b" : "a", drape_json_text(model->cloths[seam->cloth[k]].name));
+        list = drape_json_append(list, one);
+    }
+    return drape_json_with(object, "seams", list);
+}
+
 json_t *cli_info_json(const cli_info *info)
 {
     const drape_model *model = info->model;
@@ -338,6 +354,7 @@ json_t *cli_info_json(const cli_info *info)
     object = drape_json_with(object, "cloths", cloths);
     object = with_contact(object, info);
     object = with_events(object, info);
+    object = with_seams(object, model);
     cli_chosen_entries(info->sim, entries);
     for (int i = 0; i < CLI_CHOSEN; i++)
         object = drape_json_with(object, entries[i].title, chosen(&entries[i], &info->sim->chosen));

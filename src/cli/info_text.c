@@ -172,6 +172,19 @@ static void print_given(const drape_param *params, int count, const double *valu
     }
 }
 
+static void print_seam(const drape_model *model, int32_t i, const drape_seam_def *def)
+{
+    const drape_model_seam *seam = &model->seams[i];
+    const drape_term *term = &model->terms[seam->term];
+    drape_seam_def defaults = {.name = NULL};
+    drape_scene_set_defaults(&drape_form_seam, &defaults);
+    printf("\nseam %s: %s, %s\n", CLI_SHOWN(seam->name), term->ops->entry.name, term->ops->entry.summary);
+    print_given(term->ops->entry.params, term->ops->entry.param_count, term->params, &seam->choice);
+    print_keys("  ", 16, &drape_form_seam, def, &defaults);
+    printf("  %-16s %d, of %s and %s\n", "pairs", (int)seam->pair_count,
+           CLI_SHOWN(model->cloths[seam->cloth[0]].name), CLI_SHOWN(model->cloths[seam->cloth[1]].name));
+}
+
 static void print_chosen(const cli_chosen *entry, const drape_chosen *chosen)
 {
     printf("\n%s %s: %s\n", entry->title, entry->name, entry->summary);
@@ -235,7 +248,7 @@ static void print_term(const cli_info *info, int32_t i)
 {
     const drape_term *term = &info->model->terms[i];
     const drape_profile_term *cost = &info->profile.terms[i];
-    printf("  %-20s of %s: ", term->ops->entry.name, CLI_SHOWN(info->model->cloths[term->cloth].name));
+    printf("  %-20s of %s: ", term->ops->entry.name, CLI_SHOWN(cli_owner(info->model, term)));
     if (term->ops->law)
         printf("acts on %lld strain measures; its time is counted with theirs", (long long)cost->acts_on);
     else
@@ -316,7 +329,7 @@ static void print_costs(const cli_info *info)
     for (int32_t i = 0; i < info->model->term_count; i++) {
         const drape_term *term = &info->model->terms[i];
         const drape_profile_term *cost = &p->terms[i];
-        print_cost(info, term->ops->entry.name, info->model->cloths[term->cloth].name, cost->nonzeros,
+        print_cost(info, term->ops->entry.name, cli_owner(info->model, term), cost->nonzeros,
                    (long long)cost->bytes, cost->residual_seconds, cost->jacobian_seconds);
     }
     print_cost(info, "masses, clearing", "", p->implicit ? info->model->pattern.n : 0,
@@ -371,6 +384,8 @@ void cli_info_text(const cli_info *info)
     print_contact(info->sim);
     for (int32_t i = 0; i < info->model->event_count; i++)
         print_event(&info->model->events[i], &info->def.events[i]);
+    for (int32_t i = 0; i < info->model->seam_count; i++)
+        print_seam(info->model, i, &info->def.seams[i]);
     cli_chosen_entries(info->sim, entries);
     for (int i = 0; i < CLI_CHOSEN; i++)
         print_chosen(&entries[i], &info->sim->chosen);

@@ -264,6 +264,7 @@ static const struct opening {
     {"term", "type", ENTRY_PARAMS, &drape_term_registry, NULL, NULL, NULL},
     {"mesh", "grid", ENTRY_PARAMS, &drape_grid_registry, NULL, NULL, NULL},
     {"collider", "type", ENTRY_PARAMS, &drape_collider_registry, NULL, NULL, NULL},
+    {"seam", "type", ENTRY_PARAMS, &drape_seam_registry, NULL, NULL, NULL},
     {"event", "type", ENTRY_PARAMS, &drape_event_registry, NULL, NULL, NULL},
     {"self_contact", NULL, ENTRY_PARAMS, &drape_self_contact_registry, NULL, NULL, NULL},
     {"contact", NULL, ENTRY_PARAMS, &drape_contact_registry, NULL, NULL, NULL},

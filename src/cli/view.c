@@ -145,13 +145,16 @@ static drape_status scale_terms(cli_view *v, const char *name, double factor, in
     int place = 0;
     for (int32_t i = 0; i < m->term_count && !status; i++) {
         const drape_term *term = &m->terms[i];
-        place = i > 0 && m->terms[i - 1].cloth == term->cloth ? place + 1 : 0;
+        place = i > 0 && m->terms[i - 1].cloth == term->cloth && m->terms[i - 1].seam < 0 ? place + 1 : 0;
         for (int p = 0; p < term->ops->entry.param_count && !status; p++) {
             char pointer[120];
             if (strcmp(term->ops->entry.params[p].name, name) != 0 ||
                 term->ops->entry.params[p].kind != DRAPE_PARAM_NUMBER || isnan(term->params[p]))
                 continue;
-            snprintf(pointer, sizeof pointer, "/cloth/%d/terms/%d/%s", (int)term->cloth, place, name);
+            if (term->seam < 0)
+                snprintf(pointer, sizeof pointer, "/cloth/%d/terms/%d/%s", (int)term->cloth, place, name);
+            else
+                snprintf(pointer, sizeof pointer, "/seams/%d/%s", (int)term->seam, name);
             status = set_number(v, pointer, factor * term->params[p]);
             *changed += !status;
         }

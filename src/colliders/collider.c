@@ -54,7 +54,7 @@ drape_status drape_collider_build(drape_context *ctx, drape_arena *arena, const 
                              collider->choice.settings, collider->choice.setting_count, collider->values);
     if (status)
         return status;
-    collider->shape = (drape_collider_shape){.builder = &builder};
+    collider->shape = (drape_collider_shape){.builder = &builder, .user = collider->ops->user};
     ctx->message[0] = 0;
     status = ops->shape(collider->values, tolerance, &collider->shape);
     collider->shape.builder = NULL;

@@ -4,6 +4,7 @@
 #include "compile/term_builder.h"
 #include "terms/terms.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -68,18 +69,42 @@ drape_status drape_term_refuse(drape_term_builder *builder, const char *format, 
     return drape_fail_at(builder->model->ctx, DRAPE_E_ARGUMENT, builder->pointer, "%s", text);
 }
 
-static drape_status find_term(drape_context *ctx, const char *pointer, const char *name,
-                              const drape_term_ops **out)
+void drape_term_timed(drape_term_builder *builder, double from, double to)
 {
-    const int built_in = drape_registry_count(&drape_term_registry);
+    builder->term->timed[0] = from;
+    builder->term->timed[1] = to;
+}
+
+void drape_term_sew(drape_term_builder *builder, int32_t a, int32_t b)
+{
+    int32_t *sewn = builder->model->sewn;
+    if (!sewn || a < 0 || a >= builder->model->node_count || b < 0 || b >= builder->model->node_count) {
+        builder->strayed = true;
+        return;
+    }
+    while (sewn[a] != a)
+        a = sewn[a];
+    while (sewn[b] != b)
+        b = sewn[b];
+    sewn[a > b ? a : b] = a < b ? a : b;
+}
+
+/* pointer: to the name. */
+static drape_status find_term(drape_context *ctx, const drape_registry *registry, const char *pointer,
+                              const char *name, const drape_term_ops **out)
+{
+    const int built_in = drape_registry_count(registry);
+    const bool of_seams = registry == &drape_seam_registry;
     int i;
-    drape_status status = drape_registry_choose(ctx, &drape_term_registry, pointer, name, &i);
-    if (!status)
-        *out = i < built_in ? drape_terms[i] : &ctx->host_terms[i - built_in];
+    drape_status status = drape_registry_choose(ctx, registry, pointer, name, &i);
+    if (!status && i < built_in)
+        *out = of_seams ? drape_seams[i] : drape_terms[i];
+    else if (!status)
+        *out = drape_context_term_ops(ctx, of_seams, i - built_in);
     return status;
 }
 
-static drape_cloth_view view_of(const drape_model *model, const drape_cloth *cloth)
+static drape_cloth_view view_of(const drape_model *model, const drape_cloth *cloth, void *user)
 {
     const drape_mesh *m = &cloth->mesh;
     return (drape_cloth_view){.node_count = m->node_count,
@@ -104,18 +129,44 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .material = &cloth->material,
                               .gravity = {model->gravity[0], model->gravity[1], model->gravity[2]},
                               .tension = cloth->tension.warp > 0 ? &cloth->tension : NULL,
-                              .bending = cloth->bending.warp > 0 ? &cloth->bending : NULL};
+                              .bending = cloth->bending.warp > 0 ? &cloth->bending : NULL,
+                              .user = user};
+}
+
+static bool is_owned(const drape_term_builder *builder, int32_t node)
+{
+    for (int s = 0; s < 2; s++)
+        if (node >= builder->owned[s] && node - builder->owned[s] < builder->owned_count[s])
+            return true;
+    return false;
+}
+
+/* For messages: the nodes that elements may have, as the term numbers them. */
+static void describe_owned(const drape_term_builder *builder, char *text, size_t size)
+{
+    const int32_t *first = builder->owned, *count = builder->owned_count, from = builder->first_node;
+    const int used =
+        snprintf(text, size, "%d to %d", (int)(first[0] - from), (int)(first[0] + count[0] - 1 - from));
+    if (count[1] > 0 && first[1] != first[0])
+        snprintf(text + used, size - (size_t)used, " and %d to %d", (int)(first[1] - from),
+                 (int)(first[1] + count[1] - 1 - from));
 }
 
 static drape_status check_elements(drape_term_builder *builder)
 {
+    const double *timed = builder->term->timed;
     const drape_elements *el = &builder->term->elements;
     const drape_term_ops *ops = builder->term->ops;
     const int needed = ops->measure ? 2 + ops->damped : 0;
     if (el->rest_count < needed)
         return drape_term_refuse(builder, "%s has %d numbers of rest data an element; its kind needs %d",
                                  ops->entry.name, el->rest_count, needed);
-    int32_t first = builder->first_node, last = first + builder->node_count - 1;
+    char owned[64];
+    if (!builder->term->ops->energy && drape_term_is_timed(builder->term))
+        return drape_term_refuse(builder, "%s changes with time, which only an energy may", ops->entry.name);
+    if (!(timed[0] <= timed[1]) || isinf(timed[0]))
+        return drape_term_refuse(builder, "%s changes with time from %g s to %g s", ops->entry.name, timed[0],
+                                 timed[1]);
     if (builder->strayed)
         return drape_term_refuse(builder,
                                  "%s set an element outside of the %d that it announced, or a part or link "
@@ -126,24 +177,22 @@ static drape_status check_elements(drape_term_builder *builder)
             return drape_term_refuse(builder, "%s announced %d elements and did not set element %zu",
                                      ops->entry.name, (int)el->count, i);
     for (size_t i = 0; i < (size_t)el->count * (size_t)el->nodes; i++)
-        if (el->node[i] < first || el->node[i] > last)
-            return drape_term_refuse(builder, "element %zu of %s has node %d; the cloth's are 0 to %d",
+        if (!is_owned(builder, el->node[i])) {
+            describe_owned(builder, owned, sizeof owned);
+            return drape_term_refuse(builder, "element %zu of %s has node %d; the cloth's are %s",
                                      i / (size_t)el->nodes, builder->term->ops->entry.name,
-                                     (int)(el->node[i] - first), (int)(last - first));
+                                     (int)(el->node[i] - builder->first_node), owned);
+        }
     return drape_term_finish_parts(builder);
 }
 
-static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_term_ops *ops,
-                               const drape_entry_def *def)
+/* Adds a term of cloth c, without elements. */
+static drape_status begin_term(drape_model *model, int32_t c, int32_t seam, const char *pointer,
+                               const drape_term_ops *ops, const drape_entry_def *def)
 {
     drape_term *term = &model->terms[model->term_count];
-    drape_cloth *cloth = &model->cloths[c];
     drape_status status = drape_check_cancel(model->ctx);
     term->ops = ops;
-    for (int32_t i = 0; !status && i < model->term_count; i++)
-        if (model->terms[i].cloth == c && model->terms[i].ops == term->ops)
-            status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "the term \"%s\" is named twice",
-                                   def->type);
     if (!status)
         status =
             drape_params_resolve(model->ctx, pointer, term->ops->entry.params, term->ops->entry.param_count,
@@ -151,9 +200,26 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
     if (status)
         return status;
     term->cloth = c;
+    term->seam = seam;
+    term->elements.user = ops->user;
     term->first_internal = term->first_measure = -1;
     model->term_count++;
     model->has_dissipation = model->has_dissipation || term->ops->dissipative || term->ops->dissipation;
+    return DRAPE_OK;
+}
+
+static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_term_ops *ops,
+                               const drape_entry_def *def)
+{
+    drape_term *term = &model->terms[model->term_count];
+    drape_cloth *cloth = &model->cloths[c];
+    for (int32_t i = 0; i < model->term_count; i++)
+        if (model->terms[i].cloth == c && model->terms[i].ops == ops)
+            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "the term \"%s\" is named twice",
+                                 def->type);
+    drape_status status = begin_term(model, c, -1, pointer, ops, def);
+    if (status)
+        return status;
     if (term->ops->law) {
         cloth->laws[cloth->law_count++] = term;
         return DRAPE_OK;
@@ -162,8 +228,9 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
                                   .term = term,
                                   .pointer = pointer,
                                   .first_node = cloth->first_node,
-                                  .node_count = cloth->mesh.node_count};
-    drape_cloth_view view = view_of(model, cloth);
+                                  .owned = {cloth->first_node},
+                                  .owned_count = {cloth->mesh.node_count}};
+    drape_cloth_view view = view_of(model, cloth, ops->user);
     model->ctx->message[0] = 0;
     status = term->ops->build(&view, term->params, &builder);
     status = drape_fail_unsaid(model->ctx, status, pointer, "build() of \"%s\" returned %s",
@@ -174,10 +241,8 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
 /* The term number i, first the built-in ones, then those of the context's user; NULL after the last. */
 static const drape_term_ops *term_at(const drape_context *ctx, int i)
 {
-    const int built_in = drape_registry_count(&drape_term_registry), user_defined = i - built_in;
-    if (i < built_in)
-        return drape_terms[i];
-    return user_defined < ctx->host_term_count ? &ctx->host_terms[user_defined] : NULL;
+    const int built_in = drape_registry_count(&drape_term_registry);
+    return i < built_in ? drape_terms[i] : drape_context_term_ops(ctx, false, i - built_in);
 }
 
 /* The number of terms that the scene's gravity adds to every cloth. */
@@ -195,7 +260,7 @@ static drape_status build_named(drape_model *model, int32_t c, const char *point
                                 const drape_entry_def *def)
 {
     const drape_term_ops *ops;
-    drape_status status = find_term(model->ctx, pointer, def->type, &ops);
+    drape_status status = find_term(model->ctx, &drape_term_registry, pointer, def->type, &ops);
     if (status)
         return status;
     if (ops->from_scene_gravity)
@@ -237,6 +302,42 @@ static const double *own_damping(const drape_term *term)
         if (c[e] != 0)
             return c;
     return NULL;
+}
+
+/* Builds the term that joins the nodes of a seam. */
+static drape_status build_seam(drape_model *model, int32_t s, const drape_entry_def *def)
+{
+    drape_model_seam *seam = &model->seams[s];
+    const drape_cloth *side[2] = {&model->cloths[seam->cloth[0]], &model->cloths[seam->cloth[1]]};
+    const drape_term_ops *ops;
+    char pointer[64], at[80];
+    snprintf(pointer, sizeof pointer, "/seams/%d", (int)s);
+    snprintf(at, sizeof at, "%s/type", pointer);
+    drape_status status = find_term(model->ctx, &drape_seam_registry, at, def->type, &ops);
+    seam->term = model->term_count;
+    if (!status)
+        status = begin_term(model, seam->cloth[0], s, pointer, ops, def);
+    if (status)
+        return status;
+    drape_term_builder builder = {.model = model, .term = &model->terms[seam->term], .pointer = pointer};
+    drape_cloth_view cloth[2];
+    drape_seam_view view = {.pair_count = seam->pair_count, .pair = seam->pair, .user = ops->user};
+    for (int k = 0; k < 2; k++) {
+        cloth[k] = view_of(model, side[k], ops->user);
+        view.cloth[k] = &cloth[k];
+        view.first_node[k] = builder.owned[k] = side[k]->first_node;
+        builder.owned_count[k] = side[k]->mesh.node_count;
+    }
+    model->ctx->message[0] = 0;
+    status = ops->build_seam(&view, builder.term->params, &builder);
+    status = drape_fail_unsaid(model->ctx, status, pointer, "build_seam() of \"%s\" returned %s",
+                               ops->entry.name, drape_status_name(status));
+    if (!status)
+        status = check_elements(&builder);
+    builder.term->damping = status || !ops->measure ? NULL : own_damping(builder.term);
+    model->has_laws = model->has_laws || builder.term->damping;
+    model->has_dissipation = model->has_dissipation || builder.term->damping;
+    return status;
 }
 
 /* Assigns the indices of internal variables in a state, and of measures in the list of all measures. */
@@ -284,6 +385,7 @@ drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def)
     drape_status status = DRAPE_OK;
     for (size_t c = 0; c < def->cloth_count; c++)
         count += def->cloths[c].term_count + count_implied(model->ctx);
+    count += (size_t)model->seam_count;
     model->terms = drape_arena_take(&model->arena, count, sizeof *model->terms);
     if (!model->terms)
         return DRAPE_E_MEMORY;
@@ -292,6 +394,10 @@ drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def)
         if (!status)
             status = connect_laws(model, c);
     }
+    for (int32_t s = 0; !status && s < model->seam_count; s++)
+        status = build_seam(model, s, &def->seams[s].entry);
+    for (int32_t i = 0; model->sewn && i < model->node_count; i++) /* ascending: those before are final */
+        model->sewn[i] = model->sewn[model->sewn[i]];
     for (int32_t i = 0; !status && i < model->term_count; i++)
         number_elements(model, &model->terms[i]);
     return status;
@@ -301,14 +407,16 @@ static bool well_formed(const drape_term_ops *ops)
 {
     int kinds =
         (ops->measure != NULL) + (ops->energy != NULL) + (ops->dissipation != NULL) + (ops->law != NULL);
-    bool sized =
-        ops->law ? ops->nodes == 0 : ops->nodes >= 1 && ops->nodes <= DRAPE_MAX_ELEMENT_NODES && ops->build;
+    bool sized = ops->law ? ops->nodes == 0 && !ops->build_seam
+                          : ops->nodes >= 1 && ops->nodes <= DRAPE_MAX_ELEMENT_NODES &&
+                                (ops->build || ops->build_seam);
     bool internal = !ops->has_internal || (ops->commit && ops->initial);
     return ops->entry.name && ops->entry.summary && ops->entry.reference && ops->element_name && kinds == 1 &&
            sized && internal &&
            (!ops->part ||
             (ops->measure && ops->part_nodes >= 1 && ops->part_nodes <= DRAPE_MAX_ELEMENT_NODES)) &&
            (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
+           (!ops->build_seam || !ops->part) &&
            drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }
 
@@ -333,12 +441,13 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
             ctx, DRAPE_E_ARGUMENT,
             "the ops of term \"%s\" are not well formed: name, summary, reference, "
             "element_name, exactly one of measure, "
-            "energy, dissipation, law; nodes 1 to %d and build but for a law; commit and "
+            "energy, dissipation, law; nodes 1 to %d and build or build_seam but for a law; commit and "
             "initial with has_internal; damped with a measure alone, in_medium with a dissipation; part with "
-            "a measure and part_nodes; "
+            "a measure and part_nodes, and without build_seam; "
             "at most %d values of parameters, each with name and unit, a choice with choices",
             ops->entry.name ? ops->entry.name : "?", DRAPE_MAX_ELEMENT_NODES, DRAPE_MAX_PARAMS);
-    if (drape_registry_find(&drape_term_registry, ctx, ops->entry.name) >= 0)
+    if (drape_registry_find(&drape_term_registry, ctx, ops->entry.name) >= 0 ||
+        drape_registry_find(&drape_seam_registry, ctx, ops->entry.name) >= 0)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a term \"%s\" already", ops->entry.name);
     if (ctx->host_term_count == DRAPE_MAX_HOST_TERMS)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "term \"%s\": a context holds at most %d user-defined terms",

@@ -1,15 +1,10 @@
 /* pins.c: which nodes are pinned, along which track; numbers the free nodes. Pinned nodes are eliminated from
  * the system. */
+#include "compile/select.h"
 #include "compile/stages.h"
-#include "model/scene.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
-
-#define ROUND_OFF                                                                                            \
-    1e-14 /* relative: a coordinate that is meant to lie on the boundary of a box counts as
-                           inside */
 
 /* One pin under construction: its place in the scene, and the cloth that it pins. */
 typedef struct pin_place {
@@ -21,7 +16,6 @@ typedef struct pin_place {
     int32_t *track_of_node; /* (node_count) -1: fixed or free */
     uint8_t *clamped;       /* (node_count) 1: held by a pin that clamps */
     uint8_t *held;          /* (node_count) 1: held by this pin */
-    int32_t taken;          /* number of nodes pinned so far by this pin */
 } pin_place;
 
 static drape_status refuse(const pin_place *pin, const char *key, const char *text)
@@ -31,8 +25,9 @@ static drape_status refuse(const pin_place *pin, const char *key, const char *te
     return drape_fail_at(pin->model->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
 }
 
-static drape_status take_node(pin_place *pin, const char *key, int32_t local)
+static drape_status take_node(void *user, const char *key, int32_t local)
 {
+    pin_place *pin = user;
     int32_t node = pin->cloth->first_node + local;
     if (pin->model->pinned[node] && pin->track_of_node[node] != pin->track) {
         char text[128];
@@ -43,115 +38,28 @@ static drape_status take_node(pin_place *pin, const char *key, int32_t local)
     pin->clamped[node] |= pin->def->clamp;
     pin->track_of_node[node] = pin->track;
     pin->held[node] = 1;
-    pin->taken++;
     return DRAPE_OK;
 }
 
-static drape_status take_list(pin_place *pin)
-{
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < pin->def->node_count; i++) {
-        char key[48], text[96];
-        int32_t node = pin->def->nodes[i];
-        snprintf(key, sizeof key, "/nodes/%zu", i);
-        snprintf(text, sizeof text, "node %d is not in the mesh; its nodes are 0 to %d", (int)node,
-                 (int)pin->cloth->mesh.node_count - 1);
-        status = node < 0 || node >= pin->cloth->mesh.node_count ? refuse(pin, key, text)
-                                                                 : take_node(pin, key, node);
-    }
-    return status;
-}
-
-/* Pins nodes (row, column) of a grid within the ranges [first, last]. */
-static drape_status take_range(pin_place *pin, const char *key, int32_t first_row, int32_t last_row,
-                               int32_t first_column, int32_t last_column)
-{
-    drape_status status = DRAPE_OK;
-    for (int32_t r = first_row; r <= last_row; r++)
-        for (int32_t c = first_column; !status && c <= last_column; c++)
-            status = take_node(pin, key, r * pin->cloth->mesh.columns + c);
-    return status;
-}
-
-/* Narrows first and last row, first and last column to the side with which the text begins. */
-static void narrow(const char *side, const drape_mesh *mesh, int32_t range[4])
-{
-    static const struct {
-        const char *name;
-        int bound; /* index of the bound that is set to the opposite one */
-    } sides[] = {{"top", 1}, {"bottom", 0}, {"left", 3}, {"right", 2}};
-    const int32_t opposite[4] = {mesh->rows - 1, 0, mesh->columns - 1, 0};
-    for (size_t i = 0; i < sizeof sides / sizeof *sides; i++)
-        if (strncmp(sides[i].name, side, strlen(sides[i].name)) == 0)
-            range[sides[i].bound] = opposite[sides[i].bound];
-}
-
-/* first, second: the sides that meet in a corner; equal for a whole side. */
-static drape_status take_sides(pin_place *pin, const char *key, const char *first, const char *second)
-{
-    const drape_mesh *mesh = &pin->cloth->mesh;
-    int32_t range[4] = {0, mesh->rows - 1, 0, mesh->columns - 1};
-    narrow(first, mesh, range);
-    narrow(second, mesh, range);
-    return take_range(pin, key, range[0], range[1], range[2], range[3]);
-}
-
-static drape_status take_row(pin_place *pin)
-{
-    const drape_mesh *mesh = &pin->cloth->mesh;
-    if (pin->def->row >= mesh->rows) {
-        char text[96];
-        snprintf(text, sizeof text, "row %d is not in the mesh; its rows are 0 to %d", (int)pin->def->row,
-                 (int)mesh->rows - 1);
-        return refuse(pin, "/row", text);
-    }
-    return take_range(pin, "/row", pin->def->row, pin->def->row, 0, mesh->columns - 1);
-}
-
-static drape_status take_box(pin_place *pin)
-{
-    const double *low = pin->def->box_min, *high = pin->def->box_max;
-    for (int k = 0; k < 3; k++)
-        if (!(low[k] <= high[k]))
-            return refuse(pin, "/box", "min must not be above max in any coordinate");
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < pin->cloth->mesh.node_count; i++) {
-        const double *x = pin->cloth->mesh.x + 3 * (size_t)i;
-        bool inside = true;
-        for (int k = 0; k < 3; k++) {
-            double slack = ROUND_OFF * fmax(fabs(x[k]), fmax(fabs(low[k]), fabs(high[k])));
-            inside = inside && low[k] - slack <= x[k] && x[k] <= high[k] + slack;
-        }
-        if (inside)
-            status = take_node(pin, "/box", i);
-    }
-    if (!status && pin->taken == 0)
-        status = refuse(pin, "/box", "no node lies in the box");
-    return status;
-}
-
+/* Pins the selected nodes. */
 static drape_status take_selection(pin_place *pin)
 {
     const drape_pin_def *def = pin->def;
-    const char *on_grid = def->corner ? "/corner" : def->edge ? "/edge" : def->row >= 0 ? "/row" : NULL;
-    int given =
-        (def->nodes != NULL) + (def->corner != NULL) + (def->edge != NULL) + (def->row >= 0) + def->has_box;
-    if (given != 1) {
-        char wanted[128];
-        drape_scene_one_of_text(&drape_form_pin, wanted, sizeof wanted);
-        strncat(wanted, " is needed", sizeof wanted - strlen(wanted) - 1);
-        return refuse(pin, "", wanted);
-    }
-    if (on_grid && pin->cloth->mesh.rows == 0)
-        return refuse(pin, on_grid,
-                      "only a grid has rows, corners and edges; use \"nodes\" or \"box\" for this mesh");
-    if (def->nodes)
-        return take_list(pin);
-    if (def->corner)
-        return take_sides(pin, "/corner", def->corner, strchr(def->corner, '-') + 1);
-    if (def->edge)
-        return take_sides(pin, "/edge", def->edge, def->edge);
-    return def->has_box ? take_box(pin) : take_row(pin);
+    const drape_selection selection = {.ctx = pin->model->ctx,
+                                       .pointer = pin->pointer,
+                                       .form = &drape_form_pin,
+                                       .mesh = &pin->cloth->mesh,
+                                       .nodes = def->nodes,
+                                       .node_count = def->node_count,
+                                       .corner = def->corner,
+                                       .edge = def->edge,
+                                       .row = def->row,
+                                       .has_box = def->has_box,
+                                       .box_min = def->box_min,
+                                       .box_max = def->box_max,
+                                       .take = take_node,
+                                       .user = pin};
+    return drape_select_nodes(&selection);
 }
 
 static drape_status keep_track(pin_place *pin)
@@ -205,7 +113,6 @@ static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, in
         to->clamps = def->cloths[c].pins[p].clamp;
         pin->cloth = &model->cloths[c];
         pin->def = &def->cloths[c].pins[p];
-        pin->taken = 0;
         snprintf(pin->pointer, sizeof pin->pointer, "/cloth/%d/pins/%zu", (int)c, p);
         status = name_pin(pin, p, to);
         if (!status)

@@ -42,7 +42,10 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
 /* Resolves the events, after the pins. */
 drape_status drape_compile_events(drape_model *model, const drape_scene_def *def);
 
-/* Builds the terms of all cloths and assigns indices to measures and internal variables. */
+/* Finds the nodes that seams join, before the terms. */
+drape_status drape_compile_seams(drape_model *model, const drape_scene_def *def);
+
+/* Builds the terms of all cloths and seams and assigns indices to measures and internal variables. */
 drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def);
 
 /* Builds the pattern of the Jacobian from all terms and contact with colliders, and finds the block of each

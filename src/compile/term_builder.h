@@ -8,8 +8,9 @@ struct drape_term_builder {
     drape_model *model;
     drape_term *term;
     const char *pointer;
-    int32_t first_node, node_count;
-    bool reserved; /* the term has announced its elements */
+    int32_t first_node;               /* added to the numbers that the term sets */
+    int32_t owned[2], owned_count[2]; /* ranges of nodes that elements may have; the second one of a seam */
+    bool reserved;                    /* the term has announced its elements */
     int32_t *node; /* the arrays of elements.node and elements.rest, writable; node -1: not set yet */
     double *rest;
     bool strayed; /* the term set an element, a part or a link outside the range that it announced */

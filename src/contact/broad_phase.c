@@ -170,7 +170,7 @@ static void own_face(void *user, int32_t face)
 {
     query *q = user;
     const int32_t *t = q->broad->model->triangle + 3 * (size_t)face;
-    if (t[0] == q->piece || t[1] == q->piece || t[2] == q->piece)
+    if (drape_model_share_node(q->broad->model, &q->piece, 1, t, 3))
         return;
     set_nodes(&q->pair, q->piece, t[0], t[1], t[2]);
     report(q, face);
@@ -181,7 +181,7 @@ static void own_edge(void *user, int32_t edge)
     query *q = user;
     const int32_t *e = q->broad->model->edge + 2 * (size_t)edge,
                   *f = q->broad->model->edge + 2 * (size_t)q->piece;
-    if (e[0] == f[0] || e[0] == f[1] || e[1] == f[0] || e[1] == f[1])
+    if (drape_model_share_node(q->broad->model, e, 2, f, 2))
         return;
     set_nodes(&q->pair, f[0], f[1], e[0], e[1]);
     q->pair.area = 0.5 * (q->broad->edge_area[edge] + q->broad->edge_area[q->piece]);

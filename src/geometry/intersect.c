@@ -33,11 +33,10 @@ static void try_triangle(void *user, int32_t element)
     const int32_t *edge = s->edges->edge + 2 * (size_t)s->edge,
                   *triangle = s->triangles->triangle + 3 * (size_t)element;
     const double *corner[3];
-    for (int a = 0; a < 3; a++) {
-        if (s->edges->x == s->triangles->x && (triangle[a] == edge[0] || triangle[a] == edge[1]))
-            return;
+    if (s->edges->x == s->triangles->x && drape_model_share_node(s->edges->model, triangle, 3, edge, 2))
+        return;
+    for (int a = 0; a < 3; a++)
         corner[a] = s->triangles->x + 3 * (size_t)triangle[a];
-    }
     if (drape_intersect_edge(s->edges->x + 3 * (size_t)edge[0], s->edges->x + 3 * (size_t)edge[1], corner[0],
                              corner[1], corner[2]))
         s->visit(s->user, s->edge, element);
@@ -66,6 +65,7 @@ drape_status drape_intersect(drape_context *ctx, const drape_surface *edges, con
 drape_surface drape_surface_of(const drape_model *m, const double *x)
 {
     return (drape_surface){.x = x,
+                           .model = m,
                            .edge = m->edge,
                            .triangle = m->triangle,
                            .edge_count = m->edge_count,

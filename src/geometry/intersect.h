@@ -17,6 +17,7 @@ typedef struct drape_surface {
     const double *x;
     const int32_t *edge, *triangle; /* (edge_count x 2), (triangle_count x 3) nodes */
     int32_t edge_count, triangle_count;
+    const drape_model *model; /* of the cloth; NULL: a collider */
 } drape_surface;
 
 drape_surface drape_surface_of(const drape_model *model, const double *x); /* of the cloth */
@@ -26,8 +27,8 @@ bool drape_intersect_edge(const double *p, const double *q, const double *a, con
                           const double *c);
 
 /* Calls visit for each pair of an edge of `edges` and a triangle of `triangles` that it passes through,
- * edges in their order. If both have the same x, pairs that share a node do not count. Errors:
- * DRAPE_E_MEMORY. */
+ * edges in their order. If both have the same x, that of the cloth, pairs that share a node do not count, nor
+ * those with nodes that are sewn together. Errors: DRAPE_E_MEMORY. */
 typedef void drape_intersection_visit(void *user, int32_t edge, int32_t triangle);
 drape_status drape_intersect(drape_context *ctx, const drape_surface *edges, const drape_surface *triangles,
                              drape_intersection_visit *visit, void *user);

@@ -375,7 +375,8 @@ static drape_status add_moved(rosenbrock_state *s, const drape_state *in, double
 static bool depends_on_time(const rosenbrock_state *s)
 {
     const drape_motion *m = s->common.motion;
-    bool moved = m->moved_count > 0 || drape_system_has_wind(s->common.equation.system);
+    bool moved = m->moved_count > 0 || drape_system_has_wind(s->common.equation.system) ||
+                 drape_system_is_timed(s->common.equation.system);
     for (int32_t c = 0; !moved && c < m->model->collider_count; c++)
         moved = drape_motion_moves_collider(m, c);
     return moved;

@@ -95,7 +95,7 @@ static void start(drape_spectrum *s)
 static void product(drape_spectrum *s, const drape_state *at, double *y, const double *from)
 {
     const drape_model *m = s->model;
-    const drape_point point = {.x = s->x, .v = s->v, .internal = at->internal, .t = at->t};
+    const drape_point point = {.x = s->x, .v = s->v, .internal = at->internal, .t = at->t, .done = true};
     double max = 0;
     for (size_t i = 0; i < s->dofs; i++)
         max = fmax(max, fabs(s->u[i]) * s->root[i / 3]);
@@ -168,7 +168,7 @@ static double largest(drape_spectrum *s, const drape_state *at, double *y, const
 
 void drape_spectrum_largest(drape_spectrum *s, const drape_state *at, double *omega, double *damping)
 {
-    const drape_point rest = {.x = s->x, .v = s->v, .internal = at->internal, .t = at->t};
+    const drape_point rest = {.x = s->x, .v = s->v, .internal = at->internal, .t = at->t, .done = true};
     memcpy(s->x, at->x, s->nodes * sizeof *s->x);
     memset(s->v, 0, s->nodes * sizeof *s->v);
     drape_system_force(s->system, &rest, s->g0);

@@ -199,8 +199,11 @@ static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *near
     double *own = x + 3 * (size_t)i, sum[3] = {0}, square_of_reach = s->reach * s->reach;
     int pushing = 0;
     for (int k = 0; k < count; k++) {
+        const int32_t j = near ? near[k] : k;
         double d[3];
-        vec3_sub(own, x + 3 * (size_t)(near ? near[k] : k), d);
+        if (s->model->sewn && s->model->sewn[i] == s->model->sewn[j])
+            continue;
+        vec3_sub(own, x + 3 * (size_t)j, d);
         double square = vec3_dot(d, d);
         if (!(square < square_of_reach) || square == 0) /* too far, or no direction to push in */
             continue;

@@ -200,6 +200,32 @@ static json_t *with_events(json_t *object, const drape_sim *sim)
     return object;
 }
 
+/* What each seam carries at the end. */
+static json_t *with_seams(json_t *object, drape_sim *sim)
+{
+    drape_seam_report s;
+    json_t *list = json_array();
+    const int32_t count = drape_sim_seam(sim, -1, NULL);
+    for (int32_t i = 0; i < count; i++) {
+        drape_sim_seam(sim, i, &s);
+        const real_item reals[] = {{"gap_mean", s.gap_mean},
+                                   {"gap_max", s.gap_max},
+                                   {"tension", s.tension},
+                                   {"tension_max", s.tension_max}};
+        json_t *force = json_array(), *one = drape_json_with(json_object(), "name", drape_json_text(s.name));
+        for (int k = 0; k < 3; k++)
+            force = drape_json_append(force, drape_json_number(s.force[k]));
+        one = drape_json_with(one, "type", drape_json_text(s.type));
+        one = drape_json_with(one, "pairs", json_integer((json_int_t)s.pairs));
+        one = drape_json_with(with_reals(one, reals, LENGTH(reals)), "force", force);
+        list = drape_json_append(list, one);
+    }
+    if (count > 0)
+        return drape_json_with(object, "seams", list);
+    json_decref(list);
+    return object;
+}
+
 static json_t *warnings(drape_sim *sim)
 {
     json_t *list = json_array();
@@ -251,6 +277,7 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     object = with_inside(object, sim);
     object = with_no_room(object, sim);
     object = with_events(object, sim);
+    object = with_seams(object, sim);
     object = drape_json_with(object, "warnings", warnings(sim));
     if (def->realtime)
         object = drape_json_with(object, "realtime", realtime(def->realtime));

@@ -18,23 +18,39 @@ typedef struct drape_patches {
                          of one of them */
 } drape_patches;
 
-/* One term on one cloth. */
+/* One term on one cloth or one seam. */
 typedef struct drape_term {
     const drape_term_ops *ops;
-    int32_t cloth;
+    int32_t cloth; /* of a seam, that of its side a */
+    int32_t seam;  /* -1: it is of a cloth */
     double params[DRAPE_MAX_PARAMS];
     drape_elements elements; /* with node numbers of the whole model */
     drape_parts parts;       /* elements.parts points here if the term has parts */
     drape_patches patches;
-    int32_t *block; /* (drape_term_places) block of each node pair in the pattern, -1: pinned; NULL: no
+    int32_t *block;  /* (drape_term_places) block of each node pair in the pattern, -1: pinned; NULL: no
                        sparsity */
-    bool anchored;  /* its elements are attached to fixed directions in space */
+    double timed[2]; /* [s] from when to when its energy changes with time; equal: it does not */
+    bool anchored;   /* its elements are attached to fixed directions in space */
     int64_t first_internal;               /* index of its internal variables in a state; -1: none */
     int64_t first_measure;                /* index of its measures in the list of all measures; -1: none */
     const struct drape_term *const *laws; /* laws of the cloth that act on this measure */
     int law_count;
     const double *damping; /* (elements.count) its measures' own dashpots [J s/q2]; NULL: none */
 } drape_term;
+
+static inline bool drape_term_is_timed(const drape_term *term)
+{
+    return term->timed[0] < term->timed[1];
+}
+
+/* From 0 at the beginning of this time to 1 at its end, with rate 0 at both. */
+static inline double drape_term_progress(const drape_term *term, double t)
+{
+    const double s = (t - term->timed[0]) / (term->timed[1] - term->timed[0]);
+    if (!drape_term_is_timed(term) || s >= 1)
+        return 1;
+    return s > 0 ? s * s * (3 - 2 * s) : 0;
+}
 
 /* Whether the term has a Hessian, so that it couples the nodes of an element. */
 static inline bool drape_term_couples(const drape_term *term)
@@ -180,6 +196,16 @@ typedef struct drape_pin {
     bool clamps;
 } drape_pin;
 
+/* Nodes that are joined, one by one. */
+typedef struct drape_model_seam {
+    char *name;
+    drape_choice choice; /* the choice of the scene */
+    int32_t term;        /* that joins them */
+    int32_t cloth[2];    /* of its sides a and b */
+    int32_t *pair;       /* (pair_count x 2) node numbers of the model: of a, of b */
+    int32_t pair_count;
+} drape_model_seam;
+
 /* What happens at an event, beside that it is recorded and reported. */
 typedef enum drape_event_action {
     DRAPE_ACTION_RECORD,
@@ -220,7 +246,7 @@ struct drape_model {
     drape_context *ctx;
     int32_t cloth_count, term_count, node_count, triangle_count, edge_count;
     drape_cloth *cloths;
-    drape_term *terms;     /* (term_count) in scene order, gravity last in each cloth */
+    drape_term *terms;     /* (term_count) in scene order, gravity last in each cloth; then those of seams */
     double *rest;          /* (node_count x 3) [m] */
     double *velocity;      /* (node_count x 3) [m/s] at t = 0 */
     double *mass;          /* (node_count) [kg] */
@@ -255,7 +281,28 @@ struct drape_model {
     int32_t pin_count;
     drape_model_event *events; /* (event_count) in scene order */
     int32_t event_count;
+    drape_model_seam *seams; /* (seam_count) in scene order */
+    int32_t seam_count;
+    int32_t *sewn; /* (node_count) the first of the nodes that a node is sewn to, or itself; NULL: no seams */
 };
+
+/* Nodes that are sewn together count as one where the neighbours of a node are concerned: pieces that have
+ * one of these are not in contact, and may pass through each other at the seam. */
+static inline int32_t drape_model_sewn(const drape_model *model, int32_t node)
+{
+    return model->sewn ? model->sewn[node] : node;
+}
+
+/* Whether two pieces of cloth share a node, or have nodes that are sewn together. */
+static inline bool drape_model_share_node(const drape_model *model, const int32_t *a, int a_count,
+                                          const int32_t *b, int b_count)
+{
+    for (int i = 0; i < a_count; i++)
+        for (int j = 0; j < b_count; j++)
+            if (drape_model_sewn(model, a[i]) == drape_model_sewn(model, b[j]))
+                return true;
+    return false;
+}
 
 /* Writes the positions that tracks give pinned nodes at time t; other entries of x (node_count x 3) are
  * unchanged. */

@@ -41,7 +41,7 @@ typedef enum drape_scene_shape {
     DRAPE_SCENE_LIST,       /* an array of such values, integers or texts */
     DRAPE_SCENE_VERSION,    /* the number DRAPE_SCENE_FORM; not stored in the def */
     DRAPE_SCENE_REMARK,     /* a string for people; not stored in the def */
-    DRAPE_SCENE_BOX,        /* two corners of a pin's box */
+    DRAPE_SCENE_BOX,        /* two corners of a box, and at count_offset whether it is given */
     DRAPE_SCENE_TRACK,      /* an array of [time, [x, y, z]], times increasing */
     DRAPE_SCENE_QUATERNION, /* four numbers, [w, x, y, z] */
     DRAPE_SCENE_OBJECT,     /* a child object */
@@ -73,6 +73,7 @@ typedef struct drape_scene_key {
 #define DRAPE_MAX_CLOTHS    (1 << 20)
 #define DRAPE_MAX_COLLIDERS 4096
 #define DRAPE_MAX_EVENTS    256
+#define DRAPE_MAX_SEAMS     4096
 
 typedef struct drape_scene_object {
     const char *name;
@@ -90,7 +91,8 @@ typedef struct drape_scene_object {
 
 /* The top-level object and some of its descendants. */
 extern const drape_scene_object drape_form_scene, drape_form_output, drape_form_cloth, drape_form_mesh,
-    drape_form_transform, drape_form_pin, drape_form_turn, drape_form_collider, drape_form_event;
+    drape_form_transform, drape_form_pin, drape_form_turn, drape_form_collider, drape_form_event,
+    drape_form_seam, drape_form_seam_side;
 
 /* Returns the key of an object by its name; NULL if there is none. */
 const drape_scene_key *drape_scene_key_of(const drape_scene_object *object, const char *name);

@@ -192,6 +192,14 @@ void drape_event_def_init(drape_event_def *def, size_t struct_size)
     drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
+void drape_seam_def_init(drape_seam_def *def, size_t struct_size)
+{
+    drape_seam_def defaults = {.struct_size = 0};
+    drape_scene_set_defaults(&drape_form_seam, &defaults);
+    defaults.struct_size = struct_size;
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
+}
+
 void drape_pin_def_init(drape_pin_def *def, size_t struct_size)
 {
     drape_pin_def defaults = {.struct_size = 0};

@@ -230,19 +230,20 @@ static drape_status read_one(reader *r, const drape_scene_key *key, json_t *valu
 
 static drape_status read_box(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
-    drape_pin_def *pin = (drape_pin_def *)(void *)def;
-    double *const corners[2] = {pin->box_min, pin->box_max};
+    const bool given = true;
+    double low_high[6];
     if (json_array_size(value) != 2)
         return refuse(r, key, value);
     size_t mark = r->at.length;
     for (size_t i = 0; i < 2; i++) {
         drape_pointer_push_index(&r->at, i);
-        drape_status status = read_three(r, json_array_get(value, i), "a corner", corners[i]);
+        drape_status status = read_three(r, json_array_get(value, i), "a corner", low_high + 3 * i);
         if (status)
             return status;
         drape_pointer_cut(&r->at, mark);
     }
-    pin->has_box = true;
+    memcpy(def + key->offset, low_high, sizeof low_high);
+    memcpy(def + key->count_offset, &given, sizeof given);
     return DRAPE_OK;
 }
 

@@ -8,6 +8,7 @@
 /* The place of a value: a member of the def, or an array and its count. */
 #define IN(def, member)           .offset = offsetof(def, member)
 #define ARRAY(def, member, count) .offset = offsetof(def, member), .count_offset = offsetof(def, count)
+#define BOX(def)                  .offset = offsetof(def, box_min), .count_offset = offsetof(def, has_box)
 #define SETTINGS(def, member, count)                                                                         \
     .open = true, .settings_offset = offsetof(def, member), .settings_count_offset = offsetof(def, count)
 
@@ -44,7 +45,7 @@ static const drape_scene_key pin_keys[] = {
     {DRAPE_INTEGER("row", "1", UNSAID, 0, INT32_MAX, "a row of a grid, from 0"), IN(drape_pin_def, row)},
     {DRAPE_VECTOR("box", "m", UNSAID, LOWEST, HIGHEST,
                   "nodes inside a box of rest coordinates after the transform, boundary included"),
-     .shape = DRAPE_SCENE_BOX},
+     .shape = DRAPE_SCENE_BOX, BOX(drape_pin_def)},
     {DRAPE_VECTOR("track", "s and m", DRAPE_DERIVED("none: fixed"), LOWEST, HIGHEST,
                   "displacement from rest, linear between the times"),
      .shape = DRAPE_SCENE_TRACK, ARRAY(drape_pin_def, track, key_count), .at_least = 1},
@@ -214,6 +215,46 @@ const drape_scene_object drape_form_event = {
     .least_size = sizeof(drape_event_def),
 };
 
+/* ---- Seams ---- */
+
+static const drape_scene_key seam_side_keys[] = {
+    {DRAPE_TEXT("cloth", "name of its cloth"), IN(drape_seam_side_def, cloth)},
+    {DRAPE_INTEGER("nodes", "1", UNSAID, 0, INT32_MAX, "node numbers of the cloth, in the order of the seam"),
+     .shape = DRAPE_SCENE_LIST, ARRAY(drape_seam_side_def, nodes, node_count), .at_least = 1},
+    {DRAPE_CHOICE("corner", UNSAID, corners, "a corner of a grid; top is row 0, left is column 0"),
+     IN(drape_seam_side_def, corner)},
+    {DRAPE_CHOICE("edge", UNSAID, edges, "a side of a grid, by ascending column or row"),
+     IN(drape_seam_side_def, edge)},
+    {DRAPE_INTEGER("row", "1", UNSAID, 0, INT32_MAX, "a row of a grid, from 0, by ascending column"),
+     IN(drape_seam_side_def, row)},
+    {DRAPE_VECTOR(
+         "box", "m", UNSAID, LOWEST, HIGHEST,
+         "nodes inside a box of rest coordinates, sorted along the longest side of their bounding box"),
+     .shape = DRAPE_SCENE_BOX, BOX(drape_seam_side_def)},
+    {DRAPE_BOOLEAN("reverse", false, "in the reverse order"), IN(drape_seam_side_def, reverse)},
+};
+const drape_scene_object drape_form_seam_side = {.name = "seam_side",
+                                                 KEYS(seam_side_keys),
+                                                 .one_of = pin_selectors,
+                                                 .def_size = sizeof(drape_seam_side_def)};
+
+static const drape_scene_key seam_keys[] = {
+    {DRAPE_TEXT("type", "name of a seam; its parameters are keys beside it"), IN(drape_seam_def, entry.type)},
+    {DRAPE_TEXT("name", "unique name", .derived = "\"seam0\", \"seam1\" ..."), IN(drape_seam_def, name)},
+    {SHAPED(DRAPE_SCENE_OBJECT, "a", DRAPE_REQUIRED, "the nodes of one side"), IN(drape_seam_def, a),
+     .child = &drape_form_seam_side},
+    {SHAPED(DRAPE_SCENE_OBJECT, "b", DRAPE_REQUIRED, "as many nodes of the other, in the same order"),
+     IN(drape_seam_def, b), .child = &drape_form_seam_side},
+};
+
+const drape_scene_object drape_form_seam = {
+    .name = "seam",
+    KEYS(seam_keys),
+    SETTINGS(drape_seam_def, entry.settings, entry.setting_count),
+    .def_size = sizeof(drape_seam_def),
+    .least_size = sizeof(drape_seam_def),
+};
+
 /* ---- Scene ---- */
 
 static const drape_scene_key output_keys[] = {
@@ -255,6 +296,8 @@ static const drape_scene_key scene_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECT, "output", UNSAID, "what a run writes"), .child = &drape_form_output},
     {SHAPED(DRAPE_SCENE_OBJECTS, "events", NONE, "what is looked out for during the run"),
      ARRAY(drape_scene_def, events, event_count), .at_most = DRAPE_MAX_EVENTS, .child = &drape_form_event},
+    {SHAPED(DRAPE_SCENE_OBJECTS, "seams", NONE, "nodes that are sewn together, of two cloths or one"),
+     ARRAY(drape_scene_def, seams, seam_count), .at_most = DRAPE_MAX_SEAMS, .child = &drape_form_seam},
 };
 
 const drape_scene_object drape_form_scene = {.name = "scene",

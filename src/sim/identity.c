@@ -155,6 +155,8 @@ static uint64_t model_hash(const drape_model *m)
         hash = add_track(hash, &m->tracks[i]);
     for (int32_t i = 0; i < m->term_count; i++)
         hash = add_term(hash, &m->terms[i]);
+    if (m->sewn)
+        hash = add(hash, m->sewn, (size_t)m->node_count * sizeof *m->sewn);
     for (int32_t i = 0; i < m->collider_count; i++)
         hash = add_collider(hash, &m->colliders[i]);
     for (int32_t i = 0; i < m->event_count; i++)

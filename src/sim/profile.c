@@ -179,7 +179,7 @@ static int64_t count_measures(const drape_model *model, int32_t cloth)
 {
     int64_t count = 0;
     for (int32_t i = 0; i < model->term_count; i++)
-        if (model->terms[i].cloth == cloth && model->terms[i].ops->measure)
+        if (model->terms[i].cloth == cloth && model->terms[i].seam < 0 && model->terms[i].ops->measure)
             count += model->terms[i].elements.count;
     return count;
 }

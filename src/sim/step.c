@@ -61,6 +61,14 @@ static bool may_relax(const drape_sim *sim)
     return policy == DRAPE_NO_ROOM_RELAX || (policy == DRAPE_NO_ROOM_AUTO && sim->realtime.active);
 }
 
+/* The work from one state to another of what no integrator counts: the forces of the host, and terms that
+ * depend on time. */
+static double outer_work(const drape_sim *sim, const drape_state *from, const drape_state *to)
+{
+    return drape_system_push_work(sim->system, from->x, to->x) +
+           drape_system_timed_work(sim->system, from->internal, from->x, from->t, to->x, to->t);
+}
+
 static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step_info *info)
 {
     drape_state *next = next_state(sim);
@@ -79,7 +87,7 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
         info->reason = drape_reason_name(DRAPE_REASON_CANCELLED);
     if (status && !info->usable)
         return status;
-    info->pin_work += drape_system_push_work(sim->system, drape_sim_state(sim)->x, next->x);
+    info->pin_work += outer_work(sim, drape_sim_state(sim), next);
     drape_status refused = check(sim, info);
     if (refused)
         info->usable = false;
@@ -229,7 +237,7 @@ static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
     const drape_state *now = drape_sim_state(sim);
     drape_state *next = next_state(sim);
     const double t = sim->schedule.cut_end, share = (t - now->t) / (next->t - now->t);
-    const double pushed = drape_system_push_work(sim->system, now->x, next->x);
+    const double outer = outer_work(sim, now, next);
     if (!sim->chosen.integrator->interpolate_velocities)
         return false;
     drape_sim_dense_positions(sim, now, next, t, sim->frame);
@@ -239,7 +247,7 @@ static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
     next->t = t;
     info->h = t - now->t;
     info->dissipated *= share;
-    info->pin_work = share * (info->pin_work - pushed) + drape_system_push_work(sim->system, now->x, next->x);
+    info->pin_work = share * (info->pin_work - outer) + outer_work(sim, now, next);
     return !check(sim, info);
 }
 

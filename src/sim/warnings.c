@@ -28,7 +28,7 @@ static bool has_no_terms(drape_sim *sim, char *text, size_t size)
     for (int32_t c = 0; c < m->cloth_count; c++) {
         int count = 0;
         for (int32_t i = 0; i < m->term_count; i++)
-            count += m->terms[i].cloth == c && !m->terms[i].ops->from_scene_gravity;
+            count += m->terms[i].cloth == c && m->terms[i].seam < 0 && !m->terms[i].ops->from_scene_gravity;
         if (count > 0)
             continue;
         first = bare++ ? first : c;

@@ -1,5 +1,6 @@
-/* terms.h: the table of terms, and what their files share. A term is the constant drape_term_<name> of
- * term_<name>.c; its interface is drape/extend.h. */
+/* terms.h: the tables of terms and seams, and what their files share. A term is the constant
+ * drape_term_<name> of term_<name>.c, a seam drape_seam_<name> of seam_<name>.c; their interface is
+ * drape/extend.h. */
 #ifndef DRAPE_TERMS_TERMS_H
 #define DRAPE_TERMS_TERMS_H
 
@@ -7,7 +8,8 @@
 #include "base/vec3.h"
 
 extern const drape_term_ops *const drape_terms[]; /* NULL-ended */
-extern const drape_registry drape_term_registry;
+extern const drape_term_ops *const drape_seams[]; /* NULL-ended */
+extern const drape_registry drape_term_registry, drape_seam_registry;
 
 /* Rest value number `item` of an element. */
 static inline double drape_rest_of(const drape_elements *el, int item, int32_t element)

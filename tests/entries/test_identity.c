@@ -15,8 +15,13 @@ static const char base[] =
     " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
     " 'terms': ['stretch.cst', 'bend.midedge'],"
     " 'pins': [{'nodes': [5, 6], 'track': [[0, [0,0,0]], [1, [0,0.1,0]]]},"
-    "          {'name': 'other', 'nodes': [0]}]}],"
+    "          {'name': 'other', 'nodes': [0]}]},"
+    "  {'name': 'sewn', 'mesh': {'grid': 'square', 'columns': 4, 'rows': 2, 'width': 0.3, 'height': 0.1,"
+    "    'transform': {'translate': [2, 0, 0]}},"
+    "   'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.cst']}],"
     " 'events': [{'type': 'height', 'height': -1}],"
+    " 'seams': [{'type': 'stitch', 'a': {'cloth': 'sewn', 'nodes': [0, 1]},"
+    "            'b': {'cloth': 'sewn', 'nodes': [2, 3]}}],"
     " 'colliders': [{'name': 'ball', 'type': 'sphere', 'center': [0,0,-1], 'radius': 0.1}],"
     " 'self_contact': {'thickness': 0.001}, 'duration': 1}";
 
@@ -42,6 +47,7 @@ static const struct test_case {
     {"/colliders/0/name", RESUMES, NULL, "'another'"},
     {"/cloth/0/pins/0/name", RESUMES, NULL, "'another'"},
     {"/events/0/name", RESUMES, NULL, "'another'"},
+    {"/seams/0/name", RESUMES, NULL, "'another'"},
 
     {"/drape", SKIPPED, NULL, NULL},             /* has only one value */
     {"/cloth/0/mesh/file", SKIPPED, NULL, NULL}, /* its mesh counts, as that of a grid does */
@@ -72,6 +78,19 @@ static const struct test_case {
     {"/events/0/type", REFUSED, "/events/0", "{'type': 'energy', 'bound': 1}"},
     {"/events/0/cloth", REFUSED, NULL, "'sheet'"},
     {"/events/0/pins", REFUSED, NULL, "'other'"},
+    {"/seams/0/type", SKIPPED, NULL, NULL}, /* there is only one */
+    {"/seams/0/a/cloth", SKIPPED, NULL, NULL},
+    {"/seams/0/b/cloth", SKIPPED, NULL, NULL},
+    {"/seams/0/a/nodes", REFUSED, NULL, "[4, 1]"},
+    {"/seams/0/b/nodes", REFUSED, NULL, "[7, 3]"},
+    {"/seams/0/a/corner", SKIPPED, NULL, NULL}, /* as for pins: the nodes count */
+    {"/seams/0/b/corner", SKIPPED, NULL, NULL},
+    {"/seams/0/a/edge", SKIPPED, NULL, NULL},
+    {"/seams/0/b/edge", SKIPPED, NULL, NULL},
+    {"/seams/0/a/row", SKIPPED, NULL, NULL},
+    {"/seams/0/b/row", SKIPPED, NULL, NULL},
+    {"/seams/0/a/box", SKIPPED, NULL, NULL},
+    {"/seams/0/b/box", SKIPPED, NULL, NULL},
     {"/contact/distance", REFUSED, NULL, "0.002"},
     {"/integrator/method", REFUSED, NULL, "'bdf2'"},
     {"/controller/type", REFUSED, NULL, "'fixed'"},

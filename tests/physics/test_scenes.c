@@ -39,6 +39,10 @@ static const beginning beginnings[] = {
     {"hung_sheet", 0.5, {{"/cloth/0/mesh/edges", "8"}}},
     {"incline", 0.3, {{COLUMNS, "7"}, {ROWS, "7"}}, .touches = true},
     {"sphere_drape", 0.4, {{COLUMNS, "11"}, {ROWS, "11"}}, .touches = true},
+    {"tunic",
+     0.4,
+     {{COLUMNS, "9"}, {ROWS, "10"}, {"/cloth/1/mesh/columns", "9"}, {"/cloth/1/mesh/rows", "10"}},
+     .touches = true},
     {"twisted_cylinder", 0.1, {{NULL}}},
     {"verlet_100", 2, {{NULL}}, .explicit = true},
 };

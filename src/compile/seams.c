@@ -1,0 +1,216 @@
+/* seams.c: which nodes the seams join. Their elements are built with those of the other terms. */
+#include "compile/select.h"
+#include "compile/stages.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* One side of a seam under construction. */
+typedef struct side {
+    drape_model *model;
+    const drape_seam_side_def *def;
+    char pointer[64]; /* "/seams/0/a" */
+    int32_t cloth;
+    int32_t *node; /* (count) in the order of the seam, local to the cloth; room for all nodes of the cloth */
+    int32_t count;
+    uint8_t *taken; /* (nodes of the cloth) 1: the side has it */
+} side;
+
+static drape_status refuse(const side *s, const char *key, const char *text)
+{
+    char at[128];
+    snprintf(at, sizeof at, "%s%s", s->pointer, key);
+    return drape_fail_at(s->model->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
+}
+
+static drape_status find_cloth(side *s)
+{
+    char text[128];
+    for (int32_t c = 0; c < s->model->cloth_count; c++)
+        if (strcmp(s->model->cloths[c].name, s->def->cloth) == 0) {
+            s->cloth = c;
+            return DRAPE_OK;
+        }
+    snprintf(text, sizeof text, "there is no cloth \"%.60s\"", s->def->cloth);
+    return refuse(s, "/cloth", text);
+}
+
+static drape_status take_node(void *user, const char *key, int32_t local)
+{
+    side *s = user;
+    char text[96];
+    snprintf(text, sizeof text, "node %d is in the seam twice", (int)local);
+    if (s->taken[local])
+        return refuse(s, key, text);
+    s->taken[local] = 1;
+    s->node[s->count++] = local;
+    return DRAPE_OK;
+}
+
+/* ---- The order of a box ---- */
+
+typedef struct placed {
+    double along;
+    int32_t node;
+} placed;
+
+static int compare(const void *a, const void *b)
+{
+    const placed *p = a, *q = b;
+    return p->along != q->along ? (p->along > q->along) - (p->along < q->along)
+                                : (p->node > q->node) - (p->node < q->node);
+}
+
+/* Sorts the nodes along the longest side of their bounding box. */
+static drape_status sort(side *s, drape_arena *scratch)
+{
+    const double *x = s->model->cloths[s->cloth].mesh.x;
+    double low[3], high[3];
+    placed *list = drape_arena_take(scratch, (size_t)s->count, sizeof *list);
+    int axis = 0;
+    if (!list)
+        return DRAPE_E_MEMORY;
+    memcpy(low, x + 3 * (size_t)s->node[0], sizeof low);
+    memcpy(high, low, sizeof high);
+    for (int32_t i = 0; i < s->count; i++)
+        for (int k = 0; k < 3; k++) {
+            const double at = x[3 * (size_t)s->node[i] + (size_t)k];
+            low[k] = at < low[k] ? at : low[k];
+            high[k] = at > high[k] ? at : high[k];
+        }
+    for (int k = 1; k < 3; k++)
+        axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
+    for (int32_t i = 0; i < s->count; i++)
+        list[i] = (placed){x[3 * (size_t)s->node[i] + (size_t)axis], s->node[i]};
+    qsort(list, (size_t)s->count, sizeof *list, compare);
+    for (int32_t i = 0; i < s->count; i++)
+        s->node[i] = list[i].node;
+    return DRAPE_OK;
+}
+
+static void reverse(side *s)
+{
+    for (int32_t i = 0, j = s->count - 1; i < j; i++, j--) {
+        const int32_t node = s->node[i];
+        s->node[i] = s->node[j];
+        s->node[j] = node;
+    }
+}
+
+/* ---- A side ---- */
+
+static drape_status list_side(side *s, drape_arena *scratch)
+{
+    const drape_seam_side_def *def = s->def;
+    drape_status status = find_cloth(s);
+    if (status)
+        return status;
+    const drape_mesh *mesh = &s->model->cloths[s->cloth].mesh;
+    s->node = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *s->node);
+    s->taken = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *s->taken);
+    const drape_selection selection = {.ctx = s->model->ctx,
+                                       .pointer = s->pointer,
+                                       .form = &drape_form_seam_side,
+                                       .mesh = mesh,
+                                       .nodes = def->nodes,
+                                       .node_count = def->node_count,
+                                       .corner = def->corner,
+                                       .edge = def->edge,
+                                       .row = def->row,
+                                       .has_box = def->has_box,
+                                       .box_min = def->box_min,
+                                       .box_max = def->box_max,
+                                       .take = take_node,
+                                       .user = s};
+    status = drape_arena_status(scratch);
+    if (!status)
+        status = drape_select_nodes(&selection);
+    if (!status && def->has_box)
+        status = sort(s, scratch);
+    if (!status && def->reverse)
+        reverse(s);
+    return status;
+}
+
+/* ---- A seam ---- */
+
+static drape_status name_seam(drape_model *model, const char *pointer, const char *given,
+                              drape_model_seam *to)
+{
+    char name[32], at[96];
+    const int32_t index = (int32_t)(to - model->seams);
+    snprintf(name, sizeof name, "seam%d", (int)index);
+    snprintf(at, sizeof at, "%s/name", pointer);
+    const char *wanted = given ? given : name;
+    for (int32_t i = 0; i < index; i++)
+        if (strcmp(model->seams[i].name, wanted) == 0)
+            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "two seams have the name \"%.60s\"",
+                                 wanted);
+    to->name = drape_arena_text(&model->arena, wanted);
+    return drape_arena_status(&model->arena);
+}
+
+static drape_status join(drape_model *model, const char *pointer, const side sides[2], drape_model_seam *to)
+{
+    const side *a = &sides[0], *b = &sides[1];
+    if (a->count != b->count)
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
+                             "side a has %d nodes and side b has %d: they are joined one by one",
+                             (int)a->count, (int)b->count);
+    for (int32_t i = 0; i < a->count; i++)
+        if (a->cloth == b->cloth && a->node[i] == b->node[i])
+            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
+                                 "pair %d joins node %d of \"%.60s\" to itself", (int)i, (int)a->node[i],
+                                 model->cloths[a->cloth].name);
+    to->pair = drape_arena_take(&model->arena, 2 * (size_t)a->count, sizeof *to->pair);
+    if (!to->pair)
+        return DRAPE_E_MEMORY;
+    to->pair_count = a->count;
+    for (int k = 0; k < 2; k++) {
+        to->cloth[k] = sides[k].cloth;
+        for (int32_t i = 0; i < a->count; i++)
+            to->pair[2 * (size_t)i + (size_t)k] = model->cloths[sides[k].cloth].first_node + sides[k].node[i];
+    }
+    return DRAPE_OK;
+}
+
+static drape_status compile_seam(drape_model *model, size_t i, const drape_seam_def *def)
+{
+    drape_model_seam *to = &model->seams[i];
+    drape_arena scratch = drape_arena_of(model->ctx);
+    side sides[2] = {{.model = model, .def = &def->a}, {.model = model, .def = &def->b}};
+    char pointer[48];
+    snprintf(pointer, sizeof pointer, "/seams/%zu", i);
+    drape_status status = name_seam(model, pointer, def->name, to);
+    if (!status)
+        status = drape_compile_choice(model, &def->entry, "", &to->choice);
+    for (int k = 0; !status && k < 2; k++) {
+        snprintf(sides[k].pointer, sizeof sides[k].pointer, "%s/%c", pointer, "ab"[k]);
+        status = list_side(&sides[k], &scratch);
+    }
+    if (!status)
+        status = join(model, pointer, sides, to);
+    drape_arena_free(&scratch);
+    return status;
+}
+
+drape_status drape_compile_seams(drape_model *model, const drape_scene_def *def)
+{
+    drape_status status = DRAPE_OK;
+    if (def->seam_count == 0)
+        return DRAPE_OK;
+    model->seams = drape_arena_take(&model->arena, def->seam_count, sizeof *model->seams);
+    model->sewn = drape_arena_take(&model->arena, (size_t)model->node_count, sizeof *model->sewn);
+    if (!model->seams || !model->sewn)
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < model->node_count; i++)
+        model->sewn[i] = i;
+    for (size_t i = 0; !status && i < def->seam_count; i++) {
+        status = drape_check_cancel(model->ctx);
+        if (!status)
+            status = compile_seam(model, i, &def->seams[i]);
+        model->seam_count = (int32_t)i + 1;
+    }
+    return status;
+}

@@ -1,0 +1,125 @@
+/* select.c: see select.h. */
+#include "compile/select.h"
+
+#include "model/scene.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* relative: a coordinate that is meant to lie on the boundary of a box counts as inside */
+#define ROUND_OFF 1e-14
+
+static drape_status refuse(const drape_selection *s, const char *key, const char *text)
+{
+    char at[192];
+    snprintf(at, sizeof at, "%s%s", s->pointer, key);
+    return drape_fail_at(s->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
+}
+
+static drape_status take_list(const drape_selection *s)
+{
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < s->node_count; i++) {
+        char key[48], text[96];
+        int32_t node = s->nodes[i];
+        snprintf(key, sizeof key, "/nodes/%zu", i);
+        snprintf(text, sizeof text, "node %d is not in the mesh; its nodes are 0 to %d", (int)node,
+                 (int)s->mesh->node_count - 1);
+        status = node < 0 || node >= s->mesh->node_count ? refuse(s, key, text) : s->take(s->user, key, node);
+    }
+    return status;
+}
+
+/* Takes nodes (row, column) of a grid within the ranges [first, last]. */
+static drape_status take_range(const drape_selection *s, const char *key, int32_t first_row, int32_t last_row,
+                               int32_t first_column, int32_t last_column)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t r = first_row; r <= last_row; r++)
+        for (int32_t c = first_column; !status && c <= last_column; c++)
+            status = s->take(s->user, key, r * s->mesh->columns + c);
+    return status;
+}
+
+/* Narrows first and last row, first and last column to the side with which the text begins. */
+static void narrow(const char *side, const drape_mesh *mesh, int32_t range[4])
+{
+    static const struct {
+        const char *name;
+        int bound; /* index of the bound that is set to the opposite one */
+    } sides[] = {{"top", 1}, {"bottom", 0}, {"left", 3}, {"right", 2}};
+    const int32_t opposite[4] = {mesh->rows - 1, 0, mesh->columns - 1, 0};
+    for (size_t i = 0; i < sizeof sides / sizeof *sides; i++)
+        if (strncmp(sides[i].name, side, strlen(sides[i].name)) == 0)
+            range[sides[i].bound] = opposite[sides[i].bound];
+}
+
+/* first, second: the sides that meet in a corner; equal for a whole side. */
+static drape_status take_sides(const drape_selection *s, const char *key, const char *first,
+                               const char *second)
+{
+    const drape_mesh *mesh = s->mesh;
+    int32_t range[4] = {0, mesh->rows - 1, 0, mesh->columns - 1};
+    narrow(first, mesh, range);
+    narrow(second, mesh, range);
+    return take_range(s, key, range[0], range[1], range[2], range[3]);
+}
+
+static drape_status take_row(const drape_selection *s)
+{
+    const drape_mesh *mesh = s->mesh;
+    if (s->row >= mesh->rows) {
+        char text[96];
+        snprintf(text, sizeof text, "row %d is not in the mesh; its rows are 0 to %d", (int)s->row,
+                 (int)mesh->rows - 1);
+        return refuse(s, "/row", text);
+    }
+    return take_range(s, "/row", s->row, s->row, 0, mesh->columns - 1);
+}
+
+static drape_status take_box(const drape_selection *s)
+{
+    const double *low = s->box_min, *high = s->box_max;
+    for (int k = 0; k < 3; k++)
+        if (!(low[k] <= high[k]))
+            return refuse(s, "/box", "min must not be above max in any coordinate");
+    drape_status status = DRAPE_OK;
+    int32_t taken = 0;
+    for (int32_t i = 0; !status && i < s->mesh->node_count; i++) {
+        const double *x = s->mesh->x + 3 * (size_t)i;
+        bool inside = true;
+        for (int k = 0; k < 3; k++) {
+            double slack = ROUND_OFF * fmax(fabs(x[k]), fmax(fabs(low[k]), fabs(high[k])));
+            inside = inside && low[k] - slack <= x[k] && x[k] <= high[k] + slack;
+        }
+        taken += inside;
+        if (inside)
+            status = s->take(s->user, "/box", i);
+    }
+    if (!status && taken == 0)
+        status = refuse(s, "/box", "no node lies in the box");
+    return status;
+}
+
+drape_status drape_select_nodes(const drape_selection *s)
+{
+    const char *on_grid = s->corner ? "/corner" : s->edge ? "/edge" : s->row >= 0 ? "/row" : NULL;
+    int given = (s->nodes != NULL) + (s->corner != NULL) + (s->edge != NULL) + (s->row >= 0) + s->has_box;
+    if (given != 1) {
+        char wanted[128];
+        drape_scene_one_of_text(s->form, wanted, sizeof wanted);
+        strncat(wanted, " is needed", sizeof wanted - strlen(wanted) - 1);
+        return refuse(s, "", wanted);
+    }
+    if (on_grid && s->mesh->rows == 0)
+        return refuse(s, on_grid,
+                      "only a grid has rows, corners and edges; use \"nodes\" or \"box\" for this mesh");
+    if (s->nodes)
+        return take_list(s);
+    if (s->corner)
+        return take_sides(s, "/corner", s->corner, strchr(s->corner, '-') + 1);
+    if (s->edge)
+        return take_sides(s, "/edge", s->edge, s->edge);
+    return s->has_box ? take_box(s) : take_row(s);
+}

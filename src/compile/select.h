@@ -1,0 +1,31 @@
+/* select.h: the nodes of a cloth that a pin or a side of a seam selects. */
+#ifndef DRAPE_COMPILE_SELECT_H
+#define DRAPE_COMPILE_SELECT_H
+
+#include "mesh/mesh.h"
+#include "model/scene.h"
+
+/* Takes a node of the cloth. key: where in the scene it was selected, "/nodes/3". */
+typedef drape_status drape_select_take(void *user, const char *key, int32_t local);
+
+/* Exactly one of nodes, corner, edge, row (>= 0) and has_box, as in drape_pin_def. */
+typedef struct drape_selection {
+    drape_context *ctx;
+    const char *pointer; /* of the object whose keys these are */
+    const drape_scene_object *form;
+    const drape_mesh *mesh;
+    const int32_t *nodes;
+    size_t node_count;
+    const char *corner, *edge;
+    int32_t row;
+    bool has_box;
+    const double *box_min, *box_max;
+    drape_select_take *take;
+    void *user;
+} drape_selection;
+
+/* Takes each selected node: of a list in its order, else in ascending order. Errors: DRAPE_E_ARGUMENT (a node
+ * that is not in the mesh, nothing selected, or by more than one key), those of take. */
+drape_status drape_select_nodes(const drape_selection *selection);
+
+#endif

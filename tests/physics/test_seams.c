@@ -1,0 +1,381 @@
+/* test_seams.c: seams: what they carry, how they close under every integrator, their derivatives, and what
+ * depends on neither threads nor checkpoints; terms of a host between two cloths. */
+#include "support/methods.h"
+#include "support/scene.h"
+
+#include "base/vec3.h"
+#include "drape/extend.h"
+#include "geometry/intersect.h"
+#include "support/bytes.h"
+
+#define ROOM 256
+
+/* Two panels of 0.2 m x 0.2 m, the upper one pinned at its upper edge. %g: the gap between them, the
+ * integrator, and further keys. */
+#define PANEL                                                                                                \
+    "'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.2, 'height': 0.2, 'orientation': "       \
+    "'vertical', 'transform': {'translate': [0, %g, %g]}}, 'material': {'young_modulus': 1e5, "              \
+    "'poisson_ratio': 0, 'thickness': 1e-3, 'areal_density': 0.2}, 'terms': ['stretch.cst', 'bend.hinge', "  \
+    "{'type': 'damp.kelvin_voigt', 'beta': 5e-4}]"
+#define PANELS                                                                                               \
+    "{'drape': 1, 'cloth': [{'name': 'upper', " PANEL                                                        \
+    ", 'pins': [{'edge': 'top'}]}, {'name': 'lower', " PANEL                                                 \
+    "}], 'seams': [{'type': 'stitch', 'a': {'cloth': 'upper', 'edge': 'bottom'}, 'b': {'cloth': 'lower', "   \
+    "'edge': 'top'}%s}], 'self_contact': {'thickness': 1e-3}, 'integrator': {%s}, 'duration': 2}"
+
+#define WEIGHT (0.2 * 0.2 * 0.2 * 9.81) /* [N] of a panel */
+
+static scene open_panels(double gap, double aside, const char *stitch, const char *integrator)
+{
+    return scene_open(PANELS, 0.5, 0.0, 0.3 - gap, aside, stitch, integrator);
+}
+
+/* ---- Forces ---- */
+
+/* At rest a closed seam carries the weight of what hangs from it, and opens by what its threads give: the
+ * forces on the lower panel balance up to the residuals of its 75 unknowns, of at most 1e-9 N each. */
+START_TEST(carries_a_known_load)
+{
+    scene s = open_panels(0, 0, ", 'closing': 0, 'stiffness': 37", "'method': 'static', 'tolerance': 1e-9");
+    drape_seam_report seam;
+    scene_advance(&s, 2);
+    ck_assert_int_eq(drape_sim_seam(s.sim, -1, NULL), 1);
+    ck_assert_int_eq(drape_sim_seam(s.sim, 0, &seam), 1);
+    ck_assert_str_eq(seam.name, "seam0");
+    ck_assert_str_eq(seam.type, "stitch");
+    ck_assert_int_eq(seam.pairs, 5);
+    ck_assert_int_eq(seam.cloth[0], 0);
+    ck_assert_int_eq(seam.cloth[1], 1);
+    assert_below(fabs(seam.force[1] + WEIGHT), 75 * 1e-9);
+    assert_below(fabs(seam.force[0]), 75 * 1e-9);
+    assert_below(fabs(seam.force[2]), 75 * 1e-9);
+    /* E = 1/2 k l^2: the forces have the magnitude k l; sums of five with rounding of coordinates up to
+     * 0.5 m */
+    assert_below(fabs(seam.tension - 5 * 37 * seam.gap_mean), 5 * 37 * 8 * DBL_EPSILON);
+    assert_below(fabs(seam.tension_max - 37 * seam.gap_max), 37 * 8 * DBL_EPSILON);
+    /* threads hang within 1 degree of the vertical: the sum of magnitudes is that of the vertical parts */
+    assert_below(fabs(seam.gap_mean - WEIGHT / (5 * 37)), 2e-4 * WEIGHT / (5 * 37));
+    scene_close(&s);
+}
+END_TEST
+
+/* Before a seam begins to close, its threads are as long as the gap: the lower panel hangs on them from the
+ * beginning. */
+START_TEST(holds_before_it_closes)
+{
+    scene s = open_panels(0.05, 0, ", 'start': 10", "'dt': 0.01");
+    drape_seam_report seam;
+    scene_advance(&s, 1);
+    drape_sim_seam(s.sim, 0, &seam);
+    ck_assert_double_gt(seam.gap_mean, 0.05);
+    ck_assert_double_lt(seam.gap_mean,
+                        0.0504); /* by WEIGHT/(5 E h) = 1.6e-4, and a third of that for swings */
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Closing ---- */
+
+/* Two panels, 5 cm and 3 cm apart, are pulled together by every method; nothing passes through anything,
+ * and in the end the seam carries the weight, but for the swings of methods that do not dissipate: by the
+ * largest acceleration of the pull, 6 x 0.058 m/(0.5 s)^2 = 0.14 g, and by 3/2 (0.03/0.2)^2 = 0.03 of a
+ * pendulum. The account of energy closes: what threads give when they are shortened is the work that
+ * lifts the lower panel by the gap. Without it the energy would be off by that work, WEIGHT 0.05 m.
+ * Methods differ by what they dissipate, and by their tolerance in positions, 1e-5 of the scene. */
+static void close_by(const char *method)
+{
+    char integrator[96];
+    snprintf(integrator, sizeof integrator, "'method': '%s', 'dt': 0.01, 'rtol': 1e-5", method);
+    scene s = open_panels(0.05, 0.03, ", 'closing': 0.5", integrator);
+    drape_intersections found;
+    drape_seam_report seam;
+    const drape_energy start = drape_sim_energy(s.sim);
+    for (int i = 1; i <= 20; i++) {
+        scene_advance(&s, 0.1 * i);
+        ck_assert_int_eq(drape_find_intersections(s.ctx, s.model, drape_sim_positions(s.sim), &found),
+                         DRAPE_OK);
+        ck_assert_int_eq(found.count, 0);
+    }
+    const drape_energy end = drape_sim_energy(s.sim);
+    drape_sim_seam(s.sim, 0, &seam);
+    assert_below(seam.gap_max, 1e-3);
+    assert_below(fabs(seam.force[1] + WEIGHT), 0.2 * WEIGHT);
+    const double stored =
+        end.kinetic + end.elastic + end.gravity - start.kinetic - start.elastic - start.gravity;
+    printf("# %s: stored %g, dissipated %g, numerical %g J\n", method, stored, end.dissipated, end.numerical);
+    /* work = stored + dissipated + numerical: of the lifting, and of what the swing dissipates */
+    ck_assert_double_gt(stored + end.dissipated + end.numerical, 0.8 * stored);
+    ck_assert_double_gt(end.numerical, -0.1 * WEIGHT * 0.05);
+    scene_close(&s);
+}
+
+START_TEST(closes)
+{
+    for (size_t k = 0; k < METHODS; k++)
+        close_by(methods[k]);
+}
+END_TEST
+
+/* Explicit steps: the stiffness of threads counts in the stable step although they are slack when it is
+ * estimated, 20 times as stiff as the sheet. */
+START_TEST(closes_explicitly)
+{
+    scene s = open_panels(0.05, 0.0, ", 'closing': 0.5, 'stiffness': 2000",
+                          "'method': 'verlet', 'dt': 1e-3, 'substeps': 0");
+    drape_seam_report seam;
+    scene_advance(&s, 1);
+    drape_sim_seam(s.sim, 0, &seam);
+    assert_below(seam.gap_max, 1e-3);
+    const drape_energy end = drape_sim_energy(s.sim);
+    assert_below(fabs(end.numerical), 0.02 * WEIGHT * 0.05);
+    scene_close(&s);
+}
+END_TEST
+
+/* Pieces that have nodes of a seam are neighbours: contact does not push it open, thin as the gap is in
+ * comparison with the distance of layers. */
+START_TEST(is_not_in_contact)
+{
+    scene s = open_panels(0, 0, ", 'closing': 0", "'dt': 0.01");
+    drape_seam_report seam;
+    scene_advance(&s, 1);
+    drape_sim_seam(s.sim, 0, &seam);
+    ck_assert_double_lt(seam.gap_max, 0.5e-3);
+    ck_assert_double_eq(drape_sim_energy(s.sim).contact, 0);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Derivatives ---- */
+
+static void check_model(const drape_model *model, const char *term, int rows_of_term)
+{
+    static drape_check_result rows[ROOM];
+    int32_t count = 0;
+    for (unsigned seed = 1; seed <= 3; seed++) {
+        int of_term = 0;
+        ck_assert_int_eq(drape_model_check_derivatives(model, seed, rows, ROOM, &count), DRAPE_OK);
+        ck_assert_int_lt(count, ROOM);
+        for (int32_t i = 0; i < count; i++) {
+            of_term += strcmp(rows[i].term, term) == 0;
+            ck_assert_msg(rows[i].pass, "seed %u: %s of %s is off by %g", seed, rows[i].what, rows[i].term,
+                          rows[i].error);
+        }
+        ck_assert_int_eq(of_term, rows_of_term);
+    }
+}
+
+/* Gradient, Hessian, symmetry, net force and torque, before, while and after the seam closes. */
+START_TEST(derivatives)
+{
+    scene s = open_panels(0.01, 0.02, ", 'start': -0.0, 'closing': 1", "'dt': 0.01");
+    check_model(s.model, "stitch", 5);
+    ck_assert_int_eq(drape_model_check_derivatives(NULL, 1, NULL, 0, NULL), DRAPE_E_ARGUMENT);
+    int32_t count = 0;
+    ck_assert_int_eq(drape_model_check_derivatives(s.model, 1, NULL, 0, &count), DRAPE_OK);
+    ck_assert_int_gt(count, 5);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Order, the same cloth ---- */
+
+/* Sides in reverse, of a list and of a box that is sorted along its longest side; and a cloth with itself. */
+START_TEST(orders_of_sides)
+{
+    scene s = scene_model(
+        "{'drape': 1, 'cloth': [{'name': 'c', 'mesh': {'grid': 'square', 'columns': 4, 'rows': 3, 'width': "
+        "0.3, "
+        "'height': 0.2}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': "
+        "['stretch.cst']}], 'duration': 1, 'seams': ["
+        "{'type': 'stitch', 'a': {'cloth': 'c', 'nodes': [3, 1]}, 'b': {'cloth': 'c', 'nodes': [8, 9], "
+        "'reverse': "
+        "true}}, {'type': 'stitch', 'name': 'tube', 'a': {'cloth': 'c', 'box': [[0, -1, -1], [0, 1, 1]]}, "
+        "'b': "
+        "{'cloth': 'c', 'edge': 'right', 'reverse': true}}]}");
+    const int32_t first[] = {3, 9, 1, 8}, tube[] = {0, 3, 4, 7, 8, 11};
+    ck_assert_int_eq(s.model->seam_count, 2);
+    ck_assert_mem_eq(s.model->seams[0].pair, first, sizeof first);
+    ck_assert_str_eq(s.model->seams[1].name, "tube");
+    /* z falls from row to row, so a box along z begins with the last row */
+    for (int i = 0; i < 3; i++) {
+        ck_assert_int_eq(s.model->seams[1].pair[2 * i], tube[2 * (2 - i)]);
+        ck_assert_int_eq(s.model->seams[1].pair[2 * i + 1], tube[2 * (2 - i) + 1]);
+    }
+    /* 0-3, 3-9; 4-7; 8-11, 1-8 */
+    const int32_t sewn[] = {0, 1, 2, 0, 4, 5, 6, 4, 1, 0, 10, 1};
+    ck_assert_mem_eq(s.model->sewn, sewn, sizeof sewn);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Bits ---- */
+
+static scene open_with_threads(int threads)
+{
+    scene s = scene_model(PANELS, 0.5, 0.0, 0.25, 0.03, ", 'closing': 0.5", "'dt': 0.01");
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.threads = threads;
+    scene_start(&s, &def);
+    return s;
+}
+
+/* Threads do not change the bits, nor does a checkpoint while the seam closes. */
+START_TEST(same_bits)
+{
+    scene one = open_with_threads(1), three = open_with_threads(3), later = open_with_threads(1);
+    scene_advance(&one, 0.2);
+    const bytes saved = bytes_save(one.sim);
+    scene_advance(&one, 0.7);
+    scene_advance(&three, 0.2);
+    scene_advance(&three, 0.7);
+    ck_assert_int_eq(drape_sim_restore_from(later.sim, saved.data, saved.size), DRAPE_OK);
+    scene_advance(&later, 0.7);
+    ck_assert_uint_eq(drape_sim_hash(one.sim), drape_sim_hash(three.sim));
+    ck_assert_uint_eq(drape_sim_hash(one.sim), drape_sim_hash(later.sim));
+    const drape_energy a = drape_sim_energy(one.sim), b = drape_sim_energy(later.sim);
+    ck_assert_double_eq(a.numerical, b.numerical);
+    free(saved.data);
+    scene_close(&one);
+    scene_close(&three);
+    scene_close(&later);
+}
+END_TEST
+
+/* ---- A term of a host ---- */
+
+/* E = 1/2 k |x0 - (x1 + x2)/2|^2: each node of side a is drawn to the middle of a node of side b and the next
+ * one. k is what user points to. */
+static drape_status button_build(const drape_seam_view *seam, const double *params,
+                                 drape_term_builder *builder)
+{
+    const double rest = 0;
+    (void)params;
+    ck_assert_double_eq(*(double *)seam->user, 12.5);
+    ck_assert_ptr_eq(seam->cloth[0]->user, seam->user);
+    ck_assert_int_eq(seam->first_node[1], 25);
+    drape_status status = drape_term_reserve(builder, seam->pair_count, 1);
+    for (int32_t i = 0; !status && i < seam->pair_count; i++) {
+        const int32_t *pair = seam->pair + 2 * i;
+        ck_assert_int_lt(pair[1] - seam->first_node[1], seam->cloth[1]->node_count);
+        drape_term_set(builder, i, (int32_t[]){pair[0], pair[1], pair[1] + 5}, &rest);
+    }
+    return status;
+}
+
+static void button(const drape_elements *el, int32_t element, const double *x, double *e, double *g,
+                   double *hess)
+{
+    static const double weight[3] = {1, -0.5, -0.5};
+    const double k = *(double *)el->user;
+    (void)element;
+    double d[3];
+    for (int i = 0; i < 3; i++)
+        d[i] = x[i] - (x[3 + i] + x[6 + i]) / 2;
+    if (e)
+        *e = 0.5 * k * vec3_dot(d, d);
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < 3; i++) {
+            if (g)
+                g[3 * a + i] = k * weight[a] * d[i];
+            for (int b = 0; hess && b < 3; b++)
+                for (int j = 0; j < 3; j++)
+                    hess[9 * (3 * a + i) + 3 * b + j] = i == j ? k * weight[a] * weight[b] : 0;
+        }
+}
+
+static void button_energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                          const double *internal, double *e, double *g, double *hess)
+{
+    (void)internal;
+    drape_energy_range(el, first, count, x, e, g, hess, button);
+}
+
+static double strength = 12.5;
+static const drape_term_ops buttons = {.struct_size = sizeof(drape_term_ops),
+                                       .entry = {.name = "host.buttons",
+                                                 .summary = "buttons",
+                                                 .reference = "Hooke 1678, De potentia restitutiva"},
+                                       .element_name = "button",
+                                       .nodes = 3,
+                                       .convex = true,
+                                       .build_seam = button_build,
+                                       .energy = button_energy,
+                                       .user = &strength};
+
+static drape_status compile(drape_context *ctx, const char *type, int list, drape_model **model)
+{
+    drape_scene_def def;
+    drape_cloth_def cloths[2];
+    drape_seam_def seam;
+    const int32_t nodes[] = {20, 21, 22}, far[] = {0, 1, 25};
+    static const drape_setting settings[] = {{.name = "young_modulus", .number = 1e5},
+                                             {.name = "thickness", .number = 1e-3},
+                                             {.name = "density", .number = 200}};
+    static const drape_setting grid[] = {{.name = "columns", .number = 5},
+                                         {.name = "rows", .number = 5},
+                                         {.name = "width", .number = 0.2},
+                                         {.name = "height", .number = 0.2}};
+    static const drape_entry_def terms[] = {{.type = "stretch.cst"}};
+    drape_scene_def_init(&def, sizeof def);
+    for (int c = 0; c < 2; c++) {
+        drape_cloth_def_init(&cloths[c], sizeof *cloths);
+        cloths[c].mesh.grid = (drape_entry_def){"square", grid, 4};
+        cloths[c].material = settings;
+        cloths[c].material_count = 3;
+        cloths[c].terms = terms;
+        cloths[c].term_count = 1;
+    }
+    drape_seam_def_init(&seam, sizeof seam);
+    seam.entry.type = type;
+    seam.a.cloth = "cloth0";
+    seam.a.nodes = nodes;
+    seam.b.cloth = "cloth1";
+    seam.b.nodes = list ? far : (const int32_t[]){0, 1, 2};
+    seam.a.node_count = seam.b.node_count = 3;
+    def.cloths = cloths;
+    def.cloth_count = 2;
+    def.seams = &seam;
+    def.seam_count = 1;
+    return drape_model_create(ctx, &def, model);
+}
+
+/* The term has its user pointer everywhere, exact derivatives, and forces on both cloths, by structs
+ * alone. */
+START_TEST(term_of_a_host)
+{
+    scene s = scene_empty();
+    drape_seam_report seam;
+    ck_assert_int_eq(drape_context_add_term(s.ctx, &buttons), DRAPE_OK);
+    ck_assert_int_eq(drape_context_add_term(s.ctx, &buttons), DRAPE_E_ARGUMENT);
+    const drape_status status = compile(s.ctx, "host.buttons", 0, &s.model);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    check_model(s.model, "host.buttons", 5);
+    scene_start(&s, NULL);
+    ck_assert_int_eq(drape_sim_seam(s.sim, 0, &seam), 1);
+    ck_assert_str_eq(seam.type, "host.buttons");
+    /* the rows of both sheets are at 0.2 - 0.05 i, upside down: 4 rows apart, and half of one */
+    assert_below(fabs(seam.tension - 3 * 12.5 * 0.175), 1e-12);
+    scene_close(&s);
+}
+END_TEST
+
+/* What is wrong is refused where it is. */
+START_TEST(refusals)
+{
+    scene s = scene_empty();
+    drape_model *model = NULL;
+    ck_assert_int_eq(compile(s.ctx, "stitch", 1, &model), DRAPE_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx),
+                                 "/seams/0/b/nodes/2: node 25 is not in the mesh; its nodes are 0 to 24"));
+    ck_assert_int_eq(compile(s.ctx, "host.buttons", 0, &model), DRAPE_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx),
+                                 "/seams/0/type: there is no seam \"host.buttons\"; there are stitch"));
+    ck_assert_int_eq(compile(s.ctx, NULL, 0, &model), DRAPE_E_ARGUMENT);
+    drape_context_destroy(&s.ctx);
+}
+END_TEST
+
+SUITE("seams", carries_a_known_load, holds_before_it_closes, closes, closes_explicitly, is_not_in_contact,
+      derivatives, orders_of_sides, same_bits, term_of_a_host, refusals)
