@@ -263,8 +263,9 @@ DRAPE_API drape_status drape_scene_parse(drape_context *ctx, const char *text, c
 
 /* Sets the value at a JSON pointer ("/integrator/dt") to a JSON text ("0.001", "\"ida\"", "[0,0,0]"). Numbers
  * may also be written .5, +5 or 5.; a text that is not JSON is taken as a string, so ida needs no quotes.
- * Missing objects on the path are created. The key "-" appends to an array. Errors: DRAPE_E_ARGUMENT (not a
- * pointer, or one that leads into a number or past the end of an array), DRAPE_E_MEMORY. */
+ * Missing objects on the path are created. The key "-" appends to an array. If value is NULL, the member or
+ * element is removed. Errors: DRAPE_E_ARGUMENT (not a pointer, or one that leads into a number or past the end
+ * of an array; nothing to remove), DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char *value);
 
 /* Frees a scene. Models compiled from it remain valid. */
@@ -495,6 +496,46 @@ DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
  * m, an axis of length 0, no such cloth or collider, a collider that cannot turn), DRAPE_E_VERSION
  * (struct_size). Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_place(drape_sim *sim, const drape_place_def *def);
+
+/* Lets a sim go on with another model of the same cloth: another gravity, material, other terms and their
+ * parameters, masses, friction, thickness, colliders, pins, events. The cloths must be as many, and their
+ * meshes have the same nodes and triangles; rest positions may differ.
+ *
+ * drape_sim_change compiles the scene, whose values the host has changed by drape_scene_set, and keeps that
+ * model until the next change; the scene stays the host's. drape_sim_change_model takes a model that the host
+ * has compiled, and that must outlive the sim or its next change. The former model may then be freed.
+ *
+ * What goes on: time, positions and velocities to the bit; the internal variables of a term that the new model
+ * has, too, on the same cloth; the motion and placement of pins and colliders, and which pairs of contact
+ * are inside or relaxed: colliders and events are the same if their names are. So do the drag springs,
+ * drape_sim_push, the wind, observers, frames, statistics and the energy account, which takes the change of the
+ * energies as given by the host. Integrator, controller, steps, frame rate and threads are those of the sim,
+ * whatever the scene says. Integrators and controllers start anew, as after drape_sim_place; an event whose
+ * quantity the change takes past its bound has no root there.
+ *
+ * A node that becomes free goes on with the velocity of its pin. One that becomes pinned is held where it is
+ * until drape_sim_move_pins moves it, unless the model has a track for it that leads through there; one that
+ * was pinned already may get another track only if that leads through where it is.
+ * Nodes that drape_sim_pin, drape_sim_unpin or an event made differ from the model stay so. Contact is not
+ * checked: cloth that is in a collider afterwards is pushed out gently, as at the start of a run.
+ *
+ * A checkpoint that is written afterwards belongs to the new model. The sim is built anew beside the present
+ * one, which takes memory for both and about as long as drape_scene_compile and drape_sim_create
+ * (docs/embedding.md has figures). Arrays and models that the sim returned before are no longer valid. Must not
+ * be called by an observer. Errors, after which nothing has changed: DRAPE_E_ARGUMENT (NULL, other meshes, a
+ * track that begins elsewhere), those of drape_scene_compile, DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED
+ * (the context's cancel function). Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_change(drape_sim *sim, drape_scene *scene);
+DRAPE_API drape_status drape_sim_change_model(drape_sim *sim, const drape_model *model);
+
+/* Pins nodes where they are, or lets them go, as drape_sim_change does with a model that has other pins; count
+ * numbers of nodes of the sim. Nodes that are so already are left alone; if all are, nothing happens. Otherwise
+ * the sim goes on with a model of its own, which shares all but the numbers of unknowns and the sparsity with
+ * the one that was compiled. Checkpoints keep these pins. Must not be called by an observer. Errors, after
+ * which nothing has changed: DRAPE_E_ARGUMENT (no such node), DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED.
+ * Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_pin(drape_sim *sim, int32_t count, const int32_t *nodes);
+DRAPE_API drape_status drape_sim_unpin(drape_sim *sim, int32_t count, const int32_t *nodes);
 
 /* Pulls a free node towards target [m] by a spring of the given stiffness [N/m]. The force stiffness (target
  * - x) is part of the equations of every step from the next one on, and implicit if the integrator is. A call

@@ -699,48 +699,23 @@ void drape_system_archive(drape_system *system, drape_archive *a)
 
 /* ---- Another system goes on ---- */
 
-/* Bytes of an archive: counted, or kept if there is memory for them. */
-typedef struct kept {
-    unsigned char *bytes;
-    size_t size;
-} kept;
-
-static drape_status keep(void *user, const void *bytes, size_t size)
+static drape_status continue_contact(drape_system *system, drape_system *from, const int32_t *before)
 {
-    kept *k = user;
-    if (k->bytes)
-        memcpy(k->bytes + k->size, bytes, size);
-    k->size += size;
-    return DRAPE_OK;
+    const int32_t *nodes = NULL;
+    if (!system->contact || !from->contact)
+        return DRAPE_OK;
+    const drape_status status = drape_contact_continue(system->contact, from->contact, before);
+    if (status || !from->blocks)
+        return status;
+    const int32_t pairs = drape_contact_last_couplings(system->contact, &nodes);
+    return extend(system, pairs, nodes);
 }
 
-static void write_contact(drape_system *system, drape_archive *a, kept *k)
+drape_status drape_system_continue(drape_system *system, drape_system *from, const int32_t *before)
 {
-    k->size = 0;
-    drape_archive_write_to(a, system->arena->ctx, "contact", keep, k);
-    archive_contact(system, a);
-    drape_archive_end(a);
-}
-
-static drape_status continue_contact(drape_system *system, drape_system *from)
-{
-    drape_archive a;
-    kept k = {.bytes = NULL};
-    write_contact(from, &a, &k);
-    k.bytes = drape_alloc(system->arena->ctx, k.size, 1);
-    if (!k.bytes)
-        return DRAPE_E_MEMORY;
-    write_contact(from, &a, &k);
-    if (!a.status && !drape_archive_read_from(&a, system->arena->ctx, "contact", k.bytes, k.size))
-        archive_contact(system, &a);
-    drape_free(system->arena->ctx, k.bytes);
-    return a.status;
-}
-
-drape_status drape_system_continue(drape_system *system, drape_system *from)
-{
-    drape_motion_copy(system->motion, from->motion);
-    drape_system_set_drag_spring(system, &from->drag);
+    drape_motion_copy(system->motion, from->motion, before);
+    if (!system->model->pinned[from->drag.node])
+        drape_system_set_drag_spring(system, &from->drag);
     drape_system_set_push(system, from->pushed ? from->push : NULL);
-    return continue_contact(system, from);
+    return continue_contact(system, from, before);
 }

@@ -91,9 +91,10 @@ double drape_system_clock(const drape_system *system);
  * created, reads it back. The wind is left out: it is a function of the host. */
 void drape_system_archive(drape_system *system, drape_archive *a);
 
-/* Takes what another system of the same scene, in which more nodes may be pinned, keeps besides its model,
- * except the wind. Errors: DRAPE_E_MEMORY. */
-drape_status drape_system_continue(drape_system *system, drape_system *from);
+/* Takes what another system of the same cloth keeps besides its model, except the wind; a drag spring on a node
+ * that is pinned here is gone. before (collider_count): the number that each collider has there; -1: it is
+ * new. Errors: DRAPE_E_MEMORY. */
+drape_status drape_system_continue(drape_system *system, drape_system *from, const int32_t *before);
 
 /* Begins a step at a state, against which contact compares until the next call. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
