@@ -539,14 +539,20 @@ DRAPE_API drape_status drape_sim_unpin(drape_sim *sim, int32_t count, const int3
 
 /* Pulls a free node towards target [m] by a spring of the given stiffness [N/m]. The force stiffness (target
  * - x) is part of the equations of every step from the next one on, and implicit if the integrator is. A call
- * replaces the spring of the call before; stiffness 0 removes it. The spring's energy counts as elastic, and
+ * replaces the springs of the calls before; stiffness 0 removes them. The spring's energy counts as elastic, and
  * the work of moving its target counts as that of a pin. Integrators start anew. Nothing is allocated. Must
  * not be called by an observer. Errors: DRAPE_E_ARGUMENT (no such node, a pinned node, or a stiffness that is
  * negative or not finite); the sim is then unchanged. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_set_drag_spring(drape_sim *sim, int32_t node, double stiffness,
                                                  const double target[3]);
 
-/* The force of that spring on its node in the present state [N]; 0 if there is no spring. */
+/* The same with several springs at once, up to 64, also with several on one node: nodes and stiffness have count
+ * numbers, targets has count x 3. They replace all springs of the calls before; count 0 removes them. */
+DRAPE_API drape_status drape_sim_set_drag_springs(drape_sim *sim, int32_t count, const int32_t *nodes,
+                                                  const double *stiffness, const double *targets);
+
+/* The force of that spring on its node in the present state, or the sum of those of several [N]; 0 if there is
+ * none. */
 DRAPE_API void drape_sim_drag_spring_force(const drape_sim *sim, double force[3]);
 
 /* Makes the running advance, or else the next one, return DRAPE_E_STOPPED with the last accepted state:

@@ -432,7 +432,8 @@ START_TEST(the_rest_goes_on)
 {
     failing_allocator memory = {0};
     changing c = open_changing(&memory, "be", hanging);
-    const double target[3] = {0.3, -0.2, 0.4};
+    const int32_t dragged[] = {17, 12};
+    const double targets[] = {0.3, -0.2, 0.4, 0.1, -0.1, 0.2}, stiffness[] = {2, 1};
     double push[60] = {0}, force[3], now[3];
     int frames = 0;
     push[3 * 9] = 0.01;
@@ -440,7 +441,7 @@ START_TEST(the_rest_goes_on)
     good(&c.h, drape_sim_change(c.h.sim, c.scene));
     good(&c.h, drape_sim_observe(c.h.sim, count_frames, &frames));
     good(&c.h, drape_sim_push(c.h.sim, push));
-    good(&c.h, drape_sim_set_drag_spring(c.h.sim, 17, 2, target));
+    good(&c.h, drape_sim_set_drag_springs(c.h.sim, 2, dragged, stiffness, targets));
     advance(&c, 8 * FRAME);
     drape_event_record low;
     ck_assert_int_eq(drape_sim_event(c.h.sim, 0, &low), 1);
