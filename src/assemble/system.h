@@ -47,8 +47,8 @@ const drape_model *drape_system_model(const drape_system *system);
 /* Its thread pool, for callers that work on what it assembles; NULL: one thread. */
 drape_pool *drape_system_pool(const drape_system *system);
 
-/* From now on the system contains these springs and no others, and the elastic energy their energy. Their nodes
- * must be free. */
+/* From now on the system contains these springs and no others, and the elastic energy their energy. Their
+ * nodes must be free. */
 void drape_system_set_drag_springs(drape_system *system, const drape_drag_springs *springs);
 const drape_drag_springs *drape_system_drag_springs(const drape_system *system);
 

@@ -1,6 +1,6 @@
-/* continue.c: what goes on from one sim to the next, when pins or the model change. The new one is made beside
- * the present one, as when a checkpoint is restored, and has the same cloth. Terms, colliders and events are
- * the same if their names are. The integrator and the controller start anew, as after a kink. */
+/* continue.c: what goes on from one sim to the next, when pins or the model change. The new one is made
+ * beside the present one, as when a checkpoint is restored, and has the same cloth. Terms, colliders and
+ * events are the same if their names are. The integrator and the controller start anew, as after a kink. */
 #include "base/elementary.h"
 #include "sim/sim.h"
 
@@ -115,12 +115,25 @@ static drape_status copy_reasons(drape_sim *to, const drape_sim *from)
     return drape_arena_status(to->arena);
 }
 
+/* Contact may need memory to measure its energy. */
+static drape_status measured(drape_sim *sim)
+{
+    if (drape_system_status(sim->system) != DRAPE_E_MEMORY)
+        return DRAPE_OK;
+    sim->energy_known = false;
+    return DRAPE_E_MEMORY;
+}
+
 /* The energy account goes on; what the change itself adds or takes counts as given by the host. */
-static void copy_account(drape_sim *to, drape_sim *from)
+static drape_status copy_account(drape_sim *to, drape_sim *from)
 {
     const drape_energy before = drape_sim_energy(from);
+    const drape_status status = measured(from);
+    if (status)
+        return status;
     to->audit = from->audit;
     drape_sim_shift_energy(to, &before);
+    return measured(to);
 }
 
 static void copy_logged(drape_sim *to, const drape_sim *from, const int32_t *collider_before)
@@ -171,10 +184,10 @@ drape_status drape_sim_continue(drape_sim *to, drape_sim *from)
         status = hold(to, from);
     if (!status)
         status = copy_driver(to, from);
-    if (!status) {
+    if (!status)
+        status = copy_account(to, from);
+    if (!status)
         copy_logged(to, from, before);
-        copy_account(to, from);
-    }
     drape_free(to->ctx, before);
     return status;
 }

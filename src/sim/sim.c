@@ -145,7 +145,7 @@ static drape_status open_sim(drape_context *ctx, const drape_model *model, const
     return sim->arena ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-/* Creates everything that a sim with its choices needs. */
+/* Creates everything that a sim with its choices needs, except its energy account. */
 static drape_status start_sim(drape_sim *sim, int threads)
 {
     drape_status status = create_states(sim);
@@ -168,7 +168,6 @@ static drape_status start_sim(drape_sim *sim, int threads)
     drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
                         drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
     sim->max_attempts = drape_chosen_controller_value(&sim->chosen, "max_attempts", INFINITY);
-    drape_sim_reset_energy(sim);
     return DRAPE_OK;
 }
 
@@ -226,11 +225,13 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
         status = drape_choose(ctx, model, &def, &(*out)->chosen);
     if (!status)
         status = start_sim(*out, def.threads);
-    if (status)
+    if (status) {
         drape_sim_destroy(out);
-    else
-        (*out)->statistics.wall_setup = drape_clock_seconds() - start;
-    return status;
+        return status;
+    }
+    drape_sim_reset_energy(*out);
+    (*out)->statistics.wall_setup = drape_clock_seconds() - start;
+    return DRAPE_OK;
 }
 
 void drape_sim_destroy(drape_sim **out)

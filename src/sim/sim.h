@@ -107,8 +107,9 @@ struct drape_sim {
  * call comes from one of its observers). */
 drape_status drape_sim_guard(drape_sim *sim, const char *function);
 
-/* Creates a new sim of a compiled model with the same choices, at the beginning. pinned (node_count): the
- * nodes that are pinned; NULL: those of the model. */
+/* Creates a new sim of a compiled model with the same choices, at the beginning and without an energy
+ * account, which the caller copies or reads. pinned (node_count): the nodes that are pinned; NULL: those of
+ * the model. */
 drape_status drape_sim_create_like(const drape_sim *like, const drape_model *model, const uint8_t *pinned,
                                    drape_sim **out);
 
@@ -124,8 +125,8 @@ void drape_sim_exchange(drape_sim *sim, drape_sim *other);
 
 /* Pins these nodes (node_count) and no others: nodes that become free go on with the velocity of their pins,
  * those that become pinned are held where they are. The sim is built anew, for a model with these pins, and
- * takes the place of the present one if that succeeds. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED
- * (the context's cancel function); then the sim is unchanged. */
+ * takes the place of the present one if that succeeds. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER,
+ * DRAPE_E_STOPPED (the context's cancel function); then the sim is unchanged. */
 drape_status drape_sim_repin(drape_sim *sim, const uint8_t *pinned);
 
 /* The model as it was compiled, with its own pins. */

@@ -74,9 +74,9 @@ static const char hanging[] = "{'drape': 1, 'cloth': [{" CLOTH ", 'pins': [{'edg
 
 /* ---- The state ---- */
 
-/* Through a change to the same model a sim has the same state to the bit, energies to rounding, and it goes on as
- * without: a one-step method to the bit, also in contact; the others start anew with a smaller step or order,
- * within their error. */
+/* Through a change to the same model a sim has the same state to the bit, energies to rounding, and it goes
+ * on as without: a one-step method to the bit, also in contact; the others start anew with a smaller step or
+ * order, within their error. */
 START_TEST(same_model_changes_nothing)
 {
     for (int i = 0; i < METHODS; i++) {
@@ -120,9 +120,9 @@ END_TEST
 
 /* ---- Gravity and materials ---- */
 
-/* A sheet that only falls has no forces within: without gravity it goes on at the velocity that it has, and the
- * energy account stays balanced. A step of an implicit method has an error of the tolerance, of 1e-9 N on a
- * mass of 1e-3 kg: 1e-6 m/s2, over 0.25 s 3e-8 m; the error of `ida` is rtol of its speed. */
+/* A sheet that only falls has no forces within: without gravity it goes on at the velocity that it has, and
+ * the energy account stays balanced. A step of an implicit method has an error of the tolerance, of 1e-9 N
+ * on a mass of 1e-3 kg: 1e-6 m/s2, over 0.25 s 3e-8 m; the error of `ida` is rtol of its speed. */
 START_TEST(without_gravity_cloth_flies_on)
 {
     for (int i = 0; i < METHODS; i++) {
@@ -149,9 +149,9 @@ START_TEST(without_gravity_cloth_flies_on)
 }
 END_TEST
 
-/* Springs have an energy in proportion to Young's modulus. The change adds to the energy, and as the host gave
- * that, nothing to the numerical dissipation; the guard against energy out of nothing has no alarm in the steps
- * after. */
+/* Springs have an energy in proportion to Young's modulus. The change adds to the energy, and as the host
+ * gave that, nothing to the numerical dissipation; the guard against energy out of nothing has no alarm in
+ * the steps after. */
 START_TEST(a_stiffer_cloth_has_the_energy_of_its_strain)
 {
     failing_allocator memory = {0};
@@ -231,9 +231,9 @@ static double lowest(const changing *c)
     return least;
 }
 
-/* A floor that is put below a falling sheet catches it; friction that is taken away lets it slide: on a plane of
- * slope 1 : 2 with g sin a = 9.81 / sqrt(5) m/s2, as the normal forces have no part along the plane. A
- * floor that is taken away lets it fall. */
+/* A floor that is put below a falling sheet catches it; friction that is taken away lets it slide: on a
+ * plane of slope 1 : 2 with g sin a = 9.81 / sqrt(5) m/s2, as the normal forces have no part along the
+ * plane. A floor that is taken away lets it fall. */
 START_TEST(floors_come_and_go)
 {
     failing_allocator memory = {0};

@@ -158,9 +158,9 @@ START_TEST(wrong_arguments_change_nothing)
 }
 END_TEST
 
-/* Several springs add k (x - target) each to g of their nodes, two on one node both, and the sum of the forces is
- * what drape_sim_drag_spring_force returns. A list of one is the spring of drape_sim_set_drag_spring, to the bit of
- * a step; an empty list leaves none. */
+/* Several springs add k (x - target) each to g of their nodes, two on one node both, and the sum of the
+ * forces is what drape_sim_drag_spring_force returns. A list of one is the spring of
+ * drape_sim_set_drag_spring, to the bit of a step; an empty list leaves none. */
 START_TEST(several_springs_add_up)
 {
     scene h = scene_open(sheet, "", "be"), one = scene_open(sheet, "", "be");
