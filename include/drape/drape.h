@@ -306,10 +306,11 @@ DRAPE_API drape_status drape_scene_load(drape_context *ctx, const char *path, dr
 DRAPE_API drape_status drape_scene_parse(drape_context *ctx, const char *text, const char *name,
                                          drape_scene **out);
 
-/* Sets the value at a JSON pointer ("/integrator/dt") to a JSON text ("0.001", "\"ida\"", "[0,0,0]"). Numbers
- * may also be written .5, +5 or 5.; a text that is not JSON is taken as a string, so ida needs no quotes.
- * Missing objects on the path are created. The key "-" appends to an array. Errors: DRAPE_E_ARGUMENT (not a
- * pointer, or one that leads into a number or past the end of an array), DRAPE_E_MEMORY. */
+/* Sets the value at a JSON pointer ("/integrator/dt") to a JSON text ("0.001", "\"ida\"", "[0,0,0]").
+ * Numbers may also be written .5, +5 or 5.; a text that is not JSON is taken as a string, so ida needs no
+ * quotes. Missing objects on the path are created. The key "-" appends to an array. If value is NULL, the
+ * member or element is removed. Errors: DRAPE_E_ARGUMENT (not a pointer, or one that leads into a number or
+ * past the end of an array; nothing to remove), DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char *value);
 
 /* Frees a scene. Models compiled from it remain valid. */
@@ -413,9 +414,10 @@ DRAPE_API void drape_sim_def_init(drape_sim_def *def, size_t struct_size);
 
 /* Creates a sim at t = 0 with the model's rest positions and initial velocities. If def is NULL, the scene's
  * integrator and controller are used. All heap memory of Drape itself is allocated here; no step allocates
- * any, except where contact outgrows its lists, and at an event that releases pins. The messages of the sim
- * go to ctx, which may differ from the model's context. Errors: DRAPE_E_ARGUMENT (unknown entry, or a setting
- * out of range), DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's cancel function). */
+ * any, except where contact outgrows its lists, at an event that releases pins, and in drape_sim_change. The
+ * messages of the sim go to ctx, which may differ from the model's context. Errors: DRAPE_E_ARGUMENT
+ * (unknown entry, or a setting out of range), DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's
+ * cancel function). */
 DRAPE_API drape_status drape_sim_create(drape_context *ctx, const drape_model *model,
                                         const drape_sim_def *def, drape_sim **out);
 
@@ -538,16 +540,63 @@ DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
  * (struct_size). Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_place(drape_sim *sim, const drape_place_def *def);
 
+/* Lets a sim go on with another model of the same cloth: another gravity, material, other terms and their
+ * parameters, masses, friction, thickness, colliders, pins, events. The cloths must be as many, and their
+ * meshes have the same nodes and triangles; rest positions may differ.
+ *
+ * drape_sim_change compiles the scene, whose values the host has changed by drape_scene_set, and keeps that
+ * model until the next change; the scene stays the host's. drape_sim_change_model takes a model that the
+ * host has compiled, and that must outlive the sim or its next change. The former model may then be freed.
+ *
+ * What goes on: time, positions and velocities to the bit; the internal variables of a term that the new
+ * model has, too, on the same cloth; the motion and placement of pins and colliders, and which pairs of
+ * contact are inside or relaxed: colliders and events are the same if their names are. So do the drag
+ * springs, drape_sim_push, the wind, observers, frames, statistics and the energy account, which takes the
+ * change of the energies as given by the host. Integrator, controller, steps, frame rate and threads are
+ * those of the sim, whatever the scene says. Integrators and controllers start anew, as after
+ * drape_sim_place; an event whose quantity the change takes past its bound has no root there.
+ *
+ * A node that becomes free goes on with the velocity of its pin. One that becomes pinned is held where it is
+ * until drape_sim_move_pins moves it, unless the model has a track for it that leads through there; one that
+ * was pinned already may get another track only if that leads through where it is. Nodes that drape_sim_pin,
+ * drape_sim_unpin or an event made differ from the model stay so. Contact is not checked: cloth that is in a
+ * collider afterwards is pushed out gently, as at the start of a run.
+ *
+ * A checkpoint that is written afterwards belongs to the new model. The sim is built anew beside the present
+ * one, which takes memory for both and about as long as drape_scene_compile and drape_sim_create
+ * (docs/embedding.md has figures). Arrays and models that the sim returned before are no longer valid. Must
+ * not be called by an observer. Errors, after which nothing has changed: DRAPE_E_ARGUMENT (NULL, other
+ * meshes, a track that begins elsewhere), those of drape_scene_compile, DRAPE_E_MEMORY, DRAPE_E_SOLVER,
+ * DRAPE_E_STOPPED (the context's cancel function). Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_change(drape_sim *sim, drape_scene *scene);
+DRAPE_API drape_status drape_sim_change_model(drape_sim *sim, const drape_model *model);
+
+/* Pins nodes where they are, or lets them go, as drape_sim_change does with a model that has other pins;
+ * count numbers of nodes of the sim. Nodes that are so already are left alone; if all are, nothing happens.
+ * Otherwise the sim goes on with a model of its own, which shares all but the numbers of unknowns and the
+ * sparsity with the one that was compiled. Checkpoints keep these pins. Must not be called by an observer.
+ * Errors, after which nothing has changed: DRAPE_E_ARGUMENT (no such node), DRAPE_E_MEMORY, DRAPE_E_SOLVER,
+ * DRAPE_E_STOPPED. Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_pin(drape_sim *sim, int32_t count, const int32_t *nodes);
+DRAPE_API drape_status drape_sim_unpin(drape_sim *sim, int32_t count, const int32_t *nodes);
+
 /* Pulls a free node towards target [m] by a spring of the given stiffness [N/m]. The force stiffness (target
- * - x) is part of the equations of every step from the next one on, and implicit if the integrator is. A call
- * replaces the spring of the call before; stiffness 0 removes it. The spring's energy counts as elastic, and
- * the work of moving its target counts as that of a pin. Integrators start anew. Nothing is allocated. Must
- * not be called by an observer. Errors: DRAPE_E_ARGUMENT (no such node, a pinned node, or a stiffness that is
- * negative or not finite); the sim is then unchanged. Thread-safety: as the sim. */
+ * - x) is part of the equations of every step from the next one on, and implicit if the integrator is. A
+ * call replaces the springs of the calls before; stiffness 0 removes them. The spring's energy counts as
+ * elastic, and the work of moving its target counts as that of a pin. Integrators start anew. Nothing is
+ * allocated. Must not be called by an observer. Errors: DRAPE_E_ARGUMENT (no such node, a pinned node, or a
+ * stiffness that is negative or not finite); the sim is then unchanged. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_set_drag_spring(drape_sim *sim, int32_t node, double stiffness,
                                                  const double target[3]);
 
-/* The force of that spring on its node in the present state [N]; 0 if there is no spring. */
+/* The same with several springs at once, up to 64, also with several on one node: nodes and stiffness have
+ * count numbers, targets has count x 3. They replace all springs of the calls before; count 0 removes
+ * them. */
+DRAPE_API drape_status drape_sim_set_drag_springs(drape_sim *sim, int32_t count, const int32_t *nodes,
+                                                  const double *stiffness, const double *targets);
+
+/* The force of that spring on its node in the present state, or the sum of those of several [N]; 0 if there
+ * is none. */
 DRAPE_API void drape_sim_drag_spring_force(const drape_sim *sim, double force[3]);
 
 /* Makes the running advance, or else the next one, return DRAPE_E_STOPPED with the last accepted state:

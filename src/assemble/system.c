@@ -23,7 +23,7 @@ struct drape_system {
     int32_t **blocks;             /* (term_count) slots in the extended pattern; NULL: it is not in use */
     drape_status status;          /* of drape_system_status */
     drape_motion *motion;
-    drape_drag_spring drag;
+    drape_drag_springs drag;
     double *push; /* (node_count x 3) [N], if pushed */
     bool pushed;
     drape_wind wind;
@@ -89,12 +89,12 @@ drape_motion *drape_system_steer(drape_system *system)
     return system->motion;
 }
 
-void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *spring)
+void drape_system_set_drag_springs(drape_system *system, const drape_drag_springs *springs)
 {
-    system->drag = *spring;
+    system->drag = *springs;
 }
 
-const drape_drag_spring *drape_system_drag_spring(const drape_system *system)
+const drape_drag_springs *drape_system_drag_springs(const drape_system *system)
 {
     return &system->drag;
 }
@@ -133,7 +133,7 @@ bool drape_system_has_wind(const drape_system *system)
 
 void drape_system_add_loads(const drape_system *system, const double *x, double *g)
 {
-    drape_drag_spring_add_gradient(&system->drag, x, g);
+    drape_drag_springs_add_gradient(&system->drag, x, g);
     for (size_t i = 0; system->pushed && i < 3 * (size_t)system->model->node_count; i++)
         g[i] -= system->push[i];
 }
@@ -429,7 +429,7 @@ void drape_system_jacobian_without(drape_system *system, const drape_point *poin
         drape_contact_add_jacobian(system->contact, point->weight,
                                    positive_share > 0 ? DRAPE_CONTACT_GAUSS_NEWTON : point->contact,
                                    system->pattern, values);
-    drape_drag_spring_add_hessian(&system->drag, system->model, system->pattern, values);
+    drape_drag_springs_add_hessian(&system->drag, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
 }
 
@@ -513,7 +513,7 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
             drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
         *(term->ops->external ? gravity : elastic) += energy;
     }
-    *elastic += drape_drag_spring_energy(&system->drag, point->x);
+    *elastic += drape_drag_springs_energy(&system->drag, point->x);
 }
 
 bool drape_system_is_timed(const drape_system *system)
@@ -716,17 +716,29 @@ drape_diagnostic drape_system_diagnose_dof(const drape_system *system, const dou
 
 /* ---- Checkpoints ---- */
 
-static void archive_drag_spring(drape_system *system, drape_archive *a)
+static bool is_spring(const drape_model *m, const drape_drag_spring *spring)
 {
-    const drape_model *m = system->model;
-    drape_drag_spring *spring = &system->drag;
-    drape_archive_int32(a, &spring->node);
-    drape_archive_double(a, &spring->stiffness);
-    drape_archive_doubles(a, spring->target, 3);
-    if (drape_archive_has_read(a) && spring->stiffness > 0 &&
-        (spring->node < 0 || spring->node >= m->node_count || m->pinned[spring->node]))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a drag spring on node %d, which is not free",
-                           (int)spring->node);
+    return spring->node >= 0 && spring->node < m->node_count && !m->pinned[spring->node] &&
+           spring->stiffness > 0 && isfinite(spring->stiffness) && drape_all_finite(spring->target, 3);
+}
+
+static void archive_drag_springs(drape_system *system, drape_archive *a)
+{
+    drape_archive_int32(a, &system->drag.count);
+    if (drape_archive_good(a) && !(system->drag.count >= 0 && system->drag.count <= DRAPE_MAX_DRAG_SPRINGS)) {
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %d drag springs", (int)system->drag.count);
+        system->drag.count = 0;
+    }
+    for (int32_t i = 0; i < system->drag.count && drape_archive_good(a); i++) {
+        drape_drag_spring *spring = &system->drag.spring[i];
+        drape_archive_int32(a, &spring->node);
+        drape_archive_double(a, &spring->stiffness);
+        drape_archive_doubles(a, spring->target, 3);
+        if (drape_archive_has_read(a) && !is_spring(system->model, spring))
+            drape_archive_fail(a, DRAPE_E_PARSE,
+                               "the checkpoint has a drag spring on node %d that cannot be there",
+                               (int)spring->node);
+    }
 }
 
 static void archive_push(drape_system *system, drape_archive *a)
@@ -758,7 +770,7 @@ void drape_system_archive(drape_system *system, drape_archive *a)
 {
     drape_archive_mark(a, "system");
     drape_motion_archive(system->motion, a);
-    archive_drag_spring(system, a);
+    archive_drag_springs(system, a);
     archive_push(system, a);
     drape_archive_same(a, "whether there is contact", system->contact != NULL);
     archive_contact(system, a);
@@ -766,48 +778,24 @@ void drape_system_archive(drape_system *system, drape_archive *a)
 
 /* ---- Another system goes on ---- */
 
-/* Bytes of an archive: counted, or kept if there is memory for them. */
-typedef struct kept {
-    unsigned char *bytes;
-    size_t size;
-} kept;
-
-static drape_status keep(void *user, const void *bytes, size_t size)
+static drape_status continue_contact(drape_system *system, drape_system *from, const int32_t *before)
 {
-    kept *k = user;
-    if (k->bytes)
-        memcpy(k->bytes + k->size, bytes, size);
-    k->size += size;
-    return DRAPE_OK;
+    const int32_t *nodes = NULL;
+    if (!system->contact || !from->contact)
+        return DRAPE_OK;
+    const drape_status status = drape_contact_continue(system->contact, from->contact, before);
+    if (status || !from->blocks)
+        return status;
+    const int32_t pairs = drape_contact_last_couplings(system->contact, &nodes);
+    return extend(system, pairs, nodes);
 }
 
-static void write_contact(drape_system *system, drape_archive *a, kept *k)
+drape_status drape_system_continue(drape_system *system, drape_system *from, const int32_t *before)
 {
-    k->size = 0;
-    drape_archive_write_to(a, system->arena->ctx, "contact", keep, k);
-    archive_contact(system, a);
-    drape_archive_end(a);
-}
-
-static drape_status continue_contact(drape_system *system, drape_system *from)
-{
-    drape_archive a;
-    kept k = {.bytes = NULL};
-    write_contact(from, &a, &k);
-    k.bytes = drape_alloc(system->arena->ctx, k.size, 1);
-    if (!k.bytes)
-        return DRAPE_E_MEMORY;
-    write_contact(from, &a, &k);
-    if (!a.status && !drape_archive_read_from(&a, system->arena->ctx, "contact", k.bytes, k.size))
-        archive_contact(system, &a);
-    drape_free(system->arena->ctx, k.bytes);
-    return a.status;
-}
-
-drape_status drape_system_continue(drape_system *system, drape_system *from)
-{
-    drape_motion_copy(system->motion, from->motion);
-    drape_system_set_drag_spring(system, &from->drag);
+    drape_motion_copy(system->motion, from->motion, before);
+    for (int32_t i = 0; i < from->drag.count; i++)
+        if (!system->model->pinned[from->drag.spring[i].node])
+            system->drag.spring[system->drag.count++] = from->drag.spring[i];
     drape_system_set_push(system, from->pushed ? from->push : NULL);
-    return continue_contact(system, from);
+    return continue_contact(system, from, before);
 }

@@ -51,10 +51,10 @@ const drape_model *drape_system_model(const drape_system *system);
 /* Its thread pool, for callers that work on what it assembles; NULL: one thread. */
 drape_pool *drape_system_pool(const drape_system *system);
 
-/* From now on the system contains this spring, and the elastic energy its energy. Its node must be free.
- * Stiffness 0 removes it. */
-void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *spring);
-const drape_drag_spring *drape_system_drag_spring(const drape_system *system);
+/* From now on the system contains these springs and no others, and the elastic energy their energy. Their
+ * nodes must be free. */
+void drape_system_set_drag_springs(drape_system *system, const drape_drag_springs *springs);
+const drape_drag_springs *drape_system_drag_springs(const drape_system *system);
 
 /* Where pins and colliders are: on the tracks of the model, or on paths set by the host. */
 const drape_motion *drape_system_motion(const drape_system *system);
@@ -77,7 +77,7 @@ void drape_system_set_wind(drape_system *system, drape_wind_field *field, void *
 void drape_system_copy_wind(drape_system *system, const drape_system *from);
 bool drape_system_has_wind(const drape_system *system); /* it moves, and is felt */
 
-/* Adds the host's loads on nodes at x, the drag spring and the forces, to g (node_count x 3).
+/* Adds the host's loads on nodes at x, the drag springs and the forces, to g (node_count x 3).
  * drape_system_force contains them. */
 void drape_system_add_loads(const drape_system *system, const double *x, double *g);
 
@@ -101,9 +101,10 @@ double drape_system_clock(const drape_system *system);
  * created, reads it back. The wind is left out: it is a function of the host. */
 void drape_system_archive(drape_system *system, drape_archive *a);
 
-/* Takes what another system of the same scene, in which more nodes may be pinned, keeps besides its model,
- * except the wind. Errors: DRAPE_E_MEMORY. */
-drape_status drape_system_continue(drape_system *system, drape_system *from);
+/* Takes what another system of the same cloth keeps besides its model, except the wind; drag springs on nodes
+ * that are pinned here are gone. before (collider_count): the number that each collider has there; -1: it is
+ * new. Errors: DRAPE_E_MEMORY. */
+drape_status drape_system_continue(drape_system *system, drape_system *from, const int32_t *before);
 
 /* Begins a step at a state, against which contact compares until the next call. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);

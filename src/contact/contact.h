@@ -131,6 +131,11 @@ int32_t drape_contact_list_couplings(drape_contact *contact, const int32_t **nod
 /* The list made by the last drape_contact_list_couplings, or read from an archive. */
 int32_t drape_contact_last_couplings(const drape_contact *contact, const int32_t **nodes);
 
+/* Takes from contact of the same cloth what a step leaves for the next ones: which pairs are inside and which
+ * nodes are relaxed, its stiffness and activation distances, and the couplings. before (collider_count): the
+ * number that each collider has there; -1: it is new. Errors: DRAPE_E_MEMORY. */
+drape_status drape_contact_continue(drape_contact *contact, const drape_contact *from, const int32_t *before);
+
 /* Archives the beginning of the step, from which everything else follows, and the couplings. */
 void drape_contact_archive(drape_contact *contact, drape_archive *a);
 

@@ -25,15 +25,21 @@ bool drape_inside_has(const drape_inside_pairs *inside, const drape_pair *pair)
            bsearch(&key, inside->keys, (size_t)inside->count, sizeof *inside->keys, compare);
 }
 
-static bool add(drape_inside_pairs *inside, const drape_pair *pair)
+drape_status drape_inside_add(drape_inside_pairs *inside, const drape_pair_key *key)
 {
     drape_pair_key *keys =
         drape_list_grow(inside->arena, inside->keys, inside->count, &inside->room, sizeof *keys);
     if (!keys)
-        return false;
+        return DRAPE_E_MEMORY;
     inside->keys = keys;
-    inside->keys[inside->count++] = key_of(pair);
-    return true;
+    inside->keys[inside->count++] = *key;
+    return DRAPE_OK;
+}
+
+void drape_inside_sort(drape_inside_pairs *inside)
+{
+    if (inside->count > 0)
+        qsort(inside->keys, (size_t)inside->count, sizeof *inside->keys, compare);
 }
 
 /* The new list is made behind the old one, which it then replaces. */
@@ -47,18 +53,18 @@ bool drape_inside_update(drape_inside_pairs *inside, const drape_near_pair *near
         const bool had = drape_inside_has(&old, &near[i].pair);
         if (!had && !(near[i].gap < drape_pair_least_gap(&near[i].pair, rounding)))
             continue;
-        if (!add(inside, &near[i].pair)) {
+        const drape_pair_key key = key_of(&near[i].pair);
+        *status = drape_inside_add(inside, &key);
+        if (*status) {
             inside->count = before;
-            *status = DRAPE_E_MEMORY;
             return false;
         }
         added = added || !had;
     }
     inside->count -= before;
-    if (inside->count > 0) {
+    if (inside->count > 0)
         memmove(inside->keys, inside->keys + before, (size_t)inside->count * sizeof *inside->keys);
-        qsort(inside->keys, (size_t)inside->count, sizeof *inside->keys, compare);
-    }
+    drape_inside_sort(inside);
     return added;
 }
 
@@ -69,7 +75,7 @@ void drape_inside_archive(drape_inside_pairs *inside, drape_archive *a)
     if (a->reading)
         inside->count = 0;
     for (int32_t i = 0; i < count && drape_archive_good(a); i++) {
-        if (a->reading && !add(inside, &(drape_pair){0})) {
+        if (a->reading && drape_inside_add(inside, &(drape_pair_key){0})) {
             drape_archive_note(a, DRAPE_E_MEMORY);
             return;
         }

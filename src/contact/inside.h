@@ -32,6 +32,11 @@ bool drape_inside_has(const drape_inside_pairs *inside, const drape_pair *pair);
 bool drape_inside_update(drape_inside_pairs *inside, const drape_near_pair *near, int32_t count,
                          double rounding, drape_status *status);
 
+/* Adds a pair that is not among them. They are complete again after drape_inside_sort. Errors:
+ * DRAPE_E_MEMORY. */
+drape_status drape_inside_add(drape_inside_pairs *inside, const drape_pair_key *key);
+void drape_inside_sort(drape_inside_pairs *inside);
+
 void drape_inside_archive(drape_inside_pairs *inside, drape_archive *a);
 
 #endif

@@ -380,31 +380,50 @@ void drape_motion_place_cloth(drape_motion *motion, int32_t cloth, const drape_p
             place_path(by, &motion->pin_path[i]);
 }
 
-void drape_motion_copy(drape_motion *motion, const drape_motion *from)
+void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int32_t *before)
 {
     const drape_model *m = motion->model;
     for (int32_t i = 0; i < from->moved_count; i++)
         if (m->pinned[from->moved_node[i]])
             motion->pin_path[find_place(motion, from->moved_node[i])] = from->pin_path[i];
-    memcpy(motion->collider_path, from->collider_path,
-           (size_t)m->collider_count * sizeof *motion->collider_path);
-    memcpy(motion->collider_turn, from->collider_turn,
-           (size_t)m->collider_count * sizeof *motion->collider_turn);
-    memcpy(motion->collider_placed, from->collider_placed,
-           (size_t)m->collider_count * sizeof *motion->collider_placed);
+    for (int32_t c = 0; c < m->collider_count; c++) {
+        if (before[c] < 0)
+            continue;
+        motion->collider_path[c] = from->collider_path[before[c]];
+        motion->collider_turn[c] = from->collider_turn[before[c]];
+        motion->collider_placed[c] = from->collider_placed[before[c]];
+    }
     memcpy(motion->cloth_placed, from->cloth_placed, (size_t)m->cloth_count * sizeof *motion->cloth_placed);
+}
+
+void drape_motion_place_pin(const drape_motion *motion, int32_t node, double t, double x[3])
+{
+    if (motion->place[node] < 0) {
+        drape_motion_place_fixed(motion, node, x);
+        return;
+    }
+    const course c = pin_course(motion, motion->place[node]);
+    position_on(&c, t, x);
+}
+
+static drape_path resting_at(const double x[3])
+{
+    drape_path path = {.given = true, .smooth = true};
+    memcpy(path.x[0], x, sizeof path.x[0]);
+    memcpy(path.x[1], x, sizeof path.x[1]);
+    return path;
+}
+
+void drape_motion_hold_pin(drape_motion *motion, int32_t node, const double x[3])
+{
+    motion->pin_path[find_place(motion, node)] = resting_at(x);
 }
 
 void drape_motion_hold_pins(drape_motion *motion, const double *x)
 {
-    for (int32_t i = 0; i < motion->moved_count; i++) {
-        drape_path *path = &motion->pin_path[i];
-        if (!path->given)
-            continue;
-        *path = (drape_path){.given = true, .smooth = true};
-        memcpy(path->x[0], x + 3 * (size_t)motion->moved_node[i], sizeof path->x[0]);
-        memcpy(path->x[1], path->x[0], sizeof path->x[1]);
-    }
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        if (motion->pin_path[i].given)
+            motion->pin_path[i] = resting_at(x + 3 * (size_t)motion->moved_node[i]);
 }
 
 /* ---- Colliders ---- */

@@ -123,8 +123,15 @@ void drape_placement_turn(const drape_placement *by, const double x[3], double y
 /* The position of a pinned node that neither a track nor a path moves. */
 void drape_motion_place_fixed(const drape_motion *motion, int32_t node, double x[3]);
 
-/* Takes the paths and placements of another motion of the same scene, in which more nodes may be pinned. */
-void drape_motion_copy(drape_motion *motion, const drape_motion *from);
+/* Takes the paths and placements of another motion of the same cloth, in which other nodes may be pinned.
+ * before (collider_count): the number that each collider has there; -1: it is new. */
+void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int32_t *before);
+
+/* The position of a pinned node at time t. */
+void drape_motion_place_pin(const drape_motion *motion, int32_t node, double t, double x[3]);
+
+/* A pinned node rests at x from now on. */
+void drape_motion_hold_pin(drape_motion *motion, int32_t node, const double x[3]);
 
 /* Pins that a host has moved rest from now on at these positions (node_count x 3). */
 void drape_motion_hold_pins(drape_motion *motion, const double *x);

@@ -475,14 +475,17 @@ static json_t *wrap(const char *rest, json_t *value)
     return value;
 }
 
-/* Records a value that is about to be set. */
+/* Records a value that is about to be set; text NULL: removed. */
 static drape_status new_override(drape_scene *scene, const char *path, const char *pointer, const char *text,
                                  override **out)
 {
     char some[MAX_SHOWN + 1], shown[MAX_SHOWN + DRAPE_POINTER_SIZE + 16];
-    snprintf(some, sizeof some, "%s", text);
+    snprintf(some, sizeof some, "%s", text ? text : "");
     drape_text_mend_end(some);
-    snprintf(shown, sizeof shown, "set %s=%s%s", pointer, some, strlen(some) < strlen(text) ? "..." : "");
+    if (text)
+        snprintf(shown, sizeof shown, "set %s=%s%s", pointer, some, strlen(some) < strlen(text) ? "..." : "");
+    else
+        snprintf(shown, sizeof shown, "removed %s", pointer);
     drape_make_printable(shown);
     override *o = drape_arena_take(&scene->kept, 1, sizeof *o);
     if (!o || !(o->pointer = drape_arena_text(&scene->kept, path)) ||
@@ -538,6 +541,37 @@ static drape_status set_value(drape_scene *scene, const char *pointer, const cha
     return status;
 }
 
+/* The elements of an array behind a removed one are no longer where the text has them: the whole array counts
+ * as changed. */
+static drape_status remove_value(drape_scene *scene, const char *pointer)
+{
+    landing at = {.container = NULL};
+    json_t *value = NULL;
+    override *o = NULL;
+    drape_status status = check_pointer(scene, pointer);
+    if (!status && !*pointer)
+        status = drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "the whole scene cannot be removed");
+    if (!status)
+        status = land(scene, pointer, &at);
+    if (!status)
+        status = find_child(scene, pointer, &at, &value);
+    if (!status && (!value || *at.rest))
+        status = drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "cannot remove %s: there is none", pointer);
+    if (!status && json_is_array(at.container))
+        *strrchr(at.path.text, '/') = 0;
+    if (!status)
+        status = new_override(scene, at.path.text, pointer, NULL, &o);
+    if (status)
+        return status;
+    size_t index;
+    if (json_is_array(at.container) && drape_pointer_index(at.key, &index))
+        json_array_remove(at.container, index);
+    else
+        json_object_del(at.container, at.key);
+    scene->last = o;
+    return DRAPE_OK;
+}
+
 bool drape_scene_gives(const drape_scene *scene, const char *pointer)
 {
     const json_t *at = scene->ours ? scene->ours : scene->root;
@@ -555,11 +589,11 @@ drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char
 {
     if (!scene)
         return DRAPE_E_ARGUMENT;
-    if (!pointer || !value)
-        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "drape_scene_set: pointer and value are needed");
+    if (!pointer)
+        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "drape_scene_set: a pointer is needed");
     locale_t old = drape_locale_enter();
     drape_arena_free(&scene->defs); /* earlier defs point to values that may be freed */
-    drape_status status = set_value(scene, pointer, value);
+    drape_status status = value ? set_value(scene, pointer, value) : remove_value(scene, pointer);
     drape_locale_leave(old);
     return status;
 }

@@ -194,18 +194,18 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
 }
 
 /* Read by create_restored. */
-static void write_released(drape_sim *sim, drape_archive *a)
+static void write_pinned(drape_sim *sim, drape_archive *a)
 {
-    bool any = sim->released != NULL;
+    bool any = sim->pinned != NULL;
     drape_archive_bool(a, &any);
     if (any)
-        drape_archive_bytes(a, sim->released, (size_t)sim->model->node_count);
+        drape_archive_bytes(a, sim->pinned, (size_t)sim->model->node_count);
 }
 
 void drape_sim_archive(drape_sim *sim, drape_archive *a)
 {
     if (!a->reading)
-        write_released(sim, a);
+        write_pinned(sim, a);
     drape_work_archive(&sim->earlier, a);
     archive_states(sim, a);
     drape_archive_doubles(a, sim->scratch, sizeof sim->scratch / sizeof *sim->scratch);
@@ -235,23 +235,25 @@ void drape_sim_exchange(drape_sim *sim, drape_sim *other)
     drape_system_copy_wind(sim->system, other->system);
 }
 
-/* A new sim without the pins that had been released when the archive was written. */
+/* A new sim with the pins that there were when the archive was written. */
 static drape_status create_restored(drape_sim *sim, drape_archive *a, drape_sim **out)
 {
     const size_t nodes = (size_t)sim->model->node_count;
-    bool any = false, pinned = true;
+    bool any = false, flags = true;
     drape_archive_bool(a, &any);
-    uint8_t *released = any && drape_archive_good(a) ? drape_alloc(sim->ctx, nodes, 1) : NULL;
-    if (any && !released)
+    uint8_t *pinned = any && drape_archive_good(a) ? drape_alloc(sim->ctx, nodes, 1) : NULL;
+    if (any && !pinned)
         drape_archive_note(a, DRAPE_E_MEMORY);
-    if (released)
-        drape_archive_bytes(a, released, nodes);
-    for (size_t i = 0; released && i < nodes; i++)
-        pinned = pinned && released[i] <= drape_sim_base_model(sim)->pinned[i];
-    if (drape_archive_good(a) && !pinned)
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint releases a node that is not pinned");
-    const drape_status status = drape_archive_good(a) ? drape_sim_create_like(sim, released, out) : a->status;
-    drape_free(sim->ctx, released);
+    if (pinned)
+        drape_archive_bytes(a, pinned, nodes);
+    for (size_t i = 0; pinned && i < nodes; i++)
+        flags = flags && pinned[i] <= 1;
+    if (drape_archive_good(a) && !flags)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a pin that is neither there nor not");
+    const drape_status status = drape_archive_good(a)
+                                    ? drape_sim_create_like(sim, drape_sim_base_model(sim), pinned, out)
+                                    : a->status;
+    drape_free(sim->ctx, pinned);
     return status;
 }
 

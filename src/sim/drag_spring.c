@@ -1,58 +1,90 @@
-/* drag_spring.c: a spring by which a host drags a node. Setting it changes the energy of the present state;
+/* drag_spring.c: springs by which a host drags nodes. Setting them changes the energy of the present state;
  * the account counts this as work of the host, like a pin's. */
 #include "sim/sim.h"
 
 #include <math.h>
+#include <string.h>
 
-static drape_status check(const drape_sim *sim, int32_t node, double stiffness, const double *target)
+static drape_status check(const drape_sim *sim, const char *function, int32_t node, double stiffness,
+                          const double *target)
 {
     const drape_model *m = sim->model;
     if (node < 0 || node >= m->node_count)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_drag_spring: node %d; there are 0 to %d",
-                          (int)node, (int)m->node_count - 1);
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: node %d; there are 0 to %d", function, (int)node,
+                          (int)m->node_count - 1);
     if (m->pinned[node])
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "drape_sim_set_drag_spring: node %d is pinned; only free nodes can be dragged",
-                          (int)node);
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: node %d is pinned; only free nodes can be dragged",
+                          function, (int)node);
     if (!(stiffness >= 0 && isfinite(stiffness)))
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "drape_sim_set_drag_spring: stiffness = %g N/m; it is finite, 0 or more",
-                          stiffness);
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: stiffness = %g N/m; it is finite, 0 or more",
+                          function, stiffness);
     for (int k = 0; k < 3; k++)
         if (stiffness > 0 && (!target || !isfinite(target[k])))
-            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                              "drape_sim_set_drag_spring: the target must be finite");
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: the target must be finite", function);
     return DRAPE_OK;
 }
 
-drape_status drape_sim_set_drag_spring(drape_sim *sim, int32_t node, double stiffness, const double target[3])
+static void replace(drape_sim *sim, const drape_drag_springs *springs)
 {
-    drape_status guarded = drape_sim_guard(sim, "drape_sim_set_drag_spring");
-    if (guarded)
-        return guarded;
-    drape_status status = check(sim, node, stiffness, target);
-    if (status)
-        return status;
     const double *x = drape_sim_state(sim)->x;
-    drape_drag_spring spring = {.node = node, .stiffness = stiffness};
-    for (int k = 0; stiffness > 0 && k < 3; k++)
-        spring.target[k] = target[k];
-    double work = drape_drag_spring_energy(&spring, x) -
-                  drape_drag_spring_energy(drape_system_drag_spring(sim->system), x);
-    drape_system_set_drag_spring(sim->system, &spring);
+    const double work = drape_drag_springs_energy(springs, x) -
+                        drape_drag_springs_energy(drape_system_drag_springs(sim->system), x);
+    drape_system_set_drag_springs(sim->system, springs);
     sim->audit.pin_work += work;
     sim->audit.offered += fabs(work);
     sim->energy_known = sim->attempted_known = false;
     sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
-    return DRAPE_OK;
+}
+
+/* Springs without stiffness are left out. */
+static drape_status set(drape_sim *sim, const char *function, int32_t count, const int32_t *nodes,
+                        const double *stiffness, const double *targets)
+{
+    drape_drag_springs springs = {.count = 0};
+    drape_status status = drape_sim_guard(sim, function);
+    for (int32_t i = 0; !status && i < count; i++) {
+        const double *target = targets ? targets + 3 * (size_t)i : NULL;
+        status = check(sim, function, nodes[i], stiffness[i], target);
+        if (status || !(stiffness[i] > 0))
+            continue;
+        drape_drag_spring *spring = &springs.spring[springs.count++];
+        spring->node = nodes[i];
+        spring->stiffness = stiffness[i];
+        memcpy(spring->target, target, sizeof spring->target);
+    }
+    if (!status)
+        replace(sim, &springs);
+    return status;
+}
+
+drape_status drape_sim_set_drag_spring(drape_sim *sim, int32_t node, double stiffness, const double target[3])
+{
+    return set(sim, "drape_sim_set_drag_spring", 1, &node, &stiffness, target);
+}
+
+drape_status drape_sim_set_drag_springs(drape_sim *sim, int32_t count, const int32_t *nodes,
+                                        const double *stiffness, const double *targets)
+{
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    if (count < 0 || count > DRAPE_MAX_DRAG_SPRINGS)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_drag_springs: %d springs; 0 to %d",
+                          (int)count, DRAPE_MAX_DRAG_SPRINGS);
+    if (count > 0 && (!nodes || !stiffness || !targets))
+        return drape_fail(
+            sim->ctx, DRAPE_E_ARGUMENT,
+            "drape_sim_set_drag_springs: %d springs, but no list of nodes, stiffness or targets", (int)count);
+    return set(sim, "drape_sim_set_drag_springs", count, nodes, stiffness, targets);
 }
 
 void drape_sim_drag_spring_force(const drape_sim *sim, double force[3])
 {
-    const drape_drag_spring *spring = sim ? drape_system_drag_spring(sim->system) : NULL;
-    for (int k = 0; k < 3; k++)
-        force[k] = spring && spring->stiffness > 0
-                       ? spring->stiffness * (spring->target[k] -
-                                              drape_sim_state(sim)->x[3 * (size_t)spring->node + (size_t)k])
-                       : 0;
+    const drape_drag_springs *springs = sim ? drape_system_drag_springs(sim->system) : NULL;
+    memset(force, 0, 3 * sizeof *force);
+    for (int32_t i = 0; springs && i < springs->count; i++) {
+        const drape_drag_spring *spring = &springs->spring[i];
+        const double *x = drape_sim_state(sim)->x + 3 * (size_t)spring->node;
+        for (int k = 0; k < 3; k++)
+            force[k] += spring->stiffness * (spring->target[k] - x[k]);
+    }
 }

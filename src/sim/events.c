@@ -527,23 +527,24 @@ drape_status drape_events_report(drape_sim *sim)
 static drape_status release(drape_sim *sim)
 {
     const drape_event_set *e = &sim->events;
-    drape_arena scratch = drape_arena_of(sim->ctx);
-    uint8_t *nodes = drape_arena_take(&scratch, (size_t)sim->model->node_count, sizeof *nodes);
-    drape_status status = drape_arena_status(&scratch);
+    const int32_t before = sim->model->free_count;
+    const size_t nodes = (size_t)sim->model->node_count;
+    uint8_t *pinned = drape_alloc(sim->ctx, nodes, sizeof *pinned);
     bool any = false;
-    for (int32_t i = 0; !status && i < e->pending_count; i++) {
+    if (!pinned)
+        return DRAPE_E_MEMORY;
+    memcpy(pinned, sim->model->pinned, nodes * sizeof *pinned);
+    for (int32_t i = 0; i < e->pending_count; i++) {
         const drape_model_event *event = e->watches[e->pending[i].event].event;
         for (int32_t k = 0; event->action == DRAPE_ACTION_RELEASE && k < event->pinned_count; k++)
-            nodes[event->pinned[k]] = 1;
+            pinned[event->pinned[k]] = 0;
         any = any || event->action == DRAPE_ACTION_RELEASE;
     }
-    const int32_t before = sim->model->free_count;
-    if (any)
-        status = drape_sim_release(sim, nodes);
+    const drape_status status = any ? drape_sim_repin(sim, pinned) : DRAPE_OK;
     if (any && !status)
         drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g: %d nodes are released", drape_sim_state(sim)->t,
                   (int)(sim->model->free_count - before));
-    drape_arena_free(&scratch);
+    drape_free(sim->ctx, pinned);
     return status;
 }
 
@@ -655,12 +656,27 @@ drape_status drape_events_copy(drape_sim *sim, const drape_sim *from)
     return status;
 }
 
+/* The number of the event of another sim with the same name and kind; -1: there is none. */
+static int32_t event_like(const drape_event_set *set, const drape_watch *watch)
+{
+    for (int32_t i = 0; i < set->count; i++) {
+        const drape_watch *w = &set->watches[i];
+        if (strcmp(w->event->name, watch->event->name) == 0 && w->event->ops == watch->event->ops &&
+            w->function == watch->function)
+            return i;
+    }
+    return -1;
+}
+
 void drape_events_continue(drape_sim *sim, const drape_sim *from)
 {
     drape_event_set *to = &sim->events;
     for (int32_t i = 0; i < to->count; i++) {
-        const drape_watch *w = &from->events.watches[i];
         drape_watch *same = &to->watches[i];
+        const int32_t before = event_like(&from->events, same);
+        if (before < 0)
+            continue;
+        const drape_watch *w = &from->events.watches[before];
         same->known = w->known;
         same->before = w->before;
         same->side = w->side;
@@ -668,17 +684,26 @@ void drape_events_continue(drape_sim *sim, const drape_sim *from)
         memcpy(same->first, w->first, sizeof same->first);
         same->last = w->last;
     }
-    to->pending_count = from->events.pending_count;
-    to->reported = from->events.reported;
-    if (to->pending_count > 0)
-        memcpy(to->pending, from->events.pending, (size_t)to->pending_count * sizeof *to->pending);
+    for (int32_t i = 0; i < from->events.pending_count; i++) {
+        drape_pending_root root = from->events.pending[i];
+        root.event = event_like(to, &from->events.watches[root.event]);
+        if (root.event < 0 || to->pending_count == to->pending_room)
+            continue;
+        to->pending[to->pending_count++] = root;
+        to->reported += i < from->events.reported;
+    }
+}
+
+void drape_events_forget(drape_sim *sim)
+{
+    for (int32_t i = 0; i < sim->events.count; i++)
+        sim->events.watches[i].known = false;
 }
 
 void drape_events_reset(drape_sim *sim)
 {
     drape_event_set *e = &sim->events;
-    for (int32_t i = 0; i < e->count; i++)
-        e->watches[i].known = false;
+    drape_events_forget(sim);
     e->search.event = -1;
     e->pending_count = e->reported = 0;
 }

@@ -88,6 +88,9 @@ drape_status drape_events_create(struct drape_sim *sim);
 /* Adds those that a host added to another sim. Errors: DRAPE_E_MEMORY. */
 drape_status drape_events_copy(struct drape_sim *sim, const struct drape_sim *from);
 
+/* The quantities of events have changed without a step: no root lies there. Pending roots stay. */
+void drape_events_forget(struct drape_sim *sim);
+
 /* The state is another one: no root lies between it and the states before. */
 void drape_events_reset(struct drape_sim *sim);
 
@@ -103,14 +106,14 @@ void drape_events_commit(struct drape_sim *sim);
 drape_status drape_events_report(struct drape_sim *sim);
 
 /* Performs the actions of pending roots, which are then over: pins are released, then the advance stops.
- * Errors: DRAPE_E_STOPPED, with its message; those of drape_sim_release, after which they are still
+ * Errors: DRAPE_E_STOPPED, with its message; those of drape_sim_repin, after which they are still
  * pending. */
 drape_status drape_events_act(struct drape_sim *sim);
 
 /* Reports and performs what a stopped advance left over. */
 drape_status drape_events_resume(struct drape_sim *sim);
 
-/* Takes what another sim with the same events knows about them. */
+/* Takes what another sim knows about the events that both have. */
 void drape_events_continue(struct drape_sim *sim, const struct drape_sim *from);
 
 void drape_events_archive(struct drape_sim *sim, drape_archive *a);

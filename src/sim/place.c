@@ -136,14 +136,14 @@ static void place_nodes(const drape_sim *sim, const drape_place_list *cloths, co
     }
 }
 
-/* A spring by which a host drags a node goes with it. */
-static void place_drag_spring(drape_sim *sim, const drape_place_list *cloths, const drape_placement *by)
+/* Springs by which a host drags nodes go with them. */
+static void place_drag_springs(drape_sim *sim, const drape_place_list *cloths, const drape_placement *by)
 {
-    drape_drag_spring spring = *drape_system_drag_spring(sim->system);
-    if (!(spring.stiffness > 0) || !has(cloths, drape_model_cloth_of(sim->model, spring.node)))
-        return;
-    drape_placement_move(by, spring.target, spring.target);
-    drape_system_set_drag_spring(sim->system, &spring);
+    drape_drag_springs springs = *drape_system_drag_springs(sim->system);
+    for (int32_t i = 0; i < springs.count; i++)
+        if (has(cloths, drape_model_cloth_of(sim->model, springs.spring[i].node)))
+            drape_placement_move(by, springs.spring[i].target, springs.spring[i].target);
+    drape_system_set_drag_springs(sim->system, &springs);
 }
 
 static void place_motion(drape_sim *sim, const drape_place_list *cloths, const drape_place_list *colliders,
@@ -178,7 +178,7 @@ drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloth
         return status;
     const drape_energy before = drape_sim_energy(sim);
     place_nodes(sim, cloths, by, stop, next);
-    place_drag_spring(sim, cloths, by);
+    place_drag_springs(sim, cloths, by);
     place_motion(sim, cloths, colliders, by);
     sim->next = sim->now;
     sim->now = (int)(next - sim->states);

@@ -145,7 +145,7 @@ static drape_status open_sim(drape_context *ctx, const drape_model *model, const
     return sim->arena ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-/* Creates everything that a sim with its choices needs. */
+/* Creates everything that a sim with its choices needs, except its energy account. */
 static drape_status start_sim(drape_sim *sim, int threads)
 {
     drape_status status = create_states(sim);
@@ -168,33 +168,33 @@ static drape_status start_sim(drape_sim *sim, int threads)
     drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
                         drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
     sim->max_attempts = drape_chosen_controller_value(&sim->chosen, "max_attempts", INFINITY);
-    drape_sim_reset_energy(sim);
     return DRAPE_OK;
 }
 
-/* Replaces the model by one without these pins. */
-static drape_status leave_pins(drape_sim *sim, const uint8_t *released)
+/* Replaces the model by one with these pins. */
+static drape_status change_pins(drape_sim *sim, const uint8_t *pinned)
 {
     const size_t nodes = (size_t)sim->model->node_count;
-    const drape_status status = drape_compile_released(sim->ctx, sim->model, released, &sim->own_model);
+    const drape_status status = drape_compile_repinned(sim->ctx, sim->model, pinned, &sim->own_model);
     if (status)
         return status;
     sim->model = sim->own_model;
-    sim->released = drape_arena_take(sim->arena, nodes, sizeof *sim->released);
-    if (!sim->released)
+    sim->pinned = drape_arena_take(sim->arena, nodes, sizeof *sim->pinned);
+    if (!sim->pinned)
         return DRAPE_E_MEMORY;
-    memcpy(sim->released, released, nodes);
+    memcpy(sim->pinned, pinned, nodes);
     return DRAPE_OK;
 }
 
-drape_status drape_sim_create_like(const drape_sim *like, const uint8_t *released, drape_sim **out)
+drape_status drape_sim_create_like(const drape_sim *like, const drape_model *model, const uint8_t *pinned,
+                                   drape_sim **out)
 {
     const drape_sim_def def = {.frame_rate = like->frame_rate,
                                .realtime_step = like->realtime.longest_asked,
                                .teleport_speed = like->teleport_speed};
-    drape_status status = open_sim(like->ctx, drape_sim_base_model(like), &def, out);
-    if (!status && released)
-        status = leave_pins(*out, released);
+    drape_status status = open_sim(like->ctx, model, &def, out);
+    if (!status && pinned)
+        status = change_pins(*out, pinned);
     if (!status) {
         (*out)->chosen = like->chosen;
         status = start_sim(*out, drape_pool_threads(drape_system_pool(like->system)));
@@ -225,11 +225,13 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
         status = drape_choose(ctx, model, &def, &(*out)->chosen);
     if (!status)
         status = start_sim(*out, def.threads);
-    if (status)
+    if (status) {
         drape_sim_destroy(out);
-    else
-        (*out)->statistics.wall_setup = drape_clock_seconds() - start;
-    return status;
+        return status;
+    }
+    drape_sim_reset_energy(*out);
+    (*out)->statistics.wall_setup = drape_clock_seconds() - start;
+    return DRAPE_OK;
 }
 
 void drape_sim_destroy(drape_sim **out)
@@ -241,6 +243,7 @@ void drape_sim_destroy(drape_sim **out)
         sim->chosen.integrator->destroy(&sim->integrator);
     drape_system_destroy(&sim->system);
     drape_model_destroy(&sim->own_model);
+    drape_model_destroy(&sim->kept_model);
     drape_arena_destroy(&sim->arena);
     drape_free(sim->ctx, sim);
     *out = NULL;

@@ -55,9 +55,11 @@ struct drape_sim {
     drape_arena *arena; /* holds all memory of the sim and stays at its address: see drape_sim_read */
     size_t state_bytes, integrator_bytes; /* in the arena, after create */
     const drape_model *model;
-    drape_model *own_model; /* the model, if it lacks pins that were released; NULL: it is the host's */
-    uint8_t *released;      /* (node_count) 1: its pins were released; NULL: none were */
-    drape_work earlier;     /* done by the integrators that went before, each until pins were released */
+    drape_model
+        *own_model;     /* the model, if other nodes are pinned than in the one that was compiled; NULL: it
+                               is that one */
+    uint8_t *pinned;    /* (node_count) the nodes that own_model pins; NULL: those of the compiled model */
+    drape_work earlier; /* done by the integrators that went before, each until the model changed */
     drape_chosen chosen;
     drape_system *system;
     void *integrator;      /* state of chosen.integrator */
@@ -96,7 +98,8 @@ struct drape_sim {
     uint64_t model_hash, choices_hash; /* identify what a checkpoint belongs to; valid if identity_known */
     bool identity_known;
     /* The members from here on stay in place when a restored sim replaces the others (checkpoint.c). */
-    atomic_bool cancel; /* stops the running advance, or the next one */
+    atomic_bool cancel;      /* stops the running advance, or the next one */
+    drape_model *kept_model; /* compiled for this sim by drape_sim_change; NULL: the model is the host's */
     drape_observer *observers[DRAPE_MAX_OBSERVERS];
     void *observer_users[DRAPE_MAX_OBSERVERS];
     int observer_count;
@@ -107,21 +110,29 @@ struct drape_sim {
  * call comes from one of its observers). */
 drape_status drape_sim_guard(drape_sim *sim, const char *function);
 
-/* Creates a new sim with the same choices, at the beginning. released (node_count): the nodes whose pins were
- * released; NULL: none. */
-drape_status drape_sim_create_like(const drape_sim *like, const uint8_t *released, drape_sim **out);
+/* Creates a new sim of a compiled model with the same choices, at the beginning and without an energy
+ * account, which the caller copies or reads. pinned (node_count): the nodes that are pinned; NULL: those of
+ * the model. */
+drape_status drape_sim_create_like(const drape_sim *like, const drape_model *model, const uint8_t *pinned,
+                                   drape_sim **out);
+
+/* Takes to a new sim all that goes on from one of the same cloth, whose model may have other pins, terms and
+ * colliders. Errors: DRAPE_E_MEMORY, DRAPE_E_ARGUMENT (a pin is to be elsewhere); then `to` is only fit to be
+ * destroyed. */
+drape_status drape_sim_continue(drape_sim *to, drape_sim *from);
 
 /* Exchanges the contents of two sims, except what belongs to the host and stays with `sim`: observers, the
  * cancel flag, the wind. Afterwards `other` has the former contents of `sim` and is only fit to be
  * destroyed. */
 void drape_sim_exchange(drape_sim *sim, drape_sim *other);
 
-/* Makes pinned nodes free, which go on with the velocity of their pins. The sim is built anew, for a model
- * without these pins, and takes the place of the present one if that succeeds. Errors: DRAPE_E_MEMORY,
- * DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's cancel function); then the sim is unchanged. */
-drape_status drape_sim_release(drape_sim *sim, const uint8_t *nodes);
+/* Pins these nodes (node_count) and no others: nodes that become free go on with the velocity of their pins,
+ * those that become pinned are held where they are. The sim is built anew, for a model with these pins, and
+ * takes the place of the present one if that succeeds. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER,
+ * DRAPE_E_STOPPED (the context's cancel function); then the sim is unchanged. */
+drape_status drape_sim_repin(drape_sim *sim, const uint8_t *pinned);
 
-/* The model of the host, with all pins. */
+/* The model as it was compiled, with its own pins. */
 static inline const drape_model *drape_sim_base_model(const drape_sim *sim)
 {
     return sim->model->base ? sim->model->base : sim->model;

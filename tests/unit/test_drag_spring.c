@@ -158,5 +158,50 @@ START_TEST(wrong_arguments_change_nothing)
 }
 END_TEST
 
+/* Several springs add k (x - target) each to g of their nodes, two on one node both, and the sum of the
+ * forces is what drape_sim_drag_spring_force returns. A list of one is the spring of
+ * drape_sim_set_drag_spring, to the bit of a step; an empty list leaves none. */
+START_TEST(several_springs_add_up)
+{
+    scene h = scene_open(sheet, "", "be"), one = scene_open(sheet, "", "be");
+    const int32_t nodes[] = {7, 3, 7, 12, 5};
+    const double stiffness[] = {37.5, 12, 8.25, 100, 0},
+                 targets[] = {0.4, 0.3, -0.2, 0, 0, 1, -1, 2, 0.5, 0.1, 0.1, 0.1, 9, 9, 9};
+    const drape_state *s = drape_sim_state(h.sim);
+    const drape_point point = {.x = s->x, .v = s->v, .internal = s->internal};
+    double g[2][48], want[48] = {0}, force[3], sum[3] = {0};
+    drape_system_force(h.sim->system, &point, g[0]);
+    ck_assert_int_eq(drape_sim_set_drag_springs(h.sim, 5, nodes, stiffness, targets), DRAPE_OK);
+    drape_system_force(h.sim->system, &point, g[1]);
+    for (int i = 0; i < 5; i++)
+        for (int k = 0; k < 3; k++) {
+            const double f = stiffness[i] * (s->x[3 * nodes[i] + k] - targets[3 * i + k]);
+            want[3 * nodes[i] + k] += f;
+            sum[k] -= f;
+        }
+    for (int i = 0; i < 48; i++)
+        ck_assert_double_eq_tol(g[1][i] - g[0][i], want[i], 1e-15 * (fabs(g[0][i]) + 100));
+    drape_sim_drag_spring_force(h.sim, force);
+    for (int k = 0; k < 3; k++)
+        ck_assert_double_eq_tol(force[k], sum[k], 1e-13);
+    ck_assert_int_eq(drape_sim_set_drag_springs(h.sim, 1, nodes, stiffness, targets), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_set_drag_spring(one.sim, nodes[0], stiffness[0], targets), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(h.sim, 0.004) | drape_sim_advance(one.sim, 0.004), DRAPE_OK);
+    ck_assert(drape_sim_hash(h.sim) == drape_sim_hash(one.sim));
+    const int32_t none[] = {7, 16};
+    ck_assert_int_eq(drape_sim_set_drag_springs(h.sim, 2, none, stiffness, targets), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_set_drag_springs(h.sim, 65, nodes, stiffness, targets), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_set_drag_springs(h.sim, 1, nodes, NULL, targets), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_set_drag_springs(NULL, 0, NULL, NULL, NULL), DRAPE_E_ARGUMENT);
+    drape_sim_drag_spring_force(h.sim, force);
+    ck_assert_double_ne(force[0], 0); /* the refused lists left the spring */
+    ck_assert_int_eq(drape_sim_set_drag_springs(h.sim, 0, NULL, NULL, NULL), DRAPE_OK);
+    drape_sim_drag_spring_force(h.sim, force);
+    ck_assert_double_eq(force[0], 0);
+    scene_close(&h);
+    scene_close(&one);
+}
+END_TEST
+
 SUITE("drag spring", force_and_jacobian_are_those_of_a_spring, a_free_sheet_takes_the_spring_s_momentum,
-      its_work_is_accounted, every_integrator_follows, wrong_arguments_change_nothing)
+      its_work_is_accounted, every_integrator_follows, wrong_arguments_change_nothing, several_springs_add_up)

@@ -1065,6 +1065,38 @@ START_TEST(test_pipe)
 }
 END_TEST
 
+/* Members and elements can be removed; a fault in an array that has lost an element names the removal, as the
+ * text has its elements at other places. */
+START_TEST(test_remove)
+{
+    open_context();
+    ck_assert_int_eq(
+        drape_scene_parse(ctx,
+                          "{\"drape\": 1, \"duration\": 1, \"gravity\": [0,0,1], \"colliders\": "
+                          "[{\"type\": \"plane\", \"name\": \"a\"}, {\"type\": \"sphere\", \"name\": "
+                          "\"b\"}], \"cloth\": []}",
+                          "s.json", &scene),
+        DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/gravity", NULL), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/colliders/0", NULL), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/cloth/-", "{\"mesh\": {\"grid\": \"square\"}}"), DRAPE_OK);
+    ck_assert(!drape_scene_gives(scene, "/gravity") && !drape_scene_gives(scene, "/colliders/1"));
+    ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_OK);
+    ck_assert_double_eq(def.gravity[1], -9.81);
+    ck_assert_uint_eq(def.collider_count, 1);
+    ck_assert_str_eq(def.colliders[0].name, "b");
+    static const char *const none[] = {"/gravity", "/colliders/1", "/colliders/-", "/no/where", "", "x"};
+    for (size_t i = 0; i < sizeof none / sizeof *none; i++)
+        ck_assert_int_eq(drape_scene_set(scene, none[i], NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_set(scene, "/colliders/0/name", "7"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/colliders/0/type", NULL), DRAPE_OK);
+    ck_assert_int_ne(drape_scene_to_def(scene, &def), DRAPE_OK);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(ctx), "/colliders/0"));
+    drape_scene_destroy(&scene);
+    close_context();
+}
+END_TEST
+
 START_TEST(test_arguments)
 {
     open_context();
@@ -1363,5 +1395,5 @@ SUITE("scene", test_example_scene, test_example_cloth, test_example_pins, test_t
       test_host_defaults, test_numbers, test_def_sizes, test_comments, test_places, test_mend_end,
       test_colliders_and_contact, test_wrong_scenes, test_long_texts, test_deep_nesting, test_truncations,
       test_mutations, test_sets, test_set_values, test_set_loose_numbers, test_set_order, test_locate_fault,
-      test_files, test_pipe, test_arguments, test_many_nodes, test_locale, test_no_memory,
+      test_files, test_pipe, test_remove, test_arguments, test_many_nodes, test_locale, test_no_memory,
       test_no_memory_for_json, test_form, test_every_key)

@@ -1,4 +1,4 @@
-/* release.c: a model without some of its pins. What depends on which nodes are free is computed anew: their
+/* repin.c: a model with other nodes pinned. What depends on which nodes are free is computed anew: their
  * numbers, the pattern of the matrix, and the places of elements in it. Everything else is shared. */
 #include "compile/compile.h"
 #include "compile/stages.h"
@@ -22,16 +22,16 @@ static drape_status copy_terms(drape_model *model)
 }
 
 /* track_of_node (node_count) */
-static void list_tracks(const drape_model *base, const uint8_t *released, int32_t *track_of_node)
+static void list_tracks(const drape_model *base, const uint8_t *pinned, int32_t *track_of_node)
 {
     for (int32_t i = 0; i < base->node_count; i++)
         track_of_node[i] = -1;
     for (int32_t i = 0; i < base->moved_count; i++)
-        if (!released[base->moved_node[i]])
+        if (pinned[base->moved_node[i]])
             track_of_node[base->moved_node[i]] = base->moved_track[i];
 }
 
-static drape_status number(drape_model *model, const uint8_t *released)
+static drape_status number(drape_model *model, const uint8_t *pinned)
 {
     const drape_model *base = model->base;
     const size_t nodes = (size_t)model->node_count;
@@ -42,15 +42,15 @@ static drape_status number(drape_model *model, const uint8_t *released)
     drape_status status = track_of_node ? drape_arena_status(&model->arena) : DRAPE_E_MEMORY;
     if (!status) {
         for (size_t i = 0; i < nodes; i++)
-            model->pinned[i] = base->pinned[i] && !released[i];
-        list_tracks(base, released, track_of_node);
+            model->pinned[i] = pinned[i] != 0;
+        list_tracks(base, pinned, track_of_node);
         status = drape_compile_number_nodes(model, track_of_node);
     }
     drape_free(model->ctx, track_of_node);
     return status;
 }
 
-drape_status drape_compile_released(drape_context *ctx, const drape_model *base, const uint8_t *released,
+drape_status drape_compile_repinned(drape_context *ctx, const drape_model *base, const uint8_t *pinned,
                                     drape_model **out)
 {
     drape_model *model = *out = drape_alloc(ctx, 1, sizeof *model);
@@ -62,7 +62,7 @@ drape_status drape_compile_released(drape_context *ctx, const drape_model *base,
     model->ctx = ctx;
     drape_status status = copy_terms(model);
     if (!status)
-        status = number(model, released);
+        status = number(model, pinned);
     if (!status)
         status = drape_compile_pattern(model);
     if (status)

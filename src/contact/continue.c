@@ -1,0 +1,106 @@
+/* continue.c: contact that goes on where other contact of the same cloth was. See contact.h. */
+#include "contact/parts.h"
+
+#include "contact/list.h"
+
+#include <math.h>
+#include <string.h>
+
+/* The number in `to` of a collider of `from`; -1: it is gone. */
+static int32_t collider_now(const drape_contact *to, const int32_t *before, int32_t collider)
+{
+    for (int32_t c = 0; c < to->model->collider_count; c++)
+        if (before[c] == collider)
+            return c;
+    return -1;
+}
+
+static int32_t first_point(const drape_contact *c, int32_t collider)
+{
+    int32_t first = c->model->node_count;
+    for (int32_t k = 0; k < collider; k++)
+        first += c->model->colliders[k].shape.point_count;
+    return first;
+}
+
+/* Whether the points of a collider are the same ones; *shift: what is added to their numbers. */
+static bool same_points(const drape_contact *to, int32_t now, const drape_contact *from, int32_t before,
+                        int32_t *shift)
+{
+    *shift = first_point(to, now) - first_point(from, before);
+    return to->model->colliders[now].shape.point_count == from->model->colliders[before].shape.point_count;
+}
+
+/* Pairs that are left out, as those of a collider with another shape, count as new ones when the next step
+ * begins. */
+static drape_status copy_inside(drape_contact *to, const drape_contact *from, const int32_t *before)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; !status && i < from->inside.count; i++) {
+        drape_pair_key key = from->inside.keys[i];
+        int32_t shift = 0;
+        if (key.collider >= 0) {
+            const int32_t now = collider_now(to, before, key.collider);
+            if (now < 0 || !same_points(to, now, from, key.collider, &shift))
+                continue;
+            key.collider = now;
+        }
+        for (int a = 0; a < 4; a++)
+            key.node[a] += key.node[a] >= to->model->node_count ? shift : 0;
+        status = drape_inside_add(&to->inside, &key);
+    }
+    drape_inside_sort(&to->inside);
+    return status;
+}
+
+static drape_status copy_relaxed(drape_contact *to, const drape_contact *from, const int32_t *before)
+{
+    drape_status status = DRAPE_OK;
+    int32_t added = 0;
+    to->relaxed.t = from->relaxed.t;
+    for (int32_t c = 0; c < to->model->collider_count; c++)
+        if (before[c] >= 0)
+            to->relaxed.total[c] = from->relaxed.total[before[c]];
+    to->relaxed.total[to->model->collider_count] = from->relaxed.total[from->model->collider_count];
+    for (int32_t i = 0; !status && i < from->relaxed.count; i++) {
+        drape_relaxed_node node = from->relaxed.nodes[i];
+        const int32_t now = node.collider < 0 ? -1 : collider_now(to, before, node.collider);
+        if (node.collider >= 0 && now < 0)
+            continue;
+        node.collider = now;
+        status = drape_relaxed_add(&to->relaxed, now, node.node, node.since, node.until, &added);
+        if (!status)
+            *drape_relaxed_find(&to->relaxed, now, node.node) = node;
+    }
+    return status;
+}
+
+static drape_status copy_couplings(drape_contact *to, const drape_contact *from)
+{
+    for (int32_t i = 0; i < from->coupling_count; i++) {
+        int32_t *list = drape_list_grow(to->arena, to->coupling, i, &to->coupling_room, 4 * sizeof *list);
+        if (!list)
+            return DRAPE_E_MEMORY;
+        to->coupling = list;
+        memcpy(list + 4 * (size_t)i, from->coupling + 4 * (size_t)i, 4 * sizeof *list);
+        to->coupling_count = i + 1;
+    }
+    return DRAPE_OK;
+}
+
+drape_status drape_contact_continue(drape_contact *to, const drape_contact *from, const int32_t *before)
+{
+    to->press = from->press;
+    to->press.work = 0;
+    to->seconds = from->seconds;
+    to->search_seconds = from->search_seconds;
+    to->longest_path = from->longest_path;
+    for (int32_t c = 0; c < to->model->collider_count; c++)
+        if (before[c] >= 0 && !to->model->contact.distance_given)
+            to->broad.distance[c] = fmax(to->model->contact.distance, from->broad.distance[before[c]]);
+    to->broad.rounding = from->broad.rounding;
+    drape_status status = copy_inside(to, from, before);
+    if (!status)
+        status = copy_relaxed(to, from, before);
+    return status ? status : copy_couplings(to, from);
+}

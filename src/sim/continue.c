@@ -1,0 +1,193 @@
+/* continue.c: what goes on from one sim to the next, when pins or the model change. The new one is made
+ * beside the present one, as when a checkpoint is restored, and has the same cloth. Terms, colliders and
+ * events are the same if their names are. The integrator and the controller start anew, as after a kink. */
+#include "base/elementary.h"
+#include "sim/sim.h"
+
+#include <math.h>
+#include <string.h>
+
+/* of the scene's size: rounding error allowed between a node and where its pin has it */
+#define PIN_SLIP 1e-9
+
+/* ---- State ---- */
+
+/* The same term on the same cloth, if it has as many internal variables: the first one of that name that no
+ * earlier term of the new model stands for. */
+static const drape_term *term_like(const drape_model *from, const drape_model *to, const drape_term *term)
+{
+    int32_t skip = 0;
+    for (const drape_term *t = to->terms; t < term; t++)
+        skip += t->ops == term->ops && t->cloth == term->cloth;
+    for (int32_t i = 0; i < from->term_count; i++) {
+        const drape_term *t = &from->terms[i];
+        if (t->ops == term->ops && t->cloth == term->cloth && skip-- == 0)
+            return drape_term_internals(t) == drape_term_internals(term) ? t : NULL;
+    }
+    return NULL;
+}
+
+static void copy_internal(const drape_model *to, const drape_model *from, const double *before, double *after)
+{
+    for (int32_t i = 0; i < to->term_count; i++) {
+        const drape_term *term = &to->terms[i], *same = NULL;
+        if (drape_term_internals(term) > 0 && (same = term_like(from, to, term)))
+            memcpy(after + term->first_internal, before + same->first_internal,
+                   (size_t)drape_term_internals(term) * sizeof *after);
+    }
+}
+
+static void copy_state(drape_sim *to, const drape_sim *from)
+{
+    const size_t n = 3 * (size_t)to->model->node_count;
+    const drape_state *now = drape_sim_state(from);
+    drape_state *state = &to->states[to->now];
+    state->t = now->t;
+    memcpy(state->x, now->x, n * sizeof *state->x);
+    memcpy(state->v, now->v, n * sizeof *state->v);
+    copy_internal(to->model, from->model, now->internal, state->internal);
+}
+
+/* ---- Pins ---- */
+
+/* A released node goes on with the velocity that its pin had in the last step. */
+static void let_go(drape_sim *to, const drape_sim *from)
+{
+    drape_state *state = &to->states[to->now];
+    const drape_motion *motion = drape_system_motion(from->system);
+    const double before = from->before >= 0 ? from->states[from->before].t : state->t;
+    for (int32_t i = 0; i < to->model->node_count; i++) {
+        double *v = state->v + 3 * (size_t)i;
+        if (!from->model->pinned[i] || to->model->pinned[i])
+            continue;
+        memset(v, 0, 3 * sizeof *v);
+        if (motion->place[i] >= 0)
+            drape_motion_pin_velocity(motion, motion->place[i], state->t, before + (state->t - before) / 2,
+                                      v);
+    }
+}
+
+static drape_status refuse_pin(const drape_sim *sim, int32_t node, const double *x, const double *pin)
+{
+    const drape_cloth *cloth = &sim->model->cloths[drape_model_cloth_of(sim->model, node)];
+    return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                      "node %d of %s is at (%g %g %g); its track has it at (%g %g %g) m at t = %g s: a track "
+                      "that is new must begin where its nodes are",
+                      (int)(node - cloth->first_node), cloth->name, x[0], x[1], x[2], pin[0], pin[1], pin[2],
+                      drape_sim_state(sim)->t);
+}
+
+/* Pinned nodes are where they were, and held there unless their motion leads there anyway. A node that was
+ * pinned before may not get a track that begins elsewhere. */
+static drape_status hold(drape_sim *to, const drape_sim *from)
+{
+    const drape_model *m = to->model;
+    drape_motion *motion = drape_system_steer(to->system);
+    drape_state *state = &to->states[to->now];
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; !status && i < m->node_count; i++) {
+        const double *x = state->x + 3 * (size_t)i;
+        double pin[3];
+        if (!m->pinned[i])
+            continue;
+        drape_motion_place_pin(motion, i, state->t, pin);
+        if (!from->model->pinned[i])
+            memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
+        if (drape_hypot(drape_hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= PIN_SLIP * m->length)
+            continue;
+        if (from->model->pinned[i] && motion->place[i] >= 0 && motion->moved_track[motion->place[i]] >= 0)
+            status = refuse_pin(to, i, x, pin);
+        else
+            drape_motion_hold_pin(motion, i, x);
+    }
+    return status;
+}
+
+/* ---- The driver ---- */
+
+static drape_status copy_reasons(drape_sim *to, const drape_sim *from)
+{
+    to->reason_count = from->reason_count;
+    for (int i = 0; i < from->reason_count; i++) {
+        to->reasons[i].count = from->reasons[i].count;
+        to->reasons[i].reason = drape_arena_text(to->arena, from->reasons[i].reason);
+    }
+    return drape_arena_status(to->arena);
+}
+
+/* Contact may need memory to measure its energy. */
+static drape_status measured(drape_sim *sim)
+{
+    if (drape_system_status(sim->system) != DRAPE_E_MEMORY)
+        return DRAPE_OK;
+    sim->energy_known = false;
+    return DRAPE_E_MEMORY;
+}
+
+/* The energy account goes on; what the change itself adds or takes counts as given by the host. */
+static drape_status copy_account(drape_sim *to, drape_sim *from)
+{
+    const drape_energy before = drape_sim_energy(from);
+    const drape_status status = measured(from);
+    if (status)
+        return status;
+    to->audit = from->audit;
+    drape_sim_shift_energy(to, &before);
+    return measured(to);
+}
+
+static void copy_logged(drape_sim *to, const drape_sim *from, const int32_t *collider_before)
+{
+    const int32_t count = to->model->collider_count;
+    for (int32_t c = 0; c < count; c++)
+        to->relaxed_logged[c] = collider_before[c] >= 0 && from->relaxed_logged[collider_before[c]];
+    to->relaxed_logged[count] = from->relaxed_logged[from->model->collider_count];
+}
+
+static drape_status copy_driver(drape_sim *to, drape_sim *from)
+{
+    to->schedule = from->schedule;
+    to->next_frame = from->next_frame;
+    to->attempts = from->attempts;
+    to->statistics = from->statistics;
+    to->realtime = from->realtime;
+    to->earlier = drape_work_sum(from->chosen.integrator->work(from->integrator), &from->earlier);
+    if (to->chosen.integrator->set_effort)
+        to->chosen.integrator->set_effort(to->integrator, to->realtime.effort);
+    drape_events_continue(to, from);
+    return copy_reasons(to, from);
+}
+
+/* ---- All of it ---- */
+
+/* before (collider_count of `to`): the number that each collider had; -1: it is new. */
+static void match_colliders(const drape_model *to, const drape_model *from, int32_t *before)
+{
+    for (int32_t c = 0; c < to->collider_count; c++) {
+        before[c] = -1;
+        for (int32_t k = 0; before[c] < 0 && k < from->collider_count; k++)
+            if (strcmp(to->colliders[c].name, from->colliders[k].name) == 0)
+                before[c] = k;
+    }
+}
+
+drape_status drape_sim_continue(drape_sim *to, drape_sim *from)
+{
+    int32_t *before = drape_alloc(to->ctx, (size_t)to->model->collider_count + 1, sizeof *before);
+    if (!before)
+        return DRAPE_E_MEMORY;
+    match_colliders(to->model, from->model, before);
+    copy_state(to, from);
+    let_go(to, from);
+    drape_status status = drape_system_continue(to->system, from->system, before);
+    if (!status)
+        status = hold(to, from);
+    if (!status)
+        status = copy_driver(to, from);
+    if (!status)
+        status = copy_account(to, from);
+    if (!status)
+        copy_logged(to, from, before);
+    drape_free(to->ctx, before);
+    return status;
+}

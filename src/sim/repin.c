@@ -1,0 +1,66 @@
+/* repin.c: nodes that are let go, and nodes that are pinned where they are. Which nodes are free decides the
+ * size of everything: the unknowns, the pattern of the matrix, what integrators keep. So a sim is made for a
+ * model with these pins, beside the present one, as when a checkpoint is restored. */
+#include "sim/sim.h"
+
+#include <string.h>
+
+drape_status drape_sim_repin(drape_sim *sim, const uint8_t *pinned)
+{
+    const drape_model *base = drape_sim_base_model(sim);
+    const bool as_compiled = memcmp(pinned, base->pinned, (size_t)base->node_count * sizeof *pinned) == 0;
+    drape_sim *other = NULL;
+    drape_status status = drape_sim_create_like(sim, base, as_compiled ? NULL : pinned, &other);
+    if (!status)
+        status = drape_sim_continue(other, sim);
+    if (!status)
+        drape_sim_exchange(sim, other);
+    drape_sim_destroy(&other);
+    return status;
+}
+
+/* ---- For hosts ---- */
+
+static drape_status check_nodes(const drape_sim *sim, const char *function, int32_t count,
+                                const int32_t *nodes)
+{
+    if (count < 0 || (count > 0 && !nodes))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: %d nodes, but no list of them", function,
+                          (int)count);
+    for (int32_t i = 0; i < count; i++)
+        if (nodes[i] < 0 || nodes[i] >= sim->model->node_count)
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: node %d; there are 0 to %d", function,
+                              (int)nodes[i], (int)sim->model->node_count - 1);
+    return DRAPE_OK;
+}
+
+static drape_status set_pins(drape_sim *sim, const char *function, int32_t count, const int32_t *nodes,
+                             uint8_t pin)
+{
+    drape_status status = drape_sim_guard(sim, function);
+    if (!status)
+        status = check_nodes(sim, function, count, nodes);
+    if (status)
+        return status;
+    const size_t size = (size_t)sim->model->node_count * sizeof *sim->pinned;
+    uint8_t *pinned = drape_alloc(sim->ctx, size, 1);
+    if (!pinned)
+        return DRAPE_E_MEMORY;
+    memcpy(pinned, sim->model->pinned, size);
+    for (int32_t i = 0; i < count; i++)
+        pinned[nodes[i]] = pin;
+    if (memcmp(pinned, sim->model->pinned, size) != 0)
+        status = drape_sim_repin(sim, pinned);
+    drape_free(sim->ctx, pinned);
+    return status;
+}
+
+drape_status drape_sim_pin(drape_sim *sim, int32_t count, const int32_t *nodes)
+{
+    return set_pins(sim, "drape_sim_pin", count, nodes, 1);
+}
+
+drape_status drape_sim_unpin(drape_sim *sim, int32_t count, const int32_t *nodes)
+{
+    return set_pins(sim, "drape_sim_unpin", count, nodes, 0);
+}
