@@ -38,6 +38,8 @@ static const char scene_text[] =
     "  \"integrator\": {\"dt\": 0.01, \"linear_solver\": \"klu\"}, \"controller\": {\"type\": \"halving\"},\n"
     "  \"events\": [{\"type\": \"height\", \"height\": -5, \"action\": \"stop\"},\n"
     "    {\"type\": \"pin_force\", \"cloth\": \"sheet\", \"limit\": 1e6}],\n"
+    "  \"seams\": [{\"type\": \"stitch\", \"a\": {\"cloth\": \"sheet\", \"nodes\": [1, 2]},\n"
+    "    \"b\": {\"cloth\": \"cloth1\", \"box\": [[0.15, -1, -1], [1, 1, 1]]}}],\n"
     "  \"duration\": 1, \"frame_rate\": 150, \"output\": {\"formats\": [\"npy\", \"obj\", \"ply\"]} }\n";
 
 static void write_text(const char *path, const char *text)
