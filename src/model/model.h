@@ -290,7 +290,7 @@ struct drape_model {
  * one of these are not in contact, and may pass through each other at the seam. */
 static inline int32_t drape_model_sewn(const drape_model *model, int32_t node)
 {
-    return model->sewn ? model->sewn[node] : node;
+    return model && model->sewn ? model->sewn[node] : node;
 }
 
 /* Whether two pieces of cloth share a node, or have nodes that are sewn together. */

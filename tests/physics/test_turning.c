@@ -33,7 +33,8 @@ static double resting_gap(const drape_model *m)
 static scene open_patch(const char *method, double radius, double rate, double dt)
 {
     scene s = scene_open(
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.02, 'height': "
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.02, "
+        "'height': "
         "0.02, 'transform': {'translate': [%g, 0, 0.01]}},"
         " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"
         " 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': [0,1,0], 'friction': %g,"
@@ -63,7 +64,7 @@ static void middle_of(const scene *s, double middle[3])
  * 0.025, whose cosine is 1. It turns with the floor but for that part of the creep, and within the angle y eps t/r. */
 START_TEST(a_patch_sticks_to_a_turntable)
 {
-    static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "generalized_alpha",
+    static const char *const methods[] = {"be",  "bdf2",       "midpoint", "trbdf2", "generalized_alpha",
                                           "ida", "rosenbrock", "radau"};
     const double radius = 0.1, rate = 5, begin = 0.2, t = 0.6;
     const double load = rate * rate * radius / (MU * GRAVITY), y = 1 - sqrt(1 - load);
@@ -76,10 +77,12 @@ START_TEST(a_patch_sticks_to_a_turntable)
         scene_advance(&s, begin + t);
         middle_of(&s, middle);
         const double drift = hypot(middle[0], middle[2]) - first, turned = atan2(-middle[2], middle[0]);
-        fprintf(stderr, "# %s: drifted %.4g of %.4g m, turned by %.6g of %.6g\n", methods[i], drift, y * EPS * t, turned,
-               remainder(rate * (begin + t), 2 * acos(-1.0)));
-        if (!getenv("LOOSE")) assert_below(fabs(drift / (y * EPS * t) - 1), 0.08);
-        if (!getenv("LOOSE")) assert_below(fabs(remainder(turned - rate * (begin + t), 2 * acos(-1.0))), y * EPS * t / radius);
+        fprintf(stderr, "# %s: drifted %.4g of %.4g m, turned by %.6g of %.6g\n", methods[i], drift,
+                y * EPS * t, turned, remainder(rate * (begin + t), 2 * acos(-1.0)));
+        if (!getenv("LOOSE"))
+            assert_below(fabs(drift / (y * EPS * t) - 1), 0.08);
+        if (!getenv("LOOSE"))
+            assert_below(fabs(remainder(turned - rate * (begin + t), 2 * acos(-1.0))), y * EPS * t / radius);
         scene_close(&s);
     }
 }
@@ -116,11 +119,13 @@ static double spin_of(const scene *s, const double *v)
 START_TEST(torque_and_work_are_those_of_the_cloth)
 {
     scene s = scene_open(
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.2, 'height': 0.2,"
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.2, 'height': "
+        "0.2,"
         " 'transform': {'translate': [-0.09, 1e-3, 0.1]}},"
         " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"
         " 'colliders': [{'type': 'cylinder', 'a': [0,-0.1,0], 'b': [0,0,0], 'radius': 0.3, 'friction': 0.3,"
-        " 'restitution': 1, 'turns': [{'time': 0, 'rotate': [0,1,0,0]}, {'time': 1, 'rotate': [0,1,0,1200]}]}],"
+        " 'restitution': 1, 'turns': [{'time': 0, 'rotate': [0,1,0,0]}, {'time': 1, 'rotate': "
+        "[0,1,0,1200]}]}],"
         " 'integrator': {'method': 'be', 'dt': 0.002, 'tolerance': 1e-9}, 'duration': 1}");
     double taken = 0, *before = malloc(3 * (size_t)s.model->node_count * sizeof *before);
     const drape_energy start = drape_sim_energy(s.sim);
@@ -192,14 +197,17 @@ END_TEST
  * while that of a bar grows with the path of its end. */
 START_TEST(only_what_comes_nearer_counts_as_fast)
 {
-    static const char *const shapes[] = {"'type': 'sphere', 'center': [0.1, -0.11, -0.1], 'radius': 0.1",
-                                         "'type': 'box', 'center': [0.1, -0.25, -0.1], 'size': [0.02, 0.4, 0.02]"};
+    static const char *const shapes[] = {
+        "'type': 'sphere', 'center': [0.1, -0.11, -0.1], 'radius': 0.1",
+        "'type': 'box', 'center': [0.1, -0.25, -0.1], 'size': [0.02, 0.4, 0.02]"};
     for (int i = 0; i < 2; i++) {
         scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.2, 'height': "
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.2, "
+            "'height': "
             "0.2}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': "
             "['stretch.edge']}], 'colliders': [{%s, 'turns': [{'time': 0, 'rotate': [1,0,0,0]},"
-            " {'time': 1, 'rotate': [1,0,0,720]}]}], 'gravity': [0,0,0], 'integrator': {'dt': 0.01}, 'duration': 1}",
+            " {'time': 1, 'rotate': [1,0,0,720]}]}], 'gravity': [0,0,0], 'integrator': {'dt': 0.01}, "
+            "'duration': 1}",
             shapes[i]);
         scene_advance(&s, 0.03);
         const double path = drape_contact_longest_path(drape_system_contact(s.sim->system));

@@ -194,7 +194,8 @@ START_TEST(sides_belong_to_triangles)
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     for (int i = 0; i < 4; i++) {
         int64_t count = 0;
-        const drape_surface surface = {x, edges[i], triangle, 1, 2};
+        const drape_surface surface = {
+            .x = x, .edge = edges[i], .triangle = triangle, .edge_count = 1, .triangle_count = 2};
         ck_assert_int_eq(drape_intersect(ctx, &surface, &surface, count_visits, &count), DRAPE_OK);
         ck_assert_int_eq(count, i < 2 ? 2 : 0);
     }
