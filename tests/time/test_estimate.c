@@ -76,10 +76,9 @@ static int compare_numbers(const void *a, const void *b)
 }
 
 /* The median over the steps of a run is within a factor of 4 of the true error on cloth of three materials
- * and two membranes that hangs, swings and falls on a ball, with the default iterations and the least. At
- * most one step of a run is off by more than the bound and estimated at less than a tenth: where cloth on the
- * ball buckles, be may find another of the solutions of a step. bench/estimate has more scenes, of which nine
- * in ten are within a factor of 3; 4 has to hold in all of these. */
+ * and two membranes that hangs, swings and falls on a ball, with the default iterations and the least. No step
+ * without contact is off by more than the bound and estimated at less than a tenth. On the ball one may be:
+ * cloth buckles there at a saddle, near which corrections become short and then long again. */
 START_TEST(the_estimate_is_near_the_true_error)
 {
     static const source sources[] = {{"", 16, SOFT, EDGES, PINS},
@@ -105,7 +104,7 @@ START_TEST(the_estimate_is_near_the_true_error)
             const double median = p.ratio[p.count / 2];
             ck_assert_msg(median > 0.25 && median < 4, "scene %zu: median %g over %d steps", i, median,
                           p.count);
-            ck_assert_int_le(p.far_below, 1);
+            ck_assert_int_le(p.far_below, *sources[i].bodies ? 1 : 0);
             drape_sim_destroy(&p.error.exact);
             scene_close(&s);
         }
