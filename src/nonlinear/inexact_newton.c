@@ -19,13 +19,14 @@
 #include <string.h>
 
 /* Fraction of the initial work along a correction that the residual may do beyond the minimum. */
-#define WORK_FRACTION  0.5
-#define MAX_TRIALS     8    /* of step lengths beyond the first; the last one is taken if F is finite there */
-#define SHORT_STEP     0.5  /* after a shorter step the next matrix has all of the positive parts */
-#define MIN_REPAIR     1e-3 /* smallest first share of the positive parts; otherwise half of the last one */
-#define SHARE_GROWTH   4    /* factor from one share tried to the next */
-#define SMALL_STEP     0.01 /* of an edge: after a shorter correction, RMS, the exact matrix is tried again */
-#define MAX_PREDICTION 8    /* corrections in a solve, after which stress is not predicted, as in newton.c */
+#define WORK_FRACTION 0.5
+#define MAX_TRIALS    8    /* of step lengths beyond the first; the last one is taken if F is finite there */
+#define SHORT_STEP    0.5  /* after a shorter step the next matrix has all of the positive parts */
+#define MIN_REPAIR    1e-3 /* smallest first share of the positive parts; otherwise half of the last one */
+#define SHARE_GROWTH  4    /* factor from one share tried to the next */
+#define SMALL_STEP                                                                                           \
+    0.01 /* of an edge: after a shorter one, RMS, the exact matrix is tried again, without contact */
+#define MAX_PREDICTION 8 /* corrections in a solve, after which stress is not predicted, as in newton.c */
 /* Of the residual of the guess, that further iterations aim at with factors or contact: with more, stiff
  * elements and barriers that are not yet balanced throw cloth back in the next step. */
 #define MAX_LEFT 0.1
@@ -64,7 +65,8 @@
 #define ESTIMATE_TOLERANCE  0.5
 #define ESTIMATE_ITERATIONS 4
 
-/* What the first correction of a step leaves as error, as a share of itself, when that was measured last. */
+/* What the first correction of a step leaves as error, as a share of itself, when that was measured last. Not
+ * in a step that begins with the linearized equation, a guess of another kind. */
 typedef struct contraction {
     double share;       /* 0: not known */
     double along;       /* [m] RMS of that correction */
@@ -81,6 +83,7 @@ struct drape_inexact_newton {
     double share;                     /* of the positive parts in the next matrix; with factors */
     double used_share, repair_share;  /* in the last matrix; in the last one that was indefinite without */
     bool indefinite;                  /* one in this solve was */
+    bool linearized;                  /* this solve began with the linearized equation */
     bool unstable;                    /* the last matrix of this solve was, as far as it was tried */
     bool shortened;                   /* a correction of this solve was, by the line search */
     double length;                    /* that the line search gave the last correction */
@@ -150,7 +153,7 @@ static void begin(drape_inexact_newton *s, bool follows)
     s->share = 1;
     if (!follows || s->first.mass_weight != e->mass_weight)
         s->first = (contraction){0};
-    s->indefinite = s->unstable = s->shortened = false;
+    s->indefinite = s->unstable = s->shortened = s->linearized = false;
     drape_step_equation_predict_contact(e, NULL);
     if (!s->factored || (follows && s->predictor.valid))
         return;
@@ -266,6 +269,7 @@ static drape_status guess_linearized(drape_inexact_newton *s, const drape_inexac
     drape_status status = correct(s, settings);
     if (!status && drape_all_finite(s->p, e->dofs))
         memcpy(d, s->p, e->dofs * sizeof *d);
+    s->linearized = true;
     s->share = 1;
     s->indefinite = s->unstable = false;
     drape_step_equation_begin(e);
@@ -507,7 +511,9 @@ static bool is_quiet(const drape_inexact_newton *s, double error)
 
 static void measure_contraction(drape_inexact_newton *s, double error, double first)
 {
-    if (first > 0)
+    if (s->linearized)
+        s->first = (contraction){0};
+    else if (first > 0)
         s->first = (contraction){error / first, first, s->equation->mass_weight, 0};
 }
 
@@ -517,7 +523,8 @@ static void measure_contraction(drape_inexact_newton *s, double error, double fi
 static double expected_error(const drape_inexact_newton *s, const progress *p)
 {
     const contraction *c = &s->first;
-    if (p->iteration != 1 || s->fraction || slow_error(s, p) > 0 || !(c->share > 0) || c->steps >= MAX_STEPS)
+    if (p->iteration != 1 || s->linearized || s->fraction || slow_error(s, p) > 0 || !(c->share > 0) ||
+        c->steps >= MAX_STEPS)
         return INFINITY;
     return c->share * p->first * fmax(1, p->first / c->along);
 }
@@ -587,7 +594,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
             p.first = now;
         if (p.iteration == 1)
             measure_contraction(s, now, p.first);
-        s->indefinite &= now > SMALL_STEP * s->edge;
+        s->indefinite &= !goes_by_error(s) || now > SMALL_STEP * s->edge;
         p.ratio = p.iteration > 0 ? now / p.last : 1;
         p.last = now;
         drape_step_equation_predict_contact(e, s->p);
