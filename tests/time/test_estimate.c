@@ -404,7 +404,8 @@ START_TEST(an_estimate_in_contact_is_added)
 END_TEST
 
 SUITE("estimate", the_estimate_is_near_the_true_error, shortened_corrections_are_not_the_error,
-      iterations_follow_while_it_is_above_the_bound, the_default_bound_is_a_thousandth_of_the_size,
-      a_budget_limits_the_iterations, a_step_that_is_lost_is_rejected, an_inaccurate_run_has_a_warning,
+      earlier_steps_do_not_judge_one_in_which_pins_turn, iterations_follow_while_it_is_above_the_bound,
+      the_default_bound_is_a_thousandth_of_the_size, a_budget_limits_the_iterations,
+      a_step_that_is_lost_is_rejected, an_inaccurate_run_has_a_warning,
       steps_without_contact_take_one_iteration, what_a_correction_leaves_is_archived,
       pins_that_jump_take_the_sheet_along, an_estimate_in_contact_is_added)
