@@ -19,12 +19,14 @@
 #include <string.h>
 
 /* Fraction of the initial work along a correction that the residual may do beyond the minimum. */
-#define WORK_FRACTION  0.5
-#define MAX_TRIALS     8    /* of step lengths beyond the first; the last one is taken if F is finite there */
-#define SHORT_STEP     0.5  /* after a shorter step the next matrix has all of the positive parts */
-#define MIN_REPAIR     1e-3 /* smallest first share of the positive parts; otherwise half of the last one */
-#define SHARE_GROWTH   4    /* factor from one share tried to the next */
-#define MAX_PREDICTION 8    /* corrections in a solve, after which stress is not predicted, as in newton.c */
+#define WORK_FRACTION 0.5
+#define MAX_TRIALS    8    /* of step lengths beyond the first; the last one is taken if F is finite there */
+#define SHORT_STEP    0.5  /* after a shorter step the next matrix has all of the positive parts */
+#define MIN_REPAIR    1e-3 /* smallest first share of the positive parts; otherwise half of the last one */
+#define SHARE_GROWTH  4    /* factor from one share tried to the next */
+#define SMALL_STEP                                                                                           \
+    0.01 /* of an edge: after a shorter one, RMS, the exact matrix is tried again, without contact */
+#define MAX_PREDICTION 8 /* corrections in a solve, after which stress is not predicted, as in newton.c */
 /* Of the residual of the guess, that further iterations aim at with factors or contact: with more, stiff
  * elements and barriers that are not yet balanced throw cloth back in the next step. */
 #define MAX_LEFT 0.1
@@ -51,7 +53,8 @@
 /* Limits of the share m in the estimate of the error: beyond them forces are far from linear along p. */
 #define MIN_SHARE 0.05
 #define MAX_SHARE 4
-/* Of corrections that hardly contract: nine more like the last one are expected. Of how many it is measured. */
+/* Of corrections that hardly contract: nine more like the last one are expected. Five took a tenth fewer
+ * iterations, and 66 stiff or swung sheets were a sixth further off. */
 #define MAX_CONTRACTION 0.9
 #define STEPS_KEPT      4
 /* Power of the error if nothing but inertia resisted it, and with contact, whose matrix is stiffer. */
@@ -62,7 +65,8 @@
 #define ESTIMATE_TOLERANCE  0.5
 #define ESTIMATE_ITERATIONS 4
 
-/* What the first correction of a step leaves as error, as a share of itself, when that was measured last. */
+/* What the first correction of a step leaves as error, as a share of itself, when that was measured last. Not
+ * in a step that begins with the linearized equation, a guess of another kind. */
 typedef struct contraction {
     double share;       /* 0: not known */
     double along;       /* [m] RMS of that correction */
@@ -79,6 +83,8 @@ struct drape_inexact_newton {
     double share;                     /* of the positive parts in the next matrix; with factors */
     double used_share, repair_share;  /* in the last matrix; in the last one that was indefinite without */
     bool indefinite;                  /* one in this solve was */
+    bool linearized;                  /* this solve began with the linearized equation */
+    bool unstable;                    /* the last matrix of this solve was, as far as it was tried */
     bool shortened;                   /* a correction of this solve was, by the line search */
     double length;                    /* that the line search gave the last correction */
     double edge;                      /* [m] mean length of an edge */
@@ -147,7 +153,7 @@ static void begin(drape_inexact_newton *s, bool follows)
     s->share = 1;
     if (!follows || s->first.mass_weight != e->mass_weight)
         s->first = (contraction){0};
-    s->indefinite = s->shortened = false;
+    s->indefinite = s->unstable = s->shortened = s->linearized = false;
     drape_step_equation_predict_contact(e, NULL);
     if (!s->factored || (follows && s->predictor.valid))
         return;
@@ -197,6 +203,8 @@ static drape_status update_definite(drape_inexact_newton *s)
 {
     double share = s->indefinite && s->share == 0 ? s->repair_share : s->share;
     drape_status status = update_factored(s, share);
+    if (share == 0)
+        s->unstable = status == DRAPE_RETRY_LINEAR;
     s->share = 0;
     if (status != DRAPE_RETRY_LINEAR || share == 1)
         return status;
@@ -261,7 +269,9 @@ static drape_status guess_linearized(drape_inexact_newton *s, const drape_inexac
     drape_status status = correct(s, settings);
     if (!status && drape_all_finite(s->p, e->dofs))
         memcpy(d, s->p, e->dofs * sizeof *d);
+    s->linearized = true;
     s->share = 1;
+    s->indefinite = s->unstable = false;
     drape_step_equation_begin(e);
     return status < 0 ? status : DRAPE_OK;
 }
@@ -457,21 +467,24 @@ static bool goes_by_error(const drape_inexact_newton *s)
     return s->factored && !s->fraction;
 }
 
-/* The error as the corrections contract, where the line search has shortened one: a sheet that buckles, or
- * that turns by more than its stiff elements let one correction turn it, comes nearer by many small ones of
- * nearly the same length. Each alone is a small part of the error. The contraction is taken over pairs of
- * corrections, because their lengths alternate. 0: none was shortened. */
+/* The error where corrections contract slowly: 0 if there is no sign of it. A sheet that buckles, or that turns
+ * by more than its stiff elements let one correction turn it, comes nearer by many small corrections of nearly
+ * the same length, each of which is a small part of the error. The line search shortens some of them. The
+ * contraction is taken over pairs, because the lengths alternate.
+ *
+ * Where the exact matrix is indefinite there is no solution near: corrections become short near a saddle, and
+ * then longer again. Nothing tells how far that leads. */
 static double slow_error(const drape_inexact_newton *s, const progress *p)
 {
     const double *step = p->step;
     double share = MAX_CONTRACTION;
-    if (!s->shortened || !goes_by_error(s))
+    if (!goes_by_error(s) || !(s->shortened || s->unstable))
         return 0;
-    if (p->iteration == 2)
+    if (!s->unstable && p->iteration == 2)
         share = step[0] / step[1];
-    if (p->iteration == 3)
+    if (!s->unstable && p->iteration == 3)
         share = sqrt(step[0] / step[2]);
-    if (p->iteration > 3)
+    if (!s->unstable && p->iteration > 3)
         share = sqrt((step[0] + step[1]) / (step[2] + step[3]));
     share = fmin(share, MAX_CONTRACTION);
     return step[0] * share / (1 - share);
@@ -498,7 +511,9 @@ static bool is_quiet(const drape_inexact_newton *s, double error)
 
 static void measure_contraction(drape_inexact_newton *s, double error, double first)
 {
-    if (first > 0)
+    if (s->linearized)
+        s->first = (contraction){0};
+    else if (first > 0)
         s->first = (contraction){error / first, first, s->equation->mass_weight, 0};
 }
 
@@ -508,7 +523,8 @@ static void measure_contraction(drape_inexact_newton *s, double error, double fi
 static double expected_error(const drape_inexact_newton *s, const progress *p)
 {
     const contraction *c = &s->first;
-    if (p->iteration != 1 || s->shortened || s->fraction || !(c->share > 0) || c->steps >= MAX_STEPS)
+    if (p->iteration != 1 || s->linearized || s->fraction || slow_error(s, p) > 0 || !(c->share > 0) ||
+        c->steps >= MAX_STEPS)
         return INFINITY;
     return c->share * p->first * fmax(1, p->first / c->along);
 }
@@ -578,6 +594,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
             p.first = now;
         if (p.iteration == 1)
             measure_contraction(s, now, p.first);
+        s->indefinite &= !goes_by_error(s) || now > SMALL_STEP * s->edge;
         p.ratio = p.iteration > 0 ? now / p.last : 1;
         p.last = now;
         drape_step_equation_predict_contact(e, s->p);

@@ -21,6 +21,12 @@
  * it, so it is too long. The power c is fitted to 1 600 steps of cloth that hangs, swings, flies and
  * falls on things. With conjugate gradients p is that of a few of their iterations, and m is 1.
  *
+ * That holds near the solution. A stiff sheet that is jerked or buckles comes there by many corrections of
+ * nearly the same length, shortened by the line search, or passes a saddle, where they become short and then
+ * long again. With factors and without contact, where one was shortened the error is at least what a
+ * geometric series of corrections has left, by their measured contraction; where the exact matrix is still
+ * indefinite, nine times the last one.
+ *
  * Where cloth is not in contact, what the first correction of a step leaves changes little from one step to
  * the next. It is measured, by the second correction or by the estimate, and judges the three steps that
  * follow, which need no other estimate. Factors are not kept from one step to the next: in moving cloth one

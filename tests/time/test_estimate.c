@@ -27,6 +27,8 @@
 #define JERKED                                                                                               \
     "'pins': [{'corner': 'top-left', 'track': [[0, [0, 0, 0]], [1, [3, 0, 0]]]},"                            \
     "{'corner': 'top-right', 'track': [[0, [0, 0, 0]], [1, [3, 0, 0]]]}]"
+#define TURNED                                                                                               \
+    "'pins': [{'nodes': [0, 12], 'track': [[0, [0, 0, 0]], [0.2, [0.4, 0.2, 0]], [0.4, [0, 0, 0]]]}]"
 #define BALL "'colliders': [{'type': 'sphere', 'center': [0, 0, 0], 'radius': 0.3}],"
 
 typedef struct source {
@@ -76,10 +78,9 @@ static int compare_numbers(const void *a, const void *b)
 }
 
 /* The median over the steps of a run is within a factor of 4 of the true error on cloth of three materials
- * and two membranes that hangs, swings and falls on a ball, with the default iterations and the least. At
- * most one step of a run is off by more than the bound and estimated at less than a tenth: where cloth on the
- * ball buckles, be may find another of the solutions of a step. bench/estimate has more scenes, of which nine
- * in ten are within a factor of 3; 4 has to hold in all of these. */
+ * and two membranes that hangs, swings and falls on a ball, with the default iterations and the least. No step
+ * without contact is off by more than the bound and estimated at less than a tenth. On the ball one may be:
+ * cloth buckles there at a saddle, near which corrections become short and then long again. */
 START_TEST(the_estimate_is_near_the_true_error)
 {
     static const source sources[] = {{"", 16, SOFT, EDGES, PINS},
@@ -105,7 +106,7 @@ START_TEST(the_estimate_is_near_the_true_error)
             const double median = p.ratio[p.count / 2];
             ck_assert_msg(median > 0.25 && median < 4, "scene %zu: median %g over %d steps", i, median,
                           p.count);
-            ck_assert_int_le(p.far_below, 1);
+            ck_assert_int_le(p.far_below, *sources[i].bodies ? 1 : 0);
             drape_sim_destroy(&p.error.exact);
             scene_close(&s);
         }
@@ -156,6 +157,28 @@ START_TEST(shortened_corrections_are_not_the_error)
         scene_close(&s);
         scene_close(&be);
     }
+}
+END_TEST
+
+/* The pins of a soft sheet turn at 0.2 s. That step begins with the linearized equation, and what the first
+ * correction of the steps before has left says nothing about it: judged by that, one iteration was estimated at
+ * 0.45 mm and 5.2 mm off. */
+START_TEST(earlier_steps_do_not_judge_one_in_which_pins_turn)
+{
+    const source turned = {"", 13, "'young_modulus': 1e5, 'thickness': 0.001, 'areal_density': 0.2", FACES,
+                           TURNED};
+    scene s = open(&turned, "newton_k", ""), be = open(&turned, "be", "");
+    first_step f = {.error = {.exact = be.sim, .n = 3 * (size_t)s.model->node_count}};
+    f.error.x = f.x;
+    f.error.v = f.v;
+    scene_advance(&s, 0.2);
+    step_error_keep(&f.error, s.sim);
+    ck_assert_int_eq(drape_sim_observe(s.sim, compare_first, &f), DRAPE_OK);
+    scene_advance(&s, 0.2 + DT);
+    ck_assert_msg(f.estimate > 0.25 * f.distance, "%g m, estimate %g m", f.distance, f.estimate);
+    ck_assert_double_lt(f.distance, 1e-3 * SIZE);
+    scene_close(&s);
+    scene_close(&be);
 }
 END_TEST
 
@@ -381,7 +404,8 @@ START_TEST(an_estimate_in_contact_is_added)
 END_TEST
 
 SUITE("estimate", the_estimate_is_near_the_true_error, shortened_corrections_are_not_the_error,
-      iterations_follow_while_it_is_above_the_bound, the_default_bound_is_a_thousandth_of_the_size,
-      a_budget_limits_the_iterations, a_step_that_is_lost_is_rejected, an_inaccurate_run_has_a_warning,
+      earlier_steps_do_not_judge_one_in_which_pins_turn, iterations_follow_while_it_is_above_the_bound,
+      the_default_bound_is_a_thousandth_of_the_size, a_budget_limits_the_iterations,
+      a_step_that_is_lost_is_rejected, an_inaccurate_run_has_a_warning,
       steps_without_contact_take_one_iteration, what_a_correction_leaves_is_archived,
       pins_that_jump_take_the_sheet_along, an_estimate_in_contact_is_added)
