@@ -89,9 +89,9 @@ static drape_place_def quarter_def(void)
  * rounding of coordinates of 3 m, 7e-16 m, and what contact of 2000 N/m and Newton's tolerance of 1e-9 N on
  * springs of 10 N/m make of it: 1e-10 m a step at most, over 16 steps; the tolerances of verlet's substeps
  * and of ida are as small. What stops short of convergence, newton_k, is compared by the same sums in
- * another order. CVODE and ARKODE bound their first step after a start by a tenth of the coordinates, which are
- * others there: the motion is the same to the tolerance only, rtol times the sheet's 0.6 m in each of 8 frames,
- * and sqrt(60) times that where one of the 60 coordinates has all of the error.
+ * another order. CVODE and ARKODE bound their first step after a start by a tenth of the coordinates, which
+ * are others there: the motion is the same to the tolerance only, rtol times the sheet's 0.6 m in each of 8
+ * frames, and sqrt(60) times that where one of the 60 coordinates has all of the error.
  */
 START_TEST(a_placed_sim_goes_on_as_before)
 {

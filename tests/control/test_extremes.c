@@ -268,7 +268,7 @@ typedef struct extreme {
     void (*start)(scene *);                 /* NULL: at rest */
     unsigned stops;  /* integrators that may stop with a message; all others must end ok */
     unsigned crawls; /* integrators that run 3 times duration, not 3 s, if DRAPE_SLOW is set */
-    unsigned brief;  /* integrators that run a ten thousandth of duration: dirk follows a crumpled start in
+    unsigned brief;  /* integrators that run a thousandth of duration: dirk follows a crumpled start in
                          steps of 0.1 us, two of three of them rejected, 2e6 of them in all */
 } extreme;
 
@@ -424,7 +424,7 @@ static double duration_of(const extreme *c, unsigned bit)
 {
     const double duration = or_else(c->duration, 1);
     if (c->brief & bit)
-        return 1e-4 * duration;
+        return 1e-3 * duration;
     if (!getenv("DRAPE_SLOW") || (c->dt > 0 && c->dt < 1e-3))
         return duration;
     return c->crawls & bit ? 3 * duration : 3;
