@@ -11,8 +11,8 @@
 drape_status drape_steps_open(drape_context *ctx, drape_folder *folder, bool resumes, drape_file *file);
 
 /* Adds a row; call it in the C locale. energy: of the state after the attempt. events: those of the sim, of
- * which the row has the ones that are reported after the attempt; NULL: there are none. After a failure the file
- * ends with the row before. Errors: DRAPE_E_FILE. */
+ * which the row has the ones that are reported after the attempt; NULL: there are none. After a failure the
+ * file ends with the row before. Errors: DRAPE_E_FILE. */
 drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, const drape_energy *energy,
                                const drape_event_set *events);
 

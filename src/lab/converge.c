@@ -357,7 +357,7 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", label);
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "change to the next level [m]");
     if (others)
-        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, 6}, "not fitted");
+        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_OPEN_MARKER}, "not fitted");
     if (points > 0)
         lab_figure_fit(&f, xy, points, strcmp(knob, "rtol") != 0 ? 2 : 1);
     return lab_figure_end(

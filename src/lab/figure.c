@@ -269,6 +269,32 @@ void lab_figure_curve(lab_figure *f, int block, lab_style style, const char *tex
     add_entry(f, &entry);
 }
 
+static bool is_in(const lab_entry *entries, int count, const char *text, size_t length)
+{
+    for (int i = 0; i < count; i++)
+        if (strncmp(entries[i].text, text, length) == 0 &&
+            (entries[i].text[length] == 0 || entries[i].text[length] == ','))
+            return true;
+    return false;
+}
+
+void lab_figure_series(lab_figure *f, int block, const char *integrator, size_t variant, const char *name)
+{
+    const lab_style style = lab_style_of(integrator, variant);
+    const char *comma = strchr(name, ',');
+    if (variant == 0 || !comma || !is_in(f->legend, f->entries, integrator, strlen(integrator))) {
+        lab_figure_curve(f, block, style, name);
+        return;
+    }
+    lab_figure_curve(f, block, style, NULL);
+    const char *what = comma + 2;
+    if (f->variant_count == LAB_MAX_VARIANTS || is_in(f->variants, f->variant_count, what, strlen(what)))
+        return;
+    lab_entry *entry = &f->variants[f->variant_count++];
+    *entry = (lab_entry){.style = {LAB_BLACK, style.dash, LAB_OPEN_MARKER}};
+    snprintf(entry->text, sizeof entry->text, "%s", what);
+}
+
 void lab_figure_boxes(lab_figure *f, int block)
 {
     add_element(f, block);
@@ -526,6 +552,8 @@ drape_status lab_figure_end(lab *l, lab_figure *f, const char *caption)
 {
     fclose(f->script);
     fclose(f->plot);
+    for (int i = 0; i < f->variant_count; i++)
+        add_entry(f, &f->variants[i]);
     drape_status status = f->elements > 0 ? draw(l, f, caption) : DRAPE_OK;
     free(f->text);
     free(f->plot_text);

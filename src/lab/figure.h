@@ -11,8 +11,9 @@
 
 #include "lab/lab.h"
 
-#define LAB_MAX_ENTRIES 64
-#define LAB_SHADES      64 /* different colours of a scale */
+#define LAB_MAX_ENTRIES  64
+#define LAB_MAX_VARIANTS 8  /* of the integrators of a figure */
+#define LAB_SHADES       64 /* different colours of a scale */
 
 /* Colours that are not those of an integrator. */
 #define LAB_BLACK  0x000000
@@ -24,6 +25,11 @@
 #define LAB_ORANGE 0xe69f00
 #define LAB_RED    0xd55e00
 #define LAB_PURPLE 0xcc79a7
+
+/* Markers of gnuplot's that are not those of an integrator. */
+#define LAB_PLUS_MARKER  1
+#define LAB_CROSS_MARKER 2
+#define LAB_OPEN_MARKER  6
 
 typedef struct lab_style {
     int colour;
@@ -65,6 +71,8 @@ typedef struct lab_figure {
     int blocks, elements;
     lab_entry legend[LAB_MAX_ENTRIES];
     int entries;
+    lab_entry variants[LAB_MAX_VARIANTS]; /* last in the legend */
+    int variant_count;
 } lab_figure;
 
 /* Begins the figure of that name, whose axes the caller sets. Errors: DRAPE_E_MEMORY. */
@@ -76,6 +84,10 @@ void lab_figure_data_end(lab_figure *f);
 
 /* Points (x, y) of a block, joined by lines. text: in the legend; NULL: not there. */
 void lab_figure_curve(lab_figure *f, int block, lab_style style, const char *text);
+
+/* The curve of a series of an integrator, "be" or "be, error control". In the legend variants share an entry
+ * for what they have in common, "error control", in black: a name and a dash tell a series. */
+void lab_figure_series(lab_figure *f, int block, const char *integrator, size_t variant, const char *name);
 
 /* Boxes of a block: x y left right bottom top colour. */
 void lab_figure_boxes(lab_figure *f, int block);

@@ -539,14 +539,55 @@ static void tabulate_scenes(table *t)
 
 typedef struct chart {
     const char *suffix, *label, *key, *knob; /* knob: only series over this one; NULL: all */
+    bool energy;                             /* over it, not the error */
 } chart;
 
 static const chart charts[] = {
-    {"cpu", "CPU [s]", "cpu_s", NULL},
-    {"residuals", "residuals", "residuals", NULL},
-    {"dt", "dt [s]", "value", "dt"},
-    {"rtol", "rtol", "value", "rtol"},
+    {"cpu", "CPU [s]", "cpu_s", NULL, false},   {"residuals", "residuals", "residuals", NULL, false},
+    {"dt", "dt [s]", "value", "dt", false},     {"rtol", "rtol", "value", "rtol", false},
+    {"energy", "CPU [s]", "cpu_s", NULL, true},
 };
+
+/* The points of a series on a chart, added to all: x, y in turn. gained: those where the method gained energy
+ * instead of losing it. Returns how many are there then. */
+static size_t take_points(const chart *c, const series *s, bool gained, double *xy, size_t count)
+{
+    for (size_t k = 0; k < s->count; k++) {
+        const json_t *r = s->results[k];
+        const double drift = lab_is_good(r) ? lab_number(r, "energy_drift") : NAN;
+        const double x = c->knob ? lab_tag_number(r, "value") : lab_number(r, c->key),
+                     y = c->energy ? (gained ? -drift : drift)
+                         : gained  ? NAN
+                                   : resolved_error(r);
+        if (!(x > 0) || !(y > 0))
+            continue;
+        xy[2 * count] = x;
+        xy[2 * count++ + 1] = y;
+    }
+    return count;
+}
+
+static int write_points(lab_figure *f, const double *xy, size_t count)
+{
+    const int block = lab_figure_data(f);
+    for (size_t k = 0; k < count; k++)
+        fprintf(f->script, "%.9g %.9g\n", xy[2 * k], xy[2 * k + 1]);
+    lab_figure_data_end(f);
+    return block;
+}
+
+static void describe_chart(const json_t *about, const chart *c, char *text, size_t size)
+{
+    char horizon[64];
+    horizon_text(about, horizon, sizeof horizon);
+    snprintf(text, size,
+             "%.60s: %s, over %s. The error of the reference is %.1e, the horizon %s s, the duration %.3g s.",
+             lab_text(about, "name"),
+             c->energy
+                 ? "energy that the method lost, or, at open markers, gained, over the largest kinetic energy"
+                 : "error, the largest of the times, of the RMS over the nodes",
+             c->label, lab_number(about, "reference_error"), horizon, lab_number(about, "duration_s"));
+}
 
 static drape_status draw(lab *l, const json_t *about, const chart *c)
 {
@@ -555,45 +596,38 @@ static drape_status draw(lab *l, const json_t *about, const chart *c)
     series list[MAX_SERIES];
     const size_t series_count = list_series(l, scene, list);
     size_t count = 0, variant = 0;
+    bool any_gained = false;
     double *xy = drape_arena_take(&l->arena, 2 * l->count, sizeof *xy);
-    char name[96], caption[320], horizon[64];
+    char name[96], caption[400];
     snprintf(name, sizeof name, "%.64s_%s", scene, c->suffix);
     drape_status status = xy ? lab_figure_begin(l, &f, name) : DRAPE_E_MEMORY;
     if (status)
         return status;
     for (size_t i = 0; i < series_count; i++) {
         const series *s = &list[i];
-        const size_t before = count;
         variant = i && strcmp(s->integrator, list[i - 1].integrator) == 0 ? variant + 1 : 0;
         if (c->knob && strcmp(s->knob, c->knob) != 0)
             continue;
-        for (size_t k = 0; k < s->count; k++) {
-            const json_t *r = s->results[k];
-            const double x = c->knob ? lab_tag_number(r, "value") : lab_number(r, c->key),
-                         y = resolved_error(r);
-            if (!(x > 0) || !(y > 0))
-                continue;
-            xy[2 * count] = x;
-            xy[2 * count++ + 1] = y;
-        }
-        if (count == before)
-            continue;
-        const int block = lab_figure_data(&f);
-        for (size_t k = before; k < count; k++)
-            fprintf(f.script, "%.9g %.9g\n", xy[2 * k], xy[2 * k + 1]);
-        lab_figure_data_end(&f);
-        lab_figure_curve(&f, block, lab_style_of(s->integrator, variant), s->name);
+        const lab_style open = lab_style_of(s->integrator, 1);
+        const size_t before = count, lost = take_points(c, s, false, xy, count);
+        count = take_points(c, s, true, xy, lost);
+        any_gained |= count > lost;
+        if (lost > before)
+            lab_figure_series(&f, write_points(&f, xy + 2 * before, lost - before), s->integrator, variant,
+                              s->name);
+        if (count > lost)
+            lab_figure_curve(&f, write_points(&f, xy + 2 * lost, count - lost),
+                             (lab_style){open.colour, 0, open.point},
+                             lost > before || variant > 0 ? NULL : s->name);
     }
     snprintf(f.title, sizeof f.title, "%.150s", scene);
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->label);
-    snprintf(f.axes[1].label, sizeof f.axes[1].label, "error / size");
+    snprintf(f.axes[1].label, sizeof f.axes[1].label, c->energy ? "|energy_drift|" : "error / size");
+    if (any_gained)
+        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_OPEN_MARKER}, "gained");
     if (count > 0)
         lab_figure_fit(&f, xy, count, !c->knob ? 0 : strcmp(c->knob, "dt") == 0 ? 2 : 1);
-    horizon_text(about, horizon, sizeof horizon);
-    snprintf(caption, sizeof caption,
-             "%.60s: error, the largest of the times, of the RMS over the nodes, over %s. The error of the "
-             "reference is %.1e, the horizon %s s, the duration %.3g s.",
-             scene, c->label, lab_number(about, "reference_error"), horizon, lab_number(about, "duration_s"));
+    describe_chart(about, c, caption, sizeof caption);
     status = lab_figure_end(l, &f, caption);
     drape_arena_release(&l->arena, xy);
     return status;

@@ -739,17 +739,13 @@ static bool lacks_results(const lab *l, const space *s, const shade *sh, size_t 
     return false;
 }
 
-/* Markers of gnuplot's. */
-#define PLUS  1
-#define CROSS 2
-#define OPEN  6
-
 static lab_style mark_style(const char *integrator, mark kind)
 {
     const lab_style filled = lab_style_of(integrator, 0), open = lab_style_of(integrator, 1);
-    return kind == ON_CURVE    ? filled
-           : kind == FEW_STEPS ? (lab_style){open.colour, 0, open.point}
-                               : (lab_style){open.colour, 0, kind == OVER_BUDGET ? PLUS : CROSS};
+    return kind == ON_CURVE ? filled
+           : kind == FEW_STEPS
+               ? (lab_style){open.colour, 0, open.point}
+               : (lab_style){open.colour, 0, kind == OVER_BUDGET ? LAB_PLUS_MARKER : LAB_CROSS_MARKER};
 }
 
 /* Values over a single axis, a curve for each integrator. Runs of few steps are open markers off the curve,
@@ -785,11 +781,11 @@ static drape_status draw_curves(lab *l, const space *s, const shade *sh)
     }
     verdict_text(l, LATE, text);
     if (seen[FEW_STEPS])
-        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, OPEN}, verdicts[SHORT].name);
+        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_OPEN_MARKER}, verdicts[SHORT].name);
     if (seen[NO_RESULT])
-        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, CROSS}, "stopped or exploded");
+        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_CROSS_MARKER}, "stopped or exploded");
     if (seen[OVER_BUDGET])
-        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, PLUS}, text);
+        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_PLUS_MARKER}, text);
     return lab_figure_end(l, &f, sh->quantity->entry.summary);
 }
 

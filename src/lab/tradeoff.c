@@ -327,7 +327,7 @@ static drape_status draw(lab *l, const chart *c)
         for (size_t k = before; k < count; k++)
             fprintf(f.script, "%.9g %.9g\n", xy[2 * k], xy[2 * k + 1]);
         lab_figure_data_end(&f);
-        lab_figure_curve(&f, block, lab_style_of(integrator, variant), series);
+        lab_figure_series(&f, block, integrator, variant, series);
     }
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->x_label);
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "%s", c->y_label);

@@ -89,7 +89,9 @@ static drape_place_def quarter_def(void)
  * rounding of coordinates of 3 m, 7e-16 m, and what contact of 2000 N/m and Newton's tolerance of 1e-9 N on
  * springs of 10 N/m make of it: 1e-10 m a step at most, over 16 steps; the tolerances of verlet's substeps
  * and of ida are as small. What stops short of convergence, newton_k, is compared by the same sums in
- * another order.
+ * another order. CVODE and ARKODE bound their first step after a start by a tenth of the coordinates, which
+ * are others there: the motion is the same to the tolerance only, rtol times the sheet's 0.6 m in each of 8
+ * frames, and sqrt(60) times that where one of the 60 coordinates has all of the error.
  */
 START_TEST(a_placed_sim_goes_on_as_before)
 {
@@ -121,7 +123,9 @@ START_TEST(a_placed_sim_goes_on_as_before)
             }
         }
         printf("# %s: %.2g m apart\n", methods[i], worst);
-        ck_assert_msg(worst <= 1e-8, "%s: %g m apart", methods[i], worst);
+        const bool bounded = strcmp(methods[i], "cvode") == 0 || strcmp(methods[i], "dirk") == 0;
+        const double most = bounded ? 8 * sqrt(60) * 0.6 * 1e-7 : 1e-8;
+        ck_assert_msg(worst <= most, "%s: %g m apart", methods[i], worst);
         ck_assert_double_gt(fabs(drape_sim_positions(here.sim)[3 * 17 + 2]), 0.01); /* the ball met it */
         close_scene(&here, &memory[0]);
         close_scene(&there, &memory[1]);

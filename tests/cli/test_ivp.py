@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -88,6 +89,15 @@ def test_run_and_score():
     orders = {name.strip(): float(order) for name, order in orders if name.strip() in ("be", "trbdf2") and "." in order}
     assert abs(orders["be"] - 1) < 0.1 and abs(orders["trbdf2"] - 2) < 0.1, orders
     assert "report" in out and os.path.exists("r/tables.md"), out
+    # The diagram of the energy has the drift of each run, those of runs that gained energy as open markers.
+    with open("r/swing_energy.gp", encoding="utf-8") as file:
+        script = file.read()
+    heights = [float(line.split()[1]) for block in re.findall(r"\$d\d+ << EOD\n(.*?)EOD", script, re.S) for line in block.splitlines()]
+    with open("r/results.csv", encoding="utf-8") as file:
+        drifts = [float(row["energy_drift"]) for row in csv.DictReader(file)]
+    equal(len(heights), len(drifts), "points")
+    assert all(min(abs(abs(d) / h - 1) for h in heights) < 1e-6 for d in drifts), (heights, drifts)
+    equal("set label 'gained'" in script, min(drifts) < 0, "an entry for gains")
 
 
 def test_shards():

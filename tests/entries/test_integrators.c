@@ -5,6 +5,7 @@
 #include "integrators/integrator.h"
 #include "models.h"
 #include "solvers/linear.h"
+#include "support/host.h"
 #include "support/suite.h"
 
 static int param_of(const drape_integrator_ops *ops, const char *name)
@@ -24,6 +25,21 @@ START_TEST(entries_are_well_formed)
         ck_assert(dt >= 0 ? strcmp(ops->entry.params[dt].unit, "s") == 0 : ops->own_steps);
     }
     ck_assert_int_eq(drape_registry_count(&drape_integrator_registry), count);
+}
+END_TEST
+
+/* Tests of hosts, which know names only, run all that have steps in time. */
+START_TEST(hosts_have_all_methods)
+{
+    int count = 0;
+    for (int i = 0; drape_integrators[i]; i++) {
+        bool found = false;
+        for (int k = 0; k < METHODS; k++)
+            found |= strcmp(methods[k], drape_integrators[i]->entry.name) == 0;
+        ck_assert_msg(found != drape_integrators[i]->steady_state, "%s", drape_integrators[i]->entry.name);
+        count += found;
+    }
+    ck_assert_int_eq(count, METHODS);
 }
 END_TEST
 
@@ -417,6 +433,6 @@ START_TEST(a_damped_sheet_swings)
 }
 END_TEST
 
-SUITE("integrators", entries_are_well_formed, shared_names_mean_the_same,
+SUITE("integrators", entries_are_well_formed, hosts_have_all_methods, shared_names_mean_the_same,
       steps_do_not_write_their_input_and_repeat, equal_runs_have_equal_bits, a_converged_step_is_converged,
       a_step_that_has_not_converged_is_reported, a_triangle_falls_freely, a_damped_sheet_swings)

@@ -100,7 +100,7 @@ static double slide_of(const sliding *p, scene *s, double t)
 }
 
 static const char *const methods[] = {
-    "be", "bdf2", "midpoint", "trbdf2", "ida", "rosenbrock", "generalized_alpha", "cvode", "dirk"};
+    "be", "bdf2", "midpoint", "trbdf2", "ida", "rosenbrock", "generalized_alpha", "cvode", "dirk", "radau"};
 #define METHODS (sizeof methods / sizeof *methods)
 
 /* Whether a method bounds the errors of its steps, not residuals. */

@@ -11,7 +11,7 @@
 #define PARTS    20000 /* of a quadrature */
 
 static const char *const methods[] = {
-    "be", "bdf2", "trbdf2", "midpoint", "rosenbrock", "generalized_alpha", "cvode", "dirk", "ida"};
+    "be", "bdf2", "trbdf2", "midpoint", "rosenbrock", "generalized_alpha", "cvode", "dirk", "radau", "ida"};
 #define METHODS (sizeof methods / sizeof *methods)
 
 /* The integral of y / (1 + k f(y)) from 0 to y, f as in contact/restitution.h: m eps^2 of it is the energy

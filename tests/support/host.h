@@ -73,9 +73,9 @@ static inline double distance(const double *a, const double *b)
     "200}, 'terms': ['stretch.edge', 'bend.hinge'%s], 'pins': [%s]}], 'integrator': {%s}, 'frame_rate': "    \
     "64, %s 'duration': 1}"
 
-/* The integrators that have steps in time. */
-static const char *const methods[] = {"be",     "bdf2", "midpoint",   "trbdf2",           "newton_k",
-                                      "verlet", "ida",  "rosenbrock", "generalized_alpha"};
+/* The integrators that have steps in time: all of them, as entries/integrators checks. */
+static const char *const methods[] = {"be",  "bdf2",  "midpoint", "trbdf2",     "newton_k",          "verlet",
+                                      "ida", "cvode", "dirk",     "rosenbrock", "generalized_alpha", "radau"};
 enum { METHODS = sizeof methods / sizeof *methods };
 
 #endif
