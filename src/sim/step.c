@@ -177,7 +177,9 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
 {
     drape_statistics *s = &sim->statistics;
     sim->failed = 0;
-    if (!(next_state(sim)->t - sim->held_up_from < sim->schedule.dt)) {
+    /* with a time budget, the steps of the schedule may be smaller than nominal ones */
+    if (!(next_state(sim)->t - sim->held_up_from <
+          (sim->realtime.active ? sim->realtime.dt : sim->schedule.dt))) {
         sim->held_up = 0;
         sim->held_up_from = next_state(sim)->t;
     }
