@@ -39,8 +39,8 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
     }
     if (info->committed)
         return DRAPE_OK;
-    if (sim->realtime.active)
-        drape_sim_take_back(sim, next, info);
+    sim->attempted_known = false;
+    drape_sim_settle_residual(sim, next, info);
     if (!info->lenient && drape_sim_ran_away(sim, next, info)) {
         info->reason = drape_reason_name(DRAPE_REASON_ENERGY);
         return DRAPE_RETRY_REJECTED;
