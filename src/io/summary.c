@@ -55,7 +55,8 @@ static json_t *steps(const drape_sim *sim, const drape_statistics *s)
 {
     const count_item counts[] = {{"accepted", s->steps_accepted},
                                  {"rejected", s->steps_rejected},
-                                 {"unconverged", s->steps_unconverged}};
+                                 {"unconverged", s->steps_unconverged},
+                                 {"held", s->steps_held}};
     const real_item sizes[] = {{"h_min", s->h_min}, {"h_max", s->h_max}};
     json_t *object = with_counts(json_object(), counts, LENGTH(counts));
     return drape_json_with(with_reals(object, sizes, LENGTH(sizes)), "reasons", reasons(sim));

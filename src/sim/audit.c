@@ -206,9 +206,10 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
     const drape_model *m = sim->model;
     const drape_audit *audit = &sim->audit;
     const drape_energy e = drape_sim_energy(sim);
-    const drape_energy attempted =
-        measure(sim, out, drape_sim_state(sim)->internal, audit->dissipated + info->dissipated,
-                audit->pin_work + info->pin_work);
+    const drape_energy attempted = sim->attempted_known ? sim->attempted
+                                                        : measure(sim, out, drape_sim_state(sim)->internal,
+                                                                  audit->dissipated + info->dissipated,
+                                                                  audit->pin_work + info->pin_work);
     const double max_gain = sim->chosen.integrator->gain > 0 ? sim->chosen.integrator->gain : RUN_GAIN;
     const double quiet = scene_energy(m), gain = e.numerical - attempted.numerical,
                  scale = offered(audit, &attempted, info, quiet), run = audit->best - attempted.numerical,
@@ -254,25 +255,47 @@ static double internal_kinetic(const drape_model *m, const double *v, double mea
     return kinetic(m, v) - moving;
 }
 
-void drape_sim_take_back(drape_sim *sim, drape_state *out, const drape_step_info *info)
+/* Takes kinetic energy from the motion of the free nodes about their mean, so that their momentum stays.
+ * Returns how much. */
+static double take_back(const drape_model *m, double energy, double *v)
 {
-    const drape_model *m = sim->model;
-    const drape_audit *audit = &sim->audit;
-    const double left = audit->residual_work + info->residual_work;
-    if (!(left > 0) || m->free_count == 0)
-        return;
-    const drape_energy e = measure(sim, out, drape_sim_state(sim)->internal,
-                                   audit->dissipated + info->dissipated, audit->pin_work + info->pin_work);
     double mean[3] = {0};
-    const double made = fmin(audit->best - e.numerical, left), motion = internal_kinetic(m, out->v, mean);
-    if (!(made > 0) || !(motion > 0))
-        return;
-    const double share = sqrt(fmax(0, 1 - made / motion));
+    const double motion = internal_kinetic(m, v, mean), taken = fmin(energy, motion);
+    if (!(taken > 0))
+        return 0;
+    const double share = sqrt(1 - taken / motion);
     for (int32_t f = 0; f < m->free_count; f++) {
-        double *v = out->v + 3 * (size_t)m->node_of_free[f];
+        double *u = v + 3 * (size_t)m->node_of_free[f];
         for (int k = 0; k < 3; k++)
-            v[k] = mean[k] + share * (v[k] - mean[k]);
+            u[k] = mean[k] + share * (u[k] - mean[k]);
     }
+    return taken;
+}
+
+/* The dissipation is that of forces at the end of the step, which the residual drives, too: its work may go
+ * there and never have been in the motion. Taking back goes by what the motion has lost altogether. */
+void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info *info)
+{
+    const drape_audit *audit = &sim->audit;
+    const double left = audit->residual_work + info->residual_work, before = drape_sim_energy(sim).numerical;
+    if (!(left > 0) || sim->model->free_count == 0)
+        return;
+    drape_energy e = measure(sim, out, drape_sim_state(sim)->internal, audit->dissipated + info->dissipated,
+                             audit->pin_work + info->pin_work);
+    if (sim->realtime.active) {
+        const double taken =
+            take_back(sim->model, fmin(audit->most_lost - e.numerical - e.dissipated, left), out->v);
+        e.kinetic -= taken;
+        e.numerical += taken;
+    }
+    const double driven = fmin(fmin(before - e.numerical, info->residual_work), info->dissipated);
+    if (driven > 0) {
+        info->dissipated -= driven;
+        e.dissipated -= driven;
+        e.numerical += driven;
+    }
+    sim->attempted = e;
+    sim->attempted_known = true;
 }
 
 void drape_sim_add_contact_work(drape_sim *sim)
@@ -298,5 +321,6 @@ void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
     sim->attempted_known = false;
     audit->lowest = fmin(audit->lowest, sim->attempted.gravity);
     audit->best = fmax(audit->best, sim->attempted.numerical);
+    audit->most_lost = fmax(audit->most_lost, sim->attempted.numerical + sim->attempted.dissipated);
     audit->best_unexplained = fmax(audit->best_unexplained, sim->attempted.numerical + audit->residual_work);
 }

@@ -19,12 +19,11 @@ bool drape_sim_must_hold(const drape_sim *sim, drape_status failure, bool stoppe
            sim->model->contact.no_room != DRAPE_NO_ROOM_STOP;
 }
 
-/* The rest of the interval that could not be stepped through, at most a nominal step. */
+/* A nominal step, or what is left of the advance. */
 static double end_of_hold(const drape_sim *sim)
 {
     const drape_schedule *s = &sim->schedule;
-    const double next = s->stepping == DRAPE_STEPS_COUNTED ? s->interval_end : s->now + s->dt;
-    return fmin(next, s->cut ? s->cut_end : s->end);
+    return fmin(s->now + sim->realtime.dt, s->cut ? s->cut_end : s->end);
 }
 
 /* Pins and colliders do all the work: the free nodes, and with them inertia and damping, rest. */

@@ -24,6 +24,7 @@ typedef struct drape_audit {
     double offered;              /* energy at the start plus the magnitudes of all work */
     double lowest;               /* lowest energy of gravity so far */
     double best;                 /* largest numerical dissipation so far */
+    double most_lost;            /* the same with what was dissipated: all that the motion has lost */
     double residual_work;        /* of the residuals that unconverged steps left, so far */
     double best_unexplained;     /* largest numerical dissipation with that work as a source */
 } drape_audit;
@@ -165,9 +166,10 @@ double drape_sim_error_bound(const drape_sim *sim);
  * since the beginning of the run; info->diagnostic then says how much. */
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
-/* Takes from the motion of the nodes about their mean what a step to out and those before it made of energy
- * out of nothing, as far as the residuals that they left account for it. */
-void drape_sim_take_back(drape_sim *sim, drape_state *out, const drape_step_info *info);
+/* Settles what the residual of a step to `out` did. What it was dissipated at once is not counted as
+ * dissipated. With a time budget, what the residuals so far have put into the motion is taken back from it:
+ * its energy never rises but by known work. */
+void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info *info);
 
 /* The energies at positions and velocities (node_count x 3) at time t, with the internal variables of the
  * present state; `dissipated` and `numerical` are 0. */

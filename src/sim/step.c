@@ -39,8 +39,8 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
     }
     if (info->committed)
         return DRAPE_OK;
-    if (sim->realtime.active)
-        drape_sim_take_back(sim, next, info);
+    sim->attempted_known = false;
+    drape_sim_settle_residual(sim, next, info);
     if (!info->lenient && drape_sim_ran_away(sim, next, info)) {
         info->reason = drape_reason_name(DRAPE_REASON_ENERGY);
         return DRAPE_RETRY_REJECTED;
@@ -185,7 +185,9 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
 {
     drape_statistics *s = &sim->statistics;
     sim->failed = 0;
-    if (!(next_state(sim)->t - sim->held_up_from < sim->schedule.dt)) {
+    /* with a time budget, the steps of the schedule may be smaller than nominal ones */
+    if (!(next_state(sim)->t - sim->held_up_from <
+          (sim->realtime.active ? sim->realtime.dt : sim->schedule.dt))) {
         sim->held_up = 0;
         sim->held_up_from = next_state(sim)->t;
     }

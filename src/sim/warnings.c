@@ -229,6 +229,19 @@ static bool is_inaccurate(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
+/* The last resort of advances with a time budget. */
+static bool was_held(drape_sim *sim, char *text, size_t size)
+{
+    const drape_statistics *s = &sim->statistics;
+    if (s->steps_held == 0)
+        return false;
+    snprintf(text, size,
+             "in %lld of %lld steps no size of the step could be made, and the cloth was held where it was, "
+             "without velocity: the log says when and why",
+             (long long)s->steps_held, (long long)s->steps_accepted);
+    return true;
+}
+
 /* Advances with a time budget that fall behind: the cloth moves in slow motion. */
 static bool drops_time(drape_sim *sim, char *text, size_t size)
 {
@@ -272,6 +285,7 @@ static const struct {
               {"slow_contact", is_contact_slow},
               {"contact_distance", is_contact_thin},
               {"inaccurate", is_inaccurate},
+              {"held", was_held},
               {"time_dropped", drops_time}};
 
 bool drape_sim_take_warning_failure(drape_sim *sim)

@@ -70,6 +70,39 @@ START_TEST(an_infinite_hessian_stops_fixed_steps)
 }
 END_TEST
 
+/* With a time budget: while no force is finite, steps of any size fail, and the cloth is held, at a nominal
+ * step a call. Calls succeed, time goes on, and no state has a number that is not finite. Afterwards it falls
+ * again. */
+START_TEST(a_budget_holds_the_cloth)
+{
+    host_sim s = host_open("", "'type': 'halving'", true);
+    drape_realtime report;
+    int held = 0;
+    host_watch(&s);
+    for (int k = 1; k <= 30; k++) {
+        if (k == 11 || k == 21)
+            host_break(k == 11 ? HOST_NAN_FORCE : HOST_NOTHING, 1, true);
+        const drape_status status = drape_sim_advance_realtime(s.sim, HOST_DT, 1e9, &report);
+        ck_assert_msg(status == DRAPE_OK, "frame %d: %s", k, drape_context_message(s.ctx));
+        ck_assert_double_eq(drape_sim_time(s.sim), k * HOST_DT);
+        ck_assert_int_eq(report.held, k > 10 && k <= 20);
+        held += report.held;
+    }
+    double fastest = 0;
+    for (int i = 0; i < 3 * drape_model_node_count(s.model); i++)
+        fastest = fmax(fastest, fabs(drape_sim_velocities(s.sim)[i]));
+    ck_assert_double_gt(fastest, 0);
+    ck_assert_int_eq(s.nonfinite, 0);
+    ck_assert_int_eq(drape_sim_statistics(s.sim).steps_held, held);
+    drape_warning warning = {.name = ""};
+    bool warned = false;
+    for (int i = 0; !warned && drape_sim_warning(s.sim, i, &warning); i++)
+        warned = strcmp(warning.name, "held") == 0;
+    ck_assert(warned);
+    host_close(&s);
+}
+END_TEST
+
 START_TEST(halving_recovers)
 {
     static const host_fault kinds[] = {HOST_NAN_FORCE, HOST_INFINITE_FORCE, HOST_NAN_HESSIAN,
@@ -157,4 +190,4 @@ END_TEST
 
 SUITE("nonfinite", a_nan_force_stops_fixed_steps, an_infinite_force_stops_fixed_steps,
       a_nan_hessian_stops_fixed_steps, an_infinite_hessian_stops_fixed_steps, halving_recovers,
-      a_fault_that_stays_ends_the_run, accept_takes_no_nan, a_tiny_dt_min_ends_too)
+      a_budget_holds_the_cloth, a_fault_that_stays_ends_the_run, accept_takes_no_nan, a_tiny_dt_min_ends_too)

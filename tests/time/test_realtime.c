@@ -432,6 +432,42 @@ START_TEST(a_fast_body_is_served_by_the_default_distance)
 }
 END_TEST
 
+/* A sheet falls on a ball, with time for one iteration a step. The energy that the residuals put in is taken
+ * back as far as it is motion, and never counted as dissipated: neither what the cloth gains nor what is
+ * dissipated beyond what it has lost is more than its fall of 0.2 m to the ball gave it. */
+START_TEST(starved_steps_make_no_energy)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 17, 'rows': 17, 'width': 1, "
+        "'height': 1, 'orientation': 'horizontal', 'transform': {'translate': [-0.5, 0.2, "
+        "0.5]}}, 'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'areal_density': 0.2}, "
+        "'terms': ['stretch.edge', 'bend.hinge'%s]}], 'colliders': [{'type': 'sphere', "
+        "'center': [0, -0.2, 0], 'radius': 0.2, 'friction': 0.3}], 'integrator': {'method': "
+        "'newton_k'}, 'duration': 4}",
+        "");
+    const double given = 0.2 * 9.81 * 0.2; /* [J] */
+    double lost = 0, gained = 0;
+    for (int k = 0; k < 90; k++) {
+        advance(&s, 1.0 / 60, NOTHING);
+        const drape_energy e = drape_sim_energy(s.sim);
+        gained = fmax(gained, lost - e.numerical - e.dissipated);
+        lost = fmax(lost, e.numerical + e.dissipated);
+        assert_below(e.dissipated, e.numerical + e.dissipated + given);
+    }
+    assert_below(gained, given);
+    scene_close(&s);
+}
+END_TEST
+
+/* A ball that is far from the sheet when it begins to move has the whole distance after one step. */
+START_TEST(the_distance_is_there_before_the_body)
+{
+    scene s = scene_open(STRUCK, "", "newton_k");
+    ck_assert_double_ge(strike(&s, 1, PLENTY), 0.5 * 2.0 / 60);
+    scene_close(&s);
+}
+END_TEST
+
 /* Where the scene gives a distance, it stays; where the ball moves by more than five of it in a step, there
  * is a warning. */
 START_TEST(a_distance_that_is_given_is_kept)
@@ -514,6 +550,7 @@ SUITE("realtime", few_iterations_are_near_the_converged_step, light_cloth_is_nea
       a_ball_that_moves_does_not_stop_it, frame_rates_differ_by_the_order_of_the_method,
       rest_does_not_depend_on_the_frame_rate, the_level_degrades_and_recovers, dropped_time_has_a_warning,
       a_single_late_frame_is_made_up_for, every_integrator_with_a_time_takes_frames,
-      a_fast_body_is_served_by_the_default_distance, a_distance_that_is_given_is_kept,
+      a_fast_body_is_served_by_the_default_distance, the_distance_is_there_before_the_body,
+      starved_steps_make_no_energy, a_distance_that_is_given_is_kept,
       a_rejected_step_is_retried_by_the_next_call, steps_in_contact_are_not_longer_than_dt,
       wrong_arguments_are_reported)
