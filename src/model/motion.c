@@ -487,8 +487,8 @@ void drape_motion_mean_pose(const drape_motion *motion, int32_t collider, double
     drape_pose_set_mean_velocities(pose, &from, &to, span[1] - span[0]);
 }
 
-/* The rate of the rotation vector v of a path is a parabola: it stays in the hull of the control points of its
- * Bezier form. |w| <= |dv/dt|, since w is a mean of rotated dv/dt. */
+/* The rate of the rotation vector v of a path is a parabola: it stays in the hull of the control points of
+ * its Bezier form. |w| <= |dv/dt|, since w is a mean of rotated dv/dt. */
 double drape_motion_fastest_spin(const drape_motion *motion, int32_t collider, double t0, double t1)
 {
     const course c = collider_course(motion, collider);
