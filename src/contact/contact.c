@@ -412,8 +412,8 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
 {
     const size_t nodes = (size_t)c->model->node_count;
     double from[3], to[3], mean[3] = {0};
-    if (!drape_motion_moves_collider(c->motion, collider))
-        return 0;
+    if (!drape_motion_shifts_collider(c->motion, collider))
+        return turning_path_of(c, collider, t);
     drape_motion_collider(c->motion, collider, t, from);
     drape_motion_collider(c->motion, collider, t + c->dt, to);
     for (size_t i = 0; i < 3 * nodes; i++)

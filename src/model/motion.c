@@ -418,10 +418,16 @@ static course collider_course(const drape_motion *motion, int32_t collider)
                     .placed = &motion->collider_placed[collider]};
 }
 
-bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
+bool drape_motion_shifts_collider(const drape_motion *motion, int32_t collider)
 {
     const course c = collider_course(motion, collider);
-    return c.path->given || c.placed->given || c.track->key_count > 0 || c.turns->key_count > 0;
+    return c.path->given || c.placed->given || c.track->key_count > 0;
+}
+
+bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
+{
+    return drape_motion_shifts_collider(motion, collider) ||
+           motion->model->colliders[collider].turns.key_count > 0;
 }
 
 bool drape_motion_turns_collider(const drape_motion *motion, int32_t collider)

@@ -62,9 +62,10 @@ void drape_motion_place_pins(const drape_motion *motion, double t, double *x);
  * `within`: at a kink there are two velocities, and the velocity at the kink itself is the later one. */
 void drape_motion_pin_velocity(const drape_motion *motion, int32_t i, double t, double within, double v[3]);
 
-/* Whether a collider ever moves; whether it turns on its track or path; and the displacement of its pivot at
- * time t. */
+/* Whether a collider ever moves; whether its pivot does; whether it turns on its track or path; and the
+ * displacement of its pivot at time t. */
 bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider);
+bool drape_motion_shifts_collider(const drape_motion *motion, int32_t collider);
 bool drape_motion_turns_collider(const drape_motion *motion, int32_t collider);
 void drape_motion_collider(const drape_motion *motion, int32_t collider, double t, double displacement[3]);
 

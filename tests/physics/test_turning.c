@@ -207,7 +207,7 @@ START_TEST(only_what_comes_nearer_counts_as_fast)
             "'height': "
             "0.2}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': "
             "['stretch.edge']}], 'colliders': [{%s, 'turns': [{'time': 0, 'rotate': [1,0,0,0]},"
-            " {'time': 1, 'rotate': [1,0,0,720]}]}], 'gravity': [0,0,0], 'integrator': {'dt': 0.01}, "
+            " {'time': 1, 'rotate': [1,0,0,720]}]}], 'integrator': {'dt': 0.01}, "
             "'duration': 1}",
             shapes[i]);
         scene_advance(&s, 0.03);
