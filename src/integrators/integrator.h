@@ -59,8 +59,8 @@ typedef struct drape_integrator_ops {
      * model, terms that are a constraint) must not act, too: the sim creates its system without them. */
     bool projects_contact;
 
-    /* The velocities of a state are the means of the step that led to it, not those of its time: the surfaces of
-     * colliders that turn have theirs with them. */
+    /* The velocities of a state are the means of the step that led to it, not those of its time: the
+     * surfaces of colliders that turn have theirs with them. */
     bool mean_velocities;
     /* Steps from in to out, whose t is set. h: the nominal size of the step, exact, while out->t - in->t is
      * rounded. Sets out->x and out->v. */

@@ -437,10 +437,16 @@ static course collider_course(const drape_motion *motion, int32_t collider)
                     .placed = &motion->collider_placed[collider]};
 }
 
-bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
+bool drape_motion_shifts_collider(const drape_motion *motion, int32_t collider)
 {
     const course c = collider_course(motion, collider);
-    return c.path->given || c.placed->given || c.track->key_count > 0 || c.turns->key_count > 0;
+    return c.path->given || c.placed->given || c.track->key_count > 0;
+}
+
+bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
+{
+    return drape_motion_shifts_collider(motion, collider) ||
+           motion->model->colliders[collider].turns.key_count > 0;
 }
 
 bool drape_motion_turns_collider(const drape_motion *motion, int32_t collider)
@@ -506,8 +512,8 @@ void drape_motion_mean_pose(const drape_motion *motion, int32_t collider, double
     drape_pose_set_mean_velocities(pose, &from, &to, span[1] - span[0]);
 }
 
-/* The rate of the rotation vector v of a path is a parabola: it stays in the hull of the control points of its
- * Bezier form. |w| <= |dv/dt|, since w is a mean of rotated dv/dt. */
+/* The rate of the rotation vector v of a path is a parabola: it stays in the hull of the control points of
+ * its Bezier form. |w| <= |dv/dt|, since w is a mean of rotated dv/dt. */
 double drape_motion_fastest_spin(const drape_motion *motion, int32_t collider, double t0, double t1)
 {
     const course c = collider_course(motion, collider);
