@@ -27,13 +27,19 @@ typedef struct search {
     void *user;
 } search;
 
+static bool are_neighbours(const drape_model *model, const int32_t *edge, const int32_t *triangle)
+{
+    static const drape_model nothing_sewn = {.sewn = NULL};
+    return drape_model_share_node(model ? model : &nothing_sewn, triangle, 3, edge, 2);
+}
+
 static void try_triangle(void *user, int32_t element)
 {
     const search *s = user;
     const int32_t *edge = s->edges->edge + 2 * (size_t)s->edge,
                   *triangle = s->triangles->triangle + 3 * (size_t)element;
     const double *corner[3];
-    if (s->edges->x == s->triangles->x && drape_model_share_node(s->edges->model, triangle, 3, edge, 2))
+    if (s->edges->x == s->triangles->x && are_neighbours(s->edges->model, edge, triangle))
         return;
     for (int a = 0; a < 3; a++)
         corner[a] = s->triangles->x + 3 * (size_t)triangle[a];

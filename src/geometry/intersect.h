@@ -17,7 +17,7 @@ typedef struct drape_surface {
     const double *x;
     const int32_t *edge, *triangle; /* (edge_count x 2), (triangle_count x 3) nodes */
     int32_t edge_count, triangle_count;
-    const drape_model *model; /* of cloth, which may be sewn; NULL: nothing is sewn */
+    const drape_model *model; /* of the cloth, for what is sewn together; NULL: nothing is */
 } drape_surface;
 
 drape_surface drape_surface_of(const drape_model *model, const double *x); /* of the cloth */
