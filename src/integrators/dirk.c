@@ -13,6 +13,9 @@
  * Among the tables of ARKODE these need the fewest residuals for an error of 1e-3 to 1e-7 of the size, on a
  * soft and on a stiff sheet.
  *
+ * With fixed_step, steps have one size, by which the order can be measured. Nothing but a failure of Newton's
+ * method makes one shorter.
+ *
  * A step depends on the state at its beginning, the derivative there, and the size that was chosen for it.
  * ARKODE is started anew in each step with these, so a checkpoint has all of its history. The derivative is
  * that of the last stage of the step before, as deduced from the stage equation: an evaluation of the force
@@ -55,9 +58,15 @@
 #define EFFORT_LEAST  0.06
 #define TINY_ERROR    1e-10
 
-static const drape_param params[] = {
+enum { PARAM_FIXED_STEP = DRAPE_FIRST_ORDER_OWN, PARAM_COUNT };
+
+static const drape_param params[PARAM_COUNT] = {
     DRAPE_FIRST_ORDER_PARAMS(DRAPE_INTEGER("order", "1", DRAPE_DERIVED("3 for rtol >= 1e-4, else 5"), 2, 5,
                                            "order of the method")),
+    [PARAM_FIXED_STEP] =
+        DRAPE_NUMBER("fixed_step", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9,
+                     "size of every step that ends at no kink or end of an advance; the local error is not "
+                     "tested, and rtol bounds only what Newton's method leaves"),
 };
 
 static const struct {
@@ -96,6 +105,12 @@ static int system_matrix(sunrealtype t, N_Vector y, N_Vector rate, SUNMatrix mat
     (void)rate, (void)matrix, (void)mass, (void)keep, (void)a, (void)b, (void)c;
     *renewed = SUNTRUE;
     return drape_first_order_jacobian(user, t, 1 / gamma, N_VGetArrayPointer(y));
+}
+
+/* NAN: the local error chooses. */
+static double fixed_step(const dirk_state *s)
+{
+    return s->base.values[PARAM_FIXED_STEP];
 }
 
 /* c_j of the factors relative to that of the stage. */
@@ -211,7 +226,7 @@ static bool begin(drape_first_order *f, double t, double h)
 {
     dirk_state *s = (dirk_state *)f;
     s->t = t;
-    s->next = h > 0 ? h : drape_first_order_first_step(f);
+    s->next = h > 0 ? h : isnan(fixed_step(s)) ? drape_first_order_first_step(f) : fixed_step(s);
     s->error = 1;
     return true;
 }
@@ -264,6 +279,10 @@ static void choose_next(dirk_state *s)
     drape_first_order *f = &s->base;
     const int k = methods[order_of(s)].error_order;
     long attempts = 0;
+    if (!isnan(fixed_step(s))) {
+        s->next = fixed_step(s);
+        return;
+    }
     ARKStepGetNumStepAttempts(f->memory, &attempts);
     ARKStepGetEstLocalErrors(f->memory, f->between);
     const double error = fmax(TINY_ERROR, drape_first_order_norm(f, f->between)), chosen = s->next;
@@ -299,7 +318,9 @@ static drape_first_order_outcome step(drape_first_order *f, double end, double *
     s->matrices = f->linear->factorizations;
     s->attempted = true;
     f->counted = 0; /* ARKODE begins to count */
-    if (ARKStepReInit(m, NULL, rhs, s->t, s->before) || ARKStepSetInitStep(m, s->next) ||
+    int (*const set_size)(void *, sunrealtype) =
+        isnan(fixed_step(s)) ? ARKStepSetInitStep : ARKStepSetFixedStep;
+    if (ARKStepReInit(m, NULL, rhs, s->t, s->before) || set_size(m, s->next) ||
         ARKStepSetStopTime(m, s->stop))
         return DRAPE_FIRST_ORDER_REFUSED;
     const drape_first_order_outcome outcome = outcome_of(ARKStepEvolve(m, end, f->y, t, ARK_ONE_STEP));
@@ -337,10 +358,12 @@ static int dense(drape_first_order *f, double t, N_Vector out)
     return 0;
 }
 
-/* Those of ARKODE are in scratch that nothing has been written to before the first step. */
+/* Those of ARKODE are in scratch that nothing has been written to before the first step, nor in steps of
+ * fixed size. */
 static int errors(drape_first_order *f, N_Vector out)
 {
-    if (((const dirk_state *)f)->attempted)
+    const dirk_state *s = (const dirk_state *)f;
+    if (s->attempted && isnan(fixed_step(s)))
         return ARKStepGetEstLocalErrors(f->memory, out);
     N_VConst(0, out);
     return 0;
@@ -384,8 +407,8 @@ static const drape_first_order_solver solver = {
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
     dirk_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
-    return s ? drape_first_order_create(&s->base, &solver, arena, system, values, DRAPE_FIRST_ORDER_OWN,
-                                        LOOSE_ORDER, TIGHT_ORDER)
+    return s ? drape_first_order_create(&s->base, &solver, arena, system, values, PARAM_COUNT, LOOSE_ORDER,
+                                        TIGHT_ORDER)
              : DRAPE_E_MEMORY;
 }
 

@@ -14,9 +14,12 @@
 #include <ida/ida.h>
 #include <math.h>
 
-#define LOOSE_ORDER  2
-#define TIGHT_ORDER  5
-#define NEWTON_SHARE 0.33 /* of the error tolerance: bound for the error of the Newton iteration */
+#define LOOSE_ORDER 2
+#define TIGHT_ORDER 5
+/* Of the error tolerance: bound for the error of the Newton iteration. With IDA's own, 0.33, an undamped
+ * sheet of E h = 1e9 N/m lost a third of its energy in 0.5 s at rtol 1e-3 and ended 0.22 m off; with this a
+ * tenth, and 0.04 m off. It takes a sixth more residuals and matrices on a hung sheet. */
+#define NEWTON_SHARE 0.1
 /* The matrix is factored again when c_j changed by more than (1 - d)/(1 + d). IDA's own d, 0.25, takes a
  * quarter more residuals for as many factorisations. */
 #define CJ_CHANGE 0.1

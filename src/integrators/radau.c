@@ -29,7 +29,10 @@
  *   - a limit to the next step by the rate of convergence (Gustafsson & Soederlind 1997, Control strategies
  *     for the iterative solution of nonlinear equations in ODE solvers): where cloth swings fast, the
  *     iteration bounds the steps, not the error; and after a failure of the iteration, steps grow slowly;
- *   - in contact, K and D of the present state, in every step, and the present velocities as a guess.
+ *   - in contact, K and D of the present state, in every step, and the present velocities as a guess. Where
+ *     the iteration fails with them, it begins anew with an upper bound of friction in D, which does not
+ *     change at the kink where a slip ends, as in sun_newton.h; only where this fails, too, is h smaller. A
+ *     sheet of 20 x 20 nodes that falls on a ball with friction takes 146 attempts instead of 527.
  *
  * The energy account integrates the powers by the quadrature of the stages.
  */
@@ -136,6 +139,7 @@ typedef struct radau_state {
     drape_work work;
 
     bool touches; /* there is contact at the beginning of the step */
+    bool bounds;  /* the matrix has upper bounds of friction */
 
     /* Why the last evaluation failed. */
     bool nonfinite, crossing;
@@ -321,7 +325,9 @@ static drape_status prepare_matrix(radau_state *s, double h)
 {
     const double start = jacobian_clock(s);
     if (!s->have_matrix) {
-        const drape_point point = choose_matrix_point(s, h);
+        drape_point point = choose_matrix_point(s, h);
+        if (s->bounds)
+            point.contact = DRAPE_CONTACT_GAUSS_NEWTON;
         drape_status status = drape_radau_matrix_evaluate(&s->matrix, &point);
         s->work.jacobians++;
         s->work.jacobian_seconds += jacobian_clock(s) - start;
@@ -590,18 +596,22 @@ static drape_status begin(radau_state *s, const drape_state *in, double stop)
     return s->nonfinite ? DRAPE_RETRY_NONFINITE : DRAPE_OK;
 }
 
-/* The stages of a step of size h; with new K and D where those of an earlier step fail. */
+/* The stages of a step of size h; with new K and D where those of an earlier step fail, and in contact with
+ * bounds of friction where new ones fail. */
 static drape_status find_stages(radau_state *s, double h, drape_step_info *info)
 {
     drape_status status;
+    s->bounds = false;
     do {
         const bool kept = s->have_matrix && !s->current;
         info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
         status = prepare_matrix(s, h);
         if (!status)
             status = solve(s, h, info);
-        if (status <= 0 || !kept)
+        s->have_matrix &= !s->bounds;
+        if (status <= 0 || s->bounds || (!kept && !s->touches))
             return status;
+        s->bounds = !kept;
         s->have_matrix = false;
     } while (true);
 }

@@ -82,6 +82,16 @@ static drape_status renew(drape_radau_matrix *m)
 
 /* ---- Matrices ---- */
 
+/* D with the upper bounds of restitution and friction, which drape_system_damping has not: what K + D has
+ * more than K. */
+static void evaluate_bound(drape_radau_matrix *m, drape_point point)
+{
+    point.weight = 1;
+    drape_system_jacobian(m->system, &point, 0, 0, m->damping);
+    for (int64_t k = 0; k < m->linear->pattern->nonzeros; k++)
+        m->damping[k] -= m->stiffness[k];
+}
+
 drape_status drape_radau_matrix_evaluate(drape_radau_matrix *m, const drape_point *point)
 {
     bool changed;
@@ -95,7 +105,9 @@ drape_status drape_radau_matrix_evaluate(drape_radau_matrix *m, const drape_poin
         return status;
     at.weight = 0;
     drape_system_jacobian(m->system, &at, 0, 0, m->stiffness);
-    if (m->damping)
+    if (m->damping && point->contact == DRAPE_CONTACT_GAUSS_NEWTON)
+        evaluate_bound(m, at);
+    else if (m->damping)
         drape_system_damping(m->system, &at, m->damping);
     /* Friction and dashpots of strains that rotate are not symmetric. As in ida.c, Newton's iteration does
      * not need those parts: with Cholesky factors a run takes three quarters of the time, for as many

@@ -46,8 +46,9 @@ drape_status drape_radau_matrix_create(drape_arena *arena, drape_system *system,
                                        drape_radau_matrix *matrix);
 void drape_radau_matrix_destroy(drape_radau_matrix *matrix);
 
-/* Computes K and D, in a pattern with the contacts at this point. Errors: DRAPE_E_MEMORY and those of the
- * linear solver's create. */
+/* Computes K and D, in a pattern with the contacts at this point; with point->contact
+ * DRAPE_CONTACT_GAUSS_NEWTON, D has the upper bounds of restitution and friction. Errors: DRAPE_E_MEMORY and
+ * those of the linear solver's create. */
 drape_status drape_radau_matrix_evaluate(drape_radau_matrix *matrix, const drape_point *point);
 
 /* Factors P, unless that was done for this h. */

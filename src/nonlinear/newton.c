@@ -109,6 +109,7 @@ struct drape_newton {
                               for the next one; with `project` every matrix has all of them */
     bool indefinite;       /* the exact matrix was at the last iterate where it was tried */
     bool trial_evaluated;  /* the last evaluation was at `trial`, and F is finite there */
+    bool near_enough;      /* that iterate is within correction_tolerance */
     drape_status failure;  /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
 };
 
@@ -138,7 +139,7 @@ static void begin(drape_newton *s)
     s->residual = s->rounding = INFINITY;
     s->positive_share = 0;
     s->indefinite = false;
-    s->trial_evaluated = false;
+    s->trial_evaluated = s->near_enough = false;
     s->failure = DRAPE_OK;
     drape_step_equation_predict_contact(e, NULL);
     if (!s->searches)
@@ -185,7 +186,8 @@ static bool is_rounding(drape_newton *s, const double *d, bool *finite)
 }
 
 /* KINSOL must never get a NaN: its norms ignore it, so it would look like convergence. After a line search
- * F is known already. An F that is only rounding is given to KINSOL as 0, which ends its loop. */
+ * F is known already. An F that is only rounding, or at an iterate that is near enough, is given to KINSOL
+ * as 0, which ends its loop. */
 static int residual(N_Vector d_vector, N_Vector f, void *user)
 {
     drape_newton *s = user;
@@ -196,7 +198,7 @@ static int residual(N_Vector d_vector, N_Vector f, void *user)
         s->trial_evaluated = false;
         finite = drape_step_equation_evaluate(e, d);
     }
-    if (finite && is_rounding(s, d, &finite))
+    if (finite && (s->near_enough || is_rounding(s, d, &finite)))
         N_VConst(0, f);
     else
         memcpy(N_VGetArrayPointer(f), e->f, e->dofs * sizeof *e->f);
@@ -417,16 +419,29 @@ static double largest(const drape_step_equation *e, const double *f)
     return max;
 }
 
+/* Whether a chord step, which is about what the correction before it has left, is within
+ * correction_tolerance. Comparing with NaN, the default, is false. */
+static bool is_near_enough(const drape_newton *s, const double *chord)
+{
+    const double nodes = (double)s->equation->dofs / 3;
+    double squared = 0;
+    for (size_t i = 0; i < s->equation->dofs; i++)
+        squared += chord[i] * chord[i];
+    return sqrt(squared / nodes) <= s->values[DRAPE_NEWTON_CORRECTION_TOLERANCE];
+}
+
 /* Chord steps: if p lowered the residual so far that lowering it by the same factor once or twice more
  * would end the solve, the rest is corrected with the factors that gave p, at a tenth of the cost of an
- * iteration. F is known at d + p; minus_f is -F at d. A chord step that does not lower the residual is
- * undone, and one that is not feasible is not made. */
+ * iteration. With correction_tolerance the first chord step is always made, for its length. F is known at
+ * d + p; minus_f is -F at d. A chord step that does not lower the residual is undone, and one that is not
+ * feasible is not made. */
 static drape_status add_chords(drape_newton *s, const double *d, double *p, const double *minus_f)
 {
     drape_step_equation *e = s->equation;
     double bound = max_norm_bound(s), before = largest(e, e->f), rate = before / largest(e, minus_f);
+    bool measures = !isnan(s->values[DRAPE_NEWTON_CORRECTION_TOLERANCE]);
     for (int left = e->x_ahead ? MAX_CHORDS_IN_CONTACT : MAX_CHORDS;
-         left > 0 && before > bound && before * drape_pow(rate, left) <= bound; left--) {
+         left > 0 && before > bound && (measures || before * drape_pow(rate, left) <= bound); left--) {
         for (size_t i = 0; i < e->dofs; i++)
             s->chord_minus_f[i] = -e->f[i];
         drape_status status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
@@ -436,12 +451,16 @@ static drape_status add_chords(drape_newton *s, const double *d, double *p, cons
             s->trial[i] = d[i] + (p[i] + s->chord[i]);
         s->trial_evaluated = drape_step_equation_evaluate(e, s->trial);
         double after = s->trial_evaluated ? largest(e, e->f) : INFINITY;
+        s->near_enough = is_near_enough(s, s->chord);
         if (!(after < before)) {
             s->trial_evaluated = false;
             return DRAPE_OK;
         }
         for (size_t i = 0; i < e->dofs; i++)
             p[i] += s->chord[i];
+        if (s->near_enough)
+            return DRAPE_OK;
+        measures = false;
         rate = after / before;
         before = after;
     }
@@ -536,7 +555,9 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     report->tolerance = tolerance;
     report->residual = finite ? drape_step_equation_norm(e, norm) : NAN;
     report->diagnostic = drape_step_equation_diagnose(e, tolerance);
-    if (report->residual <= tolerance) {
+    if (!status && s->near_enough)
+        report->tolerance = NAN; /* it bounds what is left of the correction, not the residual */
+    if (report->residual <= tolerance || (!status && s->near_enough)) {
         report->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
         return DRAPE_OK;
     }

@@ -14,6 +14,7 @@
 #include <string.h>
 
 #define MOST   0.5  /* of the energy, of the time */
+#define MUCH   0.05 /* of the energy, for an integrator that bounds its error */
 #define MANY   3.0  /* Newton iterations an attempt */
 #define THIN   5.0  /* activation distances in a step of a collider */
 #define LARGE  20.0 /* [m] across */
@@ -171,7 +172,13 @@ static bool had_no_room(drape_sim *sim, char *text, size_t size)
 
 /* Energy that the integrator took, as a share of all that went in: by gravity, pins, colliders, hosts and
  * wind. With dt = 1/60 s over 1 s, be, bdf2 and trbdf2 take 65, 32 and 34 % in four_pins of examples/scenes,
- * 68, 45 and 11 % in sphere_drape. Where cloth is in contact it has met something, and lost energy there. */
+ * 68, 45 and 11 % in sphere_drape. Where cloth is in contact it has met something, and lost energy there.
+ *
+ * An integrator that bounds its error promises the motion, and rtol does not bound what it takes: errors
+ * of each step that are small in positions and velocities are stresses of stiff cloth, whose waves it
+ * damps. On the undamped sheet swing.json of examples/ivp over 0.5 s, ida at rtol 1e-3 takes 1 % at
+ * E h = 1e5 N/m and is off by 0.3 % of the size, 6 % and 0.8 % at 1e7, 11 % and 2.6 % at 1e9, 25 % and 10 %
+ * at 1e11. Over 1 s it takes 22 % in four_pins of examples/scenes, 8 % in box_edge, 1 % at most in others. */
 static bool dissipates_most(drape_sim *sim, char *text, size_t size)
 {
     const drape_integrator_ops *integrator = sim->chosen.integrator;
@@ -179,12 +186,12 @@ static bool dissipates_most(drape_sim *sim, char *text, size_t size)
         return false;
     const drape_energy e = drape_sim_energy(sim);
     const double in = drape_sim_energy_received(sim), share = e.numerical / in;
-    if (!(in > 0) || !(share > MOST))
+    if (!(in > 0) || !(share > (integrator->own_steps ? MUCH : MOST)))
         return false;
     snprintf(
         text, size, "%s dissipated %.0f %% of the energy that went in, %.3g of %.3g J%s: %s dissipates less",
         integrator->entry.name, 100 * share, e.numerical, in, e.contact > 0 ? ", part of it on impact" : "",
-        integrator->own_steps    ? "a smaller rtol"
+        integrator->own_steps    ? "the error is larger than rtol suggests; a smaller one"
         : integrator->order == 1 ? "a smaller dt, or an integrator of second order such as trbdf2 or bdf2,"
                                  : "a smaller dt");
     return true;

@@ -117,6 +117,21 @@ def test_dissipation():
         equal(warnings("scene.json", *advice), {}, advice)
 
 
+def test_dissipation_of_error_control():
+    """an integrator that bounds its error has the warning where a stiff sheet lost more than a twentieth, and not where rtol resolves it"""
+    grid = {"grid": "square", "columns": 9, "rows": 9, "width": 1, "height": 1}
+    corners = [{"corner": "top-left"}, {"corner": "top-right"}]
+    for stiffness in (1e6, 1e14):
+        material = {"young_modulus": stiffness, "thickness": 1e-3, "density": 200}
+        write_scene(duration=0.5, mesh=grid, material=material, terms=["stretch.edge"], pins=corners, integrator={"method": "ida"})
+        found = warnings("scene.json")
+        energy = read_json("s.json")["energy"]
+        share = energy["numerical"] / (energy["kinetic"] + energy["elastic"] + energy["numerical"])
+        equal("numerical_dissipation" in found, share > 0.05, f"{stiffness}: {share}")
+        equal(share > 0.05, stiffness > 1e9, f"{stiffness}: {share}")
+    assert re.match(r"ida dissipated \d+ % of the energy that went in, \S+ of \S+ J: the error is larger than rtol suggests; a smaller one dissipates less", found["numerical_dissipation"]), found
+
+
 def test_at_rest():
     """a sheet that does not move has no warning about energy"""
     write_scene(**FINE, gravity=[0, 0, 0])

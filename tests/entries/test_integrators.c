@@ -128,10 +128,18 @@ static drape_status take_step(stepper *s, double h, drape_step_info *info)
     return s->ops->step(s->state, &s->in, &s->out, h, info);
 }
 
+/* Any value of these would replace the bound on residuals, or on errors, which is tested here. */
+static bool replaces_a_bound(const drape_param *param)
+{
+    return strcmp(param->name, "correction_tolerance") == 0 || strcmp(param->name, "fixed_step") == 0;
+}
+
 static void defaults(const drape_integrator_ops *ops, double *values)
 {
-    for (int i = 0; i < ops->entry.param_count; i++)
-        values[i] = generic_value(&ops->entry.params[i]);
+    for (int i = 0; i < ops->entry.param_count; i++) {
+        const drape_param *param = &ops->entry.params[i];
+        values[i] = replaces_a_bound(param) ? NAN : generic_value(param);
+    }
 }
 
 /* Calls use for every integrator with each choice of each parameter in turn, the others at their defaults. */

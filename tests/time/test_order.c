@@ -45,16 +45,14 @@ static double distance(const scene *s, const double *reference)
     return sqrt(sum / s->model->node_count);
 }
 
-/* The solution of ida at rtol 1e-10, whose error is 1e-9 m at most (test_ida.c): 1e-3 of the smallest error
- * that is measured here, which changes a slope by 0.002. It restarts at kinks. */
-static double *converged(const char *terms, const char *pins)
+static double *solution(const char *method, double rtol, const char *terms, const char *pins)
 {
-    const drape_setting settings[] = {{"rtol", 1e-10, NULL}, {"max_order", 5, NULL}};
+    const drape_setting setting = {"rtol", rtol, NULL};
     drape_sim_def def;
     drape_sim_def_init(&def, sizeof def);
-    def.integrator = "ida";
-    def.integrator_settings = settings;
-    def.integrator_setting_count = 2;
+    def.integrator = method;
+    def.integrator_settings = &setting;
+    def.integrator_setting_count = 1;
     scene s = sheet(terms, pins, &def);
     const size_t size = 3 * (size_t)s.model->node_count * sizeof(double);
     double *x = malloc(size);
@@ -63,6 +61,13 @@ static double *converged(const char *terms, const char *pins)
     memcpy(x, drape_sim_positions(s.sim), size);
     scene_close(&s);
     return x;
+}
+
+/* That of ida at order 5, whose error is 1e-9 m at most (test_ida.c): 1e-3 of the smallest error that is
+ * measured with it, which changes a slope by 0.002. It restarts at kinks. */
+static double *converged(const char *terms, const char *pins)
+{
+    return solution("ida", 1e-10, terms, pins);
 }
 
 /* The end of step k of n. */
@@ -132,6 +137,46 @@ START_TEST(every_integrator_converges_with_the_order_it_declares)
 }
 END_TEST
 
+/* Error of dirk at the end of n steps of equal size. Its Newton iterations leave 0.1 x 1e-12 of the size of
+ * the scene in each stage. */
+static double error_of_dirk(int order, const double *reference, int n)
+{
+    const drape_setting settings[] = {
+        {"order", order, NULL}, {"fixed_step", END / n, NULL}, {"rtol", 1e-12, NULL}};
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = "dirk";
+    def.integrator_settings = settings;
+    def.integrator_setting_count = 3;
+    scene s = sheet(DASHPOTS, HUNG, &def);
+    scene_watch(&s);
+    scene_advance(&s, END);
+    ck_assert_int_eq(s.accepted, n);
+    const double error = distance(&s, reference);
+    scene_close(&s);
+    return error;
+}
+
+/* Steps of 4 to 1 ms, at order 3 down to 0.5 ms. The reference is radau's, of another family, at rtol 1e-12.
+ * The smallest error, 7e-12 m of order 5, is 10 times that at which halving the steps again no longer lowers
+ * it. */
+START_TEST(dirk_converges_with_each_of_its_orders)
+{
+    double *reference = solution("radau", 1e-12, DASHPOTS, HUNG);
+    for (int order = 2; order <= 5; order++) {
+        double before = NAN, slope = NAN;
+        for (int n = 50; n <= (order == 3 ? 400 : 200); n *= 2) {
+            const double error = error_of_dirk(order, reference, n);
+            slope = log2(before / error);
+            printf("# dirk of order %d, %d steps: error %.3g m, slope %.3f\n", order, n, error, slope);
+            before = error;
+        }
+        ck_assert_msg(fabs(slope - order) <= 0.1, "dirk of order %d: slope %g", order, slope);
+    }
+    free(reference);
+}
+END_TEST
+
 /* bdf2 uses the size of the step before; one-step methods use no history. */
 START_TEST(steps_of_changing_size_keep_the_order)
 {
@@ -184,6 +229,56 @@ START_TEST(kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_fir
     check_slope("bdf2", DASHPOTS, MOVED, steps_across_kinks, 2);
     const double slope = slope_of("midpoint", DASHPOTS, MOVED, steps_across_kinks);
     ck_assert_msg(slope > 1 - BOUND && slope < 2 - BOUND, "midpoint: slope %g", slope);
+}
+END_TEST
+
+/* ---- A solve that ends before its residual is small ---- */
+
+static drape_status note_tolerance(void *user, const drape_event *event)
+{
+    if (event->kind == DRAPE_EVENT_ATTEMPT)
+        *(double *)user = event->attempt->tolerance;
+    return DRAPE_OK;
+}
+
+/* Positions after a step of 20 ms of be; *matrices: that it took. Returns its bound on the residual. */
+static double turned(double correction_tolerance, double *x, int64_t *matrices)
+{
+    const drape_setting setting = {"correction_tolerance", correction_tolerance, NULL};
+    double tolerance = -1;
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = "be";
+    def.controller = "fixed";
+    def.dt = 1;
+    def.integrator_settings = &setting;
+    def.integrator_setting_count = isnan(correction_tolerance) ? 0 : 1;
+    scene s = sheet(DASHPOTS, HUNG, &def);
+    ck_assert_int_eq(drape_sim_observe(s.sim, note_tolerance, &tolerance), DRAPE_OK);
+    scene_advance(&s, 0.02);
+    memcpy(x, drape_sim_positions(s.sim), 3 * (size_t)s.model->node_count * sizeof *x);
+    *matrices = drape_sim_statistics(s.sim).jacobians;
+    scene_close(&s);
+    return tolerance;
+}
+
+/* A chord step of a matrix that contracts by half or better is at least half as long as what is left before
+ * it. A bound on it ends the solve with fewer matrices; the residual of that step has none. */
+START_TEST(correction_tolerance_bounds_what_a_solve_leaves)
+{
+    double exact[60], near[60];
+    int64_t most, matrices;
+    assert_below(turned(NAN, exact, &most), 1e-11);
+    for (double bound = 1e-2; bound > 1e-6; bound /= 100) {
+        double squared = 0;
+        ck_assert(isnan(turned(bound, near, &matrices)));
+        for (int i = 0; i < 60; i++)
+            squared += (near[i] - exact[i]) * (near[i] - exact[i]);
+        printf("# correction_tolerance %g m: %g m, %lld of %lld matrices\n", bound, sqrt(squared / 18),
+               (long long)matrices, (long long)most);
+        assert_below(sqrt(squared / 18), 2 * bound); /* 18 of 20 nodes are free */
+        ck_assert_int_lt(matrices, most);
+    }
 }
 END_TEST
 
@@ -366,7 +461,8 @@ START_TEST(the_estimate_for_backward_euler_is_its_local_error)
 }
 END_TEST
 
-SUITE("order", every_integrator_converges_with_the_order_it_declares, steps_of_changing_size_keep_the_order,
+SUITE("order", every_integrator_converges_with_the_order_it_declares, dirk_converges_with_each_of_its_orders,
+      correction_tolerance_bounds_what_a_solve_leaves, steps_of_changing_size_keep_the_order,
       kinks_at_ends_of_steps_leave_the_order, kinks_without_dashpots_leave_the_order_too,
       kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_first,
       error_falls_with_the_controllers_rtol, steps_of_the_error_controller_change_gently,
