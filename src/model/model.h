@@ -5,6 +5,7 @@
 
 #include "base/arena.h"
 #include "mesh/mesh.h"
+#include "mesh/sequence.h"
 #include "sparse/pattern.h"
 
 /* The patches of a term with parts: runs of consecutive elements with the same nodes. */
@@ -132,6 +133,9 @@ typedef struct drape_collider {
     double friction;    /* Coulomb's mu [1] */
     double restitution; /* e [1] */
     drape_track track;  /* displacement from the position that its values define; no keys: it does not move */
+    drape_sequence
+        frames; /* of the points of its shape, in its own coordinates; none: it is rigid. Such shapes
+                              keep a drape_mesh_distance of their triangles, and are not smooth */
 } drape_collider;
 
 /* Resolved parameters of contact. */

@@ -44,6 +44,10 @@ drape_status drape_motion_create(drape_arena *arena, const drape_model *model, d
     motion->cloth_placed = drape_arena_take(arena, (size_t)model->cloth_count, sizeof *motion->cloth_placed);
     motion->collider_placed =
         drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->collider_placed);
+    motion->deformation = drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->deformation);
+    for (int32_t i = 0; motion->deformation && i < model->collider_count; i++)
+        if (drape_deformation_create(arena, &model->colliders[i].frames, &motion->deformation[i]))
+            return DRAPE_E_MEMORY;
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     take_tracks(motion);
@@ -295,6 +299,8 @@ void drape_motion_copy(drape_motion *motion, const drape_motion *from)
     memcpy(motion->collider_placed, from->collider_placed,
            (size_t)m->collider_count * sizeof *motion->collider_placed);
     memcpy(motion->cloth_placed, from->cloth_placed, (size_t)m->cloth_count * sizeof *motion->cloth_placed);
+    for (int32_t i = 0; i < m->collider_count; i++)
+        drape_deformation_copy(&motion->deformation[i], &from->deformation[i]);
 }
 
 void drape_motion_hold_pins(drape_motion *motion, const double *x)
@@ -349,6 +355,22 @@ void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t
 {
     const course c = collider_course(motion, collider);
     motion->collider_path[collider] = path_to(&c, t, span, x, v);
+}
+
+bool drape_motion_deforms(const drape_motion *motion, int32_t collider)
+{
+    return drape_deformation_moves(&motion->deformation[collider]);
+}
+
+void drape_motion_points(const drape_motion *motion, int32_t collider, double t, double *x)
+{
+    drape_deformation_points(&motion->deformation[collider], t, x);
+}
+
+void drape_motion_point_velocities(const drape_motion *motion, int32_t collider, double t, double within,
+                                   double *v)
+{
+    drape_deformation_velocities(&motion->deformation[collider], t, within, v);
 }
 
 void drape_motion_place_collider(drape_motion *motion, int32_t collider, const drape_placement *by)
@@ -426,6 +448,7 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
     for (int32_t c = 0; c < motion->model->collider_count && drape_archive_good(a); c++) {
         archive_path(&motion->collider_path[c], a);
         archive_placement(&motion->collider_placed[c], a);
+        drape_deformation_archive(&motion->deformation[c], a);
     }
     for (int32_t c = 0; c < motion->model->cloth_count && drape_archive_good(a); c++)
         archive_placement(&motion->cloth_placed[c], a);
@@ -442,6 +465,7 @@ double drape_motion_next_kink(const drape_motion *motion, double t, double end)
     for (int32_t i = 0; i < motion->model->collider_count; i++) {
         const course c = collider_course(motion, i);
         end = next_kink_of(&c, t, end);
+        end = drape_deformation_next_kink(&motion->deformation[i], t, end);
     }
     return end;
 }
@@ -455,7 +479,7 @@ bool drape_motion_at_kink(const drape_motion *motion, double t)
     }
     for (int32_t i = 0; !found && i < motion->model->collider_count; i++) {
         const course c = collider_course(motion, i);
-        found = at_kink_of(&c, t);
+        found = at_kink_of(&c, t) || drape_deformation_at_kink(&motion->deformation[i], t);
     }
     return found;
 }
