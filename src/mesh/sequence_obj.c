@@ -1,7 +1,7 @@
 /*
  * sequence_obj.c: one OBJ file for each frame: those of a folder ("walk/"), in the order of their names, or
- * those of a pattern with one number ("walk_%04d.obj"), from 0 or 1 on to the last that exists. The triangles
- * are those of the first file, and the same in all.
+ * those of a pattern with one number ("walk_%04d.obj"), from 0 or 1 on to the last that exists; a single file
+ * is one frame. The triangles are those of the first file, and the same in all.
  */
 #include "mesh/contents.h"
 #include "mesh/sequence.h"
@@ -91,6 +91,8 @@ static drape_status list_pattern(const drape_sequence_source *source, name_list 
     size_t before;
     int width;
     drape_status status = DRAPE_OK;
+    if (!strchr(pattern, '%'))
+        return add_name(list, pattern);
     if (!split(pattern, &before, &width, &after))
         return drape_mesh_fail(source->ctx, &source->file, 0,
                                "a sequence of OBJ files is a folder, with a / at its end, or a pattern with "
@@ -162,7 +164,7 @@ static drape_status read_obj(const drape_sequence_source *source, drape_mesh *me
 const drape_sequence_ops drape_sequence_obj = {
     .entry = {.name = "obj",
               .summary = "one OBJ file for each frame: a folder, with a / at its end, or a pattern such as "
-                         "walk_%04d.obj",
+                         "walk_%04d.obj; a single file is one frame",
               .reference = "Wavefront OBJ"},
     .endings = {".obj", "/"},
     .has_triangles = true,

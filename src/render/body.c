@@ -324,12 +324,9 @@ static drape_status smooth_normals(drape_context *ctx, const drape_collider_shap
     return DRAPE_OK;
 }
 
-static drape_status copy_triangles(drape_arena *arena, const drape_collider_shape *shape, drape_body *body)
+drape_status drape_body_follow(drape_context *ctx, const drape_collider_shape *shape, drape_body *body)
 {
     size_t count = 3 * (size_t)shape->triangle_count;
-    body->vertex = drape_arena_take(arena, 6 * count, sizeof *body->vertex);
-    if (!body->vertex)
-        return DRAPE_E_MEMORY;
     for (size_t i = 0; i < count; i += 3) {
         double e1[3], e2[3], normal[3];
         const double *p[3];
@@ -346,7 +343,13 @@ static drape_status copy_triangles(drape_arena *arena, const drape_collider_shap
             }
     }
     body->vertex_count = count;
-    return smooth_normals(arena->ctx, shape, body);
+    return smooth_normals(ctx, shape, body);
+}
+
+static drape_status copy_triangles(drape_arena *arena, const drape_collider_shape *shape, drape_body *body)
+{
+    body->vertex = drape_arena_take(arena, 18 * (size_t)shape->triangle_count, sizeof *body->vertex);
+    return body->vertex ? drape_body_follow(arena->ctx, shape, body) : DRAPE_E_MEMORY;
 }
 
 drape_status drape_body_create(drape_arena *arena, const drape_collider *collider, const double center[3],

@@ -17,6 +17,10 @@ typedef struct drape_body {
     double low[3], high[3]; /* bounding box [m]; of an endless body the box it is cut off at */
 } drape_body;
 
+/* Draws the triangles of a shape, of which the body was made, where its points are now. Errors:
+ * DRAPE_E_MEMORY. */
+drape_status drape_body_follow(drape_context *ctx, const drape_collider_shape *shape, drape_body *body);
+
 /* Makes the body in an arena. An endless one is cut off at twice `reach` [m] from center. Errors:
  * DRAPE_E_MEMORY. */
 drape_status drape_body_create(drape_arena *arena, const drape_collider *collider, const double center[3],
