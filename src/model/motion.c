@@ -362,6 +362,12 @@ bool drape_motion_deforms(const drape_motion *motion, int32_t collider)
     return drape_deformation_moves(&motion->deformation[collider]);
 }
 
+void drape_motion_deform(drape_motion *motion, int32_t collider, double t, double span, const double *x,
+                         const double *v)
+{
+    drape_deformation_send(&motion->deformation[collider], t, span, x, v);
+}
+
 void drape_motion_points(const drape_motion *motion, int32_t collider, double t, double *x)
 {
     drape_deformation_points(&motion->deformation[collider], t, x);

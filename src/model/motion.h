@@ -63,6 +63,10 @@ void drape_motion_points(const drape_motion *motion, int32_t collider, double t,
 void drape_motion_point_velocities(const drape_motion *motion, int32_t collider, double t, double within,
                                    double *v);
 
+/* Sends the points of a collider with frames (drape_deformation_send). */
+void drape_motion_deform(drape_motion *motion, int32_t collider, double t, double span, const double *x,
+                         const double *v);
+
 /* Whether the points of a collider ever move in its own coordinates. */
 bool drape_motion_deforms(const drape_motion *motion, int32_t collider);
 
