@@ -103,8 +103,8 @@ DRAPE_API const char *drape_context_message(const drape_context *ctx);
 /* ---- Scene in memory: structs that a host fills instead of writing a scene file ---- */
 
 /* Defs in this section begin with struct_size, set by their _init function; all defs of one array have the
- * same size. drape_setting, drape_entry_def and drape_track_key have no struct_size: their layout is
- * fixed. */
+ * same size. drape_setting, drape_entry_def, drape_track_key and drape_turn_key have no struct_size:
+ * their layout is fixed. */
 
 /* One parameter, given by name. Numbers and integers go into number, with text and vector NULL; choices and
  * file names go into text; booleans go into text as "true" or "false", or into number as 0 or 1; vectors go
@@ -148,6 +148,17 @@ typedef struct drape_track_key {
     double displacement[3]; /* [m] */
 } drape_track_key;
 
+/* A key of the rotation of a collider about its pivot, from the direction that the parameters define: by axis
+ * and angle or, if it is not 0 0 0 0, by a quaternion. It is constant before the first and after the last key;
+ * between two keys the collider turns steadily about one axis. Between angles about the same axis it turns by
+ * their difference, however large; otherwise by the shortest turn from one to the other, which is the spherical
+ * linear interpolation of the quaternions. */
+typedef struct drape_turn_key {
+    double time;          /* [s], strictly increasing from key to key */
+    double rotate[4];     /* axis x y z and angle [degrees], of any size */
+    double quaternion[4]; /* w x y z, of any length */
+} drape_turn_key;
+
 /* Nodes of one cloth that are held fixed or moved along a track. Exactly one of nodes, corner, edge, row (>=
  * 0) and has_box selects them; corner, edge and row apply to grids only. */
 typedef struct drape_pin_def {
@@ -188,12 +199,17 @@ typedef struct drape_collider_def {
     drape_entry_def entry;        /* the collider: "plane", "sphere" ... */
     const char *name;             /* NULL: "collider0", "collider1" ... */
     double friction;              /* Coulomb's mu between collider and cloth [1], in [0, 1000]; default 0 */
-    const drape_track_key *track; /* displacement from the position that the parameters define; NULL: it does
-                                     not move */
+    const drape_track_key *track; /* displacement of the pivot from the position that the parameters define;
+                                     NULL: it stays there */
     size_t key_count;             /* length of track */
     double
         restitution; /* speed of rebound / speed of impact, of cloth on the collider [1], in [0, 1]; default
                            0 */
+    const drape_turn_key *turns; /* rotation about the pivot; NULL: it does not turn */
+    size_t turn_count;           /* length of turns */
+    double pivot[3]; /* [m] the point about which it turns, where the parameters define it; default NaN: the
+                        middle of the box around the points of its shape, as the center of a sphere; of a shape
+                        without points, a plane, the origin */
 } drape_collider_def;
 
 /* An event: a root of a function of the state, which is located within the step in which it lies. Initialise
@@ -317,8 +333,9 @@ DRAPE_API drape_cloth_range drape_model_cloth(const drape_model *model, int32_t 
 typedef struct drape_collider_motion {
     const char *name;       /* as in the scene, or "collider0", "collider1" ... */
     const char *type;       /* name of the collider entry, such as "sphere" */
-    double displacement[3]; /* [m] from the position that its parameters define */
-    double velocity[3];     /* [m/s]; at a key of a track, that of the piece after the key; 0 at the end of a
+    double displacement[3]; /* [m] of its pivot from the position that its parameters define */
+    double velocity
+        [3]; /* [m/s] of its pivot; at a key of a track, that of the piece after the key; 0 at the end of a
                                path given by the host */
 } drape_collider_motion;
 
@@ -477,12 +494,6 @@ DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
  * axis than that of gravity changes how the cloth hangs. The energy account takes the change of potential
  * and kinetic energy as given by the host.
  *
- * Colliders do not turn: a rotation is refused unless each of the colliders looks the same afterwards.
- * Spheres always do; planes, capsules and cylinders do if they are turned about their own axis or normal, the
- * latter two also if they are turned over; boxes do after a half turn about one of their axes, and after a
- * quarter turn about one if their sizes along the two others are equal. Leave the others out, or replace a
- * body that turns by a cloth whose nodes are all pinned.
- *
  * Contact is not checked. Where cloth and colliders move together their contacts stay as they were. Cloth
  * that is placed into a collider, or a collider into cloth, is like cloth that starts there: it is pushed out
  * gently over the next steps, and drape_sim_inside counts it. Cloth that is placed across other cloth stays
@@ -492,7 +503,7 @@ DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
  * frames, statistics, a budget's debt and the energies dissipated and numerical go on. Arrays that the sim
  * returned before are no longer valid. No memory is allocated unless contact needs more. Must not be called
  * by an observer. Errors, after which nothing has changed: DRAPE_E_ARGUMENT (NULL, not finite or beyond 1e9
- * m, an axis of length 0, no such cloth or collider, a collider that cannot turn), DRAPE_E_VERSION
+ * m, an axis of length 0, no such cloth or collider), DRAPE_E_VERSION
  * (struct_size). Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_place(drape_sim *sim, const drape_place_def *def);
 
@@ -543,11 +554,23 @@ DRAPE_API void drape_sim_cancel(drape_sim *sim);
 DRAPE_API drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const int32_t *nodes,
                                            double seconds, const double *positions, const double *velocities);
 
-/* The same for a whole collider: moves it to a displacement [m] from the position that its parameters define.
- * One that would have to be faster than teleport_speed is placed there, less the path at its velocity.
+/* The same for a whole collider: moves it to a displacement [m] from the position that its parameters define,
+ * turned as it is now; a collider that turned stops turning. One that would have to be faster than teleport_speed is placed there, less the path at its velocity.
  * drape_sim_collider returns its present position. */
 DRAPE_API drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double seconds,
                                                const double displacement[3], const double *velocity);
+
+/* The same for a collider that also turns: in the next `seconds` its pivot (drape_collider_def) moves to a
+ * displacement, and it turns about the pivot by the shortest turn to a rotation from the direction that its
+ * parameters define: a quaternion w x y z of length 1. velocity [m/s] and angular_velocity [rad/s] are those on
+ * arrival, both in space and about the pivot: displacement and rotation then are smooth, and continue the
+ * motion before. If both are NULL, it moves and turns at constant speed. The rotation is interpolated by a
+ * cubic of the rotation vector from the present one. Errors: as drape_sim_move_collider; DRAPE_E_ARGUMENT also
+ * if the rotation is NULL or far from length 1, one velocity is given alone, or an angular velocity is not
+ * finite or beyond 1e4 rad/s. */
+DRAPE_API drape_status drape_sim_move_collider_pose(drape_sim *sim, int32_t collider, double seconds,
+                                                    const double displacement[3], const double rotation[4],
+                                                    const double *velocity, const double *angular_velocity);
 
 /* Sends the points of a collider of the type animated_mesh, in place of its frames: to positions (points x 3
  * [m], in the order of its file) in `seconds` [s] from now, with velocities (points x 3 [m/s]) there. Each moves
@@ -649,7 +672,9 @@ DRAPE_API void drape_model_normals(const drape_model *model, const double *x, do
  * node's own mass. Damping laws that take rates from a step use the present velocities here.
  *
  * drape_sim_contact_forces: contact and friction on every node, with colliders and between layers of cloth.
- * drape_sim_collider_force: the total force of the cloth on one collider. Colliders have the mean velocity of
+ * drape_sim_collider_force: the total force of the cloth on one collider. drape_sim_collider_torque: the torque
+ * [N m] of these forces about a point of space [m] or, if that is NULL, about the pivot of the collider (3), where
+ * it is now. Colliders have the mean velocity of
  * the last step, so call these before moving them on. Under "newton_k", which does not bring the residual of
  * a step to zero, all of these forces are far off (docs/integrators.md). An integrator that resolves contact
  * by moving nodes ("verlet") has no such forces and returns an error. Errors: DRAPE_E_ARGUMENT,
@@ -657,10 +682,22 @@ DRAPE_API void drape_model_normals(const drape_model *model, const double *x, do
 DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_contact_forces(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3]);
+DRAPE_API drape_status drape_sim_collider_torque(drape_sim *sim, int32_t collider, const double *about,
+                                                 double torque[3]);
 
 /* The position of a collider in the last accepted state, as drape_model_collider, but including moves by the
- * host. */
+ * host: the displacement and the velocity of its pivot. */
 DRAPE_API drape_collider_motion drape_sim_collider(const drape_sim *sim, int32_t collider);
+
+/* Its rotation about the pivot then, a quaternion w x y z of length 1 with w >= 0, its angular velocity [rad/s],
+ * and where its pivot is [m]; each may be NULL. A point X where the parameters define it is at
+ * pivot + rotation (X - pivot of the def). Returns false, and writes nothing, if there is no such collider. */
+DRAPE_API bool drape_sim_collider_rotation(const drape_sim *sim, int32_t collider, double rotation[4],
+                                           double angular_velocity[3], double pivot[3]);
+
+/* The same on the track of the model at time t [s]. */
+DRAPE_API bool drape_model_collider_rotation(const drape_model *model, int32_t index, double t,
+                                             double rotation[4], double angular_velocity[3], double pivot[3]);
 
 /* Energies of the last accepted state [J]. */
 typedef struct drape_energy {

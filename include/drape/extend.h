@@ -461,7 +461,7 @@ DRAPE_API drape_status drape_shape_read_mesh(drape_collider_shape *shape, const 
 
 /*
  * A collider: a rigid, closed obstacle. values are in the order of params; a vector occupies three.
- * Coordinates are the collider's own: a track moves it as a whole. Thread-safety: as for terms, except that
+ * Coordinates are the collider's own: tracks move and turn it as a whole. Thread-safety: as for terms, except that
  * shape, which is called once per collider while a model is compiled, may allocate memory.
  */
 typedef struct drape_collider_ops {
@@ -482,12 +482,6 @@ typedef struct drape_collider_ops {
      * outside. Nodes of the cloth then meet the surface through distance; otherwise they meet the triangles
      * of the shape. */
     bool smooth;
-
-    /* Whether the collider, turned about the origin by a rotation (3 x 3, row by row), is the same collider
-     * moved by a shift (3 [m]), which is then written: colliders do not turn, so drape_sim_place turns only
-     * those that look the same afterwards. NULL: it never does. */
-    bool (*turned)(const double *values, const drape_collider_shape *shape, const double *rotation,
-                   double *shift);
 } drape_collider_ops;
 
 /* Registers a user-defined collider, as drape_context_add_term does for a term. Errors: DRAPE_E_ARGUMENT (not

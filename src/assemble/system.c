@@ -197,15 +197,17 @@ static bool evaluate_contact(drape_system *system, const drape_point *point)
     if (!system->contact)
         return false;
     drape_status status = drape_contact_evaluate_at(
-        system->contact,
-        &(drape_contact_at){
-            .x = point->x, .v = point->v, .t = point->t, .span = {point->span[0], point->span[1]}});
+        system->contact, &(drape_contact_at){.x = point->x,
+                                             .v = point->v,
+                                             .t = point->t,
+                                             .span = {point->span[0], point->span[1]},
+                                             .instant = point->instant});
     if (status && !system->status)
         system->status = status;
     return status == DRAPE_OK;
 }
 
-const double *drape_system_on_colliders(const drape_system *system)
+const drape_load *drape_system_on_colliders(const drape_system *system)
 {
     return system->contact ? drape_contact_on_colliders(system->contact) : NULL;
 }

@@ -30,6 +30,8 @@ typedef struct drape_point {
     const double *stress;   /* (measure_count) the f before ddq in a Jacobian; NULL: the forces here */
     double t;               /* [s] time of the colliders' poses */
     double span[2]; /* [s] over which the velocities of colliders are taken; equal: they are at rest */
+    bool instant;   /* those that turn have their velocities of time t instead, as the pins of methods that
+                       follow the solution between the kinks of the motion, at the ends of span */
     drape_contact_derivatives contact; /* of contact in a Jacobian without positive parts */
 } drape_point;
 
@@ -162,8 +164,8 @@ void drape_system_damping(drape_system *system, const drape_point *point, double
 void drape_system_dissipation(drape_system *system, const drape_point *point, double *g);
 
 /* Force on each collider at the last drape_system_force, or its dissipative part at the last
- * drape_system_dissipation (collider_count x 3) [N], with the sign of g; NULL without contact. */
-const double *drape_system_on_colliders(const drape_system *system);
+ * drape_system_dissipation (collider_count), with the sign of g; NULL without contact. */
+const drape_load *drape_system_on_colliders(const drape_system *system);
 
 /* Energies of the terms, elastic and gravitational [J]; energy of contact [J]. */
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity);

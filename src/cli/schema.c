@@ -321,6 +321,8 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
                                        json_integer(2));
         return array_of(drape_json_with(item, "maxItems", json_integer(2)), key->at_least, key->at_most);
     }
+    case DRAPE_SCENE_QUATERNION:
+        return numbers(4, 4);
     case DRAPE_SCENE_OBJECT:
         return object_schema(key->child);
     case DRAPE_SCENE_OBJECTS:

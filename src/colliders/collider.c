@@ -2,43 +2,45 @@
 #include "colliders/colliders.h"
 
 #include "base/param.h"
-#include "base/vec3.h"
 #include "model/track.h"
 
 drape_collider_pose drape_collider_pose_at(const drape_collider *collider, double t)
 {
-    drape_collider_pose pose = {{0}, {0}};
-    const drape_track *track = &collider->track;
-    if (track->key_count > 0) {
-        drape_track_displacement(track->keys, track->key_count, t, pose.displacement);
-        drape_track_velocity(track->keys, track->key_count, t, pose.velocity);
-    }
+    drape_collider_pose pose = {.t = t};
+    double displacement[3], velocity[3], rotation[9], spin[3];
+    drape_track_displacement(collider->track.keys, collider->track.key_count, t, displacement);
+    drape_track_velocity(collider->track.keys, collider->track.key_count, t, velocity);
+    drape_turns_rotation(&collider->turns, t, rotation);
+    drape_turns_velocity(&collider->turns, t, spin);
+    drape_pose_about(&pose, collider->pivot, rotation, displacement, velocity, spin);
     return pose;
+}
+
+void drape_collider_point(const drape_collider *collider, const drape_collider_pose *pose, int32_t point,
+                          double *x)
+{
+    drape_pose_point(pose, collider->shape.point + 3 * (size_t)point, x);
+}
+
+void drape_collider_point_velocity(const drape_collider *collider, const drape_collider_pose *pose,
+                                   int32_t point, double *v)
+{
+    double x[3];
+    drape_collider_point(collider, pose, point, x);
+    drape_pose_velocity(pose, x, v);
 }
 
 double drape_collider_distance(const drape_collider *collider, const drape_collider_pose *pose,
                                const double *x, double *normal, double *curvature)
 {
     double own[3];
-    vec3_sub(x, pose->displacement, own);
-    return collider->ops->distance(collider->values, &collider->shape, own, normal, curvature);
-}
-
-#define SAME_AXIS 1e-9 /* sine of the angle between directions that count as the same */
-
-void drape_turned_point(const double *rotation, const double *x, double *shift)
-{
-    for (int k = 0; k < 3; k++)
-        shift[k] = vec3_dot(rotation + 3 * k, x) - x[k];
-}
-
-bool drape_turned_axis(const double *rotation, const double *axis, const double *to, bool flip)
-{
-    double turned[3], across[3];
-    for (int k = 0; k < 3; k++)
-        turned[k] = vec3_dot(rotation + 3 * k, axis);
-    vec3_cross(to, turned, across);
-    return vec3_norm(across) <= SAME_AXIS && (flip || vec3_dot(to, turned) > 0);
+    drape_pose_own(pose, x, own);
+    const double d = collider->ops->distance(collider->values, &collider->shape, own, normal, curvature);
+    if (normal)
+        drape_pose_direction(pose, normal);
+    if (curvature)
+        drape_pose_tensor(pose, curvature);
+    return d;
 }
 
 drape_status drape_collider_build(drape_context *ctx, drape_arena *arena, const char *pointer,

@@ -122,25 +122,6 @@ static double distance(const double *values, const drape_collider_shape *shape, 
     return (outside > 0 ? outside : q[most]) - values[ROUNDING];
 }
 
-/* A rotation that takes each axis of the box to one along which the box is as long: half turns about its
- * axes, and quarter turns if the two others are equal. */
-static bool turned(const double *values, const drape_collider_shape *shape, const double *rotation,
-                   double *shift)
-{
-    const frame *f = shape->kept;
-    const double *size = values + SIZE;
-    bool same = true;
-    drape_turned_point(rotation, values + CENTER, shift);
-    for (int a = 0; a < 3; a++) {
-        bool found = false;
-        for (int b = 0; b < 3; b++)
-            found =
-                found || (size[a] == size[b] && drape_turned_axis(rotation, f->axis[a], f->axis[b], true));
-        same = same && found;
-    }
-    return same;
-}
-
 const drape_collider_ops drape_collider_box = {
     .struct_size = sizeof(drape_collider_ops),
     .entry = {.name = "box",
@@ -150,5 +131,4 @@ const drape_collider_ops drape_collider_box = {
     .shape = make_shape,
     .distance = distance,
     .smooth = true,
-    .turned = turned,
 };

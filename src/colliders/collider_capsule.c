@@ -48,21 +48,6 @@ static double distance(const double *values, const drape_collider_shape *shape, 
     return round_distance(from, beside ? u : NULL, normal, curvature) - values[RADIUS];
 }
 
-static bool turned(const double *values, const drape_collider_shape *shape, const double *rotation,
-                   double *shift)
-{
-    double axis[3], middle[3];
-    (void)shape;
-    vec3_sub(values + B, values + A, axis);
-    const double length = vec3_norm(axis);
-    for (int k = 0; k < 3; k++) {
-        middle[k] = values[A + k] + axis[k] / 2;
-        axis[k] /= length;
-    }
-    drape_turned_point(rotation, middle, shift);
-    return drape_turned_axis(rotation, axis, axis, true);
-}
-
 const drape_collider_ops drape_collider_capsule = {
     .struct_size = sizeof(drape_collider_ops),
     .entry = {.name = "capsule",
@@ -72,5 +57,4 @@ const drape_collider_ops drape_collider_capsule = {
     .shape = make_shape,
     .distance = distance,
     .smooth = true,
-    .turned = turned,
 };

@@ -152,15 +152,6 @@ static double distance(const double *values, const drape_collider_shape *shape, 
     return p.f - values[ROUNDING];
 }
 
-static bool turned(const double *values, const drape_collider_shape *shape, const double *rotation,
-                   double *shift)
-{
-    const axis *c = shape->kept;
-    (void)values;
-    drape_turned_point(rotation, c->middle, shift);
-    return drape_turned_axis(rotation, c->u, c->u, true);
-}
-
 const drape_collider_ops drape_collider_cylinder = {
     .struct_size = sizeof(drape_collider_ops),
     .entry =
@@ -172,5 +163,4 @@ const drape_collider_ops drape_collider_cylinder = {
     .shape = make_shape,
     .distance = distance,
     .smooth = true,
-    .turned = turned,
 };

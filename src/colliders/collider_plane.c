@@ -46,13 +46,6 @@ static double distance(const double *values, const drape_collider_shape *shape, 
     return vec3_dot(from, unit);
 }
 
-static bool turned(const double *values, const drape_collider_shape *shape, const double *rotation,
-                   double *shift)
-{
-    drape_turned_point(rotation, values + POINT, shift);
-    return drape_turned_axis(rotation, shape->kept, shape->kept, false);
-}
-
 const drape_collider_ops drape_collider_plane = {
     .struct_size = sizeof(drape_collider_ops),
     .entry = {.name = "plane",
@@ -62,5 +55,4 @@ const drape_collider_ops drape_collider_plane = {
     .shape = make_shape,
     .distance = distance,
     .smooth = true,
-    .turned = turned,
 };

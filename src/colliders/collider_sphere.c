@@ -32,19 +32,10 @@ static double distance(const double *values, const drape_collider_shape *shape, 
     return round_distance(from, NULL, normal, curvature) - values[RADIUS];
 }
 
-static bool turned(const double *values, const drape_collider_shape *shape, const double *rotation,
-                   double *shift)
-{
-    (void)shape;
-    drape_turned_point(rotation, values + CENTER, shift);
-    return true;
-}
-
 const drape_collider_ops drape_collider_sphere = {
     .struct_size = sizeof(drape_collider_ops),
     .entry = {.name = "sphere", .summary = "a ball", .reference = "d = |x - c| - r", DRAPE_PARAMS(params)},
     .shape = make_shape,
     .distance = distance,
     .smooth = true,
-    .turned = turned,
 };

@@ -1,4 +1,4 @@
-/* colliders.h: the table of colliders, the pose of a collider and the distance of a point from it.
+/* colliders.h: the table of colliders, and the points and the distance of a collider in a pose.
  *
  * A collider is the constant drape_collider_<name> of collider_<name>.c; its interface is drape/extend.h. */
 #ifndef DRAPE_COLLIDERS_COLLIDERS_H
@@ -11,26 +11,20 @@ extern const drape_registry drape_collider_registry;
 
 /* ---- Pose and distance ---- */
 
-/* The pose of a collider: x in space is x - displacement in its own coordinates. */
-typedef struct drape_collider_pose {
-    double displacement[3]; /* [m] */
-    double velocity[3];     /* [m/s] of the whole body; at a key of the track, that of the segment after it */
-} drape_collider_pose;
-
+/* The pose of a collider on its tracks; at a key, velocities are those of the segment after it. */
 drape_collider_pose drape_collider_pose_at(const drape_collider *collider, double t);
 
+/* The position in space [m] and the velocity [m/s] of a point of its shape: all that follows the features of
+ * colliders asks here. */
+void drape_collider_point(const drape_collider *collider, const drape_collider_pose *pose, int32_t point,
+                          double *x);
+void drape_collider_point_velocity(const drape_collider *collider, const drape_collider_pose *pose,
+                                   int32_t point, double *v);
+
 /* Signed distance [m] of a point of space; normal (3) and curvature (3 x 3 [1/m]) as in drape_collider_ops,
- * NULL if they are not needed. */
+ * but in space, NULL if they are not needed. */
 double drape_collider_distance(const drape_collider *collider, const drape_collider_pose *pose,
                                const double *x, double *normal, double *curvature);
-
-/* ---- Turning ---- */
-
-/* The shift that turns a point about the origin: rotation x - x. */
-void drape_turned_point(const double *rotation, const double *x, double *shift);
-
-/* Whether a rotation turns a direction of length 1 to another, to within 1e-9; flip: or to its opposite. */
-bool drape_turned_axis(const double *rotation, const double *axis, const double *to, bool flip);
 
 /* ---- Compiling a scene ---- */
 

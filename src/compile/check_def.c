@@ -95,6 +95,7 @@ static drape_status check_key(checker *c, const drape_scene_key *key, const char
     case DRAPE_SCENE_VERSION:
     case DRAPE_SCENE_REMARK:
     case DRAPE_SCENE_BOX:
+    case DRAPE_SCENE_QUATERNION:
         break;
     }
     return DRAPE_OK;

@@ -1,14 +1,18 @@
-/* colliders.c: colliders by name, with their parameters, shapes and tracks. */
+/* colliders.c: colliders by name, with their parameters, shapes, tracks and rotations. */
 #include "colliders/colliders.h"
 #include "base/def.h"
 #include "compile/stages.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
+
+#include "base/vec3.h"
 
 /* How far a polygon may lie inside a curved surface, as a fraction of the activation distance: an edge of the
  * cloth that rests on the polygon is then pushed away nearly as by the surface. */
 #define SHARE_OF_DISTANCE 0.1
+#define MAX_DISTANCE      1e9 /* [m] of a pivot, as of the keys of tracks */
 
 static drape_status find_collider(drape_context *ctx, const char *pointer, const char *name,
                                   const drape_collider_ops **out)
@@ -39,6 +43,35 @@ static drape_status name_collider(drape_model *model, const char *pointer, const
     return drape_arena_status(&model->arena);
 }
 
+/* The given pivot, or the middle of the box around the points of the shape; and how far these are from it. */
+static drape_status set_pivot(drape_model *model, const char *pointer, const double given[3],
+                              drape_collider *to)
+{
+    const drape_collider_shape *shape = &to->shape;
+    const bool is_given = !isnan(given[0]);
+    char at[96];
+    snprintf(at, sizeof at, "%s/pivot", pointer);
+    for (int k = 0; k < 3; k++) {
+        double low = shape->point_count > 0 ? INFINITY : 0, high = -low;
+        for (int32_t i = 0; i < shape->point_count; i++) {
+            low = fmin(low, shape->point[3 * (size_t)i + (size_t)k]);
+            high = fmax(high, shape->point[3 * (size_t)i + (size_t)k]);
+        }
+        to->pivot[k] = is_given ? given[k] : (low + high) / 2;
+        if (!(fabs(to->pivot[k]) <= MAX_DISTANCE))
+            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%g is not allowed; it is within %g m",
+                                 to->pivot[k], MAX_DISTANCE);
+    }
+    for (int32_t i = 0; i < shape->point_count; i++) {
+        double from[3];
+        vec3_sub(shape->point + 3 * (size_t)i, to->pivot, from);
+        to->radius = fmax(to->radius, vec3_norm(from));
+    }
+    if (shape->point_count == 0)
+        to->radius = model->length;
+    return DRAPE_OK;
+}
+
 static drape_status compile_collider(drape_model *model, size_t i, const drape_scene_def *scene)
 {
     const drape_collider_def *def = &scene->colliders[i];
@@ -54,9 +87,12 @@ static drape_status compile_collider(drape_model *model, size_t i, const drape_s
         status = drape_compile_choice(model, &def->entry, "", &to->choice);
     if (!status && def->key_count > 0)
         status = drape_compile_track(model, pointer, def->track, def->key_count, &to->track);
-    return status ? status
-                  : drape_collider_build(model->ctx, &model->arena, pointer, scene->folder,
-                                         SHARE_OF_DISTANCE * model->contact.distance, to);
+    if (!status && def->turn_count > 0)
+        status = drape_compile_turns(model, pointer, def->turns, def->turn_count, &to->turns);
+    if (!status)
+        status = drape_collider_build(model->ctx, &model->arena, pointer, scene->folder,
+                                      SHARE_OF_DISTANCE * model->contact.distance, to);
+    return status ? status : set_pivot(model, pointer, def->pivot, to);
 }
 
 drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def)

@@ -2,6 +2,7 @@
  * from the scales of the scene. */
 #include "base/elementary.h"
 #include "compile/stages.h"
+#include "model/track.h"
 
 #include <math.h>
 
@@ -89,6 +90,11 @@ static double track_speed(const drape_track *track)
     return most;
 }
 
+static double collider_speed(const drape_collider *collider)
+{
+    return track_speed(&collider->track) + drape_turns_fastest(&collider->turns) * collider->radius;
+}
+
 /* The largest speed at which the scene itself can move cloth against a collider. */
 static double scene_speed(const drape_model *model)
 {
@@ -98,7 +104,7 @@ static double scene_speed(const drape_model *model)
     for (int32_t t = 0; t < model->track_count; t++)
         cloth = fmax(cloth, track_speed(&model->tracks[t]));
     for (int32_t c = 0; c < model->collider_count; c++)
-        collider = fmax(collider, track_speed(&model->colliders[c].track));
+        collider = fmax(collider, collider_speed(&model->colliders[c]));
     return cloth + collider;
 }
 

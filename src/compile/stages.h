@@ -23,6 +23,8 @@ drape_status drape_compile_number_nodes(drape_model *model, const int32_t *track
 /* Checks a track of one or more keys and copies it. pointer: that of its pin or collider. */
 drape_status drape_compile_track(drape_model *model, const char *pointer, const drape_track_key *keys,
                                  size_t key_count, drape_track *track);
+drape_status drape_compile_turns(drape_model *model, const char *pointer, const drape_turn_key *keys,
+                                 size_t key_count, drape_turns *turns);
 
 /* Copies a choice of the scene; a type that is NULL is replaced by the fallback. */
 drape_status drape_compile_choice(drape_model *model, const drape_entry_def *def, const char *fallback,

@@ -53,11 +53,17 @@ static double activation_distance(const search *s, const drape_pair *pair)
     return fmin(pair->distance, 0.5 * drape_pair_gap_value(pair, &s->rest));
 }
 
-/* How far a node moves relative to a surface. */
+/* How far a node moves relative to a surface, straight in the coordinates of that. */
 static double move_to_surface(const drape_straight_path *path, const drape_pair *pair)
 {
     const size_t node = 3 * (size_t)pair->node[0];
     double move[3], pose[3];
+    if (path->end[0].pose[pair->collider].turned || path->end[1].pose[pair->collider].turned) {
+        drape_pose_own(&path->end[0].pose[pair->collider], path->end[0].x + node, pose);
+        drape_pose_own(&path->end[1].pose[pair->collider], path->end[1].x + node, move);
+        vec3_sub(move, pose, move);
+        return vec3_norm(move);
+    }
     vec3_sub(path->end[1].x + node, path->end[0].x + node, move);
     vec3_sub(path->end[1].pose[pair->collider].displacement, path->end[0].pose[pair->collider].displacement,
              pose);
@@ -99,7 +105,7 @@ static void consider(void *user, const drape_pair *found)
 static bool differ(const drape_broad_phase *broad, const drape_configuration end[2])
 {
     for (int32_t i = 0; i < broad->model->collider_count; i++)
-        if (memcmp(end[0].pose[i].displacement, end[1].pose[i].displacement, 3 * sizeof(double)) != 0)
+        if (drape_pose_differs(&end[0].pose[i], &end[1].pose[i]))
             return true;
     return memcmp(end[0].x, end[1].x, 3 * (size_t)broad->points * sizeof(double)) != 0;
 }
@@ -186,6 +192,43 @@ static double square_away(const double *x, const double *a, const double *b, dou
     return vec3_dot(d, d);
 }
 
+/* How much farther nodes are from their paths in the coordinates of a turned collider, in which these were
+ * straight, than in space. Counted are the nodes that were not marked for a later set. */
+static double distance_of_turned(const drape_candidates *c, int set, const drape_configuration *at,
+                                 int32_t collider, double t)
+{
+    const drape_candidate_set *from = &c->set[set];
+    const drape_model *m = c->broad->model;
+    double largest = 0;
+    for (int32_t f = 0; f < m->free_count; f++) {
+        const int32_t node = m->node_of_free[f];
+        const size_t i = 3 * (size_t)node;
+        double first[3], last[3], now[3];
+        if (c->level[node] > set)
+            continue;
+        drape_pose_own(&from->pose[0][collider], from->x[0] + i, first);
+        drape_pose_own(&from->pose[1][collider], from->x[1] + i, last);
+        drape_pose_own(&at->pose[collider], at->x + i, now);
+        const double away = sqrt(square_away(now, first, last, t)) -
+                            sqrt(square_away(at->x + i, from->x[0] + i, from->x[1] + i, t));
+        if (isnan(away))
+            return NAN;
+        largest = fmax(largest, away);
+    }
+    return largest;
+}
+
+static double square_of_collider(const drape_candidates *c, int set, const drape_configuration *at, int32_t k,
+                                 double t)
+{
+    const drape_candidate_set *from = &c->set[set];
+    if (!from->pose[0][k].turned && !from->pose[1][k].turned && !at->pose[k].turned)
+        return square_away(at->pose[k].displacement, from->pose[0][k].displacement,
+                           from->pose[1][k].displacement, t);
+    const double away = c->broad->model->colliders[k].ops->smooth ? distance_of_turned(c, set, at, k, t) : 0;
+    return away * away;
+}
+
 /* The largest distance from the path of a set, of the points and colliders that were not marked for a later
  * one. Marks those of which it exceeds the margin, unless marked is NULL. */
 static double distance_from(const drape_candidates *c, int set, const drape_configuration *at, bool *marked)
@@ -200,8 +243,7 @@ static double distance_from(const drape_candidates *c, int set, const drape_conf
             continue;
         const double square = k < 0 ? square_away(at->x + 3 * (size_t)i, from->x[0] + 3 * (size_t)i,
                                                   from->x[1] + 3 * (size_t)i, t)
-                                    : square_away(at->pose[k].displacement, from->pose[0][k].displacement,
-                                                  from->pose[1][k].displacement, t);
+                                    : square_of_collider(c, set, at, k, t);
         if (isnan(square))
             return INFINITY;
         if (marked)

@@ -20,7 +20,9 @@
 
 /* A displacement of all points, and the first pair that limits it. */
 typedef struct path {
-    const double *x, *y; /* (points x 3) */
+    const double *x, *y;        /* (points x 3) */
+    const drape_swings *swings; /* NULL: no collider turns */
+    double stray;               /* [m] how far points of colliders leave straight paths */
     const drape_keep *keep;
     double fraction;
     drape_pair limiting;
@@ -43,7 +45,7 @@ static bool comes_near(const path *p, const drape_pair *pair, double gap)
     const double rounding = p->keep->rounding, least = drape_pair_least_gap(pair, rounding);
     const drape_keep near = {
         .rounding = rounding, .least = 1, .above = (NEAR * pair->distance - least) / (gap - least)};
-    return gap < pair->distance || drape_pair_step_fraction(pair, p->x, p->y, &near, 1) < 1;
+    return gap < pair->distance || drape_pair_step_fraction(pair, p->x, p->y, p->swings, &near, 1) < 1;
 }
 
 /* A pair that does not come near limits nothing, so it makes no difference whether it is a candidate. Does
@@ -54,11 +56,11 @@ static void follow(void *user, const drape_pair *pair)
     path *p = user;
     const drape_configuration from = {.x = p->x};
     if (drape_pair_points(pair) == 1 ||
-        drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius ||
+        drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius + p->stray ||
         drape_relaxed_factor(p->relaxed, pair) > 0)
         return;
     const double limit = p->of_node ? 1 : p->fraction;
-    const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->keep, limit);
+    const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->swings, p->keep, limit);
     if (fraction >= limit || !comes_near(p, pair, drape_pair_gap_value(pair, &from)))
         return;
     if (p->of_node)
@@ -79,25 +81,46 @@ static double longest_move(const drape_contact *c, const path *p)
     return sqrt(largest);
 }
 
+/* Points that stray from the path are farther from that of the candidates. */
+static const drape_candidates *with_stray(const drape_candidates *candidates, double stray,
+                                          drape_distances *away)
+{
+    for (int i = 0; candidates && stray > 0 && i < DRAPE_CANDIDATE_SETS; i++)
+        away->set[i] += stray;
+    return candidates && drape_candidates_farthest(candidates, away) <= candidates->margin ? candidates
+                                                                                           : NULL;
+}
+
 /* The candidates that are valid on the whole path, and how far it is from theirs: as far as its ends are, at
  * most. Searched if there are none; NULL for a path that is too long, or if there is no memory. */
 static const drape_candidates *candidates_of(drape_contact *c, const drape_straight_path *straight,
-                                             double length, drape_distances *away)
+                                             double length, double stray, drape_distances *away)
 {
-    const drape_candidates *candidates = drape_contact_valid_candidates(c, straight, away);
+    const drape_candidates *candidates =
+        with_stray(drape_contact_valid_candidates(c, straight, away), stray, away);
     if (candidates || length > MAX_PATH * c->mean_edge)
         return candidates;
-    return drape_contact_search(c, straight, away);
+    return with_stray(drape_contact_search(c, straight, away), stray, away);
 }
 
-double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
-                                   const drape_collider_pose *pose, const drape_keep *keep, double *of_node,
+double drape_contact_stray(const drape_collider *collider, double angle)
+{
+    return collider->radius * angle * angle / 8; /* >= r (1 - cos(angle/2)) */
+}
+
+double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *straight,
+                                   const drape_swing *swing, const drape_keep *keep, double *of_node,
                                    drape_pair *limiting)
 {
-    const drape_straight_path straight = {
-        {{.model = c->model, .x = x, .pose = pose}, {.model = c->model, .x = y, .pose = pose}}};
-    path p = {.x = x,
-              .y = y,
+    const drape_swings swings = {.of = swing, .nodes = c->model->node_count};
+    double stray = 0;
+    for (int32_t k = 0; swing && k < c->model->collider_count; k++)
+        stray =
+            fmax(stray, swing[k].turns ? drape_contact_stray(&c->model->colliders[k], swing[k].angle) : 0);
+    path p = {.x = straight->end[0].x,
+              .y = straight->end[1].x,
+              .swings = swing ? &swings : NULL,
+              .stray = stray,
               .keep = keep,
               .fraction = 1,
               .of_node = of_node,
@@ -105,13 +128,13 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
               .relaxed = &c->relaxed};
     drape_distances away;
     drape_candidate_cursor cursor = {0};
-    const drape_candidates *candidates = candidates_of(c, &straight, longest_move(c, &p), &away);
+    const drape_candidates *candidates = candidates_of(c, straight, longest_move(c, &p), stray, &away);
     const drape_pair *pair;
     while (candidates && (pair = drape_candidates_next(candidates, &away, &cursor)))
         follow(&p, pair);
     if (!candidates) {
         const double start = drape_clock_seconds();
-        drape_candidates_find(&c->broad, &straight, 0, NULL, follow, &p);
+        drape_candidates_find(&c->broad, straight, stray / 2, NULL, follow, &p);
         c->search_seconds += drape_clock_seconds() - start;
     }
     *limiting = p.limiting;
@@ -124,25 +147,59 @@ double drape_contact_least_gap(const drape_contact *c)
     return drape_pair_least_gap(&pair, c->broad.rounding);
 }
 
+/* The path of a node in a collider's own coordinates: straight, or by a swing. */
+typedef struct own_path {
+    const drape_swing *swing; /* NULL: straight */
+    double x[3], move[3];     /* in space for a swing */
+    double length;            /* [m] at most */
+} own_path;
+
+static own_path own_path_of(const drape_collider_pose *from, const drape_collider_pose *to,
+                            const drape_swing *swing, const double *x, const double *y)
+{
+    own_path along = {.swing = swing && swing->turns ? swing : NULL};
+    if (along.swing) {
+        memcpy(along.x, x, sizeof along.x);
+        vec3_sub(y, x, along.move);
+        along.length = drape_swing_speed(swing, along.x, along.move);
+        return along;
+    }
+    drape_pose_own(from, x, along.x);
+    drape_pose_own(to, y, along.move);
+    vec3_sub(along.move, along.x, along.move);
+    along.length = vec3_norm(along.move);
+    return along;
+}
+
+static double distance_on(const drape_collider *collider, const own_path *along, double t)
+{
+    double at[3];
+    memcpy(at, along->x, sizeof at);
+    if (along->swing)
+        drape_swing_own(along->swing, along->x, along->move, t, at);
+    else
+        vec3_add_scaled(t, along->move, at);
+    return collider->ops->distance(collider->values, &collider->shape, at, NULL, NULL);
+}
+
 /* By steps of the length of the distance, with which no path can cross the surface. */
-double drape_contact_march(const drape_contact *c, const drape_collider *collider, const double *x,
+double drape_contact_march(const drape_contact *c, int32_t k, const drape_collider_pose *from,
+                           const drape_collider_pose *to, const drape_swing *swing, const double *x,
                            const double *y, const drape_keep *keep)
 {
-    double p[3], at[3], t = 0;
-    double gap = collider->ops->distance(collider->values, &collider->shape, x, NULL, NULL);
+    const drape_collider *collider = &c->model->colliders[k];
+    const own_path along = own_path_of(from, to, swing, x, y);
+    double t = 0, gap = distance_on(collider, &along, 0);
     const double least = drape_contact_least_gap(c),
                  end = drape_keep_gap(keep, least, gap, c->model->contact.distance);
-    vec3_sub(y, x, p);
-    const double length = vec3_norm(p), slack = (1 - MARCH_SHARE) * fmin(end, gap - end);
+    const double length = along.length, slack = (1 - MARCH_SHARE) * fmin(end, gap - end);
     if (!drape_gap_has_side(gap, keep->rounding) || !(length > gap - end))
         return 1;
     for (int i = 0; i < MAX_MARCHES; i++) {
         t += MARCH_SHARE * (gap - end) / length;
         if (t >= 1)
             return 1;
-        memcpy(at, x, sizeof at);
-        vec3_add_scaled(t, p, at);
-        gap = collider->ops->distance(collider->values, &collider->shape, at, NULL, NULL);
+        gap = distance_on(collider, &along, t);
         if (gap <= end + slack)
             return t;
     }
@@ -170,7 +227,7 @@ static double shorten_long(const drape_contact *c, const double *x, const double
 double drape_contact_step_fraction(drape_contact *c, const double *x, const double *y, double t,
                                    double *of_node)
 {
-    const double start = drape_clock_seconds(), span[2] = {t, t};
+    const double start = drape_clock_seconds();
     const drape_keep keep = {.rounding = c->broad.rounding,
                              .least = 1,
                              .above = KEEP_ITERATE,
@@ -180,10 +237,12 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
     const double shortened = of_node ? shorten_long(c, x, y, of_node) : 1;
     if (shortened < 1)
         return shortened;
-    drape_contact_poses(c, t, span, c->path_pose);
+    drape_contact_poses(c, t, c->path_pose);
     drape_contact_fill(c, x, c->path_pose, c->from);
     drape_contact_fill(c, y, c->path_pose, c->to);
-    double fraction = drape_contact_free_fraction(c, c->from, c->to, c->path_pose, &keep, of_node, &limiting);
+    const drape_straight_path straight = {{{.model = c->model, .x = c->from, .pose = c->path_pose},
+                                           {.model = c->model, .x = c->to, .pose = c->path_pose}}};
+    double fraction = drape_contact_free_fraction(c, &straight, NULL, &keep, of_node, &limiting);
     for (int32_t k = 0; k < c->model->collider_count; k++) {
         const drape_collider *collider = &c->model->colliders[k];
         if (!collider->ops->smooth)
@@ -191,12 +250,10 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
         for (int32_t i = 0; i < c->model->free_count; i++) {
             const int32_t node = c->model->node_of_free[i];
             const size_t at = 3 * (size_t)node;
-            double a[3], b[3];
             if (drape_relaxed_has(&c->relaxed, k, &node, 1))
                 continue;
-            vec3_sub(x + at, c->path_pose[k].displacement, a);
-            vec3_sub(y + at, c->path_pose[k].displacement, b);
-            const double own = drape_contact_march(c, collider, a, b, &keep);
+            const double own =
+                drape_contact_march(c, k, &c->path_pose[k], &c->path_pose[k], NULL, x + at, y + at, &keep);
             fraction = fmin(fraction, own);
             if (of_node)
                 of_node[node] = fmin(of_node[node], own);

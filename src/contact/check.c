@@ -6,6 +6,7 @@
 #include "base/vec3.h"
 #include "contact/depth.h"
 
+#include <math.h>
 #include <string.h>
 
 #define KEEP_PATH 0.5 /* of the least gap, or of a smaller one at the beginning of the step */
@@ -73,10 +74,32 @@ static drape_status check_gaps(drape_contact *c, const char **reason, drape_diag
     return excess > 0 ? DRAPE_RETRY_REJECTED : DRAPE_OK;
 }
 
-/* Both ends of a piece of the path, on which nodes and colliders move straight. */
+/* The angle by which a collider turns at most in a piece of the path, and how far points may stray from the
+ * straight there, in margins of the candidates. */
+#define MAX_TURN  0.7 /* [rad] */
+#define MAX_STRAY 0.25
+
+/* A piece of the path, on which nodes move straight, and colliders turn about one axis while their pivots move
+ * straight: c->swing. */
 typedef struct piece {
-    drape_configuration from, to;
+    drape_straight_path path;
 } piece;
+
+/* The end of the piece that begins at `at`, at most t. */
+static double end_of_piece(const drape_contact *c, double at, double t)
+{
+    const double end = drape_motion_next_kink(c->motion, at, t);
+    double pieces = 1;
+    for (int32_t k = 0; k < c->model->collider_count; k++) {
+        const double angle = drape_motion_turns_collider(c->motion, k)
+                                 ? drape_motion_fastest_spin(c->motion, k, at, end) * (end - at)
+                                 : 0; /* if it turned all the time; it is asked again for the rest */
+        const double stray = drape_contact_stray(&c->model->colliders[k], angle);
+        pieces =
+            fmax(pieces, ceil(fmax(angle / MAX_TURN, sqrt(stray / (MAX_STRAY * c->step_candidates.margin)))));
+    }
+    return pieces > 1 ? at + (end - at) / pieces : end;
+}
 
 static drape_status check_surfaces(drape_contact *c, const piece *p, const char **reason,
                                    drape_diagnostic *diagnostic)
@@ -87,12 +110,12 @@ static drape_status check_surfaces(drape_contact *c, const piece *p, const char 
             continue;
         for (int32_t i = 0; i < c->model->free_count; i++) {
             const int32_t node = c->model->node_of_free[i];
-            double x[3], y[3];
+            const drape_configuration *from = &p->path.end[0], *to = &p->path.end[1];
             if (drape_relaxed_has(&c->relaxed, k, &node, 1))
                 continue;
-            vec3_sub(p->from.x + 3 * (size_t)node, p->from.pose[k].displacement, x);
-            vec3_sub(p->to.x + 3 * (size_t)node, p->to.pose[k].displacement, y);
-            const double fraction = drape_contact_march(c, &c->model->colliders[k], x, y, &keep);
+            const double fraction =
+                drape_contact_march(c, k, &from->pose[k], &to->pose[k], &c->swing[k],
+                                    from->x + 3 * (size_t)node, to->x + 3 * (size_t)node, &keep);
             if (fraction >= 1)
                 continue;
             const drape_pair pair = drape_broad_phase_surface(&c->broad, node, k);
@@ -149,8 +172,7 @@ static drape_status check_features(drape_contact *c, const piece *p, const char 
 {
     const drape_keep keep = drape_contact_keep_step(c);
     drape_pair limiting;
-    const double fraction =
-        drape_contact_free_fraction(c, p->from.x, p->to.x, p->to.pose, &keep, NULL, &limiting);
+    const double fraction = drape_contact_free_fraction(c, &p->path, c->swing, &keep, NULL, &limiting);
     if (fraction >= 1)
         return DRAPE_OK;
     refuse(c, &limiting);
@@ -163,32 +185,40 @@ static drape_status check_features(drape_contact *c, const piece *p, const char 
  * tracks are. */
 static void place_on_path(const drape_contact *c, double t, double end, double *x, drape_collider_pose *pose)
 {
-    const double share = (t - c->start_t) / (end - c->start_t), span[2] = {t, t};
+    const double share = (t - c->start_t) / (end - c->start_t);
     for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++)
         x[i] = (1 - share) * c->start[i] + share * c->x[i];
     drape_motion_place_pins(c->motion, t, x);
-    drape_contact_poses(c, t, span, pose);
+    drape_contact_poses(c, t, pose);
     drape_contact_fill(c, x, pose, x);
 }
 
+static void find_swings(drape_contact *c, const piece *p)
+{
+    const drape_configuration *end = p->path.end;
+    for (int32_t k = 0; k < c->model->collider_count; k++)
+        drape_swing_between(&end[0].pose[k], &end[1].pose[k], c->model->colliders[k].pivot, &c->swing[k]);
+}
+
 /* Checks the path from the beginning of the step to where contact is evaluated, at time t: piece by piece
- * between the kinks of tracks. */
+ * between the kinks of tracks, in which no collider turns far. */
 static drape_status check_path(drape_contact *c, double t, bool surfaces, const char **reason,
                                drape_diagnostic *diagnostic)
 {
     double *const x[] = {c->from, c->to}, at = c->start_t;
     drape_collider_pose *const pose[] = {c->path_pose, c->kink_pose};
-    piece p = {.to = {.model = c->model, .x = c->start, .pose = c->start_pose}};
+    piece p = {.path.end[1] = {.model = c->model, .x = c->start, .pose = c->start_pose}};
     drape_status status = DRAPE_OK;
     bool end = false;
     for (int i = 0; !status && !end; i = !i) {
-        p.from = p.to;
-        at = drape_motion_next_kink(c->motion, at, t);
+        p.path.end[0] = p.path.end[1];
+        at = end_of_piece(c, at, t);
         end = !(at < t);
         if (!end)
             place_on_path(c, at, t, x[i], pose[i]);
-        p.to =
+        p.path.end[1] =
             (drape_configuration){.model = c->model, .x = end ? c->x : x[i], .pose = end ? c->pose : pose[i]};
+        find_swings(c, &p);
         status = surfaces ? check_surfaces(c, &p, reason, diagnostic) : DRAPE_OK;
         if (!status)
             status = check_features(c, &p, reason, diagnostic);

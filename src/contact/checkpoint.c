@@ -30,9 +30,22 @@ static void archive_couplings(drape_contact *c, drape_archive *a)
 static bool are_finite(const drape_collider_pose *pose, int32_t count)
 {
     for (int32_t i = 0; i < count; i++)
-        if (!drape_all_finite(pose[i].displacement, 3) || !drape_all_finite(pose[i].velocity, 3))
+        if (!drape_all_finite(pose[i].displacement, 3) || !drape_all_finite(pose[i].velocity, 3) ||
+            !drape_all_finite(pose[i].turn, 9) || !drape_all_finite(pose[i].gradient, 9) ||
+            !isfinite(pose[i].t))
             return false;
     return true;
+}
+
+static void archive_pose(drape_collider_pose *pose, drape_archive *a)
+{
+    drape_archive_doubles(a, pose->displacement, 3);
+    drape_archive_doubles(a, pose->velocity, 3);
+    drape_archive_doubles(a, pose->turn, 9);
+    drape_archive_doubles(a, pose->gradient, 9);
+    drape_archive_bool(a, &pose->turned);
+    drape_archive_bool(a, &pose->spins);
+    drape_archive_double(a, &pose->t);
 }
 
 static bool are_distances(const drape_contact *c)
@@ -71,7 +84,8 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     drape_archive_double(a, &c->start_t);
     drape_archive_doubles(a, c->start, points);
     drape_archive_doubles(a, c->start_v, points);
-    drape_archive_bytes(a, c->start_pose, colliders * sizeof *c->start_pose);
+    for (size_t i = 0; i < colliders; i++)
+        archive_pose(&c->start_pose[i], a);
     drape_inside_archive(&c->inside, a);
     drape_relaxed_archive(&c->relaxed, a);
     drape_archive_double(a, &c->press.factor);

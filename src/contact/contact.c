@@ -54,7 +54,8 @@ static drape_status take_arrays(drape_arena *arena, drape_contact *c)
     for (size_t i = 0; i < sizeof poses / sizeof *poses; i++)
         *poses[i] = drape_arena_take(arena, colliders, sizeof **poses[i]);
     c->start_least = drape_arena_take(arena, colliders, sizeof *c->start_least);
-    c->on_collider = drape_arena_take(arena, colliders, 3 * sizeof *c->on_collider);
+    c->on_collider = drape_arena_take(arena, colliders, sizeof *c->on_collider);
+    c->swing = drape_arena_take(arena, colliders, sizeof *c->swing);
     return drape_arena_status(arena);
 }
 
@@ -106,58 +107,55 @@ double drape_contact_search_seconds(const drape_contact *c)
 
 /* ---- The configuration ---- */
 
-static void pose_at(const drape_motion *motion, int32_t collider, double t, const double span[2],
+/* A collider that only shifts along a track has the same velocity on a whole piece of it. */
+static void pose_at(const drape_contact *c, int32_t collider, const drape_contact_at *at,
                     drape_collider_pose *pose)
 {
-    double before[3], after[3];
-    memset(pose, 0, sizeof *pose);
-    if (!drape_motion_moves_collider(motion, collider))
-        return;
-    drape_motion_collider(motion, collider, t, pose->displacement);
-    if (!(span[1] > span[0]))
-        return;
-    drape_motion_collider(motion, collider, span[0], before);
-    drape_motion_collider(motion, collider, span[1], after);
-    for (int k = 0; k < 3; k++)
-        pose->velocity[k] = (after[k] - before[k]) / (span[1] - span[0]);
+    const bool instant = at->instant && drape_motion_turns_collider(c->motion, collider);
+    if (instant)
+        drape_motion_pose(c->motion, collider, at->t, (at->span[0] + at->span[1]) / 2, pose);
+    else
+        drape_motion_mean_pose(c->motion, collider, at->t, at->span, pose);
 }
 
-void drape_contact_poses(const drape_contact *c, double t, const double span[2], drape_collider_pose *pose)
+void drape_contact_poses(const drape_contact *c, double t, drape_collider_pose *pose)
 {
     for (int32_t i = 0; i < c->model->collider_count; i++)
-        pose_at(c->motion, i, t, span, &pose[i]);
+        pose_at(c, i, &(drape_contact_at){.t = t, .span = {t, t}}, &pose[i]);
 }
 
 void drape_contact_fill(const drape_contact *c, const double *nodes, const drape_collider_pose *pose,
                         double *x)
 {
-    const size_t n = (size_t)c->model->node_count;
-    memmove(x, nodes, 3 * n * sizeof *x);
-    for (size_t i = n; i < (size_t)c->broad.points; i++)
-        for (size_t k = 0; k < 3; k++)
-            x[3 * i + k] = c->broad.rest[3 * i + k] + pose[c->broad.point_collider[i - n]].displacement[k];
+    const drape_model *m = c->model;
+    memmove(x, nodes, 3 * (size_t)m->node_count * sizeof *x);
+    x += 3 * (size_t)m->node_count;
+    for (int32_t i = 0; i < m->collider_count; i++)
+        for (int32_t p = 0; p < m->colliders[i].shape.point_count; p++, x += 3)
+            drape_collider_point(&m->colliders[i], &pose[i], p, x);
 }
 
 static void fill_velocities(const drape_contact *c, const double *nodes, double *v)
 {
-    const size_t n = (size_t)c->model->node_count;
+    const drape_model *m = c->model;
     if (nodes)
-        memcpy(v, nodes, 3 * n * sizeof *v);
+        memcpy(v, nodes, 3 * (size_t)m->node_count * sizeof *v);
     else
-        memset(v, 0, 3 * n * sizeof *v);
-    for (size_t i = n; i < (size_t)c->broad.points; i++)
-        memcpy(v + 3 * i, c->pose[c->broad.point_collider[i - n]].velocity, 3 * sizeof *v);
+        memset(v, 0, 3 * (size_t)m->node_count * sizeof *v);
+    v += 3 * (size_t)m->node_count;
+    for (int32_t i = 0; i < m->collider_count; i++)
+        for (int32_t p = 0; p < m->colliders[i].shape.point_count; p++, v += 3)
+            drape_collider_point_velocity(&m->colliders[i], &c->pose[i], p, v);
 }
 
 /* Returns whether a collider has moved. */
-static bool move_colliders(drape_contact *c, double t, const double span[2])
+static bool move_colliders(drape_contact *c, const drape_contact_at *at)
 {
     bool moved = false;
     for (int32_t i = 0; i < c->model->collider_count; i++) {
         const drape_collider_pose before = c->pose[i];
-        pose_at(c->motion, i, t, span, &c->pose[i]);
-        for (int k = 0; k < 3; k++)
-            moved = moved || c->pose[i].displacement[k] != before.displacement[k];
+        pose_at(c, i, at, &c->pose[i]);
+        moved = moved || drape_pose_differs(&c->pose[i], &before);
     }
     return moved;
 }
@@ -249,7 +247,7 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
 
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)
 {
-    const bool moved = move_colliders(c, at->t, at->span);
+    const bool moved = move_colliders(c, at);
     fill_velocities(c, at->v, c->v);
     if (drape_contact_take_failure(c)) {
         c->listed = false;
@@ -385,6 +383,30 @@ double drape_contact_longest_path(const drape_contact *c)
     return c ? c->longest_path : 0;
 }
 
+/* How far the turning of a collider brings its surface towards a node in a nominal step from time t on: a ball
+ * that turns about its center brings nothing nearer. */
+static double turning_path_of(const drape_contact *c, int32_t collider, double t)
+{
+    const drape_collider *k = &c->model->colliders[collider];
+    const double end = t + c->dt;
+    double largest = 0, before[3], after[3];
+    drape_collider_pose from, to;
+    if (!drape_motion_turns_collider(c->motion, collider))
+        return 0;
+    drape_motion_pose(c->motion, collider, t, t, &from);
+    drape_motion_pose(c->motion, collider, end, end, &to);
+    drape_pose_point(&from, k->pivot, before);
+    drape_pose_point(&to, k->pivot, after);
+    for (int i = 0; i < 3; i++)
+        to.displacement[i] -= after[i] - before[i];
+    for (int32_t i = 0; i < c->model->free_count; i++) {
+        const double *x = c->x + 3 * (size_t)c->model->node_of_free[i];
+        largest = fmax(largest, drape_collider_distance(k, &from, x, NULL, NULL) -
+                                    drape_collider_distance(k, &to, x, NULL, NULL));
+    }
+    return largest;
+}
+
 /* How far a collider moves in a nominal step from time t on, relative to the mean motion of the cloth. */
 static double path_of(const drape_contact *c, int32_t collider, double t)
 {
@@ -398,7 +420,7 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
         mean[i % 3] += c->v[i];
     for (size_t k = 0; k < 3; k++)
         to[k] -= from[k] + c->dt / (double)nodes * mean[k];
-    return vec3_norm(to);
+    return vec3_norm(to) + turning_path_of(c, collider, t);
 }
 
 /* Contact with a fast collider over a distance that it crosses in a small part of a step is hard to solve: in
@@ -456,8 +478,7 @@ void drape_contact_measure_start(drape_contact *c)
 static drape_status lag_at(drape_contact *c, const double *v, double t)
 {
     for (int32_t i = 0; i < c->model->collider_count; i++)
-        if (drape_motion_moves_collider(c->motion, i))
-            drape_motion_collider_velocity(c->motion, i, t, t, c->pose[i].velocity);
+        drape_motion_pose(c->motion, i, t, t, &c->pose[i]);
     fill_velocities(c, v, c->v);
     return drape_contact_lag(c);
 }

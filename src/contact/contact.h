@@ -16,10 +16,12 @@
 typedef struct drape_contact drape_contact;
 
 /* The point at which contact is evaluated. Colliders have their poses at time t; they move with their mean
- * velocity from span[0] to span[1], or rest if these are equal. */
+ * velocity from span[0] to span[1], or rest if these are equal. instant: those that turn have their velocity
+ * of time t, on the piece of their motion that contains the middle of the span. */
 typedef struct drape_contact_at {
     const double *x, *v; /* (node_count x 3); v NULL: at rest */
     double t, span[2];   /* [s] */
+    bool instant;
 } drape_contact_at;
 
 /* *out is NULL for a model without colliders and without self-contact. Contact takes all its memory from
@@ -67,9 +69,8 @@ drape_status drape_contact_evaluate_at(drape_contact *contact, const drape_conta
  * 3). */
 void drape_contact_add_forces(drape_contact *contact, bool conservative, bool dissipative, double *g);
 
-/* The forces of the last drape_contact_add_forces on each collider (collider_count x 3) [N], with the sign of
- * g. */
-const double *drape_contact_on_colliders(const drape_contact *contact);
+/* The forces of the last drape_contact_add_forces on each collider (collider_count), with the sign of g. */
+const drape_load *drape_contact_on_colliders(const drape_contact *contact);
 
 double drape_contact_potential(const drape_contact *contact); /* [J] */
 

@@ -49,8 +49,29 @@ void drape_contact_velocities(const drape_contact *c, const drape_active_contact
 {
     for (int a = 0; a < contact->gap.closest.points; a++)
         memcpy(v[a], c->v + 3 * (size_t)contact->pair.node[a], sizeof v[a]);
-    for (int a = 0; contact->pair.kind == DRAPE_PAIR_SURFACE && a < contact->gap.closest.points; a++)
-        vec3_sub(v[a], c->pose[contact->pair.collider].velocity, v[a]);
+    for (int a = 0; contact->pair.kind == DRAPE_PAIR_SURFACE && a < contact->gap.closest.points; a++) {
+        double surface[3];
+        drape_pose_velocity(&c->pose[contact->pair.collider], c->x + 3 * (size_t)contact->pair.node[a],
+                            surface);
+        vec3_sub(v[a], surface, v[a]);
+    }
+}
+
+/* The forces on a collider act on its points or, at its surface, where the nodes are: there its velocity was
+ * taken, so that their work is what the cloth is given. */
+static void add_moment(const drape_contact *c, const drape_active_contact *contact, const double *from,
+                       double *moment)
+{
+    const bool surface = contact->pair.kind == DRAPE_PAIR_SURFACE;
+    for (int a = 0; a < contact->gap.closest.points; a++) {
+        const int32_t node = contact->pair.node[a];
+        double own[3];
+        if (!surface && node < c->model->node_count)
+            continue;
+        drape_pose_own(&c->pose[contact->pair.collider], c->x + 3 * (size_t)node, own);
+        for (int i = 0; i < 9; i++)
+            moment[i] += (surface ? -1 : 1) * from[3 * a + i / 3] * own[i % 3];
+    }
 }
 
 static void scatter(drape_contact *c, const drape_active_contact *contact, const double *from, double *g)
@@ -60,8 +81,10 @@ static void scatter(drape_contact *c, const drape_active_contact *contact, const
         for (int k = 0; k < 3 && node[a] < c->model->node_count; k++) {
             g[3 * (size_t)node[a] + (size_t)k] += from[3 * a + k];
             if (collider >= 0)
-                c->on_collider[3 * (size_t)collider + (size_t)k] -= from[3 * a + k];
+                c->on_collider[collider].force[k] -= from[3 * a + k];
         }
+    if (collider >= 0)
+        add_moment(c, contact, from, c->on_collider[collider].moment);
 }
 
 static void add_elastic(drape_contact *c, const drape_active_contact *contact, const drape_contact_law *law,
@@ -101,7 +124,7 @@ static void add_dissipative(drape_contact *c, const drape_active_contact *contac
 void drape_contact_add_forces(drape_contact *c, bool conservative, bool dissipative, double *g)
 {
     const double start = drape_clock_seconds();
-    memset(c->on_collider, 0, 3 * (size_t)c->model->collider_count * sizeof *c->on_collider);
+    memset(c->on_collider, 0, (size_t)c->model->collider_count * sizeof *c->on_collider);
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
         const drape_contact_law law = drape_contact_law_of(c, contact);
@@ -121,7 +144,7 @@ void drape_contact_add_forces(drape_contact *c, bool conservative, bool dissipat
     c->seconds += drape_clock_seconds() - start;
 }
 
-const double *drape_contact_on_colliders(const drape_contact *c)
+const drape_load *drape_contact_on_colliders(const drape_contact *c)
 {
     return c->on_collider;
 }

@@ -132,12 +132,37 @@ static void add_dissipative(const drape_contact *c, const request *want, const d
                                 excess, v, h);
 }
 
+/* A surface that turns has another velocity wherever a node is: adds what this changes of forces with dg/dv =
+ * hv, the relative velocity being v - V(x). */
+static void add_spin(const drape_contact *c, const drape_active_contact *contact, const double *hv, double *h)
+{
+    const drape_collider_pose *pose = &c->pose[contact->pair.collider];
+    const int d = 3 * contact->gap.closest.points;
+    for (int i = 0; i < d; i++)
+        for (int j = 0; j < d; j++)
+            for (int k = 0; k < 3; k++)
+                h[D * i + j] -= hv[D * i + j - j % 3 + k] * pose->gradient[3 * k + j % 3];
+}
+
+static bool spins(const drape_contact *c, const drape_active_contact *contact)
+{
+    return contact->pair.kind == DRAPE_PAIR_SURFACE && c->pose[contact->pair.collider].spins;
+}
+
 /* h = (h + h')/2 of so many points */
 static void symmetrize(int points, double *h)
 {
     for (int i = 0; i < 3 * points; i++)
         for (int j = 0; j < i; j++)
             h[D * i + j] = h[D * j + i] = (h[D * i + j] + h[D * j + i]) / 2;
+}
+
+/* dg/dv of one active contact, h (12 x 12). */
+static void differentiate_by_v(const drape_contact *c, const drape_active_contact *contact, double *h)
+{
+    const drape_contact_law law = drape_contact_law_of(c, contact);
+    memset(h, 0, D * D * sizeof *h);
+    add_dissipative(c, &(request){1, DRAPE_CONTACT_VELOCITY}, contact, &law, NULL, 0, h);
 }
 
 /* The derivatives of one active contact, h (12 x 12). */
@@ -163,6 +188,11 @@ static void differentiate(const drape_contact *c, const request *want, const dra
     for (int i = 0; excess != 0 && i < 3 * contact->gap.closest.points; i++)
         for (int j = 0; j < 3 * contact->gap.closest.points; j++)
             h[D * i + j] += excess * ce[i / 3] * n[i % 3] * ce[j / 3] * n[j % 3];
+    if (by_x && spins(c, contact)) {
+        double hv[D * D];
+        differentiate_by_v(c, contact, hv);
+        add_spin(c, contact, hv, h);
+    }
     if (want->which == DRAPE_CONTACT_SYMMETRIC)
         symmetrize(contact->gap.closest.points, h);
 }
@@ -193,6 +223,14 @@ void drape_contact_add_jacobian(drape_contact *c, double weight, drape_contact_d
         memset(h, 0, sizeof h);
         drape_contact_velocities(c, &lagged->contact, v);
         add_friction(&want, &lagged->contact, &law, lagged->force, v, h);
+        if (spins(c, &lagged->contact) && want.which != DRAPE_CONTACT_VELOCITY &&
+            want.which != DRAPE_CONTACT_GAUSS_NEWTON) {
+            double hv[D * D] = {0};
+            add_friction(&(request){1, DRAPE_CONTACT_EXACT}, &lagged->contact, &law, lagged->force, v, hv);
+            add_spin(c, &lagged->contact, hv, h);
+            if (want.which == DRAPE_CONTACT_SYMMETRIC)
+                symmetrize(lagged->contact.gap.closest.points, h);
+        }
         add_blocks(c, &lagged->contact, h, pattern, values);
     }
     c->seconds += drape_clock_seconds() - start;
@@ -216,6 +254,11 @@ void drape_contact_fix_friction(drape_contact *c, double weight, const drape_pat
         drape_normal_derive(&contact->gap, &derivatives, &law, v, &by_x);
         const double excess = excess_stiffness(c, contact, &law, weight, false);
         add_changes_of_friction(&contact->gap, &law, weight, &normal, &derivatives, &by_x, excess, v, h);
+        if (spins(c, contact)) {
+            double hv[D * D];
+            differentiate_by_v(c, contact, hv);
+            add_spin(c, contact, hv, h);
+        }
         for (int k = 0; k < D * D; k++)
             h[k] = -h[k];
         add_blocks(c, contact, h, pattern, values);

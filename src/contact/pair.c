@@ -69,10 +69,10 @@ static void touching_normal(const drape_pair *pair, const drape_configuration *a
     vec3_sub(x[3], x[face ? 1 : 2], w);
     vec3_cross(u, w, n);
     double length = vec3_norm(n);
-    for (int k = 0; k < 3; k++)
-        out[k] = x[0][k] - at->pose[pair->collider].displacement[k];
+    drape_pose_own(&at->pose[pair->collider], x[0], out);
     for (int32_t i = 0; i < shape->point_count; i++)
         vec3_add_scaled(-1.0 / shape->point_count, shape->point + 3 * (size_t)i, out);
+    drape_pose_direction(&at->pose[pair->collider], out);
     bool cloth_first = pair->node[0] < at->model->node_count;
     double sign = (vec3_dot(n, out) < 0) == cloth_first ? -1 : 1;
     for (int k = 0; k < 3 && length > 0; k++)
@@ -180,27 +180,55 @@ static double approach_speed(drape_pair_kind kind, double p[4][3])
     return first + second;
 }
 
-static double gap_at(const drape_pair *pair, double x[4][3], double p[4][3], double t, double radius)
+/* The points of a pair and their displacements. If its collider turns, they are seen from there: its own
+ * points rest, and the others turn about it. */
+typedef struct pair_path {
+    double x[4][3], p[4][3];
+    const drape_swing *swing; /* NULL: all move straight */
+    bool rests[4];
+} pair_path;
+
+static double gap_at(const drape_pair *pair, const pair_path *path, double t, double radius)
 {
     double at[4][3];
     drape_closest closest;
-    memcpy(at, x, sizeof at);
-    for (int a = 0; a < 4; a++)
-        vec3_add_scaled(t, p[a], at[a]);
+    memcpy(at, path->x, sizeof at);
+    for (int a = 0; a < 4; a++) {
+        if (!path->swing)
+            vec3_add_scaled(t, path->p[a], at[a]);
+        else
+            drape_swing_own(path->swing, path->x[a], path->p[a], path->rests[a] ? 0 : t, at[a]);
+    }
     finders[pair->kind](at, &closest);
     return closest.distance - radius;
 }
 
-double drape_pair_step_fraction(const drape_pair *pair, const double *from, const double *to,
-                                const drape_keep *keep, double limit)
+static double speed_of(const drape_pair *pair, pair_path *path)
 {
-    double x[4][3], y[4][3], p[4][3], radius = pair->radius, t = 0;
-    gather(pair, 4, from, x);
-    gather(pair, 4, to, y);
+    double p[4][3], largest = 0;
+    memcpy(p, path->p, sizeof p);
+    if (!path->swing)
+        return approach_speed(pair->kind, p);
     for (int a = 0; a < 4; a++)
-        vec3_sub(y[a], x[a], p[a]);
-    const double speed = approach_speed(pair->kind, p), least = drape_pair_least_gap(pair, keep->rounding);
-    double gap = gap_at(pair, x, p, 0, radius);
+        if (!path->rests[a])
+            largest = fmax(largest, drape_swing_speed(path->swing, path->x[a], path->p[a]));
+    return largest;
+}
+
+double drape_pair_step_fraction(const drape_pair *pair, const double *from, const double *to,
+                                const drape_swings *swings, const drape_keep *keep, double limit)
+{
+    const bool turns = swings && pair->collider >= 0 && swings->of[pair->collider].turns;
+    pair_path path = {.swing = turns ? &swings->of[pair->collider] : NULL};
+    double y[4][3], radius = pair->radius, t = 0;
+    gather(pair, 4, from, path.x);
+    gather(pair, 4, to, y);
+    for (int a = 0; a < 4; a++) {
+        vec3_sub(y[a], path.x[a], path.p[a]);
+        path.rests[a] = turns && pair->node[a] >= swings->nodes;
+    }
+    const double speed = speed_of(pair, &path), least = drape_pair_least_gap(pair, keep->rounding);
+    double gap = gap_at(pair, &path, 0, radius);
     if (keep->core && !drape_gap_has_side(gap, keep->rounding)) {
         gap += radius;
         radius = 0;
@@ -213,7 +241,7 @@ double drape_pair_step_fraction(const drape_pair *pair, const double *from, cons
         t += ADVANCE * (gap - end) / speed;
         if (t >= limit)
             return limit;
-        gap = gap_at(pair, x, p, t, radius);
+        gap = gap_at(pair, &path, t, radius);
         if (gap <= end + slack)
             return t;
     }

@@ -87,11 +87,18 @@ bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const
 void drape_pair_derivatives(const drape_pair *pair, const drape_gap *gap, const drape_configuration *at,
                             const double *rest, drape_gap_derivatives *derivatives);
 
+/* The motion of colliders on a path, and the number of nodes, after which points are of colliders. */
+typedef struct drape_swings {
+    const drape_swing *of; /* (collider_count) */
+    int32_t nodes;
+} drape_swings;
+
 /* Continuous collision detection: the largest step fraction on the straight path from x to y, the same
  * for all points, on which the pair keeps what it must of its gap (additive continuous collision
  * detection, Li et al. 2021, Codimensional IPC, algorithm 1). It does not search beyond `limit`, which it
- * returns at most. A pair whose gap at x has no side: `limit`. */
+ * returns at most. A pair whose gap at x has no side: `limit`. The points of a collider that turns, unless
+ * swings is NULL, go on circles instead. */
 double drape_pair_step_fraction(const drape_pair *pair, const double *x, const double *y,
-                                const drape_keep *keep, double limit);
+                                const drape_swings *swings, const drape_keep *keep, double limit);
 
 #endif

@@ -71,12 +71,13 @@ struct drape_contact {
     drape_collider_pose *kink_pose;          /* (collider_count) */
     int32_t *coupling;                       /* (coupling_count of coupling_room x 4) */
     int32_t coupling_count, coupling_room;
-    double *on_collider; /* (collider_count x 3) [N] */
+    drape_swing *swing;      /* (collider_count) from one end of a displacement to the other */
+    drape_load *on_collider; /* (collider_count) */
     double seconds, search_seconds;
 };
 
-/* The poses of colliders at time t, with their mean velocity over span. pose: (collider_count). */
-void drape_contact_poses(const drape_contact *c, double t, const double span[2], drape_collider_pose *pose);
+/* The poses of colliders at time t, without velocities. pose: (collider_count). */
+void drape_contact_poses(const drape_contact *c, double t, drape_collider_pose *pose);
 
 /* Sets all points: the given nodes, which may be those of x, and the points of colliders in their poses. x:
  * (points x 3). */
@@ -120,16 +121,22 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
 /* Velocities of the points of an active contact, relative to the collider if it is a surface. */
 void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3]);
 
-/* The largest step fraction from x to y (points x 3) on which all pairs of features keep what they must
- * of their gaps, and the pair that limits it. Colliders are at pose. of_node (node_count), unless NULL, is
- * lowered at each node to the smallest fraction of its pairs. */
-double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
-                                   const drape_collider_pose *pose, const drape_keep *keep, double *of_node,
+/* The largest step fraction from one configuration to another on which all pairs of features keep what they
+ * must of their gaps, and the pair that limits it. Nodes move straight, and so do the points of colliders,
+ * except those that turn by their swing (collider_count; NULL: none turns). of_node (node_count), unless NULL,
+ * is lowered at each node to the smallest fraction of its pairs. */
+double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *straight,
+                                   const drape_swing *swing, const drape_keep *keep, double *of_node,
                                    drape_pair *limiting);
 
-/* The same for the path of a node from x to y in the collider's own coordinates, and its smooth surface. */
-double drape_contact_march(const drape_contact *c, const drape_collider *collider, const double *x,
+/* The same for the path of a node from x to y, and the smooth surface of a collider, which goes from one pose
+ * to another, by its swing unless that is NULL. */
+double drape_contact_march(const drape_contact *c, int32_t collider, const drape_collider_pose *from,
+                           const drape_collider_pose *to, const drape_swing *swing, const double *x,
                            const double *y, const drape_keep *keep);
+
+/* How far the points of a collider stray at most from straight paths [m] when it turns by an angle [rad]. */
+double drape_contact_stray(const drape_collider *collider, double angle);
 
 /* The least gap [m] between cloth and a collider. */
 double drape_contact_least_gap(const drape_contact *c);

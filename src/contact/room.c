@@ -20,8 +20,8 @@ static bool may_be_near(const drape_contact *c, const drape_collider_pose *pose,
 {
     const double *bound = c->relaxed.bound + 4 * (size_t)collider;
     double to[3];
-    vec3_sub(x, bound, to);
-    vec3_sub(to, pose[collider].displacement, to);
+    drape_pose_own(&pose[collider], x, to);
+    vec3_sub(to, bound, to);
     return !(vec3_norm(to) > bound[3] + margin);
 }
 
@@ -414,8 +414,7 @@ static bool cross(const drape_contact *c, int32_t collider, const int32_t *face,
     for (int a = 0; a < 3; a++)
         x[a] = c->x + 3 * (size_t)face[a];
     for (int a = 0; a < points; a++) {
-        memcpy(at[a], c->pose[collider].displacement, sizeof at[a]);
-        vec3_add_scaled(1, c->model->colliders[collider].shape.point + 3 * (size_t)piece[a], at[a]);
+        drape_collider_point(&c->model->colliders[collider], &c->pose[collider], piece[a], at[a]);
         y[a] = at[a];
     }
     if (points == 2)

@@ -60,9 +60,9 @@ static bool slide(const drape_collider *collider, double distance, double roundi
 static bool sweep(drape_contact *c, int32_t collider, double *y)
 {
     const drape_collider *k = &c->model->colliders[collider];
-    const double *from = c->start_pose[collider].displacement, *to = c->path_pose[collider].displacement;
+    const drape_collider_pose *from = &c->start_pose[collider], *to = &c->path_pose[collider];
     bool moved = false;
-    if (memcmp(from, to, 3 * sizeof *from) == 0)
+    if (!drape_pose_differs(from, to))
         return false;
     for (int32_t i = 0; i < c->model->free_count; i++) {
         const int32_t node = c->model->node_of_free[i];
@@ -70,12 +70,11 @@ static bool sweep(drape_contact *c, int32_t collider, double *y)
         double a[3], b[3];
         if (drape_relaxed_has(&c->relaxed, collider, &node, 1))
             continue;
-        vec3_sub(c->start + at, from, a);
-        vec3_sub(y + at, to, b);
+        drape_pose_own(from, c->start + at, a);
+        drape_pose_own(to, y + at, b);
         if (!slide(k, c->broad.distance[collider], c->broad.rounding, a, b))
             continue;
-        for (int n = 0; n < 3; n++)
-            y[at + (size_t)n] = b[n] + to[n];
+        drape_pose_point(to, b, y + at);
         moved = true;
     }
     return moved;
@@ -83,9 +82,9 @@ static bool sweep(drape_contact *c, int32_t collider, double *y)
 
 void drape_contact_sweep(drape_contact *c, double t, double *y)
 {
-    const double start = drape_clock_seconds(), span[2] = {t, t};
+    const double start = drape_clock_seconds();
     bool moved = true;
-    drape_contact_poses(c, t, span, c->path_pose);
+    drape_contact_poses(c, t, c->path_pose);
     for (int pass = 0; pass < MAX_PASSES && moved; pass++) {
         moved = false;
         for (int32_t k = 0; k < c->model->collider_count; k++)

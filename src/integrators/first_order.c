@@ -44,8 +44,12 @@ static drape_point place(drape_first_order *s, double t, const double *y)
         s->x[drape_first_order_at(s, i)] = y[i];
         s->v[drape_first_order_at(s, i)] = y[s->n + i];
     }
-    return (drape_point){
-        .x = s->x, .v = s->v, .internal = s->internal, .t = t, .span = {s->span[0], s->span[1]}};
+    return (drape_point){.x = s->x,
+                         .v = s->v,
+                         .internal = s->internal,
+                         .t = t,
+                         .span = {s->span[0], s->span[1]},
+                         .instant = true};
 }
 
 /* ---- Residual ---- */
@@ -221,18 +225,9 @@ int drape_first_order_solve_rhs(SUNLinearSolver solver, SUNMatrix matrix, N_Vect
 /* ---- Work of dissipation, pins and colliders ---- */
 
 /* Power at time t of forces on moving colliders; NULL: no contact. */
-static double collider_power(const drape_first_order *s, double t, const double *force)
+static double collider_power(const drape_first_order *s, double t, const drape_load *load)
 {
-    double power = 0;
-    if (!force)
-        return 0;
-    for (int32_t c = 0; c < s->model->collider_count; c++) {
-        double v[3];
-        drape_motion_collider_velocity(s->motion, c, t, (s->span[0] + s->span[1]) / 2, v);
-        for (int k = 0; k < 3; k++)
-            power += force[3 * c + k] * v[k];
-    }
-    return power;
+    return drape_motion_collider_power(s->motion, load, t, (s->span[0] + s->span[1]) / 2);
 }
 
 /* Power at the state in s->x, s->v at time t: of dissipative forces, and of the forces that move pins and
@@ -241,8 +236,12 @@ static void measure_powers(drape_first_order *s, double t, double powers[2])
 {
     const drape_model *m = s->model;
     const drape_motion *motion = s->motion;
-    const drape_point point = {
-        .x = s->x, .v = s->v, .internal = s->internal, .t = t, .span = {s->span[0], s->span[1]}};
+    const drape_point point = {.x = s->x,
+                               .v = s->v,
+                               .internal = s->internal,
+                               .t = t,
+                               .span = {s->span[0], s->span[1]},
+                               .instant = true};
     powers[0] = powers[1] = 0;
     if (s->dissipated) {
         drape_system_dissipation(s->system, &point, s->dissipated);

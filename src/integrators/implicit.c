@@ -124,20 +124,7 @@ void drape_implicit_report(const drape_solve_report *report, drape_step_info *in
 
 double drape_implicit_collider_work(const drape_implicit *s, double t0, double t1)
 {
-    const double *force = drape_system_on_colliders(s->equation.system);
-    double work = 0;
-    if (!force)
-        return 0;
-    for (int32_t c = 0; c < s->equation.model->collider_count; c++) {
-        double before[3], after[3];
-        if (!drape_motion_moves_collider(s->motion, c))
-            continue;
-        drape_motion_collider(s->motion, c, t0, before);
-        drape_motion_collider(s->motion, c, t1, after);
-        for (int k = 0; k < 3; k++)
-            work += force[3 * c + k] * (after[k] - before[k]);
-    }
-    return work;
+    return drape_motion_collider_work(s->motion, drape_system_on_colliders(s->equation.system), t0, t1);
 }
 
 void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_state *out,

@@ -168,8 +168,12 @@ static drape_point place(radau_state *s, double time, const double *x0, const do
         s->x[node_at(s, i)] = z ? x0[i] + z[i] : x0[i];
         s->v[node_at(s, i)] = v[i];
     }
-    return (drape_point){
-        .x = s->x, .v = s->v, .internal = s->internal, .t = time, .span = {s->span[0], s->span[1]}};
+    return (drape_point){.x = s->x,
+                         .v = s->v,
+                         .internal = s->internal,
+                         .t = time,
+                         .span = {s->span[0], s->span[1]},
+                         .instant = true};
 }
 
 /* out_i = sum_j matrix_ij in_j over the stages */
@@ -494,16 +498,9 @@ static drape_status estimate_error(radau_state *s, const drape_local_attempt *a)
 /* ---- Work of dissipation, pins and colliders ---- */
 
 /* Power of forces on moving colliders; NULL: no contact. */
-static double collider_power(const radau_state *s, double time, const double *force)
+static double collider_power(const radau_state *s, double time, const drape_load *load)
 {
-    double power = 0;
-    for (int32_t i = 0; force && i < s->model->collider_count; i++) {
-        double v[3];
-        drape_motion_collider_velocity(s->motion, i, time, (s->span[0] + s->span[1]) / 2, v);
-        for (int k = 0; k < 3; k++)
-            power += force[3 * i + k] * v[k];
-    }
-    return power;
+    return drape_motion_collider_power(s->motion, load, time, (s->span[0] + s->span[1]) / 2);
 }
 
 /* Adds h times the powers of dissipative forces, and of the forces that move pins and colliders. */

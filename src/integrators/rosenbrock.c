@@ -92,18 +92,12 @@ typedef struct rosenbrock_state {
  * so only one derivative along one direction is needed. Sums of powers at the ends of a step would count the
  * force of a dashpot at a jump of a pin's velocity for a large part of the step. */
 
-/* Forces on moving colliders, times their velocities; NULL: no contact. */
-static double collider_power(const rosenbrock_state *s, const double *force)
+/* Power of the forces on moving colliders; NULL: no contact. */
+static double collider_power(const rosenbrock_state *s, const drape_load *load)
 {
     const drape_point *point = &s->common.equation.point;
-    const drape_motion *m = s->common.motion;
-    double sum = 0, v[3];
-    for (int32_t c = 0; force && c < m->model->collider_count; c++) {
-        drape_motion_collider_velocity(m, c, point->t, (point->span[0] + point->span[1]) / 2, v);
-        for (int k = 0; k < 3; k++)
-            sum += force[3 * c + k] * v[k];
-    }
-    return sum;
+    return drape_motion_collider_power(s->common.motion, load, point->t,
+                                       (point->span[0] + point->span[1]) / 2);
 }
 
 /* P where the forces g were evaluated last. */
@@ -162,6 +156,7 @@ static drape_status evaluate_start(rosenbrock_state *s, const drape_state *in, d
     e->point.history = NULL;
     e->point.span[0] = in->t;
     e->point.span[1] = stop;
+    e->point.instant = true;
     memcpy(e->x, in->x, e->nodes * sizeof *e->x);
     memset(e->v, 0, e->nodes * sizeof *e->v);
     for (size_t i = 0; i < e->dofs; i++)

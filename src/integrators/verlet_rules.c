@@ -35,16 +35,21 @@
 /* A collider over one substep. */
 typedef struct pose {
     const drape_collider *collider;
-    drape_collider_pose at; /* at the end */
-    double moved[3];        /* [m] since the start */
+    drape_collider_pose before, at; /* at the start and at the end */
 } pose;
 
-static drape_collider_pose pose_at(const drape_motion *motion, int32_t collider, double t)
+/* Where a point that is carried along gets to. */
+static void carry(const pose *p, const double *from, double *to)
 {
-    drape_collider_pose at;
-    drape_motion_collider(motion, collider, t, at.displacement);
-    drape_motion_collider_velocity(motion, collider, t, t, at.velocity);
-    return at;
+    double moved[3];
+    if (p->before.turned || p->at.turned) {
+        drape_pose_own(&p->before, from, to);
+        drape_pose_point(&p->at, to, to);
+        return;
+    }
+    vec3_sub(p->at.displacement, p->before.displacement, moved);
+    for (int k = 0; k < 3; k++)
+        to[k] = from[k] + moved[k];
 }
 
 static bool is_flat(const pose *p, const double *x)
@@ -86,8 +91,7 @@ static void project_on(const drape_verlet_contact *contact, const pose *p, const
         double n[3], y0[3], phi = drape_collider_distance(p->collider, &p->at, x + i, n, NULL);
         if (!(phi <= 0))
             continue;
-        for (size_t k = 0; k < 3; k++)
-            y0[k] = x0[i + k] + p->moved[k];
+        carry(p, x0 + i, y0);
         if (contact->rule == DRAPE_VERLET_CS184)
             project_cs184(contact, p, y0, phi, n, x + i);
         else
@@ -99,9 +103,9 @@ void drape_verlet_project(const drape_verlet_contact *contact, double t0, double
                           double *x)
 {
     for (int32_t c = 0; c < contact->model->collider_count; c++) {
-        pose p = {.collider = &contact->model->colliders[c], .at = pose_at(contact->motion, c, t)};
-        const drape_collider_pose before = pose_at(contact->motion, c, t0);
-        vec3_sub(p.at.displacement, before.displacement, p.moved);
+        pose p = {.collider = &contact->model->colliders[c]};
+        drape_motion_pose(contact->motion, c, t0, t0, &p.before);
+        drape_motion_pose(contact->motion, c, t, t, &p.at);
         project_on(contact, &p, x0, x);
     }
 }
@@ -128,12 +132,15 @@ void drape_verlet_friction(const drape_verlet_contact *contact, double t, const 
     if (contact->rule != DRAPE_VERLET_BOSON)
         return;
     for (int32_t k = 0; k < m->collider_count; k++) {
-        const drape_collider_pose at = pose_at(contact->motion, k, t);
+        drape_collider_pose at;
+        drape_motion_pose(contact->motion, k, t, t, &at);
         for (int32_t f = 0; f < m->free_count; f++) {
             const size_t i = 3 * (size_t)m->node_of_free[f];
-            double n[3];
-            if (drape_collider_distance(&m->colliders[k], &at, x + i, n, NULL) < contact->friction_range)
-                apply_friction(contact, &m->colliders[k], at.velocity, n, v + i, g + i);
+            double n[3], velocity[3];
+            if (!(drape_collider_distance(&m->colliders[k], &at, x + i, n, NULL) < contact->friction_range))
+                continue;
+            drape_pose_velocity(&at, x + i, velocity);
+            apply_friction(contact, &m->colliders[k], velocity, n, v + i, g + i);
         }
     }
 }

@@ -1,6 +1,8 @@
 /* model.c: queries on a compiled scene. */
 #include "model/model.h"
 
+#include "base/rotation.h"
+#include "base/vec3.h"
 #include "model/track.h"
 
 void drape_model_destroy(drape_model **model)
@@ -84,11 +86,28 @@ drape_collider_motion drape_model_collider(const drape_model *model, int32_t ind
         return (drape_collider_motion){.name = "", .type = ""};
     const drape_collider *collider = &model->colliders[index];
     drape_collider_motion motion = {.name = collider->name, .type = collider->ops->entry.name};
-    if (collider->track.key_count > 0) {
-        drape_track_displacement(collider->track.keys, collider->track.key_count, t, motion.displacement);
-        drape_track_velocity(collider->track.keys, collider->track.key_count, t, motion.velocity);
-    }
+    drape_track_displacement(collider->track.keys, collider->track.key_count, t, motion.displacement);
+    drape_track_velocity(collider->track.keys, collider->track.key_count, t, motion.velocity);
     return motion;
+}
+
+bool drape_model_collider_rotation(const drape_model *model, int32_t index, double t, double rotation[4],
+                                   double angular_velocity[3], double pivot[3])
+{
+    double matrix[9];
+    if (!model || index < 0 || index >= model->collider_count)
+        return false;
+    const drape_collider *collider = &model->colliders[index];
+    drape_turns_rotation(&collider->turns, t, matrix);
+    if (rotation)
+        drape_rotation_quaternion(matrix, rotation);
+    if (angular_velocity)
+        drape_turns_velocity(&collider->turns, t, angular_velocity);
+    if (pivot) {
+        drape_track_displacement(collider->track.keys, collider->track.key_count, t, pivot);
+        vec3_add_scaled(1, collider->pivot, pivot);
+    }
+    return true;
 }
 
 double drape_model_duration(const drape_model *model)

@@ -6,6 +6,7 @@
 #include "base/arena.h"
 #include "mesh/mesh.h"
 #include "mesh/sequence.h"
+#include "model/pose.h"
 #include "sparse/pattern.h"
 
 /* The patches of a term with parts: runs of consecutive elements with the same nodes. */
@@ -123,6 +124,19 @@ typedef struct drape_track {
     size_t key_count;
 } drape_track;
 
+/* A key of a rotation: from here to the next key it turns steadily, about one axis. */
+typedef struct drape_turn {
+    double time;        /* [s] */
+    double rotation[9]; /* row by row */
+    double axis[3];     /* of length 1, in space */
+    double degrees;     /* to the next key, of any size; 0 for the last */
+} drape_turn;
+
+typedef struct drape_turns {
+    drape_turn *keys;
+    size_t key_count;
+} drape_turns;
+
 /* One obstacle. */
 typedef struct drape_collider {
     const drape_collider_ops *ops;
@@ -136,6 +150,9 @@ typedef struct drape_collider {
     drape_sequence
         frames; /* of the points of its shape, in its own coordinates; none: it is rigid. Such shapes
                               keep a drape_mesh_distance of their triangles, and are not smooth */
+    drape_turns turns;  /* rotation about the pivot; no keys: it does not turn */
+    double pivot[3];    /* [m] in its own coordinates: the point that the track displaces */
+    double radius;      /* [m] of its shape's points around the pivot; of the scene, if it has none */
 } drape_collider;
 
 /* Resolved parameters of contact. */

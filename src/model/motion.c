@@ -2,6 +2,7 @@
 #include "model/motion.h"
 
 #include "base/finite.h"
+#include "base/rotation.h"
 #include "base/vec3.h"
 #include "model/track.h"
 
@@ -41,6 +42,8 @@ drape_status drape_motion_create(drape_arena *arena, const drape_model *model, d
     motion->pin_path = drape_arena_take(arena, pins, sizeof *motion->pin_path);
     motion->collider_path =
         drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->collider_path);
+    motion->collider_turn =
+        drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->collider_turn);
     motion->cloth_placed = drape_arena_take(arena, (size_t)model->cloth_count, sizeof *motion->cloth_placed);
     motion->collider_placed =
         drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->collider_placed);
@@ -89,9 +92,7 @@ static bool rests(const double v[3])
 
 void drape_placement_turn(const drape_placement *by, const double x[3], double y[3])
 {
-    const double from[3] = {x[0], x[1], x[2]};
-    for (int k = 0; k < 3; k++)
-        y[k] = vec3_dot(by->turn + 3 * k, from);
+    drape_rotation_turn(by->turn, x, y);
 }
 
 void drape_placement_move(const drape_placement *by, const double x[3], double y[3])
@@ -107,10 +108,7 @@ static void compose(const drape_placement *by, drape_placement *placed)
     both.given = true;
     if (placed->given) {
         drape_placement_move(by, placed->shift, both.shift);
-        for (int i = 0; i < 9; i++)
-            both.turn[i] = by->turn[i - i % 3] * placed->turn[i % 3] +
-                           by->turn[i - i % 3 + 1] * placed->turn[i % 3 + 3] +
-                           by->turn[i - i % 3 + 2] * placed->turn[i % 3 + 6];
+        drape_rotation_product(by->turn, placed->turn, both.turn);
     }
     *placed = both;
 }
@@ -129,6 +127,8 @@ static void place_path(const drape_placement *by, drape_path *path)
 typedef struct course {
     const drape_track *track; /* NULL: none */
     const drape_path *path;
+    const drape_turn_path *turn; /* of a collider; NULL: of a pin, which does not turn */
+    const drape_turns *turns;
     const drape_placement *placed;
     const double *rest; /* of a pin; NULL: displacements are asked for */
 } course;
@@ -163,17 +163,64 @@ static void velocity_on(const course *c, double t, double within, double v[3])
         drape_placement_turn(c->placed, v, v);
 }
 
+/* The rotation vector of a path at time t, and its rate. */
+static void turn_vector(const course *c, double t, double within, double turn[3], double rate[3])
+{
+    drape_path cubic = {.t = {c->path->t[0], c->path->t[1]}};
+    memcpy(cubic.x[1], c->turn->turn, sizeof cubic.x[1]);
+    memcpy(cubic.v, c->turn->rate, sizeof cubic.v);
+    path_displacement(&cubic, t, turn);
+    path_velocity(&cubic, t, within, rate);
+}
+
+static void rotation_on(const course *c, double t, double rotation[9])
+{
+    double turn[3], rate[3], further[9], track[9];
+    if (c->path->given) {
+        turn_vector(c, t, t, turn, rate);
+        drape_rotation_exp(turn, further);
+        drape_rotation_product(further, c->turn->from, rotation);
+        return;
+    }
+    drape_turns_rotation(c->turns, t, rotation);
+    if (!c->placed->given)
+        return;
+    memcpy(track, rotation, sizeof track);
+    drape_rotation_product(c->placed->turn, track, rotation);
+}
+
+static void spin_on(const course *c, double t, double within, double w[3])
+{
+    double turn[3], rate[3];
+    if (c->path->given) {
+        turn_vector(c, t, within, turn, rate);
+        drape_rotation_velocity(turn, rate, w);
+        return;
+    }
+    drape_turns_velocity(c->turns, within, w);
+    if (c->placed->given)
+        drape_placement_turn(c->placed, w, w);
+}
+
+static bool arrives_at_rest(const course *c)
+{
+    return rests(c->path->v[1]) && (!c->turn || rests(c->turn->rate[1]));
+}
+
 /* The end of a path is a kink unless it comes to rest there; its beginning is one unless it continues
  * smoothly. */
 static double next_kink_of(const course *c, double t, double end)
 {
     const drape_path *path = c->path;
     for (int i = 0; path->given && i < 2; i++)
-        if (path->t[i] > t && path->t[i] < end && !(i == 0 ? path->smooth : rests(path->v[1])))
+        if (path->t[i] > t && path->t[i] < end && !(i == 0 ? path->smooth : arrives_at_rest(c)))
             end = path->t[i];
     for (size_t i = 0; !path->given && c->track && i < c->track->key_count; i++)
         if (c->track->keys[i].time > t && c->track->keys[i].time < end)
             end = c->track->keys[i].time;
+    for (size_t i = 0; !path->given && c->turns && i < c->turns->key_count; i++)
+        if (c->turns->keys[i].time > t && c->turns->keys[i].time < end)
+            end = c->turns->keys[i].time;
     return end;
 }
 
@@ -181,9 +228,12 @@ static bool at_kink_of(const course *c, double t)
 {
     const drape_path *path = c->path;
     if (path->given)
-        return (t == path->t[0] && !path->smooth) || (t == path->t[1] && !rests(path->v[1]));
+        return (t == path->t[0] && !path->smooth) || (t == path->t[1] && !arrives_at_rest(c));
     for (size_t i = 0; c->track && i < c->track->key_count; i++)
         if (c->track->keys[i].time == t)
+            return true;
+    for (size_t i = 0; c->turns && i < c->turns->key_count; i++)
+        if (c->turns->keys[i].time == t)
             return true;
     return false;
 }
@@ -201,6 +251,20 @@ static bool leading_velocity(const course *c, double t, double v[3])
     return path->given || !c->track || c->track->key_count == 0;
 }
 
+/* The same for the angular velocity. */
+static bool leading_spin(const course *c, double t, double w[3])
+{
+    const drape_path *path = c->path;
+    double turn[3], rate[3];
+    if (!path->given || t != path->t[1]) {
+        spin_on(c, t, t, w);
+        return path->given ? t != path->t[0] || path->smooth : c->turns->key_count == 0;
+    }
+    turn_vector(c, t, path->t[0], turn, rate);
+    drape_rotation_velocity(turn, rate, w);
+    return true;
+}
+
 /* The path from the position at t to another one. */
 static drape_path path_to(const course *c, double t, double span, const double to[3], const double *v)
 {
@@ -212,6 +276,30 @@ static drape_path path_to(const course *c, double t, double span, const double t
         memcpy(next.v[1], v, sizeof next.v[1]);
     for (int k = 0; !v && k < 3; k++)
         next.v[0][k] = next.v[1][k] = (to[k] - next.x[0][k]) / span;
+    return next;
+}
+
+/* The rotation from that at t to another one. *smooth is cleared if it does not go on as before. */
+static drape_turn_path turn_to(const course *c, double t, double span, const double *rotation,
+                               const double *w, bool *smooth)
+{
+    drape_turn_path next = {.turn = {0}};
+    double between[9], before[3];
+    rotation_on(c, t, next.from);
+    const bool known = leading_spin(c, t, before);
+    if (!rotation) {
+        *smooth = *smooth && known && rests(before);
+        return next;
+    }
+    drape_rotation_between(rotation, next.from, between);
+    drape_rotation_log(between, next.turn);
+    if (w) {
+        *smooth = *smooth && known;
+        memcpy(next.rate[0], before, sizeof before);
+        drape_rotation_rate(next.turn, w, next.rate[1]);
+    }
+    for (int i = 0; !w && i < 6; i++)
+        next.rate[i / 3][i % 3] = next.turn[i % 3] / span;
     return next;
 }
 
@@ -296,6 +384,8 @@ void drape_motion_copy(drape_motion *motion, const drape_motion *from)
             motion->pin_path[find_place(motion, from->moved_node[i])] = from->pin_path[i];
     memcpy(motion->collider_path, from->collider_path,
            (size_t)m->collider_count * sizeof *motion->collider_path);
+    memcpy(motion->collider_turn, from->collider_turn,
+           (size_t)m->collider_count * sizeof *motion->collider_turn);
     memcpy(motion->collider_placed, from->collider_placed,
            (size_t)m->collider_count * sizeof *motion->collider_placed);
     memcpy(motion->cloth_placed, from->cloth_placed, (size_t)m->cloth_count * sizeof *motion->cloth_placed);
@@ -321,13 +411,23 @@ static course collider_course(const drape_motion *motion, int32_t collider)
 {
     return (course){.track = &motion->model->colliders[collider].track,
                     .path = &motion->collider_path[collider],
+                    .turn = &motion->collider_turn[collider],
+                    .turns = &motion->model->colliders[collider].turns,
                     .placed = &motion->collider_placed[collider]};
 }
 
 bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
 {
     const course c = collider_course(motion, collider);
-    return c.path->given || c.placed->given || c.track->key_count > 0;
+    return c.path->given || c.placed->given || c.track->key_count > 0 || c.turns->key_count > 0;
+}
+
+bool drape_motion_turns_collider(const drape_motion *motion, int32_t collider)
+{
+    const course c = collider_course(motion, collider);
+    if (c.path->given)
+        return !(rests(c.turn->turn) && rests(c.turn->rate[0]) && rests(c.turn->rate[1]));
+    return c.turns->key_count > 0;
 }
 
 void drape_motion_collider(const drape_motion *motion, int32_t collider, double t, double displacement[3])
@@ -343,6 +443,92 @@ void drape_motion_collider_velocity(const drape_motion *motion, int32_t collider
     velocity_on(&c, t, within, v);
 }
 
+void drape_motion_rotation(const drape_motion *motion, int32_t collider, double t, double rotation[9])
+{
+    const course c = collider_course(motion, collider);
+    rotation_on(&c, t, rotation);
+}
+
+void drape_motion_spin(const drape_motion *motion, int32_t collider, double t, double within, double w[3])
+{
+    const course c = collider_course(motion, collider);
+    spin_on(&c, t, within, w);
+}
+
+void drape_motion_pose(const drape_motion *motion, int32_t collider, double t, double within,
+                       drape_collider_pose *pose)
+{
+    const course c = collider_course(motion, collider);
+    double displacement[3], v[3], rotation[9], w[3];
+    *pose = (drape_collider_pose){.t = t};
+    if (!drape_motion_moves_collider(motion, collider))
+        return;
+    position_on(&c, t, displacement);
+    velocity_on(&c, t, within, v);
+    rotation_on(&c, t, rotation);
+    spin_on(&c, t, within, w);
+    drape_pose_about(pose, motion->model->colliders[collider].pivot, rotation, displacement, v, w);
+}
+
+void drape_motion_mean_pose(const drape_motion *motion, int32_t collider, double t, const double span[2],
+                            drape_collider_pose *pose)
+{
+    static const double zero[9];
+    drape_collider_pose from, to;
+    drape_motion_pose(motion, collider, t, t, pose);
+    memset(pose->velocity, 0, sizeof pose->velocity);
+    drape_pose_set_gradient(pose, zero);
+    if (!(span[1] > span[0]) || !drape_motion_moves_collider(motion, collider))
+        return;
+    drape_motion_pose(motion, collider, span[0], span[0], &from);
+    drape_motion_pose(motion, collider, span[1], span[1], &to);
+    drape_pose_set_mean_velocities(pose, &from, &to, span[1] - span[0]);
+}
+
+/* The rate of the rotation vector v of a path is a parabola: it stays in the hull of the control points of its
+ * Bezier form. |w| <= |dv/dt|, since w is a mean of rotated dv/dt. */
+double drape_motion_fastest_spin(const drape_motion *motion, int32_t collider, double t0, double t1)
+{
+    const course c = collider_course(motion, collider);
+    const drape_path *path = c.path;
+    if (!path->given)
+        return drape_turns_fastest(c.turns);
+    if (t1 <= path->t[0] || t0 >= path->t[1])
+        return 0;
+    const double h = path->t[1] - path->t[0];
+    double control[3], fastest = 0;
+    for (int k = 0; k < 3; k++)
+        control[k] = 3 * c.turn->turn[k] / h - c.turn->rate[0][k] - c.turn->rate[1][k];
+    fastest = fmax(vec3_norm(c.turn->rate[0]), vec3_norm(c.turn->rate[1]));
+    return fmax(fastest, vec3_norm(control));
+}
+
+double drape_motion_collider_work(const drape_motion *motion, const drape_load *load, double t0, double t1)
+{
+    double work = 0;
+    for (int32_t c = 0; load && c < motion->model->collider_count; c++) {
+        drape_collider_pose before, after;
+        if (!drape_motion_moves_collider(motion, c))
+            continue;
+        drape_motion_pose(motion, c, t0, t0, &before);
+        drape_motion_pose(motion, c, t1, t1, &after);
+        drape_load_add_work(&load[c], &before, &after, &work);
+    }
+    return work;
+}
+
+double drape_motion_collider_power(const drape_motion *motion, const drape_load *load, double t,
+                                   double within)
+{
+    double power = 0;
+    for (int32_t c = 0; load && c < motion->model->collider_count; c++) {
+        drape_collider_pose pose;
+        drape_motion_pose(motion, c, t, within, &pose);
+        drape_load_add_power(&load[c], &pose, &power);
+    }
+    return power;
+}
+
 void drape_motion_collider_arrival(const drape_motion *motion, int32_t collider, double t, double v[3])
 {
     const course c = collider_course(motion, collider);
@@ -351,10 +537,22 @@ void drape_motion_collider_arrival(const drape_motion *motion, int32_t collider,
 }
 
 void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t, double span,
-                                const double x[3], const double *v)
+                                const double x[3], const double *v, const double *rotation, const double *w)
 {
     const course c = collider_course(motion, collider);
-    motion->collider_path[collider] = path_to(&c, t, span, x, v);
+    drape_path path = path_to(&c, t, span, x, v);
+    motion->collider_turn[collider] = turn_to(&c, t, span, rotation, v ? w : NULL, &path.smooth);
+    motion->collider_path[collider] = path;
+}
+
+static void place_turn(const drape_placement *by, drape_turn_path *turn)
+{
+    double from[9];
+    memcpy(from, turn->from, sizeof from);
+    drape_rotation_product(by->turn, from, turn->from);
+    drape_placement_turn(by, turn->turn, turn->turn);
+    for (int i = 0; i < 2; i++)
+        drape_placement_turn(by, turn->rate[i], turn->rate[i]);
 }
 
 bool drape_motion_deforms(const drape_motion *motion, int32_t collider)
@@ -383,6 +581,7 @@ void drape_motion_place_collider(drape_motion *motion, int32_t collider, const d
 {
     compose(by, &motion->collider_placed[collider]);
     place_path(by, &motion->collider_path[collider]);
+    place_turn(by, &motion->collider_turn[collider]);
 }
 
 /* ---- Checkpoints ---- */
@@ -408,6 +607,18 @@ static void archive_path(drape_path *path, drape_archive *a)
     }
     if (drape_archive_has_read(a) && !is_path(path))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid path");
+}
+
+static void archive_turn(drape_turn_path *turn, drape_archive *a)
+{
+    drape_archive_doubles(a, turn->from, 9);
+    drape_archive_doubles(a, turn->turn, 3);
+    for (int i = 0; i < 2; i++)
+        drape_archive_doubles(a, turn->rate[i], 3);
+    if (drape_archive_has_read(a) &&
+        !(drape_all_finite(turn->from, 9) && drape_all_finite(turn->turn, 3) &&
+          drape_all_finite(turn->rate[0], 3) && drape_all_finite(turn->rate[1], 3)))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a rotation that is not finite");
 }
 
 static void archive_placement(drape_placement *placed, drape_archive *a)
@@ -453,6 +664,8 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
     }
     for (int32_t c = 0; c < motion->model->collider_count && drape_archive_good(a); c++) {
         archive_path(&motion->collider_path[c], a);
+        if (motion->collider_path[c].given && drape_archive_good(a))
+            archive_turn(&motion->collider_turn[c], a);
         archive_placement(&motion->collider_placed[c], a);
         drape_deformation_archive(&motion->deformation[c], a);
     }

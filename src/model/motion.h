@@ -19,12 +19,23 @@ typedef struct drape_path {
     double v[2][3]; /* [m/s] */
 } drape_path;
 
+/* The rotation of a collider on its path, at time t that of a rotation vector after `from`. The vector is a
+ * cubic in time, 0 at the beginning, given by its value at the end and its rates at both: a steady turn about
+ * one axis if the rates are equal to the value over the time. */
+typedef struct drape_turn_path {
+    double from[9];    /* rotation, row by row */
+    double turn[3];    /* rotation vector [rad] at the end */
+    double rate[2][3]; /* [rad/s] of the vector at both ends */
+} drape_turn_path;
+
 /* A rigid motion, x -> turn x + shift, by which a host placed cloth or colliders elsewhere. */
 typedef struct drape_placement {
     bool given;      /* if not, nothing was placed */
     double turn[9];  /* a rotation, row by row */
     double shift[3]; /* [m] */
 } drape_placement;
+
+#define DRAPE_MAX_SPIN 1e4 /* [rad/s] of a collider: a step looks at each part of a turn */
 
 typedef struct drape_motion {
     const drape_model *model;
@@ -35,8 +46,10 @@ typedef struct drape_motion {
     drape_path *pin_path;             /* (number of pinned nodes) */
     drape_path *collider_path;        /* (collider_count) */
     drape_deformation *deformation;   /* (collider_count) */
+    drape_turn_path *collider_turn;   /* (collider_count) with the times of collider_path, if that is given */
     drape_placement *cloth_placed;    /* (cloth_count) of rest positions and tracks; paths have it in them */
-    drape_placement *collider_placed; /* (collider_count) of displacements on tracks */
+    drape_placement *collider_placed; /* (collider_count) of displacements on tracks; its turn also of
+                                         rotations */
 } drape_motion;
 
 drape_status drape_motion_create(drape_arena *arena, const drape_model *model, drape_motion **out);
@@ -51,11 +64,35 @@ void drape_motion_place_pins(const drape_motion *motion, double t, double *x);
  * `within`: at a kink there are two velocities, and the velocity at the kink itself is the later one. */
 void drape_motion_pin_velocity(const drape_motion *motion, int32_t i, double t, double within, double v[3]);
 
-/* Whether a collider ever moves; its displacement; and its velocity, as above. */
+/* Whether a collider ever moves; whether it turns on its track or path; and the displacement of its pivot at
+ * time t. */
 bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider);
+bool drape_motion_turns_collider(const drape_motion *motion, int32_t collider);
 void drape_motion_collider(const drape_motion *motion, int32_t collider, double t, double displacement[3]);
+
+/* The velocity of that, `within` as above. */
 void drape_motion_collider_velocity(const drape_motion *motion, int32_t collider, double t, double within,
                                     double v[3]);
+
+/* The pose of a collider at time t: with its velocities there, `within` as above; or with the mean ones from
+ * span[0] to span[1], 0 if these are equal. */
+void drape_motion_pose(const drape_motion *motion, int32_t collider, double t, double within,
+                       drape_collider_pose *pose);
+void drape_motion_mean_pose(const drape_motion *motion, int32_t collider, double t, const double span[2],
+                            drape_collider_pose *pose);
+
+/* Its rotation about the pivot, and its angular velocity [rad/s]. */
+void drape_motion_rotation(const drape_motion *motion, int32_t collider, double t, double rotation[9]);
+void drape_motion_spin(const drape_motion *motion, int32_t collider, double t, double within, double w[3]);
+
+/* An upper bound of its angular velocity [rad/s] from t0 to t1, between which there is no kink. */
+double drape_motion_fastest_spin(const drape_motion *motion, int32_t collider, double t0, double t1);
+
+/* The work of forces on colliders (collider_count; NULL: none) while they go from where they are at t0 to where
+ * they are at t1 [J], and their power at time t [W], `within` as above. */
+double drape_motion_collider_work(const drape_motion *motion, const drape_load *load, double t0, double t1);
+double drape_motion_collider_power(const drape_motion *motion, const drape_load *load, double t,
+                                   double within);
 
 /* Writes the positions of the points of a collider with frames at time t, in its own coordinates, and their
  * velocities there as above. */
@@ -76,19 +113,21 @@ bool drape_motion_at_kink(const drape_motion *motion, double t);
 
 /* Move a pinned node on a user-defined path from now on: from its position at time t, on a cubic, to the
  * position x and the velocity v at t + span [s]; if v is NULL, on a straight line at constant speed. For a
- * collider x is a displacement. */
+ * collider x is the displacement of its pivot. It turns by the shortest turn to the given rotation, with the
+ * angular velocity w at the end, or steadily if v is NULL; if the rotation is NULL, it keeps that of time t. */
 void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double span, const double x[3],
                            const double *v);
 void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t, double span,
-                                const double x[3], const double *v);
+                                const double x[3], const double *v, const double *rotation, const double *w);
 
-/* The velocities with which a pinned node and a collider come to where they are at time t; 0 at a key of a
- * track. */
+/* The velocities with which a pinned node and the pivot of a collider come to where they are at time t; 0 at a
+ * key of a track. */
 void drape_motion_pin_arrival(const drape_motion *motion, int32_t node, double t, double v[3]);
 void drape_motion_collider_arrival(const drape_motion *motion, int32_t collider, double t, double v[3]);
 
 /* Places the pins of a cloth, or a collider, elsewhere: their rest positions, tracks and paths, past and
- * future, are moved as one. For a collider the placement acts on displacements. */
+ * future, are moved as one. For a collider the placement acts on displacements, and its turn on
+ * rotations. */
 void drape_motion_place_cloth(drape_motion *motion, int32_t cloth, const drape_placement *by);
 void drape_motion_place_collider(drape_motion *motion, int32_t collider, const drape_placement *by);
 

@@ -37,15 +37,16 @@ void drape_scene_print(drape_scene *scene, drape_text_sink *sink, void *user);
 
 /* The JSON form of a key's value. */
 typedef enum drape_scene_shape {
-    DRAPE_SCENE_VALUE,   /* a value of the parameter */
-    DRAPE_SCENE_LIST,    /* an array of such values, integers or texts */
-    DRAPE_SCENE_VERSION, /* the number DRAPE_SCENE_FORM; not stored in the def */
-    DRAPE_SCENE_REMARK,  /* a string for people; not stored in the def */
-    DRAPE_SCENE_BOX,     /* two corners of a pin's box */
-    DRAPE_SCENE_TRACK,   /* an array of [time, [x, y, z]], times increasing */
-    DRAPE_SCENE_OBJECT,  /* a child object */
-    DRAPE_SCENE_OBJECTS, /* an array of child objects */
-    DRAPE_SCENE_ENTRIES  /* an array of child objects, or of names as a short form for objects with only a
+    DRAPE_SCENE_VALUE,      /* a value of the parameter */
+    DRAPE_SCENE_LIST,       /* an array of such values, integers or texts */
+    DRAPE_SCENE_VERSION,    /* the number DRAPE_SCENE_FORM; not stored in the def */
+    DRAPE_SCENE_REMARK,     /* a string for people; not stored in the def */
+    DRAPE_SCENE_BOX,        /* two corners of a pin's box */
+    DRAPE_SCENE_TRACK,      /* an array of [time, [x, y, z]], times increasing */
+    DRAPE_SCENE_QUATERNION, /* four numbers, [w, x, y, z] */
+    DRAPE_SCENE_OBJECT,     /* a child object */
+    DRAPE_SCENE_OBJECTS,    /* an array of child objects */
+    DRAPE_SCENE_ENTRIES     /* an array of child objects, or of names as a short form for objects with only a
                             "type" */
 } drape_scene_shape;
 
@@ -89,7 +90,7 @@ typedef struct drape_scene_object {
 
 /* The top-level object and some of its descendants. */
 extern const drape_scene_object drape_form_scene, drape_form_output, drape_form_cloth, drape_form_mesh,
-    drape_form_transform, drape_form_pin, drape_form_collider, drape_form_event;
+    drape_form_transform, drape_form_pin, drape_form_turn, drape_form_collider, drape_form_event;
 
 /* Returns the key of an object by its name; NULL if there is none. */
 const drape_scene_key *drape_scene_key_of(const drape_scene_object *object, const char *name);

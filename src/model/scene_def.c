@@ -63,7 +63,7 @@ bool drape_scene_value(const drape_scene_key *key, const void *def, drape_settin
     case DRAPE_PARAM_TURN:
         out->vector = (const double *)(const void *)at;
         out->vector_count = key->param.kind == DRAPE_PARAM_TURN ? 4 : 3;
-        return true;
+        return !isnan(*out->vector);
     case DRAPE_PARAM_CHOICE:
     case DRAPE_PARAM_TEXT:
         memcpy(&out->text, at, sizeof out->text);
@@ -210,6 +210,7 @@ void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size)
                                          [DRAPE_SCENE_REMARK] = "a string",
                                          [DRAPE_SCENE_BOX] = "two corners, [[x, y, z], [x, y, z]]",
                                          [DRAPE_SCENE_TRACK] = "an array of [time, [x, y, z]]",
+                                         [DRAPE_SCENE_QUATERNION] = "four numbers, [w, x, y, z]",
                                          [DRAPE_SCENE_OBJECT] = "an object",
                                          [DRAPE_SCENE_OBJECTS] = "an array of objects",
                                          [DRAPE_SCENE_ENTRIES] =

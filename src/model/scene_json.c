@@ -246,6 +246,18 @@ static drape_status read_box(reader *r, const drape_scene_key *key, json_t *valu
     return DRAPE_OK;
 }
 
+static drape_status read_quaternion(reader *r, const drape_scene_key *key, json_t *value, char *def)
+{
+    double q[4];
+    if (json_array_size(value) != 4)
+        return refuse(r, key, value);
+    const drape_status status = read_numbers(r, value, q);
+    if (!status && q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0)
+        return refuse_as(r, value, key->param.name, "four numbers, [w, x, y, z], not all of them 0");
+    memcpy(def + key->offset, q, sizeof q);
+    return status;
+}
+
 /* ---- Arrays ---- */
 
 /* Allocates an array with as many elements as value and stores it in the def; refuses a value that is not an
@@ -444,7 +456,7 @@ static drape_status read_value(reader *r, const drape_scene_key *key, json_t *va
         [DRAPE_SCENE_VERSION] = read_version,  [DRAPE_SCENE_REMARK] = read_remark,
         [DRAPE_SCENE_BOX] = read_box,          [DRAPE_SCENE_TRACK] = read_track,
         [DRAPE_SCENE_OBJECT] = read_child,     [DRAPE_SCENE_OBJECTS] = read_children,
-        [DRAPE_SCENE_ENTRIES] = read_children,
+        [DRAPE_SCENE_ENTRIES] = read_children, [DRAPE_SCENE_QUATERNION] = read_quaternion,
     };
     return readers[key->shape](r, key, value, def);
 }

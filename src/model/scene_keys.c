@@ -136,6 +136,19 @@ const drape_scene_object drape_form_cloth = {.name = "cloth",
 
 /* ---- Colliders and contact ---- */
 
+static const drape_scene_key turn_keys[] = {
+    {DRAPE_NUMBER("time", "s", DRAPE_REQUIRED, LOWEST, HIGHEST, "greater than that of the key before"),
+     IN(drape_turn_key, time)},
+    {DRAPE_TURN("rotate", 0, LOWEST, HIGHEST,
+                "axis and angle of any size, or a vector along the axis whose length is the angle"),
+     IN(drape_turn_key, rotate)},
+    {SHAPED(DRAPE_SCENE_QUATERNION, "quaternion", UNSAID, "the rotation as a quaternion"),
+     IN(drape_turn_key, quaternion)},
+};
+static const char *const turn_forms[] = {"rotate", "quaternion", NULL};
+const drape_scene_object drape_form_turn = {
+    .name = "turn", KEYS(turn_keys), .one_of = turn_forms, .def_size = sizeof(drape_turn_key)};
+
 static const drape_scene_key collider_keys[] = {
     {DRAPE_TEXT("type", "name of a collider; its parameters are keys beside it"),
      IN(drape_collider_def, entry.type)},
@@ -149,6 +162,12 @@ static const drape_scene_key collider_keys[] = {
     {DRAPE_VECTOR("track", "s and m", DRAPE_DERIVED("none: it does not move"), LOWEST, HIGHEST,
                   "displacement from the position that its parameters define, linear between the times"),
      .shape = DRAPE_SCENE_TRACK, ARRAY(drape_collider_def, track, key_count), .at_least = 1},
+    {SHAPED(DRAPE_SCENE_OBJECTS, "turns", DRAPE_DERIVED("none: it does not turn"),
+            "rotation about the pivot, steady between the times"),
+     ARRAY(drape_collider_def, turns, turn_count), .at_least = 1, .child = &drape_form_turn},
+    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the middle of its shape; of a plane, the origin"), LOWEST,
+                  HIGHEST, "the point about which it turns, where its parameters define it"),
+     IN(drape_collider_def, pivot)},
 };
 
 const drape_scene_object drape_form_collider = {

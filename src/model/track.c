@@ -1,6 +1,14 @@
 /* track.c: see track.h. */
 #include "model/track.h"
 
+#include "base/rotation.h"
+#include "base/vec3.h"
+#include "mesh/mesh.h"
+
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
 /* Returns the last key at or before t; -1 if t is before the first. */
 static int64_t key_before(const drape_track_key *keys, size_t key_count, double t)
 {
@@ -18,6 +26,10 @@ static int64_t key_before(const drape_track_key *keys, size_t key_count, double 
 void drape_track_displacement(const drape_track_key *keys, size_t key_count, double t, double displacement[3])
 {
     int64_t k = key_before(keys, key_count, t);
+    if (key_count == 0) {
+        memset(displacement, 0, 3 * sizeof *displacement);
+        return;
+    }
     int64_t a = k < 0 ? 0 : k, b = k + 1 < (int64_t)key_count ? k + 1 : a;
     double share = a == b ? 0 : (t - keys[a].time) / (keys[b].time - keys[a].time);
     for (int i = 0; i < 3; i++)
@@ -33,4 +45,54 @@ void drape_track_velocity(const drape_track_key *keys, size_t key_count, double 
         velocity[i] = inside ? (keys[k + 1].displacement[i] - keys[k].displacement[i]) /
                                    (keys[k + 1].time - keys[k].time)
                              : 0;
+}
+
+/* ---- Rotations ---- */
+
+/* Returns the last key at or before t, at least the first, and how much of the time to the next has gone. */
+static const drape_turn *turn_before(const drape_turns *turns, double t, double *share)
+{
+    const drape_turn *key = turns->keys, *last = turns->keys + turns->key_count - 1;
+    while (key < last && key[1].time <= t)
+        key++;
+    *share = key < last && t > key->time ? (t - key->time) / (key[1].time - key->time) : 0;
+    return key;
+}
+
+void drape_turns_rotation(const drape_turns *turns, double t, double rotation[9])
+{
+    static const double none[9] = DRAPE_NO_ROTATION;
+    double share, matrix[3][3], further[9];
+    memcpy(rotation, none, sizeof none);
+    if (turns->key_count == 0)
+        return;
+    const drape_turn *key = turn_before(turns, t, &share);
+    if (share == 0 || key->degrees == 0) {
+        memcpy(rotation, key->rotation, sizeof key->rotation);
+        return;
+    }
+    drape_rotation_matrix((const double[]){key->axis[0], key->axis[1], key->axis[2], share * key->degrees},
+                          matrix);
+    memcpy(further, matrix, sizeof further);
+    drape_rotation_product(further, key->rotation, rotation);
+}
+
+void drape_turns_velocity(const drape_turns *turns, double t, double velocity[3])
+{
+    double share;
+    memset(velocity, 0, 3 * sizeof *velocity);
+    if (turns->key_count == 0 || t < turns->keys->time)
+        return;
+    const drape_turn *key = turn_before(turns, t, &share);
+    if (key < turns->keys + turns->key_count - 1)
+        vec3_add_scaled(key->degrees * (PI / 180) / (key[1].time - key->time), key->axis, velocity);
+}
+
+double drape_turns_fastest(const drape_turns *turns)
+{
+    double fastest = 0;
+    for (size_t k = 0; k + 1 < turns->key_count; k++)
+        fastest = fmax(fastest, fabs(turns->keys[k].degrees) * (PI / 180) /
+                                    (turns->keys[k + 1].time - turns->keys[k].time));
+    return fastest;
 }

@@ -1,15 +1,25 @@
-/* track.h: the displacement of a pin or a collider as a piecewise linear function of time. */
+/* track.h: the displacement of a pin or a collider as a piecewise linear function of time, and the rotation of
+ * a collider as a piecewise steady one. */
 #ifndef DRAPE_MODEL_TRACK_H
 #define DRAPE_MODEL_TRACK_H
 
-#include "drape/drape.h"
+#include "model/model.h"
 
 /* Computes the displacement [m] at time t [s]: linear between keys, constant before the first and after the
- * last. */
+ * last, 0 without keys. */
 void drape_track_displacement(const drape_track_key *keys, size_t key_count, double t,
                               double displacement[3]);
 
 /* Computes the slope [m/s] at a time between two keys; 0 before the first and after the last. */
 void drape_track_velocity(const drape_track_key *keys, size_t key_count, double t, double velocity[3]);
+
+/* Computes the rotation (3 x 3, row by row) at time t [s]; I without keys. */
+void drape_turns_rotation(const drape_turns *turns, double t, double rotation[9]);
+
+/* Computes the angular velocity [rad/s] at a time between two keys; 0 before the first and after the last. */
+void drape_turns_velocity(const drape_turns *turns, double t, double velocity[3]);
+
+/* The largest angular velocity between keys [rad/s]. */
+double drape_turns_fastest(const drape_turns *turns);
 
 #endif

@@ -1,12 +1,16 @@
 /* host.c: what a host may change while a sim runs: pins, colliders, forces and the medium; and the forces
  * that it may read. */
 #include "base/finite.h"
+#include "base/rotation.h"
+#include "base/vec3.h"
 #include "sim/place.h"
 
 #include <math.h>
 
 #define MAX_SECONDS  1e9 /* [s] the limit of a scene's duration */
 #define MAX_DISTANCE 1e9 /* [m], [m/s] the limit of a track's keys */
+#define MAX_SPIN     DRAPE_MAX_SPIN
+#define MIN_SQUARES  1e-2 /* of the length of a quaternion that is meant to be 1 */
 
 static bool is_within_limits(const double *x, const double *v)
 {
@@ -75,25 +79,66 @@ static drape_status check_collider(const drape_sim *sim, const char *function, i
                       (int)collider, (int)sim->model->collider_count);
 }
 
+/* Where the pivot of a collider is. */
+static void pivot_of(const drape_sim *sim, int32_t collider, double pivot[3])
+{
+    drape_motion_collider(drape_system_motion(sim->system), collider, drape_sim_state(sim)->t, pivot);
+    vec3_add_scaled(1, sim->model->colliders[collider].pivot, pivot);
+}
+
+static drape_status send_collider(drape_sim *sim, const char *function, int32_t collider, double seconds,
+                                  const drape_sent *to)
+{
+    drape_status status = check_collider(sim, function, collider);
+    if (!status)
+        status = check_seconds(sim, function, seconds);
+    if (!status && !is_within_limits(to->displacement, to->velocity))
+        status =
+            drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                       "%s: displacement and velocity must be within %g m and m/s", function, MAX_DISTANCE);
+    if (!status)
+        status = drape_sim_teleport_collider(sim, collider, seconds, to);
+    if (!status)
+        drape_motion_send_collider(drape_system_steer(sim->system), collider, drape_sim_state(sim)->t,
+                                   seconds, to->displacement, to->velocity, to->rotation,
+                                   to->angular_velocity);
+    return status;
+}
+
 drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double seconds,
                                      const double displacement[3], const double *velocity)
 {
-    drape_status guarded = drape_sim_guard(sim, "drape_sim_move_collider");
+    const drape_sent to = {.displacement = displacement, .velocity = velocity};
+    const drape_status guarded = drape_sim_guard(sim, "drape_sim_move_collider");
+    return guarded ? guarded : send_collider(sim, "drape_sim_move_collider", collider, seconds, &to);
+}
+
+drape_status drape_sim_move_collider_pose(drape_sim *sim, int32_t collider, double seconds,
+                                          const double displacement[3], const double rotation[4],
+                                          const double *velocity, const double *angular_velocity)
+{
+    static const char function[] = "drape_sim_move_collider_pose";
+    double squares = 0, matrix[9];
+    const drape_sent to = {displacement, velocity, matrix, angular_velocity};
+    const drape_status guarded = drape_sim_guard(sim, function);
     if (guarded)
         return guarded;
-    drape_status status = check_collider(sim, "drape_sim_move_collider", collider);
-    if (!status)
-        status = check_seconds(sim, "drape_sim_move_collider", seconds);
-    if (!status && !is_within_limits(displacement, velocity))
-        status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                            "drape_sim_move_collider: displacement and velocity must be within %g m and m/s",
-                            MAX_DISTANCE);
-    if (!status)
-        status = drape_sim_teleport_collider(sim, collider, seconds, displacement, velocity);
-    if (!status)
-        drape_motion_send_collider(drape_system_steer(sim->system), collider, drape_sim_state(sim)->t,
-                                   seconds, displacement, velocity);
-    return status;
+    for (int i = 0; rotation && i < 4; i++)
+        squares += rotation[i] * rotation[i];
+    if (!(squares > MIN_SQUARES && squares < 1 / MIN_SQUARES))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "%s: the rotation is a quaternion w x y z of length 1; this one has %g", function,
+                          sqrt(squares));
+    if (!velocity != !angular_velocity)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "%s: velocity and angular velocity are given both, or neither", function);
+    for (int k = 0; angular_velocity && k < 3; k++)
+        if (!(fabs(angular_velocity[k]) <= MAX_SPIN))
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                              "%s: angular_velocity[%d] = %g rad/s; it is within %g", function, k,
+                              angular_velocity[k], MAX_SPIN);
+    drape_rotation_of_quaternion(rotation, matrix);
+    return send_collider(sim, function, collider, seconds, &to);
 }
 
 drape_collider_motion drape_sim_collider(const drape_sim *sim, int32_t collider)
@@ -168,6 +213,24 @@ int32_t drape_model_collider_points(const drape_model *model, int32_t collider)
         return -1;
     return model->colliders[collider].frames.frame_count > 0 ? model->colliders[collider].shape.point_count
                                                              : 0;
+}
+
+bool drape_sim_collider_rotation(const drape_sim *sim, int32_t collider, double rotation[4],
+                                 double angular_velocity[3], double pivot[3])
+{
+    double matrix[9];
+    if (!sim || collider < 0 || collider >= sim->model->collider_count)
+        return false;
+    const double t = drape_sim_state(sim)->t;
+    const drape_motion *motion = drape_system_motion(sim->system);
+    drape_motion_rotation(motion, collider, t, matrix);
+    if (rotation)
+        drape_rotation_quaternion(matrix, rotation);
+    if (angular_velocity)
+        drape_motion_spin(motion, collider, t, t, angular_velocity);
+    if (pivot)
+        pivot_of(sim, collider, pivot);
+    return true;
 }
 
 /* ---- Forces ---- */
@@ -276,24 +339,56 @@ drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)
     return read_status(sim);
 }
 
-drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3])
+/* The forces of cloth on a collider, with the sign of g. */
+static drape_status read_load(drape_sim *sim, const char *function, int32_t collider, drape_load *load)
 {
     drape_point point;
-    drape_status status = drape_sim_guard(sim, "drape_sim_collider_force");
-    if (status)
-        return status;
-    if (!force)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_force: the array is NULL");
-    status = check_collider(sim, "drape_sim_collider_force", collider);
+    drape_status status = check_collider(sim, function, collider);
     if (!status)
-        status = check_has_contact(sim, "drape_sim_collider_force");
+        status = check_has_contact(sim, function);
     if (!status)
         status = place(sim, &point);
     if (status)
         return status;
     drape_system_contact_part(sim->system, &point, true, sim->query_scratch, NULL);
-    const double *on = drape_system_on_colliders(sim->system);
-    for (int k = 0; k < 3; k++)
-        force[k] = on && on[3 * collider + k] != 0 ? -on[3 * collider + k] : 0;
+    const drape_load *on = drape_system_on_colliders(sim->system);
+    *load = on ? on[collider] : (drape_load){.force = {0}};
     return read_status(sim);
+}
+
+drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3])
+{
+    drape_load load;
+    drape_status status = drape_sim_guard(sim, "drape_sim_collider_force");
+    if (status)
+        return status;
+    if (!force)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_force: the array is NULL");
+    status = read_load(sim, "drape_sim_collider_force", collider, &load);
+    for (int k = 0; !status && k < 3; k++)
+        force[k] = load.force[k] != 0 ? -load.force[k] : 0;
+    return status;
+}
+
+drape_status drape_sim_collider_torque(drape_sim *sim, int32_t collider, const double *about,
+                                       double torque[3])
+{
+    drape_load load;
+    drape_collider_pose pose;
+    double center[3];
+    drape_status status = drape_sim_guard(sim, "drape_sim_collider_torque");
+    if (status)
+        return status;
+    if (!torque)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_torque: the array is NULL");
+    status = read_load(sim, "drape_sim_collider_torque", collider, &load);
+    if (status)
+        return status;
+    const double t = drape_sim_state(sim)->t;
+    drape_motion_pose(drape_system_motion(sim->system), collider, t, t, &pose);
+    pivot_of(sim, collider, center);
+    drape_load_torque(&load, &pose, about ? about : center, torque);
+    for (int k = 0; k < 3; k++)
+        torque[k] = torque[k] != 0 ? -torque[k] : 0;
+    return DRAPE_OK;
 }

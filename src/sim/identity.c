@@ -99,7 +99,16 @@ static uint64_t add_collider(uint64_t hash, const drape_collider *collider)
                        3 * (size_t)collider->frames.frame_count * (size_t)collider->frames.node_count);
     hash = add_doubles(hash, &collider->friction, 1);
     hash = add_doubles(hash, &collider->restitution, 1);
-    return add_track(hash, &collider->track);
+    hash = add_track(hash, &collider->track);
+    hash = add_integer(hash, (int64_t)collider->turns.key_count);
+    for (size_t k = 0; k < collider->turns.key_count; k++) {
+        const drape_turn *turn = &collider->turns.keys[k];
+        hash = add_doubles(hash, &turn->time, 1);
+        hash = add_doubles(hash, turn->rotation, 9);
+        hash = add_doubles(hash, turn->axis, 3);
+        hash = add_doubles(hash, &turn->degrees, 1);
+    }
+    return add_doubles(hash, collider->pivot, 3);
 }
 
 static uint64_t add_contact(uint64_t hash, const drape_contact_def *c)

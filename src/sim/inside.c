@@ -68,8 +68,8 @@ static drape_status intersect(drape_arena *arena, search *s)
     s->middle = drape_arena_take(arena, triangles, 3 * sizeof *s->middle);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    for (size_t i = 0; i < 3 * points; i++)
-        x[i] = shape->point[i] + s->pose->displacement[i % 3];
+    for (size_t i = 0; i < points; i++)
+        drape_collider_point(s->collider, s->pose, (int32_t)i, x + 3 * i);
     s->obstacle = (drape_surface){.x = x,
                                   .edge = shape->segment,
                                   .triangle = shape->triangle,
@@ -186,9 +186,9 @@ drape_status drape_sim_find_inside(const drape_sim *sim, int32_t collider, drape
 {
     if (!sim || collider < 0 || collider >= sim->model->collider_count)
         return DRAPE_E_ARGUMENT;
-    const drape_collider_motion motion = drape_sim_collider(sim, collider);
-    drape_collider_pose pose = {{0}, {0}};
-    memcpy(pose.displacement, motion.displacement, sizeof pose.displacement);
+    const double t = drape_sim_time(sim);
+    drape_collider_pose pose;
+    drape_motion_pose(drape_system_motion(sim->system), collider, t, t, &pose);
     return drape_find_inside(sim->ctx, sim->model, collider, &pose, drape_sim_positions(sim), found);
 }
 

@@ -6,6 +6,7 @@
 #include "sim/place.h"
 
 #include "base/def.h"
+#include "base/rotation.h"
 #include "mesh/mesh.h"
 
 #include <math.h>
@@ -48,29 +49,18 @@ static drape_status check_list(const drape_sim *sim, const char *what, const dra
     return DRAPE_OK;
 }
 
-static bool turns(const drape_placement *by)
+/* The same motion as one of the displacement of a collider's pivot. */
+static drape_placement place_displacement(const drape_sim *sim, int32_t collider, const drape_placement *by)
 {
-    bool turned = false;
-    for (int i = 0; i < 9; i++)
-        turned = turned || by->turn[i] != (i % 4 == 0);
-    return turned;
-}
-
-/* The same motion as one of displacements: a collider's own coordinates do not turn. False: the collider
- * would have to. */
-static bool place_displacement(const drape_sim *sim, int32_t collider, const drape_placement *by,
-                               drape_placement *out)
-{
-    const drape_collider *c = &sim->model->colliders[collider];
-    double shift[3];
-    *out = *by;
-    if (!turns(by))
-        return true;
-    if (!c->ops->turned || !c->ops->turned(c->values, &c->shape, by->turn, shift))
-        return false;
+    const double *pivot = sim->model->colliders[collider].pivot;
+    drape_placement own = *by;
+    double turned[3];
+    if (drape_rotation_is_none(by->turn))
+        return own;
+    drape_placement_turn(by, pivot, turned);
     for (int k = 0; k < 3; k++)
-        out->shift[k] += shift[k];
-    return true;
+        own.shift[k] += turned[k] - pivot[k];
+    return own;
 }
 
 static bool is_far(const double *x)
@@ -82,22 +72,15 @@ static drape_status check_colliders(const drape_sim *sim, const drape_place_list
                                     const drape_placement *by)
 {
     for (int32_t c = 0; c < sim->model->collider_count; c++) {
-        const drape_collider *collider = &sim->model->colliders[c];
-        drape_placement own;
         double at[3];
         if (!has(colliders, c))
             continue;
-        if (!place_displacement(sim, c, by, &own))
-            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                              "drape_sim_place: %s is a %s that would not look the same after this rotation, "
-                              "and colliders do not turn: spheres may be turned by any, planes, capsules and "
-                              "cylinders about their axes, boxes by quarter turns that keep their sizes",
-                              collider->name, collider->ops->entry.name);
+        const drape_placement own = place_displacement(sim, c, by);
         drape_motion_collider(drape_system_motion(sim->system), c, drape_sim_state(sim)->t, at);
         drape_placement_move(&own, at, at);
         if (is_far(at))
             return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_place: %s would be beyond %g m",
-                              collider->name, MAX_DISTANCE);
+                              sim->model->colliders[c].name, MAX_DISTANCE);
     }
     return DRAPE_OK;
 }
@@ -171,8 +154,8 @@ static void place_motion(drape_sim *sim, const drape_place_list *cloths, const d
         if (has(cloths, c))
             drape_motion_place_cloth(motion, c, by);
     for (int32_t c = 0; c < sim->model->collider_count; c++) {
-        drape_placement own;
-        if (has(colliders, c) && place_displacement(sim, c, by, &own))
+        const drape_placement own = place_displacement(sim, c, by);
+        if (has(colliders, c))
             drape_motion_place_collider(motion, c, &own);
     }
 }

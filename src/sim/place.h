@@ -23,7 +23,11 @@ drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloth
  * drape_sim_place_parts. */
 drape_status drape_sim_teleport_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
                                      const double *positions, const double *velocities);
+/* Where a collider is sent; velocities may be NULL, and so may the rotation (3 x 3). */
+typedef struct drape_sent {
+    const double *displacement, *velocity, *rotation, *angular_velocity;
+} drape_sent;
 drape_status drape_sim_teleport_collider(drape_sim *sim, int32_t collider, double seconds,
-                                         const double displacement[3], const double *velocity);
+                                         const drape_sent *to);
 
 #endif

@@ -4,6 +4,7 @@
  * least squares (Horn 1987, Closed-form solution of absolute orientation using unit quaternions, J. Opt. Soc.
  * Am. A 4, section 4), less the path that they would have covered at their own velocity.
  */
+#include "base/rotation.h"
 #include "base/vec3.h"
 #include "sim/place.h"
 #include "sparse/project.h"
@@ -83,17 +84,6 @@ static void best_quaternion(const double S[9], double rest, double q[4])
         q[i] = v[4 * i + best];
 }
 
-static void turn_of(const double q[4], double turn[9])
-{
-    const double w = q[0], x = q[1], y = q[2], z = q[3], n = w * w + x * x + y * y + z * z;
-    const double matrix[9] = {
-        w * w + x * x - y * y - z * z, 2 * (x * y - w * z),           2 * (x * z + w * y),
-        2 * (x * y + w * z),           w * w - x * x + y * y - z * z, 2 * (y * z - w * x),
-        2 * (x * z - w * y),           2 * (y * z + w * x),           w * w - x * x - y * y + z * z};
-    for (int i = 0; i < 9; i++)
-        turn[i] = matrix[i] / n;
-}
-
 static drape_placement fit(const pins *p)
 {
     drape_placement by = {.given = true, .turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
@@ -103,7 +93,7 @@ static drape_placement fit(const pins *p)
     const double spread = correlate(p, from, to, S);
     if (spread > 0) {
         best_quaternion(S, REST * spread, q);
-        turn_of(q, by.turn);
+        drape_rotation_of_quaternion(q, by.turn);
     }
     drape_placement_turn(&by, from, turned);
     vec3_sub(to, turned, by.shift);
@@ -199,18 +189,37 @@ drape_status drape_sim_teleport_pins(drape_sim *sim, int32_t count, const int32_
 /* ---- Colliders ---- */
 
 drape_status drape_sim_teleport_collider(drape_sim *sim, int32_t collider, double seconds,
-                                         const double displacement[3], const double *velocity)
+                                         const drape_sent *to)
 {
     const drape_motion *motion = drape_system_motion(sim->system);
-    const double t = drape_sim_state(sim)->t;
-    drape_placement by = {.given = true, .turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-    double from[3], v[3];
+    const double t = drape_sim_state(sim)->t, *pivot = sim->model->colliders[collider].pivot;
+    drape_placement by = {.given = true, .turn = DRAPE_NO_ROTATION};
+    double from[3], v[3], before[3], after[3];
     drape_motion_collider(motion, collider, t, from);
-    if (!exceeds(sim, from, displacement, seconds))
+    if (!exceeds(sim, from, to->displacement, seconds))
         return DRAPE_OK;
     drape_motion_collider_arrival(motion, collider, t, v);
-    vec3_sub(displacement, from, by.shift);
-    vec3_add_scaled(-seconds, velocity ? velocity : v, by.shift);
+    if (to->rotation) {
+        double now[9], back[9], start[9], turn[3] = {0};
+        drape_motion_rotation(motion, collider, t, now);
+        if (to->angular_velocity)
+            vec3_add_scaled(-seconds, to->angular_velocity, turn);
+        drape_rotation_exp(turn, back);
+        drape_rotation_product(back, to->rotation, start);
+        drape_rotation_between(start, now, by.turn);
+    }
+    for (int k = 0; k < 3; k++) {
+        before[k] = pivot[k] + from[k];
+        after[k] = pivot[k] + to->displacement[k];
+    }
+    vec3_add_scaled(-seconds, to->velocity ? to->velocity : v, after);
+    drape_placement_turn(&by, before, before);
+    if (drape_rotation_is_none(by.turn)) { /* without the rounding of the pivot */
+        vec3_sub(to->displacement, from, by.shift);
+        vec3_add_scaled(-seconds, to->velocity ? to->velocity : v, by.shift);
+    } else {
+        vec3_sub(after, before, by.shift);
+    }
     const drape_status status = drape_sim_place_parts(sim, &(drape_place_list){NULL, 0},
                                                       &(drape_place_list){&collider, 1}, &by, false);
     if (!status)

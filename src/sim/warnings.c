@@ -109,10 +109,10 @@ static bool describe_inside(drape_sim *sim, const double *x, bool start, char *t
     const char *what = start ? "start" : "end", *advice = start ? ": move the cloth or the collider" : "";
     for (int32_t c = 0; c < m->collider_count; c++) {
         drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], 0);
-        const drape_collider_motion motion = drape_sim_collider(sim, c);
+        const double t = drape_sim_time(sim);
         int32_t pierced = 0;
         if (!start)
-            memcpy(pose.displacement, motion.displacement, sizeof pose.displacement);
+            drape_motion_pose(drape_system_motion(sim->system), c, t, t, &pose);
         double deepest;
         const int32_t count = free_nodes_inside(m, c, &pose, x, &deepest);
         if (count > 0)

@@ -115,7 +115,8 @@ static bool check_fraction(const all_pairs *all, const double *x, const double *
     double least = 1;
     for (int32_t i = 0; i < all->list.set[0].count; i++)
         if (drape_pair_points(&all->list.set[0].pairs[i]) > 1)
-            least = fmin(least, drape_pair_step_fraction(&all->list.set[0].pairs[i], x, y, &keep, least));
+            least =
+                fmin(least, drape_pair_step_fraction(&all->list.set[0].pairs[i], x, y, NULL, &keep, least));
     ck_assert_double_le(fraction, least);
     return least < 1;
 }

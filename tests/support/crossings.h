@@ -234,8 +234,8 @@ static inline void crossings_collider(const drape_collider *collider, const drap
     double *point = malloc(((size_t)shape->point_count + 1) * 3 * sizeof *point);
     if (!point)
         abort();
-    for (int32_t i = 0; i < 3 * shape->point_count; i++)
-        point[i] = shape->point[i] + pose->displacement[i % 3];
+    for (int32_t i = 0; i < shape->point_count; i++)
+        drape_collider_point(collider, pose, i, point + 3 * (size_t)i);
     crossings_set own_edges = {.x = point, .nodes = 2},
                   own_faces = {
                       .x = point, .nodes = 3, .node = shape->triangle, .count = shape->triangle_count};

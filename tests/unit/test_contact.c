@@ -368,9 +368,10 @@ static void check_step_fraction(const drape_keep *keep, double distance)
         if (!(start > 1e-3))
             continue;
         const double kept = drape_keep_gap(keep, least, start, distance);
-        double fraction = drape_pair_step_fraction(&pair, x, y, keep, 1);
-        ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, keep, 0.5 * fraction), 0.5 * fraction);
-        ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, keep, 0.5 + 0.5 * fraction),
+        double fraction = drape_pair_step_fraction(&pair, x, y, NULL, keep, 1);
+        ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, NULL, keep, 0.5 * fraction),
+                            0.5 * fraction);
+        ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, NULL, keep, 0.5 + 0.5 * fraction),
                             fraction < 1 ? fraction : 1);
         for (int i = 0; i <= 200; i++) {
             for (int j = 0; j < D; j++)
@@ -427,7 +428,7 @@ START_TEST(test_no_gap_is_exempt)
             double x[D] = {0.1, gap, 0.1, 0, 0, 0, 1, 0, 0, 0, 0, 1}, y[D];
             memcpy(y, x, sizeof y);
             y[1] = -1e-3;
-            ck_assert_double_lt(drape_pair_step_fraction(&pair, x, y, &step, 1), 1);
+            ck_assert_double_lt(drape_pair_step_fraction(&pair, x, y, NULL, &step, 1), 1);
         }
 }
 END_TEST
