@@ -149,7 +149,8 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
         contact.pair = *pair;
         contact.gentle = false;
         contact.relaxed = drape_relaxed_factor(relaxed, pair);
-        if (contact.relaxed > 0 && pair->collider >= 0 && drape_pair_points(pair) > 1 && !(pair->radius > 0))
+        if (contact.relaxed > 0 && pair->collider >= 0 && drape_pair_points(pair) > 1 &&
+            (!(pair->radius > 0) || !at->model->colliders[pair->collider].ops->smooth))
             continue;
         if (!(contact.relaxed > 0) && contact.gap.value < DRAPE_BARRIER_GENTLE * pair->distance) {
             contact.gentle = (all_inside && contact.gap.value < drape_pair_least_gap(pair, rounding)) ||

@@ -10,7 +10,7 @@
 #define DOUBLED 0.02 /* [s] in which the pressure on a node that has room doubles, and falls by half */
 
 /* A shape without points may have no end, as a plane; inscribed ones are inside of it. */
-static void bound(const drape_collider_shape *shape, double out[4])
+void drape_relaxed_bound(const drape_collider_shape *shape, double out[4])
 {
     double radius = shape->point_count > 0 && !shape->inscribed ? 0 : INFINITY, to[3];
     memset(out, 0, 3 * sizeof *out);
@@ -34,7 +34,7 @@ drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, 
     set->bound = drape_arena_take(arena, colliders, 4 * sizeof *set->bound);
     set->total = drape_arena_take(arena, colliders + 1, sizeof *set->total);
     for (size_t i = 0; set->bound && i < colliders; i++)
-        bound(&model->colliders[i].shape, set->bound + 4 * i);
+        drape_relaxed_bound(&model->colliders[i].shape, set->bound + 4 * i);
     return drape_arena_status(arena);
 }
 

@@ -60,7 +60,7 @@ static void meet(void *user, int32_t triangle)
 }
 
 /* Two unit vectors in the plane of a triangle, and its normal; false if it has none. */
-static bool frame_of(const double corner[3][3], double frame[3][3])
+static bool frame_of(double corner[3][3], double frame[3][3])
 {
     double side[3], length;
     vec3_sub(corner[1], corner[0], frame[0]);
@@ -111,13 +111,9 @@ bool drape_contact_sweep_meshes(drape_contact *c, double *y)
 {
     drape_path_bvh *tree = &c->broad.obstacles;
     double reach = c->broad.obstacle_radius;
-    bool moved = false, deforms = false;
-    for (int32_t k = 0; k < c->model->collider_count; k++) {
-        deforms = deforms || drape_motion_deforms(c->motion, k);
+    bool moved = false;
+    for (int32_t k = 0; k < c->model->collider_count; k++)
         reach = fmax(reach, c->broad.obstacle_radius + c->broad.distance[k]);
-    }
-    if (!deforms)
-        return false;
     drape_path_bvh_fit(tree, c->start, y, NULL);
     for (int32_t f = 0; f < c->model->free_count; f++) {
         meeting m = {.contact = c, .y = y, .node = c->model->node_of_free[f], .fraction = 1, .gap = INFINITY};

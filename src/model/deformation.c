@@ -17,9 +17,8 @@ drape_status drape_deformation_create(drape_arena *arena, const drape_sequence *
     for (int end = 0; frames->frame_count > 0 && end < 2; end++) {
         out->x[end] = drape_arena_take(arena, numbers_of(frames), sizeof(double));
         out->v[end] = drape_arena_take(arena, numbers_of(frames), sizeof(double));
+        out->spare[end] = drape_arena_take(arena, numbers_of(frames), sizeof(double));
     }
-    if (frames->frame_count > 0)
-        out->spare = drape_arena_take(arena, numbers_of(frames), sizeof(double));
     return drape_arena_status(arena);
 }
 
@@ -111,13 +110,13 @@ void drape_deformation_send(drape_deformation *d, double t, double span, const d
     const bool ends = d->given && t == d->t[1], begins = d->given && t == d->t[0];
     /* the velocities that lead here; unknown at a frame, and where a path is replaced at its beginning */
     const bool known = d->given ? ends || !begins || d->smooth : d->frames->frame_count == 1;
-    drape_deformation_points(d, t, d->spare);
+    drape_deformation_points(d, t, d->spare[0]);
     if (ends)
         memcpy(d->v[0], d->v[1], count * sizeof *d->v[0]);
     else if (!begins)
         drape_deformation_velocities(d, t, t,
                                      d->v[0]); /* number by number: each reads v[0] before it is set */
-    memcpy(d->x[0], d->spare, count * sizeof *d->x[0]);
+    memcpy(d->x[0], d->spare[0], count * sizeof *d->x[0]);
     for (size_t i = 0; !v && i < count; i++)
         d->v[0][i] = (x[i] - d->x[0][i]) / span;
     memcpy(d->v[1], v ? v : d->v[0], count * sizeof *d->v[1]);

@@ -15,7 +15,7 @@ typedef struct drape_deformation {
     double t[2];                  /* [s] increasing; at rest before and after */
     double *x[2];                 /* (points x 3) [m] at both ends of a cubic */
     double *v[2];                 /* (points x 3) [m/s] */
-    double *spare;                /* (points x 3) workspace */
+    double *spare[2];             /* (points x 3) workspace */
 } drape_deformation;
 
 drape_status drape_deformation_create(drape_arena *arena, const drape_sequence *frames,

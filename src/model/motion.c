@@ -419,7 +419,8 @@ static course collider_course(const drape_motion *motion, int32_t collider)
 bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
 {
     const course c = collider_course(motion, collider);
-    return c.path->given || c.placed->given || c.track->key_count > 0 || c.turns->key_count > 0;
+    return c.path->given || c.placed->given || c.track->key_count > 0 || c.turns->key_count > 0 ||
+           drape_motion_deforms(motion, collider);
 }
 
 bool drape_motion_turns_collider(const drape_motion *motion, int32_t collider)
@@ -503,6 +504,46 @@ double drape_motion_fastest_spin(const drape_motion *motion, int32_t collider, d
     return fmax(fastest, vec3_norm(control));
 }
 
+/* Writes where the points of a collider with frames are in space. */
+static void place_points(const drape_motion *motion, int32_t collider, double t, double *x)
+{
+    const int32_t points = motion->deformation[collider].frames->node_count;
+    drape_collider_pose pose;
+    drape_motion_pose(motion, collider, t, t, &pose);
+    drape_motion_points(motion, collider, t, x);
+    for (int32_t p = 0; p < points; p++)
+        drape_pose_point(&pose, x + 3 * (size_t)p, x + 3 * (size_t)p);
+}
+
+static double work_on_points(const drape_motion *motion, int32_t collider, const double *force, double t0,
+                             double t1)
+{
+    const drape_deformation *d = &motion->deformation[collider];
+    double work = 0;
+    place_points(motion, collider, t0, d->spare[0]);
+    place_points(motion, collider, t1, d->spare[1]);
+    for (size_t i = 0; i < 3 * (size_t)d->frames->node_count; i++)
+        work += force[i] * (d->spare[1][i] - d->spare[0][i]);
+    return work;
+}
+
+static double power_on_points(const drape_motion *motion, int32_t collider, const double *force, double t,
+                              double within)
+{
+    const drape_deformation *d = &motion->deformation[collider];
+    drape_collider_pose pose;
+    double power = 0;
+    drape_motion_pose(motion, collider, t, within, &pose);
+    drape_motion_points(motion, collider, t, d->spare[0]);
+    drape_motion_point_velocities(motion, collider, t, within, d->spare[1]);
+    for (size_t p = 0; p < (size_t)d->frames->node_count; p++) {
+        double v[3];
+        drape_pose_point_velocity(&pose, d->spare[0] + 3 * p, d->spare[1] + 3 * p, v);
+        power += vec3_dot(force + 3 * p, v);
+    }
+    return power;
+}
+
 double drape_motion_collider_work(const drape_motion *motion, const drape_load *load, double t0, double t1)
 {
     double work = 0;
@@ -510,6 +551,10 @@ double drape_motion_collider_work(const drape_motion *motion, const drape_load *
         drape_collider_pose before, after;
         if (!drape_motion_moves_collider(motion, c))
             continue;
+        if (load[c].on_points) {
+            work += work_on_points(motion, c, load[c].on_points, t0, t1);
+            continue;
+        }
         drape_motion_pose(motion, c, t0, t0, &before);
         drape_motion_pose(motion, c, t1, t1, &after);
         drape_load_add_work(&load[c], &before, &after, &work);
@@ -523,6 +568,10 @@ double drape_motion_collider_power(const drape_motion *motion, const drape_load 
     double power = 0;
     for (int32_t c = 0; load && c < motion->model->collider_count; c++) {
         drape_collider_pose pose;
+        if (load[c].on_points) {
+            power += power_on_points(motion, c, load[c].on_points, t, within);
+            continue;
+        }
         drape_motion_pose(motion, c, t, within, &pose);
         drape_load_add_power(&load[c], &pose, &power);
     }

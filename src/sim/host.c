@@ -6,6 +6,7 @@
 #include "sim/place.h"
 
 #include <math.h>
+#include <string.h>
 
 #define MAX_SECONDS  1e9 /* [s] the limit of a scene's duration */
 #define MAX_DISTANCE 1e9 /* [m], [m/s] the limit of a track's keys */
