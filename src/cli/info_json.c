@@ -79,7 +79,10 @@ static json_t *with_keys(json_t *object, const drape_scene_object *form, const v
     for (size_t i = 0; i < form->key_count; i++) {
         const drape_scene_key *key = &form->keys[i];
         const bool named = key->param.kind == DRAPE_PARAM_TEXT && key->shape == DRAPE_SCENE_VALUE;
-        if (key->shape <= DRAPE_SCENE_LIST && !named)
+        drape_setting given;
+        const bool has = key->shape == DRAPE_SCENE_LIST ||
+                         (key->shape == DRAPE_SCENE_VALUE && drape_scene_value(key, def, &given));
+        if (has && !named)
             object = drape_json_with(object, key->param.name, key_value(key, def));
     }
     return object;
@@ -95,6 +98,21 @@ static json_t *track(const drape_track *track)
     return keys;
 }
 
+static json_t *turns(const drape_collider_def *def)
+{
+    json_t *keys = json_array();
+    for (size_t k = 0; k < def->turn_count; k++) {
+        const drape_turn_key *key = &def->turns[k];
+        json_t *object = drape_json_with(json_object(), "time", drape_json_number(key->time));
+        const double *q = key->quaternion;
+        const bool quaternion = q[0] != 0 || q[1] != 0 || q[2] != 0 || q[3] != 0;
+        keys = drape_json_append(
+            keys, drape_json_with(object, quaternion ? "quaternion" : "rotate",
+                                  drape_json_numbers(quaternion ? key->quaternion : key->rotate, 4)));
+    }
+    return keys;
+}
+
 static json_t *collider(const drape_collider *from, const drape_collider_def *def,
                         const cli_collider_info *info)
 {
@@ -106,6 +124,8 @@ static json_t *collider(const drape_collider *from, const drape_collider_def *de
     object = with_keys(object, &drape_form_collider, def);
     if (from->track.key_count > 0)
         object = drape_json_with(object, "track", track(&from->track));
+    if (from->turns.key_count > 0)
+        object = drape_json_with(object, "turns", turns(def));
     object = drape_json_with(object, "points", count(from->shape.point_count));
     object = drape_json_with(object, "segments", count(from->shape.segment_count));
     object = drape_json_with(object, "triangles", count(from->shape.triangle_count));

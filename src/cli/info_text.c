@@ -206,6 +206,11 @@ static void print_collider(const drape_collider *collider, const drape_collider_
     if (collider->track.key_count > 0)
         printf("  %-16s %zu keys, %.9g s to %.9g s\n", "track", collider->track.key_count,
                collider->track.keys[0].time, collider->track.keys[collider->track.key_count - 1].time);
+    if (collider->turns.key_count > 0)
+        printf("  %-16s %zu keys, %.9g s to %.9g s, about %.9g %.9g %.9g\n", "turns",
+               collider->turns.key_count, collider->turns.keys[0].time,
+               collider->turns.keys[collider->turns.key_count - 1].time, collider->pivot[0],
+               collider->pivot[1], collider->pivot[2]);
     printf("  %-16s %d points, %d segments, %d triangles\n", "features", (int)shape->point_count,
            (int)shape->segment_count, (int)shape->triangle_count);
     if (info->inside)

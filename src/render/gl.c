@@ -131,6 +131,11 @@ void drape_gl_set_matrix(GLuint program, const char *name, const float *value)
     glUniformMatrix4fv(glGetUniformLocation(program, name), 1, GL_FALSE, value);
 }
 
+void drape_gl_set_matrix3(GLuint program, const char *name, const float *value)
+{
+    glUniformMatrix3fv(glGetUniformLocation(program, name), 1, GL_FALSE, value);
+}
+
 drape_status drape_gl_check(drape_context *ctx, const char *action)
 {
     GLenum error = glGetError();

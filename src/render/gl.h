@@ -31,6 +31,7 @@ void drape_gl_set_float(GLuint program, const char *name, float value);
 void drape_gl_set_vec2(GLuint program, const char *name, float x, float y);
 void drape_gl_set_vec3(GLuint program, const char *name, const float *value);
 void drape_gl_set_matrix(GLuint program, const char *name, const float *value);
+void drape_gl_set_matrix3(GLuint program, const char *name, const float *value);
 
 /* DRAPE_OK; or DRAPE_E_FILE or DRAPE_E_MEMORY with the message "OpenGL cannot <action>". */
 drape_status drape_gl_check(drape_context *ctx, const char *action);

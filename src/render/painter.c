@@ -21,6 +21,8 @@
 #define MAX_SHADINGS 64
 #define RADIANS      0.017453292519943295f
 
+static const float unturned[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
 /* ---- Sources ---- */
 
 static const char surface_vertex[] =
@@ -31,6 +33,7 @@ static const char surface_vertex[] =
     "layout(location = 4) in float at_value;\n"
     "layout(location = 5) in float at_piece;\n"
     "uniform mat4 view;\n"
+    "uniform mat3 turn;\n"
     "uniform vec3 offset;\n"
     "uniform float relief, spread, grain; // grain: of the mesh that is drawn, in texture coordinates\n"
     "uniform sampler2D heights;\n"
@@ -40,8 +43,8 @@ static const char surface_vertex[] =
     "void main() {\n"
     "    float level = relief > 0.0 ? log2(max(1.0, grain * float(textureSize(heights, 0).x))) : 0.0;\n"
     "    float rise = relief > 0.0 ? relief * textureLod(heights, at_uv, level).r : 0.0;\n"
-    "    place = spread * at_place + offset + rise * at_normal;\n"
-    "    normal = at_normal;\n"
+    "    place = spread * (turn * at_place) + offset + rise * at_normal;\n"
+    "    normal = turn * at_normal;\n"
     "    tangent = at_tangent;\n"
     "    at = at_uv;\n"
     "    value = at_value;\n"
@@ -376,6 +379,7 @@ static void use_surface(const drape_painter *p, GLuint program, const panel_view
     drape_gl_set_vec3(program, "light", v->light.light);
     drape_gl_set_vec3(program, "window", v->window);
     drape_gl_set_vec3(program, "offset", nowhere);
+    drape_gl_set_matrix3(program, "turn", unturned);
     drape_gl_set_float(program, "clear", v->clear);
     drape_gl_set_float(program, "reach", v->reach);
     drape_gl_set_vec2(program, "pixels", (float)p->canvas.width, (float)p->canvas.height);
@@ -391,6 +395,7 @@ static void draw_bodies(const drape_stage *stage, GLuint program, bool endless)
         if (body->shape.endless != endless)
             continue;
         drape_gl_set_vec3(program, "offset", body->offset);
+        drape_gl_set_matrix3(program, "turn", body->turn);
         glBindVertexArray(body->mesh.array);
         glDrawArrays(GL_TRIANGLES, 0, (GLsizei)body->shape.vertex_count);
     }
@@ -433,6 +438,7 @@ static void draw_ground(const drape_painter *p, const drape_stage *stage, GLuint
     draw_bodies(stage, program, true);
     if (!stage->has_ground) {
         drape_gl_set_float(program, "spread", 3.5f * stage->radius);
+        drape_gl_set_matrix3(program, "turn", unturned);
         drape_gl_set_vec3(program, "offset",
                           (const float[]){stage->center[0], stage->floor, stage->center[2]});
         glBindVertexArray(p->floor.array);
@@ -458,6 +464,7 @@ static void light_panel(const drape_painter *p, const drape_stage *stage, const 
     use_surface(p, p->depth, v, &v->light.lamp);
     draw_bodies(stage, p->depth, false);
     drape_gl_set_vec3(p->depth, "offset", (const float[3]){0});
+    drape_gl_set_matrix3(p->depth, "turn", unturned);
     draw_cloth(p->depth, stage, shading);
     drape_lighting_begin_seen(&p->lighting, &v->light);
     if (with_cloth) {

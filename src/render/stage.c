@@ -7,6 +7,22 @@
 
 static const float nowhere[3] = {0};
 
+static void set_pose(drape_stage_body *body, const drape_collider_pose *pose)
+{
+    for (int k = 0; k < 3; k++)
+        body->offset[k] = (float)pose->displacement[k];
+    for (int i = 0; i < 9; i++)
+        body->turn[i] = pose->turned ? (float)pose->turn[i % 3 * 3 + i / 3] : (float)(i % 4 == 0);
+}
+
+/* The place of a vertex of a body. */
+static void place(const drape_stage_body *body, const float *vertex, float *p)
+{
+    for (int k = 0; k < 3; k++)
+        p[k] = body->turn[k] * vertex[0] + body->turn[k + 3] * vertex[1] + body->turn[k + 6] * vertex[2] +
+               body->offset[k];
+}
+
 static drape_status create_bodies(drape_stage *s)
 {
     const drape_model *m = s->model;
@@ -16,10 +32,10 @@ static drape_status create_bodies(drape_stage *s)
         drape_stage_body *body = &s->bodies[s->body_count++];
         const drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], 0);
         double center[3];
-        for (int k = 0; k < 3; k++) {
-            center[k] = (s->low[k] + s->high[k]) / 2 - pose.displacement[k];
-            body->offset[k] = (float)pose.displacement[k];
-        }
+        const double middle[3] = {(s->low[0] + s->high[0]) / 2, (s->low[1] + s->high[1]) / 2,
+                                  (s->low[2] + s->high[2]) / 2};
+        drape_pose_own(&pose, middle, center);
+        set_pose(body, &pose);
         if (drape_body_create(&s->arena, &m->colliders[c], center, 2.5 * m->length, &body->shape))
             return DRAPE_E_MEMORY;
         drape_gl_mesh_create(&body->mesh, sizes, false);
@@ -98,8 +114,7 @@ static void move_bodies(drape_stage *s, double t)
 {
     for (int32_t c = 0; c < s->body_count; c++) {
         const drape_collider_pose pose = drape_collider_pose_at(&s->model->colliders[c], t);
-        for (int k = 0; k < 3; k++)
-            s->bodies[c].offset[k] = (float)pose.displacement[k];
+        set_pose(&s->bodies[c], &pose);
     }
 }
 
@@ -110,10 +125,14 @@ void drape_stage_add(drape_stage *stage, const float *positions)
 
 void drape_stage_finish(drape_stage *stage)
 {
-    for (int32_t c = 0; c < stage->body_count; c++)
-        if (!stage->bodies[c].shape.endless)
-            extend_box(stage, stage->bodies[c].shape.vertex, stage->bodies[c].shape.vertex_count, 6,
-                       stage->bodies[c].offset);
+    for (int32_t c = 0; c < stage->body_count; c++) {
+        const drape_stage_body *body = &stage->bodies[c];
+        for (size_t i = 0; !body->shape.endless && i < body->shape.vertex_count; i++) {
+            float p[3];
+            place(body, body->shape.vertex + 6 * i, p);
+            extend_box(stage, p, 1, 3, nowhere);
+        }
+    }
     float size = 0;
     for (int k = 0; k < 3; k++) {
         stage->center[k] = (stage->low[k] + stage->high[k]) / 2;
@@ -130,11 +149,11 @@ void drape_stage_frame(drape_stage *stage, drape_framing *framing, double t, con
     drape_framing_add(framing, positions, (size_t)stage->model->node_count, offset);
     for (int32_t c = 0; c < stage->body_count; c++) {
         const drape_stage_body *body = &stage->bodies[c];
-        float moved[3];
-        for (int k = 0; k < 3; k++)
-            moved[k] = body->offset[k] + offset[k];
-        for (size_t i = 0; !body->shape.endless && i < body->shape.vertex_count; i++)
-            drape_framing_add(framing, body->shape.vertex + 6 * i, 1, moved);
+        for (size_t i = 0; !body->shape.endless && i < body->shape.vertex_count; i++) {
+            float p[3];
+            place(body, body->shape.vertex + 6 * i, p);
+            drape_framing_add(framing, p, 1, offset);
+        }
     }
 }
 

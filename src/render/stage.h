@@ -18,7 +18,8 @@ typedef struct drape_moment {
 typedef struct drape_stage_body {
     drape_body shape;
     drape_gl_mesh mesh;
-    float offset[3]; /* [m] its displacement now */
+    float turn[9];   /* its rotation now, column by column, as in OpenGL */
+    float offset[3]; /* [m] and its displacement after that */
 } drape_stage_body;
 
 typedef struct drape_stage {

@@ -3,8 +3,10 @@
 #include <string.h>
 
 #include "base/param.h"
+#include "base/rotation.h"
 #include "colliders/colliders.h"
 #include "io/json.h"
+#include "model/track.h"
 #include "report/data.h"
 
 #define MAX_ROWS 20000 /* of a table in the page */
@@ -104,14 +106,25 @@ static json_t *collider(const drape_report_data *data, const drape_collider *c)
                                drape_json_text(c->name), "parameters", parameters(c));
     if (c->shape.triangle_count > 0)
         object = drape_json_with(object, "shape", shape(&c->shape));
-    if (c->track.key_count == 0)
+    if (c->track.key_count == 0 && c->turns.key_count == 0)
         return object;
-    json_t *displacements = json_array();
+    json_t *displacements = json_array(), *rotations = json_array();
     for (int64_t k = 0; k < data->kept; k++) {
-        drape_collider_pose pose = drape_collider_pose_at(c, data->run->record.times[data->frame[k]]);
-        displacements = drape_json_append(displacements, drape_json_numbers(pose.displacement, 3));
+        const double t = data->run->record.times[data->frame[k]];
+        double displacement[3], matrix[9], q[4];
+        drape_track_displacement(c->track.keys, c->track.key_count, t, displacement);
+        drape_turns_rotation(&c->turns, t, matrix);
+        drape_rotation_quaternion(matrix, q);
+        displacements = drape_json_append(displacements, drape_json_numbers(displacement, 3));
+        rotations = drape_json_append(rotations, drape_json_numbers((double[]){q[1], q[2], q[3], q[0]}, 4));
     }
-    return drape_json_with(object, "displacements", displacements);
+    object = drape_json_with(object, "displacements", displacements);
+    if (c->turns.key_count == 0) {
+        json_decref(rotations);
+        return object;
+    }
+    object = drape_json_with(object, "rotations", rotations);
+    return drape_json_with(object, "pivot", drape_json_numbers(c->pivot, 3));
 }
 
 static json_t *colliders(const drape_report_data *data)

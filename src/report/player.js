@@ -6,16 +6,18 @@ layout(location = 1) in vec3 normal;
 layout(location = 2) in float value;
 uniform mat4 camera;
 uniform vec3 offset;
+uniform vec4 rotation;   // a quaternion x y z w, before the offset
 uniform vec4 flatten;    // a plane n.x = d to project everything onto, along the light; n = 0: none
 uniform vec3 light;
 uniform float point_size;
 out vec3 at, n;
 out float v;
+vec3 turned(vec3 a) { return a + 2.0 * cross(rotation.xyz, cross(rotation.xyz, a) + rotation.w * a); }
 void main() {
-  at = position + offset;
+  at = turned(position) + offset;
   if (dot(flatten.xyz, flatten.xyz) > 0.0)
     at -= light * ((dot(flatten.xyz, at) - flatten.w) / dot(flatten.xyz, light));
-  n = normal;
+  n = turned(normal);
   v = value;
   gl_Position = camera * vec4(at, 1.0);
   gl_PointSize = point_size;
@@ -113,6 +115,12 @@ function boundsOf(lows, highs) {
 // The lamp does not move with the camera; it is that of drape render, at elevation 54 and azimuth -16 degrees.
 const LIGHT = unit([Math.tan(Math.PI / 5) * Math.sin(-0.279), 1, Math.tan(Math.PI / 5) * Math.cos(-0.279)]);
 
+// A vector turned by a quaternion x y z w.
+function turned(q, a) {
+  const once = along(cross(q, a), q[3], a);
+  return along(a, 2, cross(q, once));
+}
+
 class Player {
   constructor(canvas) {
     this.gl = canvas.getContext('webgl2', { antialias: true, stencil: true, alpha: true, preserveDrawingBuffer: true });
@@ -145,7 +153,7 @@ class Player {
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
     gl.useProgram(program);
     this.at = {};
-    for (const name of ['camera', 'offset', 'flatten', 'light', 'point_size', 'eye', 'front', 'back', 'kind', 'alpha', 'disk', 'range']) {
+    for (const name of ['camera', 'offset', 'rotation', 'flatten', 'light', 'point_size', 'eye', 'front', 'back', 'kind', 'alpha', 'disk', 'range']) {
       this.at[name] = gl.getUniformLocation(program, name);
     }
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
@@ -195,7 +203,7 @@ class Player {
       const shape = shapeOf(collider, cloth);
       if (!shape) continue;
       const values = new Float32Array(shape.positions.length / 3);
-      this.colliders.push({ ...this.makeMesh([[3, shape.positions], [3, shape.normals], [1, values]], shape.corners), plane: shape.plane, displacements: collider.displacements });
+      this.colliders.push({ ...this.makeMesh([[3, shape.positions], [3, shape.normals], [1, values]], shape.corners), plane: shape.plane, displacements: collider.displacements, rotations: collider.rotations, pivot: collider.pivot });
       for (let i = 0; shape.bounded && i < shape.positions.length; i++) {
         const reach = 1.6 * cloth.radius, k = i % 3; // of a large one only a part is shown
         lows[k] = Math.min(lows[k], Math.max(shape.positions[i], cloth.center[k] - reach));
@@ -249,12 +257,18 @@ class Player {
   }
 
   place(collider, time) {
-    if (!collider.displacements) return [0, 0, 0];
-    const { frame, next, part } = frameAt(time), a = collider.displacements[frame], b = collider.displacements[next];
-    return a.map((x, k) => x + part * (b[k] - x));
+    const still = { offset: [0, 0, 0], rotation: [0, 0, 0, 1] };
+    if (!collider.displacements) return still;
+    const { frame, next, part } = frameAt(time), between = (list, sign) => list[frame].map((x, k) => x + part * (sign * list[next][k] - x));
+    const offset = between(collider.displacements, 1);
+    if (!collider.rotations) return { ...still, offset };
+    const sign = dot(collider.rotations[frame], collider.rotations[next]) < 0 ? -1 : 1;
+    const rotation = between(collider.rotations, sign), length = Math.hypot(...rotation);
+    rotation.forEach((q, k) => { rotation[k] = q / length; });
+    return { offset: along(sub(offset, turned(rotation, collider.pivot)), 1, collider.pivot), rotation };
   }
 
-  draw(mesh, { kind, front = [0, 0, 0], back = front, alpha = 1, offset = [0, 0, 0] }) {
+  draw(mesh, { kind, front = [0, 0, 0], back = front, alpha = 1, offset = [0, 0, 0], rotation = [0, 0, 0, 1] }) {
     const gl = this.gl;
     gl.bindVertexArray(mesh.vertices);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, mesh.corners);
@@ -263,6 +277,7 @@ class Player {
     gl.uniform3fv(this.at.back, back);
     gl.uniform1f(this.at.alpha, alpha);
     gl.uniform3fv(this.at.offset, offset);
+    gl.uniform4fv(this.at.rotation, rotation);
     gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
   }
 
@@ -274,12 +289,13 @@ class Player {
     gl.uniform3fv(this.at.front, front);
     gl.uniform1f(this.at.alpha, alpha);
     gl.uniform3fv(this.at.offset, [0, 0, 0]);
+    gl.uniform4f(this.at.rotation, 0, 0, 0, 1);
     gl.drawElements(mode, list.count, gl.UNSIGNED_INT, 0);
   }
 
   // Shadows: everything above a plane darkens it, each pixel once.
-  drawShadow(plane, offset, time) {
-    const gl = this.gl, n = plane.normal, d = dot(n, along(plane.point, 1, offset)) + 1e-3 * this.bounds.radius;
+  drawShadow(plane, { offset, rotation }, time) {
+    const gl = this.gl, n = turned(rotation, plane.normal), d = dot(n, along(turned(rotation, plane.point), 1, offset)) + 1e-3 * this.bounds.radius;
     if (dot(n, this.light) < 0.2) return;
     gl.uniform4f(this.at.flatten, ...n, d);
     gl.enable(gl.STENCIL_TEST);
@@ -287,7 +303,7 @@ class Player {
     gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
     gl.depthMask(false);
     this.draw(this.cloth, { kind: 2, alpha: 0.15 });
-    for (const other of this.colliders) if (!other.plane) this.draw(other, { kind: 2, alpha: 0.15, offset: this.place(other, time) });
+    for (const other of this.colliders) if (!other.plane) this.draw(other, { kind: 2, alpha: 0.15, ...this.place(other, time) });
     gl.depthMask(true);
     gl.disable(gl.STENCIL_TEST);
     gl.clear(gl.STENCIL_BUFFER_BIT);
@@ -314,16 +330,16 @@ class Player {
     const grey = dark ? [0.42, 0.45, 0.5] : [0.68, 0.7, 0.73], ground = dark ? [0.25, 0.27, 0.3] : [0.8, 0.82, 0.84];
     for (const collider of this.colliders) {
       if (!collider.plane) continue;
-      const offset = this.place(collider, time);
-      gl.uniform4f(this.at.disk, ...along(collider.plane.point, 1, offset), collider.plane.reach);
+      const placed = this.place(collider, time);
+      gl.uniform4f(this.at.disk, ...along(turned(placed.rotation, collider.plane.point), 1, placed.offset), collider.plane.reach);
       gl.depthMask(false);
-      this.draw(collider, { kind: 4, front: ground, alpha: 0.9, offset });
+      this.draw(collider, { kind: 4, front: ground, alpha: 0.9, ...placed });
       gl.depthMask(true);
-      this.drawShadow(collider.plane, offset, time);
+      this.drawShadow(collider.plane, placed, time);
     }
     gl.enable(gl.POLYGON_OFFSET_FILL);
     gl.polygonOffset(1, 1);
-    for (const collider of this.colliders) if (!collider.plane) this.draw(collider, { kind: 0, front: grey, offset: this.place(collider, time) });
+    for (const collider of this.colliders) if (!collider.plane) this.draw(collider, { kind: 0, front: grey, ...this.place(collider, time) });
     if (shade !== 'plain') gl.uniform2fv(this.at.range, this.ranges[shade]);
     this.draw(this.cloth, shade === 'plain' ? { kind: 0, front: [0.72, 0.2, 0.17], back: [0.86, 0.62, 0.4] } : { kind: 1 });
     gl.disable(gl.POLYGON_OFFSET_FILL);

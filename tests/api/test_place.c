@@ -220,45 +220,35 @@ START_TEST(only_what_is_chosen_is_placed)
 }
 END_TEST
 
-/* A sphere turns about any axis, a capsule and a cylinder about their own or upside down; a box by half
- * turns, and by quarter turns about the axis across which it is square. */
-START_TEST(colliders_turn_if_they_look_the_same)
+/* Colliders turn with what is placed: a box that lies across is found there, and its own coordinates turned. A
+ * second placement turns what was turned. */
+START_TEST(colliders_turn)
 {
     failing_allocator memory = {0};
     host h = several(&memory);
-    const int32_t crate = 0, sphere = 1, capsule = 2, cylinder = 3;
+    const int32_t crate = 0;
     drape_place_def def = place_def();
-    const double upright[4] = {0, 1, 0, 90}, over[4] = {1, 0, 0, 180}, tilt[4] = {0, 0, 1, 10},
-                 quarter[4] = {1, 0, 0, -90}, half[4] = {0, 1, 0, 180};
-    const uint64_t before = drape_sim_hash(h.sim);
-    memcpy(def.rotate, upright, sizeof upright);
-    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_ARGUMENT, "crate is a box that would not look the same");
-    ck_assert_uint_eq(drape_sim_hash(h.sim), before);
+    const double upright[4] = {0, 1, 0, 90}, half[4] = {0, 1, 0, 180};
+    double rotation[4], spin[3], pivot[3];
     def.cloth_count = 0;
     def.collider_count = 1;
     def.colliders = &crate;
-    memcpy(def.rotate, quarter, sizeof quarter);
-    good(&h, drape_sim_place(h.sim, &def)); /* about the line through its middle, which stays */
-    ck_assert(drape_sim_collider(h.sim, crate).displacement[0] == 0);
-    memcpy(def.rotate, half, sizeof half);
-    good(&h, drape_sim_place(h.sim, &def)); /* (9, 0, 0) to (-9, 0, 0) */
-    ck_assert(drape_sim_collider(h.sim, crate).displacement[0] == -18);
     memcpy(def.rotate, upright, sizeof upright);
-    def.colliders = &capsule;
-    good(&h, drape_sim_place(h.sim, &def)); /* its middle, (5, 1.5, 0), goes to (0, 1.5, -5) */
-    const double to[3] = {0, 1.5, -5}, middle[3] = {5, 1.5, 0};
-    for (int k = 0; k < 3; k++)
-        ck_assert(drape_sim_collider(h.sim, capsule).displacement[k] == to[k] - middle[k]);
-    memcpy(def.rotate, over, sizeof over);
-    def.colliders = &cylinder;
-    good(&h, drape_sim_place(h.sim, &def)); /* (6, 1.5, 0) to (6, -1.5, 0) */
-    ck_assert(drape_sim_collider(h.sim, cylinder).displacement[1] == -3);
-    memcpy(def.rotate, tilt, sizeof tilt);
-    says(&h, drape_sim_place(h.sim, &def), DRAPE_E_ARGUMENT, "would not look the same");
-    def.colliders = &sphere;
-    good(&h, drape_sim_place(h.sim, &def)); /* (0, -5, 0) to 5 (sin 10, -cos 10, 0) */
-    ck_assert_double_eq_tol(drape_sim_collider(h.sim, sphere).displacement[0], 5 * sin(10 * acos(-1) / 180),
-                            1e-14);
+    good(&h, drape_sim_place(h.sim, &def)); /* (9, 0, 0) to (0, 0, -9) */
+    ck_assert(drape_sim_collider_rotation(h.sim, crate, rotation, spin, pivot));
+    const double wanted[4] = {sqrt(0.5), 0, sqrt(0.5), 0}, there[3] = {0, 0, -9};
+    for (int k = 0; k < 4; k++)
+        ck_assert_double_eq_tol(rotation[k], wanted[k], 1e-15);
+    for (int k = 0; k < 3; k++) {
+        ck_assert_double_eq_tol(pivot[k], there[k], 1e-14);
+        ck_assert(spin[k] == 0);
+    }
+    memcpy(def.rotate, half, sizeof half);
+    good(&h, drape_sim_place(h.sim, &def));
+    ck_assert(drape_sim_collider_rotation(h.sim, crate, rotation, NULL, pivot));
+    ck_assert_double_eq_tol(fabs(rotation[2]), sqrt(0.5), 1e-15);
+    ck_assert_double_eq_tol(pivot[2], 9, 1e-14);
+    ck_assert(!drape_sim_collider_rotation(h.sim, 99, rotation, NULL, NULL));
     close_scene(&h, &memory);
 }
 END_TEST
@@ -542,7 +532,6 @@ START_TEST(what_is_sent_wrongly_changes_nothing)
 END_TEST
 
 SUITE("place", a_placed_sim_goes_on_as_before, any_rotation_keeps_the_strain, only_what_is_chosen_is_placed,
-      colliders_turn_if_they_look_the_same, cloth_placed_into_a_collider_comes_out,
-      a_checkpoint_keeps_placements, pins_that_are_sent_far_take_their_cloth_along,
-      colliders_that_are_sent_far_are_there, a_free_rotation_is_not_made, wrong_placements_are_refused,
-      what_is_sent_wrongly_changes_nothing)
+      colliders_turn, cloth_placed_into_a_collider_comes_out, a_checkpoint_keeps_placements,
+      pins_that_are_sent_far_take_their_cloth_along, colliders_that_are_sent_far_are_there,
+      a_free_rotation_is_not_made, wrong_placements_are_refused, what_is_sent_wrongly_changes_nothing)

@@ -5,6 +5,7 @@
 #include "colliders/colliders.h"
 
 #include "base/clock.h"
+#include "base/rotation.h"
 #include "base/vec3.h"
 #include "entries/models.h"
 #include "mesh/mesh.h"
@@ -660,41 +661,144 @@ END_TEST
 
 /* ---- Turning ---- */
 
-/* What says that it looks the same after a rotation does: the distance of a turned point from the shifted
- * collider is that of the point, to rounding of coordinates of 10 m and of the rotation. All that have such
- * rotations know some about the axes that their parameters give, and a sphere all. */
-static void check_turned(const drape_collider *c, const struct variant *v)
+#define RADIANS 0.017453292519943295
+
+/* Where the pose at time t takes a point of the collider's own coordinates. */
+static void point_at(const drape_collider *c, double t, const double *own, double *x)
 {
-    int same = 0;
-    for (int i = 0; c->ops->turned && i < 40; i++) {
-        const double *p = c->values, degrees[] = {90, 180, 37, -90};
-        double rotate[4] = {between(-1, 1), between(-1, 1), between(-1, 1), degrees[i % 4]}, R[3][3],
-               shift[3];
-        for (int k = 0; k < 3 && i < 8; k++)
-            rotate[k] = i < 4 ? p[3 + k] - p[k] : p[3 + k];
-        if (i >= 8 && i < 20)
-            for (int k = 0; k < 3; k++)
-                rotate[k] = k == i / 4 - 2;
-        drape_rotation_matrix(rotate, R);
-        if (!c->ops->turned(c->values, &c->shape, R[0], shift))
-            continue;
-        same++;
-        for (int n = 0; n < 20; n++) {
-            const double x[3] = {between(-5, 5), between(-5, 5), between(-5, 5)};
-            double y[3];
-            for (int k = 0; k < 3; k++)
-                y[k] = vec3_dot(R[k], x) - shift[k];
-            ck_assert_double_eq_tol(distance_of(c, y, NULL, NULL), distance_of(c, x, NULL, NULL), 1e-13);
-        }
-    }
-    ck_assert_msg(!c->ops->turned || same > 0, "%s", v->text);
-    ck_assert(strcmp(c->ops->entry.name, "sphere") != 0 || same == 40);
-    ck_assert(v->inside != in_post || same >= 5); /* three half turns, and both quarter turns about y */
+    const drape_collider_pose pose = drape_collider_pose_at(c, t);
+    drape_pose_point(&pose, own, x);
 }
 
-START_TEST(what_looks_the_same_after_a_rotation_does)
+/* Keys about one axis, a piece of more than a turn; then quaternions. The rates are those of the keys, and the
+ * velocity of a point is the rate of its place: by differences over 2e-6 s, to (3 rad/s)^3 1e-12/6 m of the
+ * cubic, and rounding of 1e-16/1e-6 m/s. */
+START_TEST(poses_follow_the_turns)
+{
+    scene s = with_collider(
+        "{'type': 'box', 'center': [1, 0, 0], 'size': [0.2, 0.4, 0.6], 'pivot': [1, 0, 0.5],"
+        " 'track': [[0, [0, 0, 0]], [4, [4, 0, 0]]], 'turns': [{'time': 1, 'rotate': [0, 0, 2, 0]},"
+        " {'time': 3, 'rotate': [0, 0, 3, 450]}, {'time': 4, 'rotate': [0, 0, -1, -90]},"
+        " {'time': 5, 'quaternion': [1, 0, 0, 1]}, {'time': 6, 'quaternion': [1, 1, 1, 1]},"
+        " {'time': 7, 'rotate': [0, 1, 0, 20]}]}");
+    const drape_collider *c = &s.model->colliders[0];
+    static const struct {
+        double t, degrees, rate; /* about z */
+    } cases[] = {{0, 0, 0},         {1, 0, 225},      {1.5, 112.5, 225},
+                 {2.5, 337.5, 225}, {3.5, 270, -360}, {4.5, 90, 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        double x[3], q[4], w[3], pivot[3], angle = cases[i].degrees * RADIANS;
+        const double own[3] = {1.5, 0, 0.5}, along = fmin(cases[i].t, 4);
+        point_at(c, cases[i].t, own, x);
+        ck_assert_double_eq_tol(x[0], 1 + along + 0.5 * cos(angle), 1e-14);
+        ck_assert_double_eq_tol(x[1], 0.5 * sin(angle), 1e-14);
+        ck_assert_double_eq_tol(x[2], 0.5, 1e-14);
+        ck_assert(drape_model_collider_rotation(s.model, 0, cases[i].t, q, w, pivot));
+        ck_assert_double_eq_tol(fabs(q[3]), fabs(sin(angle / 2)), 1e-14);
+        ck_assert_double_eq_tol(w[2], cases[i].rate * RADIANS, 1e-13);
+        ck_assert(w[0] == 0 && w[1] == 0 && pivot[0] == 1 + along && pivot[2] == 0.5);
+    }
+    for (double t = 0.1; t < 7; t += 0.17) {
+        const drape_collider_pose pose = drape_collider_pose_at(c, t);
+        const double own[3] = {0.3, -0.7, 0.4}, h = 1e-6;
+        double before[3], now[3], after[3], v[3];
+        point_at(c, t - h, own, before);
+        point_at(c, t, own, now);
+        point_at(c, t + h, own, after);
+        drape_pose_velocity(&pose, now, v);
+        for (int k = 0; k < 3; k++)
+            ck_assert_double_eq_tol(v[k], (after[k] - before[k]) / (2 * h), 1e-8);
+    }
+    scene_close(&s);
+}
+END_TEST
+
+/* In a turned pose the distance is that of the point in the collider's own coordinates, and its derivatives in
+ * space are exact: that of the distance along a direction is normal . u, that of the normal curvature u. Mean
+ * velocities take points from one pose to the other. */
+static void check_turned(const drape_collider *c, const struct variant *v)
+{
+    drape_collider_pose pose = {.t = 0}, next = {.t = 1}, none = {.t = 0};
+    double turn[2][9];
+    const double h = 0.01, spins[2][3] = {{0.9, -1.4, 0.3}, {0.95, -1.3, 0.33}}, zero[3] = {0},
+                 by[2][3] = {{0.2, 0.1, -0.3}, {0.21, 0.1, -0.31}}, pivot[3] = {0.1, 0.2, 0.3};
+    for (int i = 0; i < 2; i++) {
+        drape_rotation_exp(spins[i], turn[i]);
+        drape_pose_about(i ? &next : &pose, pivot, turn[i], by[i], zero, zero);
+    }
+    drape_collider_pose moving = next;
+    drape_pose_set_mean_velocities(&moving, &pose, &next, h);
+    for (int i = 0; i < 50; i++) {
+        const double own[3] = {between(-2, 2), between(-2, 2), between(-2, 2)},
+                     u[3] = {between(-1, 1), between(-1, 1), between(-1, 1)};
+        double x[3], y[3], n[3], m[3], k[9], at[3], velocity[3], l[3];
+        drape_pose_point(&pose, own, x);
+        const double d = drape_collider_distance(c, &pose, x, n, k);
+        ck_assert_double_eq_tol(d, drape_collider_distance(c, &none, own, m, NULL), 1e-13);
+        ck_assert_double_eq_tol(vec3_norm(n), 1, 1e-12);
+        drape_pose_direction(&pose, m);
+        for (int a = 0; a < 3; a++)
+            ck_assert_double_eq_tol(n[a], m[a], 1e-6); /* rounding may choose another corner */
+        memcpy(at, x, sizeof at);
+        vec3_add_scaled(1e-6, u, at);
+        const double changed = drape_collider_distance(c, &pose, at, l, NULL);
+        bool smooth = true; /* not across an edge */
+        for (int a = 0; a < 3; a++)
+            smooth = smooth && fabs(l[a] - n[a] - 1e-6 * vec3_dot(k + 3 * a, u)) < 1e-9;
+        ck_assert_msg(!smooth || fabs(changed - d - 1e-6 * vec3_dot(n, u)) < 1e-10, "%s", v->text);
+        drape_pose_point(&next, own, y);
+        drape_pose_velocity(&moving, y, velocity);
+        for (int a = 0; a < 3; a++)
+            ck_assert_double_eq_tol(x[a] + h * velocity[a], y[a], 1e-14);
+    }
+}
+
+START_TEST(a_turned_pose_turns_the_distance)
 {
     each_variant(check_turned);
+}
+END_TEST
+
+/* From one pose to another: the ends are those of the poses, a point that is carried along rests, and no point
+ * is faster than the bound: 100 places on each of 40 paths. */
+START_TEST(swings_lead_from_pose_to_pose)
+{
+    for (int i = 0; i < 40; i++) {
+        drape_collider_pose from = {.t = 0}, to = {.t = 1};
+        const double pivot[3] = {between(-1, 1), between(-1, 1), between(-1, 1)}, zero[3] = {0};
+        drape_swing swing;
+        double own[3], before[3], move[3], x[3], y[3], turn[9], rate[3];
+        for (int end = 0; end < 2; end++) {
+            const double v[3] = {between(-1, 1), between(-1, 1), between(-1, 1)},
+                         d[3] = {between(-1, 1), between(-1, 1), between(-1, 1)};
+            drape_rotation_exp(v, turn);
+            drape_rotation_log(turn, rate);
+            for (int k = 0; k < 3; k++)
+                ck_assert_double_eq_tol(rate[k], v[k], 1e-14);
+            drape_pose_about(end ? &to : &from, pivot, turn, d, zero, zero);
+        }
+        drape_swing_between(&from, &to, pivot, &swing);
+        for (int k = 0; k < 3; k++) {
+            x[k] = between(-1, 1);
+            move[k] = between(-1, 1);
+            y[k] = x[k] + move[k];
+        }
+        drape_pose_own(&from, x, own);
+        drape_swing_own(&swing, x, move, 0, before);
+        for (int k = 0; k < 3; k++)
+            ck_assert_double_eq_tol(before[k], own[k], 1e-14);
+        const double speed = drape_swing_speed(&swing, x, move);
+        for (int n = 1; n <= 100; n++) {
+            double now[3], path[3];
+            drape_swing_own(&swing, x, move, n / 100.0, now);
+            vec3_sub(now, before, path);
+            ck_assert_double_le(vec3_norm(path), speed / 100 * (1 + 1e-12));
+            memcpy(before, now, sizeof now);
+        }
+        drape_pose_own(&to, y, own);
+        for (int k = 0; k < 3; k++)
+            ck_assert_double_eq_tol(before[k], own[k], 1e-14);
+    }
 }
 END_TEST
 
@@ -732,4 +836,5 @@ END_TEST
 SUITE("colliders", entries_are_well_formed, distances_are_exact, a_mesh_equals_its_box, derivatives_are_exact,
       normals_are_continuous_outside, the_distance_is_defined_everywhere, shapes_lie_on_the_surface,
       shapes_have_the_right_features, meshes_that_are_no_solid_are_refused, poses_follow_the_track,
-      what_looks_the_same_after_a_rotation_does, queries_of_large_meshes_are_fast)
+      poses_follow_the_turns, a_turned_pose_turns_the_distance, swings_lead_from_pose_to_pose,
+      queries_of_large_meshes_are_fast)

@@ -1226,8 +1226,8 @@ END_TEST
 
 static const char whole[] =
     "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g', 'transform': {}}, 'terms': [{'type': 't'}],"
-    "'pins': [{'nodes': [0]}]}], 'colliders': [{'type': 'c'}], 'events': [{'type': 'e'}], 'integrator': {},"
-    "'controller': {}, 'output': {}}";
+    "'pins': [{'nodes': [0]}]}], 'colliders': [{'type': 'c', 'turns': [{'time': 0, 'rotate': [0, 0, 1]}]}],"
+    "'events': [{'type': 'e'}], 'integrator': {}, 'controller': {}, 'output': {}}";
 
 /* The key that a pointer leads to, and the def it belongs to. */
 static const drape_scene_key *find_key(const char *pointer, const char **at)
