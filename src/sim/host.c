@@ -208,6 +208,34 @@ drape_status drape_sim_deform_collider(drape_sim *sim, int32_t collider, double 
     return status;
 }
 
+drape_status drape_sim_collider_points(drape_sim *sim, int32_t collider, double *positions,
+                                       double *velocities)
+{
+    drape_status status = drape_sim_guard(sim, "drape_sim_collider_points");
+    if (status)
+        return status;
+    status = check_deforms(sim, "drape_sim_collider_points", collider);
+    if (!status && !positions)
+        status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_points: positions is NULL");
+    if (status)
+        return status;
+    const drape_motion *motion = drape_system_motion(sim->system);
+    const size_t points = (size_t)sim->model->colliders[collider].shape.point_count;
+    const double t = drape_sim_state(sim)->t;
+    drape_collider_pose pose;
+    drape_motion_pose(motion, collider, t, t, &pose);
+    drape_motion_points(motion, collider, t, positions);
+    if (velocities)
+        drape_motion_point_velocities(motion, collider, t, t, velocities);
+    for (size_t i = 0; i < points; i++) {
+        double *x = positions + 3 * i, *v = velocities ? velocities + 3 * i : NULL;
+        if (v)
+            drape_pose_point_velocity(&pose, x, v, v);
+        drape_pose_point(&pose, x, x);
+    }
+    return DRAPE_OK;
+}
+
 int32_t drape_model_collider_points(const drape_model *model, int32_t collider)
 {
     if (!model || collider < 0 || collider >= model->collider_count)
