@@ -1,6 +1,6 @@
-/* collider_animated_mesh.c: a triangle mesh whose points move from frame to frame, closed or open. As those of
- * collider_mesh.c, its triangles are in contact with the nodes of the cloth, instead of its distance, which
- * only says what is inside. */
+/* collider_animated_mesh.c: a triangle mesh whose points move from frame to frame, closed or open. As those
+ * of collider_mesh.c, its triangles are in contact with the nodes of the cloth, instead of its distance,
+ * which only says what is inside. */
 #include "colliders/colliders.h"
 
 #include "base/vec3.h"

@@ -41,8 +41,8 @@ struct drape_shape_builder {
 /* The text that the scene gives a parameter; NULL: none. */
 const char *drape_shape_text(const drape_collider_shape *shape, const char *parameter);
 
-/* Checks a mesh as a surface, and finds its edges; closed: as that of a solid, with triangles counterclockwise
- * from outside. */
+/* Checks a mesh as a surface, and finds its edges; closed: as that of a solid, with triangles
+ * counterclockwise from outside. */
 drape_status drape_shape_check_mesh(drape_context *ctx, const drape_mesh_source *source, bool closed,
                                     drape_mesh *mesh);
 

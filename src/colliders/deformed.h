@@ -19,8 +19,8 @@ drape_status drape_deformed_create(drape_arena *arena, const drape_collider *col
 /* Moves its points (point_count x 3) there: its tree is refitted, unless they are there already. */
 void drape_deformed_move(drape_deformed *deformed, const double *points);
 
-/* The collider at time t, on the motion of a sim, or, motion NULL, on its frames: the collider itself if it is
- * rigid. The arena holds the rest. Errors: DRAPE_E_MEMORY. */
+/* The collider at time t, on the motion of a sim, or, motion NULL, on its frames: the collider itself if it
+ * is rigid. The arena holds the rest. Errors: DRAPE_E_MEMORY. */
 drape_status drape_deformed_at(drape_arena *arena, const drape_model *model, const drape_motion *motion,
                                int32_t collider, double t, const drape_collider **out);
 

@@ -1,5 +1,6 @@
-/* sweep_mesh.c: see sweep_mesh.h. A node that a triangle reaches keeps its place over it from then on, but for
- * what it moves along it: at the end of the step it is as far from the triangle as the triangle may come. */
+/* sweep_mesh.c: see sweep_mesh.h. A node that a triangle reaches keeps its place over it from then on, but
+ * for what it moves along it: at the end of the step it is as far from the triangle as the triangle may
+ * come. */
 #include "contact/sweep_mesh.h"
 
 #include "base/vec3.h"

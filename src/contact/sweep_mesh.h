@@ -6,8 +6,8 @@
 #include "contact/contact.h"
 
 /* Moves the nodes of y (points x 3; its points of colliders are those at the end of the step) that triangles
- * of colliders that deform reach, on straight paths of all points from the beginning of the step, to where they
- * slide on these triangles. Returns whether there are any. */
+ * of colliders that deform reach, on straight paths of all points from the beginning of the step, to where
+ * they slide on these triangles. Returns whether there are any. */
 bool drape_contact_sweep_meshes(drape_contact *contact, double *y);
 
 #endif

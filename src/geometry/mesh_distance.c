@@ -1,15 +1,15 @@
 /*
  * mesh_distance.c: see mesh_distance.h.
  *
- * The nearest point is searched depth first in a tree of boxes, the nearer child first (Ericson 2005, section
- * 6.3; points of triangles: 5.1.5).
+ * The nearest point is searched depth first in a tree of boxes, the nearer child first (Ericson 2005,
+ * section 6.3; points of triangles: 5.1.5).
  *
  * x is outside if n . (x - c) > 0 for the angle-weighted pseudo-normal n of the face, edge or point that
  * contains the nearest point c (Baerentzen and Aanaes 2005, "Signed distance computation using the angle
- * weighted pseudonormal", theorem 1). This holds for every closed mesh without self-intersections. Where a mesh
- * intersects itself, the point is inside if the mesh winds around it at least once: the triangles that a ray
- * leaves the body through are more than those that it enters by (Jacobson et al. 2013, "Robust inside-outside
- * segmentation using generalized winding numbers", section 3).
+ * weighted pseudonormal", theorem 1). This holds for every closed mesh without self-intersections. Where a
+ * mesh intersects itself, the point is inside if the mesh winds around it at least once: the triangles that
+ * a ray leaves the body through are more than those that it enters by (Jacobson et al. 2013, "Robust
+ * inside-outside segmentation using generalized winding numbers", section 3).
  */
 #include "geometry/mesh_distance.h"
 #include "base/elementary.h"
@@ -280,10 +280,10 @@ typedef struct ray {
     int winding;
 } ray;
 
-/* The side of the line from corner a to corner b, seen along x, on which the ray is: positive, negative, 0 for
- * a line that is seen as a point. A ray that meets the line is beside it, as if it were moved a little along y
- * and far less along z, so that it passes through one of the triangles around an edge or a point. The sides of
- * an edge have opposite signs to the last digit in both of its triangles. */
+/* The side of the line from corner a to corner b, seen along x, on which the ray is: positive, negative, 0
+ * for a line that is seen as a point. A ray that meets the line is beside it, as if it were moved a little
+ * along y and far less along z, so that it passes through one of the triangles around an edge or a point.
+ * The sides of an edge have opposite signs to the last digit in both of its triangles. */
 static double side_of_line(const ray *r, int32_t a, int32_t b)
 {
     const bool ordered = a < b;

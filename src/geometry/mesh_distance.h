@@ -9,7 +9,7 @@ typedef struct drape_mesh_distance drape_mesh_distance;
 
 /* How the side of a point is found. */
 typedef enum drape_mesh_side {
-    DRAPE_SIDE_NORMAL, /* by the normal where it is nearest: for closed meshes that do not intersect themselves */
+    DRAPE_SIDE_NORMAL, /* by the normal where it is nearest: closed meshes that do not intersect themselves */
     DRAPE_SIDE_WINDING, /* by how often the mesh winds around it: for all closed meshes */
     DRAPE_SIDE_NONE     /* every point is outside: for open meshes */
 } drape_mesh_side;

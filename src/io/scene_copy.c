@@ -114,8 +114,8 @@ static drape_status copy_bytes(copier *c, int from, const char *source)
     return drape_file_finish(&c->out);
 }
 
-/* What is several files, as a folder of frames or their pattern, is not copied: the scene names it by its whole
- * path. */
+/* What is several files, as a folder of frames or their pattern, is not copied: the scene names it by its
+ * whole path. */
 static drape_status keep_path(copier *c, const char *source, const char *pointer)
 {
     char folder[PATH_MAX];

@@ -1,5 +1,5 @@
-/* npy_array.h: an array of float32 or float64 in the NPY format, versions 1 to 3 (numpy.lib.format; NEP 1), of
- * one to three dimensions, in C order, little endian. */
+/* npy_array.h: an array of float32 or float64 in the NPY format, versions 1 to 3 (numpy.lib.format; NEP 1),
+ * of one to three dimensions, in C order, little endian. */
 #ifndef DRAPE_MESH_NPY_ARRAY_H
 #define DRAPE_MESH_NPY_ARRAY_H
 

@@ -1,4 +1,5 @@
-/* sequence_npy.c: frames x nodes x 3 numbers in an NPY file, as the exporter "npy" and numpy.save write them. */
+/* sequence_npy.c: frames x nodes x 3 numbers in an NPY file, as the exporter "npy" and numpy.save write
+ * them. */
 #include "mesh/contents.h"
 #include "mesh/npy_array.h"
 #include "mesh/sequence.h"

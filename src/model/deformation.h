@@ -33,8 +33,8 @@ void drape_deformation_velocities(const drape_deformation *d, double t, double w
 double drape_deformation_next_kink(const drape_deformation *d, double t, double end);
 bool drape_deformation_at_kink(const drape_deformation *d, double t);
 
-/* Sends the points, from where they are at time t, on cubics to x and velocities v (points x 3) at t + span; v
- * NULL: on straight lines at constant speed. */
+/* Sends the points, from where they are at time t, on cubics to x and velocities v (points x 3) at t + span;
+ * v NULL: on straight lines at constant speed. */
 void drape_deformation_send(drape_deformation *d, double t, double span, const double *x, const double *v);
 
 /* Takes the path of another deformation of the same collider. */

@@ -1,5 +1,5 @@
-/* test_deform.c: colliders that deform: a rigid motion as frames, a ball that grows inside a ball of cloth, the
- * work that it does, points that a host sends, checkpoints and threads. */
+/* test_deform.c: colliders that deform: a rigid motion as frames, a ball that grows inside a ball of cloth,
+ * the work that it does, points that a host sends, checkpoints and threads. */
 #include "colliders/deformed.h"
 #include "support/frames.h"
 #include "support/scene.h"
@@ -42,8 +42,8 @@ static scene open_sheet(const char *format, ...)
     return scene_open(SHEET, collider);
 }
 
-/* The ball of radius 0.2 rises by 0.1 m in 0.2 s and rests; as a rigid mesh on a track, and as frames. Both meet
- * the cloth by the same pairs, in the same order, and their points differ by rounding. */
+/* The ball of radius 0.2 rises by 0.1 m in 0.2 s and rests; as a rigid mesh on a track, and as frames. Both
+ * meet the cloth by the same pairs, in the same order, and their points differ by rounding. */
 START_TEST(rigid_motion_as_frames)
 {
     const frames_folder f = frames_folder_make();
@@ -78,10 +78,11 @@ START_TEST(rigid_motion_as_frames)
 END_TEST
 
 /*
- * A ball of cloth around a ball that grows by 2 % in 1 s: strain e in all directions of the surface. Its elastic
- * energy per area at rest is E h/(1 - nu) e^2 for small e, with e of the cloth's own size; second order terms of
- * the strain measure are of relative size e. The cloth is the same polyhedron, so that it scales as a whole.
- * Nothing else takes energy but damping and what is left of motion: what the ball has done is in the account.
+ * A ball of cloth around a ball that grows by 2 % in 1 s: strain e in all directions of the surface. Its
+ * elastic energy per area at rest is E h/(1 - nu) e^2 for small e, with e of the cloth's own size; second
+ * order terms of the strain measure are of relative size e. The cloth is the same polyhedron, so that it
+ * scales as a whole. Nothing else takes energy but damping and what is left of motion: what the ball has
+ * done is in the account.
  */
 START_TEST(ball_grows_in_a_ball_of_cloth)
 {
@@ -112,9 +113,9 @@ START_TEST(ball_grows_in_a_ball_of_cloth)
     ck_assert_double_eq_tol(energy.elastic, expected, 3 * e * expected);
     ck_assert_int_eq(drape_sim_inside(s.sim, 0, NULL), 0);
     ck_assert_int_eq(drape_sim_intersections(s.sim, 0), 0);
-    /* All of it is the work of the ball. Backward Euler takes the force at the end of a step, which grows as the
-     * strain: with the stiffness k, sum k e_i (e_i - e_(i-1)) is larger than k e^2/2 by 1/50 of it in the 1/h
-     * steps in which it grows, more if they begin later; and what moves at first comes to rest. */
+    /* All of it is the work of the ball. Backward Euler takes the force at the end of a step, which grows as
+     * the strain: with the stiffness k, sum k e_i (e_i - e_(i-1)) is larger than k e^2/2 by 1/50 of it in
+     * the 1/h steps in which it grows, more if they begin later; and what moves at first comes to rest. */
     ck_assert_double_gt(energy.numerical, 0);
     ck_assert_double_lt(energy.numerical, 0.06 * energy.elastic);
     scene_close(&s);
@@ -142,9 +143,9 @@ static scene open_host(const frames_folder *f)
                       f->path);
 }
 
-/* A host that sends the points as the frames have them moves the cloth as they do: to rounding, since pieces of
- * the motion are the same straight lines. A checkpoint in
- * the middle of a path goes on with the same bits, and so does another number of threads. */
+/* A host that sends the points as the frames have them moves the cloth as they do: to rounding, since pieces
+ * of the motion are the same straight lines. A checkpoint in the middle of a path goes on with the same
+ * bits, and so does another number of threads. */
 START_TEST(host_sends_points)
 {
     const frames_folder f = frames_folder_make();
@@ -183,7 +184,7 @@ START_TEST(host_sends_points)
     for (size_t i = 0; i < n; i++)
         ck_assert_double_eq_tol(x[i], y[i], 1e-11);
 
-    /* points and velocities on the way: a cubic that arrives with 0.5 m/s */
+    /* points and velocities: a cubic that arrives with 0.5 m/s */
     static double p[3 * POINTS], v[3 * POINTS];
     send(&host, 0.1, 0.2, 0.15, (const double[]){0, 0.5, 0});
     scene_advance(&host, 0.35);

@@ -1,4 +1,5 @@
-/* frames.h: for tests with colliders that deform: files of triangles and of frames, in a folder of their own. */
+/* frames.h: for tests with colliders that deform: files of triangles and of frames, in a folder of their
+ * own. */
 #ifndef DRAPE_TESTS_FRAMES_H
 #define DRAPE_TESTS_FRAMES_H
 

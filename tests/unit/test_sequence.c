@@ -1,4 +1,5 @@
-/* test_sequence.c: frames of a mesh from files: what is read, at which times, and the message of each fault. */
+/* test_sequence.c: frames of a mesh from files: what is read, at which times, and the message of each
+ * fault. */
 #include "mesh/npy_array.h"
 #include "mesh/sequence.h"
 #include "model/deformation.h"
