@@ -653,6 +653,26 @@ DRAPE_API drape_status drape_sim_move_collider_pose(drape_sim *sim, int32_t coll
                                                     const double displacement[3], const double rotation[4],
                                                     const double *velocity, const double *angular_velocity);
 
+/* Sends the points of a collider of the type animated_mesh, in place of its frames: to positions (points x
+ * 3 [m], in the order of its file) in `seconds` [s] from now, with velocities (points x 3 [m/s]) there.
+ * Each moves on a cubic that begins where it is now, with the velocity that it has, as drape_sim_move_pins
+ * moves a pin; velocities NULL: straight, at constant speed. Then they rest until they are sent again.
+ * Coordinates are the collider's own, which are those of space unless it is moved or turned as a whole,
+ * too. The arrays are copied. Points are never placed elsewhere (teleport_speed). Errors: DRAPE_E_ARGUMENT
+ * (no such collider, one that is rigid, another number of points, seconds not in (0, 1e9], a value that is
+ * not finite or beyond 1e9 m or m/s, or a triangle with an altitude below 1e-12 of its longest edge). */
+DRAPE_API drape_status drape_sim_deform_collider(drape_sim *sim, int32_t collider, double seconds,
+                                                 int32_t points, const double *positions,
+                                                 const double *velocities);
+
+/* The number of points of a collider that deforms; 0 for a rigid one, -1 without one. */
+DRAPE_API int32_t drape_model_collider_points(const drape_model *model, int32_t collider);
+
+/* Writes where the points of a collider that deforms are in space now [m], and, unless NULL, how fast they
+ * move [m/s]: (points x 3) each; at a frame, those towards the next one. Errors: DRAPE_E_ARGUMENT. */
+DRAPE_API drape_status drape_sim_collider_points(drape_sim *sim, int32_t collider, double *positions,
+                                                 double *velocities);
+
 /* Pushes nodes: forces (node_count x 3 [N], copied) act from the next step on, regardless of the motion of
  * the nodes, until they are replaced. NULL: no forces. A force on a pinned node is taken up by its pin. The
  * work of the forces counts as that of pins. "ida" starts anew. Errors: DRAPE_E_ARGUMENT (not finite). */

@@ -493,7 +493,8 @@ typedef struct drape_collider_shape {
     bool inscribed;    /* of a convex body: its points and segments stay inside a curved surface */
     const void *kept;  /* data that the collider keeps for its distance, from drape_shape_take; NULL: none */
     struct drape_shape_builder *builder; /* used by the functions below; NULL outside the function shape */
-    void *user;                          /* of the collider's ops */
+    double distance; /* activation distance of this collider [m]; 0: that of the scene's contact */
+    void *user;      /* of the collider's ops */
 } drape_collider_shape;
 
 /* Allocates the arrays of a shape, which live as long as the model. Call it once. Errors: DRAPE_E_MEMORY. */

@@ -5,6 +5,7 @@
 
 #include "assemble/check.h"
 #include "base/finite.h"
+#include "colliders/deformed.h"
 #include "geometry/intersect.h"
 #include "sim/inside.h"
 
@@ -97,7 +98,12 @@ static drape_status check_collider(tally *t, int32_t collider, int64_t frame, do
     const drape_collider *c = &t->in->model->colliders[collider];
     const drape_collider_pose pose = drape_collider_pose_at(c, time);
     drape_inside found;
-    const drape_status status = drape_find_inside(t->in->ctx, t->in->model, collider, &pose, x, &found);
+    const drape_collider *body;
+    drape_arena arena = drape_arena_of(t->in->ctx);
+    drape_status status = drape_deformed_at(&arena, t->in->model, NULL, collider, time, &body);
+    if (!status)
+        status = drape_find_inside(t->in->ctx, t->in->model, body, &pose, x, &found);
+    drape_arena_free(&arena);
     if (status || found.triangles == 0)
         return status;
     *sum += found.triangles + found.intersections;

@@ -54,17 +54,18 @@ static drape_status check_closed(drape_context *ctx, const drape_mesh_source *so
     return DRAPE_OK;
 }
 
-static drape_status check_mesh(drape_context *ctx, const drape_mesh_source *source, drape_mesh *mesh)
+drape_status drape_shape_check_mesh(drape_context *ctx, const drape_mesh_source *source, bool closed,
+                                    drape_mesh *mesh)
 {
     drape_status status = drape_mesh_validate_triangles(ctx, source, mesh);
     if (!status)
         status = drape_mesh_connect(ctx, source, mesh);
     if (!status)
         status = drape_mesh_validate_nodes(ctx, source, mesh);
-    return status ? status : check_closed(ctx, source, mesh);
+    return status || !closed ? status : check_closed(ctx, source, mesh);
 }
 
-static drape_status copy_mesh(const drape_mesh *mesh, drape_collider_shape *shape)
+drape_status drape_shape_copy_mesh(const drape_mesh *mesh, drape_collider_shape *shape)
 {
     drape_status status =
         drape_shape_reserve(shape, mesh->node_count, mesh->edge_count, mesh->triangle_count);
@@ -76,10 +77,11 @@ static drape_status copy_mesh(const drape_mesh *mesh, drape_collider_shape *shap
     return DRAPE_OK;
 }
 
-static const char *text_of(const drape_choice *choice, const char *name)
+const char *drape_shape_text(const drape_collider_shape *shape, const char *parameter)
 {
+    const drape_choice *choice = shape->builder->choice;
     for (size_t i = 0; i < choice->setting_count; i++)
-        if (strcmp(choice->settings[i].name, name) == 0)
+        if (strcmp(choice->settings[i].name, parameter) == 0)
             return choice->settings[i].text;
     return NULL;
 }
@@ -88,7 +90,7 @@ drape_status drape_shape_read_mesh(drape_collider_shape *shape, const char *para
                                    const double turn[3], const double translate[3])
 {
     const struct drape_shape_builder *builder = shape->builder;
-    const char *file = text_of(builder->choice, parameter);
+    const char *file = drape_shape_text(shape, parameter);
     const double rotate[4] = {turn[0], turn[1], turn[2], vec3_norm(turn)};
     char at[sizeof builder->ctx->pointer];
     drape_mesh mesh = {0};
@@ -105,9 +107,9 @@ drape_status drape_shape_read_mesh(drape_collider_shape *shape, const char *para
         status = drape_mesh_validate_positions(builder->ctx, &transformed, &mesh);
     }
     if (!status)
-        status = check_mesh(builder->ctx, &source, &mesh);
+        status = drape_shape_check_mesh(builder->ctx, &source, true, &mesh);
     if (!status)
-        status = copy_mesh(&mesh, shape);
+        status = drape_shape_copy_mesh(&mesh, shape);
     drape_mesh_free(&mesh);
     return status;
 }

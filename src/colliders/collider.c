@@ -58,6 +58,7 @@ drape_status drape_collider_build(drape_context *ctx, drape_arena *arena, const 
     ctx->message[0] = 0;
     status = ops->shape(collider->values, tolerance, &collider->shape);
     collider->shape.builder = NULL;
+    collider->frames = builder.frames;
     return drape_fail_unsaid(ctx, status, pointer, "shape() of \"%s\" returned %s", ops->entry.name,
                              drape_status_name(status));
 }

@@ -26,7 +26,7 @@ static drape_status make_shape(const double *values, double tolerance, drape_col
         drape_shape_read_mesh(shape, "file", values + SCALE, values + ROTATE, values + TRANSLATE);
     if (status)
         return status;
-    shape->kept = drape_mesh_distance_create(shape->builder->arena, shape);
+    shape->kept = drape_mesh_distance_create(shape->builder->arena, shape, DRAPE_SIDE_NORMAL);
     return shape->kept ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 

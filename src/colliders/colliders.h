@@ -34,8 +34,20 @@ struct drape_shape_builder {
     const char *pointer; /* of the collider: "/colliders/0" */
     const char *folder;  /* of relative files; NULL: the working directory */
     const drape_choice *choice;
-    bool reserved; /* the arrays of the shape have been taken */
+    bool reserved;         /* the arrays of the shape have been taken */
+    drape_sequence frames; /* of a collider that deforms (drape_collider.frames) */
 };
+
+/* The text that the scene gives a parameter; NULL: none. */
+const char *drape_shape_text(const drape_collider_shape *shape, const char *parameter);
+
+/* Checks a mesh as a surface, and finds its edges; closed: as that of a solid, with triangles
+ * counterclockwise from outside. */
+drape_status drape_shape_check_mesh(drape_context *ctx, const drape_mesh_source *source, bool closed,
+                                    drape_mesh *mesh);
+
+/* Makes the nodes, edges and triangles of a mesh the parts of a shape. Errors: DRAPE_E_MEMORY. */
+drape_status drape_shape_copy_mesh(const drape_mesh *mesh, drape_collider_shape *shape);
 
 /* Resolves the parameters and makes the shape of a collider whose ops and choice are set; tolerance as in
  * drape_collider_ops. Errors are reported at pointer or below it. */

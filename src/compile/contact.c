@@ -1,6 +1,7 @@
 /* contact.c: the parameters of contact, from the scene's "contact" and "self_contact", with defaults derived
  * from the scales of the scene. */
 #include "base/elementary.h"
+#include "base/vec3.h"
 #include "compile/stages.h"
 #include "model/track.h"
 
@@ -90,9 +91,28 @@ static double track_speed(const drape_track *track)
     return most;
 }
 
+/* Of the fastest point between two frames. */
+static double frames_speed(const drape_sequence *frames)
+{
+    const size_t points = (size_t)frames->node_count;
+    double most = 0;
+    for (int32_t f = 1; f < frames->frame_count; f++) {
+        const double *a = frames->x + 3 * points * (size_t)(f - 1), *b = a + 3 * points;
+        double longest = 0;
+        for (size_t i = 0; i < points; i++) {
+            double move[3];
+            vec3_sub(b + 3 * i, a + 3 * i, move);
+            longest = fmax(longest, vec3_dot(move, move));
+        }
+        most = fmax(most, sqrt(longest) / (frames->time[f] - frames->time[f - 1]));
+    }
+    return most;
+}
+
 static double collider_speed(const drape_collider *collider)
 {
-    return track_speed(&collider->track) + drape_turns_fastest(&collider->turns) * collider->radius;
+    return track_speed(&collider->track) + drape_turns_fastest(&collider->turns) * collider->radius +
+           frames_speed(&collider->frames);
 }
 
 /* The largest speed at which the scene itself can move cloth against a collider. */

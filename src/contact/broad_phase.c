@@ -43,6 +43,7 @@ static void list_features(drape_broad_phase *s)
     int32_t first = s->model->node_count, segments = 0, triangles = 0;
     memcpy(s->rest, s->model->rest, 3 * (size_t)first * sizeof *s->rest);
     for (int32_t i = 0; i < s->model->collider_count; i++) {
+        s->first_point[i] = first;
         list_collider(s, i, first, &segments, &triangles);
         first += s->model->colliders[i].shape.point_count;
     }
@@ -82,6 +83,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->points = m->node_count + points;
     s->rest = drape_arena_take(arena, 3 * (size_t)s->points, sizeof *s->rest);
     s->point_collider = drape_arena_take(arena, (size_t)points, sizeof *s->point_collider);
+    s->first_point = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->first_point);
     s->segment = drape_arena_take(arena, 2 * (size_t)s->segments, sizeof *s->segment);
     s->segment_collider = drape_arena_take(arena, (size_t)s->segments, sizeof *s->segment_collider);
     s->triangle = drape_arena_take(arena, 3 * (size_t)triangles, sizeof *s->triangle);
@@ -95,7 +97,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < m->collider_count; i++)
-        s->distance[i] = m->contact.distance;
+        s->distance[i] = drape_collider_activation(m, i);
     for (int32_t i = 0; i < m->collider_count; i++)
         if (!m->colliders[i].ops->smooth)
             s->obstacle_radius = fmax(s->obstacle_radius, m->colliders[i].shape.radius);

@@ -13,6 +13,7 @@ typedef struct drape_broad_phase {
     const drape_model *model;
     int32_t points;              /* nodes, and points of colliders */
     int32_t *point_collider;     /* (points - node_count) */
+    int32_t *first_point;        /* (collider_count) */
     double *rest;                /* (points x 3): nodes at rest, points of undisplaced colliders */
     drape_path_bvh faces, edges; /* of the cloths */
     drape_path_bvh obstacles;    /* triangles of colliders without a smooth distance */

@@ -196,8 +196,11 @@ static void place_on_path(const drape_contact *c, double t, double end, double *
 static void find_swings(drape_contact *c, const piece *p)
 {
     const drape_configuration *end = p->path.end;
-    for (int32_t k = 0; k < c->model->collider_count; k++)
+    for (int32_t k = 0; k < c->model->collider_count; k++) {
         drape_swing_between(&end[0].pose[k], &end[1].pose[k], c->model->colliders[k].pivot, &c->swing[k]);
+        /* the points of one that deforms move straight in space between the pieces, which are short */
+        c->swing[k].turns = c->swing[k].turns && !c->deformed[k];
+    }
 }
 
 /* Checks the path from the beginning of the step to where contact is evaluated, at time t: piece by piece

@@ -51,7 +51,8 @@ static void archive_pose(drape_collider_pose *pose, drape_archive *a)
 static bool are_distances(const drape_contact *c)
 {
     for (int32_t i = 0; i < c->model->collider_count; i++)
-        if (!(c->broad.distance[i] >= c->model->contact.distance && isfinite(c->broad.distance[i])))
+        if (!(c->broad.distance[i] >= drape_collider_activation(c->model, i) &&
+              isfinite(c->broad.distance[i])))
             return false;
     return true;
 }
@@ -64,6 +65,7 @@ static drape_status restore(drape_contact *c)
     drape_candidates_forget(&c->step_candidates);
     drape_candidates_forget(&c->query_candidates);
     c->listed = false;
+    drape_contact_forget_bodies(c);
     c->between_steps = c->begun;
     if (!c->begun)
         return DRAPE_OK;

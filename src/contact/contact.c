@@ -22,6 +22,7 @@
 #include "base/vec3.h"
 #include "contact/list.h"
 #include "contact/room.h"
+#include "geometry/mesh_distance.h"
 
 #include <float.h>
 #include <string.h>
@@ -56,8 +57,36 @@ static drape_status take_arrays(drape_arena *arena, drape_contact *c)
     c->start_least = drape_arena_take(arena, colliders, sizeof *c->start_least);
     c->distance_before = drape_arena_take(arena, colliders, sizeof *c->distance_before);
     c->on_collider = drape_arena_take(arena, colliders, sizeof *c->on_collider);
+    size_t largest = 0;
+    for (size_t i = 0; i < colliders; i++)
+        if (c->model->colliders[i].frames.frame_count > 0 &&
+            (size_t)c->model->colliders[i].shape.point_count > largest)
+            largest = (size_t)c->model->colliders[i].shape.point_count;
+    c->own = drape_arena_take(arena, largest, 3 * sizeof *c->own);
+    c->own_end = drape_arena_take(arena, largest, 3 * sizeof *c->own_end);
+    c->on_point = drape_arena_take(arena, largest > 0 ? points - (size_t)c->model->node_count : 0,
+                                   3 * sizeof *c->on_point);
     c->swing = drape_arena_take(arena, colliders, sizeof *c->swing);
     return drape_arena_status(arena);
+}
+
+/* Colliders that deform have bodies of their own. */
+static drape_status take_bodies(drape_arena *arena, drape_contact *c)
+{
+    const size_t colliders = (size_t)c->model->collider_count;
+    c->deformed = drape_arena_take(arena, colliders, sizeof *c->deformed);
+    c->body = drape_arena_take(arena, colliders, sizeof *c->body);
+    c->body_t = drape_arena_take(arena, colliders, sizeof *c->body_t);
+    drape_status status = drape_arena_status(arena);
+    for (size_t i = 0; !status && i < colliders; i++) {
+        if (c->model->colliders[i].frames.frame_count == 0)
+            continue;
+        status = drape_deformed_create(arena, &c->model->colliders[i], &c->deformed[i]);
+        c->body[i] = status ? NULL : &c->deformed[i]->collider;
+    }
+    if (!status)
+        drape_contact_forget_bodies(c);
+    return status;
 }
 
 drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion, drape_contact **out)
@@ -84,6 +113,8 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
         status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->query_candidates);
     if (!status)
         status = take_arrays(arena, c);
+    if (!status)
+        status = take_bodies(arena, c);
     if (!status)
         status = drape_relaxed_create(arena, model, &c->relaxed);
     if (!status)
@@ -131,22 +162,98 @@ void drape_contact_fill(const drape_contact *c, const double *nodes, const drape
     const drape_model *m = c->model;
     memmove(x, nodes, 3 * (size_t)m->node_count * sizeof *x);
     x += 3 * (size_t)m->node_count;
-    for (int32_t i = 0; i < m->collider_count; i++)
+    for (int32_t i = 0; i < m->collider_count; i++) {
+        const double *own = m->colliders[i].shape.point;
+        if (m->colliders[i].frames.frame_count > 0) {
+            drape_motion_points(c->motion, i, pose[i].t, c->own);
+            own = c->own;
+        }
         for (int32_t p = 0; p < m->colliders[i].shape.point_count; p++, x += 3)
-            drape_collider_point(&m->colliders[i], &pose[i], p, x);
+            drape_pose_point(&pose[i], own + 3 * (size_t)p, x);
+    }
 }
 
-static void fill_velocities(const drape_contact *c, const double *nodes, double *v)
+/* The velocities of the points of a collider that deforms: mean ones in space over the span, or those of the
+ * time of its pose. */
+static void fill_deforming(const drape_contact *c, int32_t collider, const drape_contact_at *at, double *v)
+{
+    const size_t points = (size_t)c->model->colliders[collider].shape.point_count;
+    const drape_collider_pose *pose = &c->pose[collider];
+    if (at->instant) {
+        drape_motion_points(c->motion, collider, at->t, c->own);
+        drape_motion_point_velocities(c->motion, collider, at->t, (at->span[0] + at->span[1]) / 2,
+                                      c->own_end);
+        for (size_t p = 0; p < points; p++)
+            drape_pose_point_velocity(pose, c->own + 3 * p, c->own_end + 3 * p, v + 3 * p);
+        return;
+    }
+    const double h = at->span[1] - at->span[0];
+    drape_collider_pose from, to;
+    memset(v, 0, 3 * points * sizeof *v);
+    if (!(h > 0))
+        return;
+    drape_motion_pose(c->motion, collider, at->span[0], at->span[0], &from);
+    drape_motion_pose(c->motion, collider, at->span[1], at->span[1], &to);
+    drape_motion_points(c->motion, collider, at->span[0], c->own);
+    drape_motion_points(c->motion, collider, at->span[1], c->own_end);
+    for (size_t p = 0; p < points; p++) {
+        double a[3], b[3];
+        drape_pose_point(&from, c->own + 3 * p, a);
+        drape_pose_point(&to, c->own_end + 3 * p, b);
+        for (size_t k = 0; k < 3; k++)
+            v[3 * p + k] = (b[k] - a[k]) / h;
+    }
+}
+
+static void fill_velocities(const drape_contact *c, const drape_contact_at *at, double *v)
 {
     const drape_model *m = c->model;
-    if (nodes)
-        memcpy(v, nodes, 3 * (size_t)m->node_count * sizeof *v);
+    if (at->v)
+        memcpy(v, at->v, 3 * (size_t)m->node_count * sizeof *v);
     else
         memset(v, 0, 3 * (size_t)m->node_count * sizeof *v);
     v += 3 * (size_t)m->node_count;
-    for (int32_t i = 0; i < m->collider_count; i++)
-        for (int32_t p = 0; p < m->colliders[i].shape.point_count; p++, v += 3)
-            drape_collider_point_velocity(&m->colliders[i], &c->pose[i], p, v);
+    for (int32_t i = 0; i < m->collider_count; i++) {
+        const int32_t points = m->colliders[i].shape.point_count;
+        const bool deforms = drape_motion_deforms(c->motion, i);
+        if (deforms)
+            fill_deforming(c, i, at, v);
+        for (int32_t p = 0; !deforms && p < points; p++)
+            drape_collider_point_velocity(&m->colliders[i], &c->pose[i], p, v + 3 * (size_t)p);
+        v += 3 * (size_t)points;
+    }
+}
+
+const drape_collider *const *drape_contact_fit_bodies(const drape_contact *c, const drape_collider_pose *pose)
+{
+    for (int32_t i = 0; i < c->model->collider_count; i++) {
+        if (!c->deformed[i] || c->body_t[i] == pose[i].t)
+            continue;
+        drape_motion_points(c->motion, i, pose[i].t, c->own);
+        drape_deformed_move(c->deformed[i], c->own);
+        drape_relaxed_bound(&c->deformed[i]->collider.shape, c->relaxed.bound + 4 * (size_t)i);
+        c->body_t[i] = pose[i].t;
+    }
+    return c->body;
+}
+
+void drape_contact_forget_bodies(drape_contact *c)
+{
+    for (int32_t i = 0; i < c->model->collider_count; i++)
+        c->body_t[i] = NAN;
+}
+
+void drape_contact_nearest_triangle(const drape_contact *c, int32_t collider, const drape_collider_pose *pose,
+                                    const double x[3], int32_t node[3], double weight[3])
+{
+    const drape_deformed *deformed = c->deformed[collider];
+    double own[3];
+    int32_t triangle;
+    drape_pose_own(pose, x, own);
+    drape_mesh_distance_nearest(deformed->distance, &deformed->collider.shape, own, &triangle, weight);
+    for (int k = 0; k < 3; k++)
+        node[k] = c->broad.first_point[collider] +
+                  deformed->collider.shape.triangle[3 * (size_t)triangle + (size_t)k];
 }
 
 /* Returns whether a collider has moved. */
@@ -156,7 +263,8 @@ static bool move_colliders(drape_contact *c, const drape_contact_at *at)
     for (int32_t i = 0; i < c->model->collider_count; i++) {
         const drape_collider_pose before = c->pose[i];
         pose_at(c, i, at, &c->pose[i]);
-        moved = moved || drape_pose_differs(&c->pose[i], &before);
+        moved = moved || drape_pose_differs(&c->pose[i], &before) ||
+                (before.t != c->pose[i].t && drape_motion_deforms(c->motion, i));
     }
     return moved;
 }
@@ -249,7 +357,7 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)
 {
     const bool moved = move_colliders(c, at);
-    fill_velocities(c, at->v, c->v);
+    fill_velocities(c, at, c->v);
     if (drape_contact_take_failure(c)) {
         c->listed = false;
         return DRAPE_E_MEMORY;
@@ -405,6 +513,26 @@ static double turning_path_of(const drape_contact *c, int32_t collider, double t
     return largest;
 }
 
+/* How far the points of a collider that deforms move at most, relative to a displacement `mean`. */
+static double deforming_path_of(const drape_contact *c, int32_t collider, double t, const double mean[3])
+{
+    drape_collider_pose from, to;
+    double largest = 0;
+    drape_motion_pose(c->motion, collider, t, t, &from);
+    drape_motion_pose(c->motion, collider, t + c->dt, t + c->dt, &to);
+    drape_motion_points(c->motion, collider, t, c->own);
+    drape_motion_points(c->motion, collider, t + c->dt, c->own_end);
+    for (size_t p = 0; p < (size_t)c->model->colliders[collider].shape.point_count; p++) {
+        double a[3], b[3];
+        drape_pose_point(&from, c->own + 3 * p, a);
+        drape_pose_point(&to, c->own_end + 3 * p, b);
+        vec3_sub(b, a, b);
+        vec3_sub(b, mean, b);
+        largest = fmax(largest, vec3_dot(b, b));
+    }
+    return sqrt(largest);
+}
+
 /* How far a collider moves in a nominal step from time t on, relative to the mean motion of the cloth. */
 static double path_of(const drape_contact *c, int32_t collider, double t)
 {
@@ -417,7 +545,11 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
     for (size_t i = 0; i < 3 * nodes; i++)
         mean[i % 3] += c->v[i];
     for (size_t k = 0; k < 3; k++)
-        to[k] -= from[k] + c->dt / (double)nodes * mean[k];
+        mean[k] *= c->dt / (double)nodes;
+    if (drape_motion_deforms(c->motion, collider))
+        return deforming_path_of(c, collider, t, mean);
+    for (size_t k = 0; k < 3; k++)
+        to[k] -= from[k] + mean[k];
     return vec3_norm(to) + turning_path_of(c, collider, t);
 }
 
@@ -460,14 +592,14 @@ static bool narrow_distances(drape_contact *c)
 static drape_status adapt_distances(drape_contact *c, double t, bool retry)
 {
     const drape_configuration now = drape_contact_configuration(c);
-    const double least = c->model->contact.distance;
     bool changed = false;
     for (int32_t i = 0; c->dt > 0 && !retry && i < c->model->collider_count; i++) {
-        const double path = path_of(c, i, t), before = c->broad.distance[i];
+        const double path = path_of(c, i, t), before = c->broad.distance[i],
+                     least = drape_collider_activation(c->model, i);
         double distance = before;
         c->distance_before[i] = before;
         c->longest_path = fmax(c->longest_path, path);
-        if (c->model->contact.distance_given)
+        if (c->model->contact.distance_given || c->model->colliders[i].shape.distance > 0)
             continue;
         while (GROWTH * path > distance)
             distance *= 2;
@@ -507,7 +639,7 @@ static drape_status lag_at(drape_contact *c, const double *v, double t)
 {
     for (int32_t i = 0; i < c->model->collider_count; i++)
         drape_motion_pose(c->motion, i, t, t, &c->pose[i]);
-    fill_velocities(c, v, c->v);
+    fill_velocities(c, &(drape_contact_at){.v = v, .t = t, .span = {t, t}, .instant = true}, c->v);
     return drape_contact_lag(c);
 }
 

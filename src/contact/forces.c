@@ -71,10 +71,61 @@ static void add_rolling(const drape_contact *c, const drape_active_contact *cont
             v[a][k] += arm * vec3_dot(pose->gradient + 3 * k, contact->gap.closest.normal);
 }
 
+/* Whether the contact is with the distance of a collider that deforms, as that of relaxed cloth. */
+static bool is_on_body(const drape_contact *c, const drape_active_contact *contact)
+{
+    return contact->pair.kind == DRAPE_PAIR_SURFACE && c->deformed[contact->pair.collider];
+}
+
+/* The points of the collider that are nearest to such a contact. */
+static void find_body_points(const drape_contact *c, const drape_active_contact *contact, int32_t node[3],
+                             double weight[3])
+{
+    double x[3] = {0};
+    for (int a = 0; a < contact->gap.closest.points; a++)
+        vec3_add_scaled(contact->gap.closest.c[a], c->x + 3 * (size_t)contact->pair.node[a], x);
+    drape_contact_fit_bodies(c, c->pose);
+    drape_contact_nearest_triangle(c, contact->pair.collider, &c->pose[contact->pair.collider], x, node,
+                                   weight);
+}
+
+static void subtract_body_velocity(const drape_contact *c, const drape_active_contact *contact,
+                                   double v[4][3])
+{
+    int32_t node[3];
+    double weight[3];
+    find_body_points(c, contact, node, weight);
+    for (int a = 0; a < contact->gap.closest.points; a++)
+        for (int k = 0; k < 3; k++)
+            vec3_add_scaled(-weight[k], c->v + 3 * (size_t)node[k], v[a]);
+}
+
+/* The forces on the points of a collider that deforms. */
+static void add_on_points(const drape_contact *c, const drape_active_contact *contact, const double *from)
+{
+    const int32_t nodes = c->model->node_count;
+    int32_t node[3];
+    double weight[3];
+    if (!is_on_body(c, contact)) {
+        for (int a = 0; a < contact->gap.closest.points; a++)
+            if (contact->pair.node[a] >= nodes)
+                vec3_add_scaled(1, from + 3 * a, c->on_point + 3 * (size_t)(contact->pair.node[a] - nodes));
+        return;
+    }
+    find_body_points(c, contact, node, weight);
+    for (int a = 0; a < contact->gap.closest.points; a++)
+        for (int k = 0; k < 3; k++)
+            vec3_add_scaled(-weight[k], from + 3 * a, c->on_point + 3 * (size_t)(node[k] - nodes));
+}
+
 void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3])
 {
     for (int a = 0; a < contact->gap.closest.points; a++)
         memcpy(v[a], c->v + 3 * (size_t)contact->pair.node[a], sizeof v[a]);
+    if (is_on_body(c, contact)) {
+        subtract_body_velocity(c, contact, v);
+        return;
+    }
     if (drape_contact_rolls(c, contact))
         add_rolling(c, contact, v);
     for (int a = 0; contact->pair.kind == DRAPE_PAIR_SURFACE && a < contact->gap.closest.points; a++) {
@@ -116,6 +167,8 @@ static void scatter(drape_contact *c, const drape_active_contact *contact, const
         }
     if (collider >= 0)
         add_moment(c, contact, from, c->on_collider[collider].moment);
+    if (collider >= 0 && c->deformed[collider])
+        add_on_points(c, contact, from);
 }
 
 static void add_elastic(drape_contact *c, const drape_active_contact *contact, const drape_contact_law *law,
@@ -156,6 +209,13 @@ void drape_contact_add_forces(drape_contact *c, bool conservative, bool dissipat
 {
     const double start = drape_clock_seconds();
     memset(c->on_collider, 0, (size_t)c->model->collider_count * sizeof *c->on_collider);
+    for (int32_t i = 0; i < c->model->collider_count; i++) {
+        if (!c->deformed[i])
+            continue;
+        double *on = c->on_point + 3 * (size_t)(c->broad.first_point[i] - c->model->node_count);
+        memset(on, 0, 3 * (size_t)c->model->colliders[i].shape.point_count * sizeof *on);
+        c->on_collider[i].on_points = on;
+    }
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
         const drape_contact_law law = drape_contact_law_of(c, contact);

@@ -31,7 +31,7 @@ static void gather(const drape_pair *pair, int points, const double *from, doubl
 static double surface(const drape_pair *pair, const drape_configuration *at, double *normal,
                       double *curvature)
 {
-    return drape_collider_distance(&at->model->colliders[pair->collider], &at->pose[pair->collider],
+    return drape_collider_distance(drape_configuration_body(at, pair->collider), &at->pose[pair->collider],
                                    at->x + 3 * (size_t)pair->node[0], normal, curvature);
 }
 

@@ -67,7 +67,16 @@ typedef struct drape_configuration {
     const drape_model *model;
     const double *x;                 /* (points x 3) */
     const drape_collider_pose *pose; /* (collider_count) */
+    const drape_collider *const
+        *body; /* (collider_count) as they are now, of those that deform, else NULL; only
+                                          for distances from these: NULL if none is asked for */
 } drape_configuration;
+
+/* The collider whose distance counts in a configuration. */
+static inline const drape_collider *drape_configuration_body(const drape_configuration *at, int32_t collider)
+{
+    return at->body && at->body[collider] ? at->body[collider] : &at->model->colliders[collider];
+}
 
 int drape_pair_points(const drape_pair *pair);
 double drape_pair_gap_value(const drape_pair *pair, const drape_configuration *at);

@@ -7,6 +7,7 @@
 #ifndef DRAPE_CONTACT_PARTS_H
 #define DRAPE_CONTACT_PARTS_H
 
+#include "colliders/deformed.h"
 #include "contact/active.h"
 #include "contact/contact.h"
 #include "contact/friction.h"
@@ -72,13 +73,29 @@ struct drape_contact {
     drape_collider_pose *kink_pose;          /* (collider_count) */
     int32_t *coupling;                       /* (coupling_count of coupling_room x 4) */
     int32_t coupling_count, coupling_room;
-    drape_swing *swing;      /* (collider_count) from one end of a displacement to the other */
-    drape_load *on_collider; /* (collider_count) */
+    double *own, *own_end; /* (largest point_count x 3) points of a collider that deforms, and elsewhere */
+    double *on_point;      /* (points - node_count, x 3) [N] forces on points of colliders that deform */
+    drape_deformed **deformed;   /* (collider_count) those that deform, else NULL */
+    const drape_collider **body; /* (collider_count) of deformed */
+    double *body_t;              /* [s] (collider_count) at which they are; not archived: NAN, they follow */
+    drape_swing *swing;          /* (collider_count) from one end of a displacement to the other */
+    drape_load *on_collider;     /* (collider_count) */
     double seconds, search_seconds;
 };
 
 /* The poses of colliders at time t, without velocities. pose: (collider_count). */
 void drape_contact_poses(const drape_contact *c, double t, drape_collider_pose *pose);
+
+/* Lets the distances from colliders that deform be those of the times of these poses. Returns the body of a
+ * configuration. */
+const drape_collider *const *drape_contact_fit_bodies(const drape_contact *c,
+                                                      const drape_collider_pose *pose);
+void drape_contact_forget_bodies(drape_contact *c);
+
+/* The nodes of the triangle of a collider that deforms which is nearest to a point of space, and the weights
+ * of the nearest point, of the bodies fitted last. */
+void drape_contact_nearest_triangle(const drape_contact *c, int32_t collider, const drape_collider_pose *pose,
+                                    const double x[3], int32_t node[3], double weight[3]);
 
 /* Sets all points: the given nodes, which may be those of x, and the points of colliders in their poses. x:
  * (points x 3). */

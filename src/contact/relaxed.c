@@ -11,7 +11,7 @@
 #define DOUBLED 0.02 /* [s] in which the pressure on a node that has room doubles, and falls by half */
 
 /* A shape without points may have no end, as a plane; inscribed ones are inside of it. */
-static void bound(const drape_collider_shape *shape, double out[4])
+void drape_relaxed_bound(const drape_collider_shape *shape, double out[4])
 {
     double radius = shape->point_count > 0 && !shape->inscribed ? 0 : INFINITY, to[3];
     memset(out, 0, 3 * sizeof *out);
@@ -24,13 +24,14 @@ static void bound(const drape_collider_shape *shape, double out[4])
     out[3] = radius + shape->radius;
 }
 
-/* Parts without a radius, or such that enclose more than what is within their radius: the middle is deeper. */
+/* Parts without a radius, triangles of a mesh, or parts that enclose more than what is within their radius:
+ * the middle is deeper. */
 static bool is_solid(const drape_collider *collider, const double middle[3])
 {
     static const drape_collider_pose rest = {.displacement = {0}};
     const drape_collider_shape *shape = &collider->shape;
     return shape->point_count > 0 &&
-           (!(shape->radius > 0) ||
+           (!(shape->radius > 0) || !collider->ops->smooth ||
             drape_collider_distance(collider, &rest, middle, NULL, NULL) < -(1 + DEEPER) * shape->radius);
 }
 
@@ -46,7 +47,7 @@ drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, 
     set->solid = drape_arena_take(arena, colliders, sizeof *set->solid);
     set->total = drape_arena_take(arena, colliders + 1, sizeof *set->total);
     for (size_t i = 0; set->bound && set->solid && i < colliders; i++) {
-        bound(&model->colliders[i].shape, set->bound + 4 * i);
+        drape_relaxed_bound(&model->colliders[i].shape, set->bound + 4 * i);
         set->solid[i] = is_solid(&model->colliders[i], set->bound + 4 * i);
     }
     return drape_arena_status(arena);

@@ -47,6 +47,9 @@ typedef struct drape_relaxed_set {
     bool counting; /* nodes that would be relaxed are counted, and nothing changes; during one search */
 } drape_relaxed_set;
 
+/* A ball around a shape: center and radius; infinite for one that has no end. */
+void drape_relaxed_bound(const drape_collider_shape *shape, double out[4]);
+
 drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, drape_relaxed_set *out);
 
 /* NULL: the node is held. */

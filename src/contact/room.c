@@ -39,7 +39,7 @@ static bool find_face_gap(const drape_contact *c, const drape_configuration *at,
     if (!may_be_near(c, at->pose, collider, distance, x))
         return false;
     *gap = (drape_gap){.closest = {.points = 3, .c = {share[0], share[1], share[2]}}, .m = 1};
-    gap->value = drape_collider_distance(&at->model->colliders[collider], &at->pose[collider], x,
+    gap->value = drape_collider_distance(drape_configuration_body(at, collider), &at->pose[collider], x,
                                          gap->closest.normal, gap->curvature);
     return gap->value < distance;
 }
@@ -71,9 +71,12 @@ static drape_status add_face(drape_contact *c, const drape_configuration *at, in
     return status;
 }
 
-drape_status drape_room_add_surfaces(drape_contact *c, const drape_configuration *at)
+drape_status drape_room_add_surfaces(drape_contact *c, const drape_configuration *given)
 {
+    drape_configuration fitted = *given;
+    const drape_configuration *at = &fitted;
     drape_status status = DRAPE_OK;
+    fitted.body = c->relaxed.count > 0 ? drape_contact_fit_bodies(c, given->pose) : NULL;
     for (int32_t i = 0; !status && i < c->relaxed.count; i++) {
         const drape_relaxed_node *node = &c->relaxed.nodes[i];
         if (node->collider < 0 || c->model->colliders[node->collider].ops->smooth ||
@@ -124,7 +127,9 @@ static cloth_point point_of(const drape_contact *c, const drape_active_contact *
 
 static double distance_at(const drape_contact *c, int32_t collider, const double *x, double *normal)
 {
-    return drape_collider_distance(&c->model->colliders[collider], &c->pose[collider], x, normal, NULL);
+    const drape_configuration now = {.model = c->model, .body = c->body};
+    return drape_collider_distance(drape_configuration_body(&now, collider), &c->pose[collider], x, normal,
+                                   NULL);
 }
 
 /* Moves a point of the cloth out of a collider until its gap is the margin: across the cloth, in which it
@@ -276,6 +281,7 @@ drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, 
     c->between_steps = between;
     if (status)
         return status;
+    drape_contact_fit_bodies(c, c->pose);
     for (int32_t i = 0; i < relaxed->count && !relaxed->counting; i++)
         relaxed->nodes[i].blocked = t < relaxed->nodes[i].until;
     drape_model_normals(c->model, c->x, relaxed->normal);
@@ -430,13 +436,11 @@ static bool cross(const drape_contact *c, int32_t collider, const int32_t *face,
                   int points)
 {
     const double *x[3], *y[3];
-    double at[3][3];
     bool found = false;
     for (int a = 0; a < 3; a++)
         x[a] = c->x + 3 * (size_t)face[a];
     for (int a = 0; a < points; a++) {
-        drape_collider_point(&c->model->colliders[collider], &c->pose[collider], piece[a], at[a]);
-        y[a] = at[a];
+        y[a] = c->x + 3 * (size_t)(c->broad.first_point[collider] + piece[a]);
     }
     if (points == 2)
         return drape_intersect_edge(y[0], y[1], x[0], x[1], x[2]);
@@ -491,6 +495,7 @@ static double max_factor(const drape_contact *c)
 
 drape_status drape_room_review(drape_contact *c, double t, bool *changed)
 {
+    drape_contact_fit_bodies(c, c->pose);
     measure(c);
     const double before = c->relaxed.t;
     drape_relaxed_update(&c->relaxed, t, max_factor(c));

@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "base/vec3.h"
+#include "contact/sweep_mesh.h"
 
 #include <string.h>
 
@@ -62,7 +63,7 @@ static bool sweep(drape_contact *c, int32_t collider, double *y)
     const drape_collider *k = &c->model->colliders[collider];
     const drape_collider_pose *from = &c->start_pose[collider], *to = &c->path_pose[collider];
     bool moved = false;
-    if (!drape_pose_differs(from, to))
+    if (c->deformed[collider] || !drape_pose_differs(from, to))
         return false;
     for (int32_t i = 0; i < c->model->free_count; i++) {
         const int32_t node = c->model->node_of_free[i];
@@ -80,6 +81,19 @@ static bool sweep(drape_contact *c, int32_t collider, double *y)
     return moved;
 }
 
+static bool sweep_meshes(drape_contact *c, double *y)
+{
+    bool deforms = false;
+    for (int32_t k = 0; k < c->model->collider_count; k++)
+        deforms = deforms || drape_motion_deforms(c->motion, k);
+    if (!deforms)
+        return false;
+    drape_contact_fill(c, y, c->path_pose, c->to);
+    const bool moved = drape_contact_sweep_meshes(c, c->to);
+    memcpy(y, c->to, 3 * (size_t)c->model->node_count * sizeof *y);
+    return moved;
+}
+
 void drape_contact_sweep(drape_contact *c, double t, double *y)
 {
     const double start = drape_clock_seconds();
@@ -89,6 +103,7 @@ void drape_contact_sweep(drape_contact *c, double t, double *y)
         moved = false;
         for (int32_t k = 0; k < c->model->collider_count; k++)
             moved = sweep(c, k, y) || moved;
+        moved = sweep_meshes(c, y) || moved;
     }
     c->seconds += drape_clock_seconds() - start;
 }

@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -113,6 +114,23 @@ static drape_status copy_bytes(copier *c, int from, const char *source)
     return drape_file_finish(&c->out);
 }
 
+/* What is several files, as a folder of frames or their pattern, is not copied: the scene names it by its
+ * whole path. */
+static drape_status keep_path(copier *c, const char *source, const char *pointer)
+{
+    char folder[PATH_MAX];
+    if (*source == '/' || !getcwd(folder, sizeof folder))
+        return DRAPE_OK;
+    const size_t size = strlen(folder) + strlen(source) + 2;
+    char *whole = drape_alloc(c->ctx, size, 1);
+    if (!whole)
+        return DRAPE_E_MEMORY;
+    snprintf(whole, size, "%s/%s", folder, source);
+    const drape_status status = drape_scene_set(c->scene, pointer, whole);
+    drape_free(c->ctx, whole);
+    return status;
+}
+
 /* A file that cannot be read twice, such as a pipe, is not copied. */
 static drape_status copy_file(void *user, const char *source, const char *pointer)
 {
@@ -120,7 +138,9 @@ static drape_status copy_file(void *user, const char *source, const char *pointe
     struct stat info;
     char name[MESH_ROOM];
     const char *ending = strrchr(source, '.');
-    if (stat(source, &info) || !S_ISREG(info.st_mode))
+    if (stat(source, &info) || S_ISDIR(info.st_mode))
+        return keep_path(c, source, pointer);
+    if (!S_ISREG(info.st_mode))
         return DRAPE_OK;
     int from = open(source, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     if (from < 0)

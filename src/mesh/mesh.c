@@ -12,7 +12,8 @@ drape_status drape_mesh_fail(drape_context *ctx, const drape_mesh_source *source
     const locale_t old = drape_locale_enter();
     va_list args;
     va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
+    const int used = snprintf(text, sizeof text, "%s", source->part ? source->part : "");
+    vsnprintf(text + used, sizeof text - (size_t)used, format, args);
     va_end(args);
     drape_locale_leave(old);
 

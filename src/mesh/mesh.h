@@ -35,6 +35,7 @@ typedef struct drape_mesh {
 typedef struct drape_mesh_source {
     const char *pointer; /* JSON pointer at which faults are reported */
     const char *file;    /* begins the message; NULL: the mesh is not from a file */
+    const char *part;    /* begins the rest of it: "frame 3: "; NULL: nothing */
 } drape_mesh_source;
 
 /* Reports a fault of a mesh. For a file: DRAPE_E_PARSE with "file:line: text", or "file: text" if line is 0;
@@ -75,6 +76,10 @@ drape_status drape_mesh_from_arrays(drape_context *ctx, const char *pointer, con
                                     size_t node_count, const int32_t *triangle, size_t triangle_count,
                                     drape_mesh *mesh);
 
+/* As drape_mesh_from_file, but faults of the file are reported at the pointer itself. */
+drape_status drape_mesh_read(drape_context *ctx, const char *pointer, const char *folder, const char *file,
+                             drape_mesh *mesh);
+
 /* Allocates nodes and triangles, all zeros, and sets their counts; refuses counts above the limits. */
 drape_status drape_mesh_allocate(drape_context *ctx, const drape_mesh_source *source, size_t node_count,
                                  size_t triangle_count, drape_mesh *mesh);
@@ -97,6 +102,10 @@ drape_status drape_mesh_validate_positions(drape_context *ctx, const drape_mesh_
  * that no two triangles have the same nodes. */
 drape_status drape_mesh_validate_triangles(drape_context *ctx, const drape_mesh_source *source,
                                            const drape_mesh *mesh);
+
+/* The check of altitudes alone, for triangles that are valid at other positions. */
+drape_status drape_mesh_validate_shapes(drape_context *ctx, const drape_mesh_source *source,
+                                        const drape_mesh *mesh);
 
 /* Finds edges, edge_triangle and hinges of valid triangles. Refuses an edge with three triangles. Triangles
  * may have either orientation. */

@@ -51,7 +51,8 @@ static double thinness(const drape_mesh *mesh, const int32_t *n)
     return longest_squared > 0 ? vec3_norm(normal) / longest_squared : 0;
 }
 
-static drape_status check_shapes(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh)
+drape_status drape_mesh_validate_shapes(drape_context *ctx, const drape_mesh_source *source,
+                                        const drape_mesh *mesh)
 {
     for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
         const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
@@ -117,7 +118,7 @@ drape_status drape_mesh_validate_triangles(drape_context *ctx, const drape_mesh_
                                mesh->node_count == 0 ? "nodes" : "triangles");
     drape_status status = check_indices(ctx, source, mesh);
     if (!status)
-        status = check_shapes(ctx, source, mesh);
+        status = drape_mesh_validate_shapes(ctx, source, mesh);
     if (!status)
         status = check_duplicates(ctx, source, mesh);
     return status;

@@ -5,6 +5,7 @@
 
 #include "base/arena.h"
 #include "mesh/mesh.h"
+#include "mesh/sequence.h"
 #include "model/pose.h"
 #include "sparse/pattern.h"
 
@@ -162,9 +163,12 @@ typedef struct drape_collider {
     double friction;    /* Coulomb's mu [1] */
     double restitution; /* e [1] */
     drape_track track;  /* displacement from the position that its values define; no keys: it does not move */
-    drape_turns turns;  /* rotation about the pivot; no keys: it does not turn */
-    double pivot[3];    /* [m] in its own coordinates: the point that the track displaces */
-    double radius;      /* [m] of its shape's points around the pivot; of the scene, if it has none */
+    drape_sequence
+        frames;        /* of the points of its shape, in its own coordinates; none: it is rigid. Such shapes
+                              keep a drape_mesh_distance of their triangles, and are not smooth */
+    drape_turns turns; /* rotation about the pivot; no keys: it does not turn */
+    double pivot[3];   /* [m] in its own coordinates: the point that the track displaces */
+    double radius;     /* [m] of its shape's points around the pivot; of the scene, if it has none */
 } drape_collider;
 
 /* Resolved parameters of contact. */
@@ -302,6 +306,13 @@ static inline bool drape_model_share_node(const drape_model *model, const int32_
             if (drape_model_sewn(model, a[i]) == drape_model_sewn(model, b[j]))
                 return true;
     return false;
+}
+
+/* The activation distance [m] of cloth and a collider while that is slow. */
+static inline double drape_collider_activation(const drape_model *model, int32_t collider)
+{
+    const double own = model->colliders[collider].shape.distance;
+    return own > 0 ? own : model->contact.distance;
 }
 
 /* Writes the positions that tracks give pinned nodes at time t; other entries of x (node_count x 3) are

@@ -49,6 +49,10 @@ drape_status drape_motion_create(drape_arena *arena, const drape_model *model, d
     motion->cloth_placed = drape_arena_take(arena, (size_t)model->cloth_count, sizeof *motion->cloth_placed);
     motion->collider_placed =
         drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->collider_placed);
+    motion->deformation = drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->deformation);
+    for (int32_t i = 0; motion->deformation && i < model->collider_count; i++)
+        if (drape_deformation_create(arena, &model->colliders[i].frames, &motion->deformation[i]))
+            return DRAPE_E_MEMORY;
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     take_tracks(motion);
@@ -394,6 +398,8 @@ void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int
         motion->collider_placed[c] = from->collider_placed[before[c]];
     }
     memcpy(motion->cloth_placed, from->cloth_placed, (size_t)m->cloth_count * sizeof *motion->cloth_placed);
+    for (int32_t i = 0; i < m->collider_count; i++)
+        drape_deformation_copy(&motion->deformation[i], &from->deformation[i]);
 }
 
 void drape_motion_place_pin(const drape_motion *motion, int32_t node, double t, double x[3])
@@ -446,7 +452,7 @@ bool drape_motion_shifts_collider(const drape_motion *motion, int32_t collider)
 bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
 {
     return drape_motion_shifts_collider(motion, collider) ||
-           motion->model->colliders[collider].turns.key_count > 0;
+           motion->model->colliders[collider].turns.key_count > 0 || drape_motion_deforms(motion, collider);
 }
 
 bool drape_motion_turns_collider(const drape_motion *motion, int32_t collider)
@@ -530,6 +536,46 @@ double drape_motion_fastest_spin(const drape_motion *motion, int32_t collider, d
     return fmax(fastest, vec3_norm(control));
 }
 
+/* Writes where the points of a collider with frames are in space. */
+static void place_points(const drape_motion *motion, int32_t collider, double t, double *x)
+{
+    const int32_t points = motion->deformation[collider].frames->node_count;
+    drape_collider_pose pose;
+    drape_motion_pose(motion, collider, t, t, &pose);
+    drape_motion_points(motion, collider, t, x);
+    for (int32_t p = 0; p < points; p++)
+        drape_pose_point(&pose, x + 3 * (size_t)p, x + 3 * (size_t)p);
+}
+
+static double work_on_points(const drape_motion *motion, int32_t collider, const double *force, double t0,
+                             double t1)
+{
+    const drape_deformation *d = &motion->deformation[collider];
+    double work = 0;
+    place_points(motion, collider, t0, d->spare[0]);
+    place_points(motion, collider, t1, d->spare[1]);
+    for (size_t i = 0; i < 3 * (size_t)d->frames->node_count; i++)
+        work += force[i] * (d->spare[1][i] - d->spare[0][i]);
+    return work;
+}
+
+static double power_on_points(const drape_motion *motion, int32_t collider, const double *force, double t,
+                              double within)
+{
+    const drape_deformation *d = &motion->deformation[collider];
+    drape_collider_pose pose;
+    double power = 0;
+    drape_motion_pose(motion, collider, t, within, &pose);
+    drape_motion_points(motion, collider, t, d->spare[0]);
+    drape_motion_point_velocities(motion, collider, t, within, d->spare[1]);
+    for (size_t p = 0; p < (size_t)d->frames->node_count; p++) {
+        double v[3];
+        drape_pose_point_velocity(&pose, d->spare[0] + 3 * p, d->spare[1] + 3 * p, v);
+        power += vec3_dot(force + 3 * p, v);
+    }
+    return power;
+}
+
 double drape_motion_collider_work(const drape_motion *motion, const drape_load *load, double t0, double t1)
 {
     double work = 0;
@@ -537,6 +583,10 @@ double drape_motion_collider_work(const drape_motion *motion, const drape_load *
         drape_collider_pose before, after;
         if (!drape_motion_moves_collider(motion, c))
             continue;
+        if (load[c].on_points) {
+            work += work_on_points(motion, c, load[c].on_points, t0, t1);
+            continue;
+        }
         drape_motion_pose(motion, c, t0, t0, &before);
         drape_motion_pose(motion, c, t1, t1, &after);
         drape_load_add_work(&load[c], &before, &after, &work);
@@ -550,6 +600,10 @@ double drape_motion_collider_power(const drape_motion *motion, const drape_load 
     double power = 0;
     for (int32_t c = 0; load && c < motion->model->collider_count; c++) {
         drape_collider_pose pose;
+        if (load[c].on_points) {
+            power += power_on_points(motion, c, load[c].on_points, t, within);
+            continue;
+        }
         drape_motion_pose(motion, c, t, within, &pose);
         drape_load_add_power(&load[c], &pose, &power);
     }
@@ -580,6 +634,28 @@ static void place_turn(const drape_placement *by, drape_turn_path *turn)
     drape_placement_turn(by, turn->turn, turn->turn);
     for (int i = 0; i < 2; i++)
         drape_placement_turn(by, turn->rate[i], turn->rate[i]);
+}
+
+bool drape_motion_deforms(const drape_motion *motion, int32_t collider)
+{
+    return drape_deformation_moves(&motion->deformation[collider]);
+}
+
+void drape_motion_deform(drape_motion *motion, int32_t collider, double t, double span, const double *x,
+                         const double *v)
+{
+    drape_deformation_send(&motion->deformation[collider], t, span, x, v);
+}
+
+void drape_motion_points(const drape_motion *motion, int32_t collider, double t, double *x)
+{
+    drape_deformation_points(&motion->deformation[collider], t, x);
+}
+
+void drape_motion_point_velocities(const drape_motion *motion, int32_t collider, double t, double within,
+                                   double *v)
+{
+    drape_deformation_velocities(&motion->deformation[collider], t, within, v);
 }
 
 void drape_motion_place_collider(drape_motion *motion, int32_t collider, const drape_placement *by)
@@ -672,6 +748,7 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
         if (motion->collider_path[c].given && drape_archive_good(a))
             archive_turn(&motion->collider_turn[c], a);
         archive_placement(&motion->collider_placed[c], a);
+        drape_deformation_archive(&motion->deformation[c], a);
     }
     for (int32_t c = 0; c < motion->model->cloth_count && drape_archive_good(a); c++)
         archive_placement(&motion->cloth_placed[c], a);
@@ -688,6 +765,7 @@ double drape_motion_next_kink(const drape_motion *motion, double t, double end)
     for (int32_t i = 0; i < motion->model->collider_count; i++) {
         const course c = collider_course(motion, i);
         end = next_kink_of(&c, t, end);
+        end = drape_deformation_next_kink(&motion->deformation[i], t, end);
     }
     return end;
 }
@@ -701,7 +779,7 @@ bool drape_motion_at_kink(const drape_motion *motion, double t)
     }
     for (int32_t i = 0; !found && i < motion->model->collider_count; i++) {
         const course c = collider_course(motion, i);
-        found = at_kink_of(&c, t);
+        found = at_kink_of(&c, t) || drape_deformation_at_kink(&motion->deformation[i], t);
     }
     return found;
 }

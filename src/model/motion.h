@@ -6,6 +6,7 @@
 #define DRAPE_MODEL_MOTION_H
 
 #include "base/archive.h"
+#include "model/deformation.h"
 #include "model/model.h"
 
 /* A cubic from a first to a last moment, at rest before and after, given by x and v at both. x is the
@@ -44,6 +45,7 @@ typedef struct drape_motion {
     int32_t *place;                   /* (node_count) number among the moved nodes, -1: none */
     drape_path *pin_path;             /* (number of pinned nodes) */
     drape_path *collider_path;        /* (collider_count) */
+    drape_deformation *deformation;   /* (collider_count) */
     drape_turn_path *collider_turn;   /* (collider_count) with the times of collider_path, if that is given */
     drape_placement *cloth_placed;    /* (cloth_count) of rest positions and tracks; paths have it in them */
     drape_placement *collider_placed; /* (collider_count) of displacements on tracks; its turn also of
@@ -92,6 +94,19 @@ double drape_motion_fastest_spin(const drape_motion *motion, int32_t collider, d
 double drape_motion_collider_work(const drape_motion *motion, const drape_load *load, double t0, double t1);
 double drape_motion_collider_power(const drape_motion *motion, const drape_load *load, double t,
                                    double within);
+
+/* Writes the positions of the points of a collider with frames at time t, in its own coordinates, and their
+ * velocities there as above. */
+void drape_motion_points(const drape_motion *motion, int32_t collider, double t, double *x);
+void drape_motion_point_velocities(const drape_motion *motion, int32_t collider, double t, double within,
+                                   double *v);
+
+/* Sends the points of a collider with frames (drape_deformation_send). */
+void drape_motion_deform(drape_motion *motion, int32_t collider, double t, double span, const double *x,
+                         const double *v);
+
+/* Whether the points of a collider ever move in its own coordinates. */
+bool drape_motion_deforms(const drape_motion *motion, int32_t collider);
 
 /* Returns the next time after t and before end at which some velocity jumps; otherwise end. */
 double drape_motion_next_kink(const drape_motion *motion, double t, double end);

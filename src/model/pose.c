@@ -56,6 +56,16 @@ void drape_pose_velocity(const drape_collider_pose *pose, const double *x, doubl
         v[k] += vec3_dot(pose->gradient + 3 * k, from);
 }
 
+void drape_pose_point_velocity(const drape_collider_pose *pose, const double *own, const double *own_velocity,
+                               double *v)
+{
+    double x[3], further[3] = {own_velocity[0], own_velocity[1], own_velocity[2]};
+    drape_pose_point(pose, own, x);
+    drape_pose_velocity(pose, x, v);
+    drape_pose_direction(pose, further);
+    vec3_add_scaled(1, further, v);
+}
+
 void drape_pose_set_turn(drape_collider_pose *pose, const double turn[9])
 {
     memcpy(pose->turn, turn, sizeof pose->turn);

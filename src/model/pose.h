@@ -30,6 +30,10 @@ void drape_pose_tensor(const drape_collider_pose *pose, double *tensor);
 /* The velocity of the body at a point of space. */
 void drape_pose_velocity(const drape_collider_pose *pose, const double *x, double *v);
 
+/* The velocity in space of a point that moves in the body's own coordinates. */
+void drape_pose_point_velocity(const drape_collider_pose *pose, const double *own, const double *own_velocity,
+                               double *v);
+
 /* Sets turn and gradient, and the flags with them. */
 void drape_pose_set_turn(drape_collider_pose *pose, const double turn[9]);
 void drape_pose_set_gradient(drape_collider_pose *pose, const double gradient[9]);
@@ -53,6 +57,8 @@ bool drape_pose_differs(const drape_collider_pose *a, const drape_collider_pose 
 typedef struct drape_load {
     double force[3];  /* [N] sum of f */
     double moment[9]; /* [N m] sum of f X', row by row */
+    const double
+        *on_points; /* (points x 3) [N] f in space on each point of a body that deforms; NULL: rigid */
 } drape_load;
 
 /* Add the work of the load while the body goes from one pose to another, and its power at a pose, to *sum. */

@@ -296,11 +296,10 @@ static drape_status contour(drape_arena *arena, const drape_collider *collider, 
 
 /* Normals of points, the mean of those of their triangles weighted by area, for triangles that differ
  * little from it; others stay crisp. */
-static drape_status smooth_normals(drape_context *ctx, const drape_collider_shape *shape, drape_body *body)
+static void smooth_normals(const drape_collider_shape *shape, drape_body *body)
 {
-    double *sum = drape_alloc(ctx, 3 * (size_t)shape->point_count, sizeof *sum);
-    if (!sum)
-        return DRAPE_E_MEMORY;
+    double *sum = body->sum;
+    memset(sum, 0, 3 * (size_t)shape->point_count * sizeof *sum);
     for (size_t i = 0; i < body->vertex_count; i++) {
         const float *corner = body->vertex + 6 * (i - i % 3);
         double e1[3], e2[3], normal[3];
@@ -320,16 +319,11 @@ static drape_status smooth_normals(drape_context *ctx, const drape_collider_shap
         for (int k = 0; k < 3 && along > CREASE * length; k++)
             normal[k] = (float)(mean[k] / length);
     }
-    drape_free(ctx, sum);
-    return DRAPE_OK;
 }
 
-static drape_status copy_triangles(drape_arena *arena, const drape_collider_shape *shape, drape_body *body)
+void drape_body_follow(const drape_collider_shape *shape, drape_body *body)
 {
     size_t count = 3 * (size_t)shape->triangle_count;
-    body->vertex = drape_arena_take(arena, 6 * count, sizeof *body->vertex);
-    if (!body->vertex)
-        return DRAPE_E_MEMORY;
     for (size_t i = 0; i < count; i += 3) {
         double e1[3], e2[3], normal[3];
         const double *p[3];
@@ -346,7 +340,17 @@ static drape_status copy_triangles(drape_arena *arena, const drape_collider_shap
             }
     }
     body->vertex_count = count;
-    return smooth_normals(arena->ctx, shape, body);
+    smooth_normals(shape, body);
+}
+
+static drape_status copy_triangles(drape_arena *arena, const drape_collider_shape *shape, drape_body *body)
+{
+    body->vertex = drape_arena_take(arena, 18 * (size_t)shape->triangle_count, sizeof *body->vertex);
+    body->sum = drape_arena_take(arena, (size_t)shape->point_count, 3 * sizeof *body->sum);
+    if (!body->vertex || !body->sum)
+        return DRAPE_E_MEMORY;
+    drape_body_follow(shape, body);
+    return DRAPE_OK;
 }
 
 drape_status drape_body_create(drape_arena *arena, const drape_collider *collider, const double center[3],

@@ -13,9 +13,13 @@
 typedef struct drape_body {
     float *vertex;          /* (vertex_count x 6) position in the collider's own coordinates [m], normal */
     size_t vertex_count;    /* three for each triangle */
+    double *sum;            /* (points of the shape x 3) workspace for normals; NULL: no triangles */
     bool endless;           /* unbounded, as a plane is */
     double low[3], high[3]; /* bounding box [m]; of an endless body the box it is cut off at */
 } drape_body;
+
+/* Draws the triangles of a shape, of which the body was made, where its points are now. */
+void drape_body_follow(const drape_collider_shape *shape, drape_body *body);
 
 /* Makes the body in an arena. An endless one is cut off at twice `reach` [m] from center. Errors:
  * DRAPE_E_MEMORY. */

@@ -353,14 +353,15 @@ static void update_nodes(drape_skin *s, const float *x, const float *values)
 /* ---- Colliders ---- */
 
 /* Distance of a point from the nearest collider at time t [m]; infinite without any. */
-static float clearance(const drape_model *m, double t, const float *p)
+static float clearance(const drape_skin *s, double t, const float *p)
 {
+    const drape_model *m = s->model;
     double nearest = INFINITY;
     for (int32_t c = 0; c < m->collider_count; c++) {
-        const drape_collider *collider = &m->colliders[c];
-        const drape_collider_pose pose = drape_collider_pose_at(collider, t);
+        const drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], t);
         const double x[3] = {(double)p[0], (double)p[1], (double)p[2]};
-        nearest = fmin(nearest, drape_collider_distance(collider, &pose, x, NULL, NULL));
+        nearest = fmin(nearest, drape_collider_distance(s->collider ? s->collider[c] : &m->colliders[c],
+                                                        &pose, x, NULL, NULL));
     }
     return (float)nearest;
 }
@@ -368,8 +369,8 @@ static float clearance(const drape_model *m, double t, const float *p)
 /* Whether a curved point is nearer to a collider than it may be. */
 static bool cuts(const drape_skin *s, double t, const float *curved, const float *flat)
 {
-    float enough = CLEARANCE * s->edge, d = clearance(s->model, t, curved);
-    return d < enough && d < clearance(s->model, t, flat) - 1e-3f * enough;
+    float enough = CLEARANCE * s->edge, d = clearance(s, t, curved);
+    return d < enough && d < clearance(s, t, flat) - 1e-3f * enough;
 }
 
 /* Moves curved points towards the flat ones, all by the same share, until none of them cuts a collider.
@@ -552,7 +553,7 @@ void drape_skin_update(drape_skin *skin, double t, const float *positions, const
 {
     update_nodes(skin, positions, values);
     for (int32_t i = 0; i < skin->model->node_count; i++)
-        skin->gap[i] = clearance(skin->model, t, skin->vertex[i].p);
+        skin->gap[i] = clearance(skin, t, skin->vertex[i].p);
     for (int32_t e = 0; skin->level > 1 && e < skin->model->edge_count; e++)
         update_edge(skin, t, e);
     for (int32_t k = 0; skin->level > 2 && k < skin->model->triangle_count; k++)

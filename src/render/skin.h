@@ -21,6 +21,9 @@ typedef struct drape_skin_vertex {
 
 typedef struct drape_skin {
     const drape_model *model;
+    const drape_collider *const
+        *collider;           /* (collider_count) of which distances count, in the coordinates of the
+                                              model's; NULL: those */
     int level;               /* pieces of an edge */
     float edge;              /* mean length of the edges at rest [m] */
     int32_t *triangle_edge;  /* (triangle_count x 3) edge e from corner k to k + 1; -1 - e if e is reversed */

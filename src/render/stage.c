@@ -23,12 +23,24 @@ static void place(const drape_stage_body *body, const float *vertex, float *p)
                body->offset[k];
 }
 
+static drape_status take_deformed(drape_stage *s, int32_t c)
+{
+    const drape_collider *collider = &s->model->colliders[c];
+    drape_stage_body *body = &s->bodies[c];
+    body->points = drape_arena_take(&s->arena, (size_t)collider->shape.point_count, 3 * sizeof(double));
+    const drape_status status = drape_deformed_create(&s->arena, collider, &body->deformed);
+    if (!status)
+        s->collider[c] = &body->deformed->collider;
+    return body->points ? status : DRAPE_E_MEMORY;
+}
+
 static drape_status create_bodies(drape_stage *s)
 {
     const drape_model *m = s->model;
     static const int sizes[] = {3, 3, 0};
     s->bodies = drape_arena_take(&s->arena, (size_t)m->collider_count, sizeof *s->bodies);
-    for (int32_t c = 0; s->bodies && c < m->collider_count; c++) {
+    s->collider = drape_arena_take(&s->arena, (size_t)m->collider_count, sizeof *s->collider);
+    for (int32_t c = 0; s->bodies && s->collider && c < m->collider_count; c++) {
         drape_stage_body *body = &s->bodies[s->body_count++];
         const drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], 0);
         double center[3];
@@ -36,6 +48,9 @@ static drape_status create_bodies(drape_stage *s)
                                   (s->low[2] + s->high[2]) / 2};
         drape_pose_own(&pose, middle, center);
         set_pose(body, &pose);
+        s->collider[c] = &m->colliders[c];
+        if (m->colliders[c].frames.frame_count > 0 && take_deformed(s, c))
+            return DRAPE_E_MEMORY;
         if (drape_body_create(&s->arena, &m->colliders[c], center, 2.5 * m->length, &body->shape))
             return DRAPE_E_MEMORY;
         drape_gl_mesh_create(&body->mesh, sizes, false);
@@ -52,6 +67,7 @@ static drape_status create_cloth(drape_stage *s)
         s->pin_count += s->model->pinned[i];
     s->pin = drape_arena_take(&s->arena, s->pin_count, 3 * sizeof *s->pin);
     drape_status status = drape_skin_create(&s->arena, s->model, &s->skin);
+    s->skin.collider = s->collider;
     if (status)
         return status;
     drape_gl_mesh_create(&s->cloth, vertex, false);
@@ -114,7 +130,13 @@ static void move_bodies(drape_stage *s, double t)
 {
     for (int32_t c = 0; c < s->body_count; c++) {
         const drape_collider_pose pose = drape_collider_pose_at(&s->model->colliders[c], t);
-        set_pose(&s->bodies[c], &pose);
+        drape_stage_body *body = &s->bodies[c];
+        set_pose(body, &pose);
+        if (!body->deformed)
+            continue;
+        drape_sequence_points(&s->model->colliders[c].frames, t, body->points);
+        drape_deformed_move(body->deformed, body->points);
+        drape_body_follow(&body->deformed->collider.shape, &body->shape);
     }
 }
 
@@ -161,6 +183,10 @@ void drape_stage_set(drape_stage *stage, const drape_moment *moment, bool wires)
 {
     float *pin = stage->pin;
     move_bodies(stage, moment->t);
+    for (int32_t c = 0; c < stage->body_count; c++)
+        if (stage->bodies[c].deformed)
+            drape_gl_mesh_fill(&stage->bodies[c].mesh, stage->bodies[c].shape.vertex,
+                               stage->bodies[c].shape.vertex_count, true);
     drape_skin_update(&stage->skin, moment->t, moment->positions, moment->values);
     drape_gl_mesh_fill(&stage->cloth, stage->skin.vertex[0].p, stage->skin.vertex_count, true);
     stage->wire_count = 0;

@@ -3,6 +3,7 @@
 #ifndef DRAPE_RENDER_STAGE_H
 #define DRAPE_RENDER_STAGE_H
 
+#include "colliders/deformed.h"
 #include "render/body.h"
 #include "render/camera.h"
 #include "render/gl.h"
@@ -18,8 +19,10 @@ typedef struct drape_moment {
 typedef struct drape_stage_body {
     drape_body shape;
     drape_gl_mesh mesh;
-    float turn[9];   /* its rotation now, column by column, as in OpenGL */
-    float offset[3]; /* [m] and its displacement after that */
+    drape_deformed *deformed; /* of a collider that deforms, as it is now; NULL: rigid */
+    double *points;           /* (its points x 3) workspace */
+    float turn[9];            /* its rotation now, column by column, as in OpenGL */
+    float offset[3];          /* [m] and its displacement after that */
 } drape_stage_body;
 
 typedef struct drape_stage {
@@ -27,7 +30,8 @@ typedef struct drape_stage {
     const drape_model *model;
     drape_skin skin;
     drape_gl_mesh cloth, hem, wires, pins;
-    drape_stage_body *bodies; /* (body_count) the model's colliders */
+    drape_stage_body *bodies;        /* (body_count) the model's colliders */
+    const drape_collider **collider; /* (body_count) of which distances count now */
     int32_t body_count;
     size_t wire_count, pin_count;
     float *pin;              /* (pinned nodes x 3) */

@@ -6,6 +6,7 @@
 #include "sim/place.h"
 
 #include <math.h>
+#include <string.h>
 
 #define MAX_SECONDS  1e9 /* [s] the limit of a scene's duration */
 #define MAX_DISTANCE 1e9 /* [m], [m/s] the limit of a track's keys */
@@ -151,6 +152,96 @@ drape_collider_motion drape_sim_collider(const drape_sim *sim, int32_t collider)
     drape_motion_collider(motion, collider, t, at.displacement);
     drape_motion_collider_velocity(motion, collider, t, t, at.velocity);
     return at;
+}
+
+/* ---- Colliders that deform ---- */
+
+static drape_status check_deforms(const drape_sim *sim, const char *function, int32_t collider)
+{
+    drape_status status = check_collider(sim, function, collider);
+    const drape_collider *c = status ? NULL : &sim->model->colliders[collider];
+    if (!status && c->frames.frame_count == 0)
+        status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                            "%s: collider %d is a %s, which is rigid; an animated_mesh deforms", function,
+                            (int)collider, c->ops->entry.name);
+    return status;
+}
+
+static drape_status check_points(const drape_sim *sim, const drape_collider *c, int32_t points,
+                                 const double *positions, const double *velocities)
+{
+    const char *const function = "drape_sim_deform_collider";
+    if (points != c->shape.point_count || !positions)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: %d points%s; %s has %d", function, (int)points,
+                          positions ? "" : ", but no positions", c->name, (int)c->shape.point_count);
+    for (size_t i = 0; i < (size_t)points; i++)
+        if (!is_within_limits(positions + 3 * i, velocities ? velocities + 3 * i : NULL))
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                              "%s: position and velocity of point %zu must be within %g m and m/s", function,
+                              i, MAX_DISTANCE);
+    double *x = drape_alloc(sim->ctx, 3 * (size_t)points, sizeof *x);
+    if (!x)
+        return DRAPE_E_MEMORY;
+    memcpy(x, positions, 3 * (size_t)points * sizeof *x);
+    const drape_mesh mesh = {
+        .triangle_count = c->shape.triangle_count, .triangle = c->shape.triangle, .x = x};
+    const drape_mesh_source source = {.pointer = "", .part = "drape_sim_deform_collider: "};
+    const drape_status status = drape_mesh_validate_shapes(sim->ctx, &source, &mesh);
+    drape_free(sim->ctx, x);
+    return status;
+}
+
+drape_status drape_sim_deform_collider(drape_sim *sim, int32_t collider, double seconds, int32_t points,
+                                       const double *positions, const double *velocities)
+{
+    drape_status status = drape_sim_guard(sim, "drape_sim_deform_collider");
+    if (status)
+        return status;
+    status = check_deforms(sim, "drape_sim_deform_collider", collider);
+    if (!status)
+        status = check_seconds(sim, "drape_sim_deform_collider", seconds);
+    if (!status)
+        status = check_points(sim, &sim->model->colliders[collider], points, positions, velocities);
+    if (!status)
+        drape_motion_deform(drape_system_steer(sim->system), collider, drape_sim_state(sim)->t, seconds,
+                            positions, velocities);
+    return status;
+}
+
+drape_status drape_sim_collider_points(drape_sim *sim, int32_t collider, double *positions,
+                                       double *velocities)
+{
+    drape_status status = drape_sim_guard(sim, "drape_sim_collider_points");
+    if (status)
+        return status;
+    status = check_deforms(sim, "drape_sim_collider_points", collider);
+    if (!status && !positions)
+        status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_points: positions is NULL");
+    if (status)
+        return status;
+    const drape_motion *motion = drape_system_motion(sim->system);
+    const size_t points = (size_t)sim->model->colliders[collider].shape.point_count;
+    const double t = drape_sim_state(sim)->t;
+    drape_collider_pose pose;
+    drape_motion_pose(motion, collider, t, t, &pose);
+    drape_motion_points(motion, collider, t, positions);
+    if (velocities)
+        drape_motion_point_velocities(motion, collider, t, t, velocities);
+    for (size_t i = 0; i < points; i++) {
+        double *x = positions + 3 * i, *v = velocities ? velocities + 3 * i : NULL;
+        if (v)
+            drape_pose_point_velocity(&pose, x, v, v);
+        drape_pose_point(&pose, x, x);
+    }
+    return DRAPE_OK;
+}
+
+int32_t drape_model_collider_points(const drape_model *model, int32_t collider)
+{
+    if (!model || collider < 0 || collider >= model->collider_count)
+        return -1;
+    return model->colliders[collider].frames.frame_count > 0 ? model->colliders[collider].shape.point_count
+                                                             : 0;
 }
 
 bool drape_sim_collider_rotation(const drape_sim *sim, int32_t collider, double rotation[4],

@@ -93,6 +93,10 @@ static uint64_t add_collider(uint64_t hash, const drape_collider *collider)
     hash = add(hash, s->segment, 2 * (size_t)s->segment_count * sizeof *s->segment);
     hash = add(hash, s->triangle, 3 * (size_t)s->triangle_count * sizeof *s->triangle);
     hash = add_doubles(hash, &s->radius, 1);
+    hash = add_doubles(hash, &s->distance, 1);
+    hash = add_doubles(hash, collider->frames.time, (size_t)collider->frames.frame_count);
+    hash = add_doubles(hash, collider->frames.x,
+                       3 * (size_t)collider->frames.frame_count * (size_t)collider->frames.node_count);
     hash = add_doubles(hash, &collider->friction, 1);
     hash = add_doubles(hash, &collider->restitution, 1);
     hash = add_track(hash, &collider->track);

@@ -5,6 +5,7 @@
 #include "sim/inside.h"
 
 #include "base/vec3.h"
+#include "colliders/deformed.h"
 #include "geometry/intersect.h"
 #include "sim/sim.h"
 
@@ -137,18 +138,15 @@ static double deepest_between(const search *s, int32_t triangle)
     return depth_at(s, point);
 }
 
-static search search_of(const drape_model *m, int32_t collider, const drape_collider_pose *pose,
+static search search_of(const drape_model *m, const drape_collider *collider, const drape_collider_pose *pose,
                         const double *x, drape_inside *found)
 {
     *found = (drape_inside){.triangles = 0};
-    return (search){.model = m,
-                    .collider = &m->colliders[collider],
-                    .pose = pose,
-                    .cloth = drape_surface_of(m, x),
-                    .found = found};
+    return (search){
+        .model = m, .collider = collider, .pose = pose, .cloth = drape_surface_of(m, x), .found = found};
 }
 
-drape_status drape_find_inside(drape_context *ctx, const drape_model *m, int32_t collider,
+drape_status drape_find_inside(drape_context *ctx, const drape_model *m, const drape_collider *collider,
                                const drape_collider_pose *pose, const double *x, drape_inside *found)
 {
     drape_arena arena = drape_arena_of(ctx);
@@ -163,7 +161,7 @@ drape_status drape_find_inside(drape_context *ctx, const drape_model *m, int32_t
     return status;
 }
 
-drape_status drape_find_pierced(drape_context *ctx, const drape_model *m, int32_t collider,
+drape_status drape_find_pierced(drape_context *ctx, const drape_model *m, const drape_collider *collider,
                                 const drape_collider_pose *pose, const double *x, int32_t *pierced)
 {
     drape_inside found;
@@ -187,9 +185,16 @@ drape_status drape_sim_find_inside(const drape_sim *sim, int32_t collider, drape
     if (!sim || collider < 0 || collider >= sim->model->collider_count)
         return DRAPE_E_ARGUMENT;
     const double t = drape_sim_time(sim);
+    const drape_motion *motion = drape_system_motion(sim->system);
+    const drape_collider *body;
     drape_collider_pose pose;
-    drape_motion_pose(drape_system_motion(sim->system), collider, t, t, &pose);
-    return drape_find_inside(sim->ctx, sim->model, collider, &pose, drape_sim_positions(sim), found);
+    drape_arena arena = drape_arena_of(sim->ctx);
+    drape_motion_pose(motion, collider, t, t, &pose);
+    drape_status status = drape_deformed_at(&arena, sim->model, motion, collider, t, &body);
+    if (!status)
+        status = drape_find_inside(sim->ctx, sim->model, body, &pose, drape_sim_positions(sim), found);
+    drape_arena_free(&arena);
+    return status;
 }
 
 int32_t drape_sim_inside(const drape_sim *sim, int32_t collider, double *deepest)

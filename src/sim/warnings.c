@@ -4,7 +4,7 @@
  */
 #include "sim/warnings.h"
 
-#include "colliders/colliders.h"
+#include "colliders/deformed.h"
 #include "sim/inside.h"
 #include "sim/relaxed.h"
 #include "sim/sim.h"
@@ -88,14 +88,14 @@ static bool has_large_file(drape_sim *sim, char *text, size_t size)
 
 /* Free nodes of the cloth inside a collider. A pinned node may be there on purpose, and faces of which
  * only the middle is inside do not count: some contact is kept at nodes only. */
-static int32_t free_nodes_inside(const drape_model *m, int32_t collider, const drape_collider_pose *pose,
-                                 const double *x, double *deepest)
+static int32_t free_nodes_inside(const drape_model *m, const drape_collider *collider,
+                                 const drape_collider_pose *pose, const double *x, double *deepest)
 {
     int32_t count = 0;
     *deepest = 0;
     for (int32_t f = 0; f < m->free_count; f++) {
         const double *at = x + 3 * (size_t)m->node_of_free[f];
-        const double depth = -drape_collider_distance(&m->colliders[collider], pose, at, NULL, NULL);
+        const double depth = -drape_collider_distance(collider, pose, at, NULL, NULL);
         count += depth > INSIDE;
         *deepest = fmax(*deepest, depth);
     }
@@ -115,18 +115,26 @@ static bool describe_inside(drape_sim *sim, const double *x, bool start, char *t
         if (!start)
             drape_motion_pose(drape_system_motion(sim->system), c, t, t, &pose);
         double deepest;
-        const int32_t count = free_nodes_inside(m, c, &pose, x, &deepest);
+        const drape_collider *body;
+        drape_arena arena = drape_arena_of(sim->ctx);
+        if (drape_deformed_at(&arena, m, start ? NULL : drape_system_motion(sim->system), c, pose.t, &body)) {
+            drape_arena_free(&arena);
+            sim->warning_failed = true;
+            return false;
+        }
+        const int32_t count = free_nodes_inside(m, body, &pose, x, &deepest);
         if (count > 0)
             snprintf(text, size,
                      "/colliders/%d: %d free node%s of the cloth %s%s inside %s, up to %.3g m deep%s", (int)c,
                      (int)count, count == 1 ? "" : "s", what, count == 1 ? "s" : "", m->colliders[c].name,
                      deepest, advice);
-        else if (drape_find_pierced(sim->ctx, m, c, &pose, x, &pierced))
+        else if (drape_find_pierced(sim->ctx, m, body, &pose, x, &pierced))
             sim->warning_failed = true;
         else if (pierced > 0)
             snprintf(text, size, "/colliders/%d: %d triangle%s of the cloth %s%s pierced by %s%s", (int)c,
                      (int)pierced, pierced == 1 ? "" : "s", what, pierced == 1 ? "s" : "",
                      m->colliders[c].name, advice);
+        drape_arena_free(&arena);
         if (count > 0 || pierced > 0)
             return true;
     }

@@ -260,6 +260,10 @@ static const struct variant {
     {"mesh", "{'type': 'mesh', 'file': 'cube.obj'}", in_cube},
     {"mesh", "{'type': 'mesh', 'file': 'globe.obj', 'scale': [0.7, 0.5, 0.6], 'rotate': [20, 0, 30]}", NULL},
     {"mesh", "{'type': 'mesh', 'file': 'wedge.obj', 'scale': 0.7}", NULL},
+    {"animated_mesh", "{'type': 'animated_mesh', 'file': 'cube.obj'}", in_cube},
+    {"animated_mesh",
+     "{'type': 'animated_mesh', 'file': 'globe.obj', 'scale': [0.7, 0.5, 0.6], 'rotate': [20, 0, 30]}", NULL},
+    {"animated_mesh", "{'type': 'animated_mesh', 'file': 'wedge.obj', 'scale': 0.7}", NULL},
 };
 #define VARIANTS (sizeof variants / sizeof *variants)
 

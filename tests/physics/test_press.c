@@ -63,10 +63,14 @@ START_TEST(a_corner_through_a_face_is_counted)
         const crossings found = crossings_count(s.model, s.model->rest, 0);
         ck_assert_int_eq(found.colliders, i > 0 ? 3 : 0);
         ck_assert_int_eq(found.cloth + found.inside, 0);
-        ck_assert_int_eq(drape_find_inside(s.ctx, s.model, 0, &pose, s.model->rest, &inside), DRAPE_OK);
+        ck_assert_int_eq(
+            drape_find_inside(s.ctx, s.model, &s.model->colliders[0], &pose, s.model->rest, &inside),
+            DRAPE_OK);
         ck_assert_int_eq(inside.intersections, i > 0 ? 3 : 0);
         ck_assert_int_eq(inside.triangles, i > 0);
-        ck_assert_int_eq(drape_find_pierced(s.ctx, s.model, 0, &pose, s.model->rest, &pierced), DRAPE_OK);
+        ck_assert_int_eq(
+            drape_find_pierced(s.ctx, s.model, &s.model->colliders[0], &pose, s.model->rest, &pierced),
+            DRAPE_OK);
         ck_assert_int_eq(pierced, i > 0);
         /* coordinates of up to 1 m are rounded by DBL_EPSILON/2; 20 such errors */
         ck_assert_double_eq_tol(inside.deepest, i > 0 ? heights[i] / sqrt(3) : 0, 20 * DBL_EPSILON);
@@ -103,7 +107,8 @@ START_TEST(the_counter_agrees_with_the_library)
         const crossings counted = crossings_count(s.model, x, 0);
         ck_assert_int_eq(drape_find_intersections(s.ctx, s.model, x, &found), DRAPE_OK);
         ck_assert_int_eq(counted.cloth, found.count);
-        ck_assert_int_eq(drape_find_inside(s.ctx, s.model, 0, &pose, x, &inside), DRAPE_OK);
+        ck_assert_int_eq(drape_find_inside(s.ctx, s.model, &s.model->colliders[0], &pose, x, &inside),
+                         DRAPE_OK);
         ck_assert_int_eq(counted.colliders, inside.intersections);
         cloth += found.count;
         box += inside.intersections;

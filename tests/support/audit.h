@@ -8,11 +8,12 @@
 
 #include <math.h>
 
-#include "colliders/colliders.h"
+#include "colliders/deformed.h"
 #include "geometry/intersect.h"
 #include "sim/sim.h"
 
-#define AUDIT_CUTS 6 /* intervals along a side: a face is sampled at 28 points, with its corners */
+#define AUDIT_COLLIDERS 16
+#define AUDIT_CUTS      6 /* intervals along a side: a face is sampled at 28 points, with its corners */
 
 /* The largest values over all states of one kind. */
 typedef struct audit_worst {
@@ -25,8 +26,9 @@ typedef struct audit_worst {
 typedef struct audit {
     drape_context *ctx;
     const drape_model *model;
-    bool self;  /* find edges that pass through triangles */
-    bool faces; /* also sample faces between the nodes */
+    bool self;                                   /* find edges that pass through triangles */
+    bool faces;                                  /* also sample faces between the nodes */
+    const drape_collider *body[AUDIT_COLLIDERS]; /* as they are at the time of a state */
     audit_worst steps, frames;
 } audit;
 
@@ -40,9 +42,8 @@ static inline double audit_depth(const audit *a, const double *p, double t)
 {
     double deepest = -INFINITY;
     for (int32_t k = 0; k < a->model->collider_count; k++) {
-        const drape_collider *collider = &a->model->colliders[k];
-        const drape_collider_pose pose = drape_collider_pose_at(collider, t);
-        deepest = fmax(deepest, -drape_collider_distance(collider, &pose, p, NULL, NULL));
+        const drape_collider_pose pose = drape_collider_pose_at(&a->model->colliders[k], t);
+        deepest = fmax(deepest, -drape_collider_distance(a->body[k], &pose, p, NULL, NULL));
     }
     return deepest;
 }
@@ -66,8 +67,16 @@ static inline void audit_faces(const audit *a, const double *x, double t, audit_
 }
 
 /* x: positions at time t. */
-static inline drape_status audit_state(const audit *a, const double *x, double t, audit_worst *worst)
+static inline drape_status audit_state(audit *a, const double *x, double t, audit_worst *worst)
 {
+    drape_arena arena = drape_arena_of(a->ctx);
+    drape_status made = a->model->collider_count <= AUDIT_COLLIDERS ? DRAPE_OK : DRAPE_E_ARGUMENT;
+    for (int32_t k = 0; !made && k < a->model->collider_count; k++)
+        made = drape_deformed_at(&arena, a->model, NULL, k, t, &a->body[k]);
+    if (made) {
+        drape_arena_free(&arena);
+        return made;
+    }
     worst->states++;
     for (int32_t i = 0; i < a->model->node_count; i++) {
         double depth = audit_depth(a, x + 3 * (size_t)i, t);
@@ -79,6 +88,7 @@ static inline drape_status audit_state(const audit *a, const double *x, double t
     if (a->faces && a->model->collider_count > 0)
         audit_faces(a, x, t, worst);
     drape_intersections found = {0};
+    drape_arena_free(&arena);
     drape_status status = a->self ? drape_find_intersections(a->ctx, a->model, x, &found) : DRAPE_OK;
     if (found.count > worst->intersections) {
         worst->intersections = found.count;

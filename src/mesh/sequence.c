@@ -1,0 +1,156 @@
+/* sequence.c: see sequence.h. */
+#include "mesh/sequence.h"
+
+#include "mesh/contents.h"
+#include "mesh/npy_array.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#define MAX_FRAMES  1000000
+#define MAX_NUMBERS ((int64_t)1 << 31) /* of all frames: 16 GiB */
+
+static drape_status unknown_ending(drape_context *ctx, const char *pointer, const char *file)
+{
+    char known[256] = "";
+    size_t used = 0;
+    for (int i = 0; drape_sequences[i]; i++)
+        for (int k = 0; drape_sequences[i]->endings[k] && used < sizeof known; k++)
+            used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "",
+                                     drape_sequences[i]->endings[k]);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s: unknown ending; known are %s", file, known);
+}
+
+static const drape_sequence_ops *find_format(const char *file)
+{
+    const size_t length = strlen(file);
+    for (int i = 0; drape_sequences[i]; i++)
+        for (int k = 0; drape_sequences[i]->endings[k]; k++) {
+            const size_t ending = strlen(drape_sequences[i]->endings[k]);
+            if (length > ending && strcasecmp(file + length - ending, drape_sequences[i]->endings[k]) == 0)
+                return drape_sequences[i];
+        }
+    return NULL;
+}
+
+drape_status drape_sequence_allocate(const drape_sequence_source *source, const drape_mesh *mesh,
+                                     int64_t frames, drape_sequence *out)
+{
+    if (frames < 1)
+        return drape_mesh_fail(source->ctx, &source->file, 0, "it has no frames");
+    if (frames > MAX_FRAMES || frames * 3 * mesh->node_count > MAX_NUMBERS)
+        return drape_mesh_fail(source->ctx, &source->file, 0,
+                               "%" PRId64 " frames of %d nodes; at most %d frames and %" PRId64
+                               " numbers are read",
+                               frames, (int)mesh->node_count, MAX_FRAMES, MAX_NUMBERS);
+    out->frame_count = (int32_t)frames;
+    out->node_count = mesh->node_count;
+    out->x = drape_arena_take(out->arena, (size_t)frames * (size_t)mesh->node_count, 3 * sizeof *out->x);
+    out->time = drape_arena_take(out->arena, (size_t)frames, sizeof *out->time);
+    return out->x && out->time ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+/* ---- Times ---- */
+
+static drape_status check_times(drape_context *ctx, const drape_mesh_source *source,
+                                const drape_sequence *sequence)
+{
+    for (int32_t f = 0; f < sequence->frame_count; f++) {
+        const double t = sequence->time[f];
+        if (!isfinite(t) || (f > 0 && !(t > sequence->time[f - 1])))
+            return drape_mesh_fail(ctx, source, 0,
+                                   "frame %d is at %g s; times must be finite and increase from frame to "
+                                   "frame",
+                                   (int)f, t);
+    }
+    return DRAPE_OK;
+}
+
+static drape_status read_times(drape_arena *scratch, const drape_mesh_source *source, const char *folder,
+                               double start, drape_sequence *out)
+{
+    drape_context *ctx = scratch->ctx;
+    drape_contents whole = {0};
+    drape_npy_array array;
+    const char *path = drape_contents_path(scratch, folder, source->file);
+    drape_status status = path ? drape_contents_read(scratch, source->pointer, path, &whole) : DRAPE_E_MEMORY;
+    if (!status)
+        status = drape_npy_array_parse(ctx, source, whole.data, whole.size, &array);
+    if (!status && (array.dimensions != 1 || array.shape[0] != out->frame_count))
+        status = drape_mesh_fail(ctx, source, 0, "%" PRId64 " times in %d dimensions; %d times are needed",
+                                 array.shape[0], array.dimensions, (int)out->frame_count);
+    for (int32_t f = 0; !status && f < out->frame_count; f++)
+        out->time[f] = start + drape_npy_array_at(&array, (size_t)f);
+    return status ? status : check_times(ctx, source, out);
+}
+
+static drape_status set_times(drape_arena *scratch, const char *pointer, const char *folder,
+                              const drape_sequence_def *def, const drape_mesh_source *file,
+                              drape_sequence *out)
+{
+    char at[sizeof scratch->ctx->pointer];
+    snprintf(at, sizeof at, "%s/times", pointer);
+    if (def->times)
+        return read_times(scratch, &(drape_mesh_source){.pointer = at, .file = def->times}, folder,
+                          def->start, out);
+    for (int32_t f = 0; f < out->frame_count; f++)
+        out->time[f] = def->start + (out->first + out->step * f) / def->rate;
+    return check_times(scratch->ctx, file, out);
+}
+
+/* ---- Positions ---- */
+
+drape_status drape_sequence_validate(drape_context *ctx, const drape_mesh_source *source,
+                                     const drape_mesh *mesh, const drape_sequence *sequence)
+{
+    drape_mesh at = *mesh;
+    char frame[32];
+    const drape_mesh_source part = {.pointer = source->pointer, .file = source->file, .part = frame};
+    drape_status status = DRAPE_OK;
+    for (int32_t f = 0; !status && f < sequence->frame_count; f++) {
+        snprintf(frame, sizeof frame, "frame %d: ", (int)f);
+        at.x = sequence->x + 3 * (size_t)f * (size_t)sequence->node_count;
+        status = drape_mesh_validate_positions(ctx, &part, &at);
+        if (!status)
+            status = drape_mesh_validate_shapes(ctx, &part, &at);
+    }
+    return status;
+}
+
+drape_status drape_sequence_read(drape_arena *arena, const char *pointer, const char *folder,
+                                 const drape_sequence_def *def, drape_mesh *mesh, drape_sequence *out)
+{
+    drape_context *ctx = arena->ctx;
+    char at_file[sizeof ctx->pointer], at_mesh[sizeof ctx->pointer];
+    snprintf(at_file, sizeof at_file, "%s/file", pointer);
+    snprintf(at_mesh, sizeof at_mesh, "%s/mesh", pointer);
+    const drape_sequence_ops *format = find_format(def->file);
+    const drape_sequence_source source = {
+        .ctx = ctx, .file = {.pointer = at_file, .file = def->file}, .folder = folder, .rate = def->rate};
+    *out = (drape_sequence){.arena = arena, .step = 1};
+    if (!format)
+        return unknown_ending(ctx, at_file, def->file);
+    if (format->has_triangles && def->mesh)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at_mesh,
+                             "%s has its triangles itself: a mesh beside it is not used", def->file);
+    if (!format->has_triangles && !def->mesh)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at_mesh,
+                             "%s has positions only: the OBJ or PLY file of its triangles is needed",
+                             def->file);
+    drape_arena scratch = drape_arena_of(ctx);
+    const locale_t old = drape_locale_enter();
+    drape_status status =
+        format->has_triangles ? DRAPE_OK : drape_mesh_read(ctx, at_mesh, folder, def->mesh, mesh);
+    if (!status)
+        status = format->read(&source, mesh, out);
+    if (!status)
+        status = set_times(&scratch, pointer, folder, def, &source.file, out);
+    if (!status)
+        memcpy(mesh->x, out->x, 3 * (size_t)mesh->node_count * sizeof *mesh->x);
+    drape_locale_leave(old);
+    drape_arena_free(&scratch);
+    return status;
+}

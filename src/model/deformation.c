@@ -1,0 +1,201 @@
+/* deformation.c: see deformation.h. */
+#include "model/deformation.h"
+
+#include "base/finite.h"
+
+#include <string.h>
+
+static size_t numbers_of(const drape_sequence *frames)
+{
+    return 3 * (size_t)frames->node_count;
+}
+
+drape_status drape_deformation_create(drape_arena *arena, const drape_sequence *frames,
+                                      drape_deformation *out)
+{
+    *out = (drape_deformation){.frames = frames};
+    for (int end = 0; frames->frame_count > 0 && end < 2; end++) {
+        out->x[end] = drape_arena_take(arena, numbers_of(frames), sizeof(double));
+        out->v[end] = drape_arena_take(arena, numbers_of(frames), sizeof(double));
+        out->spare[end] = drape_arena_take(arena, numbers_of(frames), sizeof(double));
+    }
+    return drape_arena_status(arena);
+}
+
+bool drape_deformation_moves(const drape_deformation *d)
+{
+    return d->given || d->frames->frame_count > 1;
+}
+
+/* ---- Frames ---- */
+
+/* The last frame at or before t; -1 if t is before the first. */
+static int32_t frame_before(const drape_sequence *frames, double t)
+{
+    int32_t low = -1, high = frames->frame_count;
+    while (high - low > 1) {
+        const int32_t middle = low + (high - low) / 2;
+        *(frames->time[middle] <= t ? &low : &high) = middle;
+    }
+    return low;
+}
+
+static const double *frame_at(const drape_sequence *frames, int32_t frame)
+{
+    return frames->x + (size_t)frame * numbers_of(frames);
+}
+
+void drape_sequence_points(const drape_sequence *frames, double t, double *x)
+{
+    const int32_t k = frame_before(frames, t), a = k < 0 ? 0 : k,
+                  b = k >= 0 && k + 1 < frames->frame_count ? k + 1 : a;
+    const double *from = frame_at(frames, a), *to = frame_at(frames, b),
+                 share = a == b ? 0 : (t - frames->time[a]) / (frames->time[b] - frames->time[a]);
+    for (size_t i = 0; i < numbers_of(frames); i++)
+        x[i] = from[i] + share * (to[i] - from[i]);
+}
+
+static void frame_velocities(const drape_sequence *frames, double within, double *v)
+{
+    const int32_t k = frame_before(frames, within);
+    memset(v, 0, numbers_of(frames) * sizeof *v);
+    if (k < 0 || k + 1 >= frames->frame_count)
+        return;
+    const double *from = frame_at(frames, k), *to = frame_at(frames, k + 1),
+                 span = frames->time[k + 1] - frames->time[k];
+    for (size_t i = 0; i < numbers_of(frames); i++)
+        v[i] = (to[i] - from[i]) / span;
+}
+
+/* ---- Paths of a host ---- */
+
+/* Cubic Hermite interpolation, as that of the paths of motion.c. */
+static void path_points(const drape_deformation *d, double t, double *x)
+{
+    const size_t count = numbers_of(d->frames);
+    if (t <= d->t[0] || t >= d->t[1]) {
+        memcpy(x, d->x[t >= d->t[1]], count * sizeof *x);
+        return;
+    }
+    const double h = d->t[1] - d->t[0], s = (t - d->t[0]) / h;
+    const double rise = s * s * (3 - 2 * s), leave = s * (1 - s) * (1 - s), arrive = s * s * (s - 1);
+    for (size_t i = 0; i < count; i++)
+        x[i] = d->x[0][i] + rise * (d->x[1][i] - d->x[0][i]) + h * (leave * d->v[0][i] + arrive * d->v[1][i]);
+}
+
+static void path_velocities(const drape_deformation *d, double t, double within, double *v)
+{
+    const size_t count = numbers_of(d->frames);
+    if (within < d->t[0] || within >= d->t[1]) {
+        memset(v, 0, count * sizeof *v);
+        return;
+    }
+    const double h = d->t[1] - d->t[0], s = (t - d->t[0]) / h;
+    for (size_t i = 0; i < count; i++)
+        v[i] = 6 * s * (1 - s) * (d->x[1][i] - d->x[0][i]) / h + (1 - s) * (1 - 3 * s) * d->v[0][i] +
+               s * (3 * s - 2) * d->v[1][i];
+}
+
+static bool rests_at_end(const drape_deformation *d)
+{
+    for (size_t i = 0; i < numbers_of(d->frames); i++)
+        if (d->v[1][i] != 0)
+            return false;
+    return true;
+}
+
+void drape_deformation_send(drape_deformation *d, double t, double span, const double *x, const double *v)
+{
+    const size_t count = numbers_of(d->frames);
+    const bool ends = d->given && t == d->t[1], begins = d->given && t == d->t[0];
+    /* the velocities that lead here; unknown at a frame, and where a path is replaced at its beginning */
+    const bool known = d->given ? ends || !begins || d->smooth : d->frames->frame_count == 1;
+    drape_deformation_points(d, t, d->spare[0]);
+    if (ends)
+        memcpy(d->v[0], d->v[1], count * sizeof *d->v[0]);
+    else if (!begins)
+        drape_deformation_velocities(d, t, t,
+                                     d->v[0]); /* number by number: each reads v[0] before it is set */
+    memcpy(d->x[0], d->spare[0], count * sizeof *d->x[0]);
+    for (size_t i = 0; !v && i < count; i++)
+        d->v[0][i] = (x[i] - d->x[0][i]) / span;
+    memcpy(d->v[1], v ? v : d->v[0], count * sizeof *d->v[1]);
+    memcpy(d->x[1], x, count * sizeof *d->x[1]);
+    d->smooth = known && v;
+    d->given = true;
+    d->t[0] = t;
+    d->t[1] = t + span;
+}
+
+/* ---- Either ---- */
+
+void drape_deformation_points(const drape_deformation *d, double t, double *x)
+{
+    if (d->given)
+        path_points(d, t, x);
+    else
+        drape_sequence_points(d->frames, t, x);
+}
+
+void drape_deformation_velocities(const drape_deformation *d, double t, double within, double *v)
+{
+    if (d->given)
+        path_velocities(d, t, within, v);
+    else
+        frame_velocities(d->frames, within, v);
+}
+
+double drape_deformation_next_kink(const drape_deformation *d, double t, double end)
+{
+    for (int i = 0; d->given && i < 2; i++)
+        if (d->t[i] > t && d->t[i] < end && !(i == 0 ? d->smooth : rests_at_end(d)))
+            end = d->t[i];
+    if (d->given || d->frames->frame_count < 2)
+        return end;
+    const int32_t next = frame_before(d->frames, t) + 1;
+    return next < d->frames->frame_count && d->frames->time[next] < end ? d->frames->time[next] : end;
+}
+
+bool drape_deformation_at_kink(const drape_deformation *d, double t)
+{
+    if (d->given)
+        return (t == d->t[0] && !d->smooth) || (t == d->t[1] && !rests_at_end(d));
+    const int32_t k = d->frames->frame_count > 1 ? frame_before(d->frames, t) : -1;
+    return k >= 0 && d->frames->time[k] == t;
+}
+
+void drape_deformation_copy(drape_deformation *d, const drape_deformation *from)
+{
+    d->given = from->given;
+    d->smooth = from->smooth;
+    for (int end = 0; end < 2; end++) {
+        d->t[end] = from->t[end];
+        if (!d->x[end])
+            continue;
+        memcpy(d->x[end], from->x[end], numbers_of(d->frames) * sizeof *d->x[end]);
+        memcpy(d->v[end], from->v[end], numbers_of(d->frames) * sizeof *d->v[end]);
+    }
+}
+
+void drape_deformation_archive(drape_deformation *d, drape_archive *a)
+{
+    const size_t count = numbers_of(d->frames);
+    if (d->frames->frame_count == 0)
+        return;
+    drape_archive_bool(a, &d->given);
+    if (!d->given || !drape_archive_good(a))
+        return;
+    drape_archive_bool(a, &d->smooth);
+    drape_archive_doubles(a, d->t, 2);
+    for (int end = 0; end < 2; end++) {
+        drape_archive_doubles(a, d->x[end], count);
+        drape_archive_doubles(a, d->v[end], count);
+    }
+    if (!drape_archive_has_read(a))
+        return;
+    bool good = drape_all_finite(d->t, 2) && d->t[0] <= d->t[1];
+    for (int end = 0; end < 2; end++)
+        good = good && drape_all_finite(d->x[end], count) && drape_all_finite(d->v[end], count);
+    if (!good)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid path of a collider's points");
+}
