@@ -54,7 +54,8 @@ static void choose_threads(cli_realtime *r, const cli_scene *scene, drape_sim_de
         there > 1 ? "s" : "");
 }
 
-/* Seconds of the steps of a frame with one iteration each; 0 if they are not known, because a step failed. */
+/* Seconds of the steps of a frame with one iteration each, whatever number the trial steps make; 0 if they are
+ * not known, because a step failed. */
 static double try_steps(const cli_scene *scene, const drape_sim_def *def)
 {
     const double frame = 1 / drape_model_frame_rate(scene->model);
@@ -65,8 +66,10 @@ static double try_steps(const cli_scene *scene, const drape_sim_def *def)
         dt = drape_chosen_integrator_value(&sim->chosen, "dt", frame);
     for (int i = 0; !status && i < TRIALS && !cli_interrupted(); i++) {
         const double start = drape_clock_seconds();
+        const int64_t before = drape_sim_statistics(sim).newton_iterations;
         status = drape_sim_advance(sim, drape_sim_time(sim) + dt);
-        best = i > 0 ? fmin(best, drape_clock_seconds() - start) : best;
+        const int64_t made = drape_sim_statistics(sim).newton_iterations - before;
+        best = i > 0 ? fmin(best, (drape_clock_seconds() - start) / fmax(1, (double)made)) : best;
     }
     drape_sim_destroy(&sim);
     return status || isinf(best) ? 0 : best * fmax(1, ceil(frame / dt - 1e-9));
@@ -81,8 +84,8 @@ static drape_status set_iterations(cli_realtime *r, const cli_scene *scene, doub
     r->iterations.number = count;
     snprintf(text, sizeof text, "%d", count);
     if (seconds > 0)
-        say(r, "iterations %d: chosen, as one takes %.3g ms of a frame of %.4g ms in trial steps", count,
-            1e3 * seconds, 1e3 * budget);
+        say(r, "iterations %d: chosen, as one takes %.3g ms of a frame of %.4g ms in trial steps%s", count,
+            1e3 * seconds, 1e3 * budget, seconds > budget ? "; frames will be late" : "");
     else
         say(r, "iterations %d: chosen, as a trial step failed", count);
     return drape_scene_set(scene->scene, "/integrator/iterations", text);

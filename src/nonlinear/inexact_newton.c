@@ -470,7 +470,8 @@ static bool goes_by_error(const drape_inexact_newton *s)
 /* The error where corrections contract slowly: 0 if there is no sign of it. A sheet that buckles, or that turns
  * by more than its stiff elements let one correction turn it, comes nearer by many small corrections of nearly
  * the same length, each of which is a small part of the error. The line search shortens some of them. The
- * contraction is taken over pairs, because the lengths alternate.
+ * contraction is taken over pairs, because the lengths alternate. The first correction of a guess by the
+ * linearized equation, in which cloth may be compressed, tells nothing of it either.
  *
  * Where the exact matrix is indefinite there is no solution near: corrections become short near a saddle, and
  * then longer again. Nothing tells how far that leads. */
@@ -478,7 +479,7 @@ static double slow_error(const drape_inexact_newton *s, const progress *p)
 {
     const double *step = p->step;
     double share = MAX_CONTRACTION;
-    if (!goes_by_error(s) || !(s->shortened || s->unstable))
+    if (!goes_by_error(s) || p->iteration == 0 || !(s->shortened || s->unstable || s->linearized))
         return 0;
     if (!s->unstable && p->iteration == 2)
         share = step[0] / step[1];
