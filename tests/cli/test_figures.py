@@ -264,11 +264,11 @@ def test_the_check():
     with open("c/converge_dt.svg", encoding="utf-8") as file:
         source = file.read()
     figure = check(source, "sound")
-    place = re.search(r'translate\(([\d.]+),([\d.]+)\)"[^>]*>\s*<text>(?:<tspan[^>]*>)?be \(', source)
+    place = re.search(r'translate\(([\d.]+),([\d.]+)\)"[^>]*>\s*<text>(?:<tspan[^>]*>)?be[ <]', source)
     x, y = place.group(1), place.group(2)
     curve = figure.markers[0]
     for old, new, why in ((f"translate({x},{y})", f"translate({x},{float(y) + 14})", "touches \""), (f"translate({x},{y})", f"translate({curve[0]},{curve[1]})", "touches the line"),
-                          (f"translate({x},{y})", f"translate(300,{y})", "off the page"), ('font-size="10.00"', 'font-size="9.00"', " pt"), ("213,  94,   0", "192, 57, 43", "(192, 57, 43)")):
+                          (f"translate({x},{y})", f"translate(312,{y})", "off the page"), ('font-size="10.00"', 'font-size="9.00"', " pt"), ("213,  94,   0", "192, 57, 43", "(192, 57, 43)")):
         assert old in source, old
         try:
             check(source.replace(old, new), "changed")
