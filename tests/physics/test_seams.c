@@ -6,6 +6,7 @@
 #include "base/vec3.h"
 #include "drape/extend.h"
 #include "geometry/intersect.h"
+#include "integrators/stability.h"
 #include "support/bytes.h"
 
 #define ROOM 256
@@ -116,8 +117,35 @@ START_TEST(closes)
 }
 END_TEST
 
-/* Explicit steps: the stiffness of threads counts in the stable step although they are slack when it is
- * estimated, 20 times as stiff as the sheet. */
+/* The fastest wave with a gap of 5 cm, of which threads still have 4 cm to go, or of a seam that is closed. */
+static double fastest_wave(const char *stitch)
+{
+    scene s = open_panels(0.05, 0, stitch, "'method': 'verlet', 'dt': 1e-3");
+    drape_spectrum *spectrum;
+    drape_arena arena = drape_arena_of(s.ctx);
+    double omega, damping;
+    drape_state *state = scene_state(&s);
+    for (int i = 25; i < 50; i++)
+        state->x[3 * i + 1] += 0.01; /* threads are slack until they close */
+    ck_assert_int_eq(drape_spectrum_create(&arena, s.sim->system, 20, &spectrum), DRAPE_OK);
+    drape_spectrum_largest(spectrum, state, &omega, &damping);
+    drape_arena_free(&arena);
+    scene_close(&s);
+    return omega;
+}
+
+/* The stable step of explicit integrators counts the stiffness that threads will have. */
+START_TEST(stability_counts_slack_threads)
+{
+    const double slack = fastest_wave(", 'start': 10, 'stiffness': 2000"),
+                 closed = fastest_wave(", 'closing': 0, 'stiffness': 2000"),
+                 soft = fastest_wave(", 'start': 10, 'stiffness': 1e-3");
+    ck_assert_double_eq(slack, closed);
+    ck_assert_double_gt(closed, 2 * soft);
+}
+END_TEST
+
+/* Explicit steps, with threads 20 times as stiff as the sheet. */
 START_TEST(closes_explicitly)
 {
     scene s = open_panels(0.05, 0.0, ", 'closing': 0.5, 'stiffness': 2000",
@@ -361,6 +389,58 @@ START_TEST(term_of_a_host)
 }
 END_TEST
 
+/* A ball around the origin, whose radius is what user points to. */
+static drape_status ball_shape(const double *values, double tolerance, drape_collider_shape *shape)
+{
+    (void)values, (void)tolerance;
+    return *(double *)shape->user > 0 ? DRAPE_OK : drape_shape_refuse(shape, "", "no radius");
+}
+
+static double ball_distance(const double *values, const drape_collider_shape *shape, const double *x,
+                            double *normal, double *curvature)
+{
+    const double r = vec3_norm(x);
+    (void)values;
+    for (int i = 0; normal && i < 3; i++)
+        normal[i] = x[i] / r;
+    for (int i = 0; curvature && i < 9; i++)
+        curvature[i] = ((i % 4 == 0) - x[i / 3] * x[i % 3] / (r * r)) / r;
+    return r - *(double *)shape->user;
+}
+
+/* Colliders of a host have their user pointer, too: four nodes are 0.1 sqrt 2 m from the centre. */
+START_TEST(collider_of_a_host)
+{
+    static double radius = 0.15;
+    static const drape_collider_ops ball = {
+        .struct_size = sizeof ball,
+        .entry = {.name = "host.ball", .summary = "a ball", .reference = "d = |x| - r"},
+        .shape = ball_shape,
+        .distance = ball_distance,
+        .smooth = true,
+        .user = &radius};
+    double deepest = 0;
+    scene s = scene_empty();
+    drape_scene *parsed = NULL;
+    ck_assert_int_eq(drape_context_add_collider(s.ctx, &ball), DRAPE_OK);
+    ck_assert_int_eq(
+        drape_scene_parse(s.ctx,
+                          "{\"drape\": 1, \"duration\": 1, \"colliders\": [{\"type\": \"host.ball\"}], "
+                          "\"cloth\": [{\"mesh\": {\"grid\": \"square\", \"columns\": 2, \"rows\": 2, "
+                          "\"width\": 0.2, \"height\": 0.2, \"transform\": {\"translate\": [-0.1, 0, 0.1]}}, "
+                          "\"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200}, "
+                          "\"terms\": [\"stretch.cst\"], \"pins\": [{\"row\": 0}]}]}",
+                          "ball", &parsed),
+        DRAPE_OK);
+    ck_assert_msg(drape_scene_compile(parsed, &s.model) == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    drape_scene_destroy(&parsed);
+    scene_start(&s, NULL);
+    ck_assert_int_eq(drape_sim_inside(s.sim, 0, &deepest), 2);
+    assert_below(fabs(deepest - 0.15), 1e-12); /* the centre is the middle of the diagonal, a sample */
+    scene_close(&s);
+}
+END_TEST
+
 /* What is wrong is refused where it is. */
 START_TEST(refusals)
 {
@@ -377,5 +457,6 @@ START_TEST(refusals)
 }
 END_TEST
 
-SUITE("seams", carries_a_known_load, holds_before_it_closes, closes, closes_explicitly, is_not_in_contact,
-      derivatives, orders_of_sides, same_bits, term_of_a_host, refusals)
+SUITE("seams", carries_a_known_load, holds_before_it_closes, closes, stability_counts_slack_threads,
+      closes_explicitly, is_not_in_contact, derivatives, orders_of_sides, same_bits, term_of_a_host,
+      collider_of_a_host, refusals)
