@@ -24,7 +24,7 @@ static void bound(const drape_collider_shape *shape, double out[4])
     out[3] = radius + shape->radius;
 }
 
-/* Parts without a radius, or such that enclose more than what is within their radius: the middle is deeper. */
+/* Parts without a radius, or such that enclose more than what is within it: the middle is deeper. */
 static bool is_solid(const drape_collider *collider, const double middle[3])
 {
     static const drape_collider_pose rest = {.displacement = {0}};
