@@ -41,7 +41,7 @@ typedef struct drape_relaxed_set {
     bool *pins;       /* (collider_count) scratch */
     double *bound;    /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none */
     bool *solid; /* (collider_count) its parts enclose a volume: inside, they push to whichever side the cloth
-                    is on, and only the distance from the whole tells the way out */
+                    is on, and only the distance from the whole tells where out is */
     drape_relaxed_total *total; /* (collider_count + 1) the last one: of pinned pieces of cloth */
     double t;                   /* [s] of the last update */
     bool counting; /* nodes that would be relaxed are counted, and nothing changes; during one search */

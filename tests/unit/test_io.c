@@ -1213,7 +1213,7 @@ START_TEST(summary_is_complete)
     json_t *json = load_summary(path);
     check_keys(json, "status message version nodes dofs nnz frames time steps newton tolerance wall_s energy "
                      "strain intersections warnings hash ");
-    check_keys(json_object_get(json, "steps"), "accepted rejected unconverged h_min h_max reasons ");
+    check_keys(json_object_get(json, "steps"), "accepted rejected unconverged held h_min h_max reasons ");
     check_keys(json_object_get(json, "newton"),
                "iterations jacobians factorizations linear_iterations residuals ");
     check_keys(json_object_get(json, "wall_s"),
