@@ -402,7 +402,8 @@ START_TEST(cloth_falls_on_a_ball)
 END_TEST
 
 /* A sheet of 14 x 14 nodes drapes over a ball, and nodes slip and stick. With the symmetric part of the exact
- * matrix alone it takes 187 attempts or so; where the iteration then begins anew with a bound of friction, 90. */
+ * matrix alone it takes 187 attempts or so; where the iteration then begins anew with a bound of friction,
+ * 90. */
 START_TEST(slips_that_end_do_not_shorten_steps)
 {
     scene s =
