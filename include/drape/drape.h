@@ -148,11 +148,11 @@ typedef struct drape_track_key {
     double displacement[3]; /* [m] */
 } drape_track_key;
 
-/* A key of the rotation of a collider about its pivot, from the direction that the parameters define: by axis
- * and angle or, if it is not 0 0 0 0, by a quaternion. It is constant before the first and after the last key;
- * between two keys the collider turns steadily about one axis. Between angles about the same axis it turns by
- * their difference, however large; otherwise by the shortest turn from one to the other, which is the spherical
- * linear interpolation of the quaternions. */
+/* A key of the rotation of a collider about its pivot, from the direction that the parameters define: by
+ * axis and angle or, if it is not 0 0 0 0, by a quaternion. It is constant before the first and after the
+ * last key; between two keys the collider turns steadily about one axis. Between angles about the same
+ * axis it turns by their difference, however large; otherwise by the shortest turn from one to the other,
+ * which is the spherical linear interpolation of the quaternions. */
 typedef struct drape_turn_key {
     double time;          /* [s], strictly increasing from key to key */
     double rotate[4];     /* axis x y z and angle [degrees], of any size */
@@ -208,8 +208,8 @@ typedef struct drape_collider_def {
     const drape_turn_key *turns; /* rotation about the pivot; NULL: it does not turn */
     size_t turn_count;           /* length of turns */
     double pivot[3]; /* [m] the point about which it turns, where the parameters define it; default NaN: the
-                        middle of the box around the points of its shape, as the center of a sphere; of a shape
-                        without points, a plane, the origin */
+                        middle of the box around the points of its shape, as the center of a sphere; of a
+                        shape without points, a plane, the origin */
 } drape_collider_def;
 
 /* An event: a root of a function of the state, which is located within the step in which it lies. Initialise
@@ -554,20 +554,21 @@ DRAPE_API void drape_sim_cancel(drape_sim *sim);
 DRAPE_API drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const int32_t *nodes,
                                            double seconds, const double *positions, const double *velocities);
 
-/* The same for a whole collider: moves it to a displacement [m] from the position that its parameters define,
- * turned as it is now; a collider that turned stops turning. One that would have to be faster than teleport_speed is placed there, less the path at its velocity.
- * drape_sim_collider returns its present position. */
+/* The same for a whole collider: moves it to a displacement [m] from the position that its parameters
+ * define, turned as it is now; a collider that turned stops turning. One that would have to be faster than
+ * teleport_speed is placed there, less the path at its velocity. drape_sim_collider returns its present
+ * position. */
 DRAPE_API drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double seconds,
                                                const double displacement[3], const double *velocity);
 
 /* The same for a collider that also turns: in the next `seconds` its pivot (drape_collider_def) moves to a
- * displacement, and it turns about the pivot by the shortest turn to a rotation from the direction that its
- * parameters define: a quaternion w x y z of length 1. velocity [m/s] and angular_velocity [rad/s] are those on
- * arrival, both in space and about the pivot: displacement and rotation then are smooth, and continue the
- * motion before. If both are NULL, it moves and turns at constant speed. The rotation is interpolated by a
- * cubic of the rotation vector from the present one. Errors: as drape_sim_move_collider; DRAPE_E_ARGUMENT also
- * if the rotation is NULL or far from length 1, one velocity is given alone, or an angular velocity is not
- * finite or beyond 1e4 rad/s. */
+ * displacement, and it turns about the pivot by the shortest turn to a rotation from the direction that
+ * its parameters define: a quaternion w x y z of length 1. velocity [m/s] and angular_velocity [rad/s] are
+ * those on arrival, both in space and about the pivot: displacement and rotation then are smooth, and
+ * continue the motion before. If both are NULL, it moves and turns at constant speed. The rotation is
+ * interpolated by a cubic of the rotation vector from the present one. Errors: as drape_sim_move_collider;
+ * DRAPE_E_ARGUMENT also if the rotation is NULL or far from length 1, one velocity is given alone, or an
+ * angular velocity is not finite or beyond 1e4 rad/s. */
 DRAPE_API drape_status drape_sim_move_collider_pose(drape_sim *sim, int32_t collider, double seconds,
                                                     const double displacement[3], const double rotation[4],
                                                     const double *velocity, const double *angular_velocity);
@@ -671,13 +672,13 @@ DRAPE_API void drape_model_normals(const drape_model *model, const double *x, do
  * a node on its path against cloth, gravity, contact and push, excluding the force that accelerates the
  * node's own mass. Damping laws that take rates from a step use the present velocities here.
  *
- * drape_sim_contact_forces: contact and friction on every node, with colliders and between layers of cloth.
- * drape_sim_collider_force: the total force of the cloth on one collider. drape_sim_collider_torque: the torque
- * [N m] of these forces about a point of space [m] or, if that is NULL, about the pivot of the collider (3), where
- * it is now. Colliders have the mean velocity of
- * the last step, so call these before moving them on. Under "newton_k", which does not bring the residual of
- * a step to zero, all of these forces are far off (docs/integrators.md). An integrator that resolves contact
- * by moving nodes ("verlet") has no such forces and returns an error. Errors: DRAPE_E_ARGUMENT,
+ * drape_sim_contact_forces: contact and friction on every node, with colliders and between layers of
+ * cloth. drape_sim_collider_force: the total force of the cloth on one collider.
+ * drape_sim_collider_torque: the torque [N m] of these forces about a point of space [m] or, if that is
+ * NULL, about the pivot of the collider (3), where it is now. Colliders have the mean velocity of the last
+ * step, so call these before moving them on. Under "newton_k", which does not bring the residual of a step
+ * to zero, all of these forces are far off (docs/integrators.md). An integrator that resolves contact by
+ * moving nodes ("verlet") has no such forces and returns an error. Errors: DRAPE_E_ARGUMENT,
  * DRAPE_E_MEMORY. Thread-safety: as the sim. Must not be called by an observer. */
 DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_contact_forces(drape_sim *sim, double *forces);
@@ -689,9 +690,10 @@ DRAPE_API drape_status drape_sim_collider_torque(drape_sim *sim, int32_t collide
  * host: the displacement and the velocity of its pivot. */
 DRAPE_API drape_collider_motion drape_sim_collider(const drape_sim *sim, int32_t collider);
 
-/* Its rotation about the pivot then, a quaternion w x y z of length 1 with w >= 0, its angular velocity [rad/s],
- * and where its pivot is [m]; each may be NULL. A point X where the parameters define it is at
- * pivot + rotation (X - pivot of the def). Returns false, and writes nothing, if there is no such collider. */
+/* Its rotation about the pivot then, a quaternion w x y z of length 1 with w >= 0, its angular velocity
+ * [rad/s], and where its pivot is [m]; each may be NULL. A point X where the parameters define it is at
+ * pivot + rotation (X - pivot of the def). Returns false, and writes nothing, if there is no such
+ * collider. */
 DRAPE_API bool drape_sim_collider_rotation(const drape_sim *sim, int32_t collider, double rotation[4],
                                            double angular_velocity[3], double pivot[3]);
 

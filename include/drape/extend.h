@@ -461,8 +461,8 @@ DRAPE_API drape_status drape_shape_read_mesh(drape_collider_shape *shape, const 
 
 /*
  * A collider: a rigid, closed obstacle. values are in the order of params; a vector occupies three.
- * Coordinates are the collider's own: tracks move and turn it as a whole. Thread-safety: as for terms, except that
- * shape, which is called once per collider while a model is compiled, may allocate memory.
+ * Coordinates are the collider's own: tracks move and turn it as a whole. Thread-safety: as for terms, except
+ * that shape, which is called once per collider while a model is compiled, may allocate memory.
  */
 typedef struct drape_collider_ops {
     size_t struct_size; /* the author's sizeof(drape_collider_ops) */

@@ -1,7 +1,7 @@
 /*
- * rotation.h: rotations of space as 3 x 3 matrices, row by row, as unit quaternions (w x y z), and as rotation
- * vectors: along the axis, as long as the angle [rad]. Formulas: J. Sola, J. Deray, D. Atchuthan, "A micro Lie
- * theory for state estimation in robotics", 2018, arXiv 1812.01537, section 4.3 and appendix B.
+ * rotation.h: rotations of space as 3 x 3 matrices, row by row, as unit quaternions (w x y z), and as
+ * rotation vectors: along the axis, as long as the angle [rad]. Formulas: J. Sola, J. Deray, D. Atchuthan, "A
+ * micro Lie theory for state estimation in robotics", 2018, arXiv 1812.01537, section 4.3 and appendix B.
  */
 #ifndef DRAPE_BASE_ROTATION_H
 #define DRAPE_BASE_ROTATION_H

@@ -79,8 +79,8 @@ static drape_status check_gaps(drape_contact *c, const char **reason, drape_diag
 #define MAX_TURN  0.7 /* [rad] */
 #define MAX_STRAY 0.25
 
-/* A piece of the path, on which nodes move straight, and colliders turn about one axis while their pivots move
- * straight: c->swing. */
+/* A piece of the path, on which nodes move straight, and colliders turn about one axis while their pivots
+ * move straight: c->swing. */
 typedef struct piece {
     drape_straight_path path;
 } piece;

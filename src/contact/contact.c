@@ -491,8 +491,8 @@ double drape_contact_longest_path(const drape_contact *c)
     return c ? c->longest_path : 0;
 }
 
-/* How far the turning of a collider brings its surface towards a node in a nominal step from time t on: a ball
- * that turns about its center brings nothing nearer. */
+/* How far the turning of a collider brings its surface towards a node in a nominal step from time t on: a
+ * ball that turns about its center brings nothing nearer. */
 static double turning_path_of(const drape_contact *c, int32_t collider, double t)
 {
     const drape_collider *k = &c->model->colliders[collider];
@@ -540,8 +540,8 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
 {
     const size_t nodes = (size_t)c->model->node_count;
     double from[3], to[3], mean[3] = {0};
-    if (!drape_motion_moves_collider(c->motion, collider))
-        return 0;
+    if (!drape_motion_shifts_collider(c->motion, collider))
+        return turning_path_of(c, collider, t);
     drape_motion_collider(c->motion, collider, t, from);
     drape_motion_collider(c->motion, collider, t + c->dt, to);
     for (size_t i = 0; i < 3 * nodes; i++)

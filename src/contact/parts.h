@@ -138,10 +138,10 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
 /* Velocities of the points of an active contact, relative to the collider if it is a surface. */
 void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3]);
 
-/* The largest step fraction from one configuration to another on which all pairs of features keep what they
- * must of their gaps, and the pair that limits it. Nodes move straight, and so do the points of colliders,
- * except those that turn by their swing (collider_count; NULL: none turns). of_node (node_count), unless NULL,
- * is lowered at each node to the smallest fraction of its pairs. */
+/* The largest step fraction from one configuration to another on which all pairs of features keep what
+ * they must of their gaps, and the pair that limits it. Nodes move straight, and so do the points of
+ * colliders, except those that turn by their swing (collider_count; NULL: none turns). of_node
+ * (node_count), unless NULL, is lowered at each node to the smallest fraction of its pairs. */
 double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *straight,
                                    const drape_swing *swing, const drape_keep *keep, double *of_node,
                                    drape_pair *limiting);

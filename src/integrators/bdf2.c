@@ -107,6 +107,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     double r = s->past.known ? h / s->past.h : 0;
     double a = r * r / (1 + 2 * r), w = (1 + 2 * r) / (1 + r) / h;
     drape_implicit_base(&s->common, in, out->t, h);
+    s->common.equation.point.instant = a > 0; /* the first step is one of backward Euler */
     set_equation(s, in, a, w);
     drape_status status = drape_implicit_solve(&s->common, info);
     if (status && !info->usable)

@@ -42,4 +42,5 @@ const drape_integrator_ops drape_integrator_be = {
     .archive = drape_implicit_archive,
     .bytes = drape_implicit_bytes,
     .destroy = drape_implicit_destroy,
+    .mean_velocities = true,
 };

@@ -156,7 +156,8 @@ static void evaluate_start(alpha_state *s, const drape_state *in, double h)
                                .v = s->v0,
                                .internal = in->internal,
                                .t = in->t,
-                               .span = {e->point.span[0], e->point.span[1]}};
+                               .span = {e->point.span[0], e->point.span[1]},
+                               .instant = true};
     const bool known = s->known == in->t;
     drape_system_force(e->system, &start, s->g0);
     for (size_t i = 0; i < e->dofs; i++) {
@@ -196,6 +197,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_implicit *common = &s->common;
     drape_step_equation *e = &common->equation;
     drape_implicit_base(common, in, out->t, h);
+    common->equation.point.instant = true;
     memset(s->v0, 0, e->nodes * sizeof *s->v0);
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);

@@ -58,6 +58,10 @@ typedef struct drape_integrator_ops {
     /* It enforces contact and limits by moving nodes, so the forces that stand for them (contact of the
      * model, terms that are a constraint) must not act, too: the sim creates its system without them. */
     bool projects_contact;
+
+    /* The velocities of a state are the means of the step that led to it, not those of its time: the
+     * surfaces of colliders that turn have theirs with them. */
+    bool mean_velocities;
     /* Steps from in to out, whose t is set. h: the nominal size of the step, exact, while out->t - in->t is
      * rounded. Sets out->x and out->v. */
     drape_status (*step)(void *state, const drape_state *in, drape_state *out, double h,

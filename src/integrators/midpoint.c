@@ -32,6 +32,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_implicit *s = state;
     drape_step_equation *e = &s->equation;
     drape_implicit_base(s, in, in->t + h / 2, h / 2);
+    e->point.instant = true;
     e->point.weight = 2 / h;
     e->mass_weight = 4 / (h * h);
     for (size_t i = 0; i < e->dofs; i++)

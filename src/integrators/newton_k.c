@@ -275,4 +275,5 @@ const drape_integrator_ops drape_integrator_newton_k = {
     .archive = archive,
     .bytes = bytes,
     .destroy = destroy,
+    .mean_velocities = true,
 };

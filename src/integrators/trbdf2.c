@@ -59,7 +59,8 @@ static void evaluate_start(trbdf2_state *s, const drape_state *in)
                                .v = s->vg,
                                .internal = in->internal,
                                .t = in->t,
-                               .span = {e->point.span[0], e->point.span[1]}};
+                               .span = {e->point.span[0], e->point.span[1]},
+                               .instant = true};
     drape_system_force(e->system, &start, s->g0);
 }
 
@@ -71,6 +72,7 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
     drape_implicit *c = &s->common;
     drape_step_equation *e = &c->equation;
     drape_implicit_base(c, in, in->t + GAMMA * h, GAMMA * h);
+    e->point.instant = true;
     evaluate_start(s, in);
     for (size_t i = 0; i < e->dofs; i++) {
         size_t at = drape_step_equation_at(e, i);

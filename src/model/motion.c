@@ -9,6 +9,8 @@
 #include <math.h>
 #include <string.h>
 
+#define ARRIVAL 1e-9 /* of the time of a path */
+
 /* ---- Creation ---- */
 
 static size_t pinned_count(const drape_model *m)
@@ -238,14 +240,20 @@ static bool at_kink_of(const course *c, double t)
     return false;
 }
 
+/* Whether a path has just come to its end: the next moment that a host computes may differ by rounding. */
+static bool has_arrived(const drape_path *path, double t)
+{
+    return t >= path->t[1] && t - path->t[1] <= ARRIVAL * (path->t[1] - path->t[0]);
+}
+
 /* Writes the velocity that leads to the position at t. Returns whether it is known: it is not at a key of a
  * track, nor where the host replaces a path at the moment at which it began. */
 static bool leading_velocity(const course *c, double t, double v[3])
 {
     const drape_path *path = c->path;
-    if (path->given && (t == path->t[0] || t == path->t[1])) {
-        memcpy(v, path->v[t == path->t[1]], 3 * sizeof *v);
-        return t == path->t[1] || path->smooth;
+    if (path->given && (t == path->t[0] || has_arrived(path, t))) {
+        memcpy(v, path->v[has_arrived(path, t)], 3 * sizeof *v);
+        return has_arrived(path, t) || path->smooth;
     }
     velocity_on(c, t, t, v);
     return path->given || !c->track || c->track->key_count == 0;
@@ -256,11 +264,11 @@ static bool leading_spin(const course *c, double t, double w[3])
 {
     const drape_path *path = c->path;
     double turn[3], rate[3];
-    if (!path->given || t != path->t[1]) {
+    if (!path->given || !has_arrived(path, t)) {
         spin_on(c, t, t, w);
         return path->given ? t != path->t[0] || path->smooth : c->turns->key_count == 0;
     }
-    turn_vector(c, t, path->t[0], turn, rate);
+    turn_vector(c, path->t[1], path->t[0], turn, rate);
     drape_rotation_velocity(turn, rate, w);
     return true;
 }
@@ -416,11 +424,16 @@ static course collider_course(const drape_motion *motion, int32_t collider)
                     .placed = &motion->collider_placed[collider]};
 }
 
-bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
+bool drape_motion_shifts_collider(const drape_motion *motion, int32_t collider)
 {
     const course c = collider_course(motion, collider);
-    return c.path->given || c.placed->given || c.track->key_count > 0 || c.turns->key_count > 0 ||
-           drape_motion_deforms(motion, collider);
+    return c.path->given || c.placed->given || c.track->key_count > 0;
+}
+
+bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
+{
+    return drape_motion_shifts_collider(motion, collider) ||
+           motion->model->colliders[collider].turns.key_count > 0 || drape_motion_deforms(motion, collider);
 }
 
 bool drape_motion_turns_collider(const drape_motion *motion, int32_t collider)
@@ -486,8 +499,8 @@ void drape_motion_mean_pose(const drape_motion *motion, int32_t collider, double
     drape_pose_set_mean_velocities(pose, &from, &to, span[1] - span[0]);
 }
 
-/* The rate of the rotation vector v of a path is a parabola: it stays in the hull of the control points of its
- * Bezier form. |w| <= |dv/dt|, since w is a mean of rotated dv/dt. */
+/* The rate of the rotation vector v of a path is a parabola: it stays in the hull of the control points of
+ * its Bezier form. |w| <= |dv/dt|, since w is a mean of rotated dv/dt. */
 double drape_motion_fastest_spin(const drape_motion *motion, int32_t collider, double t0, double t1)
 {
     const course c = collider_course(motion, collider);

@@ -64,9 +64,10 @@ void drape_motion_place_pins(const drape_motion *motion, double t, double *x);
  * `within`: at a kink there are two velocities, and the velocity at the kink itself is the later one. */
 void drape_motion_pin_velocity(const drape_motion *motion, int32_t i, double t, double within, double v[3]);
 
-/* Whether a collider ever moves; whether it turns on its track or path; and the displacement of its pivot at
- * time t. */
+/* Whether a collider ever moves; whether its pivot does; whether it turns on its track or path; and the
+ * displacement of its pivot at time t. */
 bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider);
+bool drape_motion_shifts_collider(const drape_motion *motion, int32_t collider);
 bool drape_motion_turns_collider(const drape_motion *motion, int32_t collider);
 void drape_motion_collider(const drape_motion *motion, int32_t collider, double t, double displacement[3]);
 
@@ -88,8 +89,8 @@ void drape_motion_spin(const drape_motion *motion, int32_t collider, double t, d
 /* An upper bound of its angular velocity [rad/s] from t0 to t1, between which there is no kink. */
 double drape_motion_fastest_spin(const drape_motion *motion, int32_t collider, double t0, double t1);
 
-/* The work of forces on colliders (collider_count; NULL: none) while they go from where they are at t0 to where
- * they are at t1 [J], and their power at time t [W], `within` as above. */
+/* The work of forces on colliders (collider_count; NULL: none) while they go from where they are at t0 to
+ * where they are at t1 [J], and their power at time t [W], `within` as above. */
 double drape_motion_collider_work(const drape_motion *motion, const drape_load *load, double t0, double t1);
 double drape_motion_collider_power(const drape_motion *motion, const drape_load *load, double t,
                                    double within);
@@ -113,15 +114,16 @@ bool drape_motion_at_kink(const drape_motion *motion, double t);
 
 /* Move a pinned node on a user-defined path from now on: from its position at time t, on a cubic, to the
  * position x and the velocity v at t + span [s]; if v is NULL, on a straight line at constant speed. For a
- * collider x is the displacement of its pivot. It turns by the shortest turn to the given rotation, with the
- * angular velocity w at the end, or steadily if v is NULL; if the rotation is NULL, it keeps that of time t. */
+ * collider x is the displacement of its pivot. It turns by the shortest turn to the given rotation, with
+ * the angular velocity w at the end, or steadily if v is NULL; if the rotation is NULL, it keeps that of
+ * time t. */
 void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double span, const double x[3],
                            const double *v);
 void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t, double span,
                                 const double x[3], const double *v, const double *rotation, const double *w);
 
-/* The velocities with which a pinned node and the pivot of a collider come to where they are at time t; 0 at a
- * key of a track. */
+/* The velocities with which a pinned node and the pivot of a collider come to where they are at time t; 0
+ * at a key of a track. */
 void drape_motion_pin_arrival(const drape_motion *motion, int32_t node, double t, double v[3]);
 void drape_motion_collider_arrival(const drape_motion *motion, int32_t collider, double t, double v[3]);
 

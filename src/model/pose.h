@@ -1,6 +1,6 @@
 /*
- * pose.h: where a rigid body is at one instant, and how it moves: the point X of its own coordinates is at
- * x = turn X + displacement and has the velocity `velocity` + gradient (x - displacement). And the motion of a
+ * pose.h: where a rigid body is at one instant, and how it moves: the point X of its own coordinates is at x
+ * = turn X + displacement and has the velocity `velocity` + gradient (x - displacement). And the motion of a
  * body from one pose to another in which its pivot moves straight and it turns about one axis, both steadily.
  */
 #ifndef DRAPE_MODEL_POSE_H
@@ -38,13 +38,13 @@ void drape_pose_point_velocity(const drape_collider_pose *pose, const double *ow
 void drape_pose_set_turn(drape_collider_pose *pose, const double turn[9]);
 void drape_pose_set_gradient(drape_collider_pose *pose, const double gradient[9]);
 
-/* The pose of a body turned about a pivot of its own coordinates, which is then displaced, with the velocity v
- * of the pivot and the angular velocity w; pose->t is unchanged. */
+/* The pose of a body turned about a pivot of its own coordinates, which is then displaced, with the
+ * velocity v of the pivot and the angular velocity w; pose->t is unchanged. */
 void drape_pose_about(drape_collider_pose *pose, const double pivot[3], const double turn[9],
                       const double displacement[3], const double v[3], const double w[3]);
 
-/* The mean velocities of a motion in h [s] from one pose to another, by which each point of the body gets from
- * its place in the first to that in the second one. */
+/* The mean velocities of a motion in h [s] from one pose to another, by which each point of the body gets
+ * from its place in the first to that in the second one. */
 void drape_pose_set_mean_velocities(drape_collider_pose *pose, const drape_collider_pose *from,
                                     const drape_collider_pose *to, double h);
 
@@ -86,8 +86,8 @@ typedef struct drape_swing {
 void drape_swing_between(const drape_collider_pose *from, const drape_collider_pose *to,
                          const double pivot[3], drape_swing *out);
 
-/* The body's own coordinates at the fraction s of the motion of a point of space that moves straight from x by
- * `move`; and an upper bound of its speed in them, per fraction. */
+/* The body's own coordinates at the fraction s of the motion of a point of space that moves straight from
+ * x by `move`; and an upper bound of its speed in them, per fraction. */
 void drape_swing_own(const drape_swing *swing, const double *x, const double *move, double s, double *own);
 double drape_swing_speed(const drape_swing *swing, const double *x, const double *move);
 

@@ -1,5 +1,5 @@
-/* track.h: the displacement of a pin or a collider as a piecewise linear function of time, and the rotation of
- * a collider as a piecewise steady one. */
+/* track.h: the displacement of a pin or a collider as a piecewise linear function of time, and the
+ * rotation of a collider as a piecewise steady one. */
 #ifndef DRAPE_MODEL_TRACK_H
 #define DRAPE_MODEL_TRACK_H
 

@@ -67,11 +67,15 @@ static const double *reactions_of(moment *m)
 {
     const drape_state *now = drape_sim_state(m->sim);
     if (!m->has_reactions)
-        m->status = drape_sim_reactions_at(
-            m->sim,
-            &(drape_point){
-                .x = m->x, .v = m->v, .internal = now->internal, .t = m->t, .span = {now->t, m->next->t}},
-            m->sim->events.reactions);
+        m->status =
+            drape_sim_reactions_at(m->sim,
+                                   &(drape_point){.x = m->x,
+                                                  .v = m->v,
+                                                  .internal = now->internal,
+                                                  .t = m->t,
+                                                  .span = {now->t, m->next->t},
+                                                  .instant = !m->sim->chosen.integrator->mean_velocities},
+                                   m->sim->events.reactions);
     m->has_reactions = true;
     return m->sim->events.reactions;
 }

@@ -303,8 +303,12 @@ static drape_status place(drape_sim *sim, drape_point *point)
 {
     const drape_state *now = drape_sim_state(sim);
     double before = sim->before >= 0 ? sim->states[sim->before].t : now->t;
-    *point = (drape_point){
-        .x = now->x, .v = now->v, .internal = now->internal, .t = now->t, .span = {before, now->t}};
+    *point = (drape_point){.x = now->x,
+                           .v = now->v,
+                           .internal = now->internal,
+                           .t = now->t,
+                           .span = {before, now->t},
+                           .instant = !sim->chosen.integrator->mean_velocities};
     /* otherwise the last step has begun there */
     return sim->before < 0 ? drape_system_begin(sim->system, now) : DRAPE_OK;
 }

@@ -220,8 +220,8 @@ START_TEST(only_what_is_chosen_is_placed)
 }
 END_TEST
 
-/* Colliders turn with what is placed: a box that lies across is found there, and its own coordinates turned. A
- * second placement turns what was turned. */
+/* Colliders turn with what is placed: a box that lies across is found there, and its own coordinates
+ * turned. A second placement turns what was turned. */
 START_TEST(colliders_turn)
 {
     failing_allocator memory = {0};

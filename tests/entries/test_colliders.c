@@ -674,9 +674,9 @@ static void point_at(const drape_collider *c, double t, const double *own, doubl
     drape_pose_point(&pose, own, x);
 }
 
-/* Keys about one axis, a piece of more than a turn; then quaternions. The rates are those of the keys, and the
- * velocity of a point is the rate of its place: by differences over 2e-6 s, to (3 rad/s)^3 1e-12/6 m of the
- * cubic, and rounding of 1e-16/1e-6 m/s. */
+/* Keys about one axis, a piece of more than a turn; then quaternions. The rates are those of the keys, and
+ * the velocity of a point is the rate of its place: by differences over 2e-6 s, to (3 rad/s)^3 1e-12/6 m
+ * of the cubic, and rounding of 1e-16/1e-6 m/s. */
 START_TEST(poses_follow_the_turns)
 {
     scene s = with_collider(
@@ -717,9 +717,9 @@ START_TEST(poses_follow_the_turns)
 }
 END_TEST
 
-/* In a turned pose the distance is that of the point in the collider's own coordinates, and its derivatives in
- * space are exact: that of the distance along a direction is normal . u, that of the normal curvature u. Mean
- * velocities take points from one pose to the other. */
+/* In a turned pose the distance is that of the point in the collider's own coordinates, and its
+ * derivatives in space are exact: that of the distance along a direction is normal . u, that of the normal
+ * curvature u. Mean velocities take points from one pose to the other. */
 static void check_turned(const drape_collider *c, const struct variant *v)
 {
     drape_collider_pose pose = {.t = 0}, next = {.t = 1}, none = {.t = 0};
@@ -763,8 +763,8 @@ START_TEST(a_turned_pose_turns_the_distance)
 }
 END_TEST
 
-/* From one pose to another: the ends are those of the poses, a point that is carried along rests, and no point
- * is faster than the bound: 100 places on each of 40 paths. */
+/* From one pose to another: the ends are those of the poses, a point that is carried along rests, and no
+ * point is faster than the bound: 100 places on each of 40 paths. */
 START_TEST(swings_lead_from_pose_to_pose)
 {
     for (int i = 0; i < 40; i++) {

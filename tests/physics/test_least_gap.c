@@ -74,8 +74,8 @@ static int crossings_at(const drape_model *m, const double *x, double t)
         const drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], t);
         double corner[3 * 64];
         ck_assert_int_le(shape->point_count, 64);
-        for (int32_t i = 0; i < 3 * shape->point_count; i++)
-            corner[i] = shape->point[i] + pose.displacement[i % 3];
+        for (int32_t i = 0; i < shape->point_count; i++)
+            drape_collider_point(&m->colliders[c], &pose, i, corner + 3 * i);
         const surface body = {corner, shape->segment, shape->triangle, shape->segment_count,
                               shape->triangle_count};
         count += crossings(&cloth, &body) + crossings(&body, &cloth);
