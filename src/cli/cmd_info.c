@@ -3,7 +3,7 @@
 #include "cli/signals.h"
 
 #include "base/arena.h"
-#include "colliders/colliders.h"
+#include "colliders/deformed.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -119,14 +119,20 @@ static cli_cloth_info cloth_info(const drape_model *model, const drape_cloth *cl
     return info;
 }
 
-static cli_collider_info collider_info(const drape_sim *sim, const drape_collider *collider)
+static drape_status collider_info(const drape_sim *sim, int32_t index, cli_collider_info *info)
 {
-    cli_collider_info info = {0};
+    const drape_collider *collider;
+    drape_arena arena = drape_arena_of(sim->ctx);
+    const drape_status status =
+        drape_deformed_at(&arena, sim->model, NULL, index, drape_sim_time(sim), &collider);
+    *info = (cli_collider_info){0};
     const double *x = drape_sim_positions(sim);
-    const drape_collider_pose pose = drape_collider_pose_at(collider, drape_sim_time(sim));
-    for (int32_t i = 0; i < sim->model->node_count; i++)
-        info.inside += drape_collider_distance(collider, &pose, x + 3 * (size_t)i, NULL, NULL) < 0;
-    return info;
+    const drape_collider_pose pose =
+        drape_collider_pose_at(&sim->model->colliders[index], drape_sim_time(sim));
+    for (int32_t i = 0; !status && i < sim->model->node_count; i++)
+        info->inside += drape_collider_distance(collider, &pose, x + 3 * (size_t)i, NULL, NULL) < 0;
+    drape_arena_free(&arena);
+    return status;
 }
 
 /* Frames at k / rate up to the end, and one at the end if none of them is there. */
@@ -150,9 +156,11 @@ static drape_status gather(drape_arena *arena, const cli_scene *in, cli_info *in
     info->frames = count_frames(model);
     for (int32_t c = 0; c < model->cloth_count; c++)
         info->cloths[c] = cloth_info(model, &model->cloths[c]);
-    for (int32_t c = 0; c < model->collider_count; c++)
-        info->colliders[c] = collider_info(in->sim, &model->colliders[c]);
-    drape_status status = drape_scene_to_def(in->scene, &info->def);
+    drape_status status = DRAPE_OK;
+    for (int32_t c = 0; !status && c < model->collider_count; c++)
+        status = collider_info(in->sim, c, &info->colliders[c]);
+    if (!status)
+        status = drape_scene_to_def(in->scene, &info->def);
     if (!status)
         status = drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
     const drape_integrator_ops *integrator = in->sim->chosen.integrator;

@@ -164,7 +164,9 @@ static void print_given(const drape_param *params, int count, const double *valu
 {
     for (int p = 0; p < count; p++) {
         printf("  %-16s ", params[p].name);
-        if (params[p].kind == DRAPE_PARAM_TEXT)
+        if (params[p].kind == DRAPE_PARAM_TEXT && !cli_is_given(choice, params[p].name))
+            fputs(params[p].derived ? params[p].derived : "", stdout);
+        else if (params[p].kind == DRAPE_PARAM_TEXT)
             fputs(CLI_SHOWN(cli_text_of(choice, params[p].name)), stdout);
         else
             print_value(&params[p], values + drape_param_place(params, p));

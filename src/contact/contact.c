@@ -538,7 +538,8 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
 {
     const size_t nodes = (size_t)c->model->node_count;
     double from[3], to[3], mean[3] = {0};
-    if (!drape_motion_shifts_collider(c->motion, collider))
+    const bool deforms = drape_motion_deforms(c->motion, collider);
+    if (!deforms && !drape_motion_shifts_collider(c->motion, collider))
         return turning_path_of(c, collider, t);
     drape_motion_collider(c->motion, collider, t, from);
     drape_motion_collider(c->motion, collider, t + c->dt, to);
@@ -546,7 +547,7 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
         mean[i % 3] += c->v[i];
     for (size_t k = 0; k < 3; k++)
         mean[k] *= c->dt / (double)nodes;
-    if (drape_motion_deforms(c->motion, collider))
+    if (deforms)
         return deforming_path_of(c, collider, t, mean);
     for (size_t k = 0; k < 3; k++)
         to[k] -= from[k] + mean[k];

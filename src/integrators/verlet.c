@@ -152,10 +152,25 @@ static drape_status create_arrays(drape_arena *arena, verlet_state *s)
     return drape_arena_status(arena);
 }
 
+/* The rules of contact put nodes on the surface of a body that is the same before and after a substep. */
+static drape_status check_rigid(drape_arena *arena, const drape_model *m)
+{
+    for (int32_t c = 0; c < m->collider_count; c++)
+        if (m->colliders[c].frames.frame_count > 0)
+            return drape_fail_at(
+                arena->ctx, DRAPE_E_ARGUMENT, "/integrator/method",
+                "verlet has rules of contact for rigid bodies, and %s is of the type %s, which deforms; "
+                "the other integrators follow it",
+                m->colliders[c].name, m->colliders[c].ops->entry.name);
+    return DRAPE_OK;
+}
+
 static drape_status create_parts(drape_arena *arena, verlet_state *s)
 {
     const double *values = s->values;
-    drape_status status = create_arrays(arena, s);
+    drape_status status = check_rigid(arena, s->model);
+    if (!status)
+        status = create_arrays(arena, s);
     if (!status)
         status = drape_verlet_force_create(arena, s->system, &s->force);
     if (!status && !isnan(values[PARAM_STRAIN_LIMIT]))

@@ -279,5 +279,24 @@ START_TEST(inside_by_winding)
 }
 END_TEST
 
+/* Rules of contact for rigid bodies are refused, with the reason. */
+START_TEST(verlet_is_refused)
+{
+    const frames_folder f = frames_folder_make();
+    drape_sim_def def;
+    write_frames(&f, "up.npy", 1, (const double[]){0.2}, (const double[]){0});
+    scene s = open_host(&f);
+    drape_sim_destroy(&s.sim);
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = "verlet";
+    ck_assert_int_eq(drape_sim_create(s.ctx, s.model, &def, &s.sim), DRAPE_E_ARGUMENT);
+    ck_assert_msg(
+        strstr(drape_context_message(s.ctx), "collider0 is of the type animated_mesh, which deforms"), "%s",
+        drape_context_message(s.ctx));
+    scene_close(&s);
+    frames_folder_remove(&f);
+}
+END_TEST
+
 SUITE("deform", rigid_motion_as_frames, ball_grows_in_a_ball_of_cloth, host_sends_points, faults_of_a_host,
-      inside_by_winding)
+      inside_by_winding, verlet_is_refused)
