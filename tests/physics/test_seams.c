@@ -117,7 +117,7 @@ START_TEST(closes)
 }
 END_TEST
 
-/* The fastest wave with a gap of 5 cm, of which threads still have 4 cm to go, or of a seam that is closed. */
+/* The fastest wave with a gap of 5 cm, of which threads still have 4 cm to go, or of a closed seam. */
 static double fastest_wave(const char *stitch)
 {
     scene s = open_panels(0.05, 0, stitch, "'method': 'verlet', 'dt': 1e-3");
