@@ -54,8 +54,8 @@ static void choose_threads(cli_realtime *r, const cli_scene *scene, drape_sim_de
         there > 1 ? "s" : "");
 }
 
-/* Seconds of the steps of a frame with one iteration each, whatever number the trial steps make; 0 if they are
- * not known, because a step failed. */
+/* Seconds of the steps of a frame with one iteration each, whatever number the trial steps make; 0 if they
+ * are not known, because a step failed. */
 static double try_steps(const cli_scene *scene, const drape_sim_def *def)
 {
     const double frame = 1 / drape_model_frame_rate(scene->model);

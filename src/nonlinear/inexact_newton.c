@@ -467,10 +467,10 @@ static bool goes_by_error(const drape_inexact_newton *s)
     return s->factored && !s->fraction;
 }
 
-/* The error where corrections contract slowly: 0 if there is no sign of it. A sheet that buckles, or that turns
- * by more than its stiff elements let one correction turn it, comes nearer by many small corrections of nearly
- * the same length, each of which is a small part of the error. The line search shortens some of them. The
- * contraction is taken over pairs, because the lengths alternate. The first correction of a guess by the
+/* The error where corrections contract slowly: 0 if there is no sign of it. A sheet that buckles, or that
+ * turns by more than its stiff elements let one correction turn it, comes nearer by many small corrections of
+ * nearly the same length, each of which is a small part of the error. The line search shortens some of them.
+ * The contraction is taken over pairs, because the lengths alternate. The first correction of a guess by the
  * linearized equation, in which cloth may be compressed, tells nothing of it either.
  *
  * Where the exact matrix is indefinite there is no solution near: corrections become short near a saddle, and

@@ -75,10 +75,11 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The median over the steps of a run is within a factor of 4 of the true error on cloth of three materials
- * and two membranes that hangs, swings and falls on a ball, with the default iterations and the least. No step
- * without contact is off by more than the bound and estimated at less than a tenth. On the ball one may be:
- * cloth buckles there at a saddle, near which corrections become short and then long again. */
+/* The median over the steps of a run is within a factor of 4 of the true error on cloth of three
+ * materials and two membranes that hangs, swings and falls on a ball, with the default iterations and the
+ * least. No step without contact is off by more than the bound and estimated at less than a tenth. On the
+ * ball one may be: cloth buckles there at a saddle, near which corrections become short and then long again.
+ * */
 START_TEST(the_estimate_is_near_the_true_error)
 {
     static const source sources[] = {{"", 16, SOFT, EDGES, PINS},
@@ -127,11 +128,11 @@ static drape_status compare_first(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Corners of stiff sheets that lie flat are jerked sideways at 3 m/s. The sheets turn and buckle, and the line
- * search shortens the corrections, so that each is a small part of the error: the length of one more of them
- * is a fiftieth to a sixth of it. The step goes on until little is left, or says that much is: the
- * estimate is above a quarter of the true error, which is below 3 mm, twice the bound (with the estimate by one
- * more correction alone the first sheet was 20 mm off and estimated at 0.4 mm). */
+/* Corners of stiff sheets that lie flat are jerked sideways at 3 m/s. The sheets turn and buckle, and the
+ * line search shortens the corrections, so that each is a small part of the error: the length of one more of
+ * them is a fiftieth to a sixth of it. The step goes on until little is left, or says that much is: the
+ * estimate is above a quarter of the true error, which is below 3 mm, twice the bound (with the estimate by
+ * one more correction alone the first sheet was 20 mm off and estimated at 0.4 mm). */
 START_TEST(shortened_corrections_are_not_the_error)
 {
     static const struct {
@@ -158,9 +159,9 @@ START_TEST(shortened_corrections_are_not_the_error)
 }
 END_TEST
 
-/* The pins of a soft sheet turn after some steps. The next one begins with the linearized equation, and what the
- * first correction of the steps before has left, by which three of four are judged, says nothing about it: one
- * iteration was estimated at 0.45 mm and 5.2 mm off. */
+/* The pins of a soft sheet turn after some steps. The next one begins with the linearized equation, and
+ * what the first correction of the steps before has left, by which three of four are judged, says nothing
+ * about it: one iteration was estimated at 0.45 mm and 5.2 mm off. */
 START_TEST(earlier_steps_do_not_judge_one_in_which_pins_turn)
 {
     for (int steps = 12; steps < 15; steps++) {
