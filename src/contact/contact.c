@@ -383,8 +383,8 @@ double drape_contact_longest_path(const drape_contact *c)
     return c ? c->longest_path : 0;
 }
 
-/* How far the turning of a collider brings its surface towards a node in a nominal step from time t on: a ball
- * that turns about its center brings nothing nearer. */
+/* How far the turning of a collider brings its surface towards a node in a nominal step from time t on: a
+ * ball that turns about its center brings nothing nearer. */
 static double turning_path_of(const drape_contact *c, int32_t collider, double t)
 {
     const drape_collider *k = &c->model->colliders[collider];

@@ -87,6 +87,14 @@ void drape_contact_fill(const drape_contact *c, const double *nodes, const drape
 /* drape_contact_evaluate_at without its timing. */
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at);
 
+/* Whether a collider lets these nodes of one cloth in: it is ignored, or one of them is relaxed. */
+static inline bool drape_contact_lets_in(const drape_contact *c, int32_t collider, const int32_t *node,
+                                         int nodes)
+{
+    return drape_model_ignores(c->model, collider, node[0]) ||
+           drape_relaxed_has(&c->relaxed, collider, node, nodes);
+}
+
 /* Computes lagged friction from the active set at the beginning of a step. */
 drape_status drape_contact_lag(drape_contact *c);
 
@@ -123,8 +131,8 @@ void drape_contact_velocities(const drape_contact *c, const drape_active_contact
 
 /* The largest step fraction from one configuration to another on which all pairs of features keep what they
  * must of their gaps, and the pair that limits it. Nodes move straight, and so do the points of colliders,
- * except those that turn by their swing (collider_count; NULL: none turns). of_node (node_count), unless NULL,
- * is lowered at each node to the smallest fraction of its pairs. */
+ * except those that turn by their swing (collider_count; NULL: none turns). of_node (node_count), unless
+ * NULL, is lowered at each node to the smallest fraction of its pairs. */
 double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *straight,
                                    const drape_swing *swing, const drape_keep *keep, double *of_node,
                                    drape_pair *limiting);

@@ -19,6 +19,7 @@
 typedef struct search {
     const drape_model *model;
     const drape_collider *collider;
+    int32_t index; /* of the collider: cloths that ignore it are not looked at */
     const drape_collider_pose *pose;
     drape_surface cloth, obstacle;
     uint8_t *edge_crosses; /* (edge_count of the cloth) it passes through a triangle of the collider */
@@ -33,6 +34,8 @@ static void note_edge(void *user, int32_t edge, int32_t triangle)
 {
     search *s = user;
     (void)triangle;
+    if (drape_model_ignores(s->model, s->index, s->cloth.edge[2 * (size_t)edge]))
+        return;
     s->edge_crosses[edge] = 1;
     s->found->intersections++;
 }
@@ -42,6 +45,8 @@ static void note_triangle(void *user, int32_t edge, int32_t triangle)
     search *s = user;
     const int32_t *ends = s->obstacle.edge + 2 * (size_t)edge,
                   *node = s->cloth.triangle + 3 * (size_t)triangle;
+    if (drape_model_ignores(s->model, s->index, node[0]))
+        return;
     const double *p = s->obstacle.x + 3 * (size_t)ends[0], *q = s->obstacle.x + 3 * (size_t)ends[1],
                  *a = s->cloth.x + 3 * (size_t)node[0];
     double u[3], v[3], n[3], ap[3], aq[3];
@@ -143,6 +148,7 @@ static search search_of(const drape_model *m, int32_t collider, const drape_coll
     *found = (drape_inside){.triangles = 0};
     return (search){.model = m,
                     .collider = &m->colliders[collider],
+                    .index = collider,
                     .pose = pose,
                     .cloth = drape_surface_of(m, x),
                     .found = found};
@@ -155,6 +161,8 @@ drape_status drape_find_inside(drape_context *ctx, const drape_model *m, int32_t
     search s = search_of(m, collider, pose, x, found);
     drape_status status = intersect(&arena, &s);
     for (int32_t f = 0; !status && f < m->triangle_count; f++) {
+        if (drape_model_ignores(m, collider, m->triangle[3 * (size_t)f]))
+            continue;
         const double depth = fmax(deepest_sample(&s, m->triangle + 3 * (size_t)f), deepest_between(&s, f));
         found->triangles += depth > TOUCH || is_pierced(&s, f);
         found->deepest = fmax(found->deepest, depth);
