@@ -80,7 +80,7 @@ static double distance_at(const ray *r, double t, double *normal)
     return drape_collider_distance(r->collider, r->pose, x, normal, NULL);
 }
 
-/* Where the way from outside to inside enters. */
+/* Where the piece from outside to inside enters. */
 static double enter(const ray *r, double outside, double inside)
 {
     for (int i = 0; i < MAX_HALVES; i++) {

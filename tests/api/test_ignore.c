@@ -1,4 +1,4 @@
-/* test_ignore.c: cloth that passes through the colliders and cloths that it is told to ignore. */
+/* test_ignore.c: cloth that passes through the colliders and cloths that the scene says. */
 #include "support/bytes.h"
 #include "support/host.h"
 #include "support/suite.h"
@@ -68,13 +68,13 @@ START_TEST(cloth_passes_through_what_it_ignores)
 }
 END_TEST
 
-/* What a cloth ignores does not count as entered, and through layers that ignore each other nothing passes. */
+/* Where cloth is in what it ignores, it does not count as inside. */
 START_TEST(what_is_ignored_is_not_reported)
 {
     failing_allocator memory = {0};
     host h = open_scene(&memory, two, ", 'ignore': ['table', 'floor', 'lower']", "", "", "", "0.005", "be",
                         "0.008");
-    good(&h, drape_sim_advance(h.sim, 0.15)); /* on its way through */
+    good(&h, drape_sim_advance(h.sim, 0.15)); /* amid both */
     ck_assert_int_eq(drape_sim_inside(h.sim, 0, NULL), 0);
     ck_assert_int_eq(drape_sim_inside(h.sim, 1, NULL), 0);
     ck_assert_int_eq((int)drape_sim_intersections(h.sim, -1), 0);
