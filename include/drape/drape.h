@@ -191,6 +191,9 @@ typedef struct drape_cloth_def {
     const drape_pin_def *pins;    /* nodes that are held or moved; NULL: none */
     size_t pin_count;             /* length of pins */
     double velocity[3];           /* initial velocity of every node [m/s] */
+    const char *const
+        *ignore;         /* names of colliders and cloths that this cloth passes through; its own: itself */
+    size_t ignore_count; /* length of ignore */
 } drape_cloth_def;
 
 /* One side of a seam: nodes of one cloth, in the order in which they are joined. They are selected as
@@ -236,6 +239,7 @@ typedef struct drape_collider_def {
     double pivot[3]; /* [m] the point about which it turns, where the parameters define it; default NaN: the
                         middle of the box around the points of its shape, as the center of a sphere; of a
                         shape without points, a plane, the origin */
+    bool enabled; /* cloth touches it; default true. A collider that is not enabled can still be moved */
 } drape_collider_def;
 
 /* An event: a root of a function of the state, which is located within the step in which it lies. Initialise
@@ -739,6 +743,90 @@ DRAPE_API int32_t drape_sim_relaxed(const drape_sim *sim, int32_t index, drape_r
  * only touch, and pairs that share a node, do not count. Returns -1 if there is no such collider, or
  * memory is out. */
 DRAPE_API int64_t drape_sim_intersections(const drape_sim *sim, int32_t collider);
+
+/* ---- Sim: queries ---- */
+
+/* What a query looks for; the sum of both for both. */
+enum { DRAPE_QUERY_CLOTH = 1, DRAPE_QUERY_COLLIDERS = 2 };
+
+/* A place on cloth or on a collider. */
+typedef struct drape_hit {
+    bool found;       /* if not, nothing else is set */
+    int32_t collider; /* its number; -1: cloth */
+    int32_t triangle; /* of cloth, its number in the model; -1: a collider */
+    double distance;  /* [m] from the point, negative inside a collider; of a ray, along it from its origin */
+    double point[3];  /* [m] */
+    double normal[3]; /* [1] of the triangle, counterclockwise; of the collider, outward */
+    double weights[3]; /* [1] of the corners of the triangle in the point; 0 at a collider */
+} drape_hit;
+
+/* The nearest place to each of count points (count x 3 [m]) within a distance [m], which may be INFINITY, in
+ * the last accepted state; of equally near ones the triangle of the lowest number, and cloth before
+ * colliders. what: DRAPE_QUERY_CLOTH, DRAPE_QUERY_COLLIDERS or their sum. The place on a collider is the
+ * point less its signed distance along its normal.
+ *
+ * drape_sim_cast: the first place that each of count rays meets, from its origin [m] along its direction, of
+ * any length but 0, up to `length` [m]; triangles are met from both sides. A ray that begins in a collider
+ * meets it at its origin. Colliders are met to 1e-9 m; a ray that is inside a collider for less than 1e-4 of
+ * `length` may miss it.
+ *
+ * Each call refits a tree of boxes over the triangles, and takes memory for it at the first one; then a
+ * point takes about the logarithm of their number. Errors: DRAPE_E_ARGUMENT (NULL, what, a value that is not
+ * finite, a direction of length 0, within or length not above 0), DRAPE_E_MEMORY. Must not be called by an
+ * observer. Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_closest(drape_sim *sim, int what, int32_t count, const double *points,
+                                         double within, drape_hit *hits);
+DRAPE_API drape_status drape_sim_cast(drape_sim *sim, int what, int32_t count, const double *origins,
+                                      const double *directions, double length, drape_hit *hits);
+
+/* One contact of cloth with a collider, or of a piece of cloth with another: a node and a face, two edges, or
+ * parts of these. */
+typedef struct drape_contact_point {
+    int32_t collider; /* its number; -1: cloth with cloth */
+    int32_t nodes[4]; /* of the cloth; -1: none */
+    double
+        weights[4];   /* of the nodes in the point; negative on the second piece of cloth, whose closest point
+                            is minus their sum */
+    double point[3];  /* [m] of the cloth, or of the first of two pieces */
+    double normal[3]; /* [1] from the collider, or the second piece, to the first one */
+    double gap;       /* [m] between their surfaces */
+    double force[3];  /* [N] on the first one: normal force and friction */
+    double normal_force; /* [N] its part along the normal */
+} drape_contact_point;
+
+/* Lists the contacts in the last accepted state, up to `room` of them, and sets *count to their number,
+ * which may be larger; room may be 0 and contacts then NULL. Their forces add up to those of
+ * drape_sim_contact_forces and, with the other sign, of drape_sim_collider_force, whose remarks apply. A
+ * force acts on the nodes by their weights, except between nearly parallel edges. With lagged friction, the
+ * friction of a contact at the beginning of the last step is an entry of its own, with its gap and without
+ * normal force. Errors: DRAPE_E_ARGUMENT (NULL, room < 0, an integrator without contact forces),
+ * DRAPE_E_MEMORY. Must not be called by an observer. Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_contacts(drape_sim *sim, int32_t room, drape_contact_point *contacts,
+                                          int32_t *count);
+
+/* A mesh for rendering that the cloth carries: each of its vertices is fixed to the nearest triangle at
+ * rest, at the same weights of its corners and the same height above it as there, so at rest it is where it
+ * was given, and turns and shifts with the cloth. Vertices that are above a triangle by less than the radius
+ * of curvature of a fold stay on their side of it. */
+typedef struct drape_embedding drape_embedding;
+
+/* Fixes count vertices (count x 3 [m], where the cloth is at rest) with their normals (count x 3; NULL:
+ * none) to one cloth of a model, or to all if cloth is -1. Everything is copied: the model need not outlive
+ * it. Errors: DRAPE_E_ARGUMENT (NULL, no such cloth, not finite), DRAPE_E_MEMORY; then *out is NULL.
+ * Thread-safety: as the context. */
+DRAPE_API drape_status drape_embedding_create(drape_context *ctx, const drape_model *model, int32_t cloth,
+                                              int32_t count, const float *vertices, const float *normals,
+                                              drape_embedding **out);
+
+/* Writes the vertices (count x 3 [m]) and, unless NULL or none were given, the normals of length 1 (count x
+ * 3) for the nodes at x (node_count x 3 [m]). Nothing is allocated. Thread-safety: any number of threads at
+ * once. */
+DRAPE_API void drape_embedding_carry(const drape_embedding *embedding, const double *x, float *vertices,
+                                     float *normals);
+
+DRAPE_API void drape_embedding_destroy(drape_embedding **embedding);
+
+/* ---- Sim: normals, forces and energies ---- */
 
 /* Normals of the nodes (node_count x 3 [1]): the area-weighted mean over the triangles around a node,
  * normalised, with the side outside from which the triangles are counterclockwise; 0 where the mean vanishes.

@@ -778,18 +778,6 @@ void drape_system_archive(drape_system *system, drape_archive *a)
 
 /* ---- Another system goes on ---- */
 
-static drape_status continue_contact(drape_system *system, drape_system *from, const int32_t *before)
-{
-    const int32_t *nodes = NULL;
-    if (!system->contact || !from->contact)
-        return DRAPE_OK;
-    const drape_status status = drape_contact_continue(system->contact, from->contact, before);
-    if (status || !from->blocks)
-        return status;
-    const int32_t pairs = drape_contact_last_couplings(system->contact, &nodes);
-    return extend(system, pairs, nodes);
-}
-
 drape_status drape_system_continue(drape_system *system, drape_system *from, const int32_t *before)
 {
     drape_motion_copy(system->motion, from->motion, before);
@@ -797,5 +785,6 @@ drape_status drape_system_continue(drape_system *system, drape_system *from, con
         if (!system->model->pinned[from->drag.spring[i].node])
             system->drag.spring[system->drag.count++] = from->drag.spring[i];
     drape_system_set_push(system, from->pushed ? from->push : NULL);
-    return continue_contact(system, from, before);
+    return system->contact && from->contact ? drape_contact_continue(system->contact, from->contact, before)
+                                            : DRAPE_OK;
 }

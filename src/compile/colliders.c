@@ -79,6 +79,7 @@ static drape_status compile_collider(drape_model *model, size_t i, const drape_s
     char pointer[64];
     snprintf(pointer, sizeof pointer, "/colliders/%zu", i);
     drape_status status = name_collider(model, pointer, def->name, to);
+    to->index = (int32_t)i;
     to->friction = def->friction;
     to->restitution = def->restitution;
     if (!status)

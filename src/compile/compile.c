@@ -225,6 +225,7 @@ drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape
                                                                       drape_compile_events,
                                                                       drape_compile_contact,
                                                                       drape_compile_colliders,
+                                                                      drape_compile_ignored,
                                                                       drape_compile_contact_stiffness,
                                                                       drape_compile_seams,
                                                                       drape_compile_terms};

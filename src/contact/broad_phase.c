@@ -159,10 +159,20 @@ static bool is_free(const drape_broad_phase *s, int32_t point)
     return point < s->model->node_count && s->model->free_of_node[point] >= 0;
 }
 
+/* The other piece of a pair of cloths has its last node; at a collider one piece has nodes of cloth alone. */
+static bool is_ignored(const drape_broad_phase *s, const drape_pair *pair)
+{
+    const int32_t *n = pair->node, nodes = s->model->node_count;
+    return pair->collider < 0 ? drape_model_ignores_cloth(s->model, n[0], n[3])
+                              : drape_model_ignores(s->model, pair->collider, n[0] < nodes ? n[0] : n[3]);
+}
+
 static void report(query *q, int32_t element)
 {
     const int32_t *n = q->pair.node;
     const drape_broad_phase *s = q->broad;
+    if (s->model->ignored && is_ignored(s, &q->pair))
+        return;
     q->pair.rank[2] = q->tree->place[element];
     if (is_free(s, n[0]) || is_free(s, n[1]) || is_free(s, n[2]) || is_free(s, n[3]))
         q->visit(q->user, &q->pair);

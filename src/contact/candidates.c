@@ -125,7 +125,8 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
             continue;
         for (int32_t i = 0; i < m->free_count; i++) {
             const drape_pair pair = drape_broad_phase_surface(broad, m->node_of_free[i], k);
-            if (!marked || marked[broad->points + k] || marked[pair.node[0]])
+            if (!drape_model_ignores(m, k, pair.node[0]) &&
+                (!marked || marked[broad->points + k] || marked[pair.node[0]]))
                 consider(&s, &pair);
         }
     }

@@ -250,7 +250,7 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
         for (int32_t i = 0; i < c->model->free_count; i++) {
             const int32_t node = c->model->node_of_free[i];
             const size_t at = 3 * (size_t)node;
-            if (drape_relaxed_has(&c->relaxed, k, &node, 1))
+            if (drape_contact_lets_in(c, k, &node, 1))
                 continue;
             const double own =
                 drape_contact_march(c, k, &c->path_pose[k], &c->path_pose[k], NULL, x + at, y + at, &keep);

@@ -111,7 +111,7 @@ static drape_status check_surfaces(drape_contact *c, const piece *p, const char 
         for (int32_t i = 0; i < c->model->free_count; i++) {
             const int32_t node = c->model->node_of_free[i];
             const drape_configuration *from = &p->path.end[0], *to = &p->path.end[1];
-            if (drape_relaxed_has(&c->relaxed, k, &node, 1))
+            if (drape_contact_lets_in(c, k, &node, 1))
                 continue;
             const double fraction =
                 drape_contact_march(c, k, &from->pose[k], &to->pose[k], &c->swing[k],
@@ -150,7 +150,7 @@ static drape_status check_inscribed(drape_contact *c, const int32_t *node, int n
         for (int32_t i = 0; collider->shape.inscribed && i < count; i++) {
             const int32_t *n = node + (size_t)i * (size_t)nodes;
             const double depth = depth_of(collider, &c->pose[k], c->x, n, nodes, least);
-            if (depth >= least || drape_relaxed_has(&c->relaxed, k, n, nodes))
+            if (depth >= least || drape_contact_lets_in(c, k, n, nodes))
                 continue;
             const double before = depth_of(collider, &c->start_pose[k], c->start, n, nodes, INFINITY);
             const double min_gap = allowed(least, before, c->broad.rounding);

@@ -85,6 +85,9 @@ void drape_contact_add_forces(drape_contact *contact, bool conservative, bool di
 /* The forces of the last drape_contact_add_forces on each collider (collider_count), with the sign of g. */
 const drape_load *drape_contact_on_colliders(const drape_contact *contact);
 
+/* Lists up to `room` of the contacts at the last point, with their forces there; returns their number. */
+int32_t drape_contact_points(const drape_contact *contact, int32_t room, drape_contact_point *points);
+
 double drape_contact_potential(const drape_contact *contact); /* [J] */
 
 /* The energy that changes of stiffness at the beginning of steps have added to the potential since the
@@ -132,7 +135,7 @@ int32_t drape_contact_list_couplings(drape_contact *contact, const int32_t **nod
 int32_t drape_contact_last_couplings(const drape_contact *contact, const int32_t **nodes);
 
 /* Takes from contact of the same cloth what a step leaves for the next ones: which pairs are inside and which
- * nodes are relaxed, its stiffness and activation distances, and the couplings. before (collider_count): the
+ * nodes are relaxed, its stiffness and activation distances. before (collider_count): the
  * number that each collider has there; -1: it is new. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_continue(drape_contact *contact, const drape_contact *from, const int32_t *before);
 

@@ -1,8 +1,6 @@
 /* continue.c: contact that goes on where other contact of the same cloth was. See contact.h. */
 #include "contact/parts.h"
 
-#include "contact/list.h"
-
 #include <math.h>
 #include <string.h>
 
@@ -75,19 +73,6 @@ static drape_status copy_relaxed(drape_contact *to, const drape_contact *from, c
     return status;
 }
 
-static drape_status copy_couplings(drape_contact *to, const drape_contact *from)
-{
-    for (int32_t i = 0; i < from->coupling_count; i++) {
-        int32_t *list = drape_list_grow(to->arena, to->coupling, i, &to->coupling_room, 4 * sizeof *list);
-        if (!list)
-            return DRAPE_E_MEMORY;
-        to->coupling = list;
-        memcpy(list + 4 * (size_t)i, from->coupling + 4 * (size_t)i, 4 * sizeof *list);
-        to->coupling_count = i + 1;
-    }
-    return DRAPE_OK;
-}
-
 drape_status drape_contact_continue(drape_contact *to, const drape_contact *from, const int32_t *before)
 {
     to->press = from->press;
@@ -100,7 +85,5 @@ drape_status drape_contact_continue(drape_contact *to, const drape_contact *from
             to->broad.distance[c] = fmax(to->model->contact.distance, from->broad.distance[before[c]]);
     to->broad.rounding = from->broad.rounding;
     drape_status status = copy_inside(to, from, before);
-    if (!status)
-        status = copy_relaxed(to, from, before);
-    return status ? status : copy_couplings(to, from);
+    return status ? status : copy_relaxed(to, from, before);
 }

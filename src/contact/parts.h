@@ -105,6 +105,14 @@ void drape_contact_fill(const drape_contact *c, const double *nodes, const drape
 /* drape_contact_evaluate_at without its timing. */
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at);
 
+/* Whether a collider lets these nodes of one cloth in: it is ignored, or one of them is relaxed. */
+static inline bool drape_contact_lets_in(const drape_contact *c, int32_t collider, const int32_t *node,
+                                         int nodes)
+{
+    return drape_model_ignores(c->model, collider, node[0]) ||
+           drape_relaxed_has(&c->relaxed, collider, node, nodes);
+}
+
 /* Computes lagged friction from the active set at the beginning of a step. */
 drape_status drape_contact_lag(drape_contact *c);
 

@@ -161,13 +161,14 @@ static bool is_blocked_by(const drape_contact *c, int32_t other, double margin, 
     return distance_at(c, other, q, n) < margin * (1 - 1e-6) && vec3_dot(n, direction) < 0;
 }
 
-/* Says that nodes have no room at a collider. */
+/* Says that nodes have no room at a collider; -1: at pinned pieces of cloth. */
 static drape_status block(drape_contact *c, int32_t collider, const int32_t *node, int nodes, double t,
                           double until, bool may_relax, int32_t *added)
 {
     drape_status status = DRAPE_OK;
     for (int a = 0; !status && a < nodes; a++)
-        if (node[a] >= 0 && (may_relax || drape_relaxed_find(&c->relaxed, collider, node[a])))
+        if (node[a] >= 0 && !(collider >= 0 && drape_model_ignores(c->model, collider, node[a])) &&
+            (may_relax || drape_relaxed_find(&c->relaxed, collider, node[a])))
             status = drape_relaxed_add(&c->relaxed, collider, node[a], t, until, added);
     return status;
 }
@@ -228,7 +229,8 @@ static drape_status block_between(drape_contact *c, int32_t collider, const clot
     drape_status status = DRAPE_OK;
     move_out(c, collider, margin, p, q, direction);
     for (int32_t other = 0; !status && other < c->model->collider_count; other++) {
-        if (other == collider || !is_blocked_by(c, other, margin, q, direction))
+        if (other == collider || drape_model_ignores(c->model, other, p->node[0]) ||
+            !is_blocked_by(c, other, margin, q, direction))
             continue;
         status = block(c, collider, p->node, p->nodes, t, t, may_relax, added);
         if (!status)
@@ -251,7 +253,8 @@ static drape_status block_pierced(drape_contact *c, int32_t collider, double t, 
             memcpy(p.node, c->model->triangle + 3 * (size_t)f, 3 * sizeof *p.node);
             for (int a = 0; a < 3; a++)
                 vec3_add_scaled(shares[i][a], c->x + 3 * (size_t)p.node[a], p.x);
-            if (!may_be_near(c, c->pose, collider, margin, p.x) ||
+            if (drape_model_ignores(c->model, collider, p.node[0]) ||
+                !may_be_near(c, c->pose, collider, margin, p.x) ||
                 !(distance_at(c, collider, p.x, NULL) < margin))
                 continue;
             for (int a = 0; a < 3; a++)

@@ -69,7 +69,7 @@ static bool sweep(drape_contact *c, int32_t collider, double *y)
         const int32_t node = c->model->node_of_free[i];
         const size_t at = 3 * (size_t)node;
         double a[3], b[3];
-        if (drape_relaxed_has(&c->relaxed, collider, &node, 1))
+        if (drape_contact_lets_in(c, collider, &node, 1))
             continue;
         drape_pose_own(from, c->start + at, a);
         drape_pose_own(to, y + at, b);

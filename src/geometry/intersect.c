@@ -87,6 +87,9 @@ typedef struct counting {
 static void count(void *user, int32_t edge, int32_t triangle)
 {
     const counting *c = user;
+    if (drape_model_ignores_cloth(c->model, c->model->edge[2 * (size_t)edge],
+                                  c->model->triangle[3 * (size_t)triangle]))
+        return;
     if (c->found->count++ > 0)
         return;
     for (int a = 0; a < 3; a++) {

@@ -38,7 +38,8 @@ typedef struct drape_intersections {
     int32_t edge[2], triangle[3]; /* nodes of the first pair; -1 if there is none */
 } drape_intersections;
 
-/* Counts the edges of cloth that pass through triangles of cloth. Errors: DRAPE_E_MEMORY. */
+/* Counts the edges of cloth that pass through triangles of cloth that they do not ignore. Errors:
+ * DRAPE_E_MEMORY. */
 drape_status drape_find_intersections(drape_context *ctx, const drape_model *model, const double *x,
                                       drape_intersections *found);
 

@@ -89,7 +89,7 @@ static void project_on(const drape_verlet_contact *contact, const pose *p, const
     for (int32_t f = 0; f < m->free_count; f++) {
         size_t i = 3 * (size_t)m->node_of_free[f];
         double n[3], y0[3], phi = drape_collider_distance(p->collider, &p->at, x + i, n, NULL);
-        if (!(phi <= 0))
+        if (!(phi <= 0) || drape_model_ignores(m, p->collider->index, m->node_of_free[f]))
             continue;
         carry(p, x0 + i, y0);
         if (contact->rule == DRAPE_VERLET_CS184)
@@ -137,7 +137,8 @@ void drape_verlet_friction(const drape_verlet_contact *contact, double t, const 
         for (int32_t f = 0; f < m->free_count; f++) {
             const size_t i = 3 * (size_t)m->node_of_free[f];
             double n[3], velocity[3];
-            if (!(drape_collider_distance(&m->colliders[k], &at, x + i, n, NULL) < contact->friction_range))
+            if (!(drape_collider_distance(&m->colliders[k], &at, x + i, n, NULL) < contact->friction_range) ||
+                drape_model_ignores(m, k, m->node_of_free[f]))
                 continue;
             drape_pose_velocity(&at, x + i, velocity);
             apply_friction(contact, &m->colliders[k], velocity, n, v + i, g + i);
@@ -206,6 +207,8 @@ static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *near
         vec3_sub(own, x + 3 * (size_t)j, d);
         double square = vec3_dot(d, d);
         if (!(square < square_of_reach) || square == 0) /* too far, or no direction to push in */
+            continue;
+        if (drape_model_ignores_cloth(s->model, i, j))
             continue;
         double distance = sqrt(square);
         vec3_add_scaled(s->reach / distance - 1, d, sum);

@@ -155,6 +155,7 @@ typedef struct drape_turns {
 
 /* One obstacle. */
 typedef struct drape_collider {
+    int32_t index; /* its number in the scene */
     const drape_collider_ops *ops;
     char *name;
     drape_choice choice; /* the choice of the scene */
@@ -267,6 +268,10 @@ struct drape_model {
     drape_track *tracks;
     drape_collider *colliders; /* (collider_count) */
     int32_t collider_count;
+    uint8_t
+        *ignored; /* ((collider_count + cloth_count) x cloth_count) 1: the cloth does not touch the collider
+                         or, after these, the other cloth; NULL: everything touches */
+    int32_t *cloth_of_node; /* (node_count); NULL if `ignored` is */
     drape_contact_def contact;
     drape_choice contact_choice, self_choice; /* the settings of the scene */
     int64_t internal_count, measure_count;
@@ -325,5 +330,18 @@ int drape_model_couplings(const drape_model *model, drape_coupling *couplings);
 
 /* Returns the cloth that a node belongs to. */
 int32_t drape_model_cloth_of(const drape_model *model, int32_t node);
+
+/* Whether a node of cloth passes through a collider, and whether cloths of two nodes pass through each
+ * other. */
+static inline bool drape_model_ignores(const drape_model *m, int32_t collider, int32_t node)
+{
+    return m->ignored && m->ignored[collider * m->cloth_count + m->cloth_of_node[node]];
+}
+
+static inline bool drape_model_ignores_cloth(const drape_model *m, int32_t node, int32_t other)
+{
+    return m->ignored && m->ignored[(m->collider_count + m->cloth_of_node[node]) * m->cloth_count +
+                                    m->cloth_of_node[other]];
+}
 
 #endif

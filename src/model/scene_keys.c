@@ -128,6 +128,9 @@ static const drape_scene_key cloth_keys[] = {
      ARRAY(drape_cloth_def, pins, pin_count), .child = &drape_form_pin},
     {DRAPE_VECTOR("velocity", "m/s", 0, -1e9, 1e9, "initial velocity of every node"),
      IN(drape_cloth_def, velocity)},
+    {DRAPE_TEXT("ignore", "names of colliders and cloths that it passes through; its own name: itself",
+                .derived = "none"),
+     .shape = DRAPE_SCENE_LIST, ARRAY(drape_cloth_def, ignore, ignore_count)},
 };
 
 const drape_scene_object drape_form_cloth = {.name = "cloth",
@@ -169,6 +172,7 @@ static const drape_scene_key collider_keys[] = {
     {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the middle of its shape; of a plane, the origin"), LOWEST,
                   HIGHEST, "the point about which it turns, where its parameters define it"),
      IN(drape_collider_def, pivot)},
+    {DRAPE_BOOLEAN("enabled", true, "cloth touches it"), IN(drape_collider_def, enabled)},
 };
 
 const drape_scene_object drape_form_collider = {

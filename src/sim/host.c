@@ -389,6 +389,26 @@ static drape_status read_load(drape_sim *sim, const char *function, int32_t coll
     return read_status(sim);
 }
 
+drape_status drape_sim_contacts(drape_sim *sim, int32_t room, drape_contact_point *contacts, int32_t *count)
+{
+    drape_point point;
+    drape_status status = drape_sim_guard(sim, "drape_sim_contacts");
+    if (status)
+        return status;
+    if (!count || room < 0 || (room > 0 && !contacts))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "drape_sim_contacts: room for %d, but no array or no count", (int)room);
+    status = check_has_contact(sim, "drape_sim_contacts");
+    if (!status)
+        status = place(sim, &point);
+    if (status)
+        return status;
+    drape_system_contact_part(sim->system, &point, true, sim->query_scratch, NULL);
+    const drape_contact *contact = drape_system_contact(sim->system);
+    *count = contact ? drape_contact_points(contact, room, contacts) : 0;
+    return read_status(sim);
+}
+
 drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3])
 {
     drape_load load;

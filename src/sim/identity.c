@@ -165,6 +165,8 @@ static uint64_t model_hash(const drape_model *m)
         hash = add_collider(hash, &m->colliders[i]);
     for (int32_t i = 0; i < m->event_count; i++)
         hash = add_event(hash, &m->events[i]);
+    if (m->ignored)
+        hash = add(hash, m->ignored, (size_t)(m->collider_count + m->cloth_count) * (size_t)m->cloth_count);
     return add_contact(add_doubles(hash, m->gravity, 3), &m->contact);
 }
 

@@ -34,6 +34,8 @@ static void note_edge(void *user, int32_t edge, int32_t triangle)
 {
     search *s = user;
     (void)triangle;
+    if (drape_model_ignores(s->model, s->collider->index, s->cloth.edge[2 * (size_t)edge]))
+        return;
     s->edge_crosses[edge] = 1;
     s->found->intersections++;
 }
@@ -43,6 +45,8 @@ static void note_triangle(void *user, int32_t edge, int32_t triangle)
     search *s = user;
     const int32_t *ends = s->obstacle.edge + 2 * (size_t)edge,
                   *node = s->cloth.triangle + 3 * (size_t)triangle;
+    if (drape_model_ignores(s->model, s->collider->index, node[0]))
+        return;
     const double *p = s->obstacle.x + 3 * (size_t)ends[0], *q = s->obstacle.x + 3 * (size_t)ends[1],
                  *a = s->cloth.x + 3 * (size_t)node[0];
     double u[3], v[3], n[3], ap[3], aq[3];
@@ -153,6 +157,8 @@ drape_status drape_find_inside(drape_context *ctx, const drape_model *m, const d
     search s = search_of(m, collider, pose, x, found);
     drape_status status = intersect(&arena, &s);
     for (int32_t f = 0; !status && f < m->triangle_count; f++) {
+        if (drape_model_ignores(m, collider->index, m->triangle[3 * (size_t)f]))
+            continue;
         const double depth = fmax(deepest_sample(&s, m->triangle + 3 * (size_t)f), deepest_between(&s, f));
         found->triangles += depth > TOUCH || is_pierced(&s, f);
         found->deepest = fmax(found->deepest, depth);

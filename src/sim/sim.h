@@ -4,6 +4,7 @@
 
 #include "base/archive.h"
 #include "base/arena.h"
+#include "geometry/bvh.h"
 #include "sim/choose.h"
 #include "sim/events.h"
 #include "sim/schedule.h"
@@ -78,6 +79,8 @@ struct drape_sim {
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
     double *query_scratch;          /* (node_count x 3) for queries between steps */
+    drape_bvh query_tree; /* of all triangles, for queries that fit it to the state; branches NULL: not yet
+                             made. Not archived: it is the same for all states */
     int64_t attempts;
     bool *relaxed_logged;   /* (collider_count + 1) the last message was that cloth is relaxed there */
     int64_t failed;         /* attempts at the present step that failed */

@@ -95,6 +95,8 @@ static int32_t free_nodes_inside(const drape_model *m, const drape_collider *col
     *deepest = 0;
     for (int32_t f = 0; f < m->free_count; f++) {
         const double *at = x + 3 * (size_t)m->node_of_free[f];
+        if (drape_model_ignores(m, collider->index, m->node_of_free[f]))
+            continue;
         const double depth = -drape_collider_distance(collider, pose, at, NULL, NULL);
         count += depth > INSIDE;
         *deepest = fmax(*deepest, depth);

@@ -77,6 +77,8 @@ static const struct test_case {
      "[{'time': 0, 'quaternion': [1,0,1,0]}]"},
     {"/events/0/type", REFUSED, "/events/0", "{'type': 'energy', 'bound': 1}"},
     {"/events/0/cloth", REFUSED, NULL, "'sheet'"},
+    {"/cloth/0/ignore", REFUSED, NULL, "['ball']"},
+    {"/colliders/0/enabled", REFUSED, NULL, "false"},
     {"/events/0/pins", REFUSED, NULL, "'other'"},
     {"/seams/0/type", SKIPPED, NULL, NULL}, /* there is only one */
     {"/seams/0/a/cloth", SKIPPED, NULL, NULL},

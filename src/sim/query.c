@@ -1,0 +1,213 @@
+/* query.c: what a host asks about the present state: the nearest place to a point, the first one on a ray,
+ * and the contacts. */
+#include "base/finite.h"
+#include "base/vec3.h"
+#include "colliders/colliders.h"
+#include "geometry/nearest.h"
+#include "sim/sim.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MET        1e-9 /* [m] as near to a collider a ray meets it */
+#define LEAST      1e-4 /* of the length of a ray: the least step along it outside of a collider */
+#define MAX_HALVES 60   /* of a step in which a ray gets inside: then it is known to the last bit */
+
+/* ---- Places ---- */
+
+static void set_cloth(const drape_sim *sim, const drape_on_triangle *at, drape_hit *hit)
+{
+    const int32_t *node = sim->model->triangle + 3 * (size_t)at->triangle;
+    const double *x = drape_sim_state(sim)->x;
+    *hit = (drape_hit){.found = true, .collider = -1, .triangle = at->triangle, .distance = at->distance};
+    memcpy(hit->weights, at->weights, sizeof hit->weights);
+    drape_triangle_normal(node, x, hit->normal);
+    for (int a = 0; a < 3; a++)
+        vec3_add_scaled(at->weights[a], x + 3 * (size_t)node[a], hit->point);
+}
+
+static drape_collider_pose pose_of(const drape_sim *sim, int32_t collider)
+{
+    const double t = drape_sim_state(sim)->t;
+    drape_collider_pose pose;
+    drape_motion_pose(drape_system_motion(sim->system), collider, t, t, &pose);
+    return pose;
+}
+
+/* ---- Points ---- */
+
+static void find_collider_near(const drape_sim *sim, int32_t collider, const double *point, double within,
+                               drape_hit *hit)
+{
+    const drape_collider_pose pose = pose_of(sim, collider);
+    double normal[3];
+    const double distance =
+        drape_collider_distance(&sim->model->colliders[collider], &pose, point, normal, NULL);
+    if (!(fabs(distance) <= within) || (hit->found && !(fabs(distance) < fabs(hit->distance))))
+        return;
+    *hit = (drape_hit){.found = true, .collider = collider, .triangle = -1, .distance = distance};
+    memcpy(hit->normal, normal, sizeof normal);
+    memcpy(hit->point, point, sizeof hit->point);
+    vec3_add_scaled(-distance, normal, hit->point);
+}
+
+static void find_near(const drape_sim *sim, int what, const double *point, double within, drape_hit *hit)
+{
+    *hit = (drape_hit){.found = false};
+    if (what & DRAPE_QUERY_CLOTH) {
+        const drape_on_triangle at =
+            drape_nearest_on(&sim->query_tree, drape_sim_state(sim)->x, point, within);
+        if (at.triangle >= 0)
+            set_cloth(sim, &at, hit);
+    }
+    for (int32_t c = 0; (what & DRAPE_QUERY_COLLIDERS) && c < sim->model->collider_count; c++)
+        find_collider_near(sim, c, point, within, hit);
+}
+
+/* ---- Rays ---- */
+
+typedef struct ray {
+    const drape_collider *collider;
+    const drape_collider_pose *pose;
+    const double *origin, *direction;
+} ray;
+
+static double distance_at(const ray *r, double t, double *normal)
+{
+    double x[3];
+    memcpy(x, r->origin, sizeof x);
+    vec3_add_scaled(t, r->direction, x);
+    return drape_collider_distance(r->collider, r->pose, x, normal, NULL);
+}
+
+/* Where the piece from outside to inside enters. */
+static double enter(const ray *r, double outside, double inside)
+{
+    for (int i = 0; i < MAX_HALVES; i++) {
+        const double middle = outside + (inside - outside) / 2;
+        if (distance_at(r, middle, NULL) > 0)
+            outside = middle;
+        else
+            inside = middle;
+    }
+    return inside;
+}
+
+/* Within its distance from a collider, a step along the ray cannot meet it. Returns whether the ray meets
+ * it. */
+static bool meets(const ray *r, double length, double *t)
+{
+    double before = 0;
+    *t = 0;
+    for (double distance; (distance = distance_at(r, *t, NULL)) > MET;) {
+        if (*t >= length)
+            return false;
+        before = *t;
+        *t = fmin(*t + fmax(distance, LEAST * length), length);
+    }
+    if (distance_at(r, *t, NULL) < -MET && *t > 0)
+        *t = enter(r, before, *t);
+    return true;
+}
+
+static void find_collider_on(const drape_sim *sim, int32_t collider, const double *origin,
+                             const double *direction, double length, drape_hit *hit)
+{
+    const drape_collider_pose pose = pose_of(sim, collider);
+    const ray r = {&sim->model->colliders[collider], &pose, origin, direction};
+    double t, normal[3];
+    if (!meets(&r, length, &t) || (hit->found && !(t < hit->distance)))
+        return;
+    distance_at(&r, t, normal);
+    *hit = (drape_hit){.found = true, .collider = collider, .triangle = -1, .distance = t};
+    memcpy(hit->normal, normal, sizeof normal);
+    memcpy(hit->point, origin, sizeof hit->point);
+    vec3_add_scaled(t, direction, hit->point);
+}
+
+static void find_on_ray(const drape_sim *sim, int what, const double *origin, const double *along,
+                        double length, drape_hit *hit)
+{
+    const double size = vec3_norm(along), direction[3] = {along[0] / size, along[1] / size, along[2] / size};
+    *hit = (drape_hit){.found = false};
+    if (what & DRAPE_QUERY_CLOTH) {
+        const drape_on_triangle at =
+            drape_first_on_ray(&sim->query_tree, drape_sim_state(sim)->x, origin, direction, length);
+        if (at.triangle >= 0)
+            set_cloth(sim, &at, hit);
+    }
+    for (int32_t c = 0; (what & DRAPE_QUERY_COLLIDERS) && c < sim->model->collider_count; c++)
+        find_collider_on(sim, c, origin, direction, length, hit);
+}
+
+/* ---- For hosts ---- */
+
+static drape_status check(drape_sim *sim, const char *function, int what, int32_t count, const double *points,
+                          double reach, const drape_hit *hits)
+{
+    const drape_status status = drape_sim_guard(sim, function);
+    if (status)
+        return status;
+    if (count < 0 || (count > 0 && (!points || !hits)))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: %d points, but no array of them or of hits",
+                          function, (int)count);
+    if (what < DRAPE_QUERY_CLOTH || what > (DRAPE_QUERY_CLOTH | DRAPE_QUERY_COLLIDERS))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "%s: what = %d; it is 1 for cloth, 2 for colliders, 3 for both", function, what);
+    if (!(reach > 0) || !drape_all_finite(points, 3 * (size_t)count))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "%s: points must be finite, and the distance above 0: %g m", function, reach);
+    return DRAPE_OK;
+}
+
+static drape_status fit_tree(drape_sim *sim, int what)
+{
+    const drape_model *m = sim->model;
+    drape_status status = DRAPE_OK;
+    if (!(what & DRAPE_QUERY_CLOTH))
+        return DRAPE_OK;
+    if (!sim->query_tree.branches)
+        status = drape_bvh_build(sim->arena, m->triangle_count, 3, m->triangle, m->rest, &sim->query_tree);
+    if (status)
+        sim->query_tree = (drape_bvh){.count = 0};
+    else
+        drape_bvh_fit(&sim->query_tree, drape_sim_state(sim)->x);
+    return status;
+}
+
+drape_status drape_sim_closest(drape_sim *sim, int what, int32_t count, const double *points, double within,
+                               drape_hit *hits)
+{
+    drape_status status = check(sim, "drape_sim_closest", what, count, points, within, hits);
+    if (!status)
+        status = fit_tree(sim, what);
+    for (int32_t i = 0; !status && i < count; i++)
+        find_near(sim, what, points + 3 * (size_t)i, within, &hits[i]);
+    return status;
+}
+
+static drape_status check_directions(const drape_sim *sim, int32_t count, const double *directions,
+                                     double length)
+{
+    bool good = isfinite(length) && (count == 0 || directions);
+    for (int32_t i = 0; good && i < count; i++) {
+        const double size = vec3_norm(directions + 3 * (size_t)i);
+        good = size > 0 && isfinite(size);
+    }
+    return good ? DRAPE_OK
+                : drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                             "drape_sim_cast: directions and length must be finite, and no direction 0");
+}
+
+drape_status drape_sim_cast(drape_sim *sim, int what, int32_t count, const double *origins,
+                            const double *directions, double length, drape_hit *hits)
+{
+    drape_status status = check(sim, "drape_sim_cast", what, count, origins, length, hits);
+    if (!status)
+        status = check_directions(sim, count, directions, length);
+    if (!status)
+        status = fit_tree(sim, what);
+    for (int32_t i = 0; !status && i < count; i++)
+        find_on_ray(sim, what, origins + 3 * (size_t)i, directions + 3 * (size_t)i, length, &hits[i]);
+    return status;
+}
