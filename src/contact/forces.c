@@ -45,6 +45,29 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
         .restitution_velocity = def->restitution_velocity};
 }
 
+bool drape_contact_rolls(const drape_contact *c, const drape_active_contact *contact)
+{
+    const drape_pair *pair = &contact->pair;
+    return pair->kind != DRAPE_PAIR_SURFACE && pair->collider >= 0 && pair->radius > 0 &&
+           c->pose[pair->collider].spins && !c->deformed[pair->collider]; /* of these, points alone move */
+}
+
+double drape_contact_arm(const drape_contact *c, const drape_active_contact *contact)
+{
+    const bool cloth_first = contact->pair.node[0] < c->model->node_count;
+    return cloth_first ? contact->pair.radius : -contact->pair.radius;
+}
+
+/* The surface of a round feature moves otherwise than its core. */
+static void add_rolling(const drape_contact *c, const drape_active_contact *contact, double v[4][3])
+{
+    const drape_collider_pose *pose = &c->pose[contact->pair.collider];
+    const double arm = drape_contact_arm(c, contact);
+    for (int a = 0; a < contact->gap.closest.points; a++)
+        for (int k = 0; k < 3 && contact->pair.node[a] >= c->model->node_count; k++)
+            v[a][k] += arm * vec3_dot(pose->gradient + 3 * k, contact->gap.closest.normal);
+}
+
 /* Whether the contact is with the distance of a collider that deforms, as that of relaxed cloth. */
 static bool is_on_body(const drape_contact *c, const drape_active_contact *contact)
 {
@@ -100,6 +123,8 @@ void drape_contact_velocities(const drape_contact *c, const drape_active_contact
         subtract_body_velocity(c, contact, v);
         return;
     }
+    if (drape_contact_rolls(c, contact))
+        add_rolling(c, contact, v);
     for (int a = 0; contact->pair.kind == DRAPE_PAIR_SURFACE && a < contact->gap.closest.points; a++) {
         double surface[3];
         drape_pose_velocity(&c->pose[contact->pair.collider], c->x + 3 * (size_t)contact->pair.node[a],
@@ -108,18 +133,21 @@ void drape_contact_velocities(const drape_contact *c, const drape_active_contact
     }
 }
 
-/* The forces on a collider act on its points or, at its surface, where the nodes are: there its velocity was
- * taken, so that their work is what the cloth is given. */
+/* The forces on a collider act on the surface around its points or, if it is smooth, where the nodes are:
+ * there its velocity was taken, so that their work is what the cloth is given. */
 static void add_moment(const drape_contact *c, const drape_active_contact *contact, const double *from,
                        double *moment)
 {
     const bool surface = contact->pair.kind == DRAPE_PAIR_SURFACE;
     for (int a = 0; a < contact->gap.closest.points; a++) {
         const int32_t node = contact->pair.node[a];
-        double own[3];
+        double own[3], x[3];
         if (!surface && node < c->model->node_count)
             continue;
-        drape_pose_own(&c->pose[contact->pair.collider], c->x + 3 * (size_t)node, own);
+        memcpy(x, c->x + 3 * (size_t)node, sizeof x);
+        if (!surface)
+            vec3_add_scaled(drape_contact_arm(c, contact), contact->gap.closest.normal, x);
+        drape_pose_own(&c->pose[contact->pair.collider], x, own);
         for (int i = 0; i < 9; i++)
             moment[i] += (surface ? -1 : 1) * from[3 * a + i / 3] * own[i % 3];
     }

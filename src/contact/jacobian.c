@@ -132,12 +132,32 @@ static void add_dissipative(const drape_contact *c, const request *want, const d
                                 excess, v, h);
 }
 
+/* A round feature that turns has another velocity wherever the normal leads: dv = arm G dn at its points. */
+static void add_roll(const drape_contact *c, const drape_active_contact *contact,
+                     const drape_gap_derivatives *derivatives, const double *hv, double *h)
+{
+    const double *gradient = c->pose[contact->pair.collider].gradient, arm = drape_contact_arm(c, contact);
+    const int d = 3 * contact->gap.closest.points;
+    for (int i = 0; i < d; i++)
+        for (int b = 0; b < d; b++)
+            for (int k = 0; k < 3 && contact->pair.node[b / 3] >= c->model->node_count; k++)
+                for (int j = 0; j < d; j++)
+                    h[D * i + j] +=
+                        hv[D * i + b] * arm * gradient[3 * (b % 3) + k] * derivatives->closest.normal[k][j];
+}
+
 /* A surface that turns has another velocity wherever a node is: adds what this changes of forces with dg/dv =
- * hv, the relative velocity being v - V(x). */
-static void add_spin(const drape_contact *c, const drape_active_contact *contact, const double *hv, double *h)
+ * hv, the relative velocity being v - V(x). derivatives: NULL where the contact is fixed. */
+static void add_spin(const drape_contact *c, const drape_active_contact *contact,
+                     const drape_gap_derivatives *derivatives, const double *hv, double *h)
 {
     const drape_collider_pose *pose = &c->pose[contact->pair.collider];
     const int d = 3 * contact->gap.closest.points;
+    if (drape_contact_rolls(c, contact)) {
+        if (derivatives)
+            add_roll(c, contact, derivatives, hv, h);
+        return;
+    }
     for (int i = 0; i < d; i++)
         for (int j = 0; j < d; j++)
             for (int k = 0; k < 3; k++)
@@ -146,7 +166,8 @@ static void add_spin(const drape_contact *c, const drape_active_contact *contact
 
 static bool spins(const drape_contact *c, const drape_active_contact *contact)
 {
-    return contact->pair.kind == DRAPE_PAIR_SURFACE && c->pose[contact->pair.collider].spins;
+    return (contact->pair.kind == DRAPE_PAIR_SURFACE && c->pose[contact->pair.collider].spins) ||
+           drape_contact_rolls(c, contact);
 }
 
 /* h = (h + h')/2 of so many points */
@@ -191,7 +212,7 @@ static void differentiate(const drape_contact *c, const request *want, const dra
     if (by_x && spins(c, contact)) {
         double hv[D * D];
         differentiate_by_v(c, contact, hv);
-        add_spin(c, contact, hv, h);
+        add_spin(c, contact, &derivatives, hv, h);
     }
     if (want->which == DRAPE_CONTACT_SYMMETRIC)
         symmetrize(contact->gap.closest.points, h);
@@ -227,7 +248,7 @@ void drape_contact_add_jacobian(drape_contact *c, double weight, drape_contact_d
             want.which != DRAPE_CONTACT_GAUSS_NEWTON) {
             double hv[D * D] = {0};
             add_friction(&(request){1, DRAPE_CONTACT_EXACT}, &lagged->contact, &law, lagged->force, v, hv);
-            add_spin(c, &lagged->contact, hv, h);
+            add_spin(c, &lagged->contact, NULL, hv, h);
             if (want.which == DRAPE_CONTACT_SYMMETRIC)
                 symmetrize(lagged->contact.gap.closest.points, h);
         }
@@ -257,7 +278,7 @@ void drape_contact_fix_friction(drape_contact *c, double weight, const drape_pat
         if (spins(c, contact)) {
             double hv[D * D];
             differentiate_by_v(c, contact, hv);
-            add_spin(c, contact, hv, h);
+            add_spin(c, contact, &derivatives, hv, h);
         }
         for (int k = 0; k < D * D; k++)
             h[k] = -h[k];

@@ -203,12 +203,12 @@ static double gap_at(const drape_pair *pair, const pair_path *path, double t, do
     return closest.distance - radius;
 }
 
+/* Of straight displacements the common part is taken out, too. */
 static double speed_of(const drape_pair *pair, pair_path *path)
 {
-    double p[4][3], largest = 0;
-    memcpy(p, path->p, sizeof p);
+    double largest = 0;
     if (!path->swing)
-        return approach_speed(pair->kind, p);
+        return approach_speed(pair->kind, path->p);
     for (int a = 0; a < 4; a++)
         if (!path->rests[a])
             largest = fmax(largest, drape_swing_speed(path->swing, path->x[a], path->p[a]));

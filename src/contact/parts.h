@@ -135,7 +135,14 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
 /* The constants of a contact. */
 drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_active_contact *contact);
 
-/* Velocities of the points of an active contact, relative to the collider if it is a surface. */
+/* Whether a contact is with a feature of a collider that turns, around which there is a surface at a
+ * distance; and that distance along the normal of the contact, by which the surface is away from the
+ * feature. */
+bool drape_contact_rolls(const drape_contact *c, const drape_active_contact *contact);
+double drape_contact_arm(const drape_contact *c, const drape_active_contact *contact);
+
+/* Velocities of the points of an active contact, relative to the collider if it is a surface; those of its
+ * features with that of the surface around them. */
 void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3]);
 
 /* The largest step fraction from one configuration to another on which all pairs of features keep what
