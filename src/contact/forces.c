@@ -52,7 +52,7 @@ bool drape_contact_rolls(const drape_contact *c, const drape_active_contact *con
 {
     const drape_pair *pair = &contact->pair;
     return pair->kind != DRAPE_PAIR_SURFACE && pair->collider >= 0 && pair->radius > 0 &&
-           c->pose[pair->collider].spins;
+           c->pose[pair->collider].spins && !c->deformed[pair->collider]; /* of these, points alone move */
 }
 
 double drape_contact_arm(const drape_contact *c, const drape_active_contact *contact)

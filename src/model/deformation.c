@@ -170,7 +170,7 @@ void drape_deformation_copy(drape_deformation *d, const drape_deformation *from)
     d->smooth = from->smooth;
     for (int end = 0; end < 2; end++) {
         d->t[end] = from->t[end];
-        if (!d->x[end])
+        if (!d->x[end] || !from->x[end])
             continue;
         memcpy(d->x[end], from->x[end], numbers_of(d->frames) * sizeof *d->x[end]);
         memcpy(d->v[end], from->v[end], numbers_of(d->frames) * sizeof *d->v[end]);

@@ -396,10 +396,10 @@ void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int
         motion->collider_path[c] = from->collider_path[before[c]];
         motion->collider_turn[c] = from->collider_turn[before[c]];
         motion->collider_placed[c] = from->collider_placed[before[c]];
+        if (m->colliders[c].shape.point_count == from->model->colliders[before[c]].shape.point_count)
+            drape_deformation_copy(&motion->deformation[c], &from->deformation[before[c]]);
     }
     memcpy(motion->cloth_placed, from->cloth_placed, (size_t)m->cloth_count * sizeof *motion->cloth_placed);
-    for (int32_t i = 0; i < m->collider_count; i++)
-        drape_deformation_copy(&motion->deformation[i], &from->deformation[i]);
 }
 
 void drape_motion_place_pin(const drape_motion *motion, int32_t node, double t, double x[3])

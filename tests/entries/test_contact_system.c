@@ -26,6 +26,7 @@ static const struct setting {
     {"box", "'type': 'box', 'center': [0,0,0], 'size': [0.16,0.12,0.2], 'rounding': 0.03", 0.06},
     {"cylinder", "'type': 'cylinder', 'a': [0,0,-0.1], 'b': [0,0,0.1], 'radius': 0.08", 0.08},
     {"mesh", "'type': 'mesh', 'file': 'octahedron.obj'", 0.15},
+    {"animated_mesh", "'type': 'animated_mesh', 'file': 'octahedron.obj', 'thickness': 0.01", 0.16},
 };
 #define SETTINGS (sizeof settings / sizeof *settings)
 
