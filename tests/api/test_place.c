@@ -88,8 +88,10 @@ static drape_place_def quarter_def(void)
  * it is: both start anew there. A quarter turn exchanges coordinates, so what follows is the same up to
  * rounding of coordinates of 3 m, 7e-16 m, and what contact of 2000 N/m and Newton's tolerance of 1e-9 N on
  * springs of 10 N/m make of it: 1e-10 m a step at most, over 16 steps; the tolerances of verlet's substeps
- * and of ida are as small. What stops short of convergence, newton_k, is compared by the same sums in
- * another order.
+ * and of ida are as small. What stops short of convergence, newton_k, is compared by the same sums in another
+ * order. rosenbrock takes differences of forces over 1e-4 of a step: it makes of the rounding of a turned
+ * collider, 1e-15 m, forces of 1e-15 2e4/1e-4 N, which move a node of 2e-3 kg by 1e-9 m in a step of 3 ms;
+ * over some 100 steps it may be 1e-7 m.
  */
 START_TEST(a_placed_sim_goes_on_as_before)
 {
@@ -121,7 +123,8 @@ START_TEST(a_placed_sim_goes_on_as_before)
             }
         }
         printf("# %s: %.2g m apart\n", methods[i], worst);
-        ck_assert_msg(worst <= 1e-8, "%s: %g m apart", methods[i], worst);
+        ck_assert_msg(worst <= (strcmp(methods[i], "rosenbrock") == 0 ? 1e-7 : 1e-8), "%s: %g m apart",
+                      methods[i], worst);
         ck_assert_double_gt(fabs(drape_sim_positions(here.sim)[3 * 17 + 2]), 0.01); /* the ball met it */
         close_scene(&here, &memory[0]);
         close_scene(&there, &memory[1]);
