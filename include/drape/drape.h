@@ -239,7 +239,7 @@ typedef struct drape_collider_def {
     double pivot[3]; /* [m] the point about which it turns, where the parameters define it; default NaN: the
                         middle of the box around the points of its shape, as the center of a sphere; of a
                         shape without points, a plane, the origin */
-    bool enabled; /* cloth touches it; default true. A collider that is not enabled can still be moved */
+    bool enabled;    /* cloth touches it; default true. A collider that is not enabled can still be moved */
 } drape_collider_def;
 
 /* An event: a root of a function of the state, which is located within the step in which it lies. Initialise

@@ -27,7 +27,7 @@ static void print_keys(const char *indent, int width, const drape_scene_object *
         drape_scene_value_text(key, defaults, usual, sizeof usual);
         const bool has_unit = strcmp(key->param.unit, "1") != 0;
         printf("%s%-*s %s%s%s%s\n", indent, width, key->param.name, *value ? value : "none",
-               has_unit ? " " : "", has_unit ? key->param.unit : "",
+               has_unit && *value ? " " : "", has_unit && *value ? key->param.unit : "",
                strcmp(value, usual) == 0 ? " (default)" : "");
     }
 }

@@ -81,7 +81,8 @@ drape_status drape_contact_continue(drape_contact *to, const drape_contact *from
     to->search_seconds = from->search_seconds;
     to->longest_path = from->longest_path;
     for (int32_t c = 0; c < to->model->collider_count; c++)
-        if (before[c] >= 0 && !to->model->contact.distance_given && !(to->model->colliders[c].shape.distance > 0))
+        if (before[c] >= 0 && !to->model->contact.distance_given &&
+            !(to->model->colliders[c].shape.distance > 0))
             to->broad.distance[c] = fmax(to->model->contact.distance, from->broad.distance[before[c]]);
     to->broad.rounding = from->broad.rounding;
     drape_status status = copy_inside(to, from, before);

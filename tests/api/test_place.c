@@ -91,7 +91,10 @@ static drape_place_def quarter_def(void)
  * and of ida are as small. What stops short of convergence, newton_k, is compared by the same sums in
  * another order. CVODE and ARKODE bound their first step after a start by a tenth of the coordinates, which
  * are others there: the motion is the same to the tolerance only, rtol times the sheet's 0.6 m in each of 8
- * frames, and sqrt(60) times that where one of the 60 coordinates has all of the error.
+ * frames, and sqrt(60) times that where one of the 60 coordinates has all of the error. rosenbrock takes
+ * differences of forces over 1e-4 of a step: it makes of the rounding of a turned collider, 1e-15 m, forces
+ * of 1e-15 2e4/1e-4 N, which move a node of 2e-3 kg by 1e-9 m in a step of 3 ms; over some 100 steps it may
+ * be 1e-7 m.
  */
 START_TEST(a_placed_sim_goes_on_as_before)
 {
@@ -124,7 +127,8 @@ START_TEST(a_placed_sim_goes_on_as_before)
         }
         printf("# %s: %.2g m apart\n", methods[i], worst);
         const bool bounded = strcmp(methods[i], "cvode") == 0 || strcmp(methods[i], "dirk") == 0;
-        const double most = bounded ? 8 * sqrt(60) * 0.6 * 1e-7 : 1e-8;
+        const bool differences = strcmp(methods[i], "rosenbrock") == 0;
+        const double most = bounded ? 8 * sqrt(60) * 0.6 * 1e-7 : differences ? 1e-7 : 1e-8;
         ck_assert_msg(worst <= most, "%s: %g m apart", methods[i], worst);
         ck_assert_double_gt(fabs(drape_sim_positions(here.sim)[3 * 17 + 2]), 0.01); /* the ball met it */
         close_scene(&here, &memory[0]);
