@@ -824,6 +824,7 @@ DRAPE_API drape_status drape_embedding_create(drape_context *ctx, const drape_mo
 DRAPE_API void drape_embedding_carry(const drape_embedding *embedding, const double *x, float *vertices,
                                      float *normals);
 
+/* Frees *embedding and sets it to NULL; NULL, or a pointer to NULL, does nothing. */
 DRAPE_API void drape_embedding_destroy(drape_embedding **embedding);
 
 /* ---- Sim: normals, forces and energies ---- */

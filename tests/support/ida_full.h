@@ -22,7 +22,7 @@
 #include "solvers/sundials_compat.h"
 
 /* As in ida.c. */
-#define IDA_FULL_NEWTON_SHARE 0.33
+#define IDA_FULL_NEWTON_SHARE 0.1
 #define IDA_FULL_CJ_CHANGE    0.1
 #define IDA_FULL_FAILS        10
 
