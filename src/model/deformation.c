@@ -2,6 +2,7 @@
 #include "model/deformation.h"
 
 #include "base/finite.h"
+#include "model/track.h"
 
 #include <string.h>
 
@@ -107,7 +108,7 @@ static bool rests_at_end(const drape_deformation *d)
 void drape_deformation_send(drape_deformation *d, double t, double span, const double *x, const double *v)
 {
     const size_t count = numbers_of(d->frames);
-    const bool ends = d->given && t == d->t[1], begins = d->given && t == d->t[0];
+    const bool ends = d->given && drape_has_arrived(d->t, t), begins = d->given && t == d->t[0];
     /* the velocities that lead here; unknown at a frame, and where a path is replaced at its beginning */
     const bool known = d->given ? ends || !begins || d->smooth : d->frames->frame_count == 1;
     drape_deformation_points(d, t, d->spare[0]);
@@ -166,14 +167,13 @@ bool drape_deformation_at_kink(const drape_deformation *d, double t)
 
 void drape_deformation_copy(drape_deformation *d, const drape_deformation *from)
 {
-    d->given = from->given;
+    const size_t count = from->given && d->frames->frame_count > 0 ? numbers_of(d->frames) : 0;
+    d->given = count > 0;
     d->smooth = from->smooth;
-    for (int end = 0; end < 2; end++) {
+    for (int end = 0; end < 2 && d->given; end++) {
         d->t[end] = from->t[end];
-        if (!d->x[end] || !from->x[end])
-            continue;
-        memcpy(d->x[end], from->x[end], numbers_of(d->frames) * sizeof *d->x[end]);
-        memcpy(d->v[end], from->v[end], numbers_of(d->frames) * sizeof *d->v[end]);
+        memcpy(d->x[end], from->x[end], count * sizeof *d->x[end]);
+        memcpy(d->v[end], from->v[end], count * sizeof *d->v[end]);
     }
 }
 

@@ -9,8 +9,6 @@
 #include <math.h>
 #include <string.h>
 
-#define ARRIVAL 1e-9 /* of the time of a path */
-
 /* ---- Creation ---- */
 
 static size_t pinned_count(const drape_model *m)
@@ -240,20 +238,14 @@ static bool at_kink_of(const course *c, double t)
     return false;
 }
 
-/* Whether a path has just come to its end: the next moment that a host computes may differ by rounding. */
-static bool has_arrived(const drape_path *path, double t)
-{
-    return t >= path->t[1] && t - path->t[1] <= ARRIVAL * (path->t[1] - path->t[0]);
-}
-
 /* Writes the velocity that leads to the position at t. Returns whether it is known: it is not at a key of a
  * track, nor where the host replaces a path at the moment at which it began. */
 static bool leading_velocity(const course *c, double t, double v[3])
 {
     const drape_path *path = c->path;
-    if (path->given && (t == path->t[0] || has_arrived(path, t))) {
-        memcpy(v, path->v[has_arrived(path, t)], 3 * sizeof *v);
-        return has_arrived(path, t) || path->smooth;
+    if (path->given && (t == path->t[0] || drape_has_arrived(path->t, t))) {
+        memcpy(v, path->v[drape_has_arrived(path->t, t)], 3 * sizeof *v);
+        return drape_has_arrived(path->t, t) || path->smooth;
     }
     velocity_on(c, t, t, v);
     return path->given || !c->track || c->track->key_count == 0;
@@ -264,7 +256,7 @@ static bool leading_spin(const course *c, double t, double w[3])
 {
     const drape_path *path = c->path;
     double turn[3], rate[3];
-    if (!path->given || !has_arrived(path, t)) {
+    if (!path->given || !drape_has_arrived(path->t, t)) {
         spin_on(c, t, t, w);
         return path->given ? t != path->t[0] || path->smooth : c->turns->key_count == 0;
     }

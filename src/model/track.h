@@ -19,6 +19,13 @@ void drape_turns_rotation(const drape_turns *turns, double t, double rotation[9]
 /* Computes the angular velocity [rad/s] at a time between two keys; 0 before the first and after the last. */
 void drape_turns_velocity(const drape_turns *turns, double t, double velocity[3]);
 
+/* Whether the path of a host from span[0] to span[1] has just come to its end: the next moment that a host
+ * computes may differ by rounding. */
+static inline bool drape_has_arrived(const double span[2], double t)
+{
+    return t >= span[1] && t - span[1] <= 1e-9 * (span[1] - span[0]);
+}
+
 /* The largest angular velocity between keys [rad/s]. */
 double drape_turns_fastest(const drape_turns *turns);
 

@@ -2,7 +2,7 @@
  * and the contacts. */
 #include "base/finite.h"
 #include "base/vec3.h"
-#include "colliders/colliders.h"
+#include "colliders/deformed.h"
 #include "geometry/nearest.h"
 #include "sim/sim.h"
 
@@ -12,6 +12,14 @@
 #define MET        1e-9 /* [m] as near to a collider a ray meets it */
 #define LEAST      1e-4 /* of the length of a ray: the least step along it outside of a collider */
 #define MAX_HALVES 60   /* of a step in which a ray gets inside: then it is known to the last bit */
+
+/* What is asked about: the colliders as they are at the moment, where they deform. */
+typedef struct query {
+    const drape_sim *sim;
+    int what;
+    drape_arena arena;           /* of what deforms */
+    const drape_collider **body; /* (collider_count) if colliders are asked about */
+} query;
 
 /* ---- Places ---- */
 
@@ -36,13 +44,12 @@ static drape_collider_pose pose_of(const drape_sim *sim, int32_t collider)
 
 /* ---- Points ---- */
 
-static void find_collider_near(const drape_sim *sim, int32_t collider, const double *point, double within,
+static void find_collider_near(const query *q, int32_t collider, const double *point, double within,
                                drape_hit *hit)
 {
-    const drape_collider_pose pose = pose_of(sim, collider);
+    const drape_collider_pose pose = pose_of(q->sim, collider);
     double normal[3];
-    const double distance =
-        drape_collider_distance(&sim->model->colliders[collider], &pose, point, normal, NULL);
+    const double distance = drape_collider_distance(q->body[collider], &pose, point, normal, NULL);
     if (!(fabs(distance) <= within) || (hit->found && !(fabs(distance) < fabs(hit->distance))))
         return;
     *hit = (drape_hit){.found = true, .collider = collider, .triangle = -1, .distance = distance};
@@ -51,17 +58,18 @@ static void find_collider_near(const drape_sim *sim, int32_t collider, const dou
     vec3_add_scaled(-distance, normal, hit->point);
 }
 
-static void find_near(const drape_sim *sim, int what, const double *point, double within, drape_hit *hit)
+static void find_near(const query *q, const double *point, double within, drape_hit *hit)
 {
+    const drape_sim *sim = q->sim;
     *hit = (drape_hit){.found = false};
-    if (what & DRAPE_QUERY_CLOTH) {
+    if (q->what & DRAPE_QUERY_CLOTH) {
         const drape_on_triangle at =
             drape_nearest_on(&sim->query_tree, drape_sim_state(sim)->x, point, within);
         if (at.triangle >= 0)
             set_cloth(sim, &at, hit);
     }
-    for (int32_t c = 0; (what & DRAPE_QUERY_COLLIDERS) && c < sim->model->collider_count; c++)
-        find_collider_near(sim, c, point, within, hit);
+    for (int32_t c = 0; q->body && c < sim->model->collider_count; c++)
+        find_collider_near(q, c, point, within, hit);
 }
 
 /* ---- Rays ---- */
@@ -110,11 +118,11 @@ static bool meets(const ray *r, double length, double *t)
     return true;
 }
 
-static void find_collider_on(const drape_sim *sim, int32_t collider, const double *origin,
-                             const double *direction, double length, drape_hit *hit)
+static void find_collider_on(const query *q, int32_t collider, const double *origin, const double *direction,
+                             double length, drape_hit *hit)
 {
-    const drape_collider_pose pose = pose_of(sim, collider);
-    const ray r = {&sim->model->colliders[collider], &pose, origin, direction};
+    const drape_collider_pose pose = pose_of(q->sim, collider);
+    const ray r = {q->body[collider], &pose, origin, direction};
     double t, normal[3];
     if (!meets(&r, length, &t) || (hit->found && !(t < hit->distance)))
         return;
@@ -125,19 +133,20 @@ static void find_collider_on(const drape_sim *sim, int32_t collider, const doubl
     vec3_add_scaled(t, direction, hit->point);
 }
 
-static void find_on_ray(const drape_sim *sim, int what, const double *origin, const double *along,
-                        double length, drape_hit *hit)
+static void find_on_ray(const query *q, const double *origin, const double *along, double length,
+                        drape_hit *hit)
 {
+    const drape_sim *sim = q->sim;
     const double size = vec3_norm(along), direction[3] = {along[0] / size, along[1] / size, along[2] / size};
     *hit = (drape_hit){.found = false};
-    if (what & DRAPE_QUERY_CLOTH) {
+    if (q->what & DRAPE_QUERY_CLOTH) {
         const drape_on_triangle at =
             drape_first_on_ray(&sim->query_tree, drape_sim_state(sim)->x, origin, direction, length);
         if (at.triangle >= 0)
             set_cloth(sim, &at, hit);
     }
-    for (int32_t c = 0; (what & DRAPE_QUERY_COLLIDERS) && c < sim->model->collider_count; c++)
-        find_collider_on(sim, c, origin, direction, length, hit);
+    for (int32_t c = 0; q->body && c < sim->model->collider_count; c++)
+        find_collider_on(q, c, origin, direction, length, hit);
 }
 
 /* ---- For hosts ---- */
@@ -175,14 +184,32 @@ static drape_status fit_tree(drape_sim *sim, int what)
     return status;
 }
 
+/* Fits what is asked about to the present state. */
+static drape_status begin_query(drape_sim *sim, int what, query *q)
+{
+    const drape_model *m = sim->model;
+    drape_status status = fit_tree(sim, what);
+    *q = (query){.sim = sim, .what = what, .arena = drape_arena_of(sim->ctx)};
+    if (status || !(what & DRAPE_QUERY_COLLIDERS) || m->collider_count == 0)
+        return status;
+    q->body = drape_arena_take(&q->arena, (size_t)m->collider_count, sizeof *q->body);
+    status = q->body ? DRAPE_OK : DRAPE_E_MEMORY;
+    for (int32_t c = 0; !status && c < m->collider_count; c++)
+        status = drape_deformed_at(&q->arena, m, drape_system_motion(sim->system), c, drape_sim_state(sim)->t,
+                                   &q->body[c]);
+    return status;
+}
+
 drape_status drape_sim_closest(drape_sim *sim, int what, int32_t count, const double *points, double within,
                                drape_hit *hits)
 {
+    query q = {.arena = drape_arena_of(sim ? sim->ctx : NULL)};
     drape_status status = check(sim, "drape_sim_closest", what, count, points, within, hits);
     if (!status)
-        status = fit_tree(sim, what);
+        status = begin_query(sim, what, &q);
     for (int32_t i = 0; !status && i < count; i++)
-        find_near(sim, what, points + 3 * (size_t)i, within, &hits[i]);
+        find_near(&q, points + 3 * (size_t)i, within, &hits[i]);
+    drape_arena_free(&q.arena);
     return status;
 }
 
@@ -202,12 +229,14 @@ static drape_status check_directions(const drape_sim *sim, int32_t count, const 
 drape_status drape_sim_cast(drape_sim *sim, int what, int32_t count, const double *origins,
                             const double *directions, double length, drape_hit *hits)
 {
+    query q = {.arena = drape_arena_of(sim ? sim->ctx : NULL)};
     drape_status status = check(sim, "drape_sim_cast", what, count, origins, length, hits);
     if (!status)
         status = check_directions(sim, count, directions, length);
     if (!status)
-        status = fit_tree(sim, what);
+        status = begin_query(sim, what, &q);
     for (int32_t i = 0; !status && i < count; i++)
-        find_on_ray(sim, what, origins + 3 * (size_t)i, directions + 3 * (size_t)i, length, &hits[i]);
+        find_on_ray(&q, origins + 3 * (size_t)i, directions + 3 * (size_t)i, length, &hits[i]);
+    drape_arena_free(&q.arena);
     return status;
 }
