@@ -10,6 +10,10 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
         REASON("rounding", "Newton",
                "accepted: the residual is above `tolerance`, but within the rounding error of "
                "the forces that it sums"),
+    [DRAPE_REASON_CORRECTION] =
+        REASON("correction", "Newton",
+               "accepted: the residual is above `tolerance`, but a correction was within "
+               "`correction_tolerance`"),
     [DRAPE_REASON_ITERATIONS] =
         REASON("iterations", "newton_k",
                "accepted after the given number of iterations, with a residual above `tolerance`"),

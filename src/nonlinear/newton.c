@@ -419,8 +419,8 @@ static double largest(const drape_step_equation *e, const double *f)
     return max;
 }
 
-/* Whether a chord step, which is about what the correction before it has left, is within
- * correction_tolerance. Comparing with NaN, the default, is false. */
+/* Whether a chord step is within correction_tolerance. It is what the correction before it has left where
+ * corrections contract fast; a sheet that crumples may be ten times as far from the solution. Comparing with NaN, the default, is false. */
 static bool is_near_enough(const drape_newton *s, const double *chord)
 {
     const double nodes = (double)s->equation->dofs / 3;
@@ -555,10 +555,13 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     report->tolerance = tolerance;
     report->residual = finite ? drape_step_equation_norm(e, norm) : NAN;
     report->diagnostic = drape_step_equation_diagnose(e, tolerance);
-    if (!status && s->near_enough)
-        report->tolerance = NAN; /* it bounds what is left of the correction, not the residual */
-    if (report->residual <= tolerance || (!status && s->near_enough)) {
+    if (report->residual <= tolerance) {
         report->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
+        return DRAPE_OK;
+    }
+    if (!status && s->near_enough) {
+        report->reason = drape_reason_name(DRAPE_REASON_CORRECTION);
+        report->tolerance = NAN; /* the residual has none */
         return DRAPE_OK;
     }
     double rounding = finite ? drape_step_equation_rounding(e, d, norm) : NAN;

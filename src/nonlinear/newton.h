@@ -79,7 +79,7 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
         DRAPE_NUMBER("linear_tolerance", "1", 1e-3, 1e-14, DRAPE_BELOW(1),                                   \
                      "relative residual that iterative linear solvers leave in a correction"),               \
     [DRAPE_NEWTON_CORRECTION_TOLERANCE] = DRAPE_NUMBER(                                                      \
-        "correction_tolerance", "m", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9,                             \
+        "correction_tolerance", "m", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1,                               \
         "a solve also ends, whatever its residual, after a whole correction and a chord step by the same "   \
         "matrix that lowers the residual and whose root mean square over the free nodes is at most this")
 
