@@ -768,10 +768,10 @@ typedef struct drape_hit {
  * drape_sim_cast: the first place that each of count rays meets, from its origin [m] along its direction, of
  * any length but 0, up to `length` [m]; triangles are met from both sides. A ray that begins in a collider
  * meets it at its origin. Colliders are met to 1e-9 m; a ray that is inside a collider for less than 1e-4 of
- * `length` may miss it.
+ * `length` may miss it. Colliders that all cloths pass through, as those that are not enabled, are not met.
  *
  * Each call refits a tree of boxes over the triangles, and takes memory for it at the first one; then a
- * point takes about the logarithm of their number. Errors: DRAPE_E_ARGUMENT (NULL, what, a value that is not
+ * point takes about the logarithm of their number. For a collider that deforms it makes a tree of its own. Errors: DRAPE_E_ARGUMENT (NULL, what, a value that is not
  * finite, a direction of length 0, within or length not above 0), DRAPE_E_MEMORY. Must not be called by an
  * observer. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_closest(drape_sim *sim, int what, int32_t count, const double *points,

@@ -513,7 +513,17 @@ static double turning_path_of(const drape_contact *c, int32_t collider, double t
     return largest;
 }
 
-/* How far the points of a collider that deforms move at most, relative to a displacement `mean`. */
+/* How far something moves: by itself or relative to a displacement `mean`, whichever is less. What rests is
+ * not fast where cloth falls, nor what moves along with the cloth. */
+static double lesser_path(const double from[3], const double to[3], const double mean[3])
+{
+    double own[3], relative[3];
+    vec3_sub(to, from, own);
+    vec3_sub(own, mean, relative);
+    return fmin(vec3_norm(own), vec3_norm(relative));
+}
+
+/* How far the points of a collider that deforms move at most, as lesser_path. */
 static double deforming_path_of(const drape_contact *c, int32_t collider, double t, const double mean[3])
 {
     drape_collider_pose from, to;
@@ -526,14 +536,12 @@ static double deforming_path_of(const drape_contact *c, int32_t collider, double
         double a[3], b[3];
         drape_pose_point(&from, c->own + 3 * p, a);
         drape_pose_point(&to, c->own_end + 3 * p, b);
-        vec3_sub(b, a, b);
-        vec3_sub(b, mean, b);
-        largest = fmax(largest, vec3_dot(b, b));
+        largest = fmax(largest, lesser_path(a, b, mean));
     }
-    return sqrt(largest);
+    return largest;
 }
 
-/* How far a collider moves in a nominal step from time t on, relative to the mean motion of the cloth. */
+/* How far a collider moves in a nominal step from time t on, or relative to the mean motion of the cloth. */
 static double path_of(const drape_contact *c, int32_t collider, double t)
 {
     const size_t nodes = (size_t)c->model->node_count;
@@ -549,9 +557,7 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
         mean[k] *= c->dt / (double)nodes;
     if (deforms)
         return deforming_path_of(c, collider, t, mean);
-    for (size_t k = 0; k < 3; k++)
-        to[k] -= from[k] + mean[k];
-    return vec3_norm(to) + turning_path_of(c, collider, t);
+    return lesser_path(from, to, mean) + turning_path_of(c, collider, t);
 }
 
 /* Sets the activation distance of a collider. */

@@ -376,6 +376,13 @@ void drape_motion_place_cloth(drape_motion *motion, int32_t cloth, const drape_p
             place_path(by, &motion->pin_path[i]);
 }
 
+static bool same_points(const drape_collider_shape *a, const drape_collider_shape *b)
+{
+    return a->point_count == b->point_count &&
+           (a->point_count == 0 ||
+            memcmp(a->point, b->point, 3 * (size_t)a->point_count * sizeof *a->point) == 0);
+}
+
 void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int32_t *before)
 {
     const drape_model *m = motion->model;
@@ -388,7 +395,7 @@ void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int
         motion->collider_path[c] = from->collider_path[before[c]];
         motion->collider_turn[c] = from->collider_turn[before[c]];
         motion->collider_placed[c] = from->collider_placed[before[c]];
-        if (m->colliders[c].shape.point_count == from->model->colliders[before[c]].shape.point_count)
+        if (same_points(&m->colliders[c].shape, &from->model->colliders[before[c]].shape))
             drape_deformation_copy(&motion->deformation[c], &from->deformation[before[c]]);
     }
     memcpy(motion->cloth_placed, from->cloth_placed, (size_t)m->cloth_count * sizeof *motion->cloth_placed);

@@ -17,8 +17,9 @@
 typedef struct query {
     const drape_sim *sim;
     int what;
-    drape_arena arena;           /* of what deforms */
-    const drape_collider **body; /* (collider_count) if colliders are asked about */
+    drape_arena arena; /* of what deforms */
+    const drape_collider *
+        *body; /* (collider_count) if colliders are asked about; NULL: cloth passes through */
 } query;
 
 /* ---- Places ---- */
@@ -69,7 +70,8 @@ static void find_near(const query *q, const double *point, double within, drape_
             set_cloth(sim, &at, hit);
     }
     for (int32_t c = 0; q->body && c < sim->model->collider_count; c++)
-        find_collider_near(q, c, point, within, hit);
+        if (q->body[c])
+            find_collider_near(q, c, point, within, hit);
 }
 
 /* ---- Rays ---- */
@@ -146,7 +148,8 @@ static void find_on_ray(const query *q, const double *origin, const double *alon
             set_cloth(sim, &at, hit);
     }
     for (int32_t c = 0; q->body && c < sim->model->collider_count; c++)
-        find_collider_on(q, c, origin, direction, length, hit);
+        if (q->body[c])
+            find_collider_on(q, c, origin, direction, length, hit);
 }
 
 /* ---- For hosts ---- */
@@ -184,6 +187,14 @@ static drape_status fit_tree(drape_sim *sim, int what)
     return status;
 }
 
+static bool is_met(const drape_model *m, int32_t collider)
+{
+    bool met = false;
+    for (int32_t i = 0; i < m->cloth_count; i++)
+        met = met || !drape_model_ignores(m, collider, m->cloths[i].first_node);
+    return met;
+}
+
 /* Fits what is asked about to the present state. */
 static drape_status begin_query(drape_sim *sim, int what, query *q)
 {
@@ -195,8 +206,9 @@ static drape_status begin_query(drape_sim *sim, int what, query *q)
     q->body = drape_arena_take(&q->arena, (size_t)m->collider_count, sizeof *q->body);
     status = q->body ? DRAPE_OK : DRAPE_E_MEMORY;
     for (int32_t c = 0; !status && c < m->collider_count; c++)
-        status = drape_deformed_at(&q->arena, m, drape_system_motion(sim->system), c, drape_sim_state(sim)->t,
-                                   &q->body[c]);
+        if (is_met(m, c))
+            status = drape_deformed_at(&q->arena, m, drape_system_motion(sim->system), c,
+                                       drape_sim_state(sim)->t, &q->body[c]);
     return status;
 }
 
