@@ -585,11 +585,11 @@ static void add_limit(map *m)
         draw_limit(&m->f, block, m->limits++ == 0);
 }
 
-/* Over a single axis that is the step, the limit of a case is a line from bottom to top. */
+/* Over a single axis that is the step, the limit of a case is a line from bottom to top, if it is on it. */
 static void add_limit_at(lab_figure *f, const json_t *result, double bottom, double top, int *limits)
 {
     const double limit = lab_number(result, "explicit_limit_s");
-    if (isnan(limit))
+    if (!(limit >= f->axes[0].from && limit <= f->axes[0].to))
         return;
     const int line = lab_figure_data(f);
     fprintf(f->script, "%.9g %.9g\n%.9g %.9g\n", limit, bottom, limit, top);
@@ -683,8 +683,12 @@ static void set_curve_axis(lab_figure *f, const shade *sh, int failed)
 {
     lab_axis *y = &f->axes[1];
     *y = sh->axis;
-    if (!(y->to > y->from)) /* no run has a value: there are markers only */
+    if (!(y->to > y->from)) { /* no run has a value: there are markers only, and no numbers */
+        static const char *const none[] = {""};
         y->to = y->from + 1;
+        y->names = none;
+        y->name_count = 1;
+    }
     f->plot_height = CURVE_ROOM + FAILED_ROOM * failed;
     const double below = 0.04, above = 0.04 + FAILED_ROOM * failed / CURVE_ROOM;
     if (y->log) {

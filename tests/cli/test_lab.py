@@ -189,6 +189,7 @@ def test_curves_without_values():
             script = file.read()
         for text in (reason, "be", "bdf2"):
             assert f"set label '{text}' at screen" in script, (text, script)
+        assert "set ytics ('' 0)" in script, script  # no numbers
 
 
 def test_plan():
