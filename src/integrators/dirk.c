@@ -420,6 +420,7 @@ const drape_integrator_ops drape_integrator_dirk = {
     .order = 5,
     .create = create,
     .own_steps = true,
+    .order_parameter = "order",
     .gain = DRAPE_FIRST_ORDER_GAIN,
     .smooth_forces = true,
     .step = drape_first_order_step,

@@ -50,6 +50,9 @@ typedef struct drape_integrator_ops {
      * upper bound; out->t is the end of the advance, which a step may reach but not pass, and is set to the
      * time at which the step ends. */
     bool own_steps;
+    /* The parameter that fixes its order, which by default depends on rtol. NULL: it does not, or the
+     * integrator chooses its order as it goes. */
+    const char *order_parameter;
     /* Energy that a run may gain without a source, as a share of the energy available in the scene; 0: a
      * tenth, for integrators that conserve energy up to oscillations. */
     double gain;

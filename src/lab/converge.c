@@ -25,8 +25,9 @@
 #define MIN_LEVELS   3
 #define MAX_LEVELS   12
 #define OWN          "dt, with own substeps" /* the knob of an integrator that dt does not refine */
-#define ROUNDING     1e-12                   /* [m]: smaller distances are rounding */
-#define MIN_FITTED   3                       /* refinements that show that there is one order */
+#define BY_RTOL      "rtol, which sets the order"
+#define ROUNDING     1e-12 /* [m]: smaller distances are rounding */
+#define MIN_FITTED   3     /* refinements that show that there is one order */
 
 /* ---- The cases ---- */
 
@@ -49,10 +50,23 @@ static bool has_own_substeps(const drape_integrator_ops *integrator, const drape
            drape_param_find(integrator->entry.params, integrator->entry.param_count, "substeps") >= 0;
 }
 
+/* The knob of an integrator that controls its error. */
+static const char *tolerance_knob(const drape_integrator_ops *integrator, const drape_entry_def *given)
+{
+    if (!integrator->order_parameter)
+        return "rtol";
+    for (size_t i = 0; i < given->setting_count; i++)
+        if (strcmp(given->settings[i].name, integrator->order_parameter) == 0)
+            return "rtol";
+    return BY_RTOL;
+}
+
 static drape_status add_time(lab *l, const drape_integrator_ops *integrator, const drape_entry_def *given)
 {
     drape_status status = DRAPE_OK;
-    const char *knob = integrator->own_steps ? "rtol" : has_own_substeps(integrator, given) ? OWN : "dt";
+    const char *knob = integrator->own_steps                 ? tolerance_knob(integrator, given)
+                       : has_own_substeps(integrator, given) ? OWN
+                                                             : "dt";
     const char *pointer = integrator->own_steps ? "/integrator/rtol" : "/integrator/dt";
     const double ratio = integrator->own_steps ? 0.1 : 0.5;
     int limits[2];
@@ -163,7 +177,7 @@ typedef struct sequence {
 
 static bool is_tolerance(const sequence *s)
 {
-    return strcmp(s->knob, "rtol") == 0;
+    return strcmp(s->knob, "rtol") == 0 || strcmp(s->knob, BY_RTOL) == 0;
 }
 
 /* Fits a line through the finest refinements of one order. */
@@ -226,7 +240,8 @@ static void read_sequence(const lab *l, size_t first, sequence *s)
         before = good ? r : NULL;
     }
     s->unrefined = strcmp(s->knob, OWN) == 0;
-    s->chooses_order = is_tolerance(s) && chooses_order(lab_find_integrator(s->integrator));
+    s->chooses_order = strcmp(s->knob, BY_RTOL) == 0 ||
+                       (is_tolerance(s) && chooses_order(lab_find_integrator(s->integrator)));
     fit(s);
 }
 
@@ -262,8 +277,9 @@ static void report_no_order(const sequence *s, FILE *out)
         fprintf(
             out,
             "it chooses its order, and another one at another rtol; a tenth of rtol divides the change by "
-            "%.2g to %.2g",
-            pow(10, low), pow(10, high));
+            "%.2g to %.2g%s",
+            pow(10, low), pow(10, high),
+            strcmp(s->knob, BY_RTOL) == 0 ? "; a value of /integrator/order fixes it" : "");
     else
         fprintf(
             out,
@@ -346,7 +362,7 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
         return status;
     for (size_t k = 0; k < count; k++) {
         const sequence *s = &sequences[k];
-        if (s->count == 0 || strcmp(s->knob, knob) != 0)
+        if (s->count == 0 || strcmp(is_tolerance(s) ? "rtol" : s->knob, knob) != 0)
             continue;
         others |= draw_sequence(&f, s, count_before(sequences, k));
         for (size_t i = 0; i < s->count; i++, points++) {

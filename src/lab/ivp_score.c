@@ -11,6 +11,8 @@
 #include <math.h>
 #include <string.h>
 
+#define LARGEST 1e150 /* [m] a coordinate: squares of larger ones overflow */
+
 /* ---- Score ---- */
 
 /* Refuses an array of another kind or shape, and says which would be right. */
@@ -66,10 +68,11 @@ static drape_status read_frames(const lab_ivp *s, const char *path, const double
     drape_arena_release(s->arena, bytes);
     *x = copy;
     for (size_t i = 0; i < s->reference.size * s->time_count; i++)
-        if (!isfinite(copy[i]))
-            return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
-                              "%.400s: frame %zu, node %zu: %g is not a finite number", path,
-                              i / s->reference.size + before, i % s->reference.size / 3, copy[i]);
+        if (!(fabs(copy[i]) <= LARGEST))
+            return drape_fail(
+                s->arena->ctx, DRAPE_E_PARSE, "%.400s: frame %zu, at %.9g s, node %zu: %g is %s", path,
+                i / s->reference.size + before, s->times[i / s->reference.size], i % s->reference.size / 3,
+                copy[i], isfinite(copy[i]) ? "too large for a root mean square" : "not a finite number");
     return DRAPE_OK;
 }
 

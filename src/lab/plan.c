@@ -147,10 +147,10 @@ static plan make_plan(const lab *l, const size_t *sample, size_t sampled)
 {
     stratum strata[MAX_STRATA];
     size_t count = 0;
-    double lines = 0, same = 0;
+    double lines = 0, rows = 0;
     plan p = {.sampled = 0, .jobs = l->def->jobs};
     for (size_t i = 0; i < l->count; i++) {
-        same += !lab_is_ours(l, i);
+        rows += l->results[i] != NULL;
         if (!lab_is_ours(l, i))
             continue;
         stratum_of(strata, &count, json_array_get(l->cases, i))->cases++;
@@ -177,10 +177,11 @@ static plan make_plan(const lab *l, const size_t *sample, size_t sampled)
     p.cpu = total_cpu(strata, count);
     p.elapsed = p.cpu.value / fmax(1, fmin(p.jobs, (double)cores));
     p.memory = 1024.0 * (double)usage.ru_maxrss + MEMORY_OF_TEXT * lines * (n / part - 1);
-    /* The table has a row for each case, also for those that are the same as another. */
+    /* The table will have a row for each case, also for those that are the same as another; now it has one
+     * for each that is stored, which may be more than the sample. */
     const double shards = l->def->shards;
     p.disk = file_bytes(l, "experiment.json") + lines * n / part +
-             (shards > 1 ? 0 : file_bytes(l, "results.csv") * (n + same) / part);
+             (shards > 1 ? 0 : file_bytes(l, "results.csv") * (double)l->count / fmax(1, rows));
     return p;
 }
 

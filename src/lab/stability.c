@@ -585,11 +585,11 @@ static void add_limit(map *m)
         draw_limit(&m->f, block, m->limits++ == 0);
 }
 
-/* Over a single axis that is the step, the limit of a case is a line from bottom to top. */
+/* Over a single axis that is the step, the limit of a case is a line from bottom to top, if it is on it. */
 static void add_limit_at(lab_figure *f, const json_t *result, double bottom, double top, int *limits)
 {
     const double limit = lab_number(result, "explicit_limit_s");
-    if (isnan(limit))
+    if (!(limit >= f->axes[0].from && limit <= f->axes[0].to))
         return;
     const int line = lab_figure_data(f);
     fprintf(f->script, "%.9g %.9g\n%.9g %.9g\n", limit, bottom, limit, top);
@@ -683,6 +683,12 @@ static void set_curve_axis(lab_figure *f, const shade *sh, int failed)
 {
     lab_axis *y = &f->axes[1];
     *y = sh->axis;
+    if (!(y->to > y->from)) { /* no run has a value: there are markers only, and no numbers */
+        static const char *const none[] = {""};
+        y->to = y->from + 1;
+        y->names = none;
+        y->name_count = 1;
+    }
     f->plot_height = CURVE_ROOM + FAILED_ROOM * failed;
     const double below = 0.04, above = 0.04 + FAILED_ROOM * failed / CURVE_ROOM;
     if (y->log) {
@@ -731,12 +737,30 @@ static int write_marks(lab *l, const space *s, const shade *sh, size_t first, ma
     return count;
 }
 
+static bool has_curve(const lab *l, const space *s, const shade *sh, size_t first)
+{
+    for (size_t i = first; i < first + s->cells; i++)
+        if (is_mark(l, sh, ON_CURVE, i))
+            return true;
+    return false;
+}
+
 static bool lacks_results(const lab *l, const space *s, const shade *sh, size_t first)
 {
     for (size_t i = first; i < first + s->cells; i++)
         if (is_mark(l, sh, NO_RESULT, i) || is_mark(l, sh, OVER_BUDGET, i))
             return true;
     return false;
+}
+
+/* The name of the runs without a value that are not over budget. */
+static const char *blank_name(const lab *l, const shade *sh)
+{
+    bool stopped = false, completed = false;
+    for (size_t i = 0; i < l->count; i++)
+        if (is_mark(l, sh, NO_RESULT, i))
+            *(has_results(judge(l, l->results[i])) ? &completed : &stopped) = true;
+    return !completed ? "stopped or exploded" : stopped ? "stopped, exploded or no value" : "no value";
 }
 
 static lab_style mark_style(const char *integrator, mark kind)
@@ -771,6 +795,8 @@ static drape_status draw_curves(lab *l, const space *s, const shade *sh)
         const size_t first = r * s->cells;
         const char *integrator = lab_tag_text(l->results[first], "integrator");
         const double height = at_height(&f, f.plot_height - FAILED_ROOM * (failed - 0.5));
+        if (!has_curve(l, s, sh, first))
+            lab_figure_marker(&f, mark_style(integrator, ON_CURVE), integrator);
         for (mark kind = ON_CURVE; kind < MARKS; kind++) {
             if (!write_marks(l, s, sh, first, kind, height, &f, &block))
                 continue;
@@ -783,7 +809,7 @@ static drape_status draw_curves(lab *l, const space *s, const shade *sh)
     if (seen[FEW_STEPS])
         lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_OPEN_MARKER}, verdicts[SHORT].name);
     if (seen[NO_RESULT])
-        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_CROSS_MARKER}, "stopped or exploded");
+        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_CROSS_MARKER}, blank_name(l, sh));
     if (seen[OVER_BUDGET])
         lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_PLUS_MARKER}, text);
     return lab_figure_end(l, &f, sh->quantity->entry.summary);

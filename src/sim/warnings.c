@@ -180,6 +180,16 @@ static bool had_no_room(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
+/* The setting that makes steps smaller. */
+static const char *smaller_steps(const drape_chosen *c)
+{
+    if (c->integrator->own_steps)
+        return isnan(drape_chosen_integrator_value(c, "fixed_step", NAN)) ? "a smaller rtol"
+                                                                          : "a smaller fixed_step";
+    return isnan(drape_chosen_controller_value(c, "rtol", NAN)) ? "a smaller dt"
+                                                                : "a smaller rtol of the controller";
+}
+
 /* Energy that the integrator took, as a share of all that went in: by gravity, pins, colliders, hosts and
  * wind. With dt = 1/60 s over 1 s, be, bdf2 and trbdf2 take 65, 32 and 34 % in four_pins of examples/scenes,
  * 68, 45 and 11 % in sphere_drape. Where cloth is in contact it has met something, and lost energy there.
@@ -198,12 +208,11 @@ static bool dissipates_most(drape_sim *sim, char *text, size_t size)
     const double in = drape_sim_energy_received(sim), share = e.numerical / in;
     if (!(in > 0) || !(share > (integrator->own_steps ? MUCH : MOST)))
         return false;
-    snprintf(
-        text, size, "%s dissipated %.0f %% of the energy that went in, %.3g of %.3g J%s: %s dissipates less",
-        integrator->entry.name, 100 * share, e.numerical, in, e.contact > 0 ? ", part of it on impact" : "",
-        integrator->own_steps    ? "the error is larger than rtol suggests; a smaller one"
-        : integrator->order == 1 ? "a smaller dt, or an integrator of second order such as trbdf2 or bdf2,"
-                                 : "a smaller dt");
+    snprintf(text, size,
+             "%s dissipated %.0f %% of the energy that went in, %.3g of %.3g J%s: %s%s dissipates less",
+             integrator->entry.name, 100 * share, e.numerical, in,
+             e.contact > 0 ? ", part of it on impact" : "", smaller_steps(&sim->chosen),
+             integrator->order == 1 ? ", or an integrator of second order such as trbdf2 or bdf2," : "");
     return true;
 }
 

@@ -141,6 +141,7 @@ def test_bad_input():
     write_npy("short.npy", (shape[0] - 1, *shape[1:]), numbers[:(shape[0] - 1) * shape[1] * 3])
     write_npy("cut.npy", shape, numbers[:-1])
     write_npy("nan.npy", shape, (float("nan"), *numbers[1:]))
+    write_npy("huge.npy", shape, (*numbers[:242], 1e200, *numbers[243:]))
     with open("text.npy", "w", encoding="utf-8") as file:
         file.write("no array")
     write_scene(duration=0.1, frame_rate=33)
@@ -159,7 +160,8 @@ def test_bad_input():
     write_npy("fortran.npy", shape, numbers, fortran=True)
     right = "; it must be (6, 81, 3), frames x nodes x (x, y, z), a frame every 0.05 s, or one more with the start"
     for name, says in (("short", "its shape is (5, 81, 3); it must be (6, 81, 3)"), ("cut", "not as long as its header says: 11656 bytes instead of 11664"),
-                       ("nan", "frame 0, node 0: nan is not a finite number"), ("text", "its header cannot be read"),
+                       ("nan", "frame 0, at 0.05 s, node 0: nan is not a finite number"), ("huge", "frame 0, at 0.05 s, node 80: 1e+200 is too large for a root mean square"),
+                       ("text", "its header cannot be read"),
                        ("four", "its shape is (6, 81, 3, 1)" + right), ("flat", "its shape is (1458,)" + right), ("rows", "its shape is (6, 243)" + right),
                        ("turned", "its shape is (3, 81, 6)" + right), ("empty", "its shape is ()" + right), ("large", "its shape is (4611686018427387904, 81, 3)" + right),
                        ("many", "its header cannot be read"), ("minus", "its header cannot be read"), ("single", "its numbers are '<f4'"), ("big", "its numbers are '>f8'"),

@@ -177,6 +177,21 @@ def test_short_runs_are_hatched():
         assert "set label 'over budget (0.05 s)'" in file.read()
 
 
+def test_curves_without_values():
+    """curves of runs without values are drawn as markers that say why, and each integrator is in the legend"""
+    write_scene(duration=0.1)
+    axis = ("--axis", "/integrator/dt=1e-3:1e-2:3log")
+    for name, reason, options in (("explicit_limit_s", "no value", ("--results", "explicit_limit_s")),
+                                  ("energy_drift", "over budget (1e-09 s)", ("--results", "energy_drift", "--case-seconds", "1e-9"))):
+        out = good("stability", "scene.json", *axis, "--integrators", "be,bdf2", *options, "--out", name)
+        assert "gnuplot" not in out or not shutil.which("gnuplot"), out
+        with open(f"{name}/curve_{name}.gp", encoding="utf-8") as file:
+            script = file.read()
+        for text in (reason, "be", "bdf2"):
+            assert f"set label '{text}' at screen" in script, (text, script)
+        assert "set ytics ('' 0)" in script, script  # no numbers
+
+
 def test_plan():
     """a plan runs a part of the cases, spread over all, and scales their costs up by integrator; the whole run keeps them"""
     write_scene()
@@ -209,6 +224,9 @@ def test_plan():
     equal({i: found[i] for i in sample}, sample, "cases of the plan")
     size = sum(os.path.getsize("s/" + name) for name in ("experiment.json", "cases.jsonl", "results.csv"))
     assert abs(plan["disk_bytes"] / size - 1) < 0.1, (plan, size)
+    # So says a plan in the folder of the whole run, which has more cases than the sample.
+    good(*command, "--plan", "40")
+    assert abs(read_json("s/plan.json")["disk_bytes"] / size - 1) < 0.1, (read_json("s/plan.json"), size)
     assert plan["memory_bytes"] > 1e6, plan
     # A plan of more cases than there are runs all; other experiments have plans, too.
     out = good("converge", "scene.json", "--integrators", "be", "--levels", "3", "--plan", "100", "--out", "c")
@@ -291,6 +309,12 @@ def test_converge():
     equal(re.findall(r"^(ida.*): no order, as it chooses its order", out, re.M), ["ida, order 2", "ida, order 5"], "series")
     out = good("converge", "scene.json", "--integrators", "ida", "--levels", "4", "--set", "/integrator/max_order=3", "--out", "three")
     equal(re.findall(r"^(ida.*): no order", out, re.M), ["ida"], "series at an order that the user chose")
+    # The order of dirk depends on rtol, too, unless it is given.
+    out = good("converge", "scene.json", "--integrators", "dirk", "--levels", "5", "--out", "dirk")
+    assert re.search(r"^dirk: no order, as it chooses its order.* a value of /integrator/order fixes it", out, re.M), out
+    assert os.path.exists("dirk/converge_rtol.gp")
+    out = good("converge", "scene.json", "--integrators", "dirk", "--levels", "4", "--set", "/integrator/order=3", "--out", "fixed")
+    assert re.search(r"^dirk: change proportional to rtol", out, re.M), out
     # A method of one order has a slope over rtol, which is not called an order.
     out = good("converge", "scene.json", "--integrators", "rosenbrock", "--levels", "5", "--out", "ros")
     assert re.search(r"^rosenbrock: change proportional to rtol\^[\d.]+ \(95 % confidence", out, re.M) and "order" not in out, out
