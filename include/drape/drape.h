@@ -771,9 +771,9 @@ typedef struct drape_hit {
  * `length` may miss it. Colliders that all cloths pass through, as those that are not enabled, are not met.
  *
  * Each call refits a tree of boxes over the triangles, and takes memory for it at the first one; then a
- * point takes about the logarithm of their number. For a collider that deforms it makes a tree of its own. Errors: DRAPE_E_ARGUMENT (NULL, what, a value that is not
- * finite, a direction of length 0, within or length not above 0), DRAPE_E_MEMORY. Must not be called by an
- * observer. Thread-safety: as the sim. */
+ * point takes about the logarithm of their number. For a collider that deforms it makes a tree of its own.
+ * Errors: DRAPE_E_ARGUMENT (NULL, what, a value that is not finite, a direction of length 0, within or length
+ * not above 0), DRAPE_E_MEMORY. Must not be called by an observer. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_closest(drape_sim *sim, int what, int32_t count, const double *points,
                                          double within, drape_hit *hits);
 DRAPE_API drape_status drape_sim_cast(drape_sim *sim, int what, int32_t count, const double *origins,

@@ -420,7 +420,8 @@ static double largest(const drape_step_equation *e, const double *f)
 }
 
 /* Whether a chord step is within correction_tolerance. It is what the correction before it has left where
- * corrections contract fast; a sheet that crumples may be ten times as far from the solution. Comparing with NaN, the default, is false. */
+ * corrections contract fast; a sheet that crumples may be ten times as far from the solution. Comparing with
+ * NaN, the default, is false. */
 static bool is_near_enough(const drape_newton *s, const double *chord)
 {
     const double nodes = (double)s->equation->dofs / 3;
