@@ -64,7 +64,8 @@ static void write_glb(const frames_folder *f, const glb *g)
     write_bytes(f, bytes, size);
 }
 
-/* A square of two triangles of their own points, twice as large; its node rises, that above turns. */
+/* A square of two triangles of their own points, twice as large; its node rises, that above turns. Node 2 is not in
+ * the scene. */
 static glb make_square(void)
 {
     static const double x[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0, 1, 1, 0, 0, 1, 0}, time[] = {1, 3},
@@ -140,6 +141,16 @@ static glb make_skin(void)
     return g;
 }
 
+/* Replaces the first occurrence of a text. */
+static void replace(glb *g, const char *from, const char *to)
+{
+    char rest[sizeof g->json];
+    char *at = strstr(g->json, from);
+    ck_assert_msg(at != NULL, "%s", from);
+    strcpy(rest, at + strlen(from));
+    snprintf(at, sizeof g->json - (size_t)(at - g->json), "%s%s", to, rest);
+}
+
 typedef struct reading {
     drape_context *ctx;
     drape_arena arena;
@@ -196,6 +207,15 @@ START_TEST(nodes_move)
     assert_point(&r, 4, 1, 0, 2, 2);
     assert_point(&r, 4, 2, -2, 2, 2);
     close_it(&r);
+    glb still = g;
+    replace(&still, "'animations'", "'extras'");
+    write_glb(&f, &still);
+    r = read_it(&f, 2);
+    ck_assert_msg(r.status == DRAPE_OK, "%s", drape_context_message(r.ctx));
+    ck_assert_int_eq(r.frames.frame_count, 1);
+    ck_assert_double_eq(r.frames.time[0], 10);
+    assert_point(&r, 0, 2, 2, 2, 0);
+    close_it(&r);
     frames_folder_remove(&f);
 }
 END_TEST
@@ -224,16 +244,6 @@ START_TEST(skins_and_morph_targets_move)
 }
 END_TEST
 
-/* Replaces the first occurrence of a text. */
-static void replace(glb *g, const char *from, const char *to)
-{
-    char rest[sizeof g->json];
-    char *at = strstr(g->json, from);
-    ck_assert_msg(at != NULL, "%s", from);
-    strcpy(rest, at + strlen(from));
-    snprintf(at, sizeof g->json - (size_t)(at - g->json), "%s%s", to, rest);
-}
-
 START_TEST(faults_name_the_part)
 {
     static const struct {
@@ -260,6 +270,7 @@ START_TEST(faults_name_the_part)
         {false, "{'attributes'", "{'mode': 1, 'attributes'", "its scene shows no triangles"},
         {false, "[{'nodes': [0]}]", "[{'nodes': [9]}]",
          "\"scenes\": a node: it must be an integer from 0 to 2"},
+        {false, "'nodes': [{", "'knots': [{", "its scene shows no triangles"},
         {false, "'children': [1]", "'children': [0]", "a node is its own ancestor"},
         {false, "'children': [1]", "'children': [1, 1]", "node 1 is the child of nodes 0 and 0"},
         {false, "'scale': [2, 2, 2]", "'scale': [2, 2]", "node 1: \"scale\" must have 3 numbers"},
@@ -302,7 +313,7 @@ START_TEST(faults_name_the_part)
                       drape_context_message(r.ctx), cases[i].message);
         close_it(&r);
     }
-    const glb g = make_square();
+    glb g = make_square();
     write_glb(&f, &g);
     reading r = read_it(&f, 1e7); /* 2e7 frames */
     ck_assert_int_eq(r.status, DRAPE_E_PARSE);
