@@ -124,6 +124,8 @@ drape_status drape_gltf_index_of(const drape_gltf *g, const char *owner, const j
                                  int32_t *index)
 {
     int64_t number;
+    if (limit == 0)
+        return FAIL(g, "%s: the file has nothing that it could refer to", owner);
     if (!take_integer(value, 0, (double)limit - 1, &number))
         return FAIL(g, "%s: it must be an integer from 0 to %d", owner, (int)limit - 1);
     *index = (int32_t)number;
