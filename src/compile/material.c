@@ -165,15 +165,16 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
     if (status)
         return status;
     int32_t count = cloth->mesh.node_count;
-    cloth->node_mass = drape_arena_take(&model->arena, (size_t)count, sizeof *cloth->node_mass);
-    if (!cloth->node_mass)
+    cloth->material_mass = drape_arena_take(&model->arena, (size_t)count, sizeof *cloth->material_mass);
+    cloth->node_mass = cloth->material_mass;
+    if (!cloth->material_mass)
         return DRAPE_E_MEMORY;
     take_fabric(def, values, cloth);
     memcpy(cloth->material_values, values, sizeof values);
     cloth->material = resolve(values, &cloth->bending, mass, area);
     for (int32_t i = 0; i < count; i++)
-        cloth->node_mass[i] = values[MASS] == MASS_UNIFORM
-                                  ? mass / count
-                                  : cloth->material.areal_density * cloth->mesh.node_area[i];
+        cloth->material_mass[i] = values[MASS] == MASS_UNIFORM
+                                      ? mass / count
+                                      : cloth->material.areal_density * cloth->mesh.node_area[i];
     return DRAPE_OK;
 }
