@@ -40,11 +40,11 @@ static const drape_param params[] = {
     [MASS] =
         DRAPE_CHOICE("mass", MASS_AREA, mass_choices,
                      "area: lumped, a third of each triangle to each node; uniform: the same on every node"),
-    [FABRIC] = DRAPE_CHOICE(
-        "fabric", 0, drape_fabric_names,
-        "a measured fabric (`drape list fabrics`): gives the areal density unless the scene does, the "
-        "bending of bend.midedge and, without young_modulus and thickness, the tension and "
-        "shear of stretch.cst"),
+    [FABRIC] =
+        DRAPE_CHOICE("fabric", 0, drape_fabric_names,
+                     "a measured fabric: gives the areal density unless the scene does, the "
+                     "bending of bend.midedge and, without young_modulus and thickness, the tension and "
+                     "shear of stretch.cst"),
 };
 
 const drape_entry drape_material_entry = {

@@ -243,7 +243,8 @@ START_TEST(velocities_stay_and_momentum_follows)
 }
 END_TEST
 
-/* Pins and other changes leave these masses, and masses leave pins; as compiled, the model is shared again. */
+/* Pins and other changes leave these masses, and masses leave pins; as compiled, the model is shared
+ * again. */
 START_TEST(masses_and_pins_go_together)
 {
     failing_allocator memory = {0};
