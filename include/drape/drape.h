@@ -178,6 +178,22 @@ typedef struct drape_pin_def {
     const char *name; /* for events, unique among the pins of the cloth; NULL: "pin0", "pin1" ... */
 } drape_pin_def;
 
+/* Nodes of one cloth with masses of their own: a weight in a hem, a button, a fabric of varying weight.
+ * Exactly one of nodes, corner, edge, row (>= 0) and has_box selects them, as those of a pin, and exactly one
+ * of add and mass is given. Initialise with drape_mass_def_init. */
+typedef struct drape_mass_def {
+    size_t struct_size;            /* set by drape_mass_def_init */
+    const int32_t *nodes;          /* node_count node numbers, local to this cloth */
+    size_t node_count;             /* length of nodes */
+    const char *corner;            /* as in drape_pin_def */
+    const char *edge;              /* as in drape_pin_def */
+    int32_t row;                   /* as in drape_pin_def; -1: not selected by row */
+    bool has_box;                  /* whether box_min and box_max are set */
+    double box_min[3], box_max[3]; /* [m], as in drape_pin_def */
+    double add;  /* [kg] added to the mass of each of these nodes, in (0, 1e12]; NaN: not given */
+    double mass; /* [kg] of each of these nodes, in place of its mass so far, in (0, 1e12]; NaN: not given */
+} drape_mass_def;
+
 /* One piece of cloth. */
 typedef struct drape_cloth_def {
     size_t struct_size;  /* set by drape_cloth_def_init */
@@ -194,6 +210,9 @@ typedef struct drape_cloth_def {
     const char *const
         *ignore;         /* names of colliders and cloths that this cloth passes through; its own: itself */
     size_t ignore_count; /* length of ignore */
+    const drape_mass_def
+        *masses;       /* applied in this order to the masses that the material gives; NULL: none */
+    size_t mass_count; /* length of masses */
 } drape_cloth_def;
 
 /* One side of a seam: nodes of one cloth, in the order in which they are joined. They are selected as
@@ -292,6 +311,7 @@ DRAPE_API void drape_scene_def_init(drape_scene_def *def, size_t struct_size);
 DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
 DRAPE_API void drape_pin_def_init(drape_pin_def *def, size_t struct_size);
+DRAPE_API void drape_mass_def_init(drape_mass_def *def, size_t struct_size);
 DRAPE_API void drape_event_def_init(drape_event_def *def, size_t struct_size);
 DRAPE_API void drape_seam_def_init(drape_seam_def *def, size_t struct_size);
 DRAPE_API void drape_collider_def_init(drape_collider_def *def, size_t struct_size);
@@ -584,6 +604,18 @@ DRAPE_API drape_status drape_sim_change_model(drape_sim *sim, const drape_model 
 DRAPE_API drape_status drape_sim_pin(drape_sim *sim, int32_t count, const int32_t *nodes);
 DRAPE_API drape_status drape_sim_unpin(drape_sim *sim, int32_t count, const int32_t *nodes);
 
+/* Gives count nodes of the sim other masses [kg], each in (0, 1e12], as drape_sim_change does with a model
+ * that has them: inertia, weight, the center of mass of events and the derived stiffness of contact follow.
+ * Velocities stay, so momentum and kinetic energy change with the mass; the energy account takes that as
+ * given by the host. A node that is listed twice gets the later one. A stiffness that a term derived from
+ * masses when the scene was compiled, as limit.strain can, stays until drape_sim_change. The masses stay
+ * through drape_sim_change where they differ from those of the model before. drape_model_masses of
+ * drape_sim_model has the present ones. Checkpoints keep them. Must not be called by an observer. Errors,
+ * after which nothing has changed: DRAPE_E_ARGUMENT (no such node, a mass out of range), DRAPE_E_MEMORY,
+ * DRAPE_E_SOLVER, DRAPE_E_STOPPED. Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_set_masses(drape_sim *sim, int32_t count, const int32_t *nodes,
+                                            const double *masses);
+
 /* Pulls a free node towards target [m] by a spring of the given stiffness [N/m]. The force stiffness (target
  * - x) is part of the equations of every step from the next one on, and implicit if the integrator is. A
  * call replaces the springs of the calls before; stiffness 0 removes them. The spring's energy counts as
@@ -673,7 +705,8 @@ DRAPE_API drape_status drape_sim_deform_collider(drape_sim *sim, int32_t collide
 DRAPE_API int32_t drape_model_collider_points(const drape_model *model, int32_t collider);
 
 /* Writes where the points of a collider that deforms are in space now [m], and, unless NULL, how fast they
- * move [m/s]: (points x 3) each; at a frame, those towards the next one. Errors: DRAPE_E_ARGUMENT. */
+ * move [m/s]: (points x 3) each; at a frame, those towards the next one. An observer may call it. Errors:
+ * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_sim_collider_points(drape_sim *sim, int32_t collider, double *positions,
                                                  double *velocities);
 
@@ -699,8 +732,8 @@ DRAPE_API drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *fiel
 /* ---- Sim: what can be read ---- */
 
 /* The last accepted state: time [s], positions [m] and velocities [m/s], node_count x 3 each; valid until the
- * next call that changes the sim. drape_sim_model returns the model that the sim was created with
- * or, after an event released pins, a model of the sim without these, valid until the next release. */
+ * next call that changes the sim. drape_sim_model returns the model that the sim was created with or, after
+ * pins or masses have changed, a model of the sim with these, valid until the next such change. */
 DRAPE_API double drape_sim_time(const drape_sim *sim);
 DRAPE_API const double *drape_sim_positions(const drape_sim *sim);
 DRAPE_API const double *drape_sim_velocities(const drape_sim *sim);
@@ -773,7 +806,7 @@ typedef struct drape_hit {
  * Each call refits a tree of boxes over the triangles, and takes memory for it at the first one; then a
  * point takes about the logarithm of their number. For a collider that deforms it makes a tree of its own.
  * Errors: DRAPE_E_ARGUMENT (NULL, what, a value that is not finite, a direction of length 0, within or length
- * not above 0), DRAPE_E_MEMORY. Must not be called by an observer. Thread-safety: as the sim. */
+ * not above 0), DRAPE_E_MEMORY. An observer may call them. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_closest(drape_sim *sim, int what, int32_t count, const double *points,
                                          double within, drape_hit *hits);
 DRAPE_API drape_status drape_sim_cast(drape_sim *sim, int what, int32_t count, const double *origins,
@@ -800,7 +833,7 @@ typedef struct drape_contact_point {
  * force acts on the nodes by their weights, except between nearly parallel edges. With lagged friction, the
  * friction of a contact at the beginning of the last step is an entry of its own, with its gap and without
  * normal force. Errors: DRAPE_E_ARGUMENT (NULL, room < 0, an integrator without contact forces),
- * DRAPE_E_MEMORY. Must not be called by an observer. Thread-safety: as the sim. */
+ * DRAPE_E_MEMORY. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_contacts(drape_sim *sim, int32_t room, drape_contact_point *contacts,
                                           int32_t *count);
 
@@ -847,8 +880,11 @@ DRAPE_API void drape_model_normals(const drape_model *model, const double *x, do
  * NULL, about the pivot of the collider (3), where it is now. Colliders have the mean velocity of the last
  * step, so call these before moving them on. Under "newton_k", which does not bring the residual of a step
  * to zero, all of these forces are far off (docs/integrators.md). An integrator that resolves contact by
- * moving nodes ("verlet") has no such forces and returns an error. Errors: DRAPE_E_ARGUMENT,
- * DRAPE_E_MEMORY. Thread-safety: as the sim. Must not be called by an observer. */
+ * moving nodes ("verlet") has no such forces and returns an error.
+ *
+ * An observer may read them, too, which leaves no trace in the run: they are those of the last accepted
+ * state, in a frame those at the end of the step that it lies in, at an event that releases pins those
+ * before. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_contact_forces(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3]);
@@ -870,8 +906,7 @@ typedef struct drape_seam_report {
 
 /* The number of seams and, if out is not NULL and index is that of a seam in scene order, its report. The
  * forces are conservative ones and those that depend on velocities. A node that is in both sides of a seam
- * counts with the sum of the forces on it. Thread-safety: as the sim. Must not be called by an observer:
- * then nothing is written. */
+ * counts with the sum of the forces on it. An observer may call it. Thread-safety: as the sim. */
 DRAPE_API int32_t drape_sim_seam(drape_sim *sim, int32_t index, drape_seam_report *out);
 
 /* The position of a collider in the last accepted state, as drape_model_collider, but including moves by the
@@ -1109,8 +1144,8 @@ typedef struct drape_event {
 
 /* Called within drape_sim_advance. Returns 0 to continue. Any other value stops the advance, which then
  * returns DRAPE_E_STOPPED if the value is > 0, else the value itself, with the message that the observer may
- * have set by drape_context_set_message. An observer must not advance or destroy the sim, nor set its
- * state. */
+ * have set by drape_context_set_message. An observer may read whatever a host may, and save the sim; it must
+ * not advance or destroy the sim, nor change it. */
 typedef drape_status drape_observer(void *user, const drape_event *event);
 
 /* Adds an observer. Observers are called in the order in which they were added; there are at most 8. Errors:

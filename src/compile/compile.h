@@ -36,11 +36,12 @@ drape_status drape_compile_read_def(drape_context *ctx, drape_arena *arena, cons
  * copied but not checked yet. */
 drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape_model **out);
 
-/* The model in which the nodes that are marked in `pinned` (node_count) are pinned, and no others. Nodes
- * that base pins keep their tracks; edges between nodes that it does not pin are not clamped. base must be
- * compiled from a scene, and outlive the result. Errors: DRAPE_E_MEMORY, DRAPE_E_STOPPED. */
+/* The model in which the nodes that are marked in `pinned` (node_count) are pinned, and no others, and in
+ * which nodes have the masses `mass` (node_count) [kg]; NULL: those of base. Nodes that base pins keep their
+ * tracks; edges between nodes that it does not pin are not clamped. base must be compiled from a scene, and
+ * outlive the result. Errors: DRAPE_E_MEMORY, DRAPE_E_STOPPED. */
 drape_status drape_compile_repinned(drape_context *ctx, const drape_model *base, const uint8_t *pinned,
-                                    drape_model **out);
+                                    const double *mass, drape_model **out);
 
 /* Resolves an event of a host, whose function the caller has; its arrays are taken from the arena. Errors:
  * DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. */

@@ -135,6 +135,15 @@ static double fall_acceleration(const drape_model *model)
     return g > 0 ? g : model->length;
 }
 
+/* The areal density of a cloth where its nodes have the most mass, as a multiple of that of its material. */
+static double heaviest_areal_density(const drape_cloth *cloth)
+{
+    double most = 0;
+    for (int32_t i = 0; i < cloth->mesh.node_count; i++)
+        most = fmax(most, cloth->node_mass[i] / cloth->material_mass[i]);
+    return most * cloth->material.areal_density;
+}
+
 /* sigma (2 |g| L + v^2) / d, with sigma the largest areal density and L the size of the scene. Up to the
  * distance zero, the barrier absorbs 6 d of this per area (contact/barrier.h), which is 12 times the energy
  * of the speed v and of a fall over L; cloth with more energy cannot be stopped. The weight of the cloth is
@@ -143,7 +152,7 @@ static double stiffness_of_fall(const drape_model *model)
 {
     double sigma = 0, v = scene_speed(model);
     for (int32_t c = 0; c < model->cloth_count; c++)
-        sigma = fmax(sigma, model->cloths[c].material.areal_density);
+        sigma = fmax(sigma, heaviest_areal_density(&model->cloths[c]));
     return sigma * (2 * fall_acceleration(model) * model->length + v * v) / model->contact.distance;
 }
 
@@ -197,6 +206,7 @@ static drape_status resolve_contact(drape_model *model, const drape_scene_def *d
     contact->distance_given = !isnan(distance);
     contact->distance = isnan(distance) ? largest_thickness(model) : distance;
     contact->stiffness = values[DRAPE_CONTACT_STIFFNESS];
+    contact->stiffness_given = !isnan(contact->stiffness);
     contact->friction_velocity = values[DRAPE_CONTACT_FRICTION_VELOCITY];
     contact->lagged = values[DRAPE_CONTACT_FRICTION] == LAGGED;
     contact->no_room = (drape_no_room)values[DRAPE_CONTACT_NO_ROOM];
@@ -238,7 +248,7 @@ drape_status drape_compile_contact(drape_model *model, const drape_scene_def *de
 drape_status drape_compile_contact_stiffness(drape_model *model, const drape_scene_def *def)
 {
     (void)def;
-    if (isnan(model->contact.stiffness))
+    if (!model->contact.stiffness_given)
         model->contact.stiffness = fmax(stiffness_of_fall(model), stiffness_of_strain(model));
     model->contact.relaxed_pressure = relaxed_pressure(model);
     return DRAPE_OK;

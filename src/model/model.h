@@ -127,9 +127,11 @@ typedef struct drape_cloth {
     double material_values[DRAPE_MAX_PARAMS]; /* in the order of the parameters of drape_material_entry */
     drape_material material;
     drape_woven tension, bending; /* of a measured fabric; warp 0: not a measured fabric */
-    double *node_mass;            /* (mesh.node_count) [kg] */
-    uint8_t *edge_clamped;        /* (mesh.edge_count) 1: both nodes are held by pins that clamp */
-    double velocity[3];           /* [m/s] at t = 0 */
+    double *material_mass;        /* (mesh.node_count) [kg] of the material alone */
+    double *node_mass;     /* (mesh.node_count) [kg] with the "masses" of the scene; material_mass itself
+                                     if there are none */
+    uint8_t *edge_clamped; /* (mesh.edge_count) 1: both nodes are held by pins that clamp */
+    double velocity[3];    /* [m/s] at t = 0 */
     int32_t first_node, first_triangle;
     const struct drape_term **laws; /* (law_count) */
     int law_count;
@@ -181,6 +183,7 @@ typedef struct drape_contact_def {
     double distance;             /* activation distance between cloth and collider [m] */
     bool distance_given;         /* by the scene */
     double stiffness;            /* scale of the contact pressure [Pa] */
+    bool stiffness_given;        /* by the scene */
     double friction_velocity;    /* sliding speed below which friction falls to zero [m/s] */
     double restitution_velocity; /* rate of a gap below which less energy than e says is dissipated [m/s] */
     bool lagged;                 /* friction uses the normal force and direction from the start of the step */
@@ -245,8 +248,8 @@ typedef struct drape_model_event {
 
 struct drape_model {
     const drape_model
-        *base;         /* the model that this one is without some of its pins, and whose arrays it shares
-                                except those that depend on the pins; NULL: it is its own */
+        *base;         /* the model that this one is with other pins and masses, and whose arrays it shares
+                                except those that depend on these; NULL: it is its own */
     drape_arena arena; /* holds everything below except the meshes */
     drape_context *ctx;
     int32_t cloth_count, term_count, node_count, triangle_count, edge_count;

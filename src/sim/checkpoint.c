@@ -195,18 +195,22 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
 }
 
 /* Read by create_restored. */
-static void write_pinned(drape_sim *sim, drape_archive *a)
+static void write_own(drape_sim *sim, drape_archive *a)
 {
-    bool any = sim->pinned != NULL;
-    drape_archive_bool(a, &any);
-    if (any)
-        drape_archive_bytes(a, sim->pinned, (size_t)sim->model->node_count);
+    const size_t nodes = (size_t)sim->model->node_count;
+    bool pins = sim->pinned != NULL, masses = sim->masses != NULL;
+    drape_archive_bool(a, &pins);
+    drape_archive_bool(a, &masses);
+    if (pins)
+        drape_archive_bytes(a, sim->pinned, nodes);
+    if (masses)
+        drape_archive_doubles(a, sim->masses, nodes);
 }
 
 void drape_sim_archive(drape_sim *sim, drape_archive *a)
 {
     if (!a->reading)
-        write_pinned(sim, a);
+        write_own(sim, a);
     drape_work_archive(&sim->earlier, a);
     archive_states(sim, a);
     drape_archive_doubles(a, sim->scratch, sizeof sim->scratch / sizeof *sim->scratch);
@@ -236,24 +240,44 @@ void drape_sim_exchange(drape_sim *sim, drape_sim *other)
     drape_system_copy_wind(sim->system, other->system);
 }
 
-/* A new sim with the pins that there were when the archive was written. */
-static drape_status create_restored(drape_sim *sim, drape_archive *a, drape_sim **out)
+/* Reads an array of one number per node, if there is one; NULL otherwise. */
+static void *read_own(drape_sim *sim, drape_archive *a, bool any, size_t size)
 {
     const size_t nodes = (size_t)sim->model->node_count;
-    bool any = false, flags = true;
-    drape_archive_bool(a, &any);
-    uint8_t *pinned = any && drape_archive_good(a) ? drape_alloc(sim->ctx, nodes, 1) : NULL;
-    if (any && !pinned)
+    void *own = any && drape_archive_good(a) ? drape_alloc(sim->ctx, nodes, size) : NULL;
+    if (any && !own)
         drape_archive_note(a, DRAPE_E_MEMORY);
-    if (pinned)
-        drape_archive_bytes(a, pinned, nodes);
-    for (size_t i = 0; pinned && i < nodes; i++)
-        flags = flags && pinned[i] <= 1;
-    if (drape_archive_good(a) && !flags)
+    if (own)
+        drape_archive_bytes(a, own, nodes * size);
+    return own;
+}
+
+static void check_own(drape_archive *a, size_t nodes, const uint8_t *pinned, const double *masses)
+{
+    bool flags = true, positive = true;
+    for (size_t i = 0; i < nodes && drape_archive_good(a); i++) {
+        flags = flags && (!pinned || pinned[i] <= 1);
+        positive = positive && (!masses || (masses[i] > 0 && isfinite(masses[i])));
+    }
+    if (!flags)
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a pin that is neither there nor not");
-    const drape_status status = drape_archive_good(a)
-                                    ? drape_sim_create_like(sim, drape_sim_base_model(sim), pinned, out)
-                                    : a->status;
+    if (!positive)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a node without mass");
+}
+
+/* A new sim with the pins and masses that there were when the archive was written. */
+static drape_status create_restored(drape_sim *sim, drape_archive *a, drape_sim **out)
+{
+    bool pins = false, weighed = false;
+    drape_archive_bool(a, &pins);
+    drape_archive_bool(a, &weighed);
+    uint8_t *pinned = read_own(sim, a, pins, sizeof *pinned);
+    double *masses = read_own(sim, a, weighed, sizeof *masses);
+    check_own(a, (size_t)sim->model->node_count, pinned, masses);
+    const drape_status status =
+        drape_archive_good(a) ? drape_sim_create_like(sim, drape_sim_base_model(sim), pinned, masses, out)
+                              : a->status;
+    drape_free(sim->ctx, masses);
     drape_free(sim->ctx, pinned);
     return status;
 }

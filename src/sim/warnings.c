@@ -37,8 +37,8 @@ static bool has_no_terms(drape_sim *sim, char *text, size_t size)
     if (bare == 0)
         return false;
     snprintf(text, size,
-             "/cloth/%d: %s has no \"terms\": nothing resists stretching or bending%s; `drape list terms` "
-             "shows them",
+             "/cloth/%d: %s has no \"terms\": nothing resists stretching or bending%s; stretch.cst and "
+             "bend.hinge do",
              first, m->cloths[first].name, bare > 1 ? ", as with other cloths of this scene" : "");
     return true;
 }

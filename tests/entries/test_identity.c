@@ -68,6 +68,13 @@ static const struct test_case {
     {"/cloth/0/pins/0/row", REFUSED, "/cloth/0/pins/0", "{'row': 2}"},
     {"/cloth/0/pins/0/box", REFUSED, "/cloth/0/pins/0", "{'box': [[0,0,-1], [0.2,1,1]]}"},
     {"/cloth/0/pins/0/track", REFUSED, NULL, "[[0, [0,0,0]], [1, [0,0.2,0]]]"},
+    {"/cloth/0/masses/0/nodes", SKIPPED, NULL, NULL}, /* as for pins: the masses count */
+    {"/cloth/0/masses/0/corner", SKIPPED, NULL, NULL},
+    {"/cloth/0/masses/0/edge", SKIPPED, NULL, NULL},
+    {"/cloth/0/masses/0/row", SKIPPED, NULL, NULL},
+    {"/cloth/0/masses/0/box", SKIPPED, NULL, NULL},
+    {"/cloth/0/masses/0/add", REFUSED, "/cloth/0/masses", "[{'nodes': [8], 'add': 0.01}]"},
+    {"/cloth/0/masses/0/mass", REFUSED, "/cloth/0/masses", "[{'edge': 'bottom', 'mass': 0.01}]"},
     {"/colliders/0/type", REFUSED, "/colliders/0", "{'type': 'plane', 'point': [0,0,-1], 'normal': [0,0,1]}"},
     {"/colliders/0/track", REFUSED, NULL, "[[0, [0,0,0]], [1, [0,0.1,0]]]"},
     {"/colliders/0/turns/0/time", REFUSED, "/colliders/0/turns",
