@@ -159,7 +159,7 @@ typedef struct drape_turn_key {
     double quaternion[4]; /* w x y z, of any length */
 } drape_turn_key;
 
-/* Nodes of one cloth that are held fixed or moved along a track. Exactly one of nodes, corner, edge, row (>=
+/* Nodes of one cloth that are held fixed, moved along a track, or carried by a collider. Exactly one of nodes, corner, edge, row (>=
  * 0) and has_box selects them; corner, edge and row apply to grids only. */
 typedef struct drape_pin_def {
     size_t struct_size;   /* set by drape_pin_def_init */
@@ -175,7 +175,11 @@ typedef struct drape_pin_def {
     size_t key_count;              /* length of track */
     bool clamp; /* edges between these nodes keep the direction of the sheet across them, for bending terms
                    that support it */
-    const char *name; /* for events, unique among the pins of the cloth; NULL: "pin0", "pin1" ... */
+    const char *name;   /* for events, unique among the pins of the cloth; NULL: "pin0", "pin1" ... */
+    const char *attach; /* name of the collider that carries the nodes: they ride on it from where they are
+                           at rest, as by drape_sim_attach at t = 0; not with a track. NULL: none */
+    int32_t triangle;   /* of a collider that deforms: the triangle that carries them, in the order of its
+                           file, from 0; -1: for each node the nearest one at t = 0 */
 } drape_pin_def;
 
 /* Nodes of one cloth with masses of their own: a weight in a hem, a button, a fabric of varying weight.
@@ -532,7 +536,8 @@ typedef struct drape_place_def {
     double rotate[4];         /* R: axis x y z and angle [degrees]; default: no rotation */
     double center[3];         /* [m] the point that R leaves where it is; default 0 */
     double translate[3];      /* [m]; default 0 */
-    const int32_t *cloths;    /* cloth_count numbers of cloths, which take their pins along */
+    const int32_t *cloths;    /* cloth_count numbers of cloths, which take their pins along, but see
+                                 drape_sim_attach */
     int32_t cloth_count;      /* length of cloths; default -1: all cloths */
     const int32_t *colliders; /* collider_count numbers of colliders */
     int32_t collider_count;   /* length of colliders; default -1: all colliders */
@@ -615,6 +620,37 @@ DRAPE_API drape_status drape_sim_unpin(drape_sim *sim, int32_t count, const int3
  * DRAPE_E_SOLVER, DRAPE_E_STOPPED. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_set_masses(drape_sim *sim, int32_t count, const int32_t *nodes,
                                             const double *masses);
+/* Nodes that a collider carries from now on, from where they are: pins that ride on a body which a track or a
+ * host moves, turns or deforms. On a rigid collider a node keeps its place in the collider's own coordinates.
+ * On one of the type animated_mesh it stays on a triangle: at the barycentric weights of its projection onto
+ * the triangle's plane and at its offset along the triangle's normal, both of which are kept; triangles (count)
+ * gives the triangles in the order of the file, NULL: the nearest one of each node. A node beside its triangle
+ * is carried by the plane. At any time within a step, and in any frame, the nodes are where the collider's
+ * motion has them, with its velocity there; kinks of its motion are theirs. They touch nothing that is pinned, as other
+ * pins do not; cloth around them touches the collider, so it is best to attach nodes outside of it by the contact
+ * distance or more, or to let the cloth `ignore` it.
+ *
+ * Free nodes are pinned, as by drape_sim_pin; all others stay pinned, and leave their track, path or collider.
+ * drape_sim_detach lets nodes go with the velocity of their collider, as drape_sim_unpin does; they must be carried
+ * by one. drape_sim_move_pins takes a node off its collider, too. drape_sim_attached returns the collider that
+ * carries a node; -1: none, or no such node.
+ *
+ * drape_sim_place: nodes whose cloth is placed together with the collider stay where they are on it. If one is
+ * placed without the other, they stay where they are in the cloth and ride on from there. A collider that is
+ * placed because it is sent faster than teleport_speed takes the cloth that rides on it along: as it goes
+ * itself, or, if the cloth has other pins, too, by the rigid motion that fits all of its pins best.
+ * A collider that is not enabled goes on carrying. drape_sim_change: nodes go on riding on the collider of the
+ * same name, from where they are; those that the scene attached, where the new scene does. If there is no such
+ * collider, they are held where they are. drape_sim_set_state: they must be where the collider has them at t.
+ *
+ * Attaching nodes that are pinned already allocates nothing unless contact needs more; otherwise both take what drape_sim_pin takes.
+ * Checkpoints keep what is attached. Must not be called by an observer. Errors, after which nothing has changed:
+ * those of drape_sim_pin; DRAPE_E_ARGUMENT (no such collider, node or triangle; triangles of a collider that is
+ * rigid; a node to detach that no collider carries). Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_attach(drape_sim *sim, int32_t collider, int32_t count, const int32_t *nodes,
+                                        const int32_t *triangles);
+DRAPE_API drape_status drape_sim_detach(drape_sim *sim, int32_t count, const int32_t *nodes);
+DRAPE_API int32_t drape_sim_attached(const drape_sim *sim, int32_t node);
 
 /* Pulls a free node towards target [m] by a spring of the given stiffness [N/m]. The force stiffness (target
  * - x) is part of the equations of every step from the next one on, and implicit if the integrator is. A
@@ -832,8 +868,8 @@ typedef struct drape_contact_point {
  * drape_sim_contact_forces and, with the other sign, of drape_sim_collider_force, whose remarks apply. A
  * force acts on the nodes by their weights, except between nearly parallel edges. With lagged friction, the
  * friction of a contact at the beginning of the last step is an entry of its own, with its gap and without
- * normal force. Errors: DRAPE_E_ARGUMENT (NULL, room < 0, an integrator without contact forces),
- * DRAPE_E_MEMORY. Thread-safety: as the sim. */
+ * normal force. The forces of nodes that a collider carries are not among them. Errors: DRAPE_E_ARGUMENT
+ * (NULL, room < 0, an integrator without contact forces), DRAPE_E_MEMORY. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_contacts(drape_sim *sim, int32_t room, drape_contact_point *contacts,
                                           int32_t *count);
 
@@ -875,7 +911,10 @@ DRAPE_API void drape_model_normals(const drape_model *model, const double *x, do
  * node's own mass. Damping laws that take rates from a step use the present velocities here.
  *
  * drape_sim_contact_forces: contact and friction on every node, with colliders and between layers of
- * cloth. drape_sim_collider_force: the total force of the cloth on one collider.
+ * cloth. drape_sim_collider_force: the total force of the cloth on one collider: contact and friction, and
+ * the reactions of the nodes that it carries (drape_sim_attach) with the other sign. These have the weight of
+ * the nodes, drape_sim_push and the wind on them, and what else touches them, but not the force that
+ * accelerates their masses: a body that is moved by this force has these masses, too.
  * drape_sim_collider_torque: the torque [N m] of these forces about a point of space [m] or, if that is
  * NULL, about the pivot of the collider (3), where it is now. Colliders have the mean velocity of the last
  * step, so call these before moving them on. Under "newton_k", which does not bring the residual of a step

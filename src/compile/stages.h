@@ -43,6 +43,9 @@ drape_status drape_compile_contact_stiffness(drape_model *model, const drape_sce
 /* Builds the colliders, after contact. */
 drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def);
 
+/* Finds where colliders carry pins, after both. */
+drape_status drape_compile_rides(drape_model *model, const drape_scene_def *def);
+
 /* Resolves which cloths touch which colliders and cloths, after these. */
 drape_status drape_compile_ignored(drape_model *model, const drape_scene_def *def);
 

@@ -204,6 +204,16 @@ typedef struct drape_pin {
     bool clamps;
 } drape_pin;
 
+/* Where a pin is on the collider that carries it, in that collider's own coordinates. */
+typedef struct drape_ride {
+    int32_t collider; /* -1: none carries it */
+    int32_t triangle; /* of a collider with frames; -1: the collider is rigid */
+    double own[3];    /* the point [m] or, on a triangle, the weights [1] of its corners */
+    double offset;    /* [m] from the plane of the triangle, along its normal */
+    bool given;       /* a host attached it; if not, the scene did */
+    double since;     /* [s] when a host attached it: there its velocity jumps; NaN: from the start */
+} drape_ride;
+
 /* Nodes that are joined, one by one. */
 typedef struct drape_model_seam {
     char *name;
@@ -265,10 +275,11 @@ struct drape_model {
     int32_t *free_of_node; /* (node_count) number among the free nodes, -1: pinned */
     int32_t *node_of_free; /* (free_count) */
     int32_t free_count;
-    int32_t *moved_node;  /* (moved_count) pinned nodes with a track */
+    int32_t *moved_node;  /* (moved_count) pinned nodes with a track or a ride */
     int32_t *moved_track; /* (moved_count) */
     int32_t moved_count, track_count;
-    drape_track *tracks;
+    drape_track *tracks;       /* of a pin that a collider carries, without keys */
+    drape_ride *ride;          /* (node_count) of pins that colliders carry; NULL: no pin of the scene */
     drape_collider *colliders; /* (collider_count) */
     int32_t collider_count;
     uint8_t

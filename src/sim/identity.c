@@ -137,7 +137,14 @@ static uint64_t add_nodes(uint64_t hash, const drape_model *m)
     hash = add_doubles(hash, m->edge_length, (size_t)m->edge_count);
     hash = add(hash, m->pinned, nodes);
     hash = add(hash, m->moved_node, (size_t)m->moved_count * sizeof *m->moved_node);
-    return add(hash, m->moved_track, (size_t)m->moved_count * sizeof *m->moved_track);
+    hash = add(hash, m->moved_track, (size_t)m->moved_count * sizeof *m->moved_track);
+    for (size_t i = 0; m->ride && i < nodes; i++) {
+        const int64_t on[] = {m->ride[i].collider, m->ride[i].triangle};
+        hash = add(hash, on, sizeof on);
+        hash = add_doubles(hash, m->ride[i].own, 3);
+        hash = add_doubles(hash, &m->ride[i].offset, 1);
+    }
+    return hash;
 }
 
 static uint64_t add_event(uint64_t hash, const drape_model_event *event)
