@@ -135,6 +135,26 @@ static void list_sheets(drape_untangler *u)
         u->hinge_length[h] = between(u->x, u->hinge + 2 * (size_t)h);
 }
 
+/* A tree for each cloth, and for each open collider. */
+static drape_status build_trees(drape_untangler *u)
+{
+    const drape_model *m = u->model;
+    const int32_t sheets = m->cloth_count + m->collider_count;
+    int32_t first = m->triangle_count;
+    u->tree = drape_arena_take(u->arena, (size_t)sheets, sizeof *u->tree);
+    drape_status status = drape_arena_status(u->arena);
+    for (int32_t i = 0; !status && i < sheets; i++) {
+        const bool cloth = i < m->cloth_count;
+        const int32_t c = i - m->cloth_count,
+                      count = cloth ? m->cloths[i].mesh.triangle_count
+                                    : u->open[c] ? m->colliders[c].shape.triangle_count : 0,
+                      from = cloth ? m->cloths[i].first_triangle : first;
+        status = drape_bvh_build(u->arena, count, 3, u->sheets.triangle + 3 * (size_t)from, u->x, &u->tree[i]);
+        first += cloth ? 0 : count;
+    }
+    return status;
+}
+
 /* ---- Bodies ---- */
 
 static drape_status place_bodies(drape_untangler *u, const drape_motion *motion, double t)
@@ -215,7 +235,7 @@ static drape_status set_up(drape_untangler *u, const drape_motion *motion, doubl
         return status;
     list_sheets(u);
     set_rounding(u);
-    return DRAPE_OK;
+    return build_trees(u);
 }
 
 void drape_untangle_bound(drape_untangler *u, const drape_half_space *bound)
@@ -238,6 +258,9 @@ static drape_status look(drape_untangler *u)
     u->least_share = u->least_wanted = INFINITY;
     memset(u->passes, 0, (size_t)u->broad.points * sizeof *u->passes);
     memcpy(u->start, u->x, 3 * (size_t)u->broad.points * sizeof *u->x);
+    for (int32_t i = 0; i < u->model->cloth_count + u->model->collider_count; i++)
+        if (u->tree[i].count > 0)
+            drape_bvh_fit(&u->tree[i], u->x);
     drape_status status = drape_untangle_contours(u);
     if (!status)
         status = drape_untangle_bodies(u);

@@ -5,6 +5,7 @@
  */
 #include "contact/untangle_parts.h"
 
+#include "base/elementary.h"
 #include "base/vec3.h"
 #include "geometry/intersect.h"
 
@@ -12,6 +13,8 @@
 
 #define ACROSS 6    /* parts of a side of a face: 28 points of it are tested */
 #define TOUCH  1e-9 /* [m] a point less deep than this is not inside */
+#define TURN   6.283185307179586
+#define DIRECTIONS 24 /* in which a face is searched around an edge that passes through it */
 
 static double distance_at(const drape_untangler *u, int32_t collider, const double *x, double n[3])
 {
@@ -174,6 +177,38 @@ static void weights_at(const drape_untangler *u, const int32_t *node, const doub
         weight[a] = -closest.c[a + 1];
 }
 
+/* From a point where an edge of the collider passes through a face to the deepest point of the face around it:
+ * what is inside there is a wedge of any direction. */
+static void deepen(const drape_untangler *u, int32_t collider, const int32_t *node, double weight[3])
+{
+    double x[3], v[3], w[3], n[3];
+    point_of(u, node, weight, x);
+    vec3_sub(u->x + 3 * (size_t)node[1], u->x + 3 * (size_t)node[0], v);
+    vec3_sub(u->x + 3 * (size_t)node[2], u->x + 3 * (size_t)node[0], w);
+    vec3_cross(v, w, n);
+    vec3_cross(n, v, w); /* v and w are perpendicular now, in the plane of the face */
+    const double longest = longest_edge(u, node), along = vec3_norm(v), across = vec3_norm(w);
+    if (!(along > 0 && across > 0))
+        return;
+    double d = distance_at(u, collider, x, NULL);
+    for (double radius = 0.25 * longest; radius > 1e-4 * longest; radius /= 2)
+        for (int k = 0; k < DIRECTIONS; k++) {
+            double sine, cosine, other[3], there[3];
+            drape_sin_cos(k * (TURN / DIRECTIONS), &sine, &cosine);
+            memcpy(there, x, sizeof there);
+            vec3_add_scaled(radius * cosine / along, v, there);
+            vec3_add_scaled(radius * sine / across, w, there);
+            weights_at(u, node, there, other);
+            point_of(u, node, other, there);
+            const double deep = distance_at(u, collider, there, NULL);
+            if (!(deep < d))
+                continue;
+            d = deep;
+            memcpy(weight, other, sizeof other);
+            memcpy(x, there, sizeof there);
+        }
+}
+
 static drape_status push_pierced(drape_untangler *u, int32_t collider)
 {
     const drape_model *m = u->model;
@@ -195,6 +230,7 @@ static drape_status push_pierced(drape_untangler *u, int32_t collider)
         for (int k = 0; k < 3; k++)
             at[k] = p.sum[3 * (size_t)f + (size_t)k] / p.number[f];
         weights_at(u, node, at, weight);
+        deepen(u, collider, node, weight);
         push_point(u, collider, node, weight);
     }
     drape_arena_free(&arena);

@@ -9,6 +9,7 @@
 #include "base/vec3.h"
 #include "contact/list.h"
 #include "geometry/intersect.h"
+#include "geometry/orient.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -174,46 +175,100 @@ typedef struct curve {
     int32_t count;
 } curve;
 
-/* Colours the nodes of the sheet of a trace: two nodes of an edge have different colours if the curve passes
- * through the edge an odd number of times. Returns whether that is possible: the trace then cuts its sheet in
- * two. price: how much it costs to move each part. */
-static bool colour(drape_untangler *u, const curve *k, int trace, double price[2])
+/* Marks the edges of a trace; of them, blocked ones are those that the curve passes through an odd number of
+ * times. Returns whether it has any that are of cloth. */
+static bool mark(drape_untangler *u, const curve *k, int trace)
 {
-    const drape_sheets *s = &u->sheets;
-    int32_t count = 0, seed = -1;
-    bool cuts = true;
+    bool any = false;
     memset(u->colour, -1, (size_t)u->broad.points * sizeof *u->colour);
     for (int32_t i = 0; i < k->count; i++) {
         const drape_crossing *c = &u->crossing[k->crossing[i]];
-        if (c->trace != trace)
+        if (c->trace != trace || c->edge >= u->model->edge_count)
             continue;
         u->block[c->edge]++;
-        seed = seed < 0 ? s->edge[2 * (size_t)c->edge] : seed;
+        any = true;
     }
-    price[0] = price[1] = 0;
-    if (seed >= 0 && seed < u->model->node_count) {
-        u->colour[seed] = 0;
-        u->queue[count++] = seed;
-    }
-    cuts = count > 0;
-    for (int32_t i = 0; cuts && i < count; i++) {
-        const int32_t node = u->queue[i];
-        const int8_t own = u->colour[node];
-        price[own] += u->broad.node_area[node] + (u->mobility[node] > 0 ? 0 : PIN_PRICE * u->area);
-        for (int32_t a = s->first[node]; cuts && a < s->first[node + 1]; a++) {
-            const int32_t e = s->around[a], *ends = s->edge + 2 * (size_t)e,
-                          other = ends[0] == node ? ends[1] : ends[0];
-            const int8_t wanted = (int8_t)(own ^ (u->block[e] & 1));
-            if (u->colour[other] < 0) {
-                u->colour[other] = wanted;
-                u->queue[count++] = other;
-            }
-            cuts = u->colour[other] == wanted;
-        }
-    }
+    return any;
+}
+
+static void unmark(drape_untangler *u, const curve *k)
+{
     for (int32_t i = 0; i < k->count; i++)
         u->block[u->crossing[k->crossing[i]].edge] = 0;
-    return cuts && price[0] > 0 && price[1] > 0;
+}
+
+/* How much it costs to move a node. */
+static double price_of(const drape_untangler *u, int32_t node)
+{
+    return u->broad.node_area[node] + (u->mobility[node] > 0 ? 0 : PIN_PRICE * u->area);
+}
+
+/* Spreads colours from the first `count` nodes of the queue to all others that edges lead to; through a
+ * blocked edge the other colour. Returns whether they agree everywhere. */
+static bool spread(drape_untangler *u, int32_t count, bool through, double price[2])
+{
+    const drape_sheets *s = &u->sheets;
+    bool agree = true;
+    price[0] = price[1] = 0;
+    for (int32_t i = 0; agree && i < count; i++) {
+        const int32_t node = u->queue[i];
+        const int8_t own = u->colour[node];
+        price[own] += price_of(u, node);
+        for (int32_t a = s->first[node]; agree && a < s->first[node + 1]; a++) {
+            const int32_t e = s->around[a], *ends = s->edge + 2 * (size_t)e,
+                          other = ends[0] == node ? ends[1] : ends[0];
+            const bool blocked = u->block[e] & 1;
+            if (u->colour[other] < 0 && (through || !blocked)) {
+                u->colour[other] = (int8_t)(own ^ blocked);
+                u->queue[count++] = other;
+            }
+            agree = !through || u->colour[other] == (own ^ blocked);
+        }
+    }
+    return agree && price[0] > 0 && price[1] > 0;
+}
+
+/* Colours the nodes of the sheet of a trace that cuts it in two: two nodes of an edge have different colours
+ * if the edge is blocked. Returns whether that is possible. */
+static bool colour_cut(drape_untangler *u, const curve *k, int trace, double price[2])
+{
+    bool cuts = mark(u, k, trace);
+    for (int32_t i = 0; cuts && i < k->count; i++) {
+        const drape_crossing *c = &u->crossing[k->crossing[i]];
+        if (c->trace != trace)
+            continue;
+        u->queue[0] = u->sheets.edge[2 * (size_t)c->edge];
+        u->colour[u->queue[0]] = 0;
+        cuts = spread(u, 1, true, price);
+        break;
+    }
+    unmark(u, k);
+    return cuts;
+}
+
+/* Colours the nodes of the sheet of a trace that ends inside of it: as that end of a blocked edge which is
+ * nearest along edges, 1 on that side of the other sheet to which its normals point. The border between both
+ * colours so goes on from the end of the curve to the boundary. */
+static bool colour_near(drape_untangler *u, const curve *k, int trace, double price[2])
+{
+    const drape_sheets *s = &u->sheets;
+    int32_t count = 0;
+    bool any = mark(u, k, trace);
+    for (int32_t i = 0; any && i < k->count; i++) {
+        const drape_crossing *c = &u->crossing[k->crossing[i]];
+        const int32_t *corner = s->triangle + 3 * (size_t)c->triangle;
+        for (int a = 0; c->trace == trace && (u->block[c->edge] & 1) && a < 2; a++) {
+            const int32_t node = s->edge[2 * (size_t)c->edge + (size_t)a];
+            if (u->colour[node] >= 0)
+                continue;
+            u->colour[node] = drape_orient(u->x + 3 * (size_t)corner[0], u->x + 3 * (size_t)corner[1],
+                                           u->x + 3 * (size_t)corner[2], u->x + 3 * (size_t)node) > 0;
+            u->queue[count++] = node;
+        }
+    }
+    any = any && spread(u, count, false, price);
+    unmark(u, k);
+    return any;
 }
 
 /* ---- A part on the wrong side ---- */
@@ -261,8 +316,9 @@ static double wanted_between(const drape_untangler *u, int32_t sheet, int32_t ot
            drape_untangle_wanted(u, u->broad.distance[most - cloths]);
 }
 
-/* The nodes of a triangle that are on the wrong side pass the other triangle, at a point of the curve. */
-static void pass(drape_untangler *u, int32_t triangle, int32_t other, int8_t wrong, const double at[3])
+/* The nodes of a triangle that are on the wrong side pass the other triangle, at a point of the curve. Returns
+ * the side of that which is right: 1 if its normal points there, -1 if not, 0 if this pair does not tell. */
+static int pass(drape_untangler *u, int32_t triangle, int32_t other, int8_t wrong, const double at[3])
 {
     const int32_t *node = u->sheets.triangle + 3 * (size_t)triangle,
                   *corner = u->sheets.triangle + 3 * (size_t)other;
@@ -278,7 +334,7 @@ static void pass(drape_untangler *u, int32_t triangle, int32_t other, int8_t wro
         number[u->colour[node[a]] == wrong]++;
     }
     if (number[0] == 0 || number[1] == 0)
-        return;
+        return 0;
     const double side = sum[0] / number[0] >= sum[1] / number[1] ? 1 : -1;
     const double wanted = wanted_between(u, u->sheets.of_point[node[0]], u->sheets.of_point[corner[0]]);
     for (int a = 0; a < 3; a++) {
@@ -291,11 +347,59 @@ static void pass(drape_untangler *u, int32_t triangle, int32_t other, int8_t wro
             .bound = wanted};
         drape_untangle_bound(u, &bound);
     }
+    return side > 0 ? 1 : -1;
+}
+
+static bool is_boundary(const drape_sheets *s, int32_t a, int32_t b)
+{
+    for (int32_t k = s->first[a]; k < s->first[a + 1]; k++) {
+        const int32_t *ends = s->edge + 2 * (size_t)s->around[k];
+        if (ends[0] == b || ends[1] == b)
+            return s->edge_triangle[2 * (size_t)s->around[k] + 1] < 0;
+    }
+    return false;
+}
+
+/* Whether a place on a triangle is on the boundary of its sheet. */
+static bool is_at_boundary(const drape_sheets *s, const int32_t *corner, const double weight[3])
+{
+    for (int a = 0; a < 3; a++)
+        if (weight[a] <= 0 && is_boundary(s, corner[(a + 1) % 3], corner[(a + 2) % 3]))
+            return true;
+    return false;
+}
+
+/* A node of a part on the wrong side, away from the curve, goes towards the place of the other sheet that is
+ * nearest to it, as far as a sweep goes: so the part turns as a whole and is not pulled along by its edge. */
+static void follow_part(drape_untangler *u, int32_t node, int32_t sheet, int side)
+{
+    const drape_bvh *tree = &u->tree[sheet];
+    const double *x = u->x + 3 * (size_t)node;
+    const drape_on_triangle place = drape_nearest_on(tree, u->x, x, INFINITY);
+    double n[3], d[3];
+    if (place.triangle < 0)
+        return;
+    const int32_t *corner = tree->node + 3 * (size_t)place.triangle;
+    if (is_at_boundary(&u->sheets, corner, place.weights))
+        return;
+    drape_triangle_normal(corner, u->x, n);
+    memcpy(d, x, sizeof d);
+    for (int a = 0; a < 3; a++)
+        vec3_add_scaled(-place.weights[a], u->x + 3 * (size_t)corner[a], d);
+    const double height = side * vec3_dot(n, d);
+    if (height >= 0)
+        return;
+    const drape_half_space bound = {
+        .node = {node, corner[0], corner[1], corner[2]},
+        .c = {1, -place.weights[0], -place.weights[1], -place.weights[2]},
+        .normal = {side * n[0], side * n[1], side * n[2]},
+        .bound = fmin(wanted_between(u, u->sheets.of_point[node], sheet), height + drape_untangle_stride(u))};
+    drape_untangle_bound(u, &bound);
 }
 
 /* All nodes of the wrong part may be near the other sheet on its wrong side; of a sheet that passes through
  * itself, only those next to the curve, since the others are near right parts of it. */
-static void let_pass(drape_untangler *u, const curve *k, int trace, int8_t wrong, int32_t sheet)
+static void let_pass(drape_untangler *u, const curve *k, int trace, int8_t wrong, int32_t sheet, int side)
 {
     const drape_sheets *s = &u->sheets;
     int32_t count = 0, ring = 0, end;
@@ -316,6 +420,8 @@ static void let_pass(drape_untangler *u, const curve *k, int trace, int8_t wrong
         ring += i == end;
         end = i == end ? count : end;
         drape_untangle_add_passage(u, node, sheet);
+        if (!itself && side != 0)
+            follow_part(u, node, sheet, side);
         for (int32_t a = s->first[node]; !(itself && ring + 1 >= RINGS) && a < s->first[node + 1]; a++) {
             const int32_t *ends = s->edge + 2 * (size_t)s->around[a], other = ends[0] == node ? ends[1] : ends[0];
             if (u->colour[other] != wrong)
@@ -332,7 +438,7 @@ static void let_pass(drape_untangler *u, const curve *k, int trace, int8_t wrong
 static void pass_all(drape_untangler *u, const curve *k, int trace, int8_t wrong)
 {
     const int32_t contour = u->crossing[k->crossing[0]].contour;
-    int32_t sheet = -1;
+    int32_t sheet = -1, sum = 0, number = 0;
     for (int32_t first = 0, end; first < u->record_count; first = end) {
         const drape_crossing_record *r = &u->record[first];
         double at[3] = {0};
@@ -344,9 +450,12 @@ static void pass_all(drape_untangler *u, const curve *k, int trace, int8_t wrong
             at[a] /= end - first;
         const int mover = side_of_first(u, r) == trace ? 0 : 1;
         sheet = u->sheets.of_point[u->sheets.triangle[3 * (size_t)r->triangle[1 - mover]]];
-        pass(u, r->triangle[mover], r->triangle[1 - mover], wrong, at);
+        const int side = pass(u, r->triangle[mover], r->triangle[1 - mover], wrong, at);
+        sum += side;
+        number += side != 0;
     }
-    let_pass(u, k, trace, wrong, sheet);
+    const bool same = 4 * (sum < 0 ? -sum : sum) >= 3 * number;
+    let_pass(u, k, trace, wrong, sheet, !same ? 0 : sum > 0 ? 1 : sum < 0 ? -1 : 0);
 }
 
 /* ---- A curve that cuts nothing off ---- */
@@ -427,25 +536,30 @@ static void shorten(drape_untangler *u, const curve *k)
 
 /* ---- All curves ---- */
 
+/* The ways of colouring a trace, the safest first. */
+static bool (*const colourings[])(drape_untangler *, const curve *, int, double[2]) = {colour_cut, colour_near};
+
 static void treat(drape_untangler *u, const curve *k)
 {
     double price[2], best = INFINITY;
     int trace = -1;
     int8_t wrong = 0;
-    for (int i = 0; i < 2; i++)
-        if (colour(u, k, i, price))
-            for (int8_t c = 0; c < 2; c++)
-                if (price[c] < best) {
-                    best = price[c];
-                    trace = i;
-                    wrong = c;
-                }
-    if (trace < 0) {
-        shorten(u, k);
-        return;
+    for (size_t way = 0; trace < 0 && way < sizeof colourings / sizeof *colourings; way++) {
+        for (int i = 0; i < 2; i++)
+            if (colourings[way](u, k, i, price))
+                for (int8_t c = 0; c < 2; c++)
+                    if (price[c] < best) {
+                        best = price[c];
+                        trace = i;
+                        wrong = c;
+                    }
+        if (trace < 0)
+            continue;
+        colourings[way](u, k, trace, price);
+        pass_all(u, k, trace, wrong);
     }
-    colour(u, k, trace, price);
-    pass_all(u, k, trace, wrong);
+    if (trace < 0)
+        shorten(u, k);
 }
 
 drape_status drape_untangle_contours(drape_untangler *u)

@@ -10,6 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define REACH 1.2 /* strides beyond the wanted gap within which pairs are kept apart */
+
 /* ---- Passages ---- */
 
 static int compare_passages(const void *a, const void *b)
@@ -148,7 +150,7 @@ drape_status drape_untangle_gaps(drape_untangler *u)
 {
     gathering g = {.u = u,
                    .rest = {.model = u->model, .x = u->broad.rest, .pose = u->pose},
-                   .reach = 2 * drape_untangle_stride(u)};
+                   .reach = REACH * drape_untangle_stride(u)};
     const drape_broad_query want = {.x = u->x, .reach = g.reach};
     drape_broad_phase_pairs(&u->broad, &want, consider, &g);
     return u->out_of_memory ? DRAPE_E_MEMORY : DRAPE_OK;

@@ -9,6 +9,7 @@
 
 #include "contact/broad_phase.h"
 #include "contact/untangle.h"
+#include "geometry/nearest.h"
 
 /* The surfaces that have no inside: the cloths, and open colliders, which do not move. Points are those of
  * the broad phase. */
@@ -62,6 +63,7 @@ typedef struct drape_untangler {
     bool *open;                   /* (collider_count) it has no inside */
     double (*box)[2][3];          /* (collider_count) around the points of those with triangles */
     drape_sheets sheets;
+    drape_bvh *tree;              /* (cloths, and colliders) of the triangles of each sheet, fitted to x */
     double mean_edge, area;       /* [m], [m2] of all cloth */
     double *x;                    /* (points x 3) present positions */
     double *start;                /* (points x 3) at the beginning of the sweep */
