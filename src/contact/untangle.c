@@ -14,7 +14,10 @@
 
 #define ROUNDING (1e4 * DBL_EPSILON) /* as in contact.c: of the largest coordinate */
 #define ENOUGH   0.5 /* of the wanted gap: with which a sheet is clear */
-#define POLISH   30  /* sweeps for gaps, once nothing passes through */
+#define STRAIN   1e-3 /* with which a cloth is left as it is once it is clear */
+#define LESS     0.05 /* of the strain: by which a sweep that is worth it lessens it */
+#define POLISH   6    /* sweeps without such a gain that end it, once it is clear */
+#define PATIENCE 30   /* the same while gaps are too small */
 
 /* ---- Topology ---- */
 
@@ -268,49 +271,76 @@ static drape_status look(drape_untangler *u)
     return status ? status : drape_untangle_gaps(u);
 }
 
-static drape_untangle_outcome outcome_of(const drape_untangler *u, int sweeps)
+/* The largest change of the length of an edge. */
+static double strain_of(const drape_untangler *u)
 {
-    return (drape_untangle_outcome){.sweeps = sweeps,
-                                    .crossings = u->crossing_count,
-                                    .sunk = u->sunk_count,
-                                    .least_share = u->least_share};
+    double strain = 0;
+    for (int32_t e = 0; e < u->model->edge_count; e++)
+        if (u->length[e] > 0)
+            strain = fmax(strain, fabs(between(u->x, u->model->edge + 2 * (size_t)e) / u->length[e] - 1));
+    return strain;
 }
 
-/* Fewer crossings are better, and then larger gaps. */
-static bool is_better(const drape_untangle_outcome *a, const drape_untangle_outcome *b)
+/* What was reached in a sweep. Fewer crossings are better; then gaps of at least a part of the wanted ones, or
+ * larger ones; then less strain. */
+typedef struct rank {
+    int64_t crossings;
+    double gap, strain;
+} rank;
+
+static rank rank_of(const drape_untangler *u)
 {
-    const int64_t here = a->crossings + a->sunk, there = b->crossings + b->sunk;
-    return here != there ? here < there : a->least_share > b->least_share;
+    return (rank){u->crossing_count + u->sunk_count, fmin(u->least_wanted, ENOUGH), strain_of(u)};
 }
 
-static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, drape_untangle_outcome *best)
+static bool is_better(const rank *a, const rank *b)
 {
-    int clear = 0; /* sweeps in which nothing passed through */
-    double before = INFINITY;
+    if (a->crossings != b->crossings)
+        return a->crossings < b->crossings;
+    return a->gap != b->gap ? a->gap > b->gap : a->strain < b->strain;
+}
+
+static void keep(drape_untangler *u, int sweep, drape_untangle_outcome *outcome)
+{
+    outcome->sweeps = sweep;
+    outcome->crossings = u->crossing_count;
+    outcome->sunk = u->sunk_count;
+    outcome->least_share = u->least_share;
+    memcpy(u->best, u->x, 3 * (size_t)u->broad.points * sizeof *u->x);
+}
+
+/* Sweeps until nothing passes through anything, then for gaps, and then as long as there is strain that gets
+ * less. */
+static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, drape_untangle_outcome *outcome)
+{
+    rank best = {0};
+    int since = 0; /* sweeps since the best one */
     for (int i = 0;; i++) {
         if ((cancel && atomic_load(cancel)) || drape_check_cancel(u->ctx))
             return DRAPE_E_STOPPED;
         const drape_status status = look(u);
         if (status)
             return status;
-        const drape_untangle_outcome here = outcome_of(u, i);
-        before = i == 0 ? here.least_share : before;
-        if (i == 0 || is_better(&here, best)) {
-            *best = here;
-            best->least_share_before = before;
-            memcpy(u->best, u->x, 3 * (size_t)u->broad.points * sizeof *u->x);
+        const rank here = rank_of(u);
+        const double gain = best.strain - here.strain;
+        const bool better = i == 0 || is_better(&here, &best);
+        if (i == 0)
+            outcome->least_share_before = u->least_share;
+        since = better && (i == 0 || here.crossings < best.crossings || here.gap > best.gap ||
+                           gain > LESS * best.strain)
+                    ? 0
+                    : since + 1;
+        if (better) {
+            best = here;
+            keep(u, i, outcome);
         }
-        clear += here.crossings + here.sunk == 0;
-        if (i == 0 && drape_untangle_is_clear(&here))
-            break;
-        if (here.crossings + here.sunk == 0 && (u->least_wanted >= ENOUGH || clear > POLISH))
-            break;
-        best->sweeps = i;
-        if (i == u->def->sweeps)
-            break;
+        const bool clear = best.crossings == 0 && best.gap >= ENOUGH;
+        if ((i == 0 && drape_untangle_is_clear(outcome)) || i == u->def->sweeps ||
+            (clear && (best.strain <= STRAIN || since >= POLISH)) ||
+            (best.crossings == 0 && since >= PATIENCE))
+            return DRAPE_OK;
         drape_untangle_project(u);
     }
-    return DRAPE_OK;
 }
 
 drape_status drape_untangle(drape_context *ctx, const drape_motion *motion, double t,

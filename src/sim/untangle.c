@@ -121,7 +121,8 @@ static void report_moves(drape_sim *sim, const double *x, drape_untangling *u)
         double now[3], then[3];
         vec3_sub(x + b, x + a, now);
         vec3_sub(before + b, before + a, then);
-        u->strain = fmax(u->strain, fabs(vec3_norm(now) / vec3_norm(then) - 1));
+        if (vec3_norm(then) > 0)
+            u->strain = fmax(u->strain, fabs(vec3_norm(now) / vec3_norm(then) - 1));
     }
 }
 
