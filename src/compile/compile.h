@@ -18,13 +18,17 @@ enum {
     DRAPE_CONTACT_PARAM_COUNT
 };
 enum { DRAPE_SELF_THICKNESS, DRAPE_SELF_FRICTION, DRAPE_SELF_RESTITUTION, DRAPE_SELF_PARAM_COUNT };
+enum { DRAPE_UNTANGLE_SWEEPS, DRAPE_UNTANGLE_GAP, DRAPE_UNTANGLE_ON_FAILURE, DRAPE_UNTANGLE_PARAM_COUNT };
+extern const drape_param drape_untangle_params[DRAPE_UNTANGLE_PARAM_COUNT];
 extern const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT];
 extern const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT];
 
 /* Parameter lists that offer no choice of an implementation, as tables of one entry each. */
-extern const drape_registry drape_material_registry, drape_contact_registry, drape_self_contact_registry;
+extern const drape_registry drape_material_registry, drape_contact_registry, drape_self_contact_registry,
+    drape_untangle_registry;
 
 void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_CONTACT_PARAM_COUNT]);
+void drape_untangle_values(const drape_model_untangle *untangle, double values[DRAPE_UNTANGLE_PARAM_COUNT]);
 void drape_self_contact_values(const drape_contact_def *contact, double values[DRAPE_SELF_PARAM_COUNT]);
 
 /* Converts a host's def of this or an older version to this version. Data that are not the host's live in the

@@ -195,6 +195,16 @@ typedef struct drape_contact_def {
     double relaxed_pressure;     /* with which relaxed cloth is pushed out of them [Pa] */
 } drape_contact_def;
 
+/* Whether the start of a run is untangled, and how (contact/untangle.h). */
+#define DRAPE_UNTANGLE_DEFAULT_SWEEPS 400
+#define DRAPE_UNTANGLE_DEFAULT_GAP    0.5
+typedef struct drape_model_untangle {
+    bool given;    /* by the scene */
+    int sweeps;    /* at most */
+    double gap;    /* wanted at the end, in activation distances */
+    bool goes_on;  /* a run whose cloth did not come apart */
+} drape_model_untangle;
+
 /* Nodes of one cloth that one item of its "pins" holds. */
 typedef struct drape_pin {
     char *name;
@@ -288,6 +298,8 @@ struct drape_model {
     int32_t *cloth_of_node; /* (node_count); NULL if `ignored` is */
     drape_contact_def contact;
     drape_choice contact_choice, self_choice; /* the settings of the scene */
+    drape_model_untangle untangle;
+    drape_choice untangle_choice;
     int64_t internal_count, measure_count;
     bool has_laws;        /* some term needs the rates of measures */
     bool has_dissipation; /* some term dissipates energy */

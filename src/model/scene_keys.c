@@ -219,11 +219,13 @@ const drape_scene_object drape_form_collider = {
     .least_size = offsetof(drape_collider_def, track),
 };
 
-/* All members of these two are settings. */
+/* All members of these are settings. */
 static const drape_scene_object self_contact = {.name = "self_contact",
                                                 SETTINGS(drape_scene_def, self_contact, self_contact_count)};
 static const drape_scene_object contact = {.name = "contact",
                                            SETTINGS(drape_scene_def, contact, contact_count)};
+static const drape_scene_object untangle = {.name = "untangle",
+                                            SETTINGS(drape_scene_def, untangle, untangle_count)};
 
 /* ---- Events ---- */
 
@@ -325,6 +327,9 @@ static const drape_scene_key scene_keys[] = {
      .optional = true, .child = &self_contact},
     {SHAPED(DRAPE_SCENE_OBJECT, "contact", UNSAID, "settings of contact with colliders and between layers"),
      .child = &contact},
+    {SHAPED(DRAPE_SCENE_OBJECT, "untangle", DRAPE_DERIVED("none: what begins through each other stays so"),
+            "cloth that begins through cloth or colliders is taken apart before the first step"),
+     .optional = true, .child = &untangle},
     {SHAPED(DRAPE_SCENE_OBJECT, "integrator", UNSAID, "method and its settings"),
      IN(drape_scene_def, integrator), .child = &integrator},
     {SHAPED(DRAPE_SCENE_OBJECT, "controller", UNSAID, "step controller and its settings"),

@@ -194,6 +194,29 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
         sim->chosen.integrator->set_effort(sim->integrator, m->effort);
 }
 
+static void archive_untangling(drape_sim *sim, drape_archive *a)
+{
+    drape_untangling *u = &sim->untangling;
+    double *const numbers[] = {&u->time,         &u->least_gap_before, &u->least_gap,
+                               &u->displacement, &u->strain,           &u->seconds};
+    int32_t *const counts[] = {&u->inside_before, &u->inside, &u->node, &u->cloths};
+    drape_archive_mark(a, "untangling");
+    drape_archive_bool(a, &sim->untangle_due);
+    drape_archive_bool(a, &sim->untangled);
+    drape_archive_bool(a, &u->clear);
+    drape_archive_int(a, &u->sweeps);
+    drape_archive_int64(a, &u->pairs_before);
+    drape_archive_int64(a, &u->pairs);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        drape_archive_double(a, numbers[i]);
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
+        drape_archive_int32(a, counts[i]);
+    drape_archive_doubles(a, sim->untangled_move, (size_t)sim->model->cloth_count);
+    if (drape_archive_good(a) && !is_place(u->node, -1, sim->model->node_count))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an untangled node %d of %d", (int)u->node,
+                           (int)sim->model->node_count);
+}
+
 /* Read by create_restored. */
 static void write_own(drape_sim *sim, drape_archive *a)
 {
@@ -219,6 +242,7 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
     archive_statistics(sim, a);
     archive_relaxed_logged(sim, a);
     archive_realtime(sim, a);
+    archive_untangling(sim, a);
     drape_events_archive(sim, a);
     drape_system_archive(sim->system, a);
     drape_archive_mark(a, "integrator");

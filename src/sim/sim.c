@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "base/def.h"
 #include "compile/compile.h"
+#include "sim/untangle.h"
 
 #include <math.h>
 #include <string.h>
@@ -58,6 +59,8 @@ static drape_status create_states(drape_sim *sim)
     sim->query_scratch = drape_arena_take(sim->arena, n, sizeof *sim->query_scratch);
     sim->relaxed_logged =
         drape_arena_take(sim->arena, (size_t)sim->model->collider_count + 1, sizeof *sim->relaxed_logged);
+    sim->untangled_move =
+        drape_arena_take(sim->arena, (size_t)sim->model->cloth_count, sizeof *sim->untangled_move);
     sim->state_bytes = sizeof *sim + sim->arena->bytes;
     return drape_arena_status(sim->arena);
 }
@@ -207,6 +210,8 @@ drape_status drape_sim_create_like(const drape_sim *like, const drape_model *mod
         status = start_sim(*out, drape_pool_threads(drape_system_pool(like->system)));
         if (!status)
             status = drape_events_copy(*out, like);
+        if (!status)
+            drape_sim_copy_untangling(*out, like);
     }
     if (status)
         drape_sim_destroy(out);
@@ -236,6 +241,7 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
         drape_sim_destroy(out);
         return status;
     }
+    (*out)->untangle_due = model->untangle.given;
     drape_sim_reset_energy(*out);
     (*out)->statistics.wall_setup = drape_clock_seconds() - start;
     return DRAPE_OK;

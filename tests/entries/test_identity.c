@@ -23,7 +23,7 @@ static const char base[] =
     " 'seams': [{'type': 'stitch', 'a': {'cloth': 'sewn', 'nodes': [0, 1]},"
     "            'b': {'cloth': 'sewn', 'nodes': [2, 3]}}],"
     " 'colliders': [{'name': 'ball', 'type': 'sphere', 'center': [0,0,-1], 'radius': 0.1}],"
-    " 'self_contact': {'thickness': 0.001}, 'duration': 1}";
+    " 'self_contact': {'thickness': 0.001}, 'untangle': {}, 'duration': 1}";
 
 typedef enum outcome {
     REFUSED, /* the value affects results: the checkpoint must be refused */
@@ -255,6 +255,7 @@ START_TEST(every_key_that_affects_results_is_in_the_identity)
     try_settings(&t, &drape_material_registry, "/cloth/0/material");
     try_settings(&t, &drape_contact_registry, "/contact");
     try_settings(&t, &drape_self_contact_registry, "/self_contact");
+    try_settings(&t, &drape_untangle_registry, "/untangle");
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         ck_assert_msg(t.used[i], "%s is in `cases` and not a key", cases[i].key);
     printf("# %d changes\n", t.count);
