@@ -143,6 +143,14 @@ def test_one_file():
     assert page.count("throw Error(") == block(page, "run").count("throw Error(") == 1
 
 
+def test_names():
+    """no function or constant of one script replaces that of another: all share one scope"""
+    make_run()
+    good("report", "out")
+    names = re.findall(r"^(?:function|const|class) +(\w+)", read("out/report.html"), re.M)
+    assert "Player" in names and len(set(names)) == len(names), sorted(names)
+
+
 def test_small():
     """with less room, frames are left out evenly; the first and the last are kept"""
     make_run("--frame-rate", "4000", "--duration", "0.5")
