@@ -13,7 +13,7 @@ function solid(positions, normals, corners, bounded = true) {
 }
 
 // A surface of revolution; the profile is a list of [distance from the axis, place along it, normal in these directions].
-function turned(base, axis, profile) {
+function revolved(base, axis, profile) {
   const sides = 64, u = across(axis), v = cross(axis, u), positions = [], normals = [], corners = [];
   for (let i = 0; i <= sides; i++) {
     const angle = 2 * Math.PI * i / sides;
@@ -54,14 +54,14 @@ function rotation(turn) {
 
 const half = Math.PI / 2;
 const shapes = {
-  sphere: ({ center, radius }) => turned(center, [0, 1, 0], arc(radius, 0, 0, -half, half, 40)),
+  sphere: ({ center, radius }) => revolved(center, [0, 1, 0], arc(radius, 0, 0, -half, half, 40)),
   capsule: ({ a, b, radius }) => {
     const axis = unit(sub(b, a)), length = Math.hypot(...sub(b, a));
-    return turned(a, axis, [...arc(radius, 0, 0, -half, 0, 20), ...arc(radius, 0, length, 0, half, 20)]);
+    return revolved(a, axis, [...arc(radius, 0, 0, -half, 0, 20), ...arc(radius, 0, length, 0, half, 20)]);
   },
   cylinder: ({ a, b, radius, rounding }) => {
     const axis = unit(sub(b, a)), length = Math.hypot(...sub(b, a)), core = radius - rounding;
-    return turned(a, axis, [[0, 0, 0, -1], ...arc(rounding, core, rounding, -half, 0, 8),
+    return revolved(a, axis, [[0, 0, 0, -1], ...arc(rounding, core, rounding, -half, 0, 8),
       ...arc(rounding, core, length - rounding, 0, half, 8), [0, length, 0, 1]]);
   },
   box: ({ center, size, rotate, rounding }) => roundBox(center, size, rotation(rotate), rounding),
