@@ -281,9 +281,10 @@ static void rates_of(const scene *s, const double *before, double h, double forc
     }
 }
 
-/* In a step of backward Euler the momentum of the free nodes, and their angular momentum with x at the end of
- * the step, change by h times what acts from outside: gravity, on all nodes, and what the body gives, the
- * opposite of the force on it. Without friction, which acts on two points a gap apart. To the residual, 1e-9 N on 20 nodes at 1 m. */
+/* In a step of backward Euler the momentum of the free nodes, and their angular momentum with x at the end
+ * of the step, change by h times what acts from outside: gravity, on all nodes, and what the body gives,
+ * the opposite of the force on it. Without friction, which acts on two points a gap apart. To the
+ * residual, 1e-9 N on 20 nodes at 1 m. */
 START_TEST(force_and_torque_are_those_of_the_cloth)
 {
     const double h = 0.005, origin[3] = {0};
@@ -400,9 +401,9 @@ START_TEST(hanging_body_has_its_weight)
 }
 END_TEST
 
-/* Without gravity and other pins, body and cloth have a constant momentum. The cloth's changes in a step by -h
- * F of its end, the body's by h F of its beginning: their sum and h F now is constant to the residuals, 1e-10
- * N on each node and step. */
+/* Without gravity and other pins, body and cloth have a constant momentum. The cloth's changes in a step
+ * by -h F of its end, the body's by h F of its beginning: their sum and h F now is constant to the
+ * residuals, 1e-10 N on each node and step. */
 START_TEST(momentum_goes_to_and_fro)
 {
     const double h = 0.005;
