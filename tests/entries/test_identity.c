@@ -68,6 +68,8 @@ static const struct test_case {
     {"/cloth/0/pins/0/row", REFUSED, "/cloth/0/pins/0", "{'row': 2}"},
     {"/cloth/0/pins/0/box", REFUSED, "/cloth/0/pins/0", "{'box': [[0,0,-1], [0.2,1,1]]}"},
     {"/cloth/0/pins/0/track", REFUSED, NULL, "[[0, [0,0,0]], [1, [0,0.2,0]]]"},
+    {"/cloth/0/pins/0/attach", REFUSED, "/cloth/0/pins/1", "{'nodes': [0], 'attach': 'ball'}"},
+    {"/cloth/0/pins/0/triangle", SKIPPED, NULL, NULL}, /* needs the files of a body: physics/riding */
     {"/colliders/0/type", REFUSED, "/colliders/0", "{'type': 'plane', 'point': [0,0,-1], 'normal': [0,0,1]}"},
     {"/colliders/0/track", REFUSED, NULL, "[[0, [0,0,0]], [1, [0,0.1,0]]]"},
     {"/colliders/0/turns/0/time", REFUSED, "/colliders/0/turns",
