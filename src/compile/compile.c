@@ -110,6 +110,8 @@ static drape_status compile_cloth(drape_model *model, int32_t c, const drape_sce
         status = copy_source(model, &def->mesh, cloth);
     if (!status)
         status = drape_compile_material(model, pointer, def, cloth);
+    if (!status)
+        status = drape_compile_masses(model, pointer, def, cloth);
     memcpy(cloth->velocity, def->velocity, sizeof cloth->velocity);
     return status;
 }

@@ -452,24 +452,53 @@ static bool cross(const drape_contact *c, int32_t collider, const int32_t *face,
     return found;
 }
 
+/* A face of the cloth, and what pierces it. */
+typedef struct piercing {
+    const drape_contact *contact;
+    int32_t collider;
+    const int32_t *face; /* 3 nodes */
+    bool found;
+} piercing;
+
+/* The segments of a shape with triangles are their edges. */
+static void meet_triangle(void *user, int32_t triangle)
+{
+    piercing *p = user;
+    const drape_broad_phase *broad = &p->contact->broad;
+    if (p->found || broad->triangle_collider[triangle] != p->collider)
+        return;
+    int32_t corner[4];
+    for (int a = 0; a < 4; a++)
+        corner[a] = broad->triangle[3 * (size_t)triangle + a % 3] - broad->first_point[p->collider];
+    p->found = cross(p->contact, p->collider, p->face, corner, 3);
+    for (int a = 0; a < 3 && !p->found; a++)
+        p->found = cross(p->contact, p->collider, p->face, corner + a, 2);
+}
+
 /* Parts that enclose a volume push to whichever side the cloth is on: a node is out only if none pierces its
- * faces. */
+ * faces. Triangles are found in the tree of obstacles, which fits their present places. */
 static bool is_pierced(const drape_contact *c, const drape_relaxed_node *node)
 {
-    bool found = false;
     if (node->collider < 0 || !c->relaxed.solid[node->collider])
         return false;
-    const drape_collider_shape *shape = &c->model->colliders[node->collider].shape;
-    for (int32_t f = 0; !found && f < c->model->triangle_count; f++) {
-        const int32_t *n = c->model->triangle + 3 * (size_t)f;
+    const drape_collider *collider = &c->model->colliders[node->collider];
+    const drape_collider_shape *shape = &collider->shape;
+    const bool in_tree = !collider->ops->smooth && shape->triangle_count > 0;
+    piercing p = {.contact = c, .collider = node->collider};
+    for (int32_t f = 0; !p.found && f < c->model->triangle_count; f++) {
+        const int32_t *n = p.face = c->model->triangle + 3 * (size_t)f;
         if (n[0] != node->node && n[1] != node->node && n[2] != node->node)
             continue;
-        for (int32_t i = 0; i < shape->segment_count && !found; i++)
-            found = cross(c, node->collider, n, shape->segment + 2 * (size_t)i, 2);
-        for (int32_t i = 0; i < shape->triangle_count && !found; i++)
-            found = cross(c, node->collider, n, shape->triangle + 3 * (size_t)i, 3);
+        if (in_tree)
+            drape_path_bvh_query(&c->broad.obstacles,
+                                 &(drape_path_query){.node = n, .nodes = 3, .x = c->x, .after = -1},
+                                 meet_triangle, &p);
+        for (int32_t i = 0; i < shape->segment_count && !in_tree && !p.found; i++)
+            p.found = cross(c, node->collider, n, shape->segment + 2 * (size_t)i, 2);
+        for (int32_t i = 0; i < shape->triangle_count && !in_tree && !p.found; i++)
+            p.found = cross(c, node->collider, n, shape->triangle + 3 * (size_t)i, 3);
     }
-    return found;
+    return p.found;
 }
 
 /* A node is held again where the force that holds it is no more than what pushes it already. */
@@ -503,6 +532,8 @@ drape_status drape_room_review(drape_contact *c, double t, bool *changed)
     const double before = c->relaxed.t;
     drape_relaxed_update(&c->relaxed, t, max_factor(c));
     *changed = c->relaxed.t != before;
+    if (c->relaxed.count > 0)
+        drape_path_bvh_fit(&c->broad.obstacles, c->x, NULL, NULL); /* for is_pierced */
     *changed = drape_relaxed_remove(&c->relaxed, is_out, c) > 0 || *changed;
     return DRAPE_OK;
 }

@@ -212,7 +212,7 @@ drape_status drape_sim_deform_collider(drape_sim *sim, int32_t collider, double 
 drape_status drape_sim_collider_points(drape_sim *sim, int32_t collider, double *positions,
                                        double *velocities)
 {
-    drape_status status = drape_sim_guard(sim, "drape_sim_collider_points");
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     status = check_deforms(sim, "drape_sim_collider_points", collider);
@@ -311,7 +311,7 @@ static drape_status place(drape_sim *sim, drape_point *point)
                            .span = {before, now->t},
                            .instant = !sim->chosen.integrator->mean_velocities};
     /* otherwise the last step has begun there */
-    return sim->before < 0 ? drape_system_begin(sim->system, now) : DRAPE_OK;
+    return sim->before < 0 ? drape_system_begin_reading(sim->system, now) : DRAPE_OK;
 }
 
 /* A pending request to cancel the next advance is not an error of reading. */
@@ -333,7 +333,7 @@ drape_status drape_sim_reactions_at(drape_sim *sim, const drape_point *point, do
 drape_status drape_sim_reactions(drape_sim *sim, double *forces)
 {
     drape_point point;
-    drape_status status = drape_sim_guard(sim, "drape_sim_reactions");
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     if (!forces)
@@ -357,7 +357,7 @@ static drape_status check_has_contact(const drape_sim *sim, const char *function
 drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)
 {
     drape_point point;
-    drape_status status = drape_sim_guard(sim, "drape_sim_contact_forces");
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     if (!forces)
@@ -436,7 +436,7 @@ static drape_status read_wrench(drape_sim *sim, const char *function, int32_t co
 drape_status drape_sim_contacts(drape_sim *sim, int32_t room, drape_contact_point *contacts, int32_t *count)
 {
     drape_point point;
-    drape_status status = drape_sim_guard(sim, "drape_sim_contacts");
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     if (!count || room < 0 || (room > 0 && !contacts))
@@ -456,7 +456,7 @@ drape_status drape_sim_contacts(drape_sim *sim, int32_t room, drape_contact_poin
 drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3])
 {
     double sum[3], torque[3];
-    drape_status status = drape_sim_guard(sim, "drape_sim_collider_force");
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     if (!force)
@@ -471,7 +471,7 @@ drape_status drape_sim_collider_torque(drape_sim *sim, int32_t collider, const d
                                        double torque[3])
 {
     double force[3], sum[3];
-    drape_status status = drape_sim_guard(sim, "drape_sim_collider_torque");
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     if (!torque)

@@ -127,6 +127,12 @@ static uint64_t add_contact(uint64_t hash, const drape_contact_def *c)
     return add_doubles(hash, values, sizeof values / sizeof *values);
 }
 
+static uint64_t add_untangle(uint64_t hash, const drape_model_untangle *u)
+{
+    const double values[] = {u->given, u->sweeps, u->gap, u->goes_on};
+    return add_doubles(hash, values, sizeof values / sizeof *values);
+}
+
 static uint64_t add_nodes(uint64_t hash, const drape_model *m)
 {
     size_t nodes = (size_t)m->node_count;
@@ -174,6 +180,7 @@ static uint64_t model_hash(const drape_model *m)
         hash = add_event(hash, &m->events[i]);
     if (m->ignored)
         hash = add(hash, m->ignored, (size_t)(m->collider_count + m->cloth_count) * (size_t)m->cloth_count);
+    hash = add_untangle(hash, &m->untangle);
     return add_contact(add_doubles(hash, m->gravity, 3), &m->contact);
 }
 

@@ -161,8 +161,7 @@ static void place_motion(drape_sim *sim, const drape_place_list *cloths, const d
     }
 }
 
-/* What integrators and controllers remember of earlier steps is of another place. */
-static void forget_past(drape_sim *sim)
+void drape_sim_forget_past(drape_sim *sim)
 {
     sim->before = sim->past[0] = sim->past[1] = -1;
     memset(sim->scratch, 0, sizeof sim->scratch);
@@ -183,7 +182,7 @@ drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloth
     place_motion(sim, cloths, colliders, by);
     sim->next = sim->now;
     sim->now = (int)(next - sim->states);
-    forget_past(sim);
+    drape_sim_forget_past(sim);
     drape_sim_shift_energy(sim, &before);
     return DRAPE_OK;
 }
