@@ -159,8 +159,8 @@ typedef struct drape_turn_key {
     double quaternion[4]; /* w x y z, of any length */
 } drape_turn_key;
 
-/* Nodes of one cloth that are held fixed, moved along a track, or carried by a collider. Exactly one of nodes, corner, edge, row (>=
- * 0) and has_box selects them; corner, edge and row apply to grids only. */
+/* Nodes of one cloth that are held fixed, moved along a track, or carried by a collider. Exactly one of
+ * nodes, corner, edge, row (>= 0) and has_box selects them; corner, edge and row apply to grids only. */
 typedef struct drape_pin_def {
     size_t struct_size;   /* set by drape_pin_def_init */
     const int32_t *nodes; /* node_count node numbers, local to this cloth */
@@ -588,20 +588,21 @@ DRAPE_API void drape_untangle_def_init(drape_untangle_def *def, size_t struct_si
 
 /* What an untangling found and did. */
 typedef struct drape_untangling {
-    bool clear;              /* nothing passes through anything, and all gaps are those of contact */
-    double time;             /* [s] the time of the sim at which it was made */
-    int sweeps;              /* searches after which something was moved */
-    int64_t pairs_before;    /* edges that passed through triangles, of cloth and of colliders */
-    int64_t pairs;           /* afterwards */
-    int32_t inside_before;   /* triangles of cloth that reached into colliders, as drape_sim_inside counts */
-    int32_t inside;          /* afterwards */
-    double least_gap_before; /* the smallest gap, in the least gaps that contact allows; infinite: none is near */
-    double least_gap;        /* afterwards */
-    double displacement;     /* [m] the longest way of a node */
-    int32_t node;            /* the node that went it; -1: none moved */
-    int32_t cloths;          /* number of cloths that were moved, by a node at least */
-    double strain;           /* largest change of the length of an edge [1] */
-    double seconds;          /* [s] wall-clock time that it took */
+    bool clear;            /* nothing passes through anything, and all gaps are those of contact */
+    double time;           /* [s] the time of the sim at which it was made */
+    int sweeps;            /* searches after which something was moved */
+    int64_t pairs_before;  /* edges that passed through triangles, of cloth and of colliders */
+    int64_t pairs;         /* afterwards */
+    int32_t inside_before; /* triangles of cloth that reached into colliders, as drape_sim_inside counts */
+    int32_t inside;        /* afterwards */
+    double
+        least_gap_before; /* the smallest gap, in the least gaps that contact allows; infinite: none is near */
+    double least_gap;     /* afterwards */
+    double displacement;  /* [m] the longest way of a node */
+    int32_t node;         /* the node that went it; -1: none moved */
+    int32_t cloths;       /* number of cloths that were moved, by a node at least */
+    double strain;        /* largest change of the length of an edge [1] */
+    double seconds;       /* [s] wall-clock time that it took */
 } drape_untangling;
 
 /* Takes cloth apart that passes through itself, through other cloth or through colliders at the present time,
@@ -680,33 +681,36 @@ DRAPE_API drape_status drape_sim_unpin(drape_sim *sim, int32_t count, const int3
 DRAPE_API drape_status drape_sim_set_masses(drape_sim *sim, int32_t count, const int32_t *nodes,
                                             const double *masses);
 
-/* Nodes that a collider carries from now on, from where they are: pins that ride on a body which a track or a
- * host moves, turns or deforms. On a rigid collider a node keeps its place in the collider's own coordinates.
- * On one of the type animated_mesh it stays on a triangle: at the barycentric weights of its projection onto
- * the triangle's plane and at its offset along the triangle's normal, both of which are kept; triangles (count)
- * gives the triangles in the order of the file, NULL: the nearest one of each node. A node beside its triangle
- * is carried by the plane. At any time within a step, and in any frame, the nodes are where the collider's
- * motion has them, with its velocity there; kinks of its motion are theirs. They touch nothing that is pinned, as other
- * pins do not; cloth around them touches the collider, so it is best to attach nodes outside of it by the contact
- * distance or more, or to let the cloth `ignore` it.
+/* Nodes that a collider carries from now on, from where they are: pins that ride on a body which a track
+ * or a host moves, turns or deforms. On a rigid collider a node keeps its place in the collider's own
+ * coordinates. On one of the type animated_mesh it stays on a triangle: at the barycentric weights of its
+ * projection onto the triangle's plane and at its offset along the triangle's normal, both of which are
+ * kept; triangles (count) gives the triangles in the order of the file, NULL: the nearest one of each
+ * node. A node beside its triangle is carried by the plane. At any time within a step, and in any frame,
+ * the nodes are where the collider's motion has them, with its velocity there; kinks of its motion are
+ * theirs. They touch nothing that is pinned, as other pins do not; cloth around them touches the collider,
+ * so it is best to attach nodes outside of it by the contact distance or more, or to let the cloth
+ * `ignore` it.
  *
- * Free nodes are pinned, as by drape_sim_pin; all others stay pinned, and leave their track, path or collider.
- * drape_sim_detach lets nodes go with the velocity of their collider, as drape_sim_unpin does; they must be carried
- * by one. drape_sim_move_pins takes a node off its collider, too. drape_sim_attached returns the collider that
- * carries a node; -1: none, or no such node.
+ * Free nodes are pinned, as by drape_sim_pin; all others stay pinned, and leave their track, path or
+ * collider. drape_sim_detach lets nodes go with the velocity of their collider, as drape_sim_unpin does;
+ * they must be carried by one. drape_sim_move_pins takes a node off its collider, too. drape_sim_attached
+ * returns the collider that carries a node; -1: none, or no such node.
  *
- * drape_sim_place: nodes whose cloth is placed together with the collider stay where they are on it. If one is
- * placed without the other, they stay where they are in the cloth and ride on from there. A collider that is
- * placed because it is sent faster than teleport_speed takes the cloth that rides on it along: as it goes
- * itself, or, if the cloth has other pins, too, by the rigid motion that fits all of its pins best.
- * A collider that is not enabled goes on carrying. drape_sim_change: nodes go on riding on the collider of the
- * same name, from where they are; those that the scene attached, where the new scene does. If there is no such
- * collider, they are held where they are. drape_sim_set_state: they must be where the collider has them at t.
+ * drape_sim_place: nodes whose cloth is placed together with the collider stay where they are on it. If
+ * one is placed without the other, they stay where they are in the cloth and ride on from there. A
+ * collider that is placed because it is sent faster than teleport_speed takes the cloth that rides on it
+ * along: as it goes itself, or, if the cloth has other pins, too, by the rigid motion that fits all of its
+ * pins best. A collider that is not enabled goes on carrying. drape_sim_change: nodes go on riding on the
+ * collider of the same name, from where they are; those that the scene attached, where the new scene does.
+ * If there is no such collider, they are held where they are. drape_sim_set_state: they must be where the
+ * collider has them at t.
  *
- * Attaching nodes that are pinned already allocates nothing unless contact needs more; otherwise both take what drape_sim_pin takes.
- * Checkpoints keep what is attached. Must not be called by an observer. Errors, after which nothing has changed:
- * those of drape_sim_pin; DRAPE_E_ARGUMENT (no such collider, node or triangle; triangles of a collider that is
- * rigid; a node to detach that no collider carries). Thread-safety: as the sim. */
+ * Attaching nodes that are pinned already allocates nothing unless contact needs more; otherwise both take
+ * what drape_sim_pin takes. Checkpoints keep what is attached. Must not be called by an observer. Errors,
+ * after which nothing has changed: those of drape_sim_pin; DRAPE_E_ARGUMENT (no such collider, node or
+ * triangle; triangles of a collider that is rigid; a node to detach that no collider carries).
+ * Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_attach(drape_sim *sim, int32_t collider, int32_t count, const int32_t *nodes,
                                         const int32_t *triangles);
 DRAPE_API drape_status drape_sim_detach(drape_sim *sim, int32_t count, const int32_t *nodes);

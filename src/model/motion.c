@@ -7,6 +7,7 @@
 #include "model/ride.h"
 #include "model/track.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -300,7 +301,7 @@ static bool leading_velocity(const course *c, double t, double v[3])
         return drape_has_arrived(path->t, t) || path->smooth;
     }
     if (!path->given && c->ride) { /* on the motion of its collider before t */
-        velocity_on(c, t, nextafter(t, -INFINITY), v);
+        velocity_on(c, t, t > 0 ? t * (1 - DBL_EPSILON) : -1, v);
         return false;
     }
     velocity_on(c, t, t, v);

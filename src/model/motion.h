@@ -148,8 +148,8 @@ void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int
 /* The collider that carries a moved pin; -1: none. */
 int32_t drape_motion_carrier(const drape_motion *motion, int32_t i);
 
-/* The ride by which a collider carries a point of space from time t on. triangle: the one that carries it, of a
- * collider with frames, else unused. */
+/* The ride by which a collider carries a point of space from time t on. triangle: the one that carries it,
+ * of a collider with frames, else unused. */
 void drape_motion_ride_from(const drape_motion *motion, int32_t collider, int32_t triangle, double t,
                             const double x[3], drape_ride *ride);
 

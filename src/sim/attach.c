@@ -1,5 +1,5 @@
-/* attach.c: pins that a host gives to colliders to carry, and lets go; what becomes of such pins when cloth or
- * colliders are placed elsewhere, and when a sim goes on with another model. */
+/* attach.c: pins that a host gives to colliders to carry, and lets go; what becomes of such pins when
+ * cloth or colliders are placed elsewhere, and when a sim goes on with another model. */
 #include "sim/attach.h"
 
 #include "colliders/deformed.h"

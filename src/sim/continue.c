@@ -83,8 +83,8 @@ static bool has_track(const drape_motion *motion, int32_t i)
     return track >= 0 && motion->model->tracks[track].key_count > 0;
 }
 
-/* Pinned nodes are where they were, carried on from there by their collider, or held there unless their motion leads there anyway. A node that was
- * pinned before may not get a track that begins elsewhere. */
+/* Pinned nodes are where they were, carried on from there by their collider, or held there unless their
+ * motion leads there anyway. A node that was pinned before may not get a track that begins elsewhere. */
 static drape_status hold(drape_sim *to, const drape_sim *from)
 {
     const drape_model *m = to->model;

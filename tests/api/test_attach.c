@@ -55,8 +55,8 @@ static void expect_on_body(const host *h, const int32_t *nodes, int count, const
 
 /* ---- Made and released ---- */
 
-/* A free node and a pinned one: both are where they were, go with the body, and one is let go with the velocity
- * that it has there: that of the step's mean, on a path of constant speed without turning. */
+/* A free node and a pinned one: both are where they were, go with the body, and one is let go with the
+ * velocity that it has there: that of the step's mean, on a path of constant speed without turning. */
 START_TEST(nodes_are_attached_and_detached)
 {
     for (int i = 0; i < METHODS; i++) {
@@ -214,8 +214,9 @@ static double strain_of(const host *h)
     return largest;
 }
 
-/* Sent metres away in one frame, a body takes the cloth that hangs from it along. So does each of two bodies
- * that carry one cloth together, one after the other: by the best fit, whose rotation is within 1e-6 of it. */
+/* Sent metres away in one frame, a body takes the cloth that hangs from it along. So does each of two
+ * bodies that carry one cloth together, one after the other: by the best fit, whose rotation is within
+ * 1e-6 of it. */
 START_TEST(a_body_that_is_sent_far_takes_its_cloth_along)
 {
     for (int bodies = 1; bodies <= 2; bodies++) {

@@ -69,8 +69,8 @@ static const struct test_case {
     {"/cloth/0/pins/0/box", REFUSED, "/cloth/0/pins/0", "{'box': [[0,0,-1], [0.2,1,1]]}"},
     {"/cloth/0/pins/0/track", REFUSED, NULL, "[[0, [0,0,0]], [1, [0,0.2,0]]]"},
     {"/cloth/0/pins/0/attach", REFUSED, "/cloth/0/pins/1", "{'nodes': [0], 'attach': 'ball'}"},
-    {"/cloth/0/pins/0/triangle", SKIPPED, NULL, NULL}, /* a mesh is needed; what carries a node counts */
-    {"/cloth/0/masses/0/nodes", SKIPPED, NULL, NULL}, /* as for pins: the masses count */
+    {"/cloth/0/pins/0/triangle", SKIPPED, NULL, NULL}, /* needs the files of a body: physics/riding */
+    {"/cloth/0/masses/0/nodes", SKIPPED, NULL, NULL},  /* as for pins: the masses count */
     {"/cloth/0/masses/0/corner", SKIPPED, NULL, NULL},
     {"/cloth/0/masses/0/edge", SKIPPED, NULL, NULL},
     {"/cloth/0/masses/0/row", SKIPPED, NULL, NULL},

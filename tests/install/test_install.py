@@ -134,6 +134,15 @@ def host_in_c(tree):
     check_host(run(program, FRAMES, env=tree.env))
 
 
+def body_in_c(tree):
+    """A body that hangs from cloth: at the end it is pulled up with its weight, within what is left of its swing."""
+    source, program = os.path.join(EXAMPLES, "host_c", "body.c"), os.path.join(tree.work, "body_c")
+    run(need("cc"), "-Wall", "-Werror", source, *tree.flags("--cflags", "--libs"), "-lm", "-o", program)
+    lines = run(program, "300", env=tree.env).splitlines()
+    weight = float(re.search(r"with ([-0-9.]+) of its weight", lines[-1]).group(1))
+    assert len(lines) == 10 and 0.9 < weight < 1.1, lines
+
+
 def host_in_c_static(tree):
     source, program = os.path.join(EXAMPLES, "host_c", "host.c"), os.path.join(tree.work, "host_c_static")
     flags = [tree.static() if flag == "-ldrape" else flag for flag in tree.flags("--static", "--cflags", "--libs")]
@@ -192,7 +201,7 @@ def the_program_runs(tree):
 
 
 TESTS = [what_is_installed, what_the_shared_library_shows, what_the_static_library_defines,
-         what_of_libm_the_static_library_calls, what_comes_along, host_in_c, host_in_c_static,
+         what_of_libm_the_static_library_calls, what_comes_along, host_in_c, body_in_c, host_in_c_static,
          host_in_cpp, cmake_of_the_static_library, cmake_refuses_another_version, host_in_python, the_program_runs]
 
 
