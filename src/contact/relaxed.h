@@ -81,7 +81,8 @@ double drape_relaxed_factor(const drape_relaxed_set *set, const drape_pair *pair
 /* Whether any of these nodes is relaxed for the collider; -1 stands for no node. */
 bool drape_relaxed_has(const drape_relaxed_set *set, int32_t collider, const int32_t *node, int nodes);
 
-/* Whether some node of a pair comes out of its collider along a direction of its own: the pair does not act. */
+/* Whether some node of a pair comes out of its collider along a direction of its own: the pair does not
+ * act. */
 bool drape_relaxed_has_exit(const drape_relaxed_set *set, const drape_pair *pair);
 
 /* Relaxes a node from time t on, at least until `until`, or says that a relaxed one has no room. *added is

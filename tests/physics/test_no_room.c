@@ -443,8 +443,8 @@ START_TEST(test_plates)
 }
 END_TEST
 
-/* Pinches, some drawn at random, whose bodies got the cloth between their parts before it was pushed out along one
- * direction: with the nearest surface as the way out, it stays relaxed on them for good. */
+/* Pinches, drawn at random, whose bodies pierce the cloth, or have parts of it near to different sides: with
+ * the nearest surface as the way out, it stays relaxed on them for good. */
 static const struct pinch {
     double young, thickness, density;
     const char *stretch, *left, *right;
@@ -499,8 +499,8 @@ static scene open_random(const struct pinch *p)
         p->young, p->thickness, p->density, p->stretch, p->left, track[0], p->right, track[1]);
 }
 
-/* Half a second after the bodies have parted, in which a node falls by 1.2 m, nothing is relaxed or inside, and no
- * edge is strained by 10 % or more. */
+/* Half a second after the bodies have parted, in which a node falls by 1.2 m, nothing is relaxed or inside,
+ * and no edge is strained by 10 % or more. */
 static void check_entangled(const struct pinch *p)
 {
     scene s = open_random(p);
