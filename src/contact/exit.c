@@ -149,8 +149,8 @@ static double length_of(const drape_collider_shape *shape)
     return length;
 }
 
-/* How far it is from a point out of a collider in some direction; the longest where another collider is at the
- * end. */
+/* How far it is from a point out of a collider in some direction; the longest path where another collider is
+ * at the end. */
 static double path_out(const drape_contact *c, int32_t collider, const double from[3], const double along[3])
 {
     const double margin = MARGIN * c->broad.distance[collider],

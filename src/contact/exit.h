@@ -13,12 +13,12 @@
 #include "contact/relaxed.h"
 
 /* Whether a segment or triangle of a collider and a face of cloth pass through each other where contact is
- * evaluated. piercing, unless NULL: where, if it is a segment that passes through the face, else a corner of
- * the face. */
+ * evaluated. piercing, unless NULL: where, if it is a segment that passes through the face, else a corner
+ * of the face. */
 bool drape_exit_is_pierced(const drape_contact *contact, int32_t collider, int32_t face, double piercing[3]);
 
-/* At the beginning of a step: finds which relaxed nodes are in patches, and where these go. The other nodes of
- * their faces are relaxed from time t on, too. Errors: DRAPE_E_MEMORY. */
+/* At the beginning of a step: finds which relaxed nodes are in patches, and where these go. The other nodes
+ * of their faces are relaxed from time t on, too. Errors: DRAPE_E_MEMORY. */
 drape_status drape_exit_find(drape_contact *contact, double t);
 
 /* Adds the contacts of these nodes with the ends of their paths to the active set of a configuration. Errors:

@@ -444,12 +444,12 @@ START_TEST(test_plates)
 END_TEST
 
 /* Pinches, drawn at random, whose bodies pierce the cloth, or have parts of it near to different sides: with
- * the nearest surface as the way out, it stays relaxed on them for good. */
+ * the nearest surface as the end of their paths, it stays relaxed on them for good. */
 static const struct pinch {
     double young, thickness, density;
     const char *stretch, *left, *right;
     double shut, opens, open; /* [s] end of closing, begin and end of parting */
-    double way;               /* [m] that each body goes to the other one */
+    double travel;            /* [m] that each body goes to the other one */
 } pinches[] = {
     {7.47097e6, 6.15364e-4, 292.161, "stretch.cst",
      "'type': 'box', 'center': [0.0277127, 0.204452, -0.126246], 'size': [0.169701, 0.171451, 0.11858],"
@@ -483,7 +483,7 @@ static scene open_random(const struct pinch *p)
 {
     char track[2][200];
     for (int i = 0; i < 2; i++) {
-        const double z = i ? -p->way : p->way;
+        const double z = i ? -p->travel : p->travel;
         snprintf(track[i], sizeof track[i],
                  "'track': [[0.1, [0,0,0]], [%.9g, [0,0,%.9g]], [%.9g, [0,0,%.9g]], [%.9g, [0,0,0]]]",
                  p->shut, z, p->opens, z, p->open);
