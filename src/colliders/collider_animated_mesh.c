@@ -23,17 +23,20 @@ enum {
 };
 
 static const drape_param params[PARAM_COUNT] = {
-    DRAPE_TEXT("file",
-               "the frames, relative to the scene: an NPY or PC2 file; a folder of OBJ files, with a / "
-               "at its end, or their pattern, such as walk_%04d.obj; or one OBJ file, for a program "
-               "that moves its points"),
+    DRAPE_TEXT(
+        "file",
+        "the frames, relative to the scene: an NPY or PC2 file; a GLB file with an animation; a folder "
+        "of OBJ files, with a / at its end, or their pattern, such as walk_%04d.obj; or one OBJ "
+        "file, for a program that moves its points"),
     DRAPE_TEXT("mesh", "OBJ or PLY file of the triangles, for frames without, such as NPY and PC2",
                .derived = "the triangles of the frames"),
     DRAPE_TEXT("times", "NPY file of the time of each frame [s], which the start is added to",
                .derived = "the start and the frame rate"),
-    DRAPE_NUMBER("frame_rate", "1/s", 30, DRAPE_ABOVE(0), 1e6, "frames per second of simulated time"),
+    DRAPE_NUMBER("frame_rate", "1/s", 30, DRAPE_ABOVE(0), 1e6,
+                 "frames per second of simulated time; a GLB file is sampled at it"),
     DRAPE_NUMBER("start", "s", 0, -1e9, 1e9,
-                 "time of the first frame; before it and after the last one, the mesh is at rest"),
+                 "time of the first frame, of a GLB file time 0 of its animation; before it and after the "
+                 "last one, the mesh is at rest"),
     DRAPE_BOOLEAN("open", 0,
                   "the mesh has a boundary, or no inside: cloth is kept on the side on which it begins"),
     DRAPE_NUMBER(

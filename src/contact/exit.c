@@ -31,30 +31,87 @@ static void find_piercing(const double *p, const double *q, const double *const 
     vec3_add_scaled(fmax(0, fmin(s, 1)), along, out);
 }
 
+/* A face of the cloth, and what of a collider passes through it. */
+typedef struct crossing {
+    const drape_contact *contact;
+    int32_t collider;
+    const double *x[3]; /* [m] corners of the face */
+    double *where;      /* [m] as the function below returns it; NULL: not asked for */
+    int64_t key; /* of the triangle that was found: its index, and INT32_MAX more if it has no segment that
+                           passes through the face */
+    bool found;
+} crossing;
+
+static const double *point_of(const crossing *q, int32_t point)
+{
+    return q->contact->x + 3 * (size_t)(q->contact->broad.first_point[q->collider] + point);
+}
+
+static bool cross_segment(const crossing *q, int32_t a, int32_t b)
+{
+    const double *from = point_of(q, a), *to = point_of(q, b);
+    const bool found = drape_intersect_edge(from, to, q->x[0], q->x[1], q->x[2]);
+    if (found && q->where)
+        find_piercing(from, to, q->x, q->where);
+    return found;
+}
+
+static bool cross_triangle(const crossing *q, const int32_t point[3])
+{
+    const double *y[3] = {point_of(q, point[0]), point_of(q, point[1]), point_of(q, point[2])};
+    bool found = false;
+    for (int a = 0; a < 3; a++)
+        found = found || drape_intersect_edge(q->x[a], q->x[(a + 1) % 3], y[0], y[1], y[2]);
+    return found;
+}
+
+/* The segments of a shape with triangles are their edges. Of several triangles the one with the least key
+ * counts, in whatever order the tree has them. */
+static void meet_triangle(void *user, int32_t triangle)
+{
+    crossing *q = user;
+    const drape_broad_phase *broad = &q->contact->broad;
+    if (broad->triangle_collider[triangle] != q->collider || triangle > q->key || (q->found && !q->where))
+        return;
+    int32_t corner[4];
+    double at[3];
+    crossing one = *q;
+    one.where = q->where ? at : NULL;
+    bool passes = false;
+    for (int a = 0; a < 4; a++)
+        corner[a] = broad->triangle[3 * (size_t)triangle + a % 3] - broad->first_point[q->collider];
+    memcpy(at, q->x[0], sizeof at);
+    for (int a = 0; a < 3 && !passes; a++)
+        passes = cross_segment(&one, corner[a], corner[a + 1]);
+    const int64_t key = triangle + (passes ? 0 : (int64_t)INT32_MAX);
+    if (key > q->key || !(passes || cross_triangle(q, corner)))
+        return;
+    q->found = true;
+    q->key = key;
+    if (q->where)
+        memcpy(q->where, at, sizeof at);
+}
+
 bool drape_exit_is_pierced(const drape_contact *c, int32_t collider, int32_t face, double piercing[3])
 {
     const drape_collider_shape *shape = &c->model->colliders[collider].shape;
-    const int32_t first = c->broad.first_point[collider];
-    const double *x[3], *y[3];
-    bool found = false;
+    const int32_t *n = c->model->triangle + 3 * (size_t)face;
+    crossing q = {.contact = c, .collider = collider, .where = piercing, .key = INT64_MAX};
     for (int a = 0; a < 3; a++)
-        x[a] = c->x + 3 * (size_t)c->model->triangle[3 * (size_t)face + (size_t)a];
+        q.x[a] = c->x + 3 * (size_t)n[a];
     if (piercing)
-        memcpy(piercing, x[0], 3 * sizeof *piercing);
-    for (int32_t i = 0; i < shape->segment_count && !found; i++) {
-        for (size_t a = 0; a < 2; a++)
-            y[a] = c->x + 3 * (size_t)(first + shape->segment[2 * (size_t)i + a]);
-        found = drape_intersect_edge(y[0], y[1], x[0], x[1], x[2]);
-        if (found && piercing)
-            find_piercing(y[0], y[1], x, piercing);
+        memcpy(piercing, q.x[0], 3 * sizeof *piercing);
+    if (!c->model->colliders[collider].ops->smooth && shape->triangle_count > 0) {
+        drape_path_bvh_query(&c->broad.obstacles,
+                             &(drape_path_query){.node = n, .nodes = 3, .x = c->x, .after = -1},
+                             meet_triangle, &q);
+        return q.found;
     }
-    for (int32_t i = 0; i < shape->triangle_count && !found; i++) {
-        for (size_t a = 0; a < 3; a++)
-            y[a] = c->x + 3 * (size_t)(first + shape->triangle[3 * (size_t)i + a]);
-        for (int a = 0; a < 3; a++)
-            found = found || drape_intersect_edge(x[a], x[(a + 1) % 3], y[0], y[1], y[2]);
-    }
-    return found;
+    for (int32_t i = 0; i < shape->segment_count && !q.found; i++)
+        q.found = cross_segment(&q, shape->segment[2 * (size_t)i], shape->segment[2 * (size_t)i + 1]);
+    for (int32_t i = 0; i < shape->triangle_count && !q.found; i++)
+        q.found = cross_triangle(&q, shape->triangle + 3 * (size_t)i);
+    return q.found;
 }
 
 static double distance_at(const drape_contact *c, int32_t collider, const double x[3], double *normal)

@@ -13,6 +13,13 @@ typedef struct drape_report_field {
 
 #define DRAPE_REPORT_FIELDS 3 /* positions, strain, speed */
 
+/* The points of a collider that deforms, in its own coordinates, as such a field. */
+typedef struct drape_report_body {
+    int32_t collider;
+    char block[24]; /* the name of its block in the page */
+    drape_report_field field;
+} drape_report_body;
+
 typedef struct drape_report_data {
     const drape_report_source *run;
     drape_arena arena;           /* of all arrays */
@@ -24,6 +31,9 @@ typedef struct drape_report_data {
     double *weight;              /* (node_count) a third of the area of the triangles around [m2] */
     double *node_strain, *speed; /* (node_count) */
     drape_report_field fields[DRAPE_REPORT_FIELDS];
+    drape_report_body *bodies; /* (body_count) */
+    int32_t body_count;
+    double *points; /* (of the largest body x 3) in the loaded frame */
 } drape_report_data;
 
 /* Chooses frames that take at most max_bytes in the page, evenly, the first and the last among them, and
@@ -32,9 +42,11 @@ typedef struct drape_report_data {
 drape_status drape_report_data_make(const drape_report_source *run, size_t max_bytes,
                                     drape_report_data *data);
 
-/* Write parts of the page: the JSON, which contains no <; the kept frames of one field; the triangles. */
+/* Write parts of the page: the JSON, which contains no <; the kept frames of one field, or of one
+ * body; the triangles. */
 drape_status drape_report_put_json(const drape_report_data *data, drape_file *file);
 drape_status drape_report_put_field(const drape_report_data *data, int field, drape_file *file);
+drape_status drape_report_put_body(const drape_report_data *data, int32_t body, drape_file *file);
 void drape_report_put_triangles(const drape_report_data *data, drape_file *file);
 
 #endif

@@ -1,9 +1,11 @@
 /* frames.c: the frames of a page: which are kept, and their fields as 16-bit integers. */
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/vec3.h"
+#include "model/deformation.h"
 #include "report/data.h"
 
 #define LEVELS 65535
@@ -63,12 +65,47 @@ static drape_status load(const drape_report_data *d, int64_t frame)
     return find_speed(d, frame);
 }
 
+/* ---- Colliders that deform ---- */
+
+static const drape_collider *collider_of(const drape_report_data *d, int32_t body)
+{
+    return &d->run->model->colliders[d->bodies[body].collider];
+}
+
+static size_t load_body(const drape_report_data *d, int32_t body, int64_t frame)
+{
+    const drape_collider *collider = collider_of(d, body);
+    drape_sequence_points(&collider->frames, d->run->record.times[frame], d->points);
+    return 3 * (size_t)collider->shape.point_count;
+}
+
+static drape_status find_bodies(drape_report_data *d)
+{
+    const drape_model *model = d->run->model;
+    size_t most = 0;
+    d->bodies = drape_arena_take(&d->arena, (size_t)model->collider_count, sizeof *d->bodies);
+    for (int32_t i = 0; d->bodies && i < model->collider_count; i++) {
+        drape_report_body *body = &d->bodies[d->body_count];
+        if (model->colliders[i].frames.frame_count == 0)
+            continue;
+        *body = (drape_report_body){.collider = i, .field = {.name = body->block, .unit = "m", .width = 3}};
+        snprintf(body->block, sizeof body->block, "body%d", (int)i);
+        most = (size_t)fmax((double)most, model->colliders[i].shape.point_count);
+        d->body_count++;
+    }
+    d->points = drape_arena_take(&d->arena, most, 3 * sizeof *d->points);
+    return drape_arena_status(&d->arena);
+}
+
 /* ---- Which frames, and ranges ---- */
 
 static drape_status choose_frames(drape_report_data *d, size_t max_bytes)
 {
     int64_t all = d->run->record.frames;
-    double bytes = 5 * 2 * 4.0 / 3 * d->run->model->node_count; /* of a frame: 16 bits a number, in base64 */
+    double numbers = 5.0 * d->run->model->node_count;
+    for (int32_t b = 0; b < d->body_count; b++)
+        numbers += 3.0 * collider_of(d, b)->shape.point_count;
+    const double bytes = 2 * 4.0 / 3 * numbers; /* of a frame: 16 bits a number, in base64 */
     d->kept = (int64_t)fmin(fmax(floor((double)max_bytes / bytes), 2), (double)all);
     d->frame = drape_arena_take(&d->arena, (size_t)d->kept, sizeof *d->frame);
     if (!d->frame)
@@ -90,6 +127,31 @@ static void extend_range(drape_report_field *field, const double *values, size_t
     }
 }
 
+static void begin_range(drape_report_field *field, double high[3])
+{
+    for (int k = 0; k < 3; k++) {
+        field->low[k] = DBL_MAX;
+        high[k] = -DBL_MAX;
+    }
+}
+
+static void end_range(drape_report_field *field, const double high[3])
+{
+    for (int k = 0; k < field->width; k++)
+        field->step[k] = (high[k] - field->low[k]) / LEVELS;
+}
+
+static void find_body_ranges(drape_report_data *d)
+{
+    for (int32_t b = 0; b < d->body_count; b++) {
+        double high[3];
+        begin_range(&d->bodies[b].field, high);
+        for (int64_t k = 0; k < d->kept; k++)
+            extend_range(&d->bodies[b].field, d->points, load_body(d, b, d->frame[k]), high);
+        end_range(&d->bodies[b].field, high);
+    }
+}
+
 static drape_status find_ranges(drape_report_data *d)
 {
     static const drape_report_field fields[DRAPE_REPORT_FIELDS] = {
@@ -98,10 +160,7 @@ static drape_status find_ranges(drape_report_data *d)
     size_t nodes = (size_t)d->run->model->node_count;
     memcpy(d->fields, fields, sizeof fields);
     for (int f = 0; f < DRAPE_REPORT_FIELDS; f++)
-        for (int k = 0; k < 3; k++) {
-            d->fields[f].low[k] = DBL_MAX;
-            high[f][k] = -DBL_MAX;
-        }
+        begin_range(&d->fields[f], high[f]);
     for (int64_t k = 0; k < d->kept; k++) {
         drape_status status = load(d, d->frame[k]);
         if (status)
@@ -110,8 +169,8 @@ static drape_status find_ranges(drape_report_data *d)
             extend_range(&d->fields[f], values_of(d, f), nodes * (size_t)d->fields[f].width, high[f]);
     }
     for (int f = 0; f < DRAPE_REPORT_FIELDS; f++)
-        for (int k = 0; k < d->fields[f].width; k++)
-            d->fields[f].step[k] = (high[f][k] - d->fields[f].low[k]) / LEVELS;
+        end_range(&d->fields[f], high[f]);
+    find_body_ranges(d);
     return DRAPE_OK;
 }
 
@@ -128,6 +187,8 @@ drape_status drape_report_data_make(const drape_report_source *run, size_t max_b
     data->node_strain = drape_arena_take(&data->arena, nodes, sizeof *data->node_strain);
     data->speed = drape_arena_take(&data->arena, nodes, sizeof *data->speed);
     drape_status status = drape_arena_status(&data->arena);
+    if (!status)
+        status = find_bodies(data);
     if (!status)
         status = choose_frames(data, max_bytes);
     if (status)
@@ -173,6 +234,15 @@ static unsigned level_of(const drape_report_field *field, int k, double value)
     return level < 0 ? 0 : level > LEVELS ? LEVELS : (unsigned)level;
 }
 
+static void put_values(encoder *e, const drape_report_field *f, const double *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        const unsigned level = level_of(f, (int)(i % (size_t)f->width), values[i]);
+        put_byte(e, level);
+        put_byte(e, level >> 8);
+    }
+}
+
 drape_status drape_report_put_field(const drape_report_data *data, int field, drape_file *file)
 {
     const drape_report_field *f = &data->fields[field];
@@ -181,16 +251,22 @@ drape_status drape_report_put_field(const drape_report_data *data, int field, dr
         drape_status status = load(data, data->frame[k]);
         if (status)
             return status;
-        const double *values = values_of(data, field);
-        for (size_t i = 0; i < (size_t)data->run->model->node_count * (size_t)f->width; i++) {
-            unsigned level = level_of(f, (int)(i % (size_t)f->width), values[i]);
-            put_byte(&e, level);
-            put_byte(&e, level >> 8);
-        }
+        put_values(&e, f, values_of(data, field), (size_t)data->run->model->node_count * (size_t)f->width);
     }
     if (e.count > 0)
         put_group(&e);
     return DRAPE_OK;
+}
+
+drape_status drape_report_put_body(const drape_report_data *data, int32_t body, drape_file *file)
+{
+    encoder e = {.file = file};
+    drape_status status = DRAPE_OK;
+    for (int64_t k = 0; k < data->kept && !(status = drape_check_cancel(data->run->ctx)); k++)
+        put_values(&e, &data->bodies[body].field, data->points, load_body(data, body, data->frame[k]));
+    if (e.count > 0)
+        put_group(&e);
+    return status;
 }
 
 void drape_report_put_triangles(const drape_report_data *data, drape_file *file)

@@ -90,14 +90,28 @@ static json_t *parameters(const drape_collider *collider)
     return object;
 }
 
-/* The triangles of a collider, if it has some; the page draws other types by their parameters. */
-static json_t *shape(const drape_collider_shape *shape)
+/* The triangles of a collider, if it has some; the page draws other types by their parameters. The points of one
+ * that deforms are in a block of their own. */
+static json_t *shape(const drape_collider_shape *shape, const drape_report_body *body)
 {
     json_t *corners = json_array();
     for (size_t i = 0; i < 3 * (size_t)shape->triangle_count; i++)
         corners = drape_json_append(corners, json_integer(shape->triangle[i]));
+    if (body)
+        return json_pack("{s:s, s:i, s:o, s:o, s:o}", "block", body->block, "count", (int)shape->point_count,
+                         "low", drape_json_numbers(body->field.low, 3), "step",
+                         drape_json_numbers(body->field.step, 3), "triangles", corners);
     return json_pack("{s:o, s:o}", "points", drape_json_numbers(shape->point, 3 * (size_t)shape->point_count),
                      "triangles", corners);
+}
+
+static const drape_report_body *body_of(const drape_report_data *data, const drape_collider *c)
+{
+    const drape_report_body *found = NULL;
+    for (int32_t b = 0; b < data->body_count; b++)
+        if (&data->run->model->colliders[data->bodies[b].collider] == c)
+            found = &data->bodies[b];
+    return found;
 }
 
 static json_t *collider(const drape_report_data *data, const drape_collider *c)
@@ -105,7 +119,7 @@ static json_t *collider(const drape_report_data *data, const drape_collider *c)
     json_t *object = json_pack("{s:o, s:o, s:o}", "type", drape_json_text(c->ops->entry.name), "name",
                                drape_json_text(c->name), "parameters", parameters(c));
     if (c->shape.triangle_count > 0)
-        object = drape_json_with(object, "shape", shape(&c->shape));
+        object = drape_json_with(object, "shape", shape(&c->shape, body_of(data, c)));
     if (c->track.key_count == 0 && c->turns.key_count == 0)
         return object;
     json_t *displacements = json_array(), *rotations = json_array();

@@ -12,12 +12,12 @@ uniform vec3 light;
 uniform float point_size;
 out vec3 at, n;
 out float v;
-vec3 turned(vec3 a) { return a + 2.0 * cross(rotation.xyz, cross(rotation.xyz, a) + rotation.w * a); }
+vec3 rotated(vec3 a) { return a + 2.0 * cross(rotation.xyz, cross(rotation.xyz, a) + rotation.w * a); }
 void main() {
-  at = turned(position) + offset;
+  at = rotated(position) + offset;
   if (dot(flatten.xyz, flatten.xyz) > 0.0)
     at -= light * ((dot(flatten.xyz, at) - flatten.w) / dot(flatten.xyz, light));
-  n = turned(normal);
+  n = rotated(normal);
   v = value;
   gl_Position = camera * vec4(at, 1.0);
   gl_PointSize = point_size;
@@ -116,7 +116,7 @@ function boundsOf(lows, highs) {
 const LIGHT = unit([Math.tan(Math.PI / 5) * Math.sin(-0.279), 1, Math.tan(Math.PI / 5) * Math.cos(-0.279)]);
 
 // A vector turned by a quaternion x y z w.
-function turned(q, a) {
+function rotated(q, a) {
   const once = along(cross(q, a), q[3], a);
   return along(a, 2, cross(q, once));
 }
@@ -203,11 +203,12 @@ class Player {
       const shape = shapeOf(collider, cloth);
       if (!shape) continue;
       const values = new Float32Array(shape.positions.length / 3);
-      this.colliders.push({ ...this.makeMesh([[3, shape.positions], [3, shape.normals], [1, values]], shape.corners), plane: shape.plane, displacements: collider.displacements, rotations: collider.rotations, pivot: collider.pivot });
-      for (let i = 0; shape.bounded && i < shape.positions.length; i++) {
+      this.colliders.push({ ...this.makeMesh([[3, shape.positions], [3, shape.normals], [1, values]], shape.corners), plane: shape.plane, displacements: collider.displacements, rotations: collider.rotations, pivot: collider.pivot, moving: shape.points ? shape : null });
+      const corners = shape.box ?? shape.positions;
+      for (let i = 0; shape.bounded && i < corners.length; i++) {
         const reach = 1.6 * cloth.radius, k = i % 3; // of a large one only a part is shown
-        lows[k] = Math.min(lows[k], Math.max(shape.positions[i], cloth.center[k] - reach));
-        highs[k] = Math.max(highs[k], Math.min(shape.positions[i], cloth.center[k] + reach));
+        lows[k] = Math.min(lows[k], Math.max(corners[i], cloth.center[k] - reach));
+        highs[k] = Math.max(highs[k], Math.min(corners[i], cloth.center[k] + reach));
       }
     }
     this.bounds = boundsOf(lows, highs);
@@ -241,17 +242,21 @@ class Player {
   }
 
   load(time, shade) {
-    const gl = this.gl, x = fieldAt('positions', time, this.positions), n = this.normals.fill(0);
-    for (let i = 0; i < run.corners.length; i += 3) {
-      const a = 3 * run.corners[i], b = 3 * run.corners[i + 1], c = 3 * run.corners[i + 2];
-      const u0 = x[b] - x[a], u1 = x[b + 1] - x[a + 1], u2 = x[b + 2] - x[a + 2];
-      const v0 = x[c] - x[a], v1 = x[c + 1] - x[a + 1], v2 = x[c + 2] - x[a + 2];
-      const n0 = u1 * v2 - u2 * v1, n1 = u2 * v0 - u0 * v2, n2 = u0 * v1 - u1 * v0;
-      for (const k of [a, b, c]) { n[k] += n0; n[k + 1] += n1; n[k + 2] += n2; }
-    }
+    normalsOf(fieldAt('positions', time, this.positions), run.corners, this.normals);
     if (shade !== 'plain') fieldAt(shade, time, this.values);
-    [this.positions, this.normals, this.values].forEach((data, i) => {
-      gl.bindBuffer(gl.ARRAY_BUFFER, this.cloth.buffers[i]);
+    this.refill(this.cloth, [this.positions, this.normals, this.values]);
+    for (const collider of this.colliders) {
+      if (!collider.moving) continue;
+      const { positions, normals, corners, points } = collider.moving;
+      normalsOf(numbersAt(points, positions.length / 3, time, positions), corners, normals);
+      this.refill(collider, [positions, normals]);
+    }
+  }
+
+  refill(mesh, arrays) {
+    const gl = this.gl;
+    arrays.forEach((data, i) => {
+      gl.bindBuffer(gl.ARRAY_BUFFER, mesh.buffers[i]);
       gl.bufferSubData(gl.ARRAY_BUFFER, 0, data);
     });
   }
@@ -265,7 +270,7 @@ class Player {
     const sign = dot(collider.rotations[frame], collider.rotations[next]) < 0 ? -1 : 1;
     const rotation = between(collider.rotations, sign), length = Math.hypot(...rotation);
     rotation.forEach((q, k) => { rotation[k] = q / length; });
-    return { offset: along(sub(offset, turned(rotation, collider.pivot)), 1, collider.pivot), rotation };
+    return { offset: along(sub(offset, rotated(rotation, collider.pivot)), 1, collider.pivot), rotation };
   }
 
   draw(mesh, { kind, front = [0, 0, 0], back = front, alpha = 1, offset = [0, 0, 0], rotation = [0, 0, 0, 1] }) {
@@ -295,7 +300,7 @@ class Player {
 
   // Shadows: everything above a plane darkens it, each pixel once.
   drawShadow(plane, { offset, rotation }, time) {
-    const gl = this.gl, n = turned(rotation, plane.normal), d = dot(n, along(turned(rotation, plane.point), 1, offset)) + 1e-3 * this.bounds.radius;
+    const gl = this.gl, n = rotated(rotation, plane.normal), d = dot(n, along(rotated(rotation, plane.point), 1, offset)) + 1e-3 * this.bounds.radius;
     if (dot(n, this.light) < 0.2) return;
     gl.uniform4f(this.at.flatten, ...n, d);
     gl.enable(gl.STENCIL_TEST);
@@ -331,7 +336,7 @@ class Player {
     for (const collider of this.colliders) {
       if (!collider.plane) continue;
       const placed = this.place(collider, time);
-      gl.uniform4f(this.at.disk, ...along(turned(placed.rotation, collider.plane.point), 1, placed.offset), collider.plane.reach);
+      gl.uniform4f(this.at.disk, ...along(rotated(placed.rotation, collider.plane.point), 1, placed.offset), collider.plane.reach);
       gl.depthMask(false);
       this.draw(collider, { kind: 4, front: ground, alpha: 0.9, ...placed });
       gl.depthMask(true);

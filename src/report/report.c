@@ -37,6 +37,11 @@ static drape_status put_page(const drape_report_data *data, drape_file *file)
         status = drape_report_put_field(data, f, file);
         end_block(file);
     }
+    for (int32_t b = 0; !status && b < data->body_count; b++) {
+        begin_block(file, data->bodies[b].block);
+        status = drape_report_put_body(data, b, file);
+        end_block(file);
+    }
     drape_file_put(file, drape_page_tail, drape_page_tail_size);
     return status;
 }

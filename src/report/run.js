@@ -16,6 +16,9 @@ run.field = {};
 for (const field of run.fields) {
   run.field[field.name] = { ...field, levels: new Uint16Array(bytesOf(field.name)), width: field.low.length };
 }
+for (const { shape } of run.colliders) {
+  if (shape?.block) shape.points = { levels: new Uint16Array(bytesOf(shape.block)), low: shape.low, step: shape.step, width: 3 };
+}
 run.end = run.times[run.times.length - 1];
 run.begin = run.times[0];
 
@@ -33,16 +36,19 @@ function frameAt(time) {
   return { frame: low, next, part: span > 0 ? Math.min(Math.max((time - times[low]) / span, 0), 1) : 0 };
 }
 
-// Writes the field of all nodes at a time into an array, linear between two frames.
-function fieldAt(name, time, out) {
-  const { levels, low, step, width } = run.field[name];
+// Writes the numbers of all nodes, or points of a collider, at a time into an array, linear between two frames.
+function numbersAt({ levels, low, step, width }, count, time, out) {
   const { frame, next, part } = frameAt(time);
-  const size = run.nodes * width, from = frame * size, to = next * size;
+  const size = count * width, from = frame * size, to = next * size;
   for (let i = 0; i < size; i++) {
     const a = levels[from + i];
     out[i] = low[i % width] + step[i % width] * (a + part * (levels[to + i] - a));
   }
   return out;
+}
+
+function fieldAt(name, time, out) {
+  return numbersAt(run.field[name], run.nodes, time, out);
 }
 
 // The quantiles a and b of all numbers of a field, for a colour scale that single nodes do not distort.

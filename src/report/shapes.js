@@ -118,8 +118,29 @@ function ownShape({ points, triangles }) {
   return solid(positions, normals, triangles.map((_, i) => i));
 }
 
+// Triangles that share corners, as they are at the beginning; its bounds are those of all frames.
+function movingShape({ points, count, triangles }) {
+  const positions = numbersAt(points, count, run.begin, new Float32Array(3 * count)), corners = new Uint32Array(triangles);
+  const box = [...points.low, ...points.low.map((x, k) => x + 65535 * points.step[k])];
+  return { positions, normals: normalsOf(positions, corners, new Float32Array(3 * count)), corners, bounded: true, box, points };
+}
+
+// The sum of the normals of the triangles around each point, by area.
+function normalsOf(x, corners, n) {
+  n.fill(0);
+  for (let i = 0; i < corners.length; i += 3) {
+    const a = 3 * corners[i], b = 3 * corners[i + 1], c = 3 * corners[i + 2];
+    const u0 = x[b] - x[a], u1 = x[b + 1] - x[a + 1], u2 = x[b + 2] - x[a + 2];
+    const v0 = x[c] - x[a], v1 = x[c + 1] - x[a + 1], v2 = x[c + 2] - x[a + 2];
+    const n0 = u1 * v2 - u2 * v1, n1 = u2 * v0 - u0 * v2, n2 = u0 * v1 - u1 * v0;
+    for (const k of [a, b, c]) { n[k] += n0; n[k + 1] += n1; n[k + 2] += n2; }
+  }
+  return n;
+}
+
 function shapeOf(collider, bounds) {
   const parameters = Object.fromEntries(Object.entries(collider.parameters).map(([name, value]) => [name, value ?? 0]));
+  if (collider.shape?.points.levels) return movingShape(collider.shape);
   if (collider.shape) return ownShape(collider.shape);
   return shapes[collider.type] ? shapes[collider.type](parameters, bounds) : null;
 }

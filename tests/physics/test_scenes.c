@@ -10,7 +10,7 @@
 #include "support/audit.h"
 #include "support/scene.h"
 
-#define MAX_SETTINGS 6
+#define MAX_SETTINGS 8
 #define MAX_SCENES   64
 
 #define COLUMNS "/cloth/0/mesh/columns"
@@ -32,6 +32,17 @@ static const beginning beginnings[] = {
     {"capstan", 0.3, {{COLUMNS, "31"}, {ROWS, "3"}}, .touches = true},
     {"crumple", 0.4, {{COLUMNS, "11"}, {ROWS, "11"}}, .touches = true},
     {"cs184_pinned2", 0.2, {{NULL}}, .explicit = true},
+    {"dress",
+     0.25,
+     {{COLUMNS, "10"},
+      {ROWS, "10"},
+      {"/cloth/1/mesh/columns", "10"},
+      {"/cloth/1/mesh/rows", "10"},
+      {"/cloth/2/mesh/columns", "11"},
+      {"/cloth/2/mesh/rows", "16"},
+      {"/cloth/3/mesh/columns", "11"},
+      {"/cloth/3/mesh/rows", "16"}},
+     .touches = true},
     {"flag", 0.3, {{COLUMNS, "10"}, {ROWS, "7"}}},
     {"floor_drop", 0.4, {{COLUMNS, "5"}, {ROWS, "11"}}, .touches = true},
     {"fold", 1.3, {{COLUMNS, "21"}, {ROWS, "4"}}, .touches = true},

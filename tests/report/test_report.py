@@ -143,6 +143,14 @@ def test_one_file():
     assert page.count("throw Error(") == block(page, "run").count("throw Error(") == 1
 
 
+def test_names():
+    """no function or constant of one script replaces that of another: all share one scope"""
+    make_run()
+    good("report", "out")
+    names = re.findall(r"^(?:function|const|class) +(\w+)", read("out/report.html"), re.M)
+    assert "Player" in names and len(set(names)) == len(names), sorted(names)
+
+
 def test_small():
     """with less room, frames are left out evenly; the first and the last are kept"""
     make_run("--frame-rate", "4000", "--duration", "0.5")
@@ -182,7 +190,7 @@ def test_refused():
         refused("report", "bad", says=says)
         assert not any(name.startswith("report") for name in os.listdir("bad")), os.listdir("bad")
     os.remove("bad/positions.npy")
-    refused("report", "bad", says="writes it with --format npy")
+    refused("report", "bad", says="writes it with the frame format npy")
     shutil.rmtree("bad")
     shutil.copytree("out", "bad")
     with open("bad/positions.npy", "rb+") as file:
@@ -193,6 +201,45 @@ def test_refused():
     with open("bad/scene.json", "w", encoding="ascii") as file:
         json.dump(scene, file)
     refused("report", "bad", says="63 nodes, the scene of the folder has 72")
+
+
+# A tetrahedron that stretches to the right from 0.1 s to 0.3 s, in three frames.
+TETRAHEDRON = [(0, -0.6, 0), (0.2, -0.6, 0), (0, -0.4, 0), (0, -0.6, -0.2)]
+STRETCHES = [0, 0.2, 0.1]
+
+
+def stretched(amount):
+    return [(x + (amount if i == 1 else 0), y, z) for i, (x, y, z) in enumerate(TETRAHEDRON)]
+
+
+def make_deforming_run():
+    for frame, amount in enumerate(STRETCHES):
+        with open(f"body_{frame}.obj", "w", encoding="ascii") as file:
+            file.writelines("v %g %g %g\n" % p for p in stretched(amount))
+            file.write("f 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n")
+    body = {"type": "animated_mesh", "file": "body_%d.obj", "frame_rate": 10, "start": 0.1}
+    with open("scene_of_test.json", "w", encoding="utf-8") as file:
+        json.dump({**SCENE, "colliders": [SCENE["colliders"][1], body]}, file)
+    good("run", "scene_of_test.json", "--out", "out")
+    good("report", "out")
+
+
+def test_deforming():
+    """the page has the points of a collider that deforms at every kept frame, to half a step of 16 bits"""
+    make_deforming_run()
+    page = read("out/report.html")
+    data = json.loads(block(page, "run"))
+    shape = data["colliders"][1]["shape"]
+    levels, times = numbers(page, shape["block"], "H"), data["frames"]["times"]
+    assert len(levels) == 12 * len(times) == 12 * 21 and shape["count"] == 4 and len(shape["triangles"]) == 12
+    assert "shape" not in data["colliders"][0]
+    for f, time in enumerate(times):
+        s = min(max((time - 0.1) * 10, 0), 2)
+        a = min(int(s), 1)
+        wanted = [c for p in stretched(STRETCHES[a] + (s - a) * (STRETCHES[a + 1] - STRETCHES[a])) for c in p]
+        for i, value in enumerate(wanted):
+            k, level = i % 3, levels[12 * f + i]
+            assert abs(shape["low"][k] + shape["step"][k] * level - value) <= 0.5001 * shape["step"][k] + 1e-9, (f, i)
 
 
 # ---- In a browser
@@ -355,6 +402,26 @@ def test_drawn():
         strained = page.shot()
         assert len(red(strained)) < 0.3 * len(later), "another colour map"
         assert len({strained[r][c] for r, c in later}) > 100, "shades of strain"
+        assert not page.complaints, page.complaints
+
+
+def test_deforming_drawn():
+    """the view shows the points of a collider that deforms where they are at the time"""
+    make_deforming_run()
+    corner = "player.colliders[1].moving.positions[3]"
+    with Browser(address("out/report.html", "t=0.05")) as page:
+        page.settle()
+        shape = json.loads(block(read("out/report.html"), "run"))["colliders"][1]["shape"]
+        first, shots = page.evaluate(corner), [page.shot()]
+        page.evaluate("location.hash = 't=0.2'")
+        page.settle()
+        assert abs(first - 0.2) < shape["step"][0] and abs(page.evaluate(corner) - 0.4) < shape["step"][0]
+        shots.append(page.shot())
+        page.evaluate("location.hash = 't=0.25'")
+        page.settle()
+        assert abs(page.evaluate(corner) - 0.35) < 2 * shape["step"][0], "between two frames"
+        changed = [(r, c) for r in range(100, 600) for c in range(600) if shots[0][r][c] != shots[1][r][c]]
+        assert len(changed) > 500, len(changed)
         assert not page.complaints, page.complaints
 
 

@@ -148,7 +148,7 @@ START_TEST(faults_name_file_frame_and_value)
     } cases[] = {
         {"a.npy", NULL, NULL, "/c/mesh: a.npy has positions only"},
         {"b_%d.obj", "square.obj", NULL, "/c/mesh: b_%d.obj has its triangles itself"},
-        {"a.abc", NULL, NULL, "/c/file: a.abc: unknown ending; known are .npy, .pc2, .obj, /"},
+        {"a.abc", NULL, NULL, "/c/file: a.abc: unknown ending; known are .npy, .pc2, .obj, /, .glb"},
         {"gone.npy", "square.obj", NULL, "gone.npy: cannot be read: No such file"},
         {"a.npy", "gone.obj", NULL, "gone.obj: cannot be read: No such file"},
         {"five.npy", "square.obj", NULL, "five.npy: 5 nodes; the mesh has 4"},

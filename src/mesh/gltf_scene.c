@@ -1,0 +1,451 @@
+/* gltf_scene.c: see gltf_scene.h. */
+#include "mesh/gltf_scene.h"
+
+#include "base/elementary.h"
+#include "base/rotation.h"
+#include "base/vec3.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define NEARLY_EQUAL                                                                                         \
+    1e-6 /* [rad] quaternions nearer than this are interpolated linearly: the difference is below
+                             1e-18 */
+
+#define FAIL(g, ...) drape_mesh_fail((g)->ctx, (g)->file, 0, __VA_ARGS__)
+
+/* Places of a transform in drape_gltf_node.rest. */
+enum { TRANSLATION = 0, ROTATION = 3, SCALE = 7 };
+
+typedef enum interpolation { STEP, LINEAR, CUBIC } interpolation;
+
+/* Keys of one property of a node; those of cubic splines have a tangent before and behind each value. */
+struct drape_gltf_channel {
+    int32_t node;
+    int place; /* in rest; -1: the weights */
+    interpolation kind;
+    drape_gltf_array time;
+    double *value; /* (keys x width, or keys x 3 x width) */
+    int32_t width;
+};
+
+/* ---- Maps ---- */
+
+void drape_gltf_map_point(const drape_gltf_map *map, const double x[3], double y[3])
+{
+    double sum[3] = {map->column[3][0], map->column[3][1], map->column[3][2]};
+    for (int k = 0; k < 3; k++)
+        vec3_add_scaled(x[k], map->column[k], sum);
+    memcpy(y, sum, sizeof sum);
+}
+
+drape_gltf_map drape_gltf_map_product(const drape_gltf_map *a, const drape_gltf_map *b)
+{
+    drape_gltf_map out = {.column = {{0}}};
+    for (int i = 0; i < 4; i++) {
+        for (int k = 0; k < 3; k++)
+            vec3_add_scaled(b->column[i][k], a->column[k], out.column[i]);
+        vec3_add_scaled(i == 3, a->column[3], out.column[i]);
+    }
+    return out;
+}
+
+drape_gltf_map drape_gltf_map_of(const double matrix[16])
+{
+    drape_gltf_map out;
+    for (int i = 0; i < 4; i++)
+        memcpy(out.column[i], matrix + 4 * i, sizeof out.column[i]);
+    return out;
+}
+
+static drape_gltf_map map_of(const double at[10])
+{
+    const double *q = at + ROTATION, turned[4] = {q[3], q[0], q[1], q[2]};
+    double R[9];
+    drape_gltf_map out;
+    drape_rotation_of_quaternion(turned, R);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            out.column[i][k] = R[3 * k + i] * at[SCALE + i];
+    memcpy(out.column[3], at + TRANSLATION, sizeof out.column[3]);
+    return out;
+}
+
+/* ---- Nodes ---- */
+
+static drape_status check_transform(const drape_gltf *g, const char *owner, const double at[10])
+{
+    double turn = 0;
+    bool finite = true;
+    for (int i = 0; i < 10; i++)
+        finite = finite && fabs(at[i]) <= 1e9;
+    for (int i = 0; i < 4; i++)
+        turn += at[ROTATION + i] * at[ROTATION + i];
+    if (!finite)
+        return FAIL(g, "%s: numbers must be finite and within 1e9", owner);
+    return turn > 1e-12 ? DRAPE_OK : FAIL(g, "%s: a rotation must not be 0", owner);
+}
+
+static drape_status read_transform(const drape_gltf *g, const char *owner, const json_t *object,
+                                   drape_gltf_node *n)
+{
+    double matrix[16];
+    const double rest[10] = {0, 0, 0, 0, 0, 0, 1, 1, 1, 1};
+    memcpy(n->rest, rest, sizeof rest);
+    n->fixed = json_object_get(object, "matrix");
+    drape_status status = drape_gltf_numbers(g, owner, object, "matrix", 16, matrix);
+    if (!status)
+        status = drape_gltf_numbers(g, owner, object, "translation", 3, n->rest + TRANSLATION);
+    if (!status)
+        status = drape_gltf_numbers(g, owner, object, "rotation", 4, n->rest + ROTATION);
+    if (!status)
+        status = drape_gltf_numbers(g, owner, object, "scale", 3, n->rest + SCALE);
+    if (!status && n->fixed)
+        n->local = drape_gltf_map_of(matrix);
+    return status ? status : check_transform(g, owner, n->rest);
+}
+
+/* As many weights as the first primitive of its mesh has morph targets; the node's own replace those of the
+ * mesh. */
+static drape_status read_weights(const drape_gltf_scene *s, const char *owner, const json_t *object,
+                                 drape_gltf_node *n)
+{
+    const json_t *mesh = n->mesh >= 0 ? drape_gltf_item(s->gltf, "meshes", n->mesh) : NULL,
+                 *primitive = json_array_get(json_object_get(mesh, "primitives"), 0);
+    const size_t count = json_array_size(json_object_get(primitive, "targets"));
+    if (count == 0)
+        return DRAPE_OK;
+    n->weight_count = (int32_t)count;
+    n->weight = drape_arena_take(s->arena, count, sizeof *n->weight);
+    n->now_weight = drape_arena_take(s->arena, count, sizeof *n->now_weight);
+    if (!n->weight || !n->now_weight)
+        return DRAPE_E_MEMORY;
+    const drape_status status = drape_gltf_numbers(s->gltf, owner, mesh, "weights", count, n->weight);
+    return status ? status : drape_gltf_numbers(s->gltf, owner, object, "weights", count, n->weight);
+}
+
+static drape_status read_children(const drape_gltf_scene *s, const char *owner, const json_t *object,
+                                  int32_t parent)
+{
+    const json_t *child;
+    size_t i;
+    int32_t index;
+    json_array_foreach(json_object_get(object, "children"), i, child)
+    {
+        const drape_status status = drape_gltf_index_of(s->gltf, owner, child, s->node_count, &index);
+        if (status)
+            return status;
+        if (s->nodes[index].parent >= 0)
+            return FAIL(s->gltf, "node %d is the child of nodes %d and %d", (int)index,
+                        (int)s->nodes[index].parent, (int)parent);
+        s->nodes[index].parent = parent;
+    }
+    return DRAPE_OK;
+}
+
+static drape_status read_node(const drape_gltf_scene *s, int32_t index)
+{
+    const drape_gltf *g = s->gltf;
+    const json_t *object = drape_gltf_item(g, "nodes", index);
+    drape_gltf_node *n = &s->nodes[index];
+    char owner[64];
+    snprintf(owner, sizeof owner, "node %d", (int)index);
+    drape_status status = drape_gltf_index(g, owner, object, "mesh", drape_gltf_count(g, "meshes"), &n->mesh);
+    if (!status)
+        status = drape_gltf_index(g, owner, object, "skin", drape_gltf_count(g, "skins"), &n->skin);
+    if (!status)
+        status = read_transform(g, owner, object, n);
+    if (!status)
+        status = read_weights(s, owner, object, n);
+    snprintf(owner, sizeof owner, "node %d: \"children\"", (int)index);
+    return status ? status : read_children(s, owner, object, index);
+}
+
+/* Roots first, then children of what is listed; what is never listed is its own ancestor. */
+static drape_status sort_nodes(drape_gltf_scene *s)
+{
+    int32_t listed = 0, next = 0;
+    for (int32_t i = 0; i < s->node_count; i++)
+        if (s->nodes[i].parent < 0)
+            s->order[listed++] = i;
+    while (next < listed) {
+        const json_t *child;
+        size_t i;
+        json_array_foreach(json_object_get(drape_gltf_item(s->gltf, "nodes", s->order[next]), "children"), i,
+                           child)
+        {
+            s->order[listed++] = (int32_t)json_number_value(child);
+        }
+        next++;
+    }
+    return listed == s->node_count ? DRAPE_OK : FAIL(s->gltf, "a node is its own ancestor");
+}
+
+/* What the default scene shows, or, without scenes, all. */
+static drape_status mark_drawn(drape_gltf_scene *s)
+{
+    const int32_t scenes = drape_gltf_count(s->gltf, "scenes");
+    int32_t shown, index;
+    const json_t *root;
+    size_t k;
+    drape_status status = drape_gltf_index(s->gltf, "the file", s->gltf->root, "scene", scenes, &shown);
+    if (status)
+        return status;
+    for (int32_t i = 0; i < s->node_count; i++)
+        s->nodes[i].drawn = scenes == 0;
+    json_array_foreach(json_object_get(drape_gltf_item(s->gltf, "scenes", shown < 0 ? 0 : shown), "nodes"), k,
+                       root)
+    {
+        status = drape_gltf_index_of(s->gltf, "\"scenes\": a node", root, s->node_count, &index);
+        if (status)
+            return status;
+        s->nodes[index].drawn = true;
+    }
+    for (int32_t i = 0; i < s->node_count; i++) {
+        drape_gltf_node *n = &s->nodes[s->order[i]];
+        n->drawn = n->drawn || (n->parent >= 0 && s->nodes[n->parent].drawn);
+    }
+    return DRAPE_OK;
+}
+
+/* ---- The animation ---- */
+
+static drape_status find_path(const drape_gltf_scene *s, const char *owner, const json_t *target,
+                              drape_gltf_channel *c)
+{
+    static const struct {
+        const char *name;
+        int place, width;
+    } paths[] = {
+        {"translation", TRANSLATION, 3}, {"rotation", ROTATION, 4}, {"scale", SCALE, 3}, {"weights", -1, 0}};
+    const char *path = json_string_value(json_object_get(target, "path"));
+    for (size_t i = 0; path && i < sizeof paths / sizeof *paths; i++)
+        if (strcmp(path, paths[i].name) == 0) {
+            c->place = paths[i].place;
+            c->width = c->place < 0 ? s->nodes[c->node].weight_count : paths[i].width;
+            return c->width > 0 ? DRAPE_OK
+                                : FAIL(s->gltf, "%s: node %d has no morph targets", owner, (int)c->node);
+        }
+    return FAIL(s->gltf, "%s: its path is %.30s; translation, rotation, scale or weights is needed", owner,
+                path ? path : "missing");
+}
+
+static drape_status check_keys(const drape_gltf_scene *s, const char *owner, const drape_gltf_channel *c)
+{
+    const int64_t count = c->time.count, each = (c->kind == CUBIC ? 3 : 1) * (int64_t)c->width;
+    for (int64_t k = 0; k < count; k++)
+        if (!(fabs(c->time.value[k]) <= 1e9) || (k > 0 && !(c->time.value[k] > c->time.value[k - 1])))
+            return FAIL(s->gltf, "%s: key %" PRId64 " is at %g s; times must be finite and increase", owner,
+                        k, c->time.value[k]);
+    for (int64_t i = 0; i < count * each; i++)
+        if (!(fabs(c->value[i]) <= 1e9))
+            return FAIL(s->gltf, "%s: key %" PRId64 ": %g; values must be finite and within 1e9", owner,
+                        i / each, c->value[i]);
+    return DRAPE_OK;
+}
+
+/* The values of a rotation are VEC4, of others VEC3, of weights numbers, as many as targets for each key. */
+static drape_status read_sampler(const drape_gltf_scene *s, const char *owner, const json_t *sampler,
+                                 drape_gltf_channel *c)
+{
+    static const char *const names[] = {[STEP] = "STEP", [LINEAR] = "LINEAR", [CUBIC] = "CUBICSPLINE"};
+    const char *name = json_string_value(json_object_get(sampler, "interpolation"));
+    const int32_t accessors = drape_gltf_count(s->gltf, "accessors");
+    int32_t input, output;
+    drape_gltf_array value;
+    for (c->kind = STEP; name && c->kind < CUBIC && strcmp(names[c->kind], name) != 0;)
+        c->kind++;
+    c->kind = name ? c->kind : LINEAR;
+    if (name && strcmp(names[c->kind], name) != 0)
+        return FAIL(s->gltf, "%s: its interpolation is %.30s; LINEAR, STEP or CUBICSPLINE is needed", owner,
+                    name);
+    drape_status status = drape_gltf_index(s->gltf, owner, sampler, "input", accessors, &input);
+    if (!status)
+        status = drape_gltf_index(s->gltf, owner, sampler, "output", accessors, &output);
+    if (!status && (input < 0 || output < 0))
+        status = FAIL(s->gltf, "%s: its sampler needs \"input\" and \"output\"", owner);
+    if (!status)
+        status = drape_gltf_read(s->gltf, s->arena, input, &(drape_gltf_want){"times", "SCALAR", false, -1},
+                                 &c->time);
+    if (status)
+        return status;
+    const int64_t keys = c->time.count * (c->kind == CUBIC ? 3 : 1);
+    const drape_gltf_want want = {"values of an animation",
+                                  c->place < 0           ? "SCALAR"
+                                  : c->place == ROTATION ? "VEC4"
+                                                         : "VEC3",
+                                  false, c->place < 0 ? keys * c->width : keys};
+    status = drape_gltf_read(s->gltf, s->arena, output, &want, &value);
+    c->value = value.value;
+    return status ? status : check_keys(s, owner, c);
+}
+
+/* Channels without a node are for extensions. */
+static drape_status read_channel(drape_gltf_scene *s, const json_t *animation, const json_t *object,
+                                 int number)
+{
+    const json_t *samplers = json_object_get(animation, "samplers"),
+                 *target = json_object_get(object, "target");
+    const size_t count = json_array_size(samplers);
+    drape_gltf_channel *c = &s->channels[s->channel_count];
+    int32_t sampler;
+    char owner[64];
+    snprintf(owner, sizeof owner, "animation 0, channel %d", number);
+    drape_status status = drape_gltf_index(s->gltf, owner, target, "node", s->node_count, &c->node);
+    if (status || c->node < 0)
+        return status;
+    status = drape_gltf_index(s->gltf, owner, object, "sampler",
+                              count > INT32_MAX ? INT32_MAX : (int32_t)count, &sampler);
+    if (!status && sampler < 0)
+        status = FAIL(s->gltf, "%s has no sampler", owner);
+    if (!status)
+        status = find_path(s, owner, target, c);
+    if (!status)
+        status = read_sampler(s, owner, json_array_get(samplers, (size_t)sampler), c);
+    if (status)
+        return status;
+    const double first = c->time.value[0], last = c->time.value[c->time.count - 1];
+    s->start = s->channel_count == 0 ? first : fmin(s->start, first);
+    s->end = s->channel_count == 0 ? last : fmax(s->end, last);
+    s->channel_count++;
+    return DRAPE_OK;
+}
+
+static drape_status read_animation(drape_gltf_scene *s)
+{
+    const json_t *animation = drape_gltf_item(s->gltf, "animations", 0),
+                 *channels = json_object_get(animation, "channels"), *channel;
+    size_t i;
+    drape_status status = DRAPE_OK;
+    s->channels = drape_arena_take(s->arena, json_array_size(channels), sizeof *s->channels);
+    if (!s->channels)
+        return DRAPE_E_MEMORY;
+    json_array_foreach(channels, i, channel)
+    {
+        if (!status)
+            status = read_channel(s, animation, channel, (int)i);
+    }
+    return status;
+}
+
+drape_status drape_gltf_scene_read(const drape_gltf *gltf, drape_arena *arena, drape_gltf_scene *s)
+{
+    *s = (drape_gltf_scene){.gltf = gltf, .arena = arena, .node_count = drape_gltf_count(gltf, "nodes")};
+    s->nodes = drape_arena_take(arena, (size_t)s->node_count, sizeof *s->nodes);
+    s->order = drape_arena_take(arena, (size_t)s->node_count, sizeof *s->order);
+    if (!s->nodes || !s->order)
+        return DRAPE_E_MEMORY;
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; i < s->node_count; i++)
+        s->nodes[i].parent = -1;
+    for (int32_t i = 0; !status && i < s->node_count; i++)
+        status = read_node(s, i);
+    if (!status)
+        status = sort_nodes(s);
+    if (!status)
+        status = mark_drawn(s);
+    return status ? status : read_animation(s);
+}
+
+/* ---- A pose ---- */
+
+/* The shorter way between two rotations, at constant speed (Shoemake 1985). */
+static void interpolate_rotation(const double *a, const double *b, double s, double *out)
+{
+    double sine[3], cosine, dot = 0, size[2] = {0};
+    for (int k = 0; k < 4; k++) {
+        dot += a[k] * b[k];
+        size[0] += a[k] * a[k];
+        size[1] += b[k] * b[k];
+    }
+    const double length = sqrt(size[0] * size[1]), sign = dot < 0 ? -1 : 1;
+    double across = 0, weight[2] = {1 - s, s * sign};
+    for (int k = 0; k < 4; k++) {
+        const double d = b[k] * sign / sqrt(size[1]) - a[k] / sqrt(size[0]);
+        across += d * d;
+    }
+    /* |b - a| = 2 sin(angle/2), exact where the angle is small */
+    const double angle = 2 * drape_atan2(sqrt(across) / 2, sqrt(fmax(0, 1 - across / 4)));
+    if (length > 0 && angle > NEARLY_EQUAL) {
+        drape_sin_cos(angle, &sine[0], &cosine);
+        drape_sin_cos((1 - s) * angle, &sine[1], &cosine);
+        drape_sin_cos(s * angle, &sine[2], &cosine);
+        weight[0] = sine[1] / sine[0] / sqrt(size[0]);
+        weight[1] = sign * sine[2] / sine[0] / sqrt(size[1]);
+    }
+    for (int k = 0; k < 4; k++)
+        out[k] = weight[0] * a[k] + weight[1] * b[k];
+}
+
+/* Hermite splines (appendix C.5): value, tangent behind the first key, tangent before the second. */
+static void interpolate_cubic(const drape_gltf_channel *c, int64_t key, double s, double h, double *out)
+{
+    const double *a = c->value + 3 * key * c->width, *b = a + 3 * (size_t)c->width;
+    const double s2 = s * s, s3 = s2 * s;
+    for (int32_t k = 0; k < c->width; k++) {
+        const double p = a[c->width + k], m = a[2 * c->width + k], q = b[c->width + k], n = b[k];
+        out[k] =
+            (2 * s3 - 3 * s2 + 1) * p + h * (s3 - 2 * s2 + s) * m + (3 * s2 - 2 * s3) * q + h * (s3 - s2) * n;
+    }
+}
+
+static void interpolate(const drape_gltf_channel *c, double t, double *out)
+{
+    const double *time = c->time.value;
+    int64_t low = 0, high = c->time.count - 1;
+    while (low + 1 < high) { /* the key at or before t, if there is one */
+        const int64_t middle = low + (high - low) / 2;
+        if (time[middle] <= t)
+            low = middle;
+        else
+            high = middle;
+    }
+    if (c->time.count > 1 && t >= time[high])
+        low = high;
+    const size_t each = (size_t)c->width * (c->kind == CUBIC ? 3 : 1),
+                 shift = c->kind == CUBIC ? (size_t)c->width : 0;
+    const double *a = c->value + (size_t)low * each + shift;
+    const bool between = low + 1 < c->time.count && t > time[low] && c->kind != STEP;
+    const double h = between ? time[low + 1] - time[low] : 1, s = between ? (t - time[low]) / h : 0;
+    if (!between)
+        memcpy(out, a, (size_t)c->width * sizeof *out);
+    else if (c->kind == CUBIC)
+        interpolate_cubic(c, low, s, h, out);
+    else if (c->place == ROTATION)
+        interpolate_rotation(a, a + each, s, out);
+    else
+        for (int32_t k = 0; k < c->width; k++)
+            out[k] = a[k] + s * (a[each + (size_t)k] - a[k]);
+}
+
+/* A rotation that an animation lets vanish is none. */
+static void keep_rotation(double *q)
+{
+    const double none[4] = {0, 0, 0, 1};
+    if (!(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] > 1e-12))
+        memcpy(q, none, sizeof none);
+}
+
+void drape_gltf_scene_pose(drape_gltf_scene *s, double t)
+{
+    for (int32_t i = 0; i < s->node_count; i++) {
+        drape_gltf_node *n = &s->nodes[i];
+        memcpy(n->now, n->rest, sizeof n->now);
+        if (n->weight_count > 0)
+            memcpy(n->now_weight, n->weight, (size_t)n->weight_count * sizeof *n->weight);
+    }
+    for (int32_t i = 0; i < s->channel_count; i++) {
+        const drape_gltf_channel *c = &s->channels[i];
+        drape_gltf_node *n = &s->nodes[c->node];
+        interpolate(c, t, c->place < 0 ? n->now_weight : n->now + c->place);
+    }
+    for (int32_t i = 0; i < s->node_count; i++) {
+        drape_gltf_node *n = &s->nodes[s->order[i]];
+        keep_rotation(n->now + ROTATION);
+        if (!n->fixed)
+            n->local = map_of(n->now);
+        n->world = n->parent < 0 ? n->local : drape_gltf_map_product(&s->nodes[n->parent].world, &n->local);
+    }
+}
