@@ -485,8 +485,9 @@ typedef struct drape_realtime {
     double deepest_relaxed; /* [m] the deepest of them: how far inside its collider */
     double error; /* [m] largest drape_attempt.error of the accepted steps; NaN: the integrator estimates
                         none, or no step was accepted */
-    double error_bound;       /* [m] see drape_statistics; NaN: the integrator estimates no error */
-    bool accurate;            /* whether `error` is at most that; true if there is no estimate */
+    double error_bound; /* [m] see drape_statistics; NaN: the integrator estimates no error */
+    bool accurate;      /* whether it made a step, held no cloth, and `error` is at most that, as far as the
+                                 integrator estimates one */
     int64_t inaccurate_total; /* calls since the sim was created that were not accurate */
     int held; /* steps in which the cloth was held where it was, without velocity, because none could be made
                  otherwise */

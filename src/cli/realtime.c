@@ -141,7 +141,7 @@ static void count(drape_summary_realtime *s, const drape_realtime *frame)
     s->full += full;
     s->fewer += fewer;
     s->larger += !full && !fewer;
-    s->inaccurate += !frame->accurate;
+    s->inaccurate += frame->error > frame->error_bound;
     s->still += !(frame->h > 0);
     s->debt = frame->debt;
     s->dropped = frame->dropped_total;

@@ -152,6 +152,8 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
         if (contact.relaxed > 0 && pair->collider >= 0 && drape_pair_points(pair) > 1 &&
             relaxed->solid[pair->collider])
             continue;
+        if (contact.relaxed > 0 && drape_relaxed_has_exit(relaxed, pair))
+            continue;
         if (!(contact.relaxed > 0) && contact.gap.value < DRAPE_BARRIER_GENTLE * pair->distance) {
             contact.gentle = (all_inside && contact.gap.value < drape_pair_least_gap(pair, rounding)) ||
                              drape_inside_has(inside, pair);

@@ -42,6 +42,9 @@ drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, 
     set->of_node = drape_arena_take(arena, nodes, sizeof *set->of_node);
     set->normal = drape_arena_take(arena, nodes, 3 * sizeof *set->normal);
     set->reach = drape_arena_take(arena, nodes, sizeof *set->reach);
+    set->face = drape_arena_take(arena, (size_t)model->triangle_count, sizeof *set->face);
+    set->parent = drape_arena_take(arena, nodes, sizeof *set->parent);
+    set->patches = drape_arena_take(arena, nodes, sizeof *set->patches);
     set->pins = drape_arena_take(arena, colliders, sizeof *set->pins);
     set->bound = drape_arena_take(arena, colliders, 4 * sizeof *set->bound);
     set->solid = drape_arena_take(arena, colliders, sizeof *set->solid);
@@ -114,6 +117,16 @@ double drape_relaxed_factor(const drape_relaxed_set *set, const drape_pair *pair
     if (has_pin(set->model, one, split))
         factor = fmax(factor, factor_of(set, -1, other, 4 - split));
     return factor;
+}
+
+bool drape_relaxed_has_exit(const drape_relaxed_set *set, const drape_pair *pair)
+{
+    bool goes = false;
+    for (int a = 0; pair->collider >= 0 && a < drape_pair_points(pair); a++) {
+        const drape_relaxed_node *found = drape_relaxed_find(set, pair->collider, pair->node[a]);
+        goes = goes || (found && drape_relaxed_goes_out(found));
+    }
+    return goes;
 }
 
 /* ---- Changes ---- */
@@ -223,14 +236,15 @@ int32_t drape_relaxed_remove(drape_relaxed_set *set, drape_relaxed_leaves *leave
 
 static void archive_node(drape_relaxed_node *node, drape_archive *a)
 {
-    double *const values[] = {&node->since,   &node->until, &node->depth,
-                              &node->deepest, &node->gap,   &node->factor};
+    double *const values[] = {&node->since,  &node->until,   &node->depth,   &node->deepest, &node->gap,
+                              &node->factor, &node->exit[0], &node->exit[1], &node->exit[2], &node->height};
     drape_archive_int32(a, &node->collider);
     drape_archive_int32(a, &node->node);
     for (size_t i = 0; i < sizeof values / sizeof *values; i++)
         drape_archive_double(a, values[i]);
     drape_archive_bool(a, &node->blocked);
     drape_archive_bool(a, &node->fresh);
+    drape_archive_bool(a, &node->exits);
 }
 
 static void archive_totals(drape_relaxed_set *set, drape_archive *a)
@@ -248,7 +262,8 @@ static void archive_totals(drape_relaxed_set *set, drape_archive *a)
 static bool is_node(const drape_relaxed_set *set, const drape_relaxed_node *node)
 {
     return node->collider >= -1 && node->collider < set->model->collider_count && node->node >= 0 &&
-           node->node < set->model->node_count && node->factor >= 1 && isfinite(node->factor);
+           node->node < set->model->node_count && node->factor >= 1 && isfinite(node->factor) &&
+           isfinite(node->height) && isfinite(node->exit[0] + node->exit[1] + node->exit[2]);
 }
 
 void drape_relaxed_archive(drape_relaxed_set *set, drape_archive *a)

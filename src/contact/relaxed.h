@@ -14,14 +14,30 @@
 typedef struct drape_relaxed_node {
     int32_t collider; /* -1: pinned pieces of cloth */
     int32_t node;
-    double since;          /* [s] */
-    double until;          /* [s] it is not held again before this time */
-    double depth, deepest; /* [m] at the beginning of the last step, >= 0; since it was relaxed */
-    double gap;            /* [m] the smallest of its pairs there, INFINITY: none is active */
-    double factor;         /* of the pressure, >= 1 */
-    bool blocked;          /* there was no room for it at the end of the last step that was looked at */
-    bool fresh;            /* no step was accepted since it was relaxed */
+    double since;           /* [s] */
+    double until;           /* [s] it is not held again before this time */
+    double depth, deepest;  /* [m] at the beginning of the last step, >= 0; since it was relaxed */
+    double gap;             /* [m] the smallest of its pairs there, INFINITY: none is active */
+    double factor;          /* of the pressure, >= 1 */
+    bool blocked;           /* there was no room for it at the end of the last step that was looked at */
+    bool fresh;             /* no step was accepted since it was relaxed */
+    bool exits;             /* it is in a patch that comes out along one direction (exit.h): */
+    double exit[3], height; /* in the coordinates of the collider: the direction, and its end along it [m] */
 } drape_relaxed_node;
+
+/* Where it is blocked, the direction waits. */
+static inline bool drape_relaxed_goes_out(const drape_relaxed_node *node)
+{
+    return node->exits && !node->blocked;
+}
+
+/* What is summed over the faces of a patch that comes out along one direction (exit.h). */
+typedef struct drape_relaxed_patch {
+    double normal[3], area; /* [m2] sums of area and normal, and of area */
+    double cost[2];         /* [m3] sums of area and the paths out against and along the normal */
+    double kept[3];         /* [m2] sum of area and the directions of nodes that were in patches before */
+    double height;          /* [m] of the end of the longest path, along the direction in space */
+} drape_relaxed_patch;
 
 /* What became of the cloth at one collider so far. */
 typedef struct drape_relaxed_total {
@@ -35,11 +51,14 @@ typedef struct drape_relaxed_set {
     const drape_model *model;
     drape_relaxed_node *nodes; /* (count of room) by increasing collider and node */
     int32_t count, room;
-    uint8_t *of_node; /* (node_count) whether it is among them, for any collider */
-    double *normal;   /* (node_count x 3) scratch */
-    double *reach;    /* (node_count) scratch */
-    bool *pins;       /* (collider_count) scratch */
-    double *bound;    /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none */
+    uint8_t *of_node;             /* (node_count) whether it is among them, for any collider */
+    double *normal;               /* (node_count x 3) scratch */
+    double *reach;                /* (node_count) scratch */
+    bool *pins;                   /* (collider_count) scratch */
+    uint8_t *face;                /* (triangle_count) scratch of exit.c, */
+    int32_t *parent;              /* (node_count) this, too, */
+    drape_relaxed_patch *patches; /* (node_count) and this */
+    double *bound; /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none */
     bool *solid; /* (collider_count) its parts enclose a volume: inside, they push to whichever side the cloth
                     is on, and only the distance from the whole tells where out is */
     drape_relaxed_total *total; /* (collider_count + 1) the last one: of pinned pieces of cloth */
@@ -61,6 +80,10 @@ double drape_relaxed_factor(const drape_relaxed_set *set, const drape_pair *pair
 
 /* Whether any of these nodes is relaxed for the collider; -1 stands for no node. */
 bool drape_relaxed_has(const drape_relaxed_set *set, int32_t collider, const int32_t *node, int nodes);
+
+/* Whether some node of a pair comes out of its collider along a direction of its own: the pair does not
+ * act. */
+bool drape_relaxed_has_exit(const drape_relaxed_set *set, const drape_pair *pair);
 
 /* Relaxes a node from time t on, at least until `until`, or says that a relaxed one has no room. *added is
  * raised by 1 if it was not relaxed. Errors: DRAPE_E_MEMORY. */

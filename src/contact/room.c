@@ -4,8 +4,8 @@
 #include "base/clock.h"
 #include "base/vec3.h"
 #include "contact/barrier.h"
+#include "contact/exit.h"
 #include "contact/parts.h"
-#include "geometry/intersect.h"
 
 #include <string.h>
 
@@ -56,7 +56,7 @@ static drape_status add_face(drape_contact *c, const drape_configuration *at, in
         const drape_relaxed_node *found = drape_relaxed_find(&c->relaxed, collider, n[a]);
         contact.relaxed = fmax(contact.relaxed, found ? found->factor : 0);
         contact.pair.node[a] = n[a];
-        blocked = blocked || (found && found->blocked);
+        blocked = blocked || (found && (found->blocked || drape_relaxed_goes_out(found)));
     }
     contact.pair.area = c->broad.face_area[face] / 7;
     for (int i = 0; i <= ACROSS_FACE && contact.relaxed > 0 && !blocked; i++)
@@ -80,7 +80,7 @@ drape_status drape_room_add_surfaces(drape_contact *c, const drape_configuration
     for (int32_t i = 0; !status && i < c->relaxed.count; i++) {
         const drape_relaxed_node *node = &c->relaxed.nodes[i];
         if (node->collider < 0 || c->model->colliders[node->collider].ops->smooth ||
-            c->model->pinned[node->node])
+            c->model->pinned[node->node] || drape_relaxed_goes_out(node))
             continue;
         drape_active_contact contact = {.pair =
                                             drape_broad_phase_surface(&c->broad, node->node, node->collider),
@@ -92,7 +92,7 @@ drape_status drape_room_add_surfaces(drape_contact *c, const drape_configuration
         for (int32_t f = 0; !status && f < c->model->triangle_count; f++)
             if (c->relaxed.solid[k] && drape_relaxed_count(&c->relaxed, k) > 0)
                 status = add_face(c, at, k, f);
-    return status;
+    return status ? status : drape_exit_add(c, at);
 }
 
 /* ---- Looking ahead ---- */
@@ -421,84 +421,28 @@ static void measure(drape_contact *c)
         const drape_pair *pair = &contact->pair;
         for (int a = 0; contact->relaxed > 0 && a < contact->gap.closest.points; a++) {
             drape_relaxed_node *node = drape_relaxed_find(relaxed, pair->collider, pair->node[a]);
-            if (node)
+            if (node && !drape_relaxed_goes_out(node))
                 node->gap = fmin(node->gap, contact->gap.value);
         }
     }
     for (int32_t i = 0; i < relaxed->count; i++) {
         drape_relaxed_node *node = &relaxed->nodes[i];
-        if (node->collider >= 0 && c->model->pinned[node->node])
+        if (node->collider >= 0 && (c->model->pinned[node->node] || drape_relaxed_goes_out(node)))
             node->gap = fmin(node->gap, distance_at(c, node->collider, c->x + 3 * (size_t)node->node, NULL));
         node->depth = fmax(0, -node->gap);
     }
 }
 
-/* Whether a face of cloth and a piece of a collider pass through each other: two points of an edge, or
- * three of a triangle. */
-static bool cross(const drape_contact *c, int32_t collider, const int32_t *face, const int32_t *piece,
-                  int points)
-{
-    const double *x[3], *y[3];
-    bool found = false;
-    for (int a = 0; a < 3; a++)
-        x[a] = c->x + 3 * (size_t)face[a];
-    for (int a = 0; a < points; a++) {
-        y[a] = c->x + 3 * (size_t)(c->broad.first_point[collider] + piece[a]);
-    }
-    if (points == 2)
-        return drape_intersect_edge(y[0], y[1], x[0], x[1], x[2]);
-    for (int a = 0; a < 3; a++)
-        found = found || drape_intersect_edge(x[a], x[(a + 1) % 3], y[0], y[1], y[2]);
-    return found;
-}
-
-/* A face of the cloth, and what pierces it. */
-typedef struct piercing {
-    const drape_contact *contact;
-    int32_t collider;
-    const int32_t *face; /* 3 nodes */
-    bool found;
-} piercing;
-
-/* The segments of a shape with triangles are their edges. */
-static void meet_triangle(void *user, int32_t triangle)
-{
-    piercing *p = user;
-    const drape_broad_phase *broad = &p->contact->broad;
-    if (p->found || broad->triangle_collider[triangle] != p->collider)
-        return;
-    int32_t corner[4];
-    for (int a = 0; a < 4; a++)
-        corner[a] = broad->triangle[3 * (size_t)triangle + a % 3] - broad->first_point[p->collider];
-    p->found = cross(p->contact, p->collider, p->face, corner, 3);
-    for (int a = 0; a < 3 && !p->found; a++)
-        p->found = cross(p->contact, p->collider, p->face, corner + a, 2);
-}
-
-/* Parts that enclose a volume push to whichever side the cloth is on: a node is out only if none pierces its
- * faces. Triangles are found in the tree of obstacles, which fits their present places. */
+/* A node is out only if the collider pierces none of its faces. */
 static bool is_pierced(const drape_contact *c, const drape_relaxed_node *node)
 {
-    if (node->collider < 0 || !c->relaxed.solid[node->collider])
-        return false;
-    const drape_collider *collider = &c->model->colliders[node->collider];
-    const drape_collider_shape *shape = &collider->shape;
-    const bool in_tree = !collider->ops->smooth && shape->triangle_count > 0;
-    piercing p = {.contact = c, .collider = node->collider};
-    for (int32_t f = 0; !p.found && f < c->model->triangle_count; f++) {
-        const int32_t *n = p.face = c->model->triangle + 3 * (size_t)f;
-        if (n[0] != node->node && n[1] != node->node && n[2] != node->node)
-            continue;
-        if (in_tree)
-            drape_path_bvh_query(&c->broad.obstacles,
-                                 &(drape_path_query){.node = n, .nodes = 3, .x = c->x, .after = -1},
-                                 meet_triangle, &p);
-        for (int32_t i = 0; i < shape->segment_count && !in_tree && !p.found; i++)
-            p.found = cross(c, node->collider, n, shape->segment + 2 * (size_t)i, 2);
-        for (int32_t i = 0; i < shape->triangle_count && !in_tree && !p.found; i++)
-            p.found = cross(c, node->collider, n, shape->triangle + 3 * (size_t)i, 3);
+    bool found = false;
+    for (int32_t f = 0; !found && node->collider >= 0 && f < c->model->triangle_count; f++) {
+        const int32_t *n = c->model->triangle + 3 * (size_t)f;
+        if (n[0] == node->node || n[1] == node->node || n[2] == node->node)
+            found = drape_exit_is_pierced(c, node->collider, f, NULL);
     }
-    return p.found;
+    return found;
 }
 
 /* A node is held again where the force that holds it is no more than what pushes it already. */
@@ -508,7 +452,7 @@ static bool is_out(void *user, const drape_relaxed_node *node)
     const drape_contact_def *def = &c->model->contact;
     const double distance = node->collider >= 0 ? c->broad.distance[node->collider] : 2 * def->self_thickness,
                  s = node->gap / distance;
-    if (node->blocked || node->fresh || s < DRAPE_BARRIER_GENTLE)
+    if (node->blocked || node->fresh || node->exits || s < DRAPE_BARRIER_GENTLE)
         return false;
     const double pressure = -drape_barrier_at(s, DRAPE_BARRIER_GENTLE).db * c->press.factor * def->stiffness *
                             (def->distance / distance);
@@ -535,5 +479,5 @@ drape_status drape_room_review(drape_contact *c, double t, bool *changed)
     if (c->relaxed.count > 0)
         drape_path_bvh_fit(&c->broad.obstacles, c->x, NULL, NULL); /* for is_pierced */
     *changed = drape_relaxed_remove(&c->relaxed, is_out, c) > 0 || *changed;
-    return DRAPE_OK;
+    return drape_exit_find(c, t);
 }

@@ -202,7 +202,7 @@ static void settle(drape_sim *sim, double goal, drape_realtime *report)
     report->time = drape_sim_state(sim)->t;
     report->debt = m->debt;
     report->error_bound = drape_sim_error_bound(sim);
-    report->accurate = !(report->error > report->error_bound);
+    report->accurate = report->h > 0 && report->held == 0 && !(report->error > report->error_bound);
     m->inaccurate += !report->accurate;
     report->inaccurate_total = m->inaccurate;
     report->dropped_total = m->dropped;
@@ -243,7 +243,7 @@ static void enter(drape_sim *sim)
 
 drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double budget, drape_realtime *out)
 {
-    drape_realtime report = {.level = "full", .error = NAN, .error_bound = NAN, .accurate = true};
+    drape_realtime report = {.level = "full", .error = NAN, .error_bound = NAN};
     double start = drape_clock_seconds();
     drape_status guarded = drape_sim_guard(sim, "drape_sim_advance_realtime");
     if (guarded)

@@ -49,7 +49,7 @@ typedef struct drape_realtime_memory {
     int effort;                     /* the integrator's level of effort; 0 is the best */
     bool stretched;                 /* steps were longer than dt, or time was left over */
     double cap;                     /* [s] longer steps were rejected recently; INFINITY: no limit */
-    int64_t inaccurate;             /* calls with a step whose estimated error was above its bound */
+    int64_t inaccurate;             /* calls that were not accurate */
 } drape_realtime_memory;
 
 struct drape_sim {

@@ -4,6 +4,7 @@
  * bodies, the rest of the cloth is not strained, and once there is room nothing is inside any more. With
  * "stop" the run stops and names the pair.
  */
+#include "base/vec3.h"
 #include "sim/relaxed.h"
 #include "support/bytes.h"
 #include "support/scene.h"
@@ -442,5 +443,95 @@ START_TEST(test_plates)
 }
 END_TEST
 
+/* Pinches, drawn at random, whose bodies pierce the cloth, or have parts of it near to different sides: with
+ * the nearest surface as the end of their paths, it stays relaxed on them for good. */
+static const struct pinch {
+    double young, thickness, density;
+    const char *stretch, *left, *right;
+    double shut, opens, open; /* [s] end of closing, begin and end of parting */
+    double travel;            /* [m] that each body goes to the other one */
+} pinches[] = {
+    {7.47097e6, 6.15364e-4, 292.161, "stretch.cst",
+     "'type': 'box', 'center': [0.0277127, 0.204452, -0.126246], 'size': [0.169701, 0.171451, 0.11858],"
+     " 'turns': [{'time': 0.1, 'rotate': [0,0,1,0]},"
+     " {'time': 3, 'rotate': [-0.338586, 0.235483, 0.417988, 861.941]}]",
+     "'type': 'capsule', 'a': [0.0577828, 0.164257, 0.183298], 'b': [0.0526154, 0.340716, 0.100654],"
+     " 'radius': 0.0336974, 'turns': [{'time': 0.1, 'rotate': [0,0,1,0]},"
+     " {'time': 3, 'rotate': [0.635405, -0.141371, -0.52235, -715.018]}]",
+     0.331291, 0.787955, 0.984548, 0.113246},
+    {1.69577e7, 8.00344e-4, 274.248, "stretch.edge",
+     "'type': 'box', 'center': [-0.0490072, 0.175897, -0.162088], 'size': [0.193544, 0.0942329, 0.176673],"
+     " 'turns': [{'time': 0.1, 'rotate': [0,0,1,0]},"
+     " {'time': 1.04084, 'rotate': [0.202745, -0.43427, -0.301611, 210.22]}]",
+     "'type': 'capsule', 'a': [-0.120246, 0.250363, 0.106286], 'b': [0.0158429, 0.0608485, 0.175795],"
+     " 'radius': 0.0325349, 'turns': [{'time': 0.1, 'rotate': [0,0,1,0]},"
+     " {'time': 1.04084, 'rotate': [0.5257, 0.421712, 0.0257092, -188.31]}]",
+     0.390399, 0.715694, 1.04084, 0.117931},
+    {1.50858e7, 5.65587e-4, 120.302, "stretch.edge",
+     "'type': 'box', 'center': [0.0219487, 0.216593, -0.188937], 'size': [0.259615, 0.0882292, 0.240739]",
+     "'type': 'box', 'center': [-0.0108892, 0.258648, 0.185511], 'size': [0.139277, 0.257066, 0.161735],"
+     " 'rotate': [0.628583, 0.502356, -0.868571, 172.653]",
+     0.491523, 0.602655, 0.844473, 0.0977127},
+    {2.38299e6, 3.78911e-4, 302.702, "stretch.cst",
+     "'type': 'sphere', 'center': [0.0864785, 0.349578, -0.169565], 'radius': 0.09213",
+     "'type': 'capsule', 'a': [-0.0563209, 0.432332, 0.108267], 'b': [0.156765, 0.2401, 0.148321],"
+     " 'radius': 0.0308319",
+     0.442952, 0.613421, 0.946498, 0.119094},
+};
+
+static scene open_random(const struct pinch *p)
+{
+    char track[2][200];
+    for (int i = 0; i < 2; i++) {
+        const double z = i ? -p->travel : p->travel;
+        snprintf(track[i], sizeof track[i],
+                 "'track': [[0.1, [0,0,0]], [%.9g, [0,0,%.9g]], [%.9g, [0,0,%.9g]], [%.9g, [0,0,0]]]",
+                 p->shut, z, p->opens, z, p->open);
+    }
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 12, 'rows': 12, 'width': 0.5,"
+        " 'height': 0.5, 'orientation': 'vertical', 'transform': {'translate': [-0.25, 0.5, 0]}},"
+        " 'material': {'young_modulus': %.9g, 'thickness': %.9g, 'density': %.9g},"
+        " 'terms': ['%s', 'bend.hinge', {'type': 'drag.viscous', 'coefficient': 0.1}], 'pins': [" CORNERS
+        "]}],"
+        " 'colliders': [{'friction': 0.3, %s, %s}, {'friction': 0.3, %s, %s}],"
+        " 'integrator': {'method': 'newton_k', 'dt': 0.0166666666666666667}, 'duration': 4}",
+        p->young, p->thickness, p->density, p->stretch, p->left, track[0], p->right, track[1]);
+}
+
+/* Half a second after the bodies have parted, in which a node falls by 1.2 m, nothing is relaxed or inside,
+ * and no edge is strained by 10 % or more. */
+static void check_entangled(const struct pinch *p)
+{
+    scene s = open_random(p);
+    const int parted = (int)ceil((p->open + 0.5) / FRAME);
+    int32_t most = 0;
+    for (int f = 1; f <= parted + 6; f++) {
+        drape_realtime report;
+        const drape_status status = drape_sim_advance_realtime(s.sim, FRAME, 1e9, &report);
+        ck_assert_msg(status == DRAPE_OK, "frame %d: %s", f, drape_context_message(s.ctx));
+        most = report.relaxed > most ? report.relaxed : most;
+        for (int32_t e = 0; f >= parted && e < s.model->edge_count; e++) {
+            const int32_t *n = s.model->edge + 2 * (size_t)e;
+            const double *x = drape_sim_positions(s.sim);
+            double to[3];
+            vec3_sub(x + 3 * (size_t)n[1], x + 3 * (size_t)n[0], to);
+            ck_assert_double_lt(vec3_norm(to) / s.model->edge_length[e] - 1, 0.1);
+        }
+        ck_assert(f < parted || report.relaxed == 0);
+        for (int32_t c = 0; f >= parted && c < s.model->collider_count; c++)
+            ck_assert_int_eq(drape_sim_inside(s.sim, c, NULL), 0);
+    }
+    ck_assert_int_gt(most, 0);
+    scene_close(&s);
+}
+
+START_TEST(test_entangled)
+{
+    for (size_t i = 0; i < sizeof pinches / sizeof *pinches; i++)
+        check_entangled(&pinches[i]);
+}
+END_TEST
+
 SUITE("no_room", test_pinch, test_stop, test_checkpoint, test_log, test_table, test_pins_inside, test_elbow,
-      test_crevice, test_boxes, test_turned_boxes, test_plates)
+      test_crevice, test_boxes, test_turned_boxes, test_plates, test_entangled)

@@ -260,7 +260,7 @@ START_TEST(a_budget_limits_the_iterations)
         for (int i = 0; i < 6; i++) {
             ck_assert_int_eq(drape_sim_advance_realtime(s.sim, DT, plenty ? 3600 : 1e-9, &r), DRAPE_OK);
             above += !r.accurate;
-            ck_assert(r.error_bound == 1e-7 && r.accurate == !(r.error > 1e-7) &&
+            ck_assert(r.error_bound == 1e-7 && r.accurate == (r.error <= 1e-7) &&
                       isnan(r.error) == !(r.h > 0));
             ck_assert_int_eq(r.inaccurate_total, above);
         }
