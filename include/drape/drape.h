@@ -588,20 +588,21 @@ DRAPE_API void drape_untangle_def_init(drape_untangle_def *def, size_t struct_si
 
 /* What an untangling found and did. */
 typedef struct drape_untangling {
-    bool clear;              /* nothing passes through anything, and all gaps are those of contact */
-    double time;             /* [s] the time of the sim at which it was made */
-    int sweeps;              /* searches after which something was moved */
-    int64_t pairs_before;    /* edges that passed through triangles, of cloth and of colliders */
-    int64_t pairs;           /* afterwards */
-    int32_t inside_before;   /* triangles of cloth that reached into colliders, as drape_sim_inside counts */
-    int32_t inside;          /* afterwards */
-    double least_gap_before; /* the smallest gap, in the least gaps that contact allows; infinite: none is near */
-    double least_gap;        /* afterwards */
-    double displacement;     /* [m] the longest way of a node */
-    int32_t node;            /* the node that went it; -1: none moved */
-    int32_t cloths;          /* number of cloths that were moved, by a node at least */
-    double strain;           /* largest change of the length of an edge [1] */
-    double seconds;          /* [s] wall-clock time that it took */
+    bool clear;            /* nothing passes through anything, and all gaps are those of contact */
+    double time;           /* [s] the time of the sim at which it was made */
+    int sweeps;            /* searches after which something was moved */
+    int64_t pairs_before;  /* edges that passed through triangles, of cloth and of colliders */
+    int64_t pairs;         /* afterwards */
+    int32_t inside_before; /* triangles of cloth that reached into colliders, as drape_sim_inside counts */
+    int32_t inside;        /* afterwards */
+    double
+        least_gap_before; /* the smallest gap, in the least gaps that contact allows; infinite: none is near */
+    double least_gap;     /* afterwards */
+    double displacement;  /* [m] the longest way of a node */
+    int32_t node;         /* the node that went it; -1: none moved */
+    int32_t cloths;       /* number of cloths that were moved, by a node at least */
+    double strain;        /* largest change of the length of an edge [1] */
+    double seconds;       /* [s] wall-clock time that it took */
 } drape_untangling;
 
 /* Takes cloth apart that passes through itself, through other cloth or through colliders at the present time,

@@ -13,11 +13,11 @@
 #include <string.h>
 
 #define ROUNDING (1e4 * DBL_EPSILON) /* as in contact.c: of the largest coordinate */
-#define ENOUGH   0.5 /* of the wanted gap: with which a sheet is clear */
-#define STRAIN   1e-3 /* with which a cloth is left as it is once it is clear */
-#define LESS     0.05 /* of the strain: by which a sweep that is worth it lessens it */
-#define POLISH   6    /* sweeps without such a gain that end it, once it is clear */
-#define PATIENCE 30   /* the same while gaps are too small */
+#define ENOUGH   0.5                 /* of the wanted gap: with which a sheet is clear */
+#define STRAIN   1e-3                /* with which a cloth is left as it is once it is clear */
+#define LESS     0.05                /* of the strain: by which a sweep that is worth it lessens it */
+#define POLISH   6                   /* sweeps without such a gain that end it, once it is clear */
+#define PATIENCE 30                  /* the same while gaps are too small */
 
 /* ---- Topology ---- */
 
@@ -149,10 +149,12 @@ static drape_status build_trees(drape_untangler *u)
     for (int32_t i = 0; !status && i < sheets; i++) {
         const bool cloth = i < m->cloth_count;
         const int32_t c = i - m->cloth_count,
-                      count = cloth ? m->cloths[i].mesh.triangle_count
-                                    : u->open[c] ? m->colliders[c].shape.triangle_count : 0,
+                      count = cloth        ? m->cloths[i].mesh.triangle_count
+                              : u->open[c] ? m->colliders[c].shape.triangle_count
+                                           : 0,
                       from = cloth ? m->cloths[i].first_triangle : first;
-        status = drape_bvh_build(u->arena, count, 3, u->sheets.triangle + 3 * (size_t)from, u->x, &u->tree[i]);
+        status =
+            drape_bvh_build(u->arena, count, 3, u->sheets.triangle + 3 * (size_t)from, u->x, &u->tree[i]);
         first += cloth ? 0 : count;
     }
     return status;
@@ -169,8 +171,8 @@ static drape_status place_bodies(drape_untangler *u, const drape_motion *motion,
         const drape_status status = drape_deformed_at(u->arena, m, motion, c, t, &u->body[c]);
         if (status)
             return status;
-        u->open[c] = k->frames.frame_count > 0 &&
-                     drape_mesh_distance_side(u->body[c]->shape.kept) == DRAPE_SIDE_NONE;
+        u->open[c] =
+            k->frames.frame_count > 0 && drape_mesh_distance_side(u->body[c]->shape.kept) == DRAPE_SIDE_NONE;
         for (int a = 0; a < 3; a++) {
             u->box[c][0][a] = k->ops->smooth ? -INFINITY : INFINITY;
             u->box[c][1][a] = k->ops->smooth ? INFINITY : -INFINITY;
@@ -300,9 +302,8 @@ static bool is_better(const rank *a, const rank *b)
     return a->gap != b->gap ? a->gap > b->gap : a->strain < b->strain;
 }
 
-static void keep(drape_untangler *u, int sweep, drape_untangle_outcome *outcome)
+static void keep(drape_untangler *u, drape_untangle_outcome *outcome)
 {
-    outcome->sweeps = sweep;
     outcome->crossings = u->crossing_count;
     outcome->sunk = u->sunk_count;
     outcome->least_share = u->least_share;
@@ -321,6 +322,7 @@ static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, dra
         const drape_status status = look(u);
         if (status)
             return status;
+        outcome->sweeps = i;
         const rank here = rank_of(u);
         const double gain = best.strain - here.strain;
         const bool better = i == 0 || is_better(&here, &best);
@@ -332,7 +334,7 @@ static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, dra
                     : since + 1;
         if (better) {
             best = here;
-            keep(u, i, outcome);
+            keep(u, outcome);
         }
         const bool clear = best.crossings == 0 && best.gap >= ENOUGH;
         if ((i == 0 && drape_untangle_is_clear(outcome)) || i == u->def->sweeps ||

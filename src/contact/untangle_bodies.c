@@ -11,9 +11,9 @@
 
 #include <string.h>
 
-#define ACROSS 6    /* parts of a side of a face: 28 points of it are tested */
-#define TOUCH  1e-9 /* [m] a point less deep than this is not inside */
-#define TURN   6.283185307179586
+#define ACROSS     6    /* parts of a side of a face: 28 points of it are tested */
+#define TOUCH      1e-9 /* [m] a point less deep than this is not inside */
+#define TURN       6.283185307179586
 #define DIRECTIONS 24 /* in which a face is searched around an edge that passes through it */
 
 static double distance_at(const drape_untangler *u, int32_t collider, const double *x, double n[3])
