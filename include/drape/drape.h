@@ -598,7 +598,7 @@ typedef struct drape_untangling {
     double
         least_gap_before; /* the smallest gap, in the least gaps that contact allows; infinite: none is near */
     double least_gap;     /* afterwards */
-    double displacement;  /* [m] the longest way of a node */
+    double displacement;  /* [m] the largest displacement of a node */
     int32_t node;         /* the node that went it; -1: none moved */
     int32_t cloths;       /* number of cloths that were moved, by a node at least */
     double strain;        /* largest change of the length of an edge [1] */
@@ -625,7 +625,7 @@ DRAPE_API drape_status drape_sim_untangle(drape_sim *sim, const drape_untangle_d
                                           drape_untangling *report);
 
 /* Fills *out with the report of the last untangling of a sim, by its scene or its host, and moved
- * (cloth_count), unless NULL, with the longest way of a node of each cloth in it [m]. Returns false if there
+ * (cloth_count), unless NULL, with the largest displacement of a node of each cloth in it [m]. Returns false if there
  * was none. Checkpoints keep it. Thread-safety: as the sim. */
 DRAPE_API bool drape_sim_untangling(const drape_sim *sim, drape_untangling *out, double *moved);
 

@@ -260,7 +260,7 @@ void drape_untangle_bound(drape_untangler *u, const drape_half_space *bound)
 static drape_status look(drape_untangler *u)
 {
     u->bounds.count = u->passage_count = 0;
-    u->least_share = u->least_wanted = INFINITY;
+    u->min_share = u->min_wanted = INFINITY;
     memset(u->passes, 0, (size_t)u->broad.points * sizeof *u->passes);
     memcpy(u->start, u->x, 3 * (size_t)u->broad.points * sizeof *u->x);
     for (int32_t i = 0; i < u->model->cloth_count + u->model->collider_count; i++)
@@ -292,7 +292,7 @@ typedef struct rank {
 
 static rank rank_of(const drape_untangler *u)
 {
-    return (rank){u->crossing_count + u->sunk_count, fmin(u->least_wanted, ENOUGH), strain_of(u)};
+    return (rank){u->crossing_count + u->sunk_count, fmin(u->min_wanted, ENOUGH), strain_of(u)};
 }
 
 static bool is_better(const rank *a, const rank *b)
@@ -306,7 +306,7 @@ static void keep(drape_untangler *u, drape_untangle_outcome *outcome)
 {
     outcome->crossings = u->crossing_count;
     outcome->sunk = u->sunk_count;
-    outcome->least_share = u->least_share;
+    outcome->min_share = u->min_share;
     memcpy(u->best, u->x, 3 * (size_t)u->broad.points * sizeof *u->x);
 }
 
@@ -327,7 +327,7 @@ static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, dra
         const double gain = best.strain - here.strain;
         const bool better = i == 0 || is_better(&here, &best);
         if (i == 0)
-            outcome->least_share_before = u->least_share;
+            outcome->min_share_before = u->min_share;
         since = better && (i == 0 || here.crossings < best.crossings || here.gap > best.gap ||
                            gain > LESS * best.strain)
                     ? 0

@@ -26,14 +26,14 @@ typedef struct drape_untangle_outcome {
     int sweeps;         /* that were made */
     int64_t crossings;  /* of edges and triangles of sheets, that remain */
     int64_t sunk;       /* nodes and faces in closed colliders, that remain */
-    double least_share; /* the smallest gap in least gaps (contact/pair.h); INFINITY: nothing is near */
-    double least_share_before; /* the same in the beginning */
+    double min_share; /* the smallest gap in least gaps (contact/pair.h); INFINITY: nothing is near */
+    double min_share_before; /* the same in the beginning */
 } drape_untangle_outcome;
 
 /* Whether nothing passes through anything, and all gaps are those of contact. */
 static inline bool drape_untangle_is_clear(const drape_untangle_outcome *outcome)
 {
-    return outcome->crossings == 0 && outcome->sunk == 0 && outcome->least_share >= 1;
+    return outcome->crossings == 0 && outcome->sunk == 0 && outcome->min_share >= 1;
 }
 
 /* Moves the free nodes of x (node_count x 3), with pins and colliders at time t. x is left as it is if it is

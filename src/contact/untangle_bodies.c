@@ -67,8 +67,8 @@ static void push_nodes(drape_untangler *u, int32_t collider)
         const double d = distance_at(u, collider, u->x + 3 * (size_t)i, n);
         if (d >= reach)
             continue;
-        u->least_share = fmin(u->least_share, d / least);
-        u->least_wanted = fmin(u->least_wanted, d / wanted);
+        u->min_share = fmin(u->min_share, d / least);
+        u->min_wanted = fmin(u->min_wanted, d / wanted);
         if (d < -TOUCH) {
             u->sunk_count++;
             u->sunk[i] = true;

@@ -540,7 +540,7 @@ static void shorten(drape_untangler *u, const curve *k)
 
 /* ---- All curves ---- */
 
-/* The ways of colouring a trace, the safest first. */
+/* How a trace can be coloured, the safest first. */
 static bool (*const colourings[])(drape_untangler *, const curve *, int, double[2]) = {colour_cut,
                                                                                        colour_near};
 
@@ -549,18 +549,18 @@ static void treat(drape_untangler *u, const curve *k)
     double price[2], best = INFINITY;
     int trace = -1;
     int8_t wrong = 0;
-    for (size_t way = 0; trace < 0 && way < sizeof colourings / sizeof *colourings; way++) {
+    for (size_t c = 0; trace < 0 && c < sizeof colourings / sizeof *colourings; c++) {
         for (int i = 0; i < 2; i++)
-            if (colourings[way](u, k, i, price))
-                for (int8_t c = 0; c < 2; c++)
-                    if (price[c] < best) {
-                        best = price[c];
+            if (colourings[c](u, k, i, price))
+                for (int8_t part = 0; part < 2; part++)
+                    if (price[part] < best) {
+                        best = price[part];
                         trace = i;
-                        wrong = c;
+                        wrong = part;
                     }
         if (trace < 0)
             continue;
-        colourings[way](u, k, trace, price);
+        colourings[c](u, k, trace, price);
         pass_all(u, k, trace, wrong);
     }
     if (trace < 0)

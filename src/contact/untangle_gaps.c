@@ -140,9 +140,9 @@ static void consider(void *user, const drape_pair *found)
     if (gap >= wanted + g->reach)
         return;
     if (least > 0)
-        u->least_share = fmin(u->least_share, gap / least);
+        u->min_share = fmin(u->min_share, gap / least);
     if (wanted > 0)
-        u->least_wanted = fmin(u->least_wanted, gap / wanted);
+        u->min_wanted = fmin(u->min_wanted, gap / wanted);
     if (closest.distance < DRAPE_NO_SIDE * u->broad.rounding)
         choose_normal(u, &pair, closest.normal);
     bound_pair(u, &pair, &closest, wanted);

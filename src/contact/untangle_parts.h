@@ -87,15 +87,15 @@ typedef struct drape_untangler {
     int32_t *block;      /* (edge_count) scratch: how often the curve passes through the edge */
     bool *sunk;          /* (node_count) in a collider, or a corner of a face that is */
     int64_t sunk_count;  /* nodes, and faces between them, that are in a collider */
-    double least_share;  /* the smallest gap, in least gaps */
-    double least_wanted; /* the smallest gap, in wanted gaps */
+    double min_share;  /* the smallest gap, in least gaps */
+    double min_wanted; /* the smallest gap, in wanted gaps */
     bool out_of_memory;  /* of a list, in a callback */
 } drape_untangler;
 
 /* Adds a bound; notes if memory is out. */
 void drape_untangle_bound(drape_untangler *u, const drape_half_space *bound);
 
-/* The longest way [m] of a point in a sweep. */
+/* The largest displacement [m] of a point in a sweep. */
 #define DRAPE_UNTANGLE_STRIDE 0.5 /* of the mean edge */
 static inline double drape_untangle_stride(const drape_untangler *u)
 {

@@ -107,11 +107,11 @@ static void report_moves(drape_sim *sim, const double *x, drape_untangling *u)
     for (int32_t i = 0; i < m->node_count; i++) {
         double *most = &sim->untangled_move[drape_model_cloth_of(m, i)], d[3];
         vec3_sub(x + 3 * (size_t)i, before + 3 * (size_t)i, d);
-        const double way = vec3_norm(d);
-        *most = fmax(*most, way);
-        if (!(way > u->displacement))
+        const double length = vec3_norm(d);
+        *most = fmax(*most, length);
+        if (!(length > u->displacement))
             continue;
-        u->displacement = way;
+        u->displacement = length;
         u->node = i;
     }
     for (int32_t c = 0; c < m->cloth_count; c++)
@@ -180,7 +180,7 @@ static drape_status untangle(drape_sim *sim, const drape_untangle_def *def, drap
     const size_t size = 3 * (size_t)sim->model->node_count * sizeof(double);
     double *x = sim->states[sim->next].x;
     const double start = drape_clock_seconds();
-    drape_untangle_outcome outcome = {.least_share = INFINITY};
+    drape_untangle_outcome outcome = {.min_share = INFINITY};
     finding before, after;
     memcpy(x, drape_sim_positions(sim), size);
     drape_status status = find(sim, x, &before);
@@ -200,8 +200,8 @@ static drape_status untangle(drape_sim *sim, const drape_untangle_def *def, drap
                             .pairs = after.pairs,
                             .inside_before = before.inside,
                             .inside = after.inside,
-                            .least_gap_before = outcome.least_share_before,
-                            .least_gap = outcome.least_share};
+                            .least_gap_before = outcome.min_share_before,
+                            .least_gap = outcome.min_share};
     report_moves(sim, x, u);
     if (u->node >= 0 && (u->clear || def->keep))
         commit(sim);
@@ -242,9 +242,9 @@ static void log_untangling(const drape_sim *sim, const drape_untangling *u)
 {
     drape_log(
         sim->ctx, u->clear ? DRAPE_LOG_INFO : DRAPE_LOG_WARNING,
-        "t=%.9g: untangled in %d sweeps: %lld to %lld pairs of an edge and a triangle, %d to %d triangles "
-        "in colliders; the longest way of a node is %.4g m",
-        u->time, u->sweeps, (long long)u->pairs_before, (long long)u->pairs, (int)u->inside_before,
+        "t=%.9g: %s in %d sweeps: %lld to %lld pairs of an edge and a triangle, %d to %d triangles "
+        "in colliders; the largest displacement of a node is %.4g m",
+        u->time, u->clear ? "untangled" : "did not come apart", u->sweeps, (long long)u->pairs_before, (long long)u->pairs, (int)u->inside_before,
         (int)u->inside, u->displacement);
 }
 

@@ -116,7 +116,7 @@ static void comes_apart(const tangle *t)
     free(x);
 }
 
-/* The longest ways and the strains are a few times what these tangles took when this was written: they are
+/* The displacements and the strains are a few times what these tangles took when this was written: they are
  * bounds of what is no distortion, a fifth of a sheet of 1 m and a few per cent, not results. Half of a
  * sheet that passes through another one at 60 degrees has its edge 0.43 m from that. */
 static const tangle tangles[] = {
