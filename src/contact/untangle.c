@@ -283,7 +283,7 @@ static double strain_of(const drape_untangler *u)
     return strain;
 }
 
-/* What was reached in a sweep. Fewer crossings are better; then gaps of at least a part of the wanted ones, or
+/* What was reached in a sweep. Fewer crossings are better; then gaps of a part of the wanted ones, or
  * larger ones; then less strain. */
 typedef struct rank {
     int64_t crossings;

@@ -177,7 +177,7 @@ static void weights_at(const drape_untangler *u, const int32_t *node, const doub
         weight[a] = -closest.c[a + 1];
 }
 
-/* From a point where an edge of the collider passes through a face to the deepest point of the face around it:
+/* From a point where an edge of the collider goes through a face to the deepest point of the face around it:
  * what is inside there is a wedge of any direction. */
 static void deepen(const drape_untangler *u, int32_t collider, const int32_t *node, double weight[3])
 {

@@ -320,7 +320,7 @@ static double wanted_between(const drape_untangler *u, int32_t sheet, int32_t ot
            drape_untangle_wanted(u, u->broad.distance[most - cloths]);
 }
 
-/* The nodes of a triangle that are on the wrong side pass the other triangle, at a point of the curve. Returns
+/* The nodes of a triangle that are on the wrong side pass the other triangle at a point of the curve. Returns
  * the side of that which is right: 1 if its normal points there, -1 if not, 0 if this pair does not tell. */
 static int pass(drape_untangler *u, int32_t triangle, int32_t other, int8_t wrong, const double at[3])
 {
@@ -464,7 +464,7 @@ static void pass_all(drape_untangler *u, const curve *k, int trace, int8_t wrong
 
 /* ---- A curve that cuts nothing off ---- */
 
-/* The direction in which a move of an edge, relative to a triangle that it passes through, shortens the curve:
+/* The direction in which a move of an edge, relative to a triangle that it goes through, shortens the curve:
  * the sum over its faces of R - 2 (E . R) / (E . N) N, R along the curve into the face (Volino &
  * Magnenat-Thalmann 2006). */
 static void gradient_of(const drape_untangler *u, const drape_crossing *c, double g[3])

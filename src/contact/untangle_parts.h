@@ -81,15 +81,15 @@ typedef struct drape_untangler {
     int32_t record_count, record_room;
     drape_passage *passage; /* (passage_count of passage_room) sorted */
     int32_t passage_count, passage_room;
-    bool *passes;        /* (points) it has a passage */
-    int8_t *colour;      /* (points) scratch of a curve */
-    int32_t *queue;      /* (points) scratch */
-    int32_t *block;      /* (edge_count) scratch: how often the curve passes through the edge */
-    bool *sunk;          /* (node_count) in a collider, or a corner of a face that is */
-    int64_t sunk_count;  /* nodes, and faces between them, that are in a collider */
-    double min_share;  /* the smallest gap, in least gaps */
-    double min_wanted; /* the smallest gap, in wanted gaps */
-    bool out_of_memory;  /* of a list, in a callback */
+    bool *passes;       /* (points) it has a passage */
+    int8_t *colour;     /* (points) scratch of a curve */
+    int32_t *queue;     /* (points) scratch */
+    int32_t *block;     /* (edge_count) scratch: how often the curve passes through the edge */
+    bool *sunk;         /* (node_count) in a collider, or a corner of a face that is */
+    int64_t sunk_count; /* nodes, and faces between them, that are in a collider */
+    double min_share;   /* the smallest gap, in least gaps */
+    double min_wanted;  /* the smallest gap, in wanted gaps */
+    bool out_of_memory; /* of a list, in a callback */
 } drape_untangler;
 
 /* Adds a bound; notes if memory is out. */

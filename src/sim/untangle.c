@@ -240,12 +240,11 @@ bool drape_sim_untangling(const drape_sim *sim, drape_untangling *out, double *m
 
 static void log_untangling(const drape_sim *sim, const drape_untangling *u)
 {
-    drape_log(
-        sim->ctx, u->clear ? DRAPE_LOG_INFO : DRAPE_LOG_WARNING,
-        "t=%.9g: %s in %d sweeps: %lld to %lld pairs of an edge and a triangle, %d to %d triangles "
-        "in colliders; the largest displacement of a node is %.4g m",
-        u->time, u->clear ? "untangled" : "did not come apart", u->sweeps, (long long)u->pairs_before, (long long)u->pairs, (int)u->inside_before,
-        (int)u->inside, u->displacement);
+    drape_log(sim->ctx, u->clear ? DRAPE_LOG_INFO : DRAPE_LOG_WARNING,
+              "t=%.9g: %s in %d sweeps: %lld to %lld pairs of an edge and a triangle, %d to %d triangles "
+              "in colliders; the largest displacement of a node is %.4g m",
+              u->time, u->clear ? "untangled" : "did not come apart", u->sweeps, (long long)u->pairs_before,
+              (long long)u->pairs, (int)u->inside_before, (int)u->inside, u->displacement);
 }
 
 drape_status drape_sim_untangle_start(drape_sim *sim)

@@ -53,7 +53,7 @@ static const beginning beginnings[] = {
     {"rotating_sphere", 1.2, {{COLUMNS, "9"}, {ROWS, "9"}}, .touches = true},
     {"sphere_drape", 0.4, {{COLUMNS, "11"}, {ROWS, "11"}}, .touches = true},
     {"tangled",
-     0.3,
+     0.5,
      {{COLUMNS, "10"}, {ROWS, "10"}, {"/cloth/1/mesh/columns", "9"}, {"/cloth/1/mesh/rows", "9"}},
      .touches = true},
     {"tunic",
