@@ -583,51 +583,50 @@ typedef struct drape_untangle_def {
                   false: it stays as it is */
 } drape_untangle_def;
 
-/* Fills *def with the defaults. Pass the caller's sizeof(drape_untangle_def) as struct_size. Nothing if def is
- * NULL. */
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_untangle_def) as struct_size. Nothing if def
+ * is NULL. */
 DRAPE_API void drape_untangle_def_init(drape_untangle_def *def, size_t struct_size);
 
 /* What an untangling found and did. */
 typedef struct drape_untangling {
-    bool clear;            /* nothing passes through anything, and all gaps are those of contact */
-    double time;           /* [s] the time of the sim at which it was made */
-    int sweeps;            /* searches after which something was moved */
-    int64_t pairs_before;  /* edges that passed through triangles, of cloth and of colliders */
-    int64_t pairs;         /* afterwards */
-    int32_t inside_before; /* triangles of cloth that reached into colliders, as drape_sim_inside counts */
-    int32_t inside;        /* afterwards */
-    double
-        least_gap_before; /* the smallest gap, in the least gaps that contact allows; infinite: none is near */
-    double least_gap;     /* afterwards */
-    double displacement;  /* [m] the longest way of a node */
-    int32_t node;         /* the node that went it; -1: none moved */
-    int32_t cloths;       /* number of cloths that were moved, by a node at least */
-    double strain;        /* largest change of the length of an edge [1] */
-    double seconds;       /* [s] wall-clock time that it took */
+    bool clear;              /* nothing passes through anything, and all gaps are those of contact */
+    double time;             /* [s] the time of the sim at which it was made */
+    int sweeps;              /* searches after which something was moved */
+    int64_t pairs_before;    /* edges that passed through triangles, of cloth and of colliders */
+    int64_t pairs;           /* afterwards */
+    int32_t inside_before;   /* triangles of cloth that reached into colliders, as drape_sim_inside counts */
+    int32_t inside;          /* afterwards */
+    double least_gap_before; /* smallest gap, in the least gaps of contact; infinite: none is near */
+    double least_gap;        /* afterwards */
+    double displacement;     /* [m] the largest displacement of a node */
+    int32_t node;            /* the node of that displacement; -1: none moved */
+    int32_t cloths;          /* number of cloths that were moved, by a node at least */
+    double strain;           /* largest change of the length of an edge [1] */
+    double seconds;          /* [s] wall-clock time that it took */
 } drape_untangling;
 
-/* Takes cloth apart that passes through itself, through other cloth or through colliders at the present time,
- * as a scene with "untangle" does before its first step. Free nodes move, as little as is found, with hardly
- * any strain; pinned nodes and colliders stay, and so do all velocities. Pairs that `ignore` of the scene lets
- * through are left alone; without self_contact, only colliders count. If nothing passes through anything and
- * all gaps are those of contact, not a bit changes. Otherwise integrators start anew and the energy account
- * takes the change of energy as given by the host, as after drape_sim_place. The result does not depend on
- * threads or on the processor.
+/* Takes cloth apart that passes through itself, through other cloth or through colliders at the present
+ * time, as a scene with "untangle" does before its first step. Free nodes move, as little as is found, with
+ * hardly any strain; pinned nodes and colliders stay, and so do all velocities. Pairs that `ignore` of the
+ * scene lets through are left alone; without self_contact, only colliders count. If nothing passes through
+ * anything and all gaps are those of contact, not a bit changes. Otherwise integrators start anew and the
+ * energy account takes the change of energy as given by the host, as after drape_sim_place. The result does
+ * not depend on threads or on the processor.
  *
  * def: NULL for the defaults, or the scene's values if it has "untangle". *report, unless NULL, is filled
  * whatever the status, but for arguments that are refused. What remains if it does not come apart is counted
  * exactly, and then DRAPE_E_SOLVER is returned, also with `keep`: the message names the first pair. A scene
  * whose cloth intersects at rest needs "untangle" for contact between the pieces that do
- * (docs/untangling.md). Takes memory of about 2 kB for each node, which is freed again. Must not be called by
- * an observer. Errors, after which nothing has changed unless `keep` is set: DRAPE_E_ARGUMENT (a value that is
- * not allowed), DRAPE_E_VERSION (struct_size), DRAPE_E_SOLVER, DRAPE_E_STOPPED (drape_sim_cancel, or the
- * context's cancel function), DRAPE_E_MEMORY. Thread-safety: as the sim. */
+ * (docs/untangling.md). It takes memory, mostly for the pairs that are near, and frees it. Must not be called
+ * by an observer. Errors, after which nothing has changed unless `keep` is set: DRAPE_E_ARGUMENT (a value
+ * that is not allowed), DRAPE_E_VERSION (struct_size), DRAPE_E_SOLVER, DRAPE_E_STOPPED (drape_sim_cancel, or
+ * the context's cancel function), DRAPE_E_MEMORY. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_untangle(drape_sim *sim, const drape_untangle_def *def,
                                           drape_untangling *report);
 
 /* Fills *out with the report of the last untangling of a sim, by its scene or its host, and moved
- * (cloth_count), unless NULL, with the longest way of a node of each cloth in it [m]. Returns false if there
- * was none. Checkpoints keep it. Thread-safety: as the sim. */
+ * (cloth_count), unless NULL, with the largest displacement of a node of each cloth in it [m]. Returns false
+ * if there was none. Checkpoints keep it. Thread-safety: as the sim. */
 DRAPE_API bool drape_sim_untangling(const drape_sim *sim, drape_untangling *out, double *moved);
 
 /* Lets a sim go on with another model of the same cloth: another gravity, material, other terms and their
@@ -1090,7 +1089,8 @@ DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t 
 /* A doubt about a run: what is unusual, and which setting would help. */
 typedef struct drape_warning {
     const char *name; /* "no_terms", "few_steps", "large_mesh", "starts_inside", "ends_inside", "tangled",
-                         "no_room", "numerical_dissipation", "slow_contact", "contact_distance" or "inaccurate" */
+                         "no_room", "numerical_dissipation", "slow_contact", "contact_distance" or
+                         "inaccurate" */
     char text[400];   /* one line */
 } drape_warning;
 

@@ -288,7 +288,8 @@ static void print_untangling(const run *r)
     if (u.node >= 0) {
         const int32_t cloth = drape_model_cloth_of(r->in.model, u.node);
         printf("; %d cloth%s moved, by up to %.3g m (%s), strained by up to %.3g", (int)u.cloths,
-               u.cloths == 1 ? "" : "s", u.displacement, CLI_SHOWN(r->in.model->cloths[cloth].name), u.strain);
+               u.cloths == 1 ? "" : "s", u.displacement, CLI_SHOWN(r->in.model->cloths[cloth].name),
+               u.strain);
     }
     fputc('\n', stdout);
 }

@@ -40,26 +40,16 @@ static const drape_entry *fabrics[MAX_FABRICS + 1];
 static const drape_registry fabric_registry = {
     "fabric", "fabrics", "Measured fabrics", "\"fabric\" of a material", fabrics, NULL};
 
-static const drape_registry *const tables[] = {&drape_grid_registry,
-                                               &drape_import_registry,
-                                               &drape_material_registry,
-                                               &fabric_registry,
-                                               &drape_term_registry,
-                                               &drape_collider_registry,
-                                               &drape_sequence_registry,
-                                               &drape_event_registry,
-                                               &drape_seam_registry,
-                                               &drape_self_contact_registry,
-                                               &drape_contact_registry,
-                                               &drape_untangle_registry,
-                                               &drape_integrator_registry,
-                                               &drape_controller_registry,
-                                               &drape_linear_registry,
-                                               &drape_exporter_registry,
-                                               &drape_reason_registry,
-                                               &drape_field_registry,
-                                               &drape_shading_registry,
-                                               NULL};
+static const drape_registry *const tables[] = {&drape_grid_registry,       &drape_import_registry,
+                                               &drape_material_registry,   &fabric_registry,
+                                               &drape_term_registry,       &drape_collider_registry,
+                                               &drape_sequence_registry,   &drape_event_registry,
+                                               &drape_seam_registry,       &drape_self_contact_registry,
+                                               &drape_contact_registry,    &drape_untangle_registry,
+                                               &drape_integrator_registry, &drape_controller_registry,
+                                               &drape_linear_registry,     &drape_exporter_registry,
+                                               &drape_reason_registry,     &drape_field_registry,
+                                               &drape_shading_registry,    NULL};
 
 const drape_registry *const *cli_tables(void)
 {

@@ -11,8 +11,9 @@ static const drape_entry self_contact = {
     DRAPE_PARAMS(drape_self_contact_params)};
 static const drape_entry untangle = {
     .name = "untangle",
-    .summary = "before the first step, cloth that begins through cloth or colliders is taken apart; without it "
-               "such cloth begins as it is",
+    .summary =
+        "before the first step, cloth that begins through cloth or colliders is taken apart; without it "
+        "such cloth begins as it is",
     DRAPE_PARAMS(drape_untangle_params)};
 
 const drape_registry drape_untangle_registry = {"untangle",

@@ -112,7 +112,7 @@ bool drape_pair_is_apart(const drape_pair *pair, const drape_configuration *at, 
     return are_apart(pair->kind, x, gap + pair->radius);
 }
 
-/* Where a rest shape passes through itself or through another one, half of the rest distance would be nothing,
+/* Where a rest shape passes through itself or another one, half of the rest distance would be nothing,
  * so a scene that is untangled bounds it below: by the sizes of the pieces within one sheet, whose neighbours
  * are as far apart as that; other sheets keep the whole distance. */
 static double least_activation(const drape_pair *pair, const drape_configuration *rest)

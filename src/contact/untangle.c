@@ -13,11 +13,11 @@
 #include <string.h>
 
 #define ROUNDING (1e4 * DBL_EPSILON) /* as in contact.c: of the largest coordinate */
-#define ENOUGH   0.5 /* of the wanted gap: with which a sheet is clear */
-#define STRAIN   1e-3 /* with which a cloth is left as it is once it is clear */
-#define LESS     0.05 /* of the strain: by which a sweep that is worth it lessens it */
-#define POLISH   6    /* sweeps without such a gain that end it, once it is clear */
-#define PATIENCE 30   /* the same while gaps are too small */
+#define ENOUGH   0.5                 /* of the wanted gap: with which a sheet is clear */
+#define STRAIN   1e-3                /* with which a cloth is left as it is once it is clear */
+#define LESS     0.05                /* of the strain: by which a sweep that is worth it lessens it */
+#define POLISH   6                   /* sweeps without such a gain that end it, once it is clear */
+#define PATIENCE 30                  /* the same while gaps are too small */
 
 /* ---- Topology ---- */
 
@@ -149,10 +149,12 @@ static drape_status build_trees(drape_untangler *u)
     for (int32_t i = 0; !status && i < sheets; i++) {
         const bool cloth = i < m->cloth_count;
         const int32_t c = i - m->cloth_count,
-                      count = cloth ? m->cloths[i].mesh.triangle_count
-                                    : u->open[c] ? m->colliders[c].shape.triangle_count : 0,
+                      count = cloth        ? m->cloths[i].mesh.triangle_count
+                              : u->open[c] ? m->colliders[c].shape.triangle_count
+                                           : 0,
                       from = cloth ? m->cloths[i].first_triangle : first;
-        status = drape_bvh_build(u->arena, count, 3, u->sheets.triangle + 3 * (size_t)from, u->x, &u->tree[i]);
+        status =
+            drape_bvh_build(u->arena, count, 3, u->sheets.triangle + 3 * (size_t)from, u->x, &u->tree[i]);
         first += cloth ? 0 : count;
     }
     return status;
@@ -169,8 +171,8 @@ static drape_status place_bodies(drape_untangler *u, const drape_motion *motion,
         const drape_status status = drape_deformed_at(u->arena, m, motion, c, t, &u->body[c]);
         if (status)
             return status;
-        u->open[c] = k->frames.frame_count > 0 &&
-                     drape_mesh_distance_side(u->body[c]->shape.kept) == DRAPE_SIDE_NONE;
+        u->open[c] =
+            k->frames.frame_count > 0 && drape_mesh_distance_side(u->body[c]->shape.kept) == DRAPE_SIDE_NONE;
         for (int a = 0; a < 3; a++) {
             u->box[c][0][a] = k->ops->smooth ? -INFINITY : INFINITY;
             u->box[c][1][a] = k->ops->smooth ? INFINITY : -INFINITY;
@@ -258,7 +260,7 @@ void drape_untangle_bound(drape_untangler *u, const drape_half_space *bound)
 static drape_status look(drape_untangler *u)
 {
     u->bounds.count = u->passage_count = 0;
-    u->least_share = u->least_wanted = INFINITY;
+    u->min_share = u->min_wanted = INFINITY;
     memset(u->passes, 0, (size_t)u->broad.points * sizeof *u->passes);
     memcpy(u->start, u->x, 3 * (size_t)u->broad.points * sizeof *u->x);
     for (int32_t i = 0; i < u->model->cloth_count + u->model->collider_count; i++)
@@ -281,7 +283,7 @@ static double strain_of(const drape_untangler *u)
     return strain;
 }
 
-/* What was reached in a sweep. Fewer crossings are better; then gaps of at least a part of the wanted ones, or
+/* What was reached in a sweep. Fewer crossings are better; then gaps of a part of the wanted ones, or
  * larger ones; then less strain. */
 typedef struct rank {
     int64_t crossings;
@@ -290,7 +292,7 @@ typedef struct rank {
 
 static rank rank_of(const drape_untangler *u)
 {
-    return (rank){u->crossing_count + u->sunk_count, fmin(u->least_wanted, ENOUGH), strain_of(u)};
+    return (rank){u->crossing_count + u->sunk_count, fmin(u->min_wanted, ENOUGH), strain_of(u)};
 }
 
 static bool is_better(const rank *a, const rank *b)
@@ -300,12 +302,11 @@ static bool is_better(const rank *a, const rank *b)
     return a->gap != b->gap ? a->gap > b->gap : a->strain < b->strain;
 }
 
-static void keep(drape_untangler *u, int sweep, drape_untangle_outcome *outcome)
+static void keep(drape_untangler *u, drape_untangle_outcome *outcome)
 {
-    outcome->sweeps = sweep;
     outcome->crossings = u->crossing_count;
     outcome->sunk = u->sunk_count;
-    outcome->least_share = u->least_share;
+    outcome->min_share = u->min_share;
     memcpy(u->best, u->x, 3 * (size_t)u->broad.points * sizeof *u->x);
 }
 
@@ -321,18 +322,19 @@ static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, dra
         const drape_status status = look(u);
         if (status)
             return status;
+        outcome->sweeps = i;
         const rank here = rank_of(u);
         const double gain = best.strain - here.strain;
         const bool better = i == 0 || is_better(&here, &best);
         if (i == 0)
-            outcome->least_share_before = u->least_share;
+            outcome->min_share_before = u->min_share;
         since = better && (i == 0 || here.crossings < best.crossings || here.gap > best.gap ||
                            gain > LESS * best.strain)
                     ? 0
                     : since + 1;
         if (better) {
             best = here;
-            keep(u, i, outcome);
+            keep(u, outcome);
         }
         const bool clear = best.crossings == 0 && best.gap >= ENOUGH;
         if ((i == 0 && drape_untangle_is_clear(outcome)) || i == u->def->sweeps ||

@@ -11,9 +11,9 @@
 
 #include <string.h>
 
-#define ACROSS 6    /* parts of a side of a face: 28 points of it are tested */
-#define TOUCH  1e-9 /* [m] a point less deep than this is not inside */
-#define TURN   6.283185307179586
+#define ACROSS     6    /* parts of a side of a face: 28 points of it are tested */
+#define TOUCH      1e-9 /* [m] a point less deep than this is not inside */
+#define TURN       6.283185307179586
 #define DIRECTIONS 24 /* in which a face is searched around an edge that passes through it */
 
 static double distance_at(const drape_untangler *u, int32_t collider, const double *x, double n[3])
@@ -67,8 +67,8 @@ static void push_nodes(drape_untangler *u, int32_t collider)
         const double d = distance_at(u, collider, u->x + 3 * (size_t)i, n);
         if (d >= reach)
             continue;
-        u->least_share = fmin(u->least_share, d / least);
-        u->least_wanted = fmin(u->least_wanted, d / wanted);
+        u->min_share = fmin(u->min_share, d / least);
+        u->min_wanted = fmin(u->min_wanted, d / wanted);
         if (d < -TOUCH) {
             u->sunk_count++;
             u->sunk[i] = true;
@@ -177,7 +177,7 @@ static void weights_at(const drape_untangler *u, const int32_t *node, const doub
         weight[a] = -closest.c[a + 1];
 }
 
-/* From a point where an edge of the collider passes through a face to the deepest point of the face around it:
+/* From a point where an edge of the collider goes through a face to the deepest point of the face around it:
  * what is inside there is a wedge of any direction. */
 static void deepen(const drape_untangler *u, int32_t collider, const int32_t *node, double weight[3])
 {

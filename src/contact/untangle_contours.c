@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define RINGS     4    /* of nodes of a sheet that passes through itself that may be near it on the wrong side */
+#define RINGS     4 /* of nodes of a sheet that passes through itself that may be near it on the wrong side */
 #define STRIDE    0.3  /* of an edge: by which it is moved along the gradient */
 #define STEEP     0.05 /* the least sine of an edge and a triangle, for the gradient */
 #define PIN_PRICE 1e3  /* areas of all cloth for a pin: such a part is not moved if another can be */
@@ -38,7 +38,8 @@ static void note_crossing(void *user, int32_t edge, int32_t triangle)
     if (a < nodes && b < nodes && drape_model_ignores_cloth(u->model, a, b))
         return;
     if ((a < nodes) != (b < nodes) &&
-        drape_model_ignores(u->model, s->of_point[a < nodes ? b : a] - u->model->cloth_count, a < nodes ? a : b))
+        drape_model_ignores(u->model, s->of_point[a < nodes ? b : a] - u->model->cloth_count,
+                            a < nodes ? a : b))
         return;
     drape_crossing *list =
         drape_list_grow(u->arena, u->crossing, u->crossing_count, &u->crossing_room, sizeof *list);
@@ -66,14 +67,16 @@ static drape_status find_crossings(drape_untangler *u)
     const drape_model *m = u->model;
     const drape_sheets *s = &u->sheets;
     const drape_surface cloth = drape_surface_of(m, u->x);
-    const drape_surface open = {.x = u->start, /* the same positions, of points that are nobody's neighbours */
+    const drape_surface open = {.x =
+                                    u->start, /* the same positions, of points that are nobody's neighbours */
                                 .edge = s->edge + 2 * (size_t)m->edge_count,
                                 .triangle = s->triangle + 3 * (size_t)m->triangle_count,
                                 .edge_count = s->edge_count - m->edge_count,
                                 .triangle_count = s->triangle_count - m->triangle_count};
     finding own = {.u = u}, in = {u, 0, m->triangle_count}, by = {u, m->edge_count, 0};
     u->crossing_count = 0;
-    drape_status status = m->contact.self ? drape_intersect(u->ctx, &cloth, &cloth, note_crossing, &own) : DRAPE_OK;
+    drape_status status =
+        m->contact.self ? drape_intersect(u->ctx, &cloth, &cloth, note_crossing, &own) : DRAPE_OK;
     if (!status)
         status = drape_intersect(u->ctx, &cloth, &open, note_crossing, &in);
     if (!status)
@@ -154,7 +157,8 @@ static int32_t follow(drape_untangler *u, int32_t from, int32_t contour, int32_t
             if (at < 0)
                 continue;
             const int32_t first = find_pair(u, at, c->triangle);
-            const int8_t side = at < c->triangle ? c->trace : (int8_t)(1 - c->trace); /* of the lower triangle */
+            const int8_t side =
+                at < c->triangle ? c->trace : (int8_t)(1 - c->trace); /* of the lower triangle */
             for (int32_t r = first; r < u->record_count && same_pair(&u->record[r], &u->record[first]); r++) {
                 drape_crossing *other = &u->crossing[u->record[r].crossing];
                 if (other->contour >= 0)
@@ -316,7 +320,7 @@ static double wanted_between(const drape_untangler *u, int32_t sheet, int32_t ot
            drape_untangle_wanted(u, u->broad.distance[most - cloths]);
 }
 
-/* The nodes of a triangle that are on the wrong side pass the other triangle, at a point of the curve. Returns
+/* The nodes of a triangle that are on the wrong side pass the other triangle at a point of the curve. Returns
  * the side of that which is right: 1 if its normal points there, -1 if not, 0 if this pair does not tell. */
 static int pass(drape_untangler *u, int32_t triangle, int32_t other, int8_t wrong, const double at[3])
 {
@@ -340,11 +344,10 @@ static int pass(drape_untangler *u, int32_t triangle, int32_t other, int8_t wron
     for (int a = 0; a < 3; a++) {
         if (u->colour[node[a]] != wrong)
             continue;
-        const drape_half_space bound = {
-            .node = {node[a], corner[0], corner[1], corner[2]},
-            .c = {1, -weight[0], -weight[1], -weight[2]},
-            .normal = {side * n[0], side * n[1], side * n[2]},
-            .bound = wanted};
+        const drape_half_space bound = {.node = {node[a], corner[0], corner[1], corner[2]},
+                                        .c = {1, -weight[0], -weight[1], -weight[2]},
+                                        .normal = {side * n[0], side * n[1], side * n[2]},
+                                        .bound = wanted};
         drape_untangle_bound(u, &bound);
     }
     return side > 0 ? 1 : -1;
@@ -423,7 +426,8 @@ static void let_pass(drape_untangler *u, const curve *k, int trace, int8_t wrong
         if (!itself && side != 0)
             follow_part(u, node, sheet, side);
         for (int32_t a = s->first[node]; !(itself && ring + 1 >= RINGS) && a < s->first[node + 1]; a++) {
-            const int32_t *ends = s->edge + 2 * (size_t)s->around[a], other = ends[0] == node ? ends[1] : ends[0];
+            const int32_t *ends = s->edge + 2 * (size_t)s->around[a],
+                          other = ends[0] == node ? ends[1] : ends[0];
             if (u->colour[other] != wrong)
                 continue;
             u->colour[other] = (int8_t)(wrong + 2);
@@ -460,7 +464,7 @@ static void pass_all(drape_untangler *u, const curve *k, int trace, int8_t wrong
 
 /* ---- A curve that cuts nothing off ---- */
 
-/* The direction in which a move of an edge, relative to a triangle that it passes through, shortens the curve:
+/* The direction in which a move of an edge, relative to a triangle that it goes through, shortens the curve:
  * the sum over its faces of R - 2 (E . R) / (E . N) N, R along the curve into the face (Volino &
  * Magnenat-Thalmann 2006). */
 static void gradient_of(const drape_untangler *u, const drape_crossing *c, double g[3])
@@ -536,26 +540,27 @@ static void shorten(drape_untangler *u, const curve *k)
 
 /* ---- All curves ---- */
 
-/* The ways of colouring a trace, the safest first. */
-static bool (*const colourings[])(drape_untangler *, const curve *, int, double[2]) = {colour_cut, colour_near};
+/* How a trace can be coloured, the safest first. */
+static bool (*const colourings[])(drape_untangler *, const curve *, int, double[2]) = {colour_cut,
+                                                                                       colour_near};
 
 static void treat(drape_untangler *u, const curve *k)
 {
     double price[2], best = INFINITY;
     int trace = -1;
     int8_t wrong = 0;
-    for (size_t way = 0; trace < 0 && way < sizeof colourings / sizeof *colourings; way++) {
+    for (size_t c = 0; trace < 0 && c < sizeof colourings / sizeof *colourings; c++) {
         for (int i = 0; i < 2; i++)
-            if (colourings[way](u, k, i, price))
-                for (int8_t c = 0; c < 2; c++)
-                    if (price[c] < best) {
-                        best = price[c];
+            if (colourings[c](u, k, i, price))
+                for (int8_t part = 0; part < 2; part++)
+                    if (price[part] < best) {
+                        best = price[part];
                         trace = i;
-                        wrong = c;
+                        wrong = part;
                     }
         if (trace < 0)
             continue;
-        colourings[way](u, k, trace, price);
+        colourings[c](u, k, trace, price);
         pass_all(u, k, trace, wrong);
     }
     if (trace < 0)

@@ -17,7 +17,8 @@
 static int compare_passages(const void *a, const void *b)
 {
     const drape_passage *p = a, *q = b;
-    return p->point != q->point ? (p->point > q->point ? 1 : -1) : (p->sheet > q->sheet) - (p->sheet < q->sheet);
+    return p->point != q->point ? (p->point > q->point ? 1 : -1)
+                                : (p->sheet > q->sheet) - (p->sheet < q->sheet);
 }
 
 void drape_untangle_add_passage(drape_untangler *u, int32_t point, int32_t sheet)
@@ -108,7 +109,8 @@ static void choose_normal(const drape_untangler *u, const drape_pair *pair, doub
         n[k] = length > 0 ? n[k] / length : k == 1;
 }
 
-static void bound_pair(drape_untangler *u, const drape_pair *pair, const drape_closest *closest, double wanted)
+static void bound_pair(drape_untangler *u, const drape_pair *pair, const drape_closest *closest,
+                       double wanted)
 {
     drape_half_space bound = {.bound = wanted + pair->radius};
     memcpy(bound.node, pair->node, sizeof bound.node);
@@ -138,9 +140,9 @@ static void consider(void *user, const drape_pair *found)
     if (gap >= wanted + g->reach)
         return;
     if (least > 0)
-        u->least_share = fmin(u->least_share, gap / least);
+        u->min_share = fmin(u->min_share, gap / least);
     if (wanted > 0)
-        u->least_wanted = fmin(u->least_wanted, gap / wanted);
+        u->min_wanted = fmin(u->min_wanted, gap / wanted);
     if (closest.distance < DRAPE_NO_SIDE * u->broad.rounding)
         choose_normal(u, &pair, closest.normal);
     bound_pair(u, &pair, &closest, wanted);

@@ -58,44 +58,44 @@ typedef struct drape_untangler {
     const drape_model *model;
     const drape_untangle_limits *def;
     drape_broad_phase broad;
-    drape_collider_pose *pose;    /* (collider_count) */
-    const drape_collider **body;  /* (collider_count) as they are at the time */
-    bool *open;                   /* (collider_count) it has no inside */
-    double (*box)[2][3];          /* (collider_count) around the points of those with triangles */
+    drape_collider_pose *pose;   /* (collider_count) */
+    const drape_collider **body; /* (collider_count) as they are at the time */
+    bool *open;                  /* (collider_count) it has no inside */
+    double (*box)[2][3];         /* (collider_count) around the points of those with triangles */
     drape_sheets sheets;
-    drape_bvh *tree;              /* (cloths, and colliders) of the triangles of each sheet, fitted to x */
-    double mean_edge, area;       /* [m], [m2] of all cloth */
-    double *x;                    /* (points x 3) present positions */
-    double *start;                /* (points x 3) at the beginning of the sweep */
-    double *best;                 /* (points x 3) the positions with the fewest crossings so far */
-    double *mobility;             /* (points) 1: it moves; 0: a pin or a point of a collider */
-    bool *moved;                  /* (points) it has moved in some sweep */
-    double *length;               /* (edges of the model) [m] in the state that was given */
-    int32_t *hinge;               /* (hinge_count x 2) nodes opposite of an edge */
-    double *hinge_length;         /* (hinge_count) [m] in the state that was given */
+    drape_bvh *tree;        /* (cloths, and colliders) of the triangles of each sheet, fitted to x */
+    double mean_edge, area; /* [m], [m2] of all cloth */
+    double *x;              /* (points x 3) present positions */
+    double *start;          /* (points x 3) at the beginning of the sweep */
+    double *best;           /* (points x 3) the positions with the fewest crossings so far */
+    double *mobility;       /* (points) 1: it moves; 0: a pin or a point of a collider */
+    bool *moved;            /* (points) it has moved in some sweep */
+    double *length;         /* (edges of the model) [m] in the state that was given */
+    int32_t *hinge;         /* (hinge_count x 2) nodes opposite of an edge */
+    double *hinge_length;   /* (hinge_count) [m] in the state that was given */
     int32_t hinge_count;
-    drape_half_spaces bounds;     /* of this sweep */
-    drape_crossing *crossing;     /* (crossing_count of crossing_room) of this sweep */
+    drape_half_spaces bounds; /* of this sweep */
+    drape_crossing *crossing; /* (crossing_count of crossing_room) of this sweep */
     int32_t crossing_count, crossing_room;
     drape_crossing_record *record;
     int32_t record_count, record_room;
-    drape_passage *passage;       /* (passage_count of passage_room) sorted */
+    drape_passage *passage; /* (passage_count of passage_room) sorted */
     int32_t passage_count, passage_room;
-    bool *passes;                 /* (points) it has a passage */
-    int8_t *colour;               /* (points) scratch of a curve */
-    int32_t *queue;               /* (points) scratch */
-    int32_t *block;               /* (edge_count) scratch: how often the curve passes through the edge */
-    bool *sunk;                   /* (node_count) in a collider, or a corner of a face that is */
-    int64_t sunk_count;           /* nodes, and faces between them, that are in a collider */
-    double least_share;           /* the smallest gap, in least gaps */
-    double least_wanted;          /* the smallest gap, in wanted gaps */
-    bool out_of_memory;           /* of a list, in a callback */
+    bool *passes;       /* (points) it has a passage */
+    int8_t *colour;     /* (points) scratch of a curve */
+    int32_t *queue;     /* (points) scratch */
+    int32_t *block;     /* (edge_count) scratch: how often the curve passes through the edge */
+    bool *sunk;         /* (node_count) in a collider, or a corner of a face that is */
+    int64_t sunk_count; /* nodes, and faces between them, that are in a collider */
+    double min_share;   /* the smallest gap, in least gaps */
+    double min_wanted;  /* the smallest gap, in wanted gaps */
+    bool out_of_memory; /* of a list, in a callback */
 } drape_untangler;
 
 /* Adds a bound; notes if memory is out. */
 void drape_untangle_bound(drape_untangler *u, const drape_half_space *bound);
 
-/* The longest way [m] of a point in a sweep. */
+/* The largest displacement [m] of a point in a sweep. */
 #define DRAPE_UNTANGLE_STRIDE 0.5 /* of the mean edge */
 static inline double drape_untangle_stride(const drape_untangler *u)
 {

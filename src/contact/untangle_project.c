@@ -1,6 +1,6 @@
 /*
  * untangle_project.c: positions that keep all bounds, and lengths and bends as well as these allow: each is
- * satisfied in turn, by the least move of its nodes (Mueller et al. 2007, Position based dynamics, eq. 9), again
+ * satisfied in turn by the least move of its nodes (Mueller et al. 2007, Position based dynamics), again
  * and again. Bounds come last, so that they are kept best.
  */
 #include "contact/untangle_parts.h"

@@ -181,18 +181,12 @@ static json_t *with_untangling(json_t *object, const drape_sim *sim)
     const drape_untangling *u = &sim->untangling;
     if (!sim->untangled)
         return object;
-    const count_item counts[] = {{"sweeps", u->sweeps},
-                                 {"pairs_before", u->pairs_before},
-                                 {"pairs", u->pairs},
-                                 {"inside_before", u->inside_before},
-                                 {"inside", u->inside},
-                                 {"node", u->node}};
-    const real_item reals[] = {{"time", u->time},
-                               {"least_gap_before", u->least_gap_before},
-                               {"least_gap", u->least_gap},
-                               {"displacement", u->displacement},
-                               {"strain", u->strain},
-                               {"seconds", u->seconds}};
+    const count_item counts[] = {{"sweeps", u->sweeps}, {"pairs_before", u->pairs_before},
+                                 {"pairs", u->pairs},   {"inside_before", u->inside_before},
+                                 {"inside", u->inside}, {"node", u->node}};
+    const real_item reals[] = {{"time", u->time},           {"least_gap_before", u->least_gap_before},
+                               {"least_gap", u->least_gap}, {"displacement", u->displacement},
+                               {"strain", u->strain},       {"seconds", u->seconds}};
     json_t *list = json_array(), *one = drape_json_with(json_object(), "clear", json_boolean(u->clear));
     for (int32_t c = 0; c < model->cloth_count; c++) {
         if (!(sim->untangled_move[c] > 0))

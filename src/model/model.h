@@ -199,10 +199,10 @@ typedef struct drape_contact_def {
 #define DRAPE_UNTANGLE_DEFAULT_SWEEPS 400
 #define DRAPE_UNTANGLE_DEFAULT_GAP    0.5
 typedef struct drape_model_untangle {
-    bool given;    /* by the scene */
-    int sweeps;    /* at most */
-    double gap;    /* wanted at the end, in activation distances */
-    bool goes_on;  /* a run whose cloth did not come apart */
+    bool given;   /* by the scene */
+    int sweeps;   /* at most */
+    double gap;   /* wanted at the end, in activation distances */
+    bool goes_on; /* a run whose cloth did not come apart */
 } drape_model_untangle;
 
 /* Nodes of one cloth that one item of its "pins" holds. */

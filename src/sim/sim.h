@@ -98,7 +98,7 @@ struct drape_sim {
     bool untangle_due;           /* the scene asks for it, and the first step was not made yet */
     bool untangled;              /* `untangling` is known */
     drape_untangling untangling; /* the last one; its seconds are those of this machine */
-    double *untangled_move;      /* (cloth_count) [m] the longest way of a node in it */
+    double *untangled_move;      /* (cloth_count) [m] the largest displacement of a node in it */
     drape_event_set events;
     drape_energy energy, attempted;     /* of the present state; of the last attempted one */
     bool energy_known, attempted_known; /* whether these two are valid */

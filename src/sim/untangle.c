@@ -40,10 +40,10 @@ static drape_status read_def(const drape_sim *sim, const drape_untangle_def *giv
         return DRAPE_OK;
     }
     if (!drape_def_fits(given->struct_size, MIN_SIZE, sizeof *def))
-        return drape_fail(
-            sim->ctx, DRAPE_E_VERSION,
-            "the untangle def was not initialised by drape_untangle_def_init of this version: struct_size %zu",
-            given->struct_size);
+        return drape_fail(sim->ctx, DRAPE_E_VERSION,
+                          "the untangle def was not initialised by drape_untangle_def_init of this version: "
+                          "struct_size %zu",
+                          given->struct_size);
     memcpy(def, given, given->struct_size);
     if (def->sweeps < 1 || def->sweeps > MAX_SWEEP)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_untangle: sweeps = %d; it is 1 to %d",
@@ -107,11 +107,11 @@ static void report_moves(drape_sim *sim, const double *x, drape_untangling *u)
     for (int32_t i = 0; i < m->node_count; i++) {
         double *most = &sim->untangled_move[drape_model_cloth_of(m, i)], d[3];
         vec3_sub(x + 3 * (size_t)i, before + 3 * (size_t)i, d);
-        const double way = vec3_norm(d);
-        *most = fmax(*most, way);
-        if (!(way > u->displacement))
+        const double length = vec3_norm(d);
+        *most = fmax(*most, length);
+        if (!(length > u->displacement))
             continue;
-        u->displacement = way;
+        u->displacement = length;
         u->node = i;
     }
     for (int32_t c = 0; c < m->cloth_count; c++)
@@ -135,9 +135,10 @@ static void describe_first(const drape_sim *sim, const finding *found, char *tex
         const drape_cloth *a = &m->cloths[drape_model_cloth_of(m, found->own.edge[0])],
                           *b = &m->cloths[drape_model_cloth_of(m, found->own.triangle[0])];
         snprintf(text, size, "; first, edge %d %d of %s and triangle %d %d %d of %s",
-                 (int)(found->own.edge[0] - a->first_node), (int)(found->own.edge[1] - a->first_node), a->name,
-                 (int)(found->own.triangle[0] - b->first_node), (int)(found->own.triangle[1] - b->first_node),
-                 (int)(found->own.triangle[2] - b->first_node), b->name);
+                 (int)(found->own.edge[0] - a->first_node), (int)(found->own.edge[1] - a->first_node),
+                 a->name, (int)(found->own.triangle[0] - b->first_node),
+                 (int)(found->own.triangle[1] - b->first_node), (int)(found->own.triangle[2] - b->first_node),
+                 b->name);
     } else if (found->collider >= 0) {
         snprintf(text, size, "; first, at %s", m->colliders[found->collider].name);
     }
@@ -147,12 +148,13 @@ static drape_status refuse(const drape_sim *sim, const finding *found, const dra
 {
     char first[240];
     describe_first(sim, found, first, sizeof first);
-    return drape_fail(sim->ctx, DRAPE_E_SOLVER,
-                      "t=%.9g: the cloth did not come apart in %d sweeps: %lld of %lld pairs of an edge and a "
-                      "triangle still pass through each other, %d of %d triangles reach into colliders, and the "
-                      "smallest gap is %.3g of the least that contact allows%s",
-                      u->time, u->sweeps, (long long)u->pairs, (long long)u->pairs_before, (int)u->inside,
-                      (int)u->inside_before, u->least_gap, first);
+    return drape_fail(
+        sim->ctx, DRAPE_E_SOLVER,
+        "t=%.9g: the cloth did not come apart in %d sweeps: %lld of %lld pairs of an edge and a "
+        "triangle still pass through each other, %d of %d triangles reach into colliders, and the "
+        "smallest gap is %.3g of the least that contact allows%s",
+        u->time, u->sweeps, (long long)u->pairs, (long long)u->pairs_before, (int)u->inside,
+        (int)u->inside_before, u->least_gap, first);
 }
 
 /* ---- Untangling ---- */
@@ -178,7 +180,7 @@ static drape_status untangle(drape_sim *sim, const drape_untangle_def *def, drap
     const size_t size = 3 * (size_t)sim->model->node_count * sizeof(double);
     double *x = sim->states[sim->next].x;
     const double start = drape_clock_seconds();
-    drape_untangle_outcome outcome = {.least_share = INFINITY};
+    drape_untangle_outcome outcome = {.min_share = INFINITY};
     finding before, after;
     memcpy(x, drape_sim_positions(sim), size);
     drape_status status = find(sim, x, &before);
@@ -198,8 +200,8 @@ static drape_status untangle(drape_sim *sim, const drape_untangle_def *def, drap
                             .pairs = after.pairs,
                             .inside_before = before.inside,
                             .inside = after.inside,
-                            .least_gap_before = outcome.least_share_before,
-                            .least_gap = outcome.least_share};
+                            .least_gap_before = outcome.min_share_before,
+                            .least_gap = outcome.min_share};
     report_moves(sim, x, u);
     if (u->node >= 0 && (u->clear || def->keep))
         commit(sim);
@@ -239,10 +241,10 @@ bool drape_sim_untangling(const drape_sim *sim, drape_untangling *out, double *m
 static void log_untangling(const drape_sim *sim, const drape_untangling *u)
 {
     drape_log(sim->ctx, u->clear ? DRAPE_LOG_INFO : DRAPE_LOG_WARNING,
-              "t=%.9g: untangled in %d sweeps: %lld to %lld pairs of an edge and a triangle, %d to %d triangles "
-              "in colliders; the longest way of a node is %.4g m",
-              u->time, u->sweeps, (long long)u->pairs_before, (long long)u->pairs, (int)u->inside_before,
-              (int)u->inside, u->displacement);
+              "t=%.9g: %s in %d sweeps: %lld to %lld pairs of an edge and a triangle, %d to %d triangles "
+              "in colliders; the largest displacement of a node is %.4g m",
+              u->time, u->clear ? "untangled" : "did not come apart", u->sweeps, (long long)u->pairs_before,
+              (long long)u->pairs, (int)u->inside_before, (int)u->inside, u->displacement);
 }
 
 drape_status drape_sim_untangle_start(drape_sim *sim)

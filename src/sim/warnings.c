@@ -262,12 +262,13 @@ static bool is_tangled(drape_sim *sim, char *text, size_t size)
     const drape_untangling *u = &sim->untangling;
     if (!sim->untangled || u->clear)
         return false;
-    snprintf(text, size,
-             "the cloth did not come apart at t=%.9g in %d sweeps: %lld of %lld pairs of an edge and a triangle "
-             "still pass through each other, %d of %d triangles reach into colliders, and the smallest gap is "
-             "%.3g of the least that contact allows",
-             u->time, u->sweeps, (long long)u->pairs, (long long)u->pairs_before, (int)u->inside,
-             (int)u->inside_before, u->least_gap);
+    snprintf(
+        text, size,
+        "the cloth did not come apart at t=%.9g in %d sweeps: %lld of %lld pairs of an edge and a triangle "
+        "still pass through each other, %d of %d triangles reach into colliders, and the smallest gap is "
+        "%.3g of the least that contact allows",
+        u->time, u->sweeps, (long long)u->pairs, (long long)u->pairs_before, (int)u->inside,
+        (int)u->inside_before, u->least_gap);
     return true;
 }
 
@@ -317,18 +318,12 @@ static bool is_contact_thin(drape_sim *sim, char *text, size_t size)
 static const struct {
     const char *name;
     bool (*applies)(drape_sim *sim, char *text, size_t size);
-} checks[] = {{"no_terms", has_no_terms},
-              {"few_steps", has_few_steps},
-              {"large_mesh", has_large_file},
-              {"starts_inside", starts_inside},
-              {"ends_inside", ends_inside},
-              {"tangled", is_tangled},
-              {"no_room", had_no_room},
-              {"numerical_dissipation", dissipates_most},
-              {"slow_contact", is_contact_slow},
-              {"contact_distance", is_contact_thin},
-              {"inaccurate", is_inaccurate},
-              {"held", was_held},
+} checks[] = {{"no_terms", has_no_terms},        {"few_steps", has_few_steps},
+              {"large_mesh", has_large_file},    {"starts_inside", starts_inside},
+              {"ends_inside", ends_inside},      {"tangled", is_tangled},
+              {"no_room", had_no_room},          {"numerical_dissipation", dissipates_most},
+              {"slow_contact", is_contact_slow}, {"contact_distance", is_contact_thin},
+              {"inaccurate", is_inaccurate},     {"held", was_held},
               {"time_dropped", drops_time}};
 
 bool drape_sim_take_warning_failure(drape_sim *sim)

@@ -21,12 +21,12 @@ static const struct {
     int at_least;    /* entries */
     bool dots;       /* in their names */
     bool references; /* all entries have one */
-} tables[] = {{&drape_grid_registry, 4, false, false},        {&drape_import_registry, 2, false, false},
-              {&drape_sequence_registry, 3, false, true},     {&drape_term_registry, 5, true, true},
-              {&drape_collider_registry, 2, false, true},     {&drape_linear_registry, 2, false, true},
-              {&drape_integrator_registry, 2, false, true},   {&drape_controller_registry, 2, false, true},
-              {&drape_field_registry, 2, false, false},       {&drape_exporter_registry, 3, false, true},
-              {&drape_material_registry, 1, false, false},    {&drape_contact_registry, 1, false, false},
+} tables[] = {{&drape_grid_registry, 4, false, false},         {&drape_import_registry, 2, false, false},
+              {&drape_sequence_registry, 3, false, true},      {&drape_term_registry, 5, true, true},
+              {&drape_collider_registry, 2, false, true},      {&drape_linear_registry, 2, false, true},
+              {&drape_integrator_registry, 2, false, true},    {&drape_controller_registry, 2, false, true},
+              {&drape_field_registry, 2, false, false},        {&drape_exporter_registry, 3, false, true},
+              {&drape_material_registry, 1, false, false},     {&drape_contact_registry, 1, false, false},
               {&drape_self_contact_registry, 1, false, false}, {&drape_untangle_registry, 1, false, false}};
 #define TABLES (sizeof tables / sizeof *tables)
 
