@@ -159,7 +159,7 @@ typedef struct drape_turn_key {
     double quaternion[4]; /* w x y z, of any length */
 } drape_turn_key;
 
-/* Nodes of one cloth that are held fixed or moved along a track. Exactly one of nodes, corner, edge, row (>=
+/* Nodes of one cloth that are held fixed, moved along a track, or carried by a collider. Exactly one of nodes, corner, edge, row (>=
  * 0) and has_box selects them; corner, edge and row apply to grids only. */
 typedef struct drape_pin_def {
     size_t struct_size;   /* set by drape_pin_def_init */
@@ -175,8 +175,28 @@ typedef struct drape_pin_def {
     size_t key_count;              /* length of track */
     bool clamp; /* edges between these nodes keep the direction of the sheet across them, for bending terms
                    that support it */
-    const char *name; /* for events, unique among the pins of the cloth; NULL: "pin0", "pin1" ... */
+    const char *name;   /* for events, unique among the pins of the cloth; NULL: "pin0", "pin1" ... */
+    const char *attach; /* name of the collider that carries the nodes: they ride on it from where they are
+                           at rest, as by drape_sim_attach at t = 0; not with a track. NULL: none */
+    int32_t triangle;   /* of a collider that deforms: the triangle that carries them, in the order of its
+                           file, from 0; -1: for each node the nearest one at t = 0 */
 } drape_pin_def;
+
+/* Nodes of one cloth with masses of their own: a weight in a hem, a button, a fabric of varying weight.
+ * Exactly one of nodes, corner, edge, row (>= 0) and has_box selects them, as those of a pin, and exactly one
+ * of add and mass is given. Initialise with drape_mass_def_init. */
+typedef struct drape_mass_def {
+    size_t struct_size;            /* set by drape_mass_def_init */
+    const int32_t *nodes;          /* node_count node numbers, local to this cloth */
+    size_t node_count;             /* length of nodes */
+    const char *corner;            /* as in drape_pin_def */
+    const char *edge;              /* as in drape_pin_def */
+    int32_t row;                   /* as in drape_pin_def; -1: not selected by row */
+    bool has_box;                  /* whether box_min and box_max are set */
+    double box_min[3], box_max[3]; /* [m], as in drape_pin_def */
+    double add;  /* [kg] added to the mass of each of these nodes, in (0, 1e12]; NaN: not given */
+    double mass; /* [kg] of each of these nodes, in place of its mass so far, in (0, 1e12]; NaN: not given */
+} drape_mass_def;
 
 /* One piece of cloth. */
 typedef struct drape_cloth_def {
@@ -194,6 +214,9 @@ typedef struct drape_cloth_def {
     const char *const
         *ignore;         /* names of colliders and cloths that this cloth passes through; its own: itself */
     size_t ignore_count; /* length of ignore */
+    const drape_mass_def
+        *masses;       /* applied in this order to the masses that the material gives; NULL: none */
+    size_t mass_count; /* length of masses */
 } drape_cloth_def;
 
 /* One side of a seam: nodes of one cloth, in the order in which they are joined. They are selected as
@@ -284,6 +307,9 @@ typedef struct drape_scene_def {
     size_t event_count;            /* length of events */
     const drape_seam_def *seams;   /* at most 4096; NULL: none */
     size_t seam_count;             /* length of seams */
+    const drape_setting *untangle; /* sweeps, gap, on_failure: cloth that begins through itself, other cloth
+                                      or colliders is taken apart before the first step; NULL: it is not */
+    size_t untangle_count;         /* length of untangle */
 } drape_scene_def;
 
 /* Fill a def with the defaults documented above. Pass the caller's sizeof of the def as struct_size. Nothing
@@ -292,6 +318,7 @@ DRAPE_API void drape_scene_def_init(drape_scene_def *def, size_t struct_size);
 DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
 DRAPE_API void drape_pin_def_init(drape_pin_def *def, size_t struct_size);
+DRAPE_API void drape_mass_def_init(drape_mass_def *def, size_t struct_size);
 DRAPE_API void drape_event_def_init(drape_event_def *def, size_t struct_size);
 DRAPE_API void drape_seam_def_init(drape_seam_def *def, size_t struct_size);
 DRAPE_API void drape_collider_def_init(drape_collider_def *def, size_t struct_size);
@@ -512,7 +539,8 @@ typedef struct drape_place_def {
     double rotate[4];         /* R: axis x y z and angle [degrees]; default: no rotation */
     double center[3];         /* [m] the point that R leaves where it is; default 0 */
     double translate[3];      /* [m]; default 0 */
-    const int32_t *cloths;    /* cloth_count numbers of cloths, which take their pins along */
+    const int32_t *cloths;    /* cloth_count numbers of cloths, which take their pins along, but see
+                                 drape_sim_attach */
     int32_t cloth_count;      /* length of cloths; default -1: all cloths */
     const int32_t *colliders; /* collider_count numbers of colliders */
     int32_t collider_count;   /* length of colliders; default -1: all colliders */
@@ -543,6 +571,62 @@ DRAPE_API void drape_place_def_init(drape_place_def *def, size_t struct_size);
  * m, an axis of length 0, no such cloth or collider), DRAPE_E_VERSION
  * (struct_size). Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_place(drape_sim *sim, const drape_place_def *def);
+
+/* How drape_sim_untangle works. Initialise with drape_untangle_def_init. */
+typedef struct drape_untangle_def {
+    size_t struct_size; /* set by drape_untangle_def_init */
+    int sweeps;         /* searches for what passes through what, at most; default 400 */
+    double gap;         /* gap that layers and colliders are to have afterwards, in activation distances of
+                           contact, in [0.01, 1]; default 0.5 */
+    bool keep; /* if it does not come apart, the sim gets the positions with the fewest intersections; default
+                  false: it stays as it is */
+} drape_untangle_def;
+
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_untangle_def) as struct_size. Nothing if def is
+ * NULL. */
+DRAPE_API void drape_untangle_def_init(drape_untangle_def *def, size_t struct_size);
+
+/* What an untangling found and did. */
+typedef struct drape_untangling {
+    bool clear;              /* nothing passes through anything, and all gaps are those of contact */
+    double time;             /* [s] the time of the sim at which it was made */
+    int sweeps;              /* searches after which something was moved */
+    int64_t pairs_before;    /* edges that passed through triangles, of cloth and of colliders */
+    int64_t pairs;           /* afterwards */
+    int32_t inside_before;   /* triangles of cloth that reached into colliders, as drape_sim_inside counts */
+    int32_t inside;          /* afterwards */
+    double least_gap_before; /* the smallest gap, in the least gaps that contact allows; infinite: none is near */
+    double least_gap;        /* afterwards */
+    double displacement;     /* [m] the longest way of a node */
+    int32_t node;            /* the node that went it; -1: none moved */
+    int32_t cloths;          /* number of cloths that were moved, by a node at least */
+    double strain;           /* largest change of the length of an edge [1] */
+    double seconds;          /* [s] wall-clock time that it took */
+} drape_untangling;
+
+/* Takes cloth apart that passes through itself, through other cloth or through colliders at the present time,
+ * as a scene with "untangle" does before its first step. Free nodes move, as little as is found, with hardly
+ * any strain; pinned nodes and colliders stay, and so do all velocities. Pairs that `ignore` of the scene lets
+ * through are left alone; without self_contact, only colliders count. If nothing passes through anything and
+ * all gaps are those of contact, not a bit changes. Otherwise integrators start anew and the energy account
+ * takes the change of energy as given by the host, as after drape_sim_place. The result does not depend on
+ * threads or on the processor.
+ *
+ * def: NULL for the defaults, or the scene's values if it has "untangle". *report, unless NULL, is filled
+ * whatever the status, but for arguments that are refused. What remains if it does not come apart is counted
+ * exactly, and then DRAPE_E_SOLVER is returned, also with `keep`: the message names the first pair. A scene
+ * whose cloth intersects at rest needs "untangle" for contact between the pieces that do
+ * (docs/untangling.md). Takes memory of about 2 kB for each node, which is freed again. Must not be called by
+ * an observer. Errors, after which nothing has changed unless `keep` is set: DRAPE_E_ARGUMENT (a value that is
+ * not allowed), DRAPE_E_VERSION (struct_size), DRAPE_E_SOLVER, DRAPE_E_STOPPED (drape_sim_cancel, or the
+ * context's cancel function), DRAPE_E_MEMORY. Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_untangle(drape_sim *sim, const drape_untangle_def *def,
+                                          drape_untangling *report);
+
+/* Fills *out with the report of the last untangling of a sim, by its scene or its host, and moved
+ * (cloth_count), unless NULL, with the longest way of a node of each cloth in it [m]. Returns false if there
+ * was none. Checkpoints keep it. Thread-safety: as the sim. */
+DRAPE_API bool drape_sim_untangling(const drape_sim *sim, drape_untangling *out, double *moved);
 
 /* Lets a sim go on with another model of the same cloth: another gravity, material, other terms and their
  * parameters, masses, friction, thickness, colliders, pins, events. The cloths must be as many, and their
@@ -583,6 +667,50 @@ DRAPE_API drape_status drape_sim_change_model(drape_sim *sim, const drape_model 
  * DRAPE_E_STOPPED. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_pin(drape_sim *sim, int32_t count, const int32_t *nodes);
 DRAPE_API drape_status drape_sim_unpin(drape_sim *sim, int32_t count, const int32_t *nodes);
+
+/* Gives count nodes of the sim other masses [kg], each in (0, 1e12], as drape_sim_change does with a model
+ * that has them: inertia, weight, the center of mass of events and the derived stiffness of contact follow.
+ * Velocities stay, so momentum and kinetic energy change with the mass; the energy account takes that as
+ * given by the host. A node that is listed twice gets the later one. A stiffness that a term derived from
+ * masses when the scene was compiled, as limit.strain can, stays until drape_sim_change. The masses stay
+ * through drape_sim_change where they differ from those of the model before. drape_model_masses of
+ * drape_sim_model has the present ones. Checkpoints keep them. Must not be called by an observer. Errors,
+ * after which nothing has changed: DRAPE_E_ARGUMENT (no such node, a mass out of range), DRAPE_E_MEMORY,
+ * DRAPE_E_SOLVER, DRAPE_E_STOPPED. Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_set_masses(drape_sim *sim, int32_t count, const int32_t *nodes,
+                                            const double *masses);
+
+/* Nodes that a collider carries from now on, from where they are: pins that ride on a body which a track or a
+ * host moves, turns or deforms. On a rigid collider a node keeps its place in the collider's own coordinates.
+ * On one of the type animated_mesh it stays on a triangle: at the barycentric weights of its projection onto
+ * the triangle's plane and at its offset along the triangle's normal, both of which are kept; triangles (count)
+ * gives the triangles in the order of the file, NULL: the nearest one of each node. A node beside its triangle
+ * is carried by the plane. At any time within a step, and in any frame, the nodes are where the collider's
+ * motion has them, with its velocity there; kinks of its motion are theirs. They touch nothing that is pinned, as other
+ * pins do not; cloth around them touches the collider, so it is best to attach nodes outside of it by the contact
+ * distance or more, or to let the cloth `ignore` it.
+ *
+ * Free nodes are pinned, as by drape_sim_pin; all others stay pinned, and leave their track, path or collider.
+ * drape_sim_detach lets nodes go with the velocity of their collider, as drape_sim_unpin does; they must be carried
+ * by one. drape_sim_move_pins takes a node off its collider, too. drape_sim_attached returns the collider that
+ * carries a node; -1: none, or no such node.
+ *
+ * drape_sim_place: nodes whose cloth is placed together with the collider stay where they are on it. If one is
+ * placed without the other, they stay where they are in the cloth and ride on from there. A collider that is
+ * placed because it is sent faster than teleport_speed takes the cloth that rides on it along: as it goes
+ * itself, or, if the cloth has other pins, too, by the rigid motion that fits all of its pins best.
+ * A collider that is not enabled goes on carrying. drape_sim_change: nodes go on riding on the collider of the
+ * same name, from where they are; those that the scene attached, where the new scene does. If there is no such
+ * collider, they are held where they are. drape_sim_set_state: they must be where the collider has them at t.
+ *
+ * Attaching nodes that are pinned already allocates nothing unless contact needs more; otherwise both take what drape_sim_pin takes.
+ * Checkpoints keep what is attached. Must not be called by an observer. Errors, after which nothing has changed:
+ * those of drape_sim_pin; DRAPE_E_ARGUMENT (no such collider, node or triangle; triangles of a collider that is
+ * rigid; a node to detach that no collider carries). Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_attach(drape_sim *sim, int32_t collider, int32_t count, const int32_t *nodes,
+                                        const int32_t *triangles);
+DRAPE_API drape_status drape_sim_detach(drape_sim *sim, int32_t count, const int32_t *nodes);
+DRAPE_API int32_t drape_sim_attached(const drape_sim *sim, int32_t node);
 
 /* Pulls a free node towards target [m] by a spring of the given stiffness [N/m]. The force stiffness (target
  * - x) is part of the equations of every step from the next one on, and implicit if the integrator is. A
@@ -673,7 +801,8 @@ DRAPE_API drape_status drape_sim_deform_collider(drape_sim *sim, int32_t collide
 DRAPE_API int32_t drape_model_collider_points(const drape_model *model, int32_t collider);
 
 /* Writes where the points of a collider that deforms are in space now [m], and, unless NULL, how fast they
- * move [m/s]: (points x 3) each; at a frame, those towards the next one. Errors: DRAPE_E_ARGUMENT. */
+ * move [m/s]: (points x 3) each; at a frame, those towards the next one. An observer may call it. Errors:
+ * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_sim_collider_points(drape_sim *sim, int32_t collider, double *positions,
                                                  double *velocities);
 
@@ -699,8 +828,8 @@ DRAPE_API drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *fiel
 /* ---- Sim: what can be read ---- */
 
 /* The last accepted state: time [s], positions [m] and velocities [m/s], node_count x 3 each; valid until the
- * next call that changes the sim. drape_sim_model returns the model that the sim was created with
- * or, after an event released pins, a model of the sim without these, valid until the next release. */
+ * next call that changes the sim. drape_sim_model returns the model that the sim was created with or, after
+ * pins or masses have changed, a model of the sim with these, valid until the next such change. */
 DRAPE_API double drape_sim_time(const drape_sim *sim);
 DRAPE_API const double *drape_sim_positions(const drape_sim *sim);
 DRAPE_API const double *drape_sim_velocities(const drape_sim *sim);
@@ -773,7 +902,7 @@ typedef struct drape_hit {
  * Each call refits a tree of boxes over the triangles, and takes memory for it at the first one; then a
  * point takes about the logarithm of their number. For a collider that deforms it makes a tree of its own.
  * Errors: DRAPE_E_ARGUMENT (NULL, what, a value that is not finite, a direction of length 0, within or length
- * not above 0), DRAPE_E_MEMORY. Must not be called by an observer. Thread-safety: as the sim. */
+ * not above 0), DRAPE_E_MEMORY. An observer may call them. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_closest(drape_sim *sim, int what, int32_t count, const double *points,
                                          double within, drape_hit *hits);
 DRAPE_API drape_status drape_sim_cast(drape_sim *sim, int what, int32_t count, const double *origins,
@@ -799,8 +928,8 @@ typedef struct drape_contact_point {
  * drape_sim_contact_forces and, with the other sign, of drape_sim_collider_force, whose remarks apply. A
  * force acts on the nodes by their weights, except between nearly parallel edges. With lagged friction, the
  * friction of a contact at the beginning of the last step is an entry of its own, with its gap and without
- * normal force. Errors: DRAPE_E_ARGUMENT (NULL, room < 0, an integrator without contact forces),
- * DRAPE_E_MEMORY. Must not be called by an observer. Thread-safety: as the sim. */
+ * normal force. The forces of nodes that a collider carries are not among them. Errors: DRAPE_E_ARGUMENT
+ * (NULL, room < 0, an integrator without contact forces), DRAPE_E_MEMORY. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_contacts(drape_sim *sim, int32_t room, drape_contact_point *contacts,
                                           int32_t *count);
 
@@ -842,13 +971,19 @@ DRAPE_API void drape_model_normals(const drape_model *model, const double *x, do
  * node's own mass. Damping laws that take rates from a step use the present velocities here.
  *
  * drape_sim_contact_forces: contact and friction on every node, with colliders and between layers of
- * cloth. drape_sim_collider_force: the total force of the cloth on one collider.
+ * cloth. drape_sim_collider_force: the total force of the cloth on one collider: contact and friction, and
+ * the reactions of the nodes that it carries (drape_sim_attach) with the other sign. These have the weight of
+ * the nodes, drape_sim_push and the wind on them, and what else touches them, but not the force that
+ * accelerates their masses: a body that is moved by this force has these masses, too.
  * drape_sim_collider_torque: the torque [N m] of these forces about a point of space [m] or, if that is
  * NULL, about the pivot of the collider (3), where it is now. Colliders have the mean velocity of the last
  * step, so call these before moving them on. Under "newton_k", which does not bring the residual of a step
  * to zero, all of these forces are far off (docs/integrators.md). An integrator that resolves contact by
- * moving nodes ("verlet") has no such forces and returns an error. Errors: DRAPE_E_ARGUMENT,
- * DRAPE_E_MEMORY. Thread-safety: as the sim. Must not be called by an observer. */
+ * moving nodes ("verlet") has no such forces and returns an error.
+ *
+ * An observer may read them, too, which leaves no trace in the run: they are those of the last accepted
+ * state, in a frame those at the end of the step that it lies in, at an event that releases pins those
+ * before. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_contact_forces(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3]);
@@ -870,8 +1005,7 @@ typedef struct drape_seam_report {
 
 /* The number of seams and, if out is not NULL and index is that of a seam in scene order, its report. The
  * forces are conservative ones and those that depend on velocities. A node that is in both sides of a seam
- * counts with the sum of the forces on it. Thread-safety: as the sim. Must not be called by an observer:
- * then nothing is written. */
+ * counts with the sum of the forces on it. An observer may call it. Thread-safety: as the sim. */
 DRAPE_API int32_t drape_sim_seam(drape_sim *sim, int32_t index, drape_seam_report *out);
 
 /* The position of a collider in the last accepted state, as drape_model_collider, but including moves by the
@@ -950,8 +1084,8 @@ DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t 
 
 /* A doubt about a run: what is unusual, and which setting would help. */
 typedef struct drape_warning {
-    const char *name; /* "no_terms", "few_steps", "large_mesh", "starts_inside", "ends_inside", "no_room",
-                         "numerical_dissipation", "slow_contact", "contact_distance" or "inaccurate" */
+    const char *name; /* "no_terms", "few_steps", "large_mesh", "starts_inside", "ends_inside", "tangled",
+                         "no_room", "numerical_dissipation", "slow_contact", "contact_distance" or "inaccurate" */
     char text[400];   /* one line */
 } drape_warning;
 
@@ -960,7 +1094,8 @@ typedef struct drape_warning {
  * 20 steps of dt, unless integrator or controller choose their own steps or substeps. large_mesh: a mesh
  * from a file is more than 20 m across, as one in centimetres is. starts_inside, ends_inside: free nodes
  * are inside a collider, by more than 1e-9 m, or it pierces triangles without a pinned node, at the start,
- * or after the steps so far; the text describes the first such collider. no_room: bodies
+ * or after the steps so far; the text describes the first such collider. tangled: an
+ * untangling left intersections, gaps below the least or triangles in colliders. no_room: bodies
  * left cloth no room, and it was relaxed there (drape_sim_relaxed). numerical_dissipation: the
  * integrator took more than half of the energy that went in. slow_contact: contact takes most of the time
  * of the steps, and longer than the motion lasts, and a setting is known to help. contact_distance: a
@@ -1109,8 +1244,8 @@ typedef struct drape_event {
 
 /* Called within drape_sim_advance. Returns 0 to continue. Any other value stops the advance, which then
  * returns DRAPE_E_STOPPED if the value is > 0, else the value itself, with the message that the observer may
- * have set by drape_context_set_message. An observer must not advance or destroy the sim, nor set its
- * state. */
+ * have set by drape_context_set_message. An observer may read whatever a host may, and save the sim; it must
+ * not advance or destroy the sim, nor change it. */
 typedef drape_status drape_observer(void *user, const drape_event *event);
 
 /* Adds an observer. Observers are called in the order in which they were added; there are at most 8. Errors:

@@ -164,6 +164,14 @@ drape_status drape_system_begin(drape_system *system, const drape_state *in)
     return system->contact ? drape_contact_begin(system->contact, in->x, in->v, in->t) : DRAPE_OK;
 }
 
+drape_status drape_system_begin_reading(drape_system *system, const drape_state *at)
+{
+    const bool begun = system->contact && drape_contact_has_begun(system->contact, at->x, at->t);
+    const drape_status status = begun ? DRAPE_OK : drape_system_begin(system, at);
+    drape_system_end_step(system);
+    return status;
+}
+
 void drape_system_end_step(drape_system *system)
 {
     if (system->contact)

@@ -109,6 +109,10 @@ drape_status drape_system_continue(drape_system *system, drape_system *from, con
 /* Begins a step at a state, against which contact compares until the next call. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
 
+/* For forces in a state that no step has led to: begins one there, unless that is where one has begun that
+ * failed, which must not make contact stiffer, and ends it. Errors: DRAPE_E_MEMORY. */
+drape_status drape_system_begin_reading(drape_system *system, const drape_state *at);
+
 /* drape_contact_expect, drape_contact_relax, drape_contact_lacks_room and drape_contact_let_in; without
  * contact nothing. */
 void drape_system_expect(drape_system *system, double t1, bool may_relax);

@@ -58,6 +58,14 @@ void cli_contact(const drape_sim *sim, cli_contact_entries *out)
                          .values = out->values[1],
                          .choice = &model->self_choice};
     }
+    if (model->untangle.given) {
+        drape_untangle_values(&model->untangle, out->values[2]);
+        out->entries[out->count++] = (cli_chosen){.title = "untangle",
+                                                  .params = drape_untangle_params,
+                                                  .param_count = DRAPE_UNTANGLE_PARAM_COUNT,
+                                                  .values = out->values[2],
+                                                  .choice = &model->untangle_choice};
+    }
 }
 
 bool cli_is_given(const drape_choice *choice, const char *name)

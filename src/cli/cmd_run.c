@@ -275,6 +275,24 @@ static void print_wall(const run *r, const drape_statistics *s)
     fputc('\n', stdout);
 }
 
+/* Printed only if the scene asks for it. */
+static void print_untangling(const run *r)
+{
+    drape_untangling u;
+    if (!drape_sim_untangling(r->in.sim, &u, NULL))
+        return;
+    printf("untangled %s: %lld to %lld pairs of an edge and a triangle, %d to %d triangles in colliders; %d "
+           "sweeps, %.3g s",
+           u.clear ? "yes" : "no", (long long)u.pairs_before, (long long)u.pairs, (int)u.inside_before,
+           (int)u.inside, u.sweeps, u.seconds);
+    if (u.node >= 0) {
+        const int32_t cloth = drape_model_cloth_of(r->in.model, u.node);
+        printf("; %d cloth%s moved, by up to %.3g m (%s), strained by up to %.3g", (int)u.cloths,
+               u.cloths == 1 ? "" : "s", u.displacement, CLI_SHOWN(r->in.model->cloths[cloth].name), u.strain);
+    }
+    fputc('\n', stdout);
+}
+
 /* Printed only if cloth reaches into a collider, or passes through itself, at the end. */
 static void print_inside(const run *r)
 {
@@ -307,6 +325,7 @@ static void print_results(const run *r)
                (long long)s.unstable_modes);
     print_energy(r);
     print_events(r);
+    print_untangling(r);
     print_inside(r);
     print_wall(r, &s);
     if (r->request->realtime)

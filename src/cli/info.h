@@ -46,11 +46,11 @@ typedef struct cli_chosen {
 #define CLI_CHOSEN 2
 void cli_chosen_entries(const drape_sim *sim, cli_chosen entries[CLI_CHOSEN]);
 
-/* Contact and self-contact, if they are modelled, in the same form. */
+/* Contact, self-contact and the untangling of the start, if the scene has them, in the same form. */
 typedef struct cli_contact_entries {
     int count;
-    cli_chosen entries[2];
-    double values[2][DRAPE_MAX_PARAMS];
+    cli_chosen entries[3];
+    double values[3][DRAPE_MAX_PARAMS];
 } cli_contact_entries;
 void cli_contact(const drape_sim *sim, cli_contact_entries *out);
 

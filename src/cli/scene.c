@@ -100,7 +100,8 @@ int cli_run_load(const cli_command *command, const char *folder, cli_scene *out,
                           command->settings[0].option, folder, folder);
     int code = drape_record_scene(command->ctx, folder, &path) == DRAPE_OK
                    ? cli_scene_load(command, path, out)
-                   : cli_misuse(command->verb, "%s", drape_context_message(command->ctx));
+                   : cli_misuse(command->verb, "%s; `drape run SCENE --out DIR` writes one",
+                                drape_context_message(command->ctx));
     drape_free(command->ctx, path);
     if (code == CLI_GO_ON && drape_record_open(command->ctx, folder, out->model->node_count, run))
         code = cli_report(command, CLI_BAD_INPUT);

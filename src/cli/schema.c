@@ -268,6 +268,7 @@ static const struct opening {
     {"event", "type", ENTRY_PARAMS, &drape_event_registry, NULL, NULL, NULL},
     {"self_contact", NULL, ENTRY_PARAMS, &drape_self_contact_registry, NULL, NULL, NULL},
     {"contact", NULL, ENTRY_PARAMS, &drape_contact_registry, NULL, NULL, NULL},
+    {"untangle", NULL, ENTRY_PARAMS, &drape_untangle_registry, NULL, NULL, NULL},
     {"integrator", "method", TABLE_PARAMS, &drape_integrator_registry, NULL, NULL, NULL},
     {"controller", "type", TABLE_PARAMS, &drape_controller_registry, NULL, NULL, NULL},
     {"material", NULL, ENTRY_PARAMS, &drape_material_registry,

@@ -1,8 +1,10 @@
 /* deformed.c: see deformed.h. */
 #include "colliders/deformed.h"
 
+#include "geometry/closest.h"
 #include "geometry/mesh_distance.h"
 
+#include <math.h>
 #include <string.h>
 
 drape_status drape_deformed_create(drape_arena *arena, const drape_collider *collider, drape_deformed **out)
@@ -49,4 +51,26 @@ drape_status drape_deformed_at(drape_arena *arena, const drape_model *model, con
     drape_deformed_move(deformed, x);
     *out = &deformed->collider;
     return DRAPE_OK;
+}
+
+int32_t drape_deformed_nearest(const drape_motion *motion, int32_t collider, double t, const double x[3])
+{
+    const drape_collider *c = &motion->model->colliders[collider];
+    drape_collider_pose pose;
+    drape_closest at;
+    double points[4][3], corner[9], best = INFINITY;
+    int32_t nearest = -1;
+    drape_motion_pose(motion, collider, t, t, &pose);
+    drape_pose_own(&pose, x, points[0]);
+    for (int32_t k = 0; c->frames.frame_count > 0 && k < c->shape.triangle_count; k++) {
+        drape_deformation_corners(&motion->deformation[collider], c->shape.triangle + 3 * (size_t)k, t,
+                                  corner);
+        memcpy(points[1], corner, sizeof corner);
+        drape_closest_point_triangle(points, &at);
+        if (at.distance < best) {
+            best = at.distance;
+            nearest = k;
+        }
+    }
+    return nearest;
 }

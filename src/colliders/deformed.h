@@ -24,4 +24,8 @@ void drape_deformed_move(drape_deformed *deformed, const double *points);
 drape_status drape_deformed_at(drape_arena *arena, const drape_model *model, const drape_motion *motion,
                                int32_t collider, double t, const drape_collider **out);
 
+/* The triangle of a collider with frames that is nearest to a point of space at time t, the first of
+ * several; -1 if the collider is rigid. Tries all triangles. */
+int32_t drape_deformed_nearest(const drape_motion *motion, int32_t collider, double t, const double x[3]);
+
 #endif

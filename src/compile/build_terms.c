@@ -208,6 +208,24 @@ static drape_status begin_term(drape_model *model, int32_t c, int32_t seam, cons
     return DRAPE_OK;
 }
 
+/* Has a term of one cloth build its elements. */
+static drape_status build_elements(drape_model *model, drape_term *term, const char *pointer)
+{
+    const drape_cloth *cloth = &model->cloths[term->cloth];
+    drape_term_builder builder = {.model = model,
+                                  .term = term,
+                                  .pointer = pointer,
+                                  .first_node = cloth->first_node,
+                                  .owned = {cloth->first_node},
+                                  .owned_count = {cloth->mesh.node_count}};
+    const drape_cloth_view view = view_of(model, cloth, term->ops->user);
+    model->ctx->message[0] = 0;
+    drape_status status = term->ops->build(&view, term->params, &builder);
+    status = drape_fail_unsaid(model->ctx, status, pointer, "build() of \"%s\" returned %s",
+                               term->ops->entry.name, drape_status_name(status));
+    return status ? status : check_elements(&builder);
+}
+
 static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_term_ops *ops,
                                const drape_entry_def *def)
 {
@@ -224,18 +242,16 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
         cloth->laws[cloth->law_count++] = term;
         return DRAPE_OK;
     }
-    drape_term_builder builder = {.model = model,
-                                  .term = term,
-                                  .pointer = pointer,
-                                  .first_node = cloth->first_node,
-                                  .owned = {cloth->first_node},
-                                  .owned_count = {cloth->mesh.node_count}};
-    drape_cloth_view view = view_of(model, cloth, ops->user);
-    model->ctx->message[0] = 0;
-    status = term->ops->build(&view, term->params, &builder);
-    status = drape_fail_unsaid(model->ctx, status, pointer, "build() of \"%s\" returned %s",
-                               term->ops->entry.name, drape_status_name(status));
-    return status ? status : check_elements(&builder);
+    return build_elements(model, term, pointer);
+}
+
+drape_status drape_compile_weight(drape_model *model)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; !status && i < model->term_count; i++)
+        if (model->terms[i].ops->from_scene_gravity)
+            status = build_elements(model, &model->terms[i], "/gravity");
+    return status;
 }
 
 /* The term number i, first the built-in ones, then those of the context's user; NULL after the last. */

@@ -110,6 +110,8 @@ static drape_status compile_cloth(drape_model *model, int32_t c, const drape_sce
         status = copy_source(model, &def->mesh, cloth);
     if (!status)
         status = drape_compile_material(model, pointer, def, cloth);
+    if (!status)
+        status = drape_compile_masses(model, pointer, def, cloth);
     memcpy(cloth->velocity, def->velocity, sizeof cloth->velocity);
     return status;
 }
@@ -218,17 +220,11 @@ static void stop_pinned(drape_model *model)
 
 drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape_model **out)
 {
-    static drape_status (*const stages[])(drape_model *,
-                                          const drape_scene_def *) = {copy_scene,
-                                                                      compile_cloths,
-                                                                      drape_compile_pins,
-                                                                      drape_compile_events,
-                                                                      drape_compile_contact,
-                                                                      drape_compile_colliders,
-                                                                      drape_compile_ignored,
-                                                                      drape_compile_contact_stiffness,
-                                                                      drape_compile_seams,
-                                                                      drape_compile_terms};
+    static drape_status (*const stages[])(drape_model *, const drape_scene_def *) = {
+        copy_scene,           compile_cloths,        drape_compile_pins,
+        drape_compile_events, drape_compile_contact, drape_compile_colliders,
+        drape_compile_rides,  drape_compile_ignored, drape_compile_contact_stiffness,
+        drape_compile_seams,  drape_compile_terms};
     *out = NULL;
     drape_model *model = drape_alloc(ctx, 1, sizeof *model);
     if (!model)

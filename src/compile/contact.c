@@ -1,5 +1,5 @@
-/* contact.c: the parameters of contact, from the scene's "contact" and "self_contact", with defaults derived
- * from the scales of the scene. */
+/* contact.c: the parameters of contact, from the scene's "contact", "self_contact" and "untangle", with
+ * defaults derived from the scales of the scene. */
 #include "base/elementary.h"
 #include "base/vec3.h"
 #include "compile/stages.h"
@@ -47,6 +47,27 @@ const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT] = {
     [DRAPE_SELF_RESTITUTION] =
         DRAPE_NUMBER("restitution", "1", 0, 0, 1, "speed of rebound / speed of impact, of layers of cloth"),
 };
+
+static const char *const failures[] = {"stop", "continue", NULL};
+
+const drape_param drape_untangle_params[DRAPE_UNTANGLE_PARAM_COUNT] = {
+    [DRAPE_UNTANGLE_SWEEPS] = DRAPE_INTEGER("sweeps", "1", DRAPE_UNTANGLE_DEFAULT_SWEEPS, 1, 1e6,
+                                            "searches for what passes through what, at most"),
+    [DRAPE_UNTANGLE_GAP] =
+        DRAPE_NUMBER("gap", "1", DRAPE_UNTANGLE_DEFAULT_GAP, 0.01, 1,
+                     "gap that layers and colliders are to have afterwards, in activation distances"),
+    [DRAPE_UNTANGLE_ON_FAILURE] =
+        DRAPE_CHOICE("on_failure", 0, failures,
+                     "stop: a run whose cloth does not come apart ends before its first step; continue: it "
+                     "begins with what was reached, and a warning"),
+};
+
+void drape_untangle_values(const drape_model_untangle *untangle, double values[DRAPE_UNTANGLE_PARAM_COUNT])
+{
+    values[DRAPE_UNTANGLE_SWEEPS] = untangle->sweeps;
+    values[DRAPE_UNTANGLE_GAP] = untangle->gap;
+    values[DRAPE_UNTANGLE_ON_FAILURE] = untangle->goes_on;
+}
 
 void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_CONTACT_PARAM_COUNT])
 {
@@ -135,6 +156,15 @@ static double fall_acceleration(const drape_model *model)
     return g > 0 ? g : model->length;
 }
 
+/* The areal density of a cloth where its nodes have the most mass, as a multiple of that of its material. */
+static double heaviest_areal_density(const drape_cloth *cloth)
+{
+    double most = 0;
+    for (int32_t i = 0; i < cloth->mesh.node_count; i++)
+        most = fmax(most, cloth->node_mass[i] / cloth->material_mass[i]);
+    return most * cloth->material.areal_density;
+}
+
 /* sigma (2 |g| L + v^2) / d, with sigma the largest areal density and L the size of the scene. Up to the
  * distance zero, the barrier absorbs 6 d of this per area (contact/barrier.h), which is 12 times the energy
  * of the speed v and of a fall over L; cloth with more energy cannot be stopped. The weight of the cloth is
@@ -143,7 +173,7 @@ static double stiffness_of_fall(const drape_model *model)
 {
     double sigma = 0, v = scene_speed(model);
     for (int32_t c = 0; c < model->cloth_count; c++)
-        sigma = fmax(sigma, model->cloths[c].material.areal_density);
+        sigma = fmax(sigma, heaviest_areal_density(&model->cloths[c]));
     return sigma * (2 * fall_acceleration(model) * model->length + v * v) / model->contact.distance;
 }
 
@@ -197,6 +227,7 @@ static drape_status resolve_contact(drape_model *model, const drape_scene_def *d
     contact->distance_given = !isnan(distance);
     contact->distance = isnan(distance) ? largest_thickness(model) : distance;
     contact->stiffness = values[DRAPE_CONTACT_STIFFNESS];
+    contact->stiffness_given = !isnan(contact->stiffness);
     contact->friction_velocity = values[DRAPE_CONTACT_FRICTION_VELOCITY];
     contact->lagged = values[DRAPE_CONTACT_FRICTION] == LAGGED;
     contact->no_room = (drape_no_room)values[DRAPE_CONTACT_NO_ROOM];
@@ -223,13 +254,35 @@ static drape_status resolve_self_contact(drape_model *model, const drape_scene_d
     return DRAPE_OK;
 }
 
+static drape_status resolve_untangle(drape_model *model, const drape_scene_def *def)
+{
+    double values[DRAPE_UNTANGLE_PARAM_COUNT];
+    if (!def->untangle)
+        return DRAPE_OK;
+    const drape_status status =
+        drape_params_resolve(model->ctx, "/untangle", drape_untangle_params, DRAPE_UNTANGLE_PARAM_COUNT,
+                             def->untangle, def->untangle_count, values);
+    if (status)
+        return status;
+    model->untangle = (drape_model_untangle){.given = true,
+                                             .sweeps = (int)values[DRAPE_UNTANGLE_SWEEPS],
+                                             .gap = values[DRAPE_UNTANGLE_GAP],
+                                             .goes_on = values[DRAPE_UNTANGLE_ON_FAILURE] > 0};
+    return DRAPE_OK;
+}
+
 drape_status drape_compile_contact(drape_model *model, const drape_scene_def *def)
 {
+    const drape_entry_def untangle = {.settings = def->untangle, .setting_count = def->untangle_count};
     const drape_entry_def contact = {.settings = def->contact, .setting_count = def->contact_count};
     const drape_entry_def self = {.settings = def->self_contact, .setting_count = def->self_contact_count};
     drape_status status = resolve_contact(model, def);
     if (!status)
         status = resolve_self_contact(model, def);
+    if (!status)
+        status = resolve_untangle(model, def);
+    if (!status)
+        status = drape_compile_choice(model, &untangle, "untangle", &model->untangle_choice);
     if (!status)
         status = drape_compile_choice(model, &contact, "contact", &model->contact_choice);
     return status ? status : drape_compile_choice(model, &self, "self_contact", &model->self_choice);
@@ -238,7 +291,7 @@ drape_status drape_compile_contact(drape_model *model, const drape_scene_def *de
 drape_status drape_compile_contact_stiffness(drape_model *model, const drape_scene_def *def)
 {
     (void)def;
-    if (isnan(model->contact.stiffness))
+    if (!model->contact.stiffness_given)
         model->contact.stiffness = fmax(stiffness_of_fall(model), stiffness_of_strain(model));
     model->contact.relaxed_pressure = relaxed_pressure(model);
     return DRAPE_OK;

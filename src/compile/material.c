@@ -40,11 +40,11 @@ static const drape_param params[] = {
     [MASS] =
         DRAPE_CHOICE("mass", MASS_AREA, mass_choices,
                      "area: lumped, a third of each triangle to each node; uniform: the same on every node"),
-    [FABRIC] = DRAPE_CHOICE(
-        "fabric", 0, drape_fabric_names,
-        "a measured fabric (`drape list fabrics`): gives the areal density unless the scene does, the "
-        "bending of bend.midedge and, without young_modulus and thickness, the tension and "
-        "shear of stretch.cst"),
+    [FABRIC] =
+        DRAPE_CHOICE("fabric", 0, drape_fabric_names,
+                     "a measured fabric: gives the areal density unless the scene does, the "
+                     "bending of bend.midedge and, without young_modulus and thickness, the tension and "
+                     "shear of stretch.cst"),
 };
 
 const drape_entry drape_material_entry = {
@@ -165,15 +165,16 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
     if (status)
         return status;
     int32_t count = cloth->mesh.node_count;
-    cloth->node_mass = drape_arena_take(&model->arena, (size_t)count, sizeof *cloth->node_mass);
-    if (!cloth->node_mass)
+    cloth->material_mass = drape_arena_take(&model->arena, (size_t)count, sizeof *cloth->material_mass);
+    cloth->node_mass = cloth->material_mass;
+    if (!cloth->material_mass)
         return DRAPE_E_MEMORY;
     take_fabric(def, values, cloth);
     memcpy(cloth->material_values, values, sizeof values);
     cloth->material = resolve(values, &cloth->bending, mass, area);
     for (int32_t i = 0; i < count; i++)
-        cloth->node_mass[i] = values[MASS] == MASS_UNIFORM
-                                  ? mass / count
-                                  : cloth->material.areal_density * cloth->mesh.node_area[i];
+        cloth->material_mass[i] = values[MASS] == MASS_UNIFORM
+                                      ? mass / count
+                                      : cloth->material.areal_density * cloth->mesh.node_area[i];
     return DRAPE_OK;
 }

@@ -31,7 +31,8 @@ static drape_status take_node(void *user, const char *key, int32_t local)
     int32_t node = pin->cloth->first_node + local;
     if (pin->model->pinned[node] && pin->track_of_node[node] != pin->track) {
         char text[128];
-        snprintf(text, sizeof text, "node %d is pinned twice, along different tracks", (int)local);
+        snprintf(text, sizeof text, "node %d is pinned twice, along different tracks or colliders",
+                 (int)local);
         return refuse(pin, key, text);
     }
     pin->model->pinned[node] = 1;
@@ -66,6 +67,10 @@ static drape_status keep_track(pin_place *pin)
 {
     drape_model *model = pin->model;
     pin->track = -1;
+    if (pin->def->attach && pin->def->key_count > 0)
+        return refuse(pin, "/attach", "a pin is carried by a collider or moves along a track, not both");
+    if (pin->def->attach)
+        pin->track = model->track_count++; /* without keys: drape_compile_rides has its motion */
     if (pin->def->key_count == 0)
         return DRAPE_OK;
     pin->track = model->track_count++;

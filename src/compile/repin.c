@@ -1,5 +1,6 @@
-/* repin.c: a model with other nodes pinned. What depends on which nodes are free is computed anew: their
- * numbers, the pattern of the matrix, and the places of elements in it. Everything else is shared. */
+/* repin.c: a model with other nodes pinned, or other masses. What depends on which nodes are free is computed
+ * anew: their numbers, the pattern of the matrix, and the places of elements in it; and what depends on
+ * masses: weights and the stiffness of contact. Everything else is shared. */
 #include "compile/compile.h"
 #include "compile/stages.h"
 
@@ -50,8 +51,26 @@ static drape_status number(drape_model *model, const uint8_t *pinned)
     return status;
 }
 
+/* mass (node_count) */
+static drape_status weigh(drape_model *model, const double *mass)
+{
+    const size_t nodes = (size_t)model->node_count, cloths = (size_t)model->cloth_count;
+    const drape_cloth *from = model->cloths;
+    model->mass = drape_arena_take(&model->arena, nodes, sizeof *model->mass);
+    model->cloths = drape_arena_take(&model->arena, cloths, sizeof *model->cloths);
+    if (drape_arena_status(&model->arena))
+        return DRAPE_E_MEMORY;
+    memcpy(model->mass, mass, nodes * sizeof *mass);
+    for (size_t c = 0; c < cloths; c++) {
+        model->cloths[c] = from[c];
+        model->cloths[c].node_mass = model->mass + from[c].first_node;
+    }
+    const drape_status status = drape_compile_weight(model);
+    return status ? status : drape_compile_contact_stiffness(model, NULL);
+}
+
 drape_status drape_compile_repinned(drape_context *ctx, const drape_model *base, const uint8_t *pinned,
-                                    drape_model **out)
+                                    const double *mass, drape_model **out)
 {
     drape_model *model = *out = drape_alloc(ctx, 1, sizeof *model);
     if (!model)
@@ -62,7 +81,9 @@ drape_status drape_compile_repinned(drape_context *ctx, const drape_model *base,
     model->ctx = ctx;
     drape_status status = copy_terms(model);
     if (!status)
-        status = number(model, pinned);
+        status = number(model, pinned ? pinned : base->pinned);
+    if (!status && mass)
+        status = weigh(model, mass);
     if (!status)
         status = drape_compile_pattern(model);
     if (status)

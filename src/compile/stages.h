@@ -13,6 +13,10 @@ drape_status drape_compile_check_def(drape_context *ctx, const drape_scene_def *
 drape_status drape_compile_material(drape_model *model, const char *pointer, const drape_cloth_def *def,
                                     drape_cloth *cloth);
 
+/* Applies the masses of its nodes, after the material. pointer: "/cloth/0". */
+drape_status drape_compile_masses(drape_model *model, const char *pointer, const drape_cloth_def *def,
+                                  drape_cloth *cloth);
+
 /* Marks the pinned nodes of all cloths, numbers the free ones, and stores the tracks. */
 drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def);
 
@@ -33,11 +37,14 @@ drape_status drape_compile_choice(drape_model *model, const drape_entry_def *def
 /* Resolves contact and self-contact, after the materials. */
 drape_status drape_compile_contact(drape_model *model, const drape_scene_def *def);
 
-/* The default of contact's stiffness, after the colliders, whose tracks it depends on. */
+/* The default of contact's stiffness, after the colliders, whose tracks it depends on. def is not used. */
 drape_status drape_compile_contact_stiffness(drape_model *model, const drape_scene_def *def);
 
 /* Builds the colliders, after contact. */
 drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def);
+
+/* Finds where colliders carry pins, after both. */
+drape_status drape_compile_rides(drape_model *model, const drape_scene_def *def);
 
 /* Resolves which cloths touch which colliders and cloths, after these. */
 drape_status drape_compile_ignored(drape_model *model, const drape_scene_def *def);
@@ -50,6 +57,9 @@ drape_status drape_compile_seams(drape_model *model, const drape_scene_def *def)
 
 /* Builds the terms of all cloths and seams and assigns indices to measures and internal variables. */
 drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def);
+
+/* Builds the terms of the scene's gravity anew, for cloths whose masses have changed. */
+drape_status drape_compile_weight(drape_model *model);
 
 /* Builds the pattern of the Jacobian from all terms and contact with colliders, and finds the block of each
  * node pair of each element. */

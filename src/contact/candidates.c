@@ -44,15 +44,6 @@ typedef struct search {
     void *user;
 } search;
 
-/* Layers of one sheet that are close together at rest must not be in contact there: their activation
- * distance is at most half of the rest distance. */
-static double activation_distance(const search *s, const drape_pair *pair)
-{
-    if (pair->collider >= 0 || drape_pair_is_apart(pair, &s->rest, 2 * pair->distance))
-        return pair->distance;
-    return fmin(pair->distance, 0.5 * drape_pair_gap_value(pair, &s->rest));
-}
-
 /* How far a node moves relative to a surface, straight in the coordinates of that. */
 static double move_to_surface(const drape_straight_path *path, const drape_pair *pair)
 {
@@ -97,7 +88,7 @@ static void consider(void *user, const drape_pair *found)
     pair.gap_at_search = least_gap(s, &pair, pair.distance + s->reach);
     if (pair.gap_at_search >= pair.distance + s->reach)
         return;
-    pair.distance = activation_distance(s, &pair);
+    pair.distance = drape_pair_activation_distance(&pair, &s->rest);
     if (pair.gap_at_search < pair.distance + s->reach)
         s->visit(s->user, &pair);
 }

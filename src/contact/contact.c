@@ -631,6 +631,12 @@ static bool is_retry(const drape_contact *c)
     return c->begun && memcmp(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x) == 0;
 }
 
+bool drape_contact_has_begun(const drape_contact *c, const double *x, double t)
+{
+    return c->begun && c->start_t == t &&
+           memcmp(c->start, x, 3 * (size_t)c->model->node_count * sizeof *x) == 0;
+}
+
 void drape_contact_measure_start(drape_contact *c)
 {
     memset(c->start_least, 0, (size_t)c->model->collider_count * sizeof *c->start_least);

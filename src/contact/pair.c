@@ -8,6 +8,7 @@
 
 /* of |e1|^2 |e2|^2 at rest: sin^2 below which edges are mollified (Li et al. 2020) */
 #define PARALLEL_WIDTH 1e-3
+#define UNTANGLED      0.1  /* of the shortest edge: activation distance of pieces that rest in each other */
 #define TOUCHING       1e-9 /* [m] below this distance, positions do not determine a normal */
 #define ADVANCE        0.9  /* share of the certainly free fraction that is taken at once */
 #define MAX_ADVANCES   1000 /* after these the fraction reached is safe, even if it is not the largest */
@@ -109,6 +110,36 @@ bool drape_pair_is_apart(const drape_pair *pair, const drape_configuration *at, 
         return false;
     gather(pair, 4, at->x, x);
     return are_apart(pair->kind, x, gap + pair->radius);
+}
+
+/* Where a rest shape passes through itself or through another one, half of the rest distance would be nothing,
+ * so a scene that is untangled bounds it below: by the sizes of the pieces within one sheet, whose neighbours
+ * are as far apart as that; other sheets keep the whole distance. */
+static double least_activation(const drape_pair *pair, const drape_configuration *rest)
+{
+    const drape_model *m = rest->model;
+    const int split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    double x[4][3], shortest = INFINITY, d[3];
+    if (!m->untangle.given)
+        return 0;
+    if (drape_model_cloth_of(m, pair->node[0]) != drape_model_cloth_of(m, pair->node[3]))
+        return pair->distance;
+    gather(pair, 4, rest->x, x);
+    for (int a = 0; a < 4; a++)
+        for (int b = a + 1; b < 4; b++) {
+            if ((a < split) != (b < split))
+                continue;
+            vec3_sub(x[a], x[b], d);
+            shortest = fmin(shortest, vec3_norm(d));
+        }
+    return fmin(pair->distance, UNTANGLED * shortest);
+}
+
+double drape_pair_activation_distance(const drape_pair *pair, const drape_configuration *rest)
+{
+    if (pair->collider >= 0 || drape_pair_is_apart(pair, rest, 2 * pair->distance))
+        return pair->distance;
+    return fmin(pair->distance, fmax(0.5 * drape_pair_gap_value(pair, rest), least_activation(pair, rest)));
 }
 
 static bool surface_gap(const drape_pair *pair, const drape_configuration *at, drape_gap *gap)

@@ -81,6 +81,10 @@ static inline const drape_collider *drape_configuration_body(const drape_configu
 int drape_pair_points(const drape_pair *pair);
 double drape_pair_gap_value(const drape_pair *pair, const drape_configuration *at);
 
+/* The activation distance of a pair of the broad phase. Layers of one sheet that are close together at rest
+ * must not be in contact there: theirs is at most half of the rest distance. */
+double drape_pair_activation_distance(const drape_pair *pair, const drape_configuration *rest);
+
 /* Whether the boxes around the pieces already show that the gap is larger than `gap`, as for most
  * candidates. */
 bool drape_pair_is_apart(const drape_pair *pair, const drape_configuration *at, double gap);

@@ -39,10 +39,9 @@ drape_status drape_record_scene(drape_context *ctx, const char *folder, char **p
         return DRAPE_OK;
     drape_free(ctx, *path);
     *path = NULL;
-    return drape_fail(ctx, DRAPE_E_FILE,
-                      "\"%.500s\" is not the folder of a run: it has no " DRAPE_SCENE_COPY
-                      " that can be read; `drape run SCENE --out DIR` writes one",
-                      folder);
+    return drape_fail(
+        ctx, DRAPE_E_FILE,
+        "\"%.500s\" is not the folder of a run: it has no " DRAPE_SCENE_COPY " that can be read", folder);
 }
 
 /* ---- Frames ---- */
@@ -62,8 +61,7 @@ static drape_status read_header(drape_record *run, const char *path)
     ssize_t size = pread(run->positions, header, sizeof header, 0);
     if (size < 0 || !drape_npy_read_header(header, (size_t)size, &run->frames, &nodes, &data))
         return not_positions(
-            run, path,
-            "it is not an array of float64, frames x nodes x 3, C order, as `drape run` writes it");
+            run, path, "it is not an array of float64, frames x nodes x 3, C order, as a run writes it");
     run->data = (off_t)data;
     if (nodes != run->nodes)
         return drape_fail(run->ctx, DRAPE_E_PARSE,
@@ -84,7 +82,7 @@ static drape_status open_positions(drape_record *run)
     drape_status status =
         run->positions < 0
             ? drape_fail(run->ctx, DRAPE_E_FILE,
-                         "cannot read \"%.500s\": %s; `drape run --out` writes it with --format npy", path,
+                         "cannot read \"%.500s\": %s; a run writes it with the frame format npy", path,
                          strerror(errno))
             : read_header(run, path);
     drape_free(run->ctx, path);

@@ -174,6 +174,37 @@ static json_t *with_no_room(json_t *object, const drape_sim *sim)
     return object;
 }
 
+/* What the untangling of the start, or the last one of a host, found and did. */
+static json_t *with_untangling(json_t *object, const drape_sim *sim)
+{
+    const drape_model *model = drape_sim_model(sim);
+    const drape_untangling *u = &sim->untangling;
+    if (!sim->untangled)
+        return object;
+    const count_item counts[] = {{"sweeps", u->sweeps},
+                                 {"pairs_before", u->pairs_before},
+                                 {"pairs", u->pairs},
+                                 {"inside_before", u->inside_before},
+                                 {"inside", u->inside},
+                                 {"node", u->node}};
+    const real_item reals[] = {{"time", u->time},
+                               {"least_gap_before", u->least_gap_before},
+                               {"least_gap", u->least_gap},
+                               {"displacement", u->displacement},
+                               {"strain", u->strain},
+                               {"seconds", u->seconds}};
+    json_t *list = json_array(), *one = drape_json_with(json_object(), "clear", json_boolean(u->clear));
+    for (int32_t c = 0; c < model->cloth_count; c++) {
+        if (!(sim->untangled_move[c] > 0))
+            continue;
+        json_t *cloth = drape_json_with(json_object(), "name", drape_json_text(model->cloths[c].name));
+        list = drape_json_append(
+            list, drape_json_with(cloth, "displacement", drape_json_number(sim->untangled_move[c])));
+    }
+    one = with_reals(with_counts(one, counts, LENGTH(counts)), reals, LENGTH(reals));
+    return drape_json_with(object, "untangling", drape_json_with(one, "cloths", list));
+}
+
 /* The time and value of an event, and the direction in which its bound was passed. */
 static json_t *root(const drape_event_root *r)
 {
@@ -276,6 +307,7 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     if (s.stability_known)
         object = drape_json_with(object, "equilibrium", stability(&s));
     object = with_inside(object, sim);
+    object = with_untangling(object, sim);
     object = with_no_room(object, sim);
     object = with_events(object, sim);
     object = with_seams(object, sim);

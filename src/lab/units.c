@@ -25,6 +25,7 @@ static const struct {
               {"/colliders/", &drape_collider_registry},
               {"/contact/", &drape_contact_registry},
               {"/self_contact/", &drape_self_contact_registry},
+              {"/untangle/", &drape_untangle_registry},
               {"/integrator/", &drape_integrator_registry},
               {"/controller/", &drape_controller_registry}};
 

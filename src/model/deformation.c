@@ -46,55 +46,63 @@ static const double *frame_at(const drape_sequence *frames, int32_t frame)
     return frames->x + (size_t)frame * numbers_of(frames);
 }
 
-void drape_sequence_points(const drape_sequence *frames, double t, double *x)
+/* Here and below: `count` of the numbers of the points, from the number `first` on. */
+static void frame_points(const drape_sequence *frames, double t, size_t first, size_t count, double *x)
 {
     const int32_t k = frame_before(frames, t), a = k < 0 ? 0 : k,
                   b = k >= 0 && k + 1 < frames->frame_count ? k + 1 : a;
-    const double *from = frame_at(frames, a), *to = frame_at(frames, b),
+    const double *from = frame_at(frames, a) + first, *to = frame_at(frames, b) + first,
                  share = a == b ? 0 : (t - frames->time[a]) / (frames->time[b] - frames->time[a]);
-    for (size_t i = 0; i < numbers_of(frames); i++)
+    for (size_t i = 0; i < count; i++)
         x[i] = from[i] + share * (to[i] - from[i]);
 }
 
-static void frame_velocities(const drape_sequence *frames, double within, double *v)
+void drape_sequence_points(const drape_sequence *frames, double t, double *x)
+{
+    frame_points(frames, t, 0, numbers_of(frames), x);
+}
+
+static void frame_velocities(const drape_sequence *frames, double within, size_t first, size_t count,
+                             double *v)
 {
     const int32_t k = frame_before(frames, within);
-    memset(v, 0, numbers_of(frames) * sizeof *v);
+    memset(v, 0, count * sizeof *v);
     if (k < 0 || k + 1 >= frames->frame_count)
         return;
-    const double *from = frame_at(frames, k), *to = frame_at(frames, k + 1),
+    const double *from = frame_at(frames, k) + first, *to = frame_at(frames, k + 1) + first,
                  span = frames->time[k + 1] - frames->time[k];
-    for (size_t i = 0; i < numbers_of(frames); i++)
+    for (size_t i = 0; i < count; i++)
         v[i] = (to[i] - from[i]) / span;
 }
 
 /* ---- Paths of a host ---- */
 
 /* Cubic Hermite interpolation, as that of the paths of motion.c. */
-static void path_points(const drape_deformation *d, double t, double *x)
+static void path_points(const drape_deformation *d, double t, size_t first, size_t count, double *x)
 {
-    const size_t count = numbers_of(d->frames);
+    const double *x0 = d->x[0] + first, *x1 = d->x[1] + first, *v0 = d->v[0] + first, *v1 = d->v[1] + first;
     if (t <= d->t[0] || t >= d->t[1]) {
-        memcpy(x, d->x[t >= d->t[1]], count * sizeof *x);
+        memcpy(x, t >= d->t[1] ? x1 : x0, count * sizeof *x);
         return;
     }
     const double h = d->t[1] - d->t[0], s = (t - d->t[0]) / h;
     const double rise = s * s * (3 - 2 * s), leave = s * (1 - s) * (1 - s), arrive = s * s * (s - 1);
     for (size_t i = 0; i < count; i++)
-        x[i] = d->x[0][i] + rise * (d->x[1][i] - d->x[0][i]) + h * (leave * d->v[0][i] + arrive * d->v[1][i]);
+        x[i] = x0[i] + rise * (x1[i] - x0[i]) + h * (leave * v0[i] + arrive * v1[i]);
 }
 
-static void path_velocities(const drape_deformation *d, double t, double within, double *v)
+static void path_velocities(const drape_deformation *d, double t, double within, size_t first, size_t count,
+                            double *v)
 {
-    const size_t count = numbers_of(d->frames);
+    const double *x0 = d->x[0] + first, *x1 = d->x[1] + first, *v0 = d->v[0] + first, *v1 = d->v[1] + first;
     if (within < d->t[0] || within >= d->t[1]) {
         memset(v, 0, count * sizeof *v);
         return;
     }
     const double h = d->t[1] - d->t[0], s = (t - d->t[0]) / h;
     for (size_t i = 0; i < count; i++)
-        v[i] = 6 * s * (1 - s) * (d->x[1][i] - d->x[0][i]) / h + (1 - s) * (1 - 3 * s) * d->v[0][i] +
-               s * (3 * s - 2) * d->v[1][i];
+        v[i] =
+            6 * s * (1 - s) * (x1[i] - x0[i]) / h + (1 - s) * (1 - 3 * s) * v0[i] + s * (3 * s - 2) * v1[i];
 }
 
 static bool rests_at_end(const drape_deformation *d)
@@ -130,20 +138,44 @@ void drape_deformation_send(drape_deformation *d, double t, double span, const d
 
 /* ---- Either ---- */
 
-void drape_deformation_points(const drape_deformation *d, double t, double *x)
+static void points_from(const drape_deformation *d, double t, size_t first, size_t count, double *x)
 {
     if (d->given)
-        path_points(d, t, x);
+        path_points(d, t, first, count, x);
     else
-        drape_sequence_points(d->frames, t, x);
+        frame_points(d->frames, t, first, count, x);
+}
+
+static void velocities_from(const drape_deformation *d, double t, double within, size_t first, size_t count,
+                            double *v)
+{
+    if (d->given)
+        path_velocities(d, t, within, first, count, v);
+    else
+        frame_velocities(d->frames, within, first, count, v);
+}
+
+void drape_deformation_points(const drape_deformation *d, double t, double *x)
+{
+    points_from(d, t, 0, numbers_of(d->frames), x);
 }
 
 void drape_deformation_velocities(const drape_deformation *d, double t, double within, double *v)
 {
-    if (d->given)
-        path_velocities(d, t, within, v);
-    else
-        frame_velocities(d->frames, within, v);
+    velocities_from(d, t, within, 0, numbers_of(d->frames), v);
+}
+
+void drape_deformation_corners(const drape_deformation *d, const int32_t *triangle, double t, double x[9])
+{
+    for (int i = 0; i < 3; i++)
+        points_from(d, t, 3 * (size_t)triangle[i], 3, x + 3 * i);
+}
+
+void drape_deformation_corner_velocities(const drape_deformation *d, const int32_t *triangle, double t,
+                                         double within, double v[9])
+{
+    for (int i = 0; i < 3; i++)
+        velocities_from(d, t, within, 3 * (size_t)triangle[i], 3, v + 3 * i);
 }
 
 double drape_deformation_next_kink(const drape_deformation *d, double t, double end)

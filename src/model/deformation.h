@@ -29,6 +29,11 @@ bool drape_deformation_moves(const drape_deformation *d);
 void drape_deformation_points(const drape_deformation *d, double t, double *x);
 void drape_deformation_velocities(const drape_deformation *d, double t, double within, double *v);
 
+/* The same of the three points of a triangle alone. */
+void drape_deformation_corners(const drape_deformation *d, const int32_t *triangle, double t, double x[9]);
+void drape_deformation_corner_velocities(const drape_deformation *d, const int32_t *triangle, double t,
+                                         double within, double v[9]);
+
 /* As drape_motion_next_kink and drape_motion_at_kink. */
 double drape_deformation_next_kink(const drape_deformation *d, double t, double end);
 bool drape_deformation_at_kink(const drape_deformation *d, double t);

@@ -127,9 +127,11 @@ typedef struct drape_cloth {
     double material_values[DRAPE_MAX_PARAMS]; /* in the order of the parameters of drape_material_entry */
     drape_material material;
     drape_woven tension, bending; /* of a measured fabric; warp 0: not a measured fabric */
-    double *node_mass;            /* (mesh.node_count) [kg] */
-    uint8_t *edge_clamped;        /* (mesh.edge_count) 1: both nodes are held by pins that clamp */
-    double velocity[3];           /* [m/s] at t = 0 */
+    double *material_mass;        /* (mesh.node_count) [kg] of the material alone */
+    double *node_mass;     /* (mesh.node_count) [kg] with the "masses" of the scene; material_mass itself
+                                     if there are none */
+    uint8_t *edge_clamped; /* (mesh.edge_count) 1: both nodes are held by pins that clamp */
+    double velocity[3];    /* [m/s] at t = 0 */
     int32_t first_node, first_triangle;
     const struct drape_term **laws; /* (law_count) */
     int law_count;
@@ -181,6 +183,7 @@ typedef struct drape_contact_def {
     double distance;             /* activation distance between cloth and collider [m] */
     bool distance_given;         /* by the scene */
     double stiffness;            /* scale of the contact pressure [Pa] */
+    bool stiffness_given;        /* by the scene */
     double friction_velocity;    /* sliding speed below which friction falls to zero [m/s] */
     double restitution_velocity; /* rate of a gap below which less energy than e says is dissipated [m/s] */
     bool lagged;                 /* friction uses the normal force and direction from the start of the step */
@@ -192,6 +195,16 @@ typedef struct drape_contact_def {
     double relaxed_pressure;     /* with which relaxed cloth is pushed out of them [Pa] */
 } drape_contact_def;
 
+/* Whether the start of a run is untangled, and how (contact/untangle.h). */
+#define DRAPE_UNTANGLE_DEFAULT_SWEEPS 400
+#define DRAPE_UNTANGLE_DEFAULT_GAP    0.5
+typedef struct drape_model_untangle {
+    bool given;    /* by the scene */
+    int sweeps;    /* at most */
+    double gap;    /* wanted at the end, in activation distances */
+    bool goes_on;  /* a run whose cloth did not come apart */
+} drape_model_untangle;
+
 /* Nodes of one cloth that one item of its "pins" holds. */
 typedef struct drape_pin {
     char *name;
@@ -200,6 +213,16 @@ typedef struct drape_pin {
     int32_t node_count;
     bool clamps;
 } drape_pin;
+
+/* Where a pin is on the collider that carries it, in that collider's own coordinates. */
+typedef struct drape_ride {
+    int32_t collider; /* -1: none carries it */
+    int32_t triangle; /* of a collider with frames; -1: the collider is rigid */
+    double own[3];    /* the point [m] or, on a triangle, the weights [1] of its corners */
+    double offset;    /* [m] from the plane of the triangle, along its normal */
+    bool given;       /* a host attached it; if not, the scene did */
+    double since;     /* [s] when a host attached it: there its velocity jumps; NaN: from the start */
+} drape_ride;
 
 /* Nodes that are joined, one by one. */
 typedef struct drape_model_seam {
@@ -245,8 +268,8 @@ typedef struct drape_model_event {
 
 struct drape_model {
     const drape_model
-        *base;         /* the model that this one is without some of its pins, and whose arrays it shares
-                                except those that depend on the pins; NULL: it is its own */
+        *base;         /* the model that this one is with other pins and masses, and whose arrays it shares
+                                except those that depend on these; NULL: it is its own */
     drape_arena arena; /* holds everything below except the meshes */
     drape_context *ctx;
     int32_t cloth_count, term_count, node_count, triangle_count, edge_count;
@@ -262,10 +285,11 @@ struct drape_model {
     int32_t *free_of_node; /* (node_count) number among the free nodes, -1: pinned */
     int32_t *node_of_free; /* (free_count) */
     int32_t free_count;
-    int32_t *moved_node;  /* (moved_count) pinned nodes with a track */
+    int32_t *moved_node;  /* (moved_count) pinned nodes with a track or a ride */
     int32_t *moved_track; /* (moved_count) */
     int32_t moved_count, track_count;
-    drape_track *tracks;
+    drape_track *tracks;       /* of a pin that a collider carries, without keys */
+    drape_ride *ride;          /* (node_count) of pins that colliders carry; NULL: no pin of the scene */
     drape_collider *colliders; /* (collider_count) */
     int32_t collider_count;
     uint8_t
@@ -274,6 +298,8 @@ struct drape_model {
     int32_t *cloth_of_node; /* (node_count); NULL if `ignored` is */
     drape_contact_def contact;
     drape_choice contact_choice, self_choice; /* the settings of the scene */
+    drape_model_untangle untangle;
+    drape_choice untangle_choice;
     int64_t internal_count, measure_count;
     bool has_laws;        /* some term needs the rates of measures */
     bool has_dissipation; /* some term dissipates energy */

@@ -4,6 +4,7 @@
 #include "base/finite.h"
 #include "base/rotation.h"
 #include "base/vec3.h"
+#include "model/ride.h"
 #include "model/track.h"
 
 #include <math.h>
@@ -25,6 +26,7 @@ static void take_tracks(drape_motion *motion)
     for (int32_t i = 0; i < m->moved_count; i++) {
         motion->moved_node[i] = m->moved_node[i];
         motion->moved_track[i] = m->moved_track[i];
+        motion->ride[i] = m->ride ? m->ride[m->moved_node[i]] : drape_ride_none();
         motion->place[m->moved_node[i]] = i;
     }
 }
@@ -40,6 +42,7 @@ drape_status drape_motion_create(drape_arena *arena, const drape_model *model, d
     motion->moved_track = drape_arena_take(arena, pins, sizeof *motion->moved_track);
     motion->place = drape_arena_take(arena, (size_t)model->node_count, sizeof *motion->place);
     motion->pin_path = drape_arena_take(arena, pins, sizeof *motion->pin_path);
+    motion->ride = drape_arena_take(arena, pins, sizeof *motion->ride);
     motion->collider_path =
         drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->collider_path);
     motion->collider_turn =
@@ -123,8 +126,10 @@ static void place_path(const drape_placement *by, drape_path *path)
 
 /* ---- Courses: tracks or paths ---- */
 
-/* The motion of one pin or collider. */
+/* The motion of one pin or collider. A path of a host goes before a ride, and a ride before a track. */
 typedef struct course {
+    const drape_motion *motion;
+    const drape_ride *ride;   /* NULL: of a pin that no collider carries, or of a collider */
     const drape_track *track; /* NULL: none */
     const drape_path *path;
     const drape_turn_path *turn; /* of a collider; NULL: of a pin, which does not turn */
@@ -133,12 +138,53 @@ typedef struct course {
     const double *rest; /* of a pin; NULL: displacements are asked for */
 } course;
 
+static void pose_without_rates(const drape_motion *motion, int32_t collider, double t,
+                               drape_collider_pose *pose);
+
+/* Where a collider has a pin that it carries. */
+static void position_on_ride(const drape_motion *motion, const drape_ride *ride, double t, double x[3])
+{
+    const drape_collider *collider = &motion->model->colliders[ride->collider];
+    drape_collider_pose pose;
+    double corner[9];
+    pose_without_rates(motion, ride->collider, t, &pose);
+    memcpy(x, ride->own, 3 * sizeof *x);
+    if (ride->triangle >= 0) {
+        drape_deformation_corners(&motion->deformation[ride->collider],
+                                  collider->shape.triangle + 3 * (size_t)ride->triangle, t, corner);
+        drape_ride_point(ride, corner, x);
+    }
+    drape_pose_point(&pose, x, x);
+}
+
+static void velocity_on_ride(const drape_motion *motion, const drape_ride *ride, double t, double within,
+                             double v[3])
+{
+    const drape_collider *collider = &motion->model->colliders[ride->collider];
+    drape_collider_pose pose;
+    double corner[9], rate[9], own[3], own_velocity[3] = {0};
+    drape_motion_pose(motion, ride->collider, t, within, &pose);
+    memcpy(own, ride->own, sizeof own);
+    if (ride->triangle >= 0) {
+        const int32_t *triangle = collider->shape.triangle + 3 * (size_t)ride->triangle;
+        drape_deformation_corners(&motion->deformation[ride->collider], triangle, t, corner);
+        drape_deformation_corner_velocities(&motion->deformation[ride->collider], triangle, t, within, rate);
+        drape_ride_point(ride, corner, own);
+        drape_ride_velocity(ride, corner, rate, own_velocity);
+    }
+    drape_pose_point_velocity(&pose, own, own_velocity, v);
+}
+
 /* Paths of pins hold positions, not displacements, so that a pin reaches exactly the position that the host
  * gave. */
 static void position_on(const course *c, double t, double x[3])
 {
     if (c->path->given) {
         path_displacement(c->path, t, x);
+        return;
+    }
+    if (c->ride) {
+        position_on_ride(c->motion, c->ride, t, x);
         return;
     }
     memset(x, 0, 3 * sizeof *x);
@@ -154,6 +200,10 @@ static void velocity_on(const course *c, double t, double within, double v[3])
 {
     if (c->path->given) {
         path_velocity(c->path, t, within, v);
+        return;
+    }
+    if (c->ride) {
+        velocity_on_ride(c->motion, c->ride, t, within, v);
         return;
     }
     memset(v, 0, 3 * sizeof *v);
@@ -215,7 +265,7 @@ static double next_kink_of(const course *c, double t, double end)
     for (int i = 0; path->given && i < 2; i++)
         if (path->t[i] > t && path->t[i] < end && !(i == 0 ? path->smooth : arrives_at_rest(c)))
             end = path->t[i];
-    for (size_t i = 0; !path->given && c->track && i < c->track->key_count; i++)
+    for (size_t i = 0; !path->given && !c->ride && c->track && i < c->track->key_count; i++)
         if (c->track->keys[i].time > t && c->track->keys[i].time < end)
             end = c->track->keys[i].time;
     for (size_t i = 0; !path->given && c->turns && i < c->turns->key_count; i++)
@@ -229,6 +279,8 @@ static bool at_kink_of(const course *c, double t)
     const drape_path *path = c->path;
     if (path->given)
         return (t == path->t[0] && !path->smooth) || (t == path->t[1] && !arrives_at_rest(c));
+    if (c->ride)
+        return t == c->ride->since; /* those of its collider come with the colliders */
     for (size_t i = 0; c->track && i < c->track->key_count; i++)
         if (c->track->keys[i].time == t)
             return true;
@@ -246,6 +298,10 @@ static bool leading_velocity(const course *c, double t, double v[3])
     if (path->given && (t == path->t[0] || drape_has_arrived(path->t, t))) {
         memcpy(v, path->v[drape_has_arrived(path->t, t)], 3 * sizeof *v);
         return drape_has_arrived(path->t, t) || path->smooth;
+    }
+    if (!path->given && c->ride) { /* on the motion of its collider before t */
+        velocity_on(c, t, nextafter(t, -INFINITY), v);
+        return false;
     }
     velocity_on(c, t, t, v);
     return path->given || !c->track || c->track->key_count == 0;
@@ -309,7 +365,9 @@ static course pin_course(const drape_motion *motion, int32_t i)
 {
     const drape_model *m = motion->model;
     const int32_t node = motion->moved_node[i];
-    return (course){.track = motion->moved_track[i] >= 0 ? &m->tracks[motion->moved_track[i]] : NULL,
+    return (course){.motion = motion,
+                    .ride = motion->ride[i].collider >= 0 ? &motion->ride[i] : NULL,
+                    .track = motion->moved_track[i] >= 0 ? &m->tracks[motion->moved_track[i]] : NULL,
                     .path = &motion->pin_path[i],
                     .placed = &motion->cloth_placed[drape_model_cloth_of(m, node)],
                     .rest = m->rest + 3 * (size_t)node};
@@ -356,6 +414,7 @@ static int32_t find_place(drape_motion *motion, int32_t node)
         i = motion->place[node] = motion->moved_count++;
         motion->moved_node[i] = node;
         motion->moved_track[i] = -1;
+        motion->ride[i] = drape_ride_none();
     }
     return i;
 }
@@ -366,6 +425,39 @@ void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double 
     const int32_t i = find_place(motion, node);
     const course c = pin_course(motion, i);
     motion->pin_path[i] = path_to(&c, t, span, x, v);
+}
+
+/* ---- Pins that colliders carry ---- */
+
+int32_t drape_motion_carrier(const drape_motion *motion, int32_t i)
+{
+    return motion->pin_path[i].given ? -1 : motion->ride[i].collider;
+}
+
+void drape_motion_ride_from(const drape_motion *motion, int32_t collider, int32_t triangle, double t,
+                            const double x[3], drape_ride *ride)
+{
+    const drape_collider *on = &motion->model->colliders[collider];
+    drape_collider_pose pose;
+    double corner[9];
+    *ride = drape_ride_none();
+    ride->collider = collider;
+    pose_without_rates(motion, collider, t, &pose);
+    drape_pose_own(&pose, x, ride->own);
+    if (on->frames.frame_count == 0)
+        return;
+    ride->triangle = triangle;
+    drape_deformation_corners(&motion->deformation[collider], on->shape.triangle + 3 * (size_t)triangle, t,
+                              corner);
+    double own[3] = {ride->own[0], ride->own[1], ride->own[2]};
+    drape_ride_fix(ride, corner, own);
+}
+
+void drape_motion_take_ride(drape_motion *motion, int32_t node, const drape_ride *ride)
+{
+    const int32_t i = find_place(motion, node);
+    motion->pin_path[i].given = false;
+    motion->ride[i] = *ride;
 }
 
 void drape_motion_place_cloth(drape_motion *motion, int32_t cloth, const drape_placement *by)
@@ -500,6 +592,20 @@ void drape_motion_pose(const drape_motion *motion, int32_t collider, double t, d
     rotation_on(&c, t, rotation);
     spin_on(&c, t, within, w);
     drape_pose_about(pose, motion->model->colliders[collider].pivot, rotation, displacement, v, w);
+}
+
+static void pose_without_rates(const drape_motion *motion, int32_t collider, double t,
+                               drape_collider_pose *pose)
+{
+    static const double zero[3];
+    const course c = collider_course(motion, collider);
+    double displacement[3], rotation[9];
+    *pose = (drape_collider_pose){.t = t};
+    if (!drape_motion_moves_collider(motion, collider))
+        return;
+    position_on(&c, t, displacement);
+    rotation_on(&c, t, rotation);
+    drape_pose_about(pose, motion->model->colliders[collider].pivot, rotation, displacement, zero, zero);
 }
 
 void drape_motion_mean_pose(const drape_motion *motion, int32_t collider, double t, const double span[2],
@@ -701,6 +807,33 @@ static void archive_turn(drape_turn_path *turn, drape_archive *a)
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a rotation that is not finite");
 }
 
+static bool is_ride(const drape_motion *motion, const drape_ride *ride)
+{
+    const drape_model *m = motion->model;
+    if (ride->collider < 0 || ride->collider >= m->collider_count)
+        return ride->collider == -1 && ride->triangle == -1;
+    const drape_collider *on = &m->colliders[ride->collider];
+    const int32_t triangles = on->frames.frame_count > 0 ? on->shape.triangle_count : 0;
+    return drape_all_finite(ride->own, 3) && isfinite(ride->offset) && !isinf(ride->since) &&
+           (triangles > 0 ? ride->triangle >= 0 && ride->triangle < triangles : ride->triangle == -1);
+}
+
+static void archive_ride(drape_motion *motion, drape_ride *ride, drape_archive *a)
+{
+    drape_archive_int32(a, &ride->collider);
+    drape_archive_int32(a, &ride->triangle);
+    if (ride->collider >= 0) {
+        drape_archive_doubles(a, ride->own, 3);
+        drape_archive_doubles(a, &ride->offset, 1);
+        drape_archive_bool(a, &ride->given);
+        drape_archive_doubles(a, &ride->since, 1);
+    }
+    if (drape_archive_has_read(a) && !is_ride(motion, ride)) {
+        *ride = drape_ride_none();
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid pin on a collider");
+    }
+}
+
 static void archive_placement(drape_placement *placed, drape_archive *a)
 {
     drape_archive_bool(a, &placed->given);
@@ -741,6 +874,8 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
         archive_place(motion, i, a);
         if (drape_archive_good(a))
             archive_path(&motion->pin_path[i], a);
+        if (drape_archive_good(a))
+            archive_ride(motion, &motion->ride[i], a);
     }
     for (int32_t c = 0; c < motion->model->collider_count && drape_archive_good(a); c++) {
         archive_path(&motion->collider_path[c], a);

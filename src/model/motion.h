@@ -39,11 +39,12 @@ typedef struct drape_placement {
 
 typedef struct drape_motion {
     const drape_model *model;
-    int32_t moved_count;              /* pinned nodes with a track or a path */
-    int32_t *moved_node;              /* (number of pinned nodes) */
-    int32_t *moved_track;             /* (number of pinned nodes) -1: no track */
-    int32_t *place;                   /* (node_count) number among the moved nodes, -1: none */
-    drape_path *pin_path;             /* (number of pinned nodes) */
+    int32_t moved_count;  /* pinned nodes with a track or a path */
+    int32_t *moved_node;  /* (number of pinned nodes) */
+    int32_t *moved_track; /* (number of pinned nodes) -1: no track */
+    int32_t *place;       /* (node_count) number among the moved nodes, -1: none */
+    drape_path *pin_path; /* (number of pinned nodes) */
+    drape_ride *ride;     /* (number of pinned nodes) the collider that carries it, unless it has a path */
     drape_path *collider_path;        /* (collider_count) */
     drape_deformation *deformation;   /* (collider_count) */
     drape_turn_path *collider_turn;   /* (collider_count) with the times of collider_path, if that is given */
@@ -143,6 +144,17 @@ void drape_motion_place_fixed(const drape_motion *motion, int32_t node, double x
 /* Takes the paths and placements of another motion of the same cloth, in which other nodes may be pinned.
  * before (collider_count): the number that each collider has there; -1: it is new. */
 void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int32_t *before);
+
+/* The collider that carries a moved pin; -1: none. */
+int32_t drape_motion_carrier(const drape_motion *motion, int32_t i);
+
+/* The ride by which a collider carries a point of space from time t on. triangle: the one that carries it, of a
+ * collider with frames, else unused. */
+void drape_motion_ride_from(const drape_motion *motion, int32_t collider, int32_t triangle, double t,
+                            const double x[3], drape_ride *ride);
+
+/* A pinned node goes on with this ride, and with no path. */
+void drape_motion_take_ride(drape_motion *motion, int32_t node, const drape_ride *ride);
 
 /* The position of a pinned node at time t. */
 void drape_motion_place_pin(const drape_motion *motion, int32_t node, double t, double x[3]);

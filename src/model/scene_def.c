@@ -50,7 +50,7 @@ bool drape_scene_value(const drape_scene_key *key, const void *def, drape_settin
     switch (key->param.kind) {
     case DRAPE_PARAM_NUMBER:
         memcpy(&out->number, at, sizeof out->number);
-        return true;
+        return !isnan(out->number) || !key->param.derived;
     case DRAPE_PARAM_INTEGER:
         memcpy(&integer, at, sizeof integer);
         out->number = integer;
@@ -204,6 +204,14 @@ void drape_pin_def_init(drape_pin_def *def, size_t struct_size)
 {
     drape_pin_def defaults = {.struct_size = 0};
     drape_scene_set_defaults(&drape_form_pin, &defaults);
+    defaults.struct_size = struct_size;
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
+}
+
+void drape_mass_def_init(drape_mass_def *def, size_t struct_size)
+{
+    drape_mass_def defaults = {.struct_size = 0};
+    drape_scene_set_defaults(&drape_form_mass, &defaults);
     defaults.struct_size = struct_size;
     drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }

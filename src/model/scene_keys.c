@@ -49,6 +49,12 @@ static const drape_scene_key pin_keys[] = {
     {DRAPE_VECTOR("track", "s and m", DRAPE_DERIVED("none: fixed"), LOWEST, HIGHEST,
                   "displacement from rest, linear between the times"),
      .shape = DRAPE_SCENE_TRACK, ARRAY(drape_pin_def, track, key_count), .at_least = 1},
+    {DRAPE_TEXT("attach", "name of the collider that carries the nodes, which ride on it from where they are",
+                .derived = "none"),
+     IN(drape_pin_def, attach)},
+    {DRAPE_INTEGER("triangle", "1", DRAPE_DERIVED("the nearest one of each node"), 0, INT32_MAX,
+                   "the triangle that carries the nodes, of a collider that deforms, from 0"),
+     IN(drape_pin_def, triangle)},
     {DRAPE_BOOLEAN("clamp", false,
                    "edges between these nodes keep the direction of the sheet across them; for bend.midedge"),
      IN(drape_pin_def, clamp)},
@@ -60,6 +66,33 @@ const drape_scene_object drape_form_pin = {.name = "pin",
                                            .one_of = pin_selectors,
                                            .def_size = sizeof(drape_pin_def),
                                            .least_size = offsetof(drape_pin_def, clamp)};
+
+/* ---- Masses ---- */
+
+static const drape_scene_key mass_keys[] = {
+    {DRAPE_INTEGER("nodes", "1", UNSAID, 0, INT32_MAX, "node numbers of this cloth"),
+     .shape = DRAPE_SCENE_LIST, ARRAY(drape_mass_def, nodes, node_count), .at_least = 1},
+    {DRAPE_CHOICE("corner", UNSAID, corners, "a corner of a grid; top is row 0, left is column 0"),
+     IN(drape_mass_def, corner)},
+    {DRAPE_CHOICE("edge", UNSAID, edges, "a side of a grid; top is row 0, left is column 0"),
+     IN(drape_mass_def, edge)},
+    {DRAPE_INTEGER("row", "1", UNSAID, 0, INT32_MAX, "a row of a grid, from 0"), IN(drape_mass_def, row)},
+    {DRAPE_VECTOR("box", "m", UNSAID, LOWEST, HIGHEST,
+                  "nodes inside a box of rest coordinates after the transform, boundary included"),
+     .shape = DRAPE_SCENE_BOX, BOX(drape_mass_def)},
+    {DRAPE_NUMBER("add", "kg", DRAPE_DERIVED("none; exactly one of add and mass is given"), DRAPE_ABOVE(0),
+                  1e12, "added to the mass of each of these nodes"),
+     IN(drape_mass_def, add)},
+    {DRAPE_NUMBER("mass", "kg", DRAPE_DERIVED("none; exactly one of add and mass is given"), DRAPE_ABOVE(0),
+                  1e12, "of each of these nodes, in place of its mass so far"),
+     IN(drape_mass_def, mass)},
+};
+
+const drape_scene_object drape_form_mass = {.name = "mass",
+                                            KEYS(mass_keys),
+                                            .one_of = pin_selectors,
+                                            .def_size = sizeof(drape_mass_def),
+                                            .least_size = sizeof(drape_mass_def)};
 
 /* ---- Objects with settings ---- */
 
@@ -131,6 +164,9 @@ static const drape_scene_key cloth_keys[] = {
     {DRAPE_TEXT("ignore", "names of colliders and cloths that it passes through; its own name: itself",
                 .derived = "none"),
      .shape = DRAPE_SCENE_LIST, ARRAY(drape_cloth_def, ignore, ignore_count)},
+    {SHAPED(DRAPE_SCENE_OBJECTS, "masses", DRAPE_DERIVED("none: those of the material"),
+            "nodes with masses of their own, applied in this order"),
+     ARRAY(drape_cloth_def, masses, mass_count), .child = &drape_form_mass},
 };
 
 const drape_scene_object drape_form_cloth = {.name = "cloth",
@@ -183,11 +219,13 @@ const drape_scene_object drape_form_collider = {
     .least_size = offsetof(drape_collider_def, track),
 };
 
-/* All members of these two are settings. */
+/* All members of these are settings. */
 static const drape_scene_object self_contact = {.name = "self_contact",
                                                 SETTINGS(drape_scene_def, self_contact, self_contact_count)};
 static const drape_scene_object contact = {.name = "contact",
                                            SETTINGS(drape_scene_def, contact, contact_count)};
+static const drape_scene_object untangle = {.name = "untangle",
+                                            SETTINGS(drape_scene_def, untangle, untangle_count)};
 
 /* ---- Events ---- */
 
@@ -289,6 +327,9 @@ static const drape_scene_key scene_keys[] = {
      .optional = true, .child = &self_contact},
     {SHAPED(DRAPE_SCENE_OBJECT, "contact", UNSAID, "settings of contact with colliders and between layers"),
      .child = &contact},
+    {SHAPED(DRAPE_SCENE_OBJECT, "untangle", DRAPE_DERIVED("none: what begins through each other stays so"),
+            "cloth that begins through cloth or colliders is taken apart before the first step"),
+     .optional = true, .child = &untangle},
     {SHAPED(DRAPE_SCENE_OBJECT, "integrator", UNSAID, "method and its settings"),
      IN(drape_scene_def, integrator), .child = &integrator},
     {SHAPED(DRAPE_SCENE_OBJECT, "controller", UNSAID, "step controller and its settings"),

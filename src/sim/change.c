@@ -54,13 +54,28 @@ static const uint8_t *pins_of(const drape_sim *sim, const drape_model *model, ui
     return own ? pinned : NULL;
 }
 
+/* The same for masses that the host set. */
+static const double *masses_of(const drape_sim *sim, const drape_model *model, double *masses)
+{
+    const drape_model *base = drape_sim_base_model(sim);
+    bool own = false;
+    for (int32_t i = 0; sim->masses && i < model->node_count; i++) {
+        masses[i] = sim->masses[i] != base->mass[i] ? sim->masses[i] : model->mass[i];
+        own = own || masses[i] != model->mass[i];
+    }
+    return own ? masses : NULL;
+}
+
 static drape_status change(drape_sim *sim, const drape_model *model)
 {
     drape_sim *other = NULL;
-    uint8_t *pinned = drape_alloc(sim->ctx, (size_t)model->node_count, sizeof *pinned);
-    if (!pinned)
-        return DRAPE_E_MEMORY;
-    drape_status status = drape_sim_create_like(sim, model, pins_of(sim, model, pinned), &other);
+    const size_t nodes = (size_t)model->node_count;
+    uint8_t *pinned = drape_alloc(sim->ctx, nodes, sizeof *pinned);
+    double *masses = drape_alloc(sim->ctx, nodes, sizeof *masses);
+    drape_status status = DRAPE_E_MEMORY;
+    if (pinned && masses)
+        status = drape_sim_create_like(sim, model, pins_of(sim, model, pinned), masses_of(sim, model, masses),
+                                       &other);
     if (!status)
         status = drape_sim_continue(other, sim);
     if (!status) {
@@ -68,6 +83,7 @@ static drape_status change(drape_sim *sim, const drape_model *model)
         drape_sim_exchange(sim, other);
     }
     drape_sim_destroy(&other);
+    drape_free(sim->ctx, masses);
     drape_free(sim->ctx, pinned);
     return status;
 }

@@ -194,19 +194,46 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
         sim->chosen.integrator->set_effort(sim->integrator, m->effort);
 }
 
-/* Read by create_restored. */
-static void write_pinned(drape_sim *sim, drape_archive *a)
+static void archive_untangling(drape_sim *sim, drape_archive *a)
 {
-    bool any = sim->pinned != NULL;
-    drape_archive_bool(a, &any);
-    if (any)
-        drape_archive_bytes(a, sim->pinned, (size_t)sim->model->node_count);
+    drape_untangling *u = &sim->untangling;
+    double *const numbers[] = {&u->time,         &u->least_gap_before, &u->least_gap,
+                               &u->displacement, &u->strain,           &u->seconds};
+    int32_t *const counts[] = {&u->inside_before, &u->inside, &u->node, &u->cloths};
+    drape_archive_mark(a, "untangling");
+    drape_archive_bool(a, &sim->untangle_due);
+    drape_archive_bool(a, &sim->untangled);
+    drape_archive_bool(a, &u->clear);
+    drape_archive_int(a, &u->sweeps);
+    drape_archive_int64(a, &u->pairs_before);
+    drape_archive_int64(a, &u->pairs);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        drape_archive_double(a, numbers[i]);
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
+        drape_archive_int32(a, counts[i]);
+    drape_archive_doubles(a, sim->untangled_move, (size_t)sim->model->cloth_count);
+    if (drape_archive_good(a) && !is_place(u->node, -1, sim->model->node_count))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an untangled node %d of %d", (int)u->node,
+                           (int)sim->model->node_count);
+}
+
+/* Read by create_restored. */
+static void write_own(drape_sim *sim, drape_archive *a)
+{
+    const size_t nodes = (size_t)sim->model->node_count;
+    bool pins = sim->pinned != NULL, masses = sim->masses != NULL;
+    drape_archive_bool(a, &pins);
+    drape_archive_bool(a, &masses);
+    if (pins)
+        drape_archive_bytes(a, sim->pinned, nodes);
+    if (masses)
+        drape_archive_doubles(a, sim->masses, nodes);
 }
 
 void drape_sim_archive(drape_sim *sim, drape_archive *a)
 {
     if (!a->reading)
-        write_pinned(sim, a);
+        write_own(sim, a);
     drape_work_archive(&sim->earlier, a);
     archive_states(sim, a);
     drape_archive_doubles(a, sim->scratch, sizeof sim->scratch / sizeof *sim->scratch);
@@ -215,6 +242,7 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
     archive_statistics(sim, a);
     archive_relaxed_logged(sim, a);
     archive_realtime(sim, a);
+    archive_untangling(sim, a);
     drape_events_archive(sim, a);
     drape_system_archive(sim->system, a);
     drape_archive_mark(a, "integrator");
@@ -236,24 +264,44 @@ void drape_sim_exchange(drape_sim *sim, drape_sim *other)
     drape_system_copy_wind(sim->system, other->system);
 }
 
-/* A new sim with the pins that there were when the archive was written. */
-static drape_status create_restored(drape_sim *sim, drape_archive *a, drape_sim **out)
+/* Reads an array of one number per node, if there is one; NULL otherwise. */
+static void *read_own(drape_sim *sim, drape_archive *a, bool any, size_t size)
 {
     const size_t nodes = (size_t)sim->model->node_count;
-    bool any = false, flags = true;
-    drape_archive_bool(a, &any);
-    uint8_t *pinned = any && drape_archive_good(a) ? drape_alloc(sim->ctx, nodes, 1) : NULL;
-    if (any && !pinned)
+    void *own = any && drape_archive_good(a) ? drape_alloc(sim->ctx, nodes, size) : NULL;
+    if (any && !own)
         drape_archive_note(a, DRAPE_E_MEMORY);
-    if (pinned)
-        drape_archive_bytes(a, pinned, nodes);
-    for (size_t i = 0; pinned && i < nodes; i++)
-        flags = flags && pinned[i] <= 1;
-    if (drape_archive_good(a) && !flags)
+    if (own)
+        drape_archive_bytes(a, own, nodes * size);
+    return own;
+}
+
+static void check_own(drape_archive *a, size_t nodes, const uint8_t *pinned, const double *masses)
+{
+    bool flags = true, positive = true;
+    for (size_t i = 0; i < nodes && drape_archive_good(a); i++) {
+        flags = flags && (!pinned || pinned[i] <= 1);
+        positive = positive && (!masses || (masses[i] > 0 && isfinite(masses[i])));
+    }
+    if (!flags)
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a pin that is neither there nor not");
-    const drape_status status = drape_archive_good(a)
-                                    ? drape_sim_create_like(sim, drape_sim_base_model(sim), pinned, out)
-                                    : a->status;
+    if (!positive)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a node without mass");
+}
+
+/* A new sim with the pins and masses that there were when the archive was written. */
+static drape_status create_restored(drape_sim *sim, drape_archive *a, drape_sim **out)
+{
+    bool pins = false, weighed = false;
+    drape_archive_bool(a, &pins);
+    drape_archive_bool(a, &weighed);
+    uint8_t *pinned = read_own(sim, a, pins, sizeof *pinned);
+    double *masses = read_own(sim, a, weighed, sizeof *masses);
+    check_own(a, (size_t)sim->model->node_count, pinned, masses);
+    const drape_status status =
+        drape_archive_good(a) ? drape_sim_create_like(sim, drape_sim_base_model(sim), pinned, masses, out)
+                              : a->status;
+    drape_free(sim->ctx, masses);
     drape_free(sim->ctx, pinned);
     return status;
 }

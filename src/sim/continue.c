@@ -2,7 +2,7 @@
  * beside the present one, as when a checkpoint is restored, and has the same cloth. Terms, colliders and
  * events are the same if their names are. The integrator and the controller start anew, as after a kink. */
 #include "base/elementary.h"
-#include "sim/sim.h"
+#include "sim/attach.h"
 
 #include <math.h>
 #include <string.h>
@@ -77,7 +77,13 @@ static drape_status refuse_pin(const drape_sim *sim, int32_t node, const double 
                       drape_sim_state(sim)->t);
 }
 
-/* Pinned nodes are where they were, and held there unless their motion leads there anyway. A node that was
+static bool has_track(const drape_motion *motion, int32_t i)
+{
+    const int32_t track = motion->moved_track[i];
+    return track >= 0 && motion->model->tracks[track].key_count > 0;
+}
+
+/* Pinned nodes are where they were, carried on from there by their collider, or held there unless their motion leads there anyway. A node that was
  * pinned before may not get a track that begins elsewhere. */
 static drape_status hold(drape_sim *to, const drape_sim *from)
 {
@@ -95,7 +101,9 @@ static drape_status hold(drape_sim *to, const drape_sim *from)
             memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
         if (drape_hypot(drape_hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= PIN_SLIP * m->length)
             continue;
-        if (from->model->pinned[i] && motion->place[i] >= 0 && motion->moved_track[motion->place[i]] >= 0)
+        if (drape_sim_carrier(to, i) >= 0)
+            drape_sim_ride_on(to, i);
+        else if (from->model->pinned[i] && motion->place[i] >= 0 && has_track(motion, motion->place[i]))
             status = refuse_pin(to, i, x, pin);
         else
             drape_motion_hold_pin(motion, i, x);
@@ -180,8 +188,10 @@ drape_status drape_sim_continue(drape_sim *to, drape_sim *from)
     copy_state(to, from);
     let_go(to, from);
     drape_status status = drape_system_continue(to->system, from->system, before);
-    if (!status)
+    if (!status) {
+        drape_sim_continue_rides(to, from, before);
         status = hold(to, from);
+    }
     if (!status)
         status = copy_driver(to, from);
     if (!status)

@@ -3,6 +3,7 @@
 #include "base/finite.h"
 #include "base/rotation.h"
 #include "base/vec3.h"
+#include "sim/attach.h"
 #include "sim/place.h"
 
 #include <math.h>
@@ -211,7 +212,7 @@ drape_status drape_sim_deform_collider(drape_sim *sim, int32_t collider, double 
 drape_status drape_sim_collider_points(drape_sim *sim, int32_t collider, double *positions,
                                        double *velocities)
 {
-    drape_status status = drape_sim_guard(sim, "drape_sim_collider_points");
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     status = check_deforms(sim, "drape_sim_collider_points", collider);
@@ -310,7 +311,7 @@ static drape_status place(drape_sim *sim, drape_point *point)
                            .span = {before, now->t},
                            .instant = !sim->chosen.integrator->mean_velocities};
     /* otherwise the last step has begun there */
-    return sim->before < 0 ? drape_system_begin(sim->system, now) : DRAPE_OK;
+    return sim->before < 0 ? drape_system_begin_reading(sim->system, now) : DRAPE_OK;
 }
 
 /* A pending request to cancel the next advance is not an error of reading. */
@@ -332,7 +333,7 @@ drape_status drape_sim_reactions_at(drape_sim *sim, const drape_point *point, do
 drape_status drape_sim_reactions(drape_sim *sim, double *forces)
 {
     drape_point point;
-    drape_status status = drape_sim_guard(sim, "drape_sim_reactions");
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     if (!forces)
@@ -356,7 +357,7 @@ static drape_status check_has_contact(const drape_sim *sim, const char *function
 drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)
 {
     drape_point point;
-    drape_status status = drape_sim_guard(sim, "drape_sim_contact_forces");
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     if (!forces)
@@ -372,27 +373,70 @@ drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)
     return read_status(sim);
 }
 
-/* The forces of cloth on a collider, with the sign of g. */
-static drape_status read_load(drape_sim *sim, const char *function, int32_t collider, drape_load *load)
+/* The forces of contact on a collider, with the sign of g. */
+static drape_status read_load(drape_sim *sim, const drape_point *point, int32_t collider, drape_load *load)
 {
-    drape_point point;
-    drape_status status = check_collider(sim, function, collider);
-    if (!status)
-        status = check_has_contact(sim, function);
-    if (!status)
-        status = place(sim, &point);
-    if (status)
-        return status;
-    drape_system_contact_part(sim->system, &point, true, sim->query_scratch, NULL);
+    drape_system_contact_part(sim->system, point, true, sim->query_scratch, NULL);
     const drape_load *on = drape_system_on_colliders(sim->system);
     *load = on ? on[collider] : (drape_load){.force = {0}};
     return read_status(sim);
 }
 
+/* What the pins that a collider carries put on it: the sum of their forces and its moment about a point. */
+static drape_status add_carried(drape_sim *sim, const drape_point *point, int32_t collider,
+                                const double about[3], double force[3], double moment[3])
+{
+    const drape_motion *motion = drape_system_motion(sim->system);
+    double *forces = sim->query_scratch, arm[3], turning[3];
+    bool carries = false;
+    for (int32_t i = 0; i < motion->moved_count && !carries; i++)
+        carries = drape_motion_carrier(motion, i) == collider;
+    if (!carries)
+        return DRAPE_OK;
+    const drape_status status = drape_sim_reactions_at(sim, point, forces);
+    for (int32_t i = 0; !status && i < motion->moved_count; i++) {
+        const size_t node = (size_t)motion->moved_node[i];
+        if (drape_motion_carrier(motion, i) != collider)
+            continue;
+        vec3_sub(point->x + 3 * node, about, arm);
+        vec3_cross(arm, forces + 3 * node, turning);
+        vec3_add_scaled(-1, forces + 3 * node, force);
+        vec3_add_scaled(-1, turning, moment);
+    }
+    return status;
+}
+
+/* All that cloth does to a collider now: force, and torque about a point or, NULL, its pivot. */
+static drape_status read_wrench(drape_sim *sim, const char *function, int32_t collider, const double *about,
+                                double force[3], double torque[3])
+{
+    drape_point point;
+    drape_load load;
+    drape_collider_pose pose;
+    double center[3];
+    drape_status status = check_collider(sim, function, collider);
+    if (!status)
+        status = check_has_contact(sim, function);
+    if (!status)
+        status = place(sim, &point);
+    if (!status)
+        status = read_load(sim, &point, collider, &load);
+    if (status)
+        return status;
+    drape_motion_pose(drape_system_motion(sim->system), collider, point.t, point.t, &pose);
+    pivot_of(sim, collider, center);
+    drape_load_torque(&load, &pose, about ? about : center, torque);
+    for (int k = 0; k < 3; k++) {
+        force[k] = load.force[k] != 0 ? -load.force[k] : 0;
+        torque[k] = torque[k] != 0 ? -torque[k] : 0;
+    }
+    return add_carried(sim, &point, collider, about ? about : center, force, torque);
+}
+
 drape_status drape_sim_contacts(drape_sim *sim, int32_t room, drape_contact_point *contacts, int32_t *count)
 {
     drape_point point;
-    drape_status status = drape_sim_guard(sim, "drape_sim_contacts");
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     if (!count || room < 0 || (room > 0 && !contacts))
@@ -411,37 +455,29 @@ drape_status drape_sim_contacts(drape_sim *sim, int32_t room, drape_contact_poin
 
 drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3])
 {
-    drape_load load;
-    drape_status status = drape_sim_guard(sim, "drape_sim_collider_force");
+    double sum[3], torque[3];
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     if (!force)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_force: the array is NULL");
-    status = read_load(sim, "drape_sim_collider_force", collider, &load);
-    for (int k = 0; !status && k < 3; k++)
-        force[k] = load.force[k] != 0 ? -load.force[k] : 0;
+    status = read_wrench(sim, "drape_sim_collider_force", collider, NULL, sum, torque);
+    if (!status)
+        memcpy(force, sum, sizeof sum);
     return status;
 }
 
 drape_status drape_sim_collider_torque(drape_sim *sim, int32_t collider, const double *about,
                                        double torque[3])
 {
-    drape_load load;
-    drape_collider_pose pose;
-    double center[3];
-    drape_status status = drape_sim_guard(sim, "drape_sim_collider_torque");
+    double force[3], sum[3];
+    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
     if (status)
         return status;
     if (!torque)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_torque: the array is NULL");
-    status = read_load(sim, "drape_sim_collider_torque", collider, &load);
-    if (status)
-        return status;
-    const double t = drape_sim_state(sim)->t;
-    drape_motion_pose(drape_system_motion(sim->system), collider, t, t, &pose);
-    pivot_of(sim, collider, center);
-    drape_load_torque(&load, &pose, about ? about : center, torque);
-    for (int k = 0; k < 3; k++)
-        torque[k] = torque[k] != 0 ? -torque[k] : 0;
-    return DRAPE_OK;
+    status = read_wrench(sim, "drape_sim_collider_torque", collider, about, force, sum);
+    if (!status)
+        memcpy(torque, sum, sizeof sum);
+    return status;
 }

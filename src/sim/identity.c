@@ -127,6 +127,12 @@ static uint64_t add_contact(uint64_t hash, const drape_contact_def *c)
     return add_doubles(hash, values, sizeof values / sizeof *values);
 }
 
+static uint64_t add_untangle(uint64_t hash, const drape_model_untangle *u)
+{
+    const double values[] = {u->given, u->sweeps, u->gap, u->goes_on};
+    return add_doubles(hash, values, sizeof values / sizeof *values);
+}
+
 static uint64_t add_nodes(uint64_t hash, const drape_model *m)
 {
     size_t nodes = (size_t)m->node_count;
@@ -137,7 +143,14 @@ static uint64_t add_nodes(uint64_t hash, const drape_model *m)
     hash = add_doubles(hash, m->edge_length, (size_t)m->edge_count);
     hash = add(hash, m->pinned, nodes);
     hash = add(hash, m->moved_node, (size_t)m->moved_count * sizeof *m->moved_node);
-    return add(hash, m->moved_track, (size_t)m->moved_count * sizeof *m->moved_track);
+    hash = add(hash, m->moved_track, (size_t)m->moved_count * sizeof *m->moved_track);
+    for (size_t i = 0; m->ride && i < nodes; i++) {
+        const int64_t on[] = {m->ride[i].collider, m->ride[i].triangle};
+        hash = add(hash, on, sizeof on);
+        hash = add_doubles(hash, m->ride[i].own, 3);
+        hash = add_doubles(hash, &m->ride[i].offset, 1);
+    }
+    return hash;
 }
 
 static uint64_t add_event(uint64_t hash, const drape_model_event *event)
@@ -167,6 +180,7 @@ static uint64_t model_hash(const drape_model *m)
         hash = add_event(hash, &m->events[i]);
     if (m->ignored)
         hash = add(hash, m->ignored, (size_t)(m->collider_count + m->cloth_count) * (size_t)m->cloth_count);
+    hash = add_untangle(hash, &m->untangle);
     return add_contact(add_doubles(hash, m->gravity, 3), &m->contact);
 }
 

@@ -8,6 +8,7 @@
 #include "base/def.h"
 #include "base/rotation.h"
 #include "mesh/mesh.h"
+#include "sim/attach.h"
 
 #include <math.h>
 #include <string.h>
@@ -160,8 +161,7 @@ static void place_motion(drape_sim *sim, const drape_place_list *cloths, const d
     }
 }
 
-/* What integrators and controllers remember of earlier steps is of another place. */
-static void forget_past(drape_sim *sim)
+void drape_sim_forget_past(drape_sim *sim)
 {
     sim->before = sim->past[0] = sim->past[1] = -1;
     memset(sim->scratch, 0, sizeof sim->scratch);
@@ -182,7 +182,7 @@ drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloth
     place_motion(sim, cloths, colliders, by);
     sim->next = sim->now;
     sim->now = (int)(next - sim->states);
-    forget_past(sim);
+    drape_sim_forget_past(sim);
     drape_sim_shift_energy(sim, &before);
     return DRAPE_OK;
 }
@@ -212,6 +212,18 @@ static drape_status read_def(const drape_sim *sim, const drape_place_def *given,
     return DRAPE_OK;
 }
 
+/* Pins whose cloth was placed without the collider that carries them, or that without them, stay where they
+ * are, so that nothing is strained, and ride on from there. */
+static void keep_riding(drape_sim *sim, const drape_place_list *cloths, const drape_place_list *colliders)
+{
+    const drape_motion *motion = drape_system_motion(sim->system);
+    for (int32_t i = 0; i < motion->moved_count; i++) {
+        const int32_t on = drape_motion_carrier(motion, i), node = motion->moved_node[i];
+        if (on >= 0 && has(colliders, on) != has(cloths, drape_model_cloth_of(sim->model, node)))
+            drape_sim_ride_on(sim, node);
+    }
+}
+
 /* R (x - c) + c + t. Without a rotation c cancels exactly. */
 static drape_placement placement_of(const drape_place_def *def)
 {
@@ -239,5 +251,9 @@ drape_status drape_sim_place(drape_sim *sim, const drape_place_def *given)
     status = check_list(sim, "cloth", &cloths, sim->model->cloth_count);
     if (!status)
         status = check_list(sim, "collider", &colliders, sim->model->collider_count);
-    return status ? status : drape_sim_place_parts(sim, &cloths, &colliders, &by, def.stop);
+    if (!status)
+        status = drape_sim_place_parts(sim, &cloths, &colliders, &by, def.stop);
+    if (!status)
+        keep_riding(sim, &cloths, &colliders);
+    return status;
 }

@@ -18,6 +18,9 @@ drape_status drape_sim_check_place(const drape_sim *sim, const drape_place_list 
 drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloths,
                                    const drape_place_list *colliders, const drape_placement *by, bool stop);
 
+/* What integrators and controllers remember of earlier steps is of another place. */
+void drape_sim_forget_past(drape_sim *sim);
+
 /* Before pins, or a collider, are sent on: if they are faster than the sim's teleport_speed, places their
  * cloth, or the collider, where they are sent to, as drape_sim_move_pins says. Errors: as
  * drape_sim_place_parts. */

@@ -157,9 +157,8 @@ static void find_on_ray(const query *q, const double *origin, const double *alon
 static drape_status check(drape_sim *sim, const char *function, int what, int32_t count, const double *points,
                           double reach, const drape_hit *hits)
 {
-    const drape_status status = drape_sim_guard(sim, function);
-    if (status)
-        return status;
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
     if (count < 0 || (count > 0 && (!points || !hits)))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: %d points, but no array of them or of hits",
                           function, (int)count);

@@ -16,6 +16,7 @@
 #include "base/reason.h"
 #include "sim/relaxed.h"
 #include "sim/sim.h"
+#include "sim/untangle.h"
 
 #include <math.h>
 
@@ -249,6 +250,8 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
         return guarded;
     sim->ctx->message[0] = 0;
     drape_status status = check_arguments(sim, frame_dt, budget);
+    if (!status)
+        status = drape_sim_untangle_start(sim);
     if (!status) {
         enter(sim);
         double owed = sim->realtime.debt + frame_dt, goal = drape_sim_state(sim)->t + owed;

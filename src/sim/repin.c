@@ -10,7 +10,7 @@ drape_status drape_sim_repin(drape_sim *sim, const uint8_t *pinned)
     const drape_model *base = drape_sim_base_model(sim);
     const bool as_compiled = memcmp(pinned, base->pinned, (size_t)base->node_count * sizeof *pinned) == 0;
     drape_sim *other = NULL;
-    drape_status status = drape_sim_create_like(sim, base, as_compiled ? NULL : pinned, &other);
+    drape_status status = drape_sim_create_like(sim, base, as_compiled ? NULL : pinned, sim->masses, &other);
     if (!status)
         status = drape_sim_continue(other, sim);
     if (!status)

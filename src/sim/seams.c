@@ -35,7 +35,7 @@ static void sum_forces(const drape_model_seam *seam, const double *g, drape_seam
 int32_t drape_sim_seam(drape_sim *sim, int32_t index, drape_seam_report *out)
 {
     const int32_t count = sim ? sim->model->seam_count : 0;
-    if (!out || index < 0 || index >= count || sim->notifying)
+    if (!out || index < 0 || index >= count)
         return count;
     const drape_model *m = sim->model;
     const drape_model_seam *seam = &m->seams[index];

@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "base/def.h"
 #include "compile/compile.h"
+#include "sim/untangle.h"
 
 #include <math.h>
 #include <string.h>
@@ -58,6 +59,8 @@ static drape_status create_states(drape_sim *sim)
     sim->query_scratch = drape_arena_take(sim->arena, n, sizeof *sim->query_scratch);
     sim->relaxed_logged =
         drape_arena_take(sim->arena, (size_t)sim->model->collider_count + 1, sizeof *sim->relaxed_logged);
+    sim->untangled_move =
+        drape_arena_take(sim->arena, (size_t)sim->model->cloth_count, sizeof *sim->untangled_move);
     sim->state_bytes = sizeof *sim + sim->arena->bytes;
     return drape_arena_status(sim->arena);
 }
@@ -171,35 +174,44 @@ static drape_status start_sim(drape_sim *sim, int threads)
     return DRAPE_OK;
 }
 
-/* Replaces the model by one with these pins. */
-static drape_status change_pins(drape_sim *sim, const uint8_t *pinned)
+/* A copy in the arena; NULL without one to copy. */
+static void *keep(drape_sim *sim, const void *from, size_t count, size_t size)
+{
+    void *copy = from ? drape_arena_take(sim->arena, count, size) : NULL;
+    if (copy)
+        memcpy(copy, from, count * size);
+    return copy;
+}
+
+/* Replaces the model by one with these pins and masses. */
+static drape_status change_nodes(drape_sim *sim, const uint8_t *pinned, const double *masses)
 {
     const size_t nodes = (size_t)sim->model->node_count;
-    const drape_status status = drape_compile_repinned(sim->ctx, sim->model, pinned, &sim->own_model);
+    const drape_status status = drape_compile_repinned(sim->ctx, sim->model, pinned, masses, &sim->own_model);
     if (status)
         return status;
     sim->model = sim->own_model;
-    sim->pinned = drape_arena_take(sim->arena, nodes, sizeof *sim->pinned);
-    if (!sim->pinned)
-        return DRAPE_E_MEMORY;
-    memcpy(sim->pinned, pinned, nodes);
-    return DRAPE_OK;
+    sim->pinned = keep(sim, pinned, nodes, sizeof *pinned);
+    sim->masses = keep(sim, masses, nodes, sizeof *masses);
+    return drape_arena_status(sim->arena);
 }
 
 drape_status drape_sim_create_like(const drape_sim *like, const drape_model *model, const uint8_t *pinned,
-                                   drape_sim **out)
+                                   const double *masses, drape_sim **out)
 {
     const drape_sim_def def = {.frame_rate = like->frame_rate,
                                .realtime_step = like->realtime.longest_asked,
                                .teleport_speed = like->teleport_speed};
     drape_status status = open_sim(like->ctx, model, &def, out);
-    if (!status && pinned)
-        status = change_pins(*out, pinned);
+    if (!status && (pinned || masses))
+        status = change_nodes(*out, pinned, masses);
     if (!status) {
         (*out)->chosen = like->chosen;
         status = start_sim(*out, drape_pool_threads(drape_system_pool(like->system)));
         if (!status)
             status = drape_events_copy(*out, like);
+        if (!status)
+            drape_sim_copy_untangling(*out, like);
     }
     if (status)
         drape_sim_destroy(out);
@@ -229,6 +241,7 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
         drape_sim_destroy(out);
         return status;
     }
+    (*out)->untangle_due = model->untangle.given;
     drape_sim_reset_energy(*out);
     (*out)->statistics.wall_setup = drape_clock_seconds() - start;
     return DRAPE_OK;

@@ -58,9 +58,10 @@ struct drape_sim {
     size_t state_bytes, integrator_bytes; /* in the arena, after create */
     const drape_model *model;
     drape_model
-        *own_model;     /* the model, if other nodes are pinned than in the one that was compiled; NULL: it
-                               is that one */
+        *own_model;     /* the model, if other nodes are pinned than in the one that was compiled, or nodes
+                               have other masses; NULL: it is that one */
     uint8_t *pinned;    /* (node_count) the nodes that own_model pins; NULL: those of the compiled model */
+    double *masses;     /* (node_count) [kg] of own_model; NULL: those of the compiled model */
     drape_work earlier; /* done by the integrators that went before, each until the model changed */
     drape_chosen chosen;
     drape_system *system;
@@ -94,6 +95,10 @@ struct drape_sim {
     int reason_count;
     drape_audit audit;
     drape_realtime_memory realtime;
+    bool untangle_due;           /* the scene asks for it, and the first step was not made yet */
+    bool untangled;              /* `untangling` is known */
+    drape_untangling untangling; /* the last one; its seconds are those of this machine */
+    double *untangled_move;      /* (cloth_count) [m] the longest way of a node in it */
     drape_event_set events;
     drape_energy energy, attempted;     /* of the present state; of the last attempted one */
     bool energy_known, attempted_known; /* whether these two are valid */
@@ -115,10 +120,10 @@ struct drape_sim {
 drape_status drape_sim_guard(drape_sim *sim, const char *function);
 
 /* Creates a new sim of a compiled model with the same choices, at the beginning and without an energy
- * account, which the caller copies or reads. pinned (node_count): the nodes that are pinned; NULL: those of
- * the model. */
+ * account, which the caller copies or reads. pinned (node_count): the nodes that are pinned; masses
+ * (node_count) [kg]; NULL: those of the model. */
 drape_status drape_sim_create_like(const drape_sim *like, const drape_model *model, const uint8_t *pinned,
-                                   drape_sim **out);
+                                   const double *masses, drape_sim **out);
 
 /* Takes to a new sim all that goes on from one of the same cloth, whose model may have other pins, terms and
  * colliders. Errors: DRAPE_E_MEMORY, DRAPE_E_ARGUMENT (a pin is to be elsewhere); then `to` is only fit to be

@@ -9,6 +9,7 @@
 #include "sim/dense.h"
 #include "sim/hold.h"
 #include "sim/relaxed.h"
+#include "sim/untangle.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -523,8 +524,10 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
     sim->ctx->message[0] = 0; /* so that after a failure the message belongs to this advance */
     if (!isfinite(t_end))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");
-    drape_status status =
-        drape_sim_emit_frames(sim); /* the first frame, and those left over when an observer stopped the
+    drape_status status = drape_sim_untangle_start(sim);
+    if (!status)
+        status =
+            drape_sim_emit_frames(sim); /* the first frame, and those left over when an observer stopped the
                                        run */
     if (!status)
         status = drape_events_resume(sim);

@@ -6,6 +6,7 @@
  */
 #include "base/rotation.h"
 #include "base/vec3.h"
+#include "sim/attach.h"
 #include "sim/place.h"
 #include "sparse/project.h"
 
@@ -188,6 +189,58 @@ drape_status drape_sim_teleport_pins(drape_sim *sim, int32_t count, const int32_
 
 /* ---- Colliders ---- */
 
+/* How many pins of a cloth a collider carries, and how many pins it has. */
+static int32_t count_carried(const drape_sim *sim, int32_t collider, const drape_cloth *cloth, int32_t *total)
+{
+    int32_t carried = 0;
+    *total = 0;
+    for (int32_t i = 0; i < cloth->mesh.node_count; i++) {
+        const int32_t node = cloth->first_node + i;
+        if (!sim->model->pinned[node])
+            continue;
+        *total += 1;
+        carried += drape_sim_carrier(sim, node) == collider;
+    }
+    return carried;
+}
+
+/* Cloth that rides on a collider goes with it: as the collider does or, if it has other pins, too, by the
+ * rigid motion that fits all of them best. A collider that was moved by hand takes each to the place that its
+ * pins have then, so it does not matter in which order several of them are sent. */
+static void carry(drape_sim *sim, int32_t collider, const drape_placement *by)
+{
+    const drape_model *m = sim->model;
+    const drape_place_list none = {NULL, 0};
+    for (int32_t c = 0; c < m->cloth_count; c++) {
+        int32_t count;
+        const int32_t carried = count_carried(sim, collider, &m->cloths[c], &count);
+        drape_placement fitted = *by;
+        if (carried == 0)
+            continue;
+        if (carried < count) {
+            const pins p = {.model = m,
+                            .cloth = &m->cloths[c],
+                            .from = drape_sim_state(sim)->x,
+                            .to = targets(sim, 0, NULL, 0, NULL)};
+            fitted = fit(&p);
+        }
+        (void)drape_sim_place_parts(sim, &(drape_place_list){&c, 1}, &none, &fitted, false);
+    }
+}
+
+/* Whether all that a collider carries can be placed with it. */
+static drape_status check_carried(const drape_sim *sim, int32_t collider, const drape_placement *by)
+{
+    const drape_place_list one = {&collider, 1};
+    drape_status status = DRAPE_OK;
+    for (int32_t c = 0; !status && c < sim->model->cloth_count; c++) {
+        int32_t count;
+        if (count_carried(sim, collider, &sim->model->cloths[c], &count) > 0)
+            status = drape_sim_check_place(sim, &(drape_place_list){&c, 1}, &one, by);
+    }
+    return status;
+}
+
 drape_status drape_sim_teleport_collider(drape_sim *sim, int32_t collider, double seconds,
                                          const drape_sent *to)
 {
@@ -220,8 +273,12 @@ drape_status drape_sim_teleport_collider(drape_sim *sim, int32_t collider, doubl
     } else {
         vec3_sub(after, before, by.shift);
     }
-    const drape_status status = drape_sim_place_parts(sim, &(drape_place_list){NULL, 0},
-                                                      &(drape_place_list){&collider, 1}, &by, false);
+    drape_status status = check_carried(sim, collider, &by);
+    if (!status)
+        status = drape_sim_place_parts(sim, &(drape_place_list){NULL, 0}, &(drape_place_list){&collider, 1},
+                                       &by, false);
+    if (!status)
+        carry(sim, collider, &by);
     if (!status)
         drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g: %s is sent faster than %.4g m/s: it is placed there", t,
                   sim->model->colliders[collider].name, sim->teleport_speed);

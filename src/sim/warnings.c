@@ -37,8 +37,8 @@ static bool has_no_terms(drape_sim *sim, char *text, size_t size)
     if (bare == 0)
         return false;
     snprintf(text, size,
-             "/cloth/%d: %s has no \"terms\": nothing resists stretching or bending%s; `drape list terms` "
-             "shows them",
+             "/cloth/%d: %s has no \"terms\": nothing resists stretching or bending%s; stretch.cst and "
+             "bend.hinge do",
              first, m->cloths[first].name, bare > 1 ? ", as with other cloths of this scene" : "");
     return true;
 }
@@ -143,9 +143,10 @@ static bool describe_inside(drape_sim *sim, const double *x, bool start, char *t
     return false;
 }
 
+/* The report of an untangled start says what was inside. */
 static bool starts_inside(drape_sim *sim, char *text, size_t size)
 {
-    return describe_inside(sim, sim->model->rest, true, text, size);
+    return !sim->model->untangle.given && describe_inside(sim, sim->model->rest, true, text, size);
 }
 
 static bool ends_inside(drape_sim *sim, char *text, size_t size)
@@ -255,6 +256,21 @@ static bool is_inaccurate(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
+/* A run that goes on although its start did not come apart. */
+static bool is_tangled(drape_sim *sim, char *text, size_t size)
+{
+    const drape_untangling *u = &sim->untangling;
+    if (!sim->untangled || u->clear)
+        return false;
+    snprintf(text, size,
+             "the cloth did not come apart at t=%.9g in %d sweeps: %lld of %lld pairs of an edge and a triangle "
+             "still pass through each other, %d of %d triangles reach into colliders, and the smallest gap is "
+             "%.3g of the least that contact allows",
+             u->time, u->sweeps, (long long)u->pairs, (long long)u->pairs_before, (int)u->inside,
+             (int)u->inside_before, u->least_gap);
+    return true;
+}
+
 /* The last resort of advances with a time budget. */
 static bool was_held(drape_sim *sim, char *text, size_t size)
 {
@@ -306,6 +322,7 @@ static const struct {
               {"large_mesh", has_large_file},
               {"starts_inside", starts_inside},
               {"ends_inside", ends_inside},
+              {"tangled", is_tangled},
               {"no_room", had_no_room},
               {"numerical_dissipation", dissipates_most},
               {"slow_contact", is_contact_slow},

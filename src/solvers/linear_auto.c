@@ -102,8 +102,7 @@ static void report(const void *state, drape_linear_report *out)
 
 const drape_linear_ops drape_linear_auto = {
     .entry = {.name = "auto",
-              .summary =
-                  "the fastest direct solver of this build for the number of unknowns; drape info says which",
+              .summary = "the fastest direct solver of this build for the number of unknowns",
               .reference = "bench/linears"},
     .create = create,
     .use_threads = use_threads,

@@ -344,6 +344,7 @@ START_TEST(every_older_def_is_read)
                                     offsetof(drape_scene_def, self_contact),
                                     offsetof(drape_scene_def, contact),
                                     offsetof(drape_scene_def, up),
+                                    offsetof(drape_scene_def, untangle),
                                     sizeof(drape_scene_def)},
                         pins[] = {offsetof(drape_pin_def, clamp), sizeof(drape_pin_def)},
                         cloths[] = {sizeof(drape_cloth_def) - sizeof(double[3]), sizeof(drape_cloth_def)};

@@ -23,7 +23,7 @@ static const char base[] =
     " 'seams': [{'type': 'stitch', 'a': {'cloth': 'sewn', 'nodes': [0, 1]},"
     "            'b': {'cloth': 'sewn', 'nodes': [2, 3]}}],"
     " 'colliders': [{'name': 'ball', 'type': 'sphere', 'center': [0,0,-1], 'radius': 0.1}],"
-    " 'self_contact': {'thickness': 0.001}, 'duration': 1}";
+    " 'self_contact': {'thickness': 0.001}, 'untangle': {}, 'duration': 1}";
 
 typedef enum outcome {
     REFUSED, /* the value affects results: the checkpoint must be refused */
@@ -68,6 +68,13 @@ static const struct test_case {
     {"/cloth/0/pins/0/row", REFUSED, "/cloth/0/pins/0", "{'row': 2}"},
     {"/cloth/0/pins/0/box", REFUSED, "/cloth/0/pins/0", "{'box': [[0,0,-1], [0.2,1,1]]}"},
     {"/cloth/0/pins/0/track", REFUSED, NULL, "[[0, [0,0,0]], [1, [0,0.2,0]]]"},
+    {"/cloth/0/masses/0/nodes", SKIPPED, NULL, NULL}, /* as for pins: the masses count */
+    {"/cloth/0/masses/0/corner", SKIPPED, NULL, NULL},
+    {"/cloth/0/masses/0/edge", SKIPPED, NULL, NULL},
+    {"/cloth/0/masses/0/row", SKIPPED, NULL, NULL},
+    {"/cloth/0/masses/0/box", SKIPPED, NULL, NULL},
+    {"/cloth/0/masses/0/add", REFUSED, "/cloth/0/masses", "[{'nodes': [8], 'add': 0.01}]"},
+    {"/cloth/0/masses/0/mass", REFUSED, "/cloth/0/masses", "[{'edge': 'bottom', 'mass': 0.01}]"},
     {"/colliders/0/type", REFUSED, "/colliders/0", "{'type': 'plane', 'point': [0,0,-1], 'normal': [0,0,1]}"},
     {"/colliders/0/track", REFUSED, NULL, "[[0, [0,0,0]], [1, [0,0.1,0]]]"},
     {"/colliders/0/turns/0/time", REFUSED, "/colliders/0/turns",
@@ -248,6 +255,7 @@ START_TEST(every_key_that_affects_results_is_in_the_identity)
     try_settings(&t, &drape_material_registry, "/cloth/0/material");
     try_settings(&t, &drape_contact_registry, "/contact");
     try_settings(&t, &drape_self_contact_registry, "/self_contact");
+    try_settings(&t, &drape_untangle_registry, "/untangle");
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         ck_assert_msg(t.used[i], "%s is in `cases` and not a key", cases[i].key);
     printf("# %d changes\n", t.count);

@@ -27,7 +27,7 @@ static const struct {
               {&drape_integrator_registry, 2, false, true},   {&drape_controller_registry, 2, false, true},
               {&drape_field_registry, 2, false, false},       {&drape_exporter_registry, 3, false, true},
               {&drape_material_registry, 1, false, false},    {&drape_contact_registry, 1, false, false},
-              {&drape_self_contact_registry, 1, false, false}};
+              {&drape_self_contact_registry, 1, false, false}, {&drape_untangle_registry, 1, false, false}};
 #define TABLES (sizeof tables / sizeof *tables)
 
 START_TEST(entries_are_well_formed)

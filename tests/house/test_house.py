@@ -123,6 +123,18 @@ def library_is_silent(files):
     return complaints
 
 
+def messages_are_of_the_library(files):
+    """What the library says names no option or verb of the program, which a host does not have; the program adds them."""
+    complaints = []
+    for path, text in sources(files, "src").items():
+        if path.startswith(DRAWS_OR_PRINTS):
+            continue
+        for match in re.finditer(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', text, flags=re.S):
+            if match.group().startswith('"') and re.search(r"(?<![\w-])--[a-z]|\bdrape [a-z]+ |\bdrape (?:run|list|info|check|help)\b|command line", match.group()):
+                complaints.append(f"{path}:{line_of(text, match.start())}: {match.group()[:60]}: of the program, not of the library")
+    return complaints
+
+
 # Functions of the C library that IEEE 754 does not define: each library has its own bits, and some choose by the processor. `pow` and `log` of a
 # struct are no calls of them.
 OF_THE_LIBRARY = re.compile(r"(?<![\w.>])(?:sin|cos|sincos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|asinh|acosh|atanh|exp|exp2|exp10|expm1|log|log2"
@@ -208,6 +220,7 @@ BROKEN = {
         {"src/mesh/a.c": "", "src/mesh/meson.build": "sources = ['b.c']\n"},
         {"tests/unit/test_a.c": "", "tests/meson.build": "'b'\n"}],
     library_is_silent: [{"src/io/a.c": 'printf("x");\n'}, {"src/io/a.c": "fputs(x, stderr);\n"}, {"src/io/a.c": "abort ();\n"}],
+    messages_are_of_the_library: [{"src/sim/a.c": 'fail("choose --dt");\n'}, {"src/base/a.c": 'x = "see `drape list terms`";\n'}],
     states_are_reproducible: [
         {"src/sim/a.c": "x = sin(y);\n"}, {"src/base/a.h": "return -pow (x, 2);\n"}, {"src/terms/a.c": "logf(x)\n"}, {"src/mesh/a.c": "2*atan2(y, x)\n"}],
     one_place_for_cpp: [{"src/io/a.h": "#ifdef __cplusplus\n"}, {"include/drape/drape.h": "visibility\n"}],
@@ -222,7 +235,8 @@ SOUND = {
     **MAP, "CONTRIBUTING.md": "\n### Words\n| `gizmo` | device |\n", "docs/a.md": "agizmo is gizmotic\n",
     "src/sim/b.c": '#include "base/a.h"\n#include "sim/a.h"\n#include "drape/drape.h"\n/* printf(x) */ snprintf(x, "exit(1)");\n',
     "src/sim/c.c": "drape_sin_cos(x); log_of(x); a->log(x); b.pow(x); sqrt(x); /* sin(x) */ fmod(x, y);\n",
-    "src/sim/meson.build": "sources = ['b.c', 'c.c']\nentries += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1); sin(x);\n",
+    "src/sim/meson.build": "sources = ['b.c', 'c.c', 'd.c']\nentries += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1); sin(x); say(\"--dt\");\n",
+    "src/sim/d.c": '/* drape list shows "--dt" */ i--; fail("drape_sim_advance: dt --");\n',
     "src/cli/meson.build": "'main.c'\n", "src/README.md": "cli -> sim\nsim -> mesh\nmesh -> base\n", "include/drape/drape.h": '#include "export.h"\n',
     "include/drape/export.h": "__cplusplus visibility\n", "tests/unit/test_a.c": "", "tests/meson.build": "'a'\n"}
 

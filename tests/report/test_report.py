@@ -190,7 +190,7 @@ def test_refused():
         refused("report", "bad", says=says)
         assert not any(name.startswith("report") for name in os.listdir("bad")), os.listdir("bad")
     os.remove("bad/positions.npy")
-    refused("report", "bad", says="writes it with --format npy")
+    refused("report", "bad", says="writes it with the frame format npy")
     shutil.rmtree("bad")
     shutil.copytree("out", "bad")
     with open("bad/positions.npy", "rb+") as file:

@@ -1,0 +1,72 @@
+/* masses.c: nodes with masses of their own, beside or in place of what the material gives them. */
+#include "compile/select.h"
+#include "compile/stages.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* One item of "masses". */
+typedef struct mass_item {
+    const drape_mass_def *def;
+    double *mass;   /* (node_count) [kg] so far */
+    uint8_t *taken; /* (node_count) 1: the item has changed this node: one that is listed twice counts once */
+} mass_item;
+
+static drape_status take_node(void *user, const char *key, int32_t local)
+{
+    const mass_item *item = user;
+    (void)key;
+    if (!item->taken[local])
+        item->mass[local] = isnan(item->def->add) ? item->def->mass : item->mass[local] + item->def->add;
+    item->taken[local] = 1;
+    return DRAPE_OK;
+}
+
+static drape_status apply(drape_model *model, const char *pointer, const drape_mesh *mesh, mass_item *item)
+{
+    const drape_mass_def *def = item->def;
+    const drape_selection selection = {.ctx = model->ctx,
+                                       .pointer = pointer,
+                                       .form = &drape_form_mass,
+                                       .mesh = mesh,
+                                       .nodes = def->nodes,
+                                       .node_count = def->node_count,
+                                       .corner = def->corner,
+                                       .edge = def->edge,
+                                       .row = def->row,
+                                       .has_box = def->has_box,
+                                       .box_min = def->box_min,
+                                       .box_max = def->box_max,
+                                       .take = take_node,
+                                       .user = item};
+    if (isnan(def->add) == isnan(def->mass))
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
+                             "exactly one of add, mass is needed; given: %s",
+                             isnan(def->add) ? "none" : "both");
+    memset(item->taken, 0, (size_t)mesh->node_count);
+    return drape_select_nodes(&selection);
+}
+
+drape_status drape_compile_masses(drape_model *model, const char *pointer, const drape_cloth_def *def,
+                                  drape_cloth *cloth)
+{
+    const size_t count = (size_t)cloth->mesh.node_count;
+    drape_status status = DRAPE_OK;
+    if (def->mass_count == 0)
+        return DRAPE_OK;
+    cloth->node_mass = drape_arena_take(&model->arena, count, sizeof *cloth->node_mass);
+    mass_item item = {.mass = cloth->node_mass, .taken = drape_alloc(model->ctx, count, 1)};
+    if (!item.mass || !item.taken)
+        status = DRAPE_E_MEMORY;
+    else
+        memcpy(item.mass, cloth->material_mass, count * sizeof *item.mass);
+    for (size_t i = 0; !status && i < def->mass_count; i++) {
+        char at[128];
+        snprintf(at, sizeof at, "%s/masses/%zu", pointer, i);
+        item.def = &def->masses[i];
+        status = apply(model, at, &cloth->mesh, &item);
+    }
+    drape_free(model->ctx, item.taken);
+    return status;
+}

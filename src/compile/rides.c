@@ -1,0 +1,104 @@
+/* rides.c: pins that colliders carry: the point of its collider at which each begins. */
+#include "colliders/deformed.h"
+#include "compile/stages.h"
+#include "model/ride.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static bool any_rides(const drape_scene_def *def)
+{
+    for (size_t c = 0; c < def->cloth_count; c++)
+        for (size_t p = 0; p < def->cloths[c].pin_count; p++)
+            if (def->cloths[c].pins[p].attach || def->cloths[c].pins[p].triangle >= 0)
+                return true;
+    return false;
+}
+
+/* The number of the collider that the pin names. */
+static drape_status find_carrier(const drape_model *model, const char *pointer, const drape_pin_def *def,
+                                 int32_t *collider)
+{
+    char at[128];
+    if (!def->attach) {
+        snprintf(at, sizeof at, "%s/triangle", pointer);
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
+                             "a triangle is one of a collider, which \"attach\" names; there is no attach");
+    }
+    for (int32_t c = 0; c < model->collider_count; c++)
+        if (strcmp(model->colliders[c].name, def->attach) == 0) {
+            *collider = c;
+            return DRAPE_OK;
+        }
+    snprintf(at, sizeof at, "%s/attach", pointer);
+    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "there is no collider \"%.60s\"", def->attach);
+}
+
+static drape_status check_triangle(const drape_model *model, const char *pointer, int32_t triangle,
+                                   const drape_collider *collider)
+{
+    char at[128];
+    const bool deforms = collider->frames.frame_count > 0;
+    if (triangle < 0 || (deforms && triangle < collider->shape.triangle_count))
+        return DRAPE_OK;
+    snprintf(at, sizeof at, "%s/triangle", pointer);
+    if (!deforms)
+        return drape_fail_at(
+            model->ctx, DRAPE_E_ARGUMENT, at,
+            "%d is not allowed: \"%.60s\" is a %s, which is rigid and carries pins as a whole", (int)triangle,
+            collider->name, collider->ops->entry.name);
+    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
+                         "there is no triangle %d; \"%.60s\" has the triangles 0 to %d", (int)triangle,
+                         collider->name, (int)collider->shape.triangle_count - 1);
+}
+
+/* The nodes of a pin begin where they are at rest. */
+static void attach(drape_model *model, const drape_motion *motion, const drape_pin *pin, int32_t collider,
+                   int32_t triangle)
+{
+    for (int32_t i = 0; i < pin->node_count; i++) {
+        const double *x = model->rest + 3 * (size_t)pin->node[i];
+        const int32_t on = triangle >= 0 ? triangle : drape_deformed_nearest(motion, collider, 0, x);
+        drape_motion_ride_from(motion, collider, on, 0, x, &model->ride[pin->node[i]]);
+    }
+}
+
+static drape_status attach_all(drape_model *model, const drape_scene_def *def, const drape_motion *motion)
+{
+    const drape_pin *pin = model->pins;
+    drape_status status = DRAPE_OK;
+    for (size_t c = 0; c < def->cloth_count; c++)
+        for (size_t p = 0; !status && p < def->cloths[c].pin_count; p++, pin++) {
+            const drape_pin_def *from = &def->cloths[c].pins[p];
+            int32_t collider = -1;
+            char pointer[64];
+            if (!from->attach && from->triangle < 0)
+                continue;
+            snprintf(pointer, sizeof pointer, "/cloth/%zu/pins/%zu", c, p);
+            status = find_carrier(model, pointer, from, &collider);
+            if (!status)
+                status = check_triangle(model, pointer, from->triangle, &model->colliders[collider]);
+            if (!status)
+                attach(model, motion, pin, collider, from->triangle);
+        }
+    return status;
+}
+
+drape_status drape_compile_rides(drape_model *model, const drape_scene_def *def)
+{
+    drape_motion *motion = NULL;
+    if (!any_rides(def))
+        return DRAPE_OK;
+    drape_ride *ride = drape_arena_take(&model->arena, (size_t)model->node_count, sizeof *ride);
+    if (!ride)
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < model->node_count; i++)
+        ride[i] = drape_ride_none();
+    drape_arena scratch = drape_arena_of(model->ctx);
+    drape_status status = drape_motion_create(&scratch, model, &motion); /* of the colliders */
+    model->ride = ride;
+    if (!status)
+        status = attach_all(model, def, motion);
+    drape_arena_free(&scratch);
+    return status;
+}

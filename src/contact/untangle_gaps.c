@@ -1,0 +1,157 @@
+/*
+ * untangle_gaps.c: the pairs that are near each other, as contact has them. Each keeps its side, and gets the
+ * gap that is wanted, unless one of its pieces is to pass the other one's sheet.
+ */
+#include "contact/untangle_parts.h"
+
+#include "base/vec3.h"
+#include "contact/list.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define REACH 1.2 /* strides beyond the wanted gap within which pairs are kept apart */
+
+/* ---- Passages ---- */
+
+static int compare_passages(const void *a, const void *b)
+{
+    const drape_passage *p = a, *q = b;
+    return p->point != q->point ? (p->point > q->point ? 1 : -1) : (p->sheet > q->sheet) - (p->sheet < q->sheet);
+}
+
+void drape_untangle_add_passage(drape_untangler *u, int32_t point, int32_t sheet)
+{
+    drape_passage *list =
+        drape_list_grow(u->arena, u->passage, u->passage_count, &u->passage_room, sizeof *list);
+    u->out_of_memory = u->out_of_memory || !list;
+    if (!list)
+        return;
+    u->passage = list;
+    u->passage[u->passage_count++] = (drape_passage){point, sheet};
+    u->passes[point] = true;
+}
+
+void drape_untangle_sort_passages(drape_untangler *u)
+{
+    if (u->passage_count > 0)
+        qsort(u->passage, (size_t)u->passage_count, sizeof *u->passage, compare_passages);
+}
+
+bool drape_untangle_passes(const drape_untangler *u, int32_t point, int32_t sheet)
+{
+    const drape_passage key = {point, sheet};
+    return u->passes[point] &&
+           bsearch(&key, u->passage, (size_t)u->passage_count, sizeof key, compare_passages);
+}
+
+/* ---- Pairs ---- */
+
+typedef struct gathering {
+    drape_untangler *u;
+    drape_configuration rest;
+    double reach;
+} gathering;
+
+/* Whether some node of one piece passes the sheet of the other. */
+static bool is_passing(const drape_untangler *u, const drape_pair *pair)
+{
+    const int split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    const int32_t sheet[2] = {u->sheets.of_point[pair->node[0]], u->sheets.of_point[pair->node[3]]};
+    for (int a = 0; a < 4; a++)
+        if (drape_untangle_passes(u, pair->node[a], sheet[a < split]))
+            return true;
+    return false;
+}
+
+/* What is in a closed collider has no side that its features could keep it on. */
+static bool is_sunk(const drape_untangler *u, const drape_pair *pair)
+{
+    for (int a = 0; pair->collider >= 0 && !u->open[pair->collider] && a < 4; a++)
+        if (pair->node[a] < u->model->node_count && u->sunk[pair->node[a]])
+            return true;
+    return false;
+}
+
+static void normal_at(const drape_untangler *u, int32_t node, double n[3])
+{
+    const drape_sheets *s = &u->sheets;
+    memset(n, 0, 3 * sizeof *n);
+    for (int32_t a = s->first[node]; a < s->first[node + 1]; a++)
+        for (int k = 0; k < 2; k++) {
+            const int32_t face = s->edge_triangle[2 * (size_t)s->around[a] + (size_t)k];
+            double v[3], w[3], own[3];
+            if (face < 0)
+                continue;
+            const int32_t *t = s->triangle + 3 * (size_t)face;
+            vec3_sub(u->x + 3 * (size_t)t[1], u->x + 3 * (size_t)t[0], v);
+            vec3_sub(u->x + 3 * (size_t)t[2], u->x + 3 * (size_t)t[0], w);
+            vec3_cross(v, w, own);
+            vec3_add_scaled(1, own, n);
+        }
+}
+
+/* Pieces at distance 0, such as layers that begin in one plane: the sheet that comes later goes to where the
+ * normal of the earlier one points. */
+static void choose_normal(const drape_untangler *u, const drape_pair *pair, double n[3])
+{
+    const int split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    const bool first = pair->node[0] < pair->node[3];
+    memset(n, 0, 3 * sizeof *n);
+    for (int a = first ? 0 : split; a < (first ? split : 4); a++) {
+        double own[3];
+        normal_at(u, pair->node[a], own);
+        vec3_add_scaled(first ? -1 : 1, own, n);
+    }
+    const double length = vec3_norm(n);
+    for (int k = 0; k < 3; k++)
+        n[k] = length > 0 ? n[k] / length : k == 1;
+}
+
+static void bound_pair(drape_untangler *u, const drape_pair *pair, const drape_closest *closest, double wanted)
+{
+    drape_half_space bound = {.bound = wanted + pair->radius};
+    memcpy(bound.node, pair->node, sizeof bound.node);
+    memcpy(bound.c, closest->c, sizeof bound.c);
+    memcpy(bound.normal, closest->normal, sizeof bound.normal);
+    drape_untangle_bound(u, &bound);
+}
+
+static void consider(void *user, const drape_pair *found)
+{
+    gathering *g = user;
+    drape_untangler *u = g->u;
+    drape_pair pair = *found;
+    double x[4][3];
+    drape_closest closest;
+    pair.distance = drape_pair_activation_distance(found, &g->rest);
+    if (is_passing(u, &pair) || is_sunk(u, &pair))
+        return;
+    for (int a = 0; a < 4; a++)
+        memcpy(x[a], u->x + 3 * (size_t)pair.node[a], sizeof x[a]);
+    if (pair.kind == DRAPE_PAIR_TRIANGLE)
+        drape_closest_point_triangle(x, &closest);
+    else
+        drape_closest_segments(x, &closest);
+    const double gap = closest.distance - pair.radius, wanted = drape_untangle_wanted(u, pair.distance),
+                 least = drape_pair_least_gap(&pair, u->broad.rounding);
+    if (gap >= wanted + g->reach)
+        return;
+    if (least > 0)
+        u->least_share = fmin(u->least_share, gap / least);
+    if (wanted > 0)
+        u->least_wanted = fmin(u->least_wanted, gap / wanted);
+    if (closest.distance < DRAPE_NO_SIDE * u->broad.rounding)
+        choose_normal(u, &pair, closest.normal);
+    bound_pair(u, &pair, &closest, wanted);
+}
+
+drape_status drape_untangle_gaps(drape_untangler *u)
+{
+    gathering g = {.u = u,
+                   .rest = {.model = u->model, .x = u->broad.rest, .pose = u->pose},
+                   .reach = REACH * drape_untangle_stride(u)};
+    const drape_broad_query want = {.x = u->x, .reach = g.reach};
+    drape_broad_phase_pairs(&u->broad, &want, consider, &g);
+    return u->out_of_memory ? DRAPE_E_MEMORY : DRAPE_OK;
+}
