@@ -351,7 +351,7 @@ drape_status drape_gltf_scene_read(const drape_gltf *gltf, drape_arena *arena, d
 
 /* ---- A pose ---- */
 
-/* The shorter way between two rotations, at constant speed (Shoemake 1985). */
+/* The rotation between two others by the smaller angle, at constant speed (Shoemake 1985). */
 static void interpolate_rotation(const double *a, const double *b, double s, double *out)
 {
     double sine[3], cosine, dot = 0, size[2] = {0};

@@ -1,6 +1,6 @@
 /*
- * gltf_scene.h: the nodes of a glTF file, a tree of transforms, and its first animation, which moves them: where
- * they are at a time. glTF 2.0 specification, sections 3.5, 3.7.3 and 3.11 and appendix C.
+ * gltf_scene.h: the nodes of a glTF file, a tree of transforms, and its first animation, which moves them:
+ * where they are at a time. glTF 2.0 specification, sections 3.5, 3.7.3 and 3.11 and appendix C.
  */
 #ifndef DRAPE_MESH_GLTF_SCENE_H
 #define DRAPE_MESH_GLTF_SCENE_H

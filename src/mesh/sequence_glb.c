@@ -1,8 +1,8 @@
 /*
- * sequence_glb.c: the animation of a GLB file, glTF 2.0: all triangles that its scene shows, moved by nodes, skins
- * (linear blend skinning) and morph targets, sampled at the rate of the sequence. Exporters split a point where its
- * normal or texture has a seam: points that coincide in all frames become one, and points without triangles are left
- * out, so that a surface is as closed as it looks.
+ * sequence_glb.c: the animation of a GLB file, glTF 2.0: all triangles that its scene shows, moved by
+ * nodes, skins (linear blend skinning) and morph targets, sampled at the rate of the sequence. Exporters
+ * split a point where its normal or texture has a seam: points that coincide in all frames become one, and
+ * points without triangles are left out, so that a surface is as closed as it looks.
  */
 #include "mesh/contents.h"
 #include "mesh/gltf_scene.h"
@@ -359,7 +359,7 @@ static bool are_same(const track *a, const track *b)
     return compare_tracks(a, &c) == 0;
 }
 
-/* Sets to[i] to the first point that goes the same way as i. */
+/* Sets to[i] to the first point that moves as i does. */
 static drape_status find_same(drape_arena *arena, const drape_mesh *mesh, const drape_sequence *frames,
                               int32_t *to)
 {

@@ -90,8 +90,8 @@ static json_t *parameters(const drape_collider *collider)
     return object;
 }
 
-/* The triangles of a collider, if it has some; the page draws other types by their parameters. The points of one
- * that deforms are in a block of their own. */
+/* The triangles of a collider, if it has some; the page draws other types by their parameters. The points
+ * of one that deforms are in a block of their own. */
 static json_t *shape(const drape_collider_shape *shape, const drape_report_body *body)
 {
     json_t *corners = json_array();

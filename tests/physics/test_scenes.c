@@ -33,7 +33,7 @@ static const beginning beginnings[] = {
     {"crumple", 0.4, {{COLUMNS, "11"}, {ROWS, "11"}}, .touches = true},
     {"cs184_pinned2", 0.2, {{NULL}}, .explicit = true},
     {"dress",
-     0.25,
+     0.35,
      {{COLUMNS, "10"},
       {ROWS, "10"},
       {"/cloth/1/mesh/columns", "10"},

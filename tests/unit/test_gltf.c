@@ -1,5 +1,6 @@
-/* test_gltf.c: the animation of a GLB file: nodes, skins and morph targets move its points as the formulas of the
- * specification say; each fault has a message that names the part; whatever the bytes are, reading ends. */
+/* test_gltf.c: the animation of a GLB file: nodes, skins and morph targets move its points as the formulas
+ * of the specification say; each fault has a message that names the part; whatever the bytes are, reading
+ * ends. */
 #include "mesh/sequence.h"
 #include "support/frames.h"
 
@@ -64,8 +65,8 @@ static void write_glb(const frames_folder *f, const glb *g)
     write_bytes(f, bytes, size);
 }
 
-/* A square of two triangles of their own points, twice as large; its node rises, that above turns. Node 2 is not in
- * the scene. */
+/* A square of two triangles of their own points, twice as large; its node rises, that above turns. Node 2
+ * is not in the scene. */
 static glb make_square(void)
 {
     static const double x[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0, 1, 1, 0, 0, 1, 0}, time[] = {1, 3},
@@ -93,7 +94,8 @@ static glb make_square(void)
     return g;
 }
 
-/* A square on two joints, the second at x = 1, which turns about y after 1 s; the last point has a morph target. */
+/* A square on two joints, the second at x = 1, which turns about y after 1 s; the last point has a morph
+ * target. */
 static glb make_skin(void)
 {
     static const double x[] = {0, 0, 0, 2, 0, 0, 2, 1, 0, 0, 1, 0},
@@ -185,8 +187,9 @@ static void assert_point(const reading *r, int frame, int node, double x, double
     ck_assert_double_eq_tol(at[2], z, 1e-14);
 }
 
-/* Points are 2 x, raised by t - 1, and turned about z by -90 degrees (t - 1)/2: the quaternion of the second key
- * has another sign and length, and between them the way is the shorter one. The six points of the file are four. */
+/* Points are 2 x, raised by t - 1, and turned about z by -90 degrees (t - 1)/2: the quaternion of the
+ * second key has another sign and length, and between them the smaller angle counts. The six points of the
+ * file are four. */
 START_TEST(nodes_move)
 {
     const frames_folder f = frames_folder_make();
@@ -220,7 +223,8 @@ START_TEST(nodes_move)
 }
 END_TEST
 
-/* The node of a skinned mesh does not move it. At half of the spline the weight is 1/2 + 1/8 of the tangent. */
+/* The node of a skinned mesh does not move it. At half of the spline the weight is 1/2 + 1/8 of the
+ * tangent. */
 START_TEST(skins_and_morph_targets_move)
 {
     const frames_folder f = frames_folder_make();
@@ -325,8 +329,8 @@ START_TEST(faults_name_the_part)
 }
 END_TEST
 
-/* Whatever a byte is, and wherever the file ends, reading ends with a status; under the sanitizers nothing is read
- * outside of it. */
+/* Whatever a byte is, and wherever the file ends, reading ends with a status; under the sanitizers nothing
+ * is read outside of it. */
 START_TEST(hostile_bytes_are_read_or_refused)
 {
     const frames_folder f = frames_folder_make();
