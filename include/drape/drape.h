@@ -271,7 +271,7 @@ typedef struct drape_event_def {
     size_t struct_size;    /* set by drape_event_def_init */
     drape_entry_def entry; /* the event: "height", "plane", "energy" or "pin_force"; for a function of the
                               host, drape_sim_add_event, its type is NULL */
-    const char *name;      /* NULL: "event0", "event1" ... */
+    const char *name;      /* NULL: "event0", "event1" ...; it has no ";", "@" or control characters */
     const char *cloth;     /* name of the cloth that it is about; NULL: all of them */
     const char *pins;      /* name of the pins that it measures or releases; NULL: all pins of the cloth */
     const char *direction; /* in which the quantity passes its bound: "up", "down" or "both"; NULL: "both" */

@@ -125,6 +125,16 @@ static drape_status resolve(const place *p, const drape_event_def *def, drape_mo
     return status || to->action != DRAPE_ACTION_RELEASE ? status : check_release(p, to);
 }
 
+/* In the column of events of steps.csv, "a@0.1;b@0.2", a name ends at "@" and an event at ";". */
+static drape_status check_name(const place *p, const char *name)
+{
+    bool good = true;
+    for (const char *c = name; c && *c; c++)
+        good = good && *c != ';' && *c != '@' && (unsigned char)*c >= ' ' && *c != 0x7f;
+    return good ? DRAPE_OK
+                : refuse(p, "name", "the name of an event has no \";\", \"@\" or control character");
+}
+
 /* ---- Of a scene ---- */
 
 static drape_status name_event(const place *p, const char *given, drape_model *model, drape_model_event *to)
@@ -138,7 +148,7 @@ static drape_status name_event(const place *p, const char *given, drape_model *m
         if (strcmp(model->events[i].name, wanted) == 0)
             return refuse(p, "name", text);
     to->name = drape_arena_text(p->arena, wanted);
-    return drape_arena_status(p->arena);
+    return to->name ? check_name(p, wanted) : DRAPE_E_MEMORY;
 }
 
 static drape_status find_function(const place *p, const drape_event_def *def, drape_model *model,
@@ -194,6 +204,8 @@ drape_status drape_compile_host_event(drape_context *ctx, drape_arena *arena, co
     const place p = {.ctx = ctx, .arena = arena, .model = model, .pointer = "/event"};
     *to = (drape_model_event){.ops = NULL};
     to->name = drape_arena_text(arena, def->name);
-    const drape_status status = drape_arena_status(arena);
+    drape_status status = drape_arena_status(arena);
+    if (!status)
+        status = check_name(&p, def->name);
     return status ? status : resolve(&p, def, to);
 }

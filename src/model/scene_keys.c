@@ -235,7 +235,8 @@ static const char *const actions[] = {"record", "stop", "release", NULL};
 static const drape_scene_key event_keys[] = {
     {DRAPE_TEXT("type", "name of an event; its parameters are keys beside it"),
      IN(drape_event_def, entry.type)},
-    {DRAPE_TEXT("name", "unique name", .derived = "\"event0\", \"event1\" ..."), IN(drape_event_def, name)},
+    {DRAPE_TEXT("name", "unique name, without ; and @", .derived = "\"event0\", \"event1\" ..."),
+     IN(drape_event_def, name)},
     {DRAPE_TEXT("cloth", "name of the cloth that it is about", .derived = "all of them"),
      IN(drape_event_def, cloth)},
     {DRAPE_TEXT("pins", "name of the pins that it measures or releases", .derived = "all pins of the cloth"),

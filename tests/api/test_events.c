@@ -302,6 +302,9 @@ START_TEST(wrong_events_are_refused)
     ck_assert_int_eq(drape_sim_add_event(f.sim, &def, clock_of, &at), DRAPE_E_ARGUMENT);
     ck_assert_str_eq(drape_context_message(f.ctx),
                      "drape_sim_add_event: there is an event of the name \"clock\"");
+    def = def_of("a@b", NULL, NULL);
+    ck_assert_int_eq(drape_sim_add_event(f.sim, &def, clock_of, &at), DRAPE_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(f.ctx), "/event/name: the name of an event has no"));
     def = def_of("a", "sideways", NULL);
     ck_assert_int_eq(drape_sim_add_event(f.sim, &def, clock_of, &at), DRAPE_E_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(drape_context_message(f.ctx), "/event/direction: \"sideways\""));

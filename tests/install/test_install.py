@@ -58,8 +58,8 @@ class Tree:
             raise Skip("this build has no static library")
         return path
 
-    def flags(self, *options):
-        return run(need("pkg-config"), *options, "drape", env=self.env).split()
+    def flags(self, *options, package="drape"):
+        return run(need("pkg-config"), *options, package, env=self.env).split()
 
 
 def declared():
@@ -113,7 +113,10 @@ def what_of_libm_the_static_library_calls(tree):
 
 def what_comes_along(tree):
     needed = re.findall(r"NEEDED +(\S+)", run("objdump", "-p", tree.shared()))
-    for name in ("libgsl", "libsundials", "libpetsc", "libmpi", "libepoxy", "libGL"):
+    others = ["libgsl", "libpetsc", "libmpi", "libepoxy", "libGL"]
+    if "--wrap" in " ".join(tree.flags("--static", "--libs")):  # SUNDIALS and SuiteSparse are archives: they are inside
+        others += ["libsundials", "libklu", "libbtf", "libamd", "libcolamd", "libsuitesparse"]
+    for name in others:
         assert not any(library.startswith(name) for library in needed), needed
     libraries = tree.flags("--libs")
     assert "-ldrape" in libraries and not any("sundials" in flag or "klu" in flag for flag in libraries), libraries
@@ -144,12 +147,117 @@ def body_in_c(tree):
 
 
 def host_in_c_static(tree):
+    """By drape-static, with and without --static, and by what drape lists for it; the shared library is beside."""
     source, program = os.path.join(EXAMPLES, "host_c", "host.c"), os.path.join(tree.work, "host_c_static")
-    flags = [tree.static() if flag == "-ldrape" else flag for flag in tree.flags("--static", "--cflags", "--libs")]
-    run(need("cc"), source, *flags, "-lm", "-o", program)
-    assert "libdrape" not in run("ldd", program) and "sundials" not in run("ldd", program)
-    assert {"__wrap_SUNRpowerR", "drape_pow"} <= symbols(program)  # IDA and KINSOL call our powers
+    listed = [tree.static() if flag == "-ldrape" else flag for flag in tree.flags("--static", "--cflags", "--libs")]
+    for flags in (tree.flags("--cflags", "--libs", package="drape-static"), tree.flags("--static", "--cflags", "--libs", package="drape-static"), listed):
+        run(need("cc"), source, *flags, "-lm", "-o", program)
+        assert "libdrape" not in run("ldd", program) and "sundials" not in run("ldd", program)
+        assert {"__wrap_SUNRpowerR", "drape_pow"} <= symbols(program)  # IDA and KINSOL call our powers
     check_host(run(program, FRAMES))
+
+
+# A host with functions of its own under the names of SuiteSparse and SUNDIALS, as one with other versions of them has, which is put before them.
+CLASHING = r"""
+#include <drape/drape.h>
+#include <stdio.h>
+#include <stdlib.h>
+static const char text[] = "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"square\", \"columns\": 6, \"rows\": 6, \"width\": 1, \"height\": 1},"
+    "\"material\": {\"young_modulus\": 1e4, \"thickness\": 1e-3, \"density\": 200}, \"terms\": [\"stretch.edge\"], \"pins\": [{\"edge\": \"top\"}]}],"
+    "\"integrator\": {\"linear_solver\": \"klu\"}, \"duration\": 1}";
+#define OURS(name) void name(void) { fprintf(stderr, #name " of the host was called\n"), exit(1); }
+NAMES
+int main(void)
+{
+    static const char *const methods[] = {"be", "ida", "cvode", "dirk"};
+    drape_context *ctx = NULL;
+    drape_scene *scene = NULL;
+    drape_status status = drape_context_create(NULL, &ctx);
+    if (!status) status = drape_scene_parse(ctx, text, "text", &scene);
+    for (int i = 0; !status && i < 4; i++) {
+        drape_model *model = NULL;
+        drape_sim *sim = NULL;
+        status = drape_scene_set(scene, "/integrator/method", methods[i]);
+        if (!status) status = drape_scene_compile(scene, &model);
+        if (!status) status = drape_sim_create(ctx, model, NULL, &sim);
+        if (!status) status = drape_sim_advance(sim, 0.1);
+        drape_sim_destroy(&sim), drape_model_destroy(&model);
+    }
+    puts(status ? drape_context_message(ctx) : "it runs");
+    drape_scene_destroy(&scene), drape_context_destroy(&ctx);
+    return status != DRAPE_OK;
+}
+"""
+CLASHES = ("klu_l_analyze", "klu_l_factor", "klu_l_refactor", "klu_l_solve", "klu_l_defaults", "klu_l_rcond", "btf_l_order", "amd_order", "amd_l_order", "amd_l2",
+           "colamd_l", "SuiteSparse_malloc", "SuiteSparse_free", "SuiteSparse_config", "KINCreate", "KINSol", "IDACreate", "IDASolve", "CVode", "CVodeCreate",
+           "ARKStepCreate", "ARKStepEvolve", "N_VNew_Serial", "N_VClone", "N_VDestroy", "SUNContext_Create", "SUNRpowerR", "SUNMatDestroy")
+
+
+def host_with_libraries_of_its_own(tree):
+    if "libklu" in run("objdump", "-p", tree.shared()):
+        raise Skip("this build links SuiteSparse as shared libraries, which are the host's to choose")
+    source, program = os.path.join(tree.work, "clash.c"), os.path.join(tree.work, "clash")
+    with open(source, "w") as file:
+        file.write(CLASHING.replace("NAMES", "\n".join(f"OURS({name})" for name in CLASHES)))
+    run(need("cc"), source, "-rdynamic", *tree.flags("--cflags", "--libs"), "-o", program)
+    assert set(CLASHES) <= symbols(program, "-D")
+    assert run(program, env=tree.env) == "it runs\n"
+
+
+LAB = r"""
+#include <drape/lab.h>
+#include <stdio.h>
+int main(void)
+{
+    drape_context *ctx = NULL;
+    drape_lab_def def;
+    drape_lab_outcome outcome = {0};
+    drape_lab_def_init(&def, sizeof def);
+    if (drape_context_create(NULL, &ctx)) return 1;
+    def.scene = "nowhere.json", def.folder = "out";
+    const drape_status status = drape_lab_run(ctx, "tradeoff", &def, &outcome);
+    puts(drape_context_message(ctx));
+    drape_lab_outcome_free(&outcome);
+    drape_context_destroy(&ctx);
+    return status != DRAPE_E_FILE;
+}
+"""
+
+
+def the_lab_links(tree):
+    """By drape-lab alone, which brings the static library along."""
+    tree.static()
+    if not os.path.exists(os.path.join(tree.lib, "libdrape_lab.a")):
+        raise Skip("this build has no experiments")
+    source, program = os.path.join(tree.work, "lab.c"), os.path.join(tree.work, "lab")
+    with open(source, "w") as file:
+        file.write(LAB)
+    for options in ((), ("--static",)):
+        run(need("cc"), source, *tree.flags("--cflags", "--libs", *options, package="drape-lab"), "-o", program)
+    assert "nowhere.json" in run(program, cwd=tree.work)
+    assert "GPL" in run(need("pkg-config"), "--variable=licence", "drape-lab", env=tree.env)
+    assert "GPL-3" not in run(need("pkg-config"), "--variable=licence", "drape", env=tree.env)
+
+
+def documentation_is_installed(tree):
+    """Pages with their pictures, the licence and the notices of what is inside; every link between these holds."""
+    folder = os.path.join(tree.prefix, "share", "doc", "drape")
+    for name in ("LICENSE", "README.md", "CHANGELOG.md", "CITATION.cff", "docs/embedding.md", "licences/third-party.txt", "licences/LGPL-2.1.txt", "licences/GPL-3.txt"):
+        assert os.path.getsize(os.path.join(folder, name)) > 0, name
+    assert {name for name in os.listdir(os.path.join(SOURCE, "docs")) if name.endswith(".md")} <= set(os.listdir(os.path.join(folder, "docs")))
+    assert not os.path.exists(os.path.join(folder, "docs", "make"))
+    with open(os.path.join(folder, "licences", "third-party.txt")) as file:
+        notices = file.read()
+    for name in ("KINSOL", "ARKODE", "CVODE", "KLU and BTF", "AMD, COLAMD", "jansson", "GNU Scientific Library"):
+        assert name in notices, name
+    for name in sorted(os.listdir(os.path.join(folder, "docs"))):
+        if name.endswith(".md"):
+            with open(os.path.join(folder, "docs", name), encoding="utf-8") as file:
+                links = re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", re.sub(r"```.*?```|`[^`]*`", "", file.read(), flags=re.S))
+            for link in links:
+                target = os.path.normpath(os.path.join(folder, "docs", link))
+                of_sources = re.match(r"\.\./(bench|examples|include|src|tests|tools|CONTRIBUTING\.md)", link)  # these are not installed
+                assert os.path.exists(target) or of_sources, f"{name}: {link}"
 
 
 def host_in_cpp(tree):
@@ -202,7 +310,8 @@ def the_program_runs(tree):
 
 TESTS = [what_is_installed, what_the_shared_library_shows, what_the_static_library_defines,
          what_of_libm_the_static_library_calls, what_comes_along, host_in_c, body_in_c, host_in_c_static,
-         host_in_cpp, cmake_of_the_static_library, cmake_refuses_another_version, host_in_python, the_program_runs]
+         host_with_libraries_of_its_own, the_lab_links, documentation_is_installed, host_in_cpp,
+         cmake_of_the_static_library, cmake_refuses_another_version, host_in_python, the_program_runs]
 
 
 def main():
