@@ -255,8 +255,8 @@ static double lumped_share(drape_factored_jacobian *s, double dt)
     return lumped / inertia;
 }
 
-/* Leaves bending out of the pattern where N is near A and has less than half of its entries, as with bend.midedge:
- * with those of hinges, factors of 900 nodes cost hardly more than the conjugate gradients. */
+/* Leaves bending out of the pattern where N is near A and has less than half of its entries, as with
+ * bend.midedge: with those of hinges, factors of 900 nodes cost hardly more than conjugate gradients. */
 static drape_status choose_pattern(drape_factored_jacobian *s, double dt)
 {
     const int64_t all = drape_system_pattern(s->system)->nonzeros;

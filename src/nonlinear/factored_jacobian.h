@@ -11,13 +11,15 @@
  *         except for contact, but may be indefinite
  * It is symmetric, of friction it has the symmetric part, except for drag, which is exact.
  *
- * C couples nodes two and three edges apart, which makes factors of A several times as expensive as those of
- * J+: for a measured fabric of 10 000 nodes nine times. So, where there is no drag, a matrix N without these
- * entries is factored: each c_ij that J+ has no block for is added to the diagonal,
- *     N = A + sum of the c_ij |x_i - x_j|^2 that are left out
- * which is exact where nodes move alike, and stiffer than A otherwise, as most of the c_ij are positive. Then A
- * x = b is solved by conjugate gradients preconditioned by N, in 2 to 5 iterations. Where the c_ij are large
- * beside the inertia, as in thick plates of a fine mesh, these take too many, and A is factored.
+ * C couples nodes two and three edges apart, which makes factors of A several times as expensive as those
+ * of J+: for a measured fabric of 10 000 nodes nine times. So, where there is no drag, a matrix N without
+ * these entries is factored: each c_ij that J+ has no block for is added to the diagonal,
+ *     N = A + sum of the c_ij |x_i - x_j|^2 that are left out, as quadratic forms
+ * which is exact where nodes move alike, and stiffer than A otherwise, as most of the c_ij are positive. Then
+ * A x = b is solved by conjugate gradients preconditioned by N, in 2 to 5 iterations. Where the c_ij are
+ * large beside the inertia, as in thick plates of a fine mesh, these take too many, and A is factored. That is
+ * decided for the nominal step: a longer one takes more iterations. N may be definite where A is not: that is
+ * known only if conjugate gradients meet a direction without positive curvature.
  *
  * With predicted stress (stress_predictor.h) in J+, one correction from the extrapolated guess is within a
  * hundredth of the motion of sheets that hang, at any stiffness of the membrane.
@@ -49,8 +51,8 @@ drape_status drape_factored_jacobian_update(drape_factored_jacobian *jacobian, c
                                             double mass_weight, double share, drape_work *work);
 
 /* x = A^-1 b (free DOFs); with the factors of N, until the residual falls to `tolerance` times its initial
- * value in the norm of N^-1, or A turns out not to be definite, where x is a descent direction. Sets the number
- * of iterations and whether A was definite as far as it was seen. A status > 0: x is not finite. */
+ * value in the norm of N^-1, or A turns out not to be definite, where x is a descent direction. Sets the
+ * number of iterations and whether A was definite as far as it was seen. A status > 0: x is not finite. */
 drape_status drape_factored_jacobian_solve(drape_factored_jacobian *jacobian, const double *b,
                                            double tolerance, double *x, int *iterations, bool *definite);
 

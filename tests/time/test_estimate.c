@@ -132,8 +132,8 @@ static drape_status compare_first(void *user, const drape_event *event)
  * line search shortens the corrections, so that each is a small part of the error: the length of one more of
  * them is a fiftieth to a sixth of it. The step goes on until little is left, or says that much is: the
  * estimate is above a quarter of the true error, which is below 3 mm, twice the bound (with the estimate by
- * one more correction alone the first sheet was 20 mm off and estimated at 0.4 mm). The converged step is where
- * further corrections lead: that of be may be another solution, 3.4 mm from this one. */
+ * one more correction alone the first sheet was 20 mm off and estimated at 0.4 mm). The converged step is
+ * where further corrections lead: that of be may be another solution, 3.4 mm from this one. */
 START_TEST(shortened_corrections_are_not_the_error)
 {
     static const struct {
