@@ -17,9 +17,9 @@
  *     N = A + sum of the c_ij |x_i - x_j|^2 that are left out, as quadratic forms
  * which is exact where nodes move alike, and stiffer than A otherwise, as most of the c_ij are positive. Then
  * A x = b is solved by conjugate gradients preconditioned by N, in 2 to 5 iterations. Where the c_ij are
- * large beside the inertia, as in thick plates of a fine mesh, these take too many, and A is factored. That is
- * decided for the nominal step: a longer one takes more iterations. N may be definite where A is not: that is
- * known only if conjugate gradients meet a direction without positive curvature.
+ * large beside the inertia, as in thick plates of a fine mesh, these take too many, and A is factored. That
+ * is decided for the nominal step: a longer one takes more iterations. N may be definite where A is not: that
+ * is known only if conjugate gradients meet a direction without positive curvature.
  *
  * With predicted stress (stress_predictor.h) in J+, one correction from the extrapolated guess is within a
  * hundredth of the motion of sheets that hang, at any stiffness of the membrane.

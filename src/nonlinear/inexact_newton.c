@@ -69,8 +69,8 @@
 #define ESTIMATE_TOLERANCE  0.5
 #define ESTIMATE_ITERATIONS 4
 /* Of these tolerances with factors that lump bending: sheets that hang by two corners are 0.5 to 7 mm of 1 m
- * from the converged step with all of it, and 0.4 to 0.7 mm with 0.01, as with factors of the whole matrix, for
- * one or two iterations more in each solution. */
+ * from the converged step with all of it, and 0.4 to 0.7 mm with 0.01, as with factors of the whole matrix,
+ * for one or two iterations more in each solution. */
 #define LUMPED_TOLERANCE 0.01
 
 /* What the first correction of a step leaves as error, as a share of itself, when that was measured last. Not

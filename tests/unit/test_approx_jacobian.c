@@ -394,8 +394,9 @@ START_TEST(factored_matrix_is_the_positive_jacobian)
 END_TEST
 
 /* With bending lumped in the factors, conjugate gradients solve with the matrix that another system factors
- * whole: at steps of 100 s bending exceeds the inertia so far that it is not lumped. Values without it are in
- * a smaller pattern. The tolerance is in the norm of N^-1, whose condition is that of the stiff sheet, 1e5. */
+ * whole: at steps of 100 s bending exceeds the inertia so far that it is not lumped. Values without it are
+ * in a smaller pattern. The tolerance is in the norm of N^-1, whose condition is that of the stiff sheet,
+ * 1e5. */
 START_TEST(lumped_factors_solve_with_all_of_bending)
 {
     state q = open_state(9, "'stretch.cst', 'bend.midedge'"),
