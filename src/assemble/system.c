@@ -19,8 +19,9 @@ struct drape_system {
     drape_contact *contact;       /* NULL: the model has none, or it was not added */
     const drape_pattern *pattern; /* the model's, or the extended one */
     drape_arena extension;        /* holds the extended pattern and its block slots */
-    drape_pattern extended;       /* the model's pattern with the pairs of nodes that contact couples */
+    drape_pattern extended;       /* without some terms, or with the pairs of nodes that contact couples */
     int32_t **blocks;             /* (term_count) slots in the extended pattern; NULL: it is not in use */
+    const bool *left_out;         /* (term_count) terms without slots in it; NULL: none */
     drape_status status;          /* of drape_system_status */
     drape_motion *motion;
     drape_drag_springs drag;
@@ -309,7 +310,7 @@ static drape_status place_terms(drape_system *system)
     system->blocks = drape_arena_take(arena, (size_t)model->term_count, sizeof *system->blocks);
     for (int32_t i = 0; system->blocks && i < model->term_count; i++) {
         const drape_term *term = &model->terms[i];
-        if (!drape_term_couples(term))
+        if (!drape_term_couples(term) || (system->left_out && system->left_out[i]))
             continue;
         system->blocks[i] = drape_arena_take(arena, drape_term_places(term), sizeof **system->blocks);
         if (system->blocks[i])
@@ -318,7 +319,8 @@ static drape_status place_terms(drape_system *system)
     return drape_arena_status(arena);
 }
 
-/* Builds the extended pattern: that of the model and these pairs of contact (pairs x 4 nodes). */
+/* Builds the extended pattern: that of the model, without the terms that are left out, and these pairs of
+ * contact (pairs x 4 nodes). */
 static drape_status extend(drape_system *system, int32_t pairs, const int32_t *nodes)
 {
     const drape_model *model = system->model;
@@ -328,7 +330,7 @@ static drape_status extend(drape_system *system, int32_t pairs, const int32_t *n
         drape_free(ctx, couplings);
         return DRAPE_E_MEMORY;
     }
-    int count = drape_model_couplings(model, couplings);
+    int count = drape_model_couplings(model, system->left_out, couplings);
     couplings[count++] = (drape_coupling){.count = pairs, .nodes = 4, .node = nodes};
     forget_extension(system);
     drape_status status = drape_pattern_build(&system->extension, model->free_count, model->free_of_node,
@@ -341,6 +343,15 @@ static drape_status extend(drape_system *system, int32_t pairs, const int32_t *n
     else
         system->pattern = &system->extended;
     return status;
+}
+
+drape_status drape_system_leave_out(drape_system *system, const bool *terms)
+{
+    system->left_out = terms;
+    if (terms)
+        return extend(system, 0, NULL);
+    forget_extension(system);
+    return DRAPE_OK;
 }
 
 drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed)

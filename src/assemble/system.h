@@ -129,6 +129,11 @@ void drape_system_end_step(drape_system *system);
 const drape_pattern *drape_system_pattern(const drape_system *system);
 drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed);
 
+/* From now on the pattern is without what only these terms (term_count) couple, which no matrix in it may
+ * then contain; NULL: it has all of them, as at first. terms must outlive the system. Errors: DRAPE_E_MEMORY,
+ * after which the pattern has all of them until it changes. */
+drape_status drape_system_leave_out(drape_system *system, const bool *terms);
+
 /* The first failure since drape_system_begin in functions that return no status: out of memory for
  * contacts, or cancelled. */
 drape_status drape_system_status(const drape_system *system);

@@ -16,7 +16,7 @@ drape_status drape_compile_pattern(drape_model *model)
     drape_coupling *couplings = drape_alloc(model->ctx, (size_t)model->term_count + 1, sizeof *couplings);
     if (!couplings)
         return DRAPE_E_MEMORY;
-    const int count = drape_model_couplings(model, couplings);
+    const int count = drape_model_couplings(model, NULL, couplings);
     const size_t before = model->arena.bytes;
     drape_status status = drape_pattern_build(&model->arena, model->free_count, model->free_of_node,
                                               couplings, count, &model->pattern);

@@ -43,7 +43,9 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_ERROR] = DRAPE_NUMBER(
         "error", "m", DRAPE_DERIVED("1e-3 times the diagonal of the rest bounding box"), DRAPE_ABOVE(0), 1e9,
         "further iterations follow while the estimated distance to the converged "
-        "step, RMS over the nodes, is above this; not a bound on an accepted state"),
+        "step, RMS over the nodes, is above this, with conjugate gradients and without contact above half of "
+        "it; "
+        "not a bound on an accepted state"),
     [PARAM_TOLERANCE] =
         DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,
                      "residual of the free nodes, largest component, below which no iteration is made, at "

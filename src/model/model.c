@@ -132,12 +132,12 @@ void drape_model_place_pins(const drape_model *model, double t, double *x)
     }
 }
 
-int drape_model_couplings(const drape_model *model, drape_coupling *couplings)
+int drape_model_couplings(const drape_model *model, const bool *without, drape_coupling *couplings)
 {
     bool features = false;
     int count = 0;
     for (int32_t i = 0; i < model->term_count; i++)
-        if (drape_term_couples(&model->terms[i]))
+        if (drape_term_couples(&model->terms[i]) && !(without && without[i]))
             couplings[count++] = drape_term_coupling(&model->terms[i]);
     for (int32_t i = 0; i < model->collider_count; i++)
         features = features || model->colliders[i].shape.point_count > 0;

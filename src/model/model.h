@@ -351,8 +351,9 @@ static inline double drape_collider_activation(const drape_model *model, int32_t
 void drape_model_place_pins(const drape_model *model, double t, double *x);
 
 /* Lists what couples nodes of the model in every state: the terms and, if a collider has features that the
- * faces and edges of cloth can touch, the triangles. couplings: of term_count + 1. Returns their number. */
-int drape_model_couplings(const drape_model *model, drape_coupling *couplings);
+ * faces and edges of cloth can touch, the triangles. without (term_count): terms to be left out; NULL: none.
+ * couplings: of term_count + 1. Returns their number. */
+int drape_model_couplings(const drape_model *model, const bool *without, drape_coupling *couplings);
 
 /* Returns the cloth that a node belongs to. */
 int32_t drape_model_cloth_of(const drape_model *model, int32_t node);

@@ -1,11 +1,14 @@
 /* factored_jacobian.c: see factored_jacobian.h. */
 #include "nonlinear/factored_jacobian.h"
 
+#include "base/finite.h"
 #include "base/vec3.h"
 #include "nonlinear/scalar_stiffness.h"
+#include "solvers/pcg.h"
 #include "solvers/sun_linear.h"
 
 #include <math.h>
+#include <string.h>
 
 /* How far a wave of stretching may travel in a step, in sizes of the scene, for conjugate gradients. One
  * iteration with them is .019, .051 and .076 m from the converged step on a sheet of 1 m over which waves
@@ -13,12 +16,19 @@
 #define MAX_TRAVEL 1
 /* Free nodes up to which factors cost no more than conjugate gradients. */
 #define FEW_NODES 200
+/* Of what is lumped in N beside the inertia of a step: beyond, conjugate gradients take ten iterations and
+ * more and, on irregular meshes, negative entries that are lumped outweigh the inertia. */
+#define MAX_LUMPED     20
+#define MAX_ITERATIONS 30 /* of conjugate gradients */
 
 struct drape_factored_jacobian {
     drape_system *system;
     bool *flat;        /* (terms) those that C stands for */
     bool nonsymmetric; /* there is drag that couples nodes */
+    bool lumps;        /* N is factored, in a pattern without what only C couples; else A */
     drape_scalar_stiffness scalar;
+    int32_t *block; /* (entries of C) in the pattern; -1: lumped */
+    drape_pcg pcg;
     SUNContext sun;
     drape_sun_linear *linear;
 };
@@ -89,22 +99,42 @@ drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, 
 
 /* ---- Update ---- */
 
-/* Adds C and the masses. The columns of both matrices are in order, and C is symmetric. */
-static void add_scalars(const drape_factored_jacobian *s, double *values)
+/* Finds the entries of C in the pattern. The columns of both are in order, and C is symmetric. */
+static void place_scalars(drape_factored_jacobian *s)
 {
     const drape_pattern *p = drape_system_pattern(s->system);
     const drape_scalar_stiffness *c = &s->scalar;
     for (int32_t j = 0; j < c->n; j++) {
         int32_t block = p->block_start[j];
         for (int32_t k = c->start[j]; k < c->start[j + 1]; k++) {
-            while (p->block_row[block] != c->column[k])
+            while (block + 1 < p->block_start[j + 1] && p->block_row[block] < c->column[k])
                 block++;
+            s->block[k] = p->block_row[block] == c->column[k] ? block : -1;
+        }
+    }
+}
+
+/* Adds C and the masses; what is not in the pattern is lumped. */
+static void add_scalars(const drape_factored_jacobian *s, double *values)
+{
+    const drape_pattern *p = drape_system_pattern(s->system);
+    const drape_scalar_stiffness *c = &s->scalar;
+    for (int32_t j = 0; j < c->n; j++)
+        for (int32_t k = c->start[j]; k < c->start[j + 1]; k++) {
             int64_t stride;
-            double *to = drape_pattern_at(p, values, j, block, &stride);
+            double *to =
+                drape_pattern_at(p, values, j, s->block[k] >= 0 ? s->block[k] : p->diagonal[j], &stride);
             for (int r = 0; r < 3; r++)
                 to[r * stride + r] += c->sum[k];
         }
-    }
+}
+
+/* The pattern may have changed, or be that of a checkpoint. */
+static drape_status take_pattern(drape_factored_jacobian *s)
+{
+    drape_status status = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->system));
+    place_scalars(s);
+    return status;
 }
 
 static drape_status assemble(drape_factored_jacobian *s, const drape_point *at, double mass_weight,
@@ -116,7 +146,7 @@ static drape_status assemble(drape_factored_jacobian *s, const drape_point *at, 
     drape_status status = drape_system_extend_pattern(s->system, at, &changed);
     s->linear->stale |= changed;
     if (!status && s->linear->stale)
-        status = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->system));
+        status = take_pattern(s);
     if (status)
         return status;
     drape_scalar_stiffness_weigh(&s->scalar, at->weight, mass_weight);
@@ -145,9 +175,63 @@ drape_status drape_factored_jacobian_update(drape_factored_jacobian *s, const dr
     return status;
 }
 
-drape_status drape_factored_jacobian_solve(drape_factored_jacobian *s, const double *b, double *x)
+/* ---- Solve ---- */
+
+/* y = N x, which is symmetric: column by column. */
+static void multiply_narrow(const drape_factored_jacobian *s, const double *x, double *y)
 {
-    return drape_sun_linear_solve(s->linear, b, x);
+    const drape_pattern *p = drape_system_pattern(s->system);
+    for (int32_t j = 0; j < p->block_count; j++) {
+        double sum[3] = {0};
+        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
+            int64_t stride;
+            const double *a = drape_pattern_at(p, s->linear->values, j, k, &stride),
+                         *from = x + 3 * (size_t)p->block_row[k];
+            for (int c = 0; c < 3; c++)
+                sum[c] += vec3_dot(a + c * stride, from);
+        }
+        memcpy(y + 3 * (size_t)j, sum, sizeof sum);
+    }
+}
+
+/* y = A x */
+static void multiply(const void *owner, const double *x, double *y)
+{
+    const drape_factored_jacobian *s = owner;
+    const drape_scalar_stiffness *c = &s->scalar;
+    multiply_narrow(s, x, y);
+    for (int32_t i = 0; i < c->n; i++)
+        for (int32_t k = c->start[i]; k < c->start[i + 1]; k++)
+            for (size_t r = 0; s->block[k] < 0 && r < 3; r++)
+                y[3 * (size_t)i + r] += c->sum[k] * (x[3 * (size_t)c->column[k] + r] - x[3 * (size_t)i + r]);
+}
+
+/* z = N^-1 r. Without a solution it is 0, where conjugate gradients end. */
+static void precondition(const void *owner, const double *r, double *z)
+{
+    const drape_factored_jacobian *s = owner;
+    if (drape_sun_linear_solve(s->linear, r, z))
+        memset(z, 0, (size_t)s->pcg.n * sizeof *z);
+}
+
+drape_status drape_factored_jacobian_solve(drape_factored_jacobian *s, const double *b, double tolerance,
+                                           double *x, int *iterations, bool *definite)
+{
+    *iterations = 1;
+    *definite = true;
+    if (!s->lumps)
+        return drape_sun_linear_solve(s->linear, b, x);
+    drape_pcg_solve(&s->pcg, b, x, tolerance, MAX_ITERATIONS);
+    *iterations = s->pcg.iterations;
+    *definite = s->pcg.definite;
+    return s->linear->status                       ? s->linear->status
+           : drape_all_finite(x, (size_t)s->pcg.n) ? DRAPE_OK
+                                                   : DRAPE_RETRY_LINEAR;
+}
+
+bool drape_factored_jacobian_is_lumped(const drape_factored_jacobian *s)
+{
+    return s->lumps;
 }
 
 const double *drape_factored_jacobian_values(const drape_factored_jacobian *s)
@@ -157,7 +241,37 @@ const double *drape_factored_jacobian_values(const drape_factored_jacobian *s)
 
 /* ---- Creation and destruction ---- */
 
-drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *system,
+/* What is lumped in N, as a share of the inertia in a step. */
+static double lumped_share(drape_factored_jacobian *s, double dt)
+{
+    const drape_scalar_stiffness *c = &s->scalar;
+    double lumped = 0, inertia = 0;
+    drape_scalar_stiffness_weigh(&s->scalar, 1 / dt, 1 / (dt * dt));
+    for (int32_t i = 0; i < c->n; i++) {
+        inertia += c->mass_weight * c->model->mass[c->model->node_of_free[i]];
+        for (int32_t k = c->start[i]; k < c->start[i + 1]; k++)
+            lumped += s->block[k] < 0 ? fabs(c->sum[k]) : 0;
+    }
+    return lumped / inertia;
+}
+
+/* Leaves bending out of the pattern where N is near A and has less than half of its entries, as with
+ * bend.midedge: with those of hinges, factors of 900 nodes cost hardly more than conjugate gradients. */
+static drape_status choose_pattern(drape_factored_jacobian *s, double dt)
+{
+    const int64_t all = drape_system_pattern(s->system)->nonzeros;
+    drape_status status = s->nonsymmetric ? DRAPE_OK : drape_system_leave_out(s->system, s->flat);
+    if (status)
+        return status;
+    place_scalars(s);
+    s->lumps = 2 * drape_system_pattern(s->system)->nonzeros < all && lumped_share(s, dt) <= MAX_LUMPED;
+    if (!s->lumps)
+        drape_system_leave_out(s->system, NULL);
+    place_scalars(s);
+    return DRAPE_OK;
+}
+
+drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *system, double dt,
                                             drape_factored_jacobian **out)
 {
     drape_factored_jacobian *s = *out = drape_arena_take(arena, 1, sizeof *s);
@@ -172,6 +286,13 @@ drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *sy
         status = drape_scalar_stiffness_covers(system, s->flat);
     if (!status)
         status = drape_scalar_stiffness_build(arena, system, s->flat, &s->scalar);
+    if (status)
+        return status;
+    s->block = drape_arena_take(arena, (size_t)s->scalar.start[s->scalar.n], sizeof *s->block);
+    s->pcg = drape_pcg_of(arena, 3 * (int64_t)m->free_count, s, multiply, precondition);
+    status = drape_arena_status(arena);
+    if (!status)
+        status = choose_pattern(s, dt);
     if (status)
         return status;
     if (drape_sundials_context(&s->sun))
@@ -197,7 +318,7 @@ void drape_factored_jacobian_archive(drape_factored_jacobian *s, drape_archive *
 {
     drape_archive_mark(a, "factored jacobian");
     if (drape_archive_has_read(a))
-        drape_archive_note(a, drape_sun_linear_ensure_pattern(s->linear, drape_system_pattern(s->system)));
+        drape_archive_note(a, take_pattern(s));
     drape_sun_linear_archive(s->linear, a, false);
 }
 
