@@ -1,16 +1,23 @@
 /*
- * realtime: frames of 1/60 s with contact, within a budget. Four scenes, in each of which the cloth is moved
+ * realtime: frames of 1/60 s with contact, within a budget. Five scenes, in each of which the cloth is moved
  * as by a host, frame by frame:
  *     sphere, capsule  a sheet of 1 m with 50 x 50 nodes hung by two corners, and a body that goes through
  *                      its place and back at 2 m/s all the time; the budget is a frame
  *     ball             the same with 30 x 30 nodes and a ball at up to 1.8 m/s; the budget is 4 ms
  *     capes            three capes of 30 x 30 nodes, each a sim of its own with a third of a frame, pinned to
  *                      the shoulders of a body of six capsules that walks, turns back and bobs; in a tenth of
- *                      the frames, drawn at random, the budget is a tenth
+ *                      the frames, drawn at random, the budget is a tenth, and in the middle of the run body
+ *                      and cape are placed 6 m away (drape_sim_place)
+ *     elbow            an arm and a forearm, two capsules that overlap at the elbow, bend to 150 degrees and
+ *                      straighten in 3 s, and pinch a sheet of 0.3 m with 16 x 16 nodes that lies over them
  * The clock of the library is replaced by the CPU time of the process, so that other programs on the machine
  * do not matter. A frame is missed if its call took longer than its budget; starved ones are not counted.
- * `strain` is the largest of any edge at the end of a frame, `inside` the depth of cloth in a body,
- * `crossings` that of edges through triangles of the cloth, each the largest of all frames.
+ * `strain` is the largest of any edge at the end of a frame, `apart` that of edges without a node that is
+ * relaxed, because bodies leave it no room, or was in the half second before, `inside` the depth of cloth in
+ * a body, `crossings` the number of edges through triangles of the cloth, each the largest of all frames.
+ * `recovery` is the number of frames from the placing on until there is one with nothing inside of a body and
+ * no more strain than in the second before, of the sim that takes longest; -1: nothing is placed, or there is
+ * none.
  *
  *     realtime [--csv FILE] [--seconds S] [--scene NAME] [--contact NAME] [--slower F] [--be]
  *
@@ -26,6 +33,9 @@
 
 #define FRAME      (1.0 / 60)
 #define MAX_FRAMES 4000
+#define TELEPORT   10.0 /* [s] */
+#define MAX_NODES  2500
+#define PINCHED    0.5  /* [s] after which a node that was relaxed counts among the others */
 #define BODIES     6
 #define CAPES      3
 #define MATERIAL                                                                                             \
@@ -51,7 +61,10 @@ struct scene {
     double seconds, speed; /* [s], [m/s] of the bodies */
     double budget;         /* [s] of each sim */
     double starved;        /* share of the frames that have a tenth of the budget */
+    bool placed;           /* at TELEPORT, by `away` */
 };
+
+static const double away[3] = {5, 1, 3}; /* [m] */
 
 /* From 0.6 to -0.6 and back at constant speed. */
 static double there_and_back(double path)
@@ -83,20 +96,32 @@ static drape_status walk(const scene *s, drape_sim *sim, int which, double t, do
     const double turn = 2 * acos(-1) * t, phase = 0.7 * which;
     const double body[3] = {0.03 * sin(turn + phase), 0.03 * cos(2 * turn + phase) - 0.03 * cos(phase),
                             s->speed * (1 - cos(turn / 4 + phase) - 1 + cos(phase)) * 4 / (2 * acos(-1))};
-    const double stride = 0.2 * (sin(turn + phase) - sin(phase));
+    const double stride = 0.2 * (sin(turn + phase) - sin(phase)), far = t > TELEPORT;
     drape_status status = DRAPE_OK;
     for (int i = 0; i < BODIES && !status; i++) {
         const double sign = i < 2 ? 0 : i == 2 || i == 5 ? 1 : -1;
-        const double to[3] = {body[0], body[1], body[2] + sign * stride};
+        const double to[3] = {body[0] + far * away[0], body[1] + far * away[1],
+                              body[2] + sign * stride + far * away[2]};
         status = drape_sim_move_collider(sim, i, seconds, to, NULL);
     }
     for (int i = 0; i < 30; i++) {
         pins[i] = i;
-        at[3 * i] = -0.25 + 0.5 * i / 29 + body[0];
-        at[3 * i + 1] = 1.45 + body[1];
-        at[3 * i + 2] = -0.16 + body[2];
+        at[3 * i] = -0.25 + 0.5 * i / 29 + body[0] + far * away[0];
+        at[3 * i + 1] = 1.45 + body[1] + far * away[1];
+        at[3 * i + 2] = -0.16 + body[2] + far * away[2];
     }
     return status ? status : drape_sim_move_pins(sim, 30, pins, seconds, at, NULL);
+}
+
+/* Half a second of rest, a second to bend to 150 degrees, a second to straighten, and half of rest. */
+static drape_status bend(const scene *s, drape_sim *sim, int which, double t, double seconds)
+{
+    static const double still[3] = {0, 0, 0};
+    const double at = fmod(t, 3), share = fmin(fmax(at < 1.5 ? at - 0.5 : 2.5 - at, 0), 1),
+                 half = share * 75 * acos(-1) / 180;
+    const double rotation[4] = {cos(half), 0, 0, sin(half)};
+    (void)s, (void)which;
+    return drape_sim_move_collider_pose(sim, 1, seconds, still, rotation, NULL, NULL);
 }
 
 #define HUNG(side)                                                                                           \
@@ -108,15 +133,15 @@ static const scene scenes[] = {
     {"sphere",
      "{'drape': 1, " HUNG(50) ", 'colliders': [{'type': 'sphere', 'center': [0, -0.6, 0], 'radius': 0.2, "
                               "'friction': 0.3}], %s 'duration': 100}",
-     sweep, 1, 6, 2, FRAME, 0},
+     sweep, 1, 6, 2, FRAME, 0, false},
     {"capsule",
      "{'drape': 1, " HUNG(50) ", 'colliders': [{'type': 'capsule', 'a': [-0.25, -0.6, 0], 'b': [0.25, -0.5, "
                               "0], 'radius': 0.12, 'friction': 0.3}], %s 'duration': 100}",
-     sweep, 1, 6, 2, FRAME, 0},
+     sweep, 1, 6, 2, FRAME, 0, false},
     {"ball",
      "{'drape': 1, " HUNG(30) ", 'colliders': [{'type': 'sphere', 'center': [0, -0.6, 0], 'radius': 0.2, "
                               "'friction': 0.3}], %s 'duration': 100}",
-     swing, 1, 6, 1.8, 4e-3, 0},
+     swing, 1, 6, 1.8, 4e-3, 0, false},
     {"capes",
      "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 30, 'rows': 30, 'width': 0.5, 'height': "
      "1, "
@@ -129,7 +154,15 @@ static const scene scenes[] = {
      "{'type': 'capsule', 'a': [-0.24, 0.8, 0], 'b': [-0.2, 1.35, 0], 'radius': 0.05, 'friction': 0.3},"
      "{'type': 'capsule', 'a': [0.24, 0.8, 0], 'b': [0.2, 1.35, 0], 'radius': 0.05, 'friction': 0.3}], %s "
      "'duration': 100}",
-     walk, CAPES, 20, 1.5, FRAME / CAPES, 0.1},
+     walk, CAPES, 20, 1.5, FRAME / CAPES, 0.1, true},
+    {"elbow",
+     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 16, 'rows': 16, 'width': 0.3, 'height': "
+     "0.3, 'transform': {'translate': [-0.15, 0.046, 0.15]}}, " MATERIAL
+     ", 'pins': [{'edge': 'left'}]}], 'colliders': ["
+     "{'type': 'capsule', 'a': [-0.3, 0, 0], 'b': [0, 0, 0], 'radius': 0.04, 'friction': 1},"
+     "{'type': 'capsule', 'a': [0, 0, 0], 'b': [0.24, 0, 0], 'radius': 0.04, 'friction': 1, 'pivot': [0, 0, "
+     "0]}], %s 'duration': 100}",
+     bend, 1, 6, 0, FRAME, 0, false},
 };
 #define SCENES ((int)(sizeof scenes / sizeof *scenes))
 
@@ -149,35 +182,49 @@ static const variant variants[] = {
 
 typedef struct result {
     double ms[MAX_FRAMES];
-    int frames, missed, starved, errors;
-    double dropped, strain, inside;
+    int frames, missed, starved, errors, recovery;
+    double dropped, strain, apart, inside;
     int64_t crossings, attempts, rejected;
     double contact; /* share of the time of steps */
 } result;
 
-static double strain_of(const drape_sim *sim)
+/* The largest strain of an edge, and of those that are not pinched. */
+static double strain_of(const drape_sim *sim, const double *pinched, double *apart)
 {
     const drape_model *m = sim->model;
-    const double *x = drape_sim_positions(sim);
+    const double *x = drape_sim_positions(sim), since = drape_sim_time(sim) - PINCHED;
     double largest = 0;
     for (int32_t e = 0; e < m->edge_count; e++) {
-        const double *a = x + 3 * (size_t)m->edge[2 * e], *b = x + 3 * (size_t)m->edge[2 * e + 1];
+        const int32_t *n = m->edge + 2 * e;
+        const double *a = x + 3 * (size_t)n[0], *b = x + 3 * (size_t)n[1];
         const double d[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-        largest = fmax(largest, sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / m->edge_length[e] - 1);
+        const double strain = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / m->edge_length[e] - 1;
+        largest = fmax(largest, strain);
+        if (pinched[n[0]] < since && pinched[n[1]] < since)
+            *apart = fmax(*apart, strain);
     }
     return largest;
 }
 
-static void examine(const drape_sim *sim, bool self, result *r)
+/* Returns the strain, INFINITY if there is cloth inside of a body. pinched: [s] (nodes) when each was relaxed
+ * last. */
+static double examine(const drape_sim *sim, bool self, double *pinched, result *r)
 {
-    r->strain = fmax(r->strain, strain_of(sim));
+    drape_relaxed relaxed;
+    for (int32_t i = 0; i < drape_sim_relaxed(sim, i, &relaxed); i++)
+        pinched[relaxed.node] = drape_sim_time(sim);
+    double strain = strain_of(sim, pinched, &r->apart);
+    r->strain = fmax(r->strain, strain);
     for (int32_t c = 0; c < sim->model->collider_count; c++) {
         double deepest = 0;
-        if (drape_sim_inside(sim, c, &deepest) > 0)
-            r->inside = fmax(r->inside, deepest);
+        if (drape_sim_inside(sim, c, &deepest) == 0)
+            continue;
+        r->inside = fmax(r->inside, deepest);
+        strain = INFINITY;
     }
     const int64_t crossings = self ? drape_sim_intersections(sim, -1) : 0;
     r->crossings = crossings > r->crossings ? crossings : r->crossings;
+    return strain;
 }
 
 static double draw(uint64_t *seed)
@@ -188,52 +235,89 @@ static double draw(uint64_t *seed)
 
 static double slower = 1;
 
+/* A sim of the run, and what its recovery is judged by. */
+typedef struct one {
+    drape_sim *sim;
+    double debt;         /* [s] */
+    double pinched[MAX_NODES]; /* [s] (nodes) */
+    double before;       /* the largest strain in the second before it was placed */
+    int recovery;        /* frames; -1: not yet */
+} one;
+
+static void judge_recovery(one *o, double t, double strain)
+{
+    if (t <= TELEPORT && t > TELEPORT - 1)
+        o->before = fmax(o->before, strain);
+    if (t > TELEPORT && o->recovery < 0 && strain <= o->before)
+        o->recovery = (int)((t - TELEPORT) / FRAME + 0.5);
+}
+
+static void place(drape_context *ctx, drape_sim *sim)
+{
+    drape_place_def def;
+    drape_place_def_init(&def, sizeof def);
+    memcpy(def.translate, away, sizeof def.translate);
+    if (drape_sim_place(sim, &def))
+        bench_fail(ctx, "to place it");
+}
+
 static void run(drape_context *ctx, const scene *s, const variant *v, const char *integrator, double seconds,
                 result *r)
 {
     const bool converged = strcmp(integrator, "be") == 0;
     const drape_setting dt[] = {{"dt", FRAME, NULL}, {NULL, 0, NULL}};
     drape_model *model = bench_model(ctx, s->text, v->contact);
-    drape_sim *sim[CAPES];
-    double debt[CAPES] = {0};
+    static one of[CAPES];
     uint64_t seed = 7;
     *r = (result){.frames = (int)(seconds / FRAME + 0.5)};
     for (int i = 0; i < s->sims; i++) {
-        sim[i] = bench_sim(ctx, model, integrator, dt, NULL, NULL);
-        if (s->move(s, sim[i], i, 0, 1e-9) || drape_sim_advance(sim[i], 1e-6))
+        of[i] = (one){.sim = bench_sim(ctx, model, integrator, dt, NULL, NULL), .recovery = -1};
+        for (int k = 0; k < MAX_NODES; k++)
+            of[i].pinched[k] = -INFINITY;
+        if (s->move(s, of[i].sim, i, 0, 1e-9) || drape_sim_advance(of[i].sim, 1e-6))
             bench_fail(ctx, "the start of %s", s->name);
     }
     for (int k = 0; k < r->frames; k++) {
         const bool starved = draw(&seed) < s->starved;
         r->starved += starved;
+        const bool now = s->placed && k == (int)(TELEPORT / FRAME + 0.5);
         for (int i = 0; i < s->sims; i++) {
-            drape_realtime report = {0};
+            one *o = &of[i];
+            drape_realtime report = {.kept = true};
+            if (now)
+                place(ctx, o->sim);
             const double start = drape_clock_seconds();
-            if (s->move(s, sim[i], i, (k + 1) * FRAME, FRAME + debt[i]))
+            if (s->move(s, o->sim, i, (k + 1) * FRAME, FRAME + o->debt))
                 bench_fail(ctx, "%s", s->name);
             const drape_status status =
-                converged ? drape_sim_advance(sim[i], drape_sim_time(sim[i]) + FRAME)
-                          : drape_sim_advance_realtime(sim[i], FRAME,
+                converged ? drape_sim_advance(o->sim, drape_sim_time(o->sim) + FRAME)
+                          : drape_sim_advance_realtime(o->sim, FRAME,
                                                        slower * s->budget * (starved ? 0.1 : 1), &report);
             r->ms[k] += 1e3 * (drape_clock_seconds() - start);
             r->errors += status != DRAPE_OK;
             if (status && r->errors == 1)
-                fprintf(stderr, "%s, %s, t=%g: %s\n", s->name, v->name, drape_sim_time(sim[i]),
+                fprintf(stderr, "%s, %s, t=%g: %s\n", s->name, v->name, drape_sim_time(o->sim),
                         drape_context_message(ctx));
-            r->missed += !converged && !starved && !report.kept;
-            debt[i] = report.debt;
+            r->missed += !starved && !report.kept;
+            o->debt = report.debt;
             r->dropped += report.dropped;
-            examine(sim[i], v->self, r);
+            const double strain = examine(o->sim, v->self, o->pinched, r);
+            judge_recovery(o, (k + 1) * FRAME, strain);
         }
     }
+    r->recovery = s->placed ? 0 : -1;
+    for (int i = 0; i < s->sims; i++)
+        r->recovery = r->recovery < 0 || of[i].recovery < 0 ? -1
+                      : of[i].recovery > r->recovery        ? of[i].recovery
+                                                            : r->recovery;
     double steps = 0, contact = 0;
     for (int i = 0; i < s->sims; i++) {
-        const drape_statistics stats = drape_sim_statistics(sim[i]);
+        const drape_statistics stats = drape_sim_statistics(of[i].sim);
         steps += stats.wall_steps;
         contact += stats.wall_contact;
         r->attempts += stats.steps_accepted + stats.steps_rejected;
         r->rejected += stats.steps_rejected;
-        drape_sim_destroy(&sim[i]);
+        drape_sim_destroy(&of[i].sim);
     }
     r->contact = contact / steps;
     drape_model_destroy(&model);
@@ -250,18 +334,21 @@ static void measure(drape_context *ctx, const scene *s, const variant *v, const 
 {
     static result r;
     run(ctx, s, v, integrator, seconds > 0 ? seconds : s->seconds, &r);
-    printf("%-8s %-8s %-9s %6d %7.2f %7.2f %7.2f %7.2f %7d %8.2f %8.1f %8.2f %9lld %8lld %8lld %6d %8.0f\n",
+    printf("%-8s %-8s %-9s %6d %7.2f %7.2f %7.2f %7.2f %7d %8.2f %8.1f %7.1f %8.2f %9lld %8lld %8lld %6d "
+           "%8d %8.0f\n",
            s->name, v->name, integrator, r.frames, percentile(&r, 0.5), percentile(&r, 0.95),
-           percentile(&r, 0.99), r.ms[r.frames - 1], r.missed, r.dropped, 100 * r.strain, 1e3 * r.inside,
-           (long long)r.crossings, (long long)r.attempts, (long long)r.rejected, r.errors, 100 * r.contact);
+           percentile(&r, 0.99), r.ms[r.frames - 1], r.missed, r.dropped, 100 * r.strain, 100 * r.apart,
+           1e3 * r.inside, (long long)r.crossings, (long long)r.attempts, (long long)r.rejected, r.errors,
+           r.recovery, 100 * r.contact);
     fflush(stdout);
     if (!csv)
         return;
     bench_csv_row(csv);
-    fprintf(csv, "%s,%s,%s,%d,%d,%g,%g,%g,%g,%d,%g,%g,%g,%lld,%lld,%lld,%d,%g\n", s->name, v->name,
+    fprintf(csv, "%s,%s,%s,%d,%d,%g,%g,%g,%g,%d,%g,%g,%g,%g,%lld,%lld,%lld,%d,%d,%g\n", s->name, v->name,
             integrator, r.frames, r.starved, percentile(&r, 0.5), percentile(&r, 0.95), percentile(&r, 0.99),
-            r.ms[r.frames - 1], r.missed, r.dropped, 100 * r.strain, 1e3 * r.inside, (long long)r.crossings,
-            (long long)r.attempts, (long long)r.rejected, r.errors, 100 * r.contact);
+            r.ms[r.frames - 1], r.missed, r.dropped, 100 * r.strain, 100 * r.apart, 1e3 * r.inside,
+            (long long)r.crossings, (long long)r.attempts, (long long)r.rejected, r.errors, r.recovery,
+            100 * r.contact);
 }
 
 int main(int argc, char **argv)
@@ -291,21 +378,25 @@ int main(int argc, char **argv)
         return bench_usage("", usage);
     FILE *csv =
         bench_csv(file, "scene,contact,integrator,frames,starved,p50_ms,p95_ms,p99_ms,worst_ms,missed,"
-                        "dropped_s,strain_percent,inside_mm,crossings,attempts,rejected,errors,"
-                        "contact_percent");
+                        "dropped_s,strain_percent,apart_percent,inside_mm,crossings,attempts,rejected,errors,"
+                        "recovery_frames,contact_percent");
     drape_context *ctx = bench_context();
     puts("scene    contact  method    frames     p50     p95     p99   worst  missed  dropped strain % "
          "inside mm "
          "crossings attempts rejected errors contact %");
+    int measured = 0;
     for (int i = 0; i < SCENES; i++)
         for (int k = 0; k < VARIANTS; k++) {
             if ((only && strcmp(only, scenes[i].name) != 0) ||
                 (contact && strcmp(contact, variants[k].name) != 0))
                 continue;
+            measured++;
             measure(ctx, &scenes[i], &variants[k], "newton_k", seconds, csv);
             if (be)
                 measure(ctx, &scenes[i], &variants[k], "be", seconds, csv);
         }
     drape_context_destroy(&ctx);
-    return csv && fclose(csv) ? 1 : 0;
+    if (measured == 0)
+        fputs("no such scene or contact; see the head of bench/realtime.c\n", stderr);
+    return (csv && fclose(csv)) || measured == 0 ? 1 : 0;
 }

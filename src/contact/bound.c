@@ -51,11 +51,11 @@ double drape_bound_by_axes(const drape_pair *pair, const double *x, const double
     for (int end = 0; end < ends; end++) {
         axis_between(split, at[end], axis);
         double least = lead_along(split, axis, at[0]);
-        if (y)
-            least = fmin(least, lead_along(split, axis, at[1]));
+        const double last = y ? lead_along(split, axis, at[1]) : least;
+        least = last < least ? last : least;
         const double length = vec3_norm(axis);
-        if (length > 0)
-            bound = fmax(bound, least / length);
+        if (length > 0 && least / length > bound)
+            bound = least / length;
     }
     return bound;
 }

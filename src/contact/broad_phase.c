@@ -4,6 +4,10 @@
 #include <math.h>
 #include <string.h>
 
+/* Points and segments of colliders up to which the trees of the cloth are not fitted for them: to fit costs
+ * as much as twenty scans. */
+#define FEW 16
+
 /* ---- Creation ---- */
 
 static void count_features(const drape_model *m, int32_t *points, int32_t *segments, int32_t *triangles)
@@ -89,6 +93,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->triangle = drape_arena_take(arena, 3 * (size_t)triangles, sizeof *s->triangle);
     s->triangle_collider = drape_arena_take(arena, (size_t)triangles, sizeof *s->triangle_collider);
     s->distance = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->distance);
+    s->side = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->side);
     s->near_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near_node);
     s->near_edge = drape_arena_take(arena, (size_t)m->edge_count, sizeof *s->near_edge);
     s->node_area = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->node_area);
@@ -152,6 +157,7 @@ typedef struct query {
     drape_pair pair; /* its constants, as far as they depend on this piece alone */
     int32_t piece;   /* number of the point, edge or segment */
     const drape_path_bvh *tree;
+    bool scans; /* the trees of the cloth are not fitted */
 } query;
 
 static bool is_free(const drape_broad_phase *s, int32_t point)
@@ -250,7 +256,11 @@ static void search_tree(query *q, int32_t piece, const int32_t *node, int nodes,
                                    .only_marked = !is_marked(q->want->marked, node, nodes)};
     q->piece = q->pair.rank[1] = piece;
     q->tree = tree;
-    drape_path_bvh_query(tree, &want, visit, q);
+    if (q->scans)
+        drape_path_bvh_scan(tree, &want, q->broad->model->node_count, q->want->marked, q->broad->side, visit,
+                            q);
+    else
+        drape_path_bvh_query(tree, &want, visit, q);
 }
 
 static void note_nodes(void *user, int32_t face)
@@ -345,15 +355,17 @@ void drape_broad_phase_pairs(drape_broad_phase *s, const drape_broad_query *want
                              drape_broad_phase_visit *visit, void *user)
 {
     query q = {.broad = s, .want = want, .visit = visit, .user = user};
-    const bool features = s->points > s->model->node_count;
-    if (features || s->model->contact.self) {
+    const int32_t features = s->points - s->model->node_count + s->segments;
+    q.scans = features <= FEW && !s->model->contact.self;
+    if (!q.scans) {
         drape_path_bvh_fit(&s->faces, want->x, want->y, want->marked);
         drape_path_bvh_fit(&s->edges, want->x, want->y, want->marked);
     }
     drape_path_bvh_fit(&s->obstacles, want->x, want->y, want->marked);
     if (s->model->contact.self)
         search_self(&q);
-    if (features)
+    if (features > 0)
         search_features(&q);
+    q.scans = false;
     search_obstacles(&q);
 }

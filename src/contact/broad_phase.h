@@ -22,6 +22,7 @@ typedef struct drape_broad_phase {
     int32_t segments;
     int32_t *triangle; /* (obstacles.count x 3) of colliders */
     int32_t *triangle_collider;
+    uint8_t *side;               /* (node_count) scratch of drape_path_bvh_scan */
     bool *near_node, *near_edge; /* of a search of marked pairs: what may meet a marked face or edge */
     double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
     double *distance;       /* (collider_count) activation distance of cloth and each collider [m] */

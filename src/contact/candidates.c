@@ -8,7 +8,7 @@
 #include <string.h>
 
 #define ROUNDING  1e-12 /* of the model's length: larger than the rounding of a bound of a gap */
-#define MAX_PATCH 0.3   /* of the nodes: if more have left their path, all pairs are searched */
+#define MAX_PATCH 0.1   /* of the nodes: if more have left their path, all pairs are searched */
 
 static void take_set(drape_arena *arena, const drape_broad_phase *broad, drape_candidate_set *set)
 {
@@ -144,12 +144,11 @@ static void add(void *user, const drape_pair *pair)
 }
 
 static drape_status collect(drape_candidates *c, drape_candidate_set *set, const bool *marked,
-                            const drape_straight_path *path, const double *ahead)
+                            const drape_straight_path *path)
 {
-    const double *ends[2] = {path->end[0].x, ahead};
     drape_straight_path own;
     for (int end = 0; end < 2; end++) {
-        memcpy(set->x[end], ends[end], 3 * (size_t)c->broad->points * sizeof *set->x[end]);
+        memcpy(set->x[end], path->end[end].x, 3 * (size_t)c->broad->points * sizeof *set->x[end]);
         memcpy(set->pose[end], path->end[end].pose,
                (size_t)c->broad->model->collider_count * sizeof *set->pose[end]);
         own.end[end] =
@@ -328,15 +327,14 @@ bool drape_candidates_patch_serves(drape_candidates *c, const drape_straight_pat
     return choose_set(c, path) > 0;
 }
 
-drape_status drape_candidates_search(drape_candidates *c, const drape_straight_path *path,
-                                     const double *ahead)
+drape_status drape_candidates_search(drape_candidates *c, const drape_straight_path *path)
 {
     const int sets = choose_set(c, path);
     const size_t count = (size_t)(c->broad->points + c->broad->model->collider_count);
     for (size_t i = 0; i < count; i++)
         c->level[i] = sets > 0 && c->marked[i] ? (uint8_t)sets : sets > 0 ? c->level[i] : 0;
     memset(c->stale, 0, (size_t)c->broad->model->collider_count * sizeof *c->stale);
-    const drape_status status = collect(c, &c->set[sets], sets > 0 ? c->marked : NULL, path, ahead);
+    const drape_status status = collect(c, &c->set[sets], sets > 0 ? c->marked : NULL, path);
     c->sets = status ? 0 : sets + 1;
     return status;
 }

@@ -52,10 +52,9 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
 void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *path, double margin,
                            const bool *marked, drape_broad_phase_visit *visit, void *user);
 
-/* Makes the candidates valid on the path: between `path` and its continuation to `ahead` (points x 3), by a
- * patch if few points are away from earlier searches there. Errors: DRAPE_E_MEMORY. */
-drape_status drape_candidates_search(drape_candidates *candidates, const drape_straight_path *path,
-                                     const double *ahead);
+/* Makes the candidates valid on the path, by a patch if few points are away from earlier searches there.
+ * Errors: DRAPE_E_MEMORY. */
+drape_status drape_candidates_search(drape_candidates *candidates, const drape_straight_path *path);
 
 /* Whether that would search no more than a patch. */
 bool drape_candidates_patch_serves(drape_candidates *candidates, const drape_straight_path *path);

@@ -29,7 +29,6 @@
 
 #define MARGIN  0.12 /* by which points may leave the path of a search before a new one, in mean edges */
 #define LONGEST 8.0  /* in mean edges: for a path that is longer, candidates are searched at its end alone */
-#define AHEAD   1.0  /* by which a path is continued, in its length: the next step begins there */
 /* A gap below this share of the largest coordinate is rounding: closest points and their distance have
  * errors of some hundred units in the last place. */
 #define ROUNDING (1e4 * DBL_EPSILON)
@@ -48,7 +47,7 @@
 static drape_status take_arrays(drape_arena *arena, drape_contact *c)
 {
     const size_t points = (size_t)c->broad.points, colliders = (size_t)c->model->collider_count;
-    double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start, &c->start_v, &c->ahead};
+    double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start, &c->start_v};
     drape_collider_pose **const poses[] = {&c->pose, &c->start_pose, &c->path_pose, &c->kink_pose};
     for (size_t i = 0; i < sizeof positions / sizeof *positions; i++)
         *positions[i] = drape_arena_take(arena, points, 3 * sizeof(double));
@@ -291,9 +290,7 @@ const drape_candidates *drape_contact_search(drape_contact *c, const drape_strai
 {
     const double start = drape_clock_seconds();
     drape_candidates *candidates = c->between_steps ? &c->query_candidates : &c->step_candidates;
-    for (size_t i = 0; i < 3 * (size_t)c->broad.points; i++)
-        c->ahead[i] = path->end[1].x[i] + AHEAD * (path->end[1].x[i] - path->end[0].x[i]);
-    const drape_status status = drape_candidates_search(candidates, path, c->ahead);
+    const drape_status status = drape_candidates_search(candidates, path);
     if (!are_valid(candidates, path, away)) /* positions that are not finite */
         for (int i = 0; i < DRAPE_CANDIDATE_SETS; i++)
             away->set[i] = INFINITY;
@@ -323,7 +320,7 @@ static bool is_near_start(const drape_contact *c, const double *x)
 }
 
 /* The path of a search for a configuration. In a step all pairs are searched from its beginning on, or that
- * of the step before, since that and the continuation will be looked at, too. */
+ * of the step before, since that will be looked at, too. */
 static drape_straight_path path_to(drape_contact *c, const drape_configuration *at, bool in_step)
 {
     const drape_straight_path here = {{*at, *at}};

@@ -47,7 +47,6 @@ struct drape_contact {
     drape_active_set active;   /* at x, if it is listed */
     bool listed;
     bool out_of_memory; /* in a search of collision detection: the next update or check reports it */
-    double *ahead;      /* (points x 3) the end of the path of a search */
 
     bool begun;                      /* a step has begun: */
     double start_t;                  /* [s] its beginning */
@@ -131,7 +130,7 @@ const drape_candidates *drape_contact_valid_candidates(const drape_contact *c,
                                                        const drape_straight_path *path,
                                                        drape_distances *away);
 
-/* Searches candidates on a path and its continuation. NULL: out of memory. */
+/* Searches candidates on a path. NULL: out of memory. */
 const drape_candidates *drape_contact_search(drape_contact *c, const drape_straight_path *path,
                                              drape_distances *away);
 

@@ -2,6 +2,7 @@
 #include "geometry/path_bvh.h"
 
 #include <math.h>
+#include <string.h>
 
 /* ---- Building ---- */
 
@@ -59,9 +60,12 @@ drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, 
     drape_status status = drape_bvh_build(&temporary, count, nodes, node, x, &binary);
     bvh->branches = status ? NULL : drape_arena_take(arena, (size_t)count, sizeof *bvh->branches);
     bvh->place = status ? NULL : drape_arena_take(arena, (size_t)count, sizeof *bvh->place);
-    const bool complete = bvh->branches && bvh->place;
-    if (complete)
+    bvh->order = status ? NULL : drape_arena_take(arena, (size_t)count, sizeof *bvh->order);
+    const bool complete = bvh->branches && bvh->place && bvh->order;
+    if (complete) {
         merge(bvh, &binary, 0);
+        memcpy(bvh->order, binary.order, (size_t)count * sizeof *bvh->order);
+    }
     for (int32_t e = 0; complete && e < count; e++)
         bvh->place[binary.order[e]] = e;
     drape_arena_free(&temporary);
@@ -208,4 +212,39 @@ void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *fro
         traverse_paths(bvh, &q, visit, user);
     else
         traverse_points(bvh, &q, visit, user);
+}
+
+/* ---- Without a tree ---- */
+
+/* On which sides of the query a point is at both ends: bit 2 k is above along axis k, 2 k + 1 below. */
+static void find_sides(const drape_path_query *from, int32_t points, uint8_t *side)
+{
+    const double *const x = from->x, *const y = from->y ? from->y : from->x;
+    const drape_box first = box_of(from->node, from->nodes, x), last = box_of(from->node, from->nodes, y);
+    for (size_t i = 0; i < (size_t)points; i++) {
+        unsigned int sides = 0;
+        for (size_t k = 0; k < 3; k++) {
+            const unsigned int above = (unsigned int)(x[3 * i + k] > first.high[k] + from->reach) &
+                                       (unsigned int)(y[3 * i + k] > last.high[k] + from->reach),
+                               below = (unsigned int)(x[3 * i + k] < first.low[k] - from->reach) &
+                                       (unsigned int)(y[3 * i + k] < last.low[k] - from->reach);
+            sides |= (above | below << 1) << 2 * k;
+        }
+        side[i] = (uint8_t)sides;
+    }
+}
+
+/* An axis separates an element if all of its points are on the same side. */
+void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *from, int32_t points,
+                         const bool *marked, uint8_t *side, drape_bvh_visit *visit, void *user)
+{
+    find_sides(from, points, side);
+    for (int32_t place = 0; place < bvh->count; place++) {
+        const int32_t e = bvh->order[place], *node = bvh->node + (size_t)e * (size_t)bvh->nodes;
+        unsigned int common = side[node[0]];
+        for (int a = 1; a < bvh->nodes; a++)
+            common &= side[node[a]];
+        if (common == 0 && e > from->after && (!from->only_marked || is_marked(bvh, -1 - e, marked)))
+            visit(user, e);
+    }
 }

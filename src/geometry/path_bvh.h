@@ -24,7 +24,8 @@ typedef struct drape_path_bvh {
     int32_t count; /* number of elements */
     int nodes;     /* nodes per element */
     const int32_t *node;
-    int32_t *place; /* (count) of each element in the order of queries */
+    int32_t *place; /* (count) of each element in the order of queries, */
+    int32_t *order; /* (count) and the element in each place */
     drape_path_branch *branches;
     int32_t branch_count;
 } drape_path_bvh;
@@ -51,5 +52,11 @@ typedef struct drape_path_query {
 /* Calls visit for every such element, in an order that does not depend on the positions. */
 void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *query, drape_bvh_visit *visit,
                           void *user);
+
+/* The same for a tree that is not fitted, by a look at each of the points 0 .. points - 1 that its elements
+ * have: for a few queries that is less than to fit it. marked as in drape_path_bvh_fit; side: (points)
+ * scratch. */
+void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *query, int32_t points,
+                         const bool *marked, uint8_t *side, drape_bvh_visit *visit, void *user);
 
 #endif

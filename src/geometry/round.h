@@ -23,6 +23,8 @@ static inline void round_across(const double *u, double *out)
 static inline double round_distance(const double *r, const double *u, double *normal, double *curvature)
 {
     double n[3] = {0, 1, 0}, length = vec3_norm(r);
+    if (!normal && !curvature)
+        return length;
     if (length > 0)
         for (int k = 0; k < 3; k++)
             n[k] = r[k] / length;
