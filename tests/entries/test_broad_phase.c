@@ -210,7 +210,7 @@ START_TEST(everything_near_is_found)
     }
     printf("# %d pairs, %.1f active, %d of %d paths end at a collision, %d with a patch\n",
            (int)all.list.set[0].count, (double)active / ROUNDS, crossing, ROUNDS, patches);
-    ck_assert_int_gt(patches, ROUNDS / 10);
+    ck_assert_int_gt(patches, ROUNDS / 40); /* they serve where less than a tenth of the nodes leave a path */
     ck_assert_int_gt(active, 5 * ROUNDS);
     ck_assert_int_gt(crossing, ROUNDS / 10);
     drape_arena_free(&arena);
