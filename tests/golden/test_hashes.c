@@ -6,8 +6,7 @@
  *
  * Meshes are made coarser, so that there is time for contact: if a scene has colliders or self-contact, the
  * attempts start from the state that `be` reaches after most of its duration, and the test checks that
- * there is contact in it. With a sanitizer, which makes all ten times slower, every other scene is left
- * out: box_edge, crumple, flag, fold, hung_sheet, sphere_drape and verlet_100 remain, with every integrator.
+ * there is contact in it. With a sanitizer, which makes all ten times slower, every other scene is left out.
  * DRAPE_EVERY=N takes every Nth scene, for a processor that is emulated. hashes.txt names the versions of the
  * libraries with which it was written; with others, whose results may have other bits, the test says so and
  * leaves the comparison out. `tools/hashes` writes the file: with DRAPE_HASHES=FILE this program writes its
