@@ -21,8 +21,9 @@ typedef struct bench {
     drape_arena arena;
     double *x, *v, *g; /* (node_count x 3) */
     double *history;   /* (measure_count); NULL if no law needs rates */
-    double *values;    /* of the Jacobian */
-    double *b, *d;     /* (free DOFs) */
+    const drape_pattern *pattern;
+    double *values; /* of the Jacobian, in the pattern */
+    double *b, *d;  /* (free DOFs) */
     drape_point point;
     double mass_weight;
     int32_t term; /* the one that is measured */
@@ -79,7 +80,7 @@ static void set_point(bench *s, double dt)
         .x = s->x, .v = s->v, .internal = from->internal, .weight = 1 / dt, .history = s->history};
 }
 
-static drape_status create(bench *s, bool implicit)
+static drape_status create(bench *s)
 {
     const drape_model *model = s->sim->model;
     size_t nodes = 3 * (size_t)model->node_count, dofs = 3 * (size_t)model->free_count;
@@ -90,8 +91,19 @@ static drape_status create(bench *s, bool implicit)
     s->d = drape_arena_take(&s->arena, dofs, sizeof *s->d);
     if (model->has_laws)
         s->history = drape_arena_take(&s->arena, (size_t)model->measure_count, sizeof *s->history);
-    if (implicit)
-        s->values = drape_arena_take(&s->arena, (size_t)model->pattern.nonzeros, sizeof *s->values);
+    return drape_arena_status(&s->arena);
+}
+
+/* Takes the values of a matrix that has all pairs in contact at the point, of which a scene may begin with
+ * some. */
+static drape_status create_values(bench *s)
+{
+    bool changed;
+    const drape_status status = drape_system_extend_pattern(s->sim->system, &s->point, &changed);
+    if (status)
+        return status;
+    s->pattern = drape_system_pattern(s->sim->system);
+    s->values = drape_arena_take(&s->arena, (size_t)s->pattern->nonzeros, sizeof *s->values);
     return drape_arena_status(&s->arena);
 }
 
@@ -241,7 +253,7 @@ static void report_solver(const bench *s, drape_profile *out)
  * what they will take. */
 static drape_status measure_solver(bench *s, drape_profile *out)
 {
-    drape_status status = s->linear->create(&s->arena, &s->sim->model->pattern, &s->solver);
+    drape_status status = s->linear->create(&s->arena, s->pattern, &s->solver);
     if (status)
         return status;
     size_t before = s->arena.bytes + drape_linear_bytes(s->linear, s->solver);
@@ -264,10 +276,14 @@ static const drape_linear_ops *linear_of(const drape_chosen *chosen)
 
 static drape_status measure(bench *s, drape_profile *out)
 {
-    drape_status status = create(s, out->implicit);
+    drape_status status = create(s);
     if (status)
         return status;
     set_point(s, out->dt);
+    if (out->implicit)
+        status = create_values(s);
+    if (status)
+        return status;
     status = measure_terms(s, out->implicit, out->terms);
     if (status)
         return status;
