@@ -508,7 +508,7 @@ def test_broken_run():
         file.truncate(size - 100)
     one_line(drape("render", "ball", "--out", "x.png"), 2, "less data than its header says")
     os.remove("ball/positions.npy")
-    one_line(drape("render", "ball", "--out", "x.png"), 2, "--format npy")
+    one_line(drape("render", "ball", "--out", "x.png"), 2, "frame format npy")
     write_scene(mesh={"grid": "square", "columns": 3, "rows": 3, "width": 1, "height": 1}, colliders=None, contact=None)
     good("run", "ball.json", "--out", "small", "--format", "npy")
     shutil.copy("small/positions.npy", "ball/positions.npy")
