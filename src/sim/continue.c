@@ -187,7 +187,7 @@ drape_status drape_sim_continue(drape_sim *to, drape_sim *from)
     match_colliders(to->model, from->model, before);
     copy_state(to, from);
     let_go(to, from);
-    drape_status status = drape_system_continue(to->system, from->system, before);
+    drape_status status = drape_system_continue(to->system, from->system, before, drape_sim_state(from)->t);
     if (!status) {
         drape_sim_continue_rides(to, from, before);
         status = hold(to, from);
