@@ -3,6 +3,8 @@
 #include "base/finite.h"
 #include "base/rotation.h"
 #include "base/vec3.h"
+#include "colliders/colliders.h"
+#include "geometry/mesh_distance.h"
 #include "sim/attach.h"
 #include "sim/place.h"
 
@@ -207,7 +209,9 @@ static drape_status check_points(const drape_sim *sim, const drape_collider *c, 
     const drape_mesh mesh = {
         .triangle_count = c->shape.triangle_count, .triangle = c->shape.triangle, .x = x};
     const drape_mesh_source source = {.pointer = "", .part = "drape_sim_deform_collider: "};
-    const drape_status status = drape_mesh_validate_shapes(sim->ctx, &source, &mesh);
+    drape_status status = drape_mesh_validate_shapes(sim->ctx, &source, &mesh);
+    if (!status && drape_mesh_distance_side(c->shape.kept) != DRAPE_SIDE_NONE)
+        status = drape_shape_check_volume(sim->ctx, &source, &mesh);
     drape_free(sim->ctx, x);
     return status;
 }
