@@ -797,9 +797,9 @@ void drape_system_archive(drape_system *system, drape_archive *a)
 
 /* ---- Another system goes on ---- */
 
-drape_status drape_system_continue(drape_system *system, drape_system *from, const int32_t *before)
+drape_status drape_system_continue(drape_system *system, drape_system *from, const int32_t *before, double t)
 {
-    drape_motion_copy(system->motion, from->motion, before);
+    drape_motion_copy(system->motion, from->motion, before, t);
     for (int32_t i = 0; i < from->drag.count; i++)
         if (!system->model->pinned[from->drag.spring[i].node])
             system->drag.spring[system->drag.count++] = from->drag.spring[i];

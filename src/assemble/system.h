@@ -104,7 +104,7 @@ void drape_system_archive(drape_system *system, drape_archive *a);
 /* Takes what another system of the same cloth keeps besides its model, except the wind; drag springs on nodes
  * that are pinned here are gone. before (collider_count): the number that each collider has there; -1: it is
  * new. Errors: DRAPE_E_MEMORY. */
-drape_status drape_system_continue(drape_system *system, drape_system *from, const int32_t *before);
+drape_status drape_system_continue(drape_system *system, drape_system *from, const int32_t *before, double t);
 
 /* Begins a step at a state, against which contact compares until the next call. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);

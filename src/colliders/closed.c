@@ -28,6 +28,18 @@ static double six_volumes(const drape_mesh *mesh)
     return sum;
 }
 
+drape_status drape_shape_check_volume(drape_context *ctx, const drape_mesh_source *source,
+                                      const drape_mesh *mesh)
+{
+    const double volume = six_volumes(mesh) / 6;
+    if (volume > 0)
+        return DRAPE_OK;
+    return drape_mesh_fail(ctx, source, 0,
+                           "the mesh is inside out: its volume is %g m3; triangles go counterclockwise seen "
+                           "from outside",
+                           volume);
+}
+
 static drape_status check_closed(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh)
 {
     for (int32_t e = 0; e < mesh->edge_count; e++) {
@@ -44,14 +56,7 @@ static drape_status check_closed(drape_context *ctx, const drape_mesh_source *so
                 "same direction",
                 (int)beside[0], (int)beside[1], (int)ends[0], (int)ends[1]);
     }
-    double volume = six_volumes(mesh) / 6;
-    if (!(volume > 0))
-        return drape_mesh_fail(
-            ctx, source, 0,
-            "the mesh is inside out: its volume is %g m3; triangles go counterclockwise seen "
-            "from outside",
-            volume);
-    return DRAPE_OK;
+    return drape_shape_check_volume(ctx, source, mesh);
 }
 
 drape_status drape_shape_check_mesh(drape_context *ctx, const drape_mesh_source *source, bool closed,

@@ -62,6 +62,22 @@ static void transform(const double *values, const drape_mesh *mesh, drape_sequen
     memcpy(mesh->x, frames->x, 3 * (size_t)mesh->node_count * sizeof *mesh->x);
 }
 
+/* A body that turned inside out between two frames would hold the cloth that is outside. */
+static drape_status check_volumes(drape_context *ctx, const char *at, const char *file,
+                                  const drape_mesh *mesh, const drape_sequence *frames)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t f = 1; !status && f < frames->frame_count; f++) {
+        char part[32];
+        snprintf(part, sizeof part, "frame %d: ", (int)f);
+        const drape_mesh_source source = {.pointer = at, .file = file, .part = part};
+        drape_mesh frame = *mesh;
+        frame.x = frames->x + 3 * (size_t)f * (size_t)mesh->node_count;
+        status = drape_shape_check_volume(ctx, &source, &frame);
+    }
+    return status;
+}
+
 /* Positions are checked before and after the transform: what is wrong in a file is reported there. */
 static drape_status read_frames(const double *values, drape_collider_shape *shape, drape_mesh *mesh,
                                 drape_sequence *frames)
@@ -82,6 +98,8 @@ static drape_status read_frames(const double *values, drape_collider_shape *shap
         status = drape_shape_check_mesh(builder->ctx, &file, values[OPEN] == 0, mesh);
     if (!status)
         status = drape_sequence_validate(builder->ctx, &file, mesh, frames);
+    if (!status && values[OPEN] == 0)
+        status = check_volumes(builder->ctx, at, def.file, mesh, frames);
     if (status)
         return status;
     transform(values, mesh, frames);

@@ -46,6 +46,10 @@ const char *drape_shape_text(const drape_collider_shape *shape, const char *para
 drape_status drape_shape_check_mesh(drape_context *ctx, const drape_mesh_source *source, bool closed,
                                     drape_mesh *mesh);
 
+/* Whether the volume inside a closed mesh is positive. Errors: DRAPE_E_ARGUMENT. */
+drape_status drape_shape_check_volume(drape_context *ctx, const drape_mesh_source *source,
+                                      const drape_mesh *mesh);
+
 /* Makes the nodes, edges and triangles of a mesh the parts of a shape. Errors: DRAPE_E_MEMORY. */
 drape_status drape_shape_copy_mesh(const drape_mesh *mesh, drape_collider_shape *shape);
 

@@ -1,8 +1,8 @@
 /* deformed.c: see deformed.h. */
 #include "colliders/deformed.h"
 
-#include "geometry/closest.h"
 #include "geometry/mesh_distance.h"
+#include "geometry/nearest.h"
 
 #include <math.h>
 #include <string.h>
@@ -53,24 +53,30 @@ drape_status drape_deformed_at(drape_arena *arena, const drape_model *model, con
     return DRAPE_OK;
 }
 
-int32_t drape_deformed_nearest(const drape_motion *motion, int32_t collider, double t, const double x[3])
+drape_status drape_deformed_nearest(drape_context *ctx, const drape_motion *motion, int32_t collider,
+                                    double t, int32_t count, const int32_t *nodes, const double *x,
+                                    int32_t *triangles)
 {
     const drape_collider *c = &motion->model->colliders[collider];
+    drape_arena arena = drape_arena_of(ctx);
     drape_collider_pose pose;
-    drape_closest at;
-    double points[4][3], corner[9], best = INFINITY;
-    int32_t nearest = -1;
+    drape_bvh tree = {.count = 0};
+    double *points = NULL;
+    drape_status status = DRAPE_OK;
     drape_motion_pose(motion, collider, t, t, &pose);
-    drape_pose_own(&pose, x, points[0]);
-    for (int32_t k = 0; c->frames.frame_count > 0 && k < c->shape.triangle_count; k++) {
-        drape_deformation_corners(&motion->deformation[collider], c->shape.triangle + 3 * (size_t)k, t,
-                                  corner);
-        memcpy(points[1], corner, sizeof corner);
-        drape_closest_point_triangle(points, &at);
-        if (at.distance < best) {
-            best = at.distance;
-            nearest = k;
-        }
+    if (count > 0 && c->frames.frame_count > 0) {
+        points = drape_arena_take(&arena, (size_t)c->shape.point_count, 3 * sizeof *points);
+        status = drape_arena_status(&arena);
+        if (!status)
+            drape_motion_points(motion, collider, t, points);
+        if (!status)
+            status = drape_bvh_build(&arena, c->shape.triangle_count, 3, c->shape.triangle, points, &tree);
     }
-    return nearest;
+    for (int32_t i = 0; !status && i < count; i++) {
+        double own[3];
+        drape_pose_own(&pose, x + 3 * (size_t)nodes[i], own);
+        triangles[i] = drape_nearest_on(&tree, points, own, INFINITY).triangle;
+    }
+    drape_arena_free(&arena);
+    return status;
 }

@@ -24,8 +24,11 @@ void drape_deformed_move(drape_deformed *deformed, const double *points);
 drape_status drape_deformed_at(drape_arena *arena, const drape_model *model, const drape_motion *motion,
                                int32_t collider, double t, const drape_collider **out);
 
-/* The triangle of a collider with frames that is nearest to a point of space at time t, the first of
- * several; -1 if the collider is rigid. Tries all triangles. */
-int32_t drape_deformed_nearest(const drape_motion *motion, int32_t collider, double t, const double x[3]);
+/* Writes the triangles (count) of a collider with frames that are nearest to nodes (count) at the positions x
+ * (node_count x 3) of space at time t, of several the first one; -1 if the collider is rigid. Errors:
+ * DRAPE_E_MEMORY. */
+drape_status drape_deformed_nearest(drape_context *ctx, const drape_motion *motion, int32_t collider,
+                                    double t, int32_t count, const int32_t *nodes, const double *x,
+                                    int32_t *triangles);
 
 #endif

@@ -51,6 +51,7 @@ static drape_status set_pivot(drape_model *model, const char *pointer, const dou
     const bool is_given = !isnan(given[0]);
     char at[96];
     snprintf(at, sizeof at, "%s/pivot", pointer);
+    to->pivot_given = is_given;
     for (int k = 0; k < 3; k++) {
         double low = shape->point_count > 0 ? INFINITY : 0, high = -low;
         for (int32_t i = 0; i < shape->point_count; i++) {

@@ -53,14 +53,23 @@ static drape_status check_triangle(const drape_model *model, const char *pointer
 }
 
 /* The nodes of a pin begin where they are at rest. */
-static void attach(drape_model *model, const drape_motion *motion, const drape_pin *pin, int32_t collider,
-                   int32_t triangle)
+static drape_status attach(drape_model *model, const drape_motion *motion, const drape_pin *pin,
+                           int32_t collider, int32_t triangle)
 {
-    for (int32_t i = 0; i < pin->node_count; i++) {
-        const double *x = model->rest + 3 * (size_t)pin->node[i];
-        const int32_t on = triangle >= 0 ? triangle : drape_deformed_nearest(motion, collider, 0, x);
-        drape_motion_ride_from(motion, collider, on, 0, x, &model->ride[pin->node[i]]);
-    }
+    int32_t *on = drape_alloc(model->ctx, (size_t)pin->node_count + 1, sizeof *on);
+    if (!on)
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < pin->node_count; i++)
+        on[i] = triangle;
+    drape_status status = DRAPE_OK;
+    if (triangle < 0)
+        status = drape_deformed_nearest(model->ctx, motion, collider, 0, pin->node_count, pin->node,
+                                        model->rest, on);
+    for (int32_t i = 0; !status && i < pin->node_count; i++)
+        drape_motion_ride_from(motion, collider, on[i], 0, model->rest + 3 * (size_t)pin->node[i],
+                               &model->ride[pin->node[i]]);
+    drape_free(model->ctx, on);
+    return status;
 }
 
 static drape_status attach_all(drape_model *model, const drape_scene_def *def, const drape_motion *motion)
@@ -79,7 +88,7 @@ static drape_status attach_all(drape_model *model, const drape_scene_def *def, c
             if (!status)
                 status = check_triangle(model, pointer, from->triangle, &model->colliders[collider]);
             if (!status)
-                attach(model, motion, pin, collider, from->triangle);
+                status = attach(model, motion, pin, collider, from->triangle);
         }
     return status;
 }

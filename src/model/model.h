@@ -171,6 +171,7 @@ typedef struct drape_collider {
                               keep a drape_mesh_distance of their triangles, and are not smooth */
     drape_turns turns; /* rotation about the pivot; no keys: it does not turn */
     double pivot[3];   /* [m] in its own coordinates: the point that the track displaces */
+    bool pivot_given;  /* by the scene; if not, it is the middle of the shape */
     double radius;     /* [m] of its shape's points around the pivot; of the scene, if it has none */
 } drape_collider;
 

@@ -469,31 +469,6 @@ void drape_motion_place_cloth(drape_motion *motion, int32_t cloth, const drape_p
             place_path(by, &motion->pin_path[i]);
 }
 
-static bool same_points(const drape_collider_shape *a, const drape_collider_shape *b)
-{
-    return a->point_count == b->point_count &&
-           (a->point_count == 0 ||
-            memcmp(a->point, b->point, 3 * (size_t)a->point_count * sizeof *a->point) == 0);
-}
-
-void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int32_t *before)
-{
-    const drape_model *m = motion->model;
-    for (int32_t i = 0; i < from->moved_count; i++)
-        if (m->pinned[from->moved_node[i]])
-            motion->pin_path[find_place(motion, from->moved_node[i])] = from->pin_path[i];
-    for (int32_t c = 0; c < m->collider_count; c++) {
-        if (before[c] < 0)
-            continue;
-        motion->collider_path[c] = from->collider_path[before[c]];
-        motion->collider_turn[c] = from->collider_turn[before[c]];
-        motion->collider_placed[c] = from->collider_placed[before[c]];
-        if (same_points(&m->colliders[c].shape, &from->model->colliders[before[c]].shape))
-            drape_deformation_copy(&motion->deformation[c], &from->deformation[before[c]]);
-    }
-    memcpy(motion->cloth_placed, from->cloth_placed, (size_t)m->cloth_count * sizeof *motion->cloth_placed);
-}
-
 void drape_motion_place_pin(const drape_motion *motion, int32_t node, double t, double x[3])
 {
     if (motion->place[node] < 0) {
@@ -716,11 +691,14 @@ double drape_motion_collider_power(const drape_motion *motion, const drape_load 
     return power;
 }
 
-void drape_motion_collider_arrival(const drape_motion *motion, int32_t collider, double t, double v[3])
+void drape_motion_collider_arrival(const drape_motion *motion, int32_t collider, double t, double v[3],
+                                   double w[3])
 {
     const course c = collider_course(motion, collider);
     if (!leading_velocity(&c, t, v))
         memset(v, 0, 3 * sizeof *v);
+    if (!leading_spin(&c, t, w))
+        memset(w, 0, 3 * sizeof *w);
 }
 
 void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t, double span,
@@ -769,6 +747,108 @@ void drape_motion_place_collider(drape_motion *motion, int32_t collider, const d
     compose(by, &motion->collider_placed[collider]);
     place_path(by, &motion->collider_path[collider]);
     place_turn(by, &motion->collider_turn[collider]);
+}
+
+/* ---- Another motion ---- */
+
+/* A path begins anew at time t: the motion up to there is forgotten, that from there on is the same but for
+ * the way between the ends of a turn. */
+static void cut_path(const course *c, double t, drape_path *path, drape_turn_path *turn)
+{
+    drape_path rest = *path;
+    drape_turn_path after = *turn;
+    double end[9], between[9], spin[2][3];
+    rest.t[0] = t;
+    rest.smooth = true;
+    path_displacement(path, t, rest.x[0]);
+    path_velocity(path, t, t, rest.v[0]);
+    rotation_on(c, t, after.from);
+    rotation_on(c, path->t[1], end);
+    spin_on(c, t, t, spin[0]);
+    drape_rotation_velocity(turn->turn, turn->rate[1], spin[1]);
+    drape_rotation_between(end, after.from, between);
+    drape_rotation_log(between, after.turn);
+    memcpy(after.rate[0], spin[0], sizeof after.rate[0]);
+    drape_rotation_rate(after.turn, spin[1], after.rate[1]);
+    *path = rest;
+    *turn = after;
+}
+
+/* With the rotation R about the pivot p' in place of p, a displacement d' = d + p - p' - R (p - p') is that of
+ * the same pose; by = p - p'. */
+static void shift_by_pivot(const double R[9], const double by[3], double d[3])
+{
+    double turned[3];
+    drape_rotation_turn(R, by, turned);
+    for (int k = 0; k < 3; k++)
+        d[k] += by[k] - turned[k];
+}
+
+static void repivot_path(const double by[3], drape_path *path, const drape_turn_path *turn)
+{
+    for (int end = 0; end < 2; end++) {
+        static const double zero[3];
+        double further[9], R[9], turned[3], w[3], moves[3];
+        drape_rotation_exp(end ? turn->turn : zero, further);
+        drape_rotation_product(further, turn->from, R);
+        drape_rotation_velocity(end ? turn->turn : zero, turn->rate[end], w);
+        drape_rotation_turn(R, by, turned);
+        vec3_cross(w, turned, moves);
+        shift_by_pivot(R, by, path->x[end]);
+        vec3_add_scaled(-1, moves, path->v[end]);
+    }
+}
+
+/* The pose in space and its velocities at t, and those at the end of a path, are those about the former
+ * pivot. A pivot that no scene gives is the middle of the shape and moves with it. */
+static void keep_pose(drape_motion *motion, int32_t collider, const drape_collider *before, double t)
+{
+    const drape_collider *now = &motion->model->colliders[collider];
+    drape_path *path = &motion->collider_path[collider];
+    drape_placement *placed = &motion->collider_placed[collider];
+    const course c = collider_course(motion, collider);
+    double by[3], R[9];
+    vec3_sub(before->pivot, now->pivot, by);
+    if (rests(by) || !(before->pivot_given || now->pivot_given))
+        return;
+    if (path->given) {
+        if (t > path->t[0] && t < path->t[1])
+            cut_path(&c, t, path, &motion->collider_turn[collider]);
+        repivot_path(by, path, &motion->collider_turn[collider]);
+        return;
+    }
+    rotation_on(&c, t, R);
+    if (drape_rotation_is_none(R))
+        return;
+    if (!placed->given)
+        *placed = (drape_placement){.given = true, .turn = DRAPE_NO_ROTATION};
+    shift_by_pivot(R, by, placed->shift);
+}
+
+static bool same_points(const drape_collider_shape *a, const drape_collider_shape *b)
+{
+    return a->point_count == b->point_count &&
+           (a->point_count == 0 ||
+            memcmp(a->point, b->point, 3 * (size_t)a->point_count * sizeof *a->point) == 0);
+}
+
+void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int32_t *before, double t)
+{
+    const drape_model *m = motion->model;
+    for (int32_t i = 0; i < from->moved_count; i++)
+        if (m->pinned[from->moved_node[i]])
+            motion->pin_path[find_place(motion, from->moved_node[i])] = from->pin_path[i];
+    for (int32_t c = 0; c < m->collider_count; c++) {
+        if (before[c] < 0)
+            continue;
+        motion->collider_path[c] = from->collider_path[before[c]];
+        motion->collider_turn[c] = from->collider_turn[before[c]];
+        motion->collider_placed[c] = from->collider_placed[before[c]];
+        if (same_points(&m->colliders[c].shape, &from->model->colliders[before[c]].shape))
+            drape_deformation_copy(&motion->deformation[c], &from->deformation[before[c]]);
+        keep_pose(motion, c, &from->model->colliders[before[c]], t);
+    }
+    memcpy(motion->cloth_placed, from->cloth_placed, (size_t)m->cloth_count * sizeof *motion->cloth_placed);
 }
 
 /* ---- Checkpoints ---- */

@@ -123,10 +123,11 @@ void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double 
 void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t, double span,
                                 const double x[3], const double *v, const double *rotation, const double *w);
 
-/* The velocities with which a pinned node and the pivot of a collider come to where they are at time t; 0
- * at a key of a track. */
+/* The velocities with which a pinned node and the pivot of a collider come to where they are at time t, and
+ * the angular velocity w of the collider; 0 at a key of a track. */
 void drape_motion_pin_arrival(const drape_motion *motion, int32_t node, double t, double v[3]);
-void drape_motion_collider_arrival(const drape_motion *motion, int32_t collider, double t, double v[3]);
+void drape_motion_collider_arrival(const drape_motion *motion, int32_t collider, double t, double v[3],
+                                   double w[3]);
 
 /* Places the pins of a cloth, or a collider, elsewhere: their rest positions, tracks and paths, past and
  * future, are moved as one. For a collider the placement acts on displacements, and its turn on
@@ -141,9 +142,10 @@ void drape_placement_turn(const drape_placement *by, const double x[3], double y
 /* The position of a pinned node that neither a track nor a path moves. */
 void drape_motion_place_fixed(const drape_motion *motion, int32_t node, double x[3]);
 
-/* Takes the paths and placements of another motion of the same cloth, in which other nodes may be pinned.
- * before (collider_count): the number that each collider has there; -1: it is new. */
-void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int32_t *before);
+/* Takes the paths and placements at time t of another motion of the same cloth, in which other nodes may be
+ * pinned. before (collider_count): the number that each collider has there; -1: it is new. One that has
+ * another pivot, given there or here, is where it would be with the former one. */
+void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int32_t *before, double t);
 
 /* The collider that carries a moved pin; -1: none. */
 int32_t drape_motion_carrier(const drape_motion *motion, int32_t i);

@@ -6,18 +6,27 @@
 
 #include <string.h>
 
-/* The collider carries the node from where it is. triangle -1: the nearest one, if the collider deforms. */
+/* The collider carries the node from where it is; triangle -1: as a whole. */
 static void attach(const drape_sim *sim, int32_t node, int32_t collider, int32_t triangle, bool given)
 {
     const drape_state *now = drape_sim_state(sim);
     drape_motion *motion = drape_system_steer(sim->system);
-    const double *x = now->x + 3 * (size_t)node;
-    const int32_t on = triangle >= 0 ? triangle : drape_deformed_nearest(motion, collider, now->t, x);
     drape_ride ride;
-    drape_motion_ride_from(motion, collider, on, now->t, x, &ride);
+    drape_motion_ride_from(motion, collider, triangle, now->t, now->x + 3 * (size_t)node, &ride);
     ride.given = given;
     ride.since = now->t;
     drape_motion_take_ride(motion, node, &ride);
+}
+
+/* *out: the triangles (count) of a collider that carry these nodes from where they are, to be freed. */
+static drape_status find_triangles(const drape_sim *sim, int32_t collider, int32_t count,
+                                   const int32_t *nodes, int32_t **out)
+{
+    const drape_state *now = drape_sim_state(sim);
+    *out = drape_alloc(sim->ctx, (size_t)count + 1, sizeof **out);
+    return *out ? drape_deformed_nearest(sim->ctx, drape_system_motion(sim->system), collider, now->t, count,
+                                         nodes, now->x, *out)
+                : DRAPE_E_MEMORY;
 }
 
 int32_t drape_sim_carrier(const drape_sim *sim, int32_t node)
@@ -96,6 +105,22 @@ static void start_riding(drape_sim *sim, int32_t count, const int32_t *nodes)
     sim->chosen.integrator->restart(sim->integrator, now);
 }
 
+static drape_status carry(drape_sim *sim, int32_t collider, int32_t count, const int32_t *nodes,
+                          const int32_t *triangles)
+{
+    /* contact may need memory for its energy; a sim that was made for new pins has it */
+    const drape_energy before = drape_sim_energy(sim);
+    if (drape_system_status(sim->system) == DRAPE_E_MEMORY) {
+        sim->energy_known = false;
+        return DRAPE_E_MEMORY;
+    }
+    for (int32_t i = 0; i < count; i++)
+        attach(sim, nodes[i], collider, triangles ? triangles[i] : -1, true);
+    start_riding(sim, count, nodes);
+    drape_sim_shift_energy(sim, &before);
+    return DRAPE_OK;
+}
+
 drape_status drape_sim_attach(drape_sim *sim, int32_t collider, int32_t count, const int32_t *nodes,
                               const int32_t *triangles)
 {
@@ -108,21 +133,15 @@ drape_status drape_sim_attach(drape_sim *sim, int32_t collider, int32_t count, c
     status = check_nodes(sim, "drape_sim_attach", count, nodes);
     if (!status)
         status = check_triangles(sim, collider, count, triangles);
+    int32_t *nearest = NULL;
+    if (!status && !triangles && sim->model->colliders[collider].frames.frame_count > 0)
+        status = find_triangles(sim, collider, count, nodes, &nearest);
     if (!status)
         status = set_pins(sim, count, nodes, 1);
-    if (status)
-        return status;
-    /* contact may need memory for its energy; a sim that was made for new pins has it */
-    const drape_energy before = drape_sim_energy(sim);
-    if (drape_system_status(sim->system) == DRAPE_E_MEMORY) {
-        sim->energy_known = false;
-        return DRAPE_E_MEMORY;
-    }
-    for (int32_t i = 0; i < count; i++)
-        attach(sim, nodes[i], collider, triangles ? triangles[i] : -1, true);
-    start_riding(sim, count, nodes);
-    drape_sim_shift_energy(sim, &before);
-    return DRAPE_OK;
+    if (!status)
+        status = carry(sim, collider, count, nodes, nearest ? nearest : triangles);
+    drape_free(sim->ctx, nearest);
+    return status;
 }
 
 drape_status drape_sim_detach(drape_sim *sim, int32_t count, const int32_t *nodes)
@@ -163,8 +182,15 @@ static int32_t number_in(const drape_model *to, int32_t collider, const int32_t 
     return -1;
 }
 
+/* Pins of `to` that its colliders are to carry on triangles that are not known yet. */
+typedef struct joining {
+    int32_t *collider; /* (node_count) -1: none */
+    bool *given;       /* (node_count) by the host, not by the scene */
+    int32_t *nodes;    /* (node_count) workspace */
+} joining;
+
 /* Pins that went on with a ride, each on the collider of the same name. */
-static void continue_rides(drape_sim *to, const drape_sim *from, const int32_t *before)
+static void continue_rides(drape_sim *to, const drape_sim *from, const int32_t *before, joining *join)
 {
     const drape_model *m = to->model;
     const drape_motion *motion = drape_system_motion(from->system);
@@ -175,26 +201,63 @@ static void continue_rides(drape_sim *to, const drape_sim *from, const int32_t *
         if (c < 0 || !m->pinned[node] || !(ride.given || (m->ride && m->ride[node].collider == c)))
             continue;
         ride.collider = c;
-        if (same_triangles(&m->colliders[c], &from->model->colliders[on]))
+        if (same_triangles(&m->colliders[c], &from->model->colliders[on])) {
             drape_motion_take_ride(drape_system_steer(to->system), node, &ride);
-        else
-            attach(to, node, c, -1, ride.given);
+            continue;
+        }
+        join->collider[node] = c;
+        join->given[node] = ride.given;
     }
 }
 
 /* Pins that the new scene attaches to another collider than the former one did, or newly. */
-static void begin_rides(drape_sim *to, const drape_sim *from, const int32_t *before)
+static void begin_rides(drape_sim *to, const drape_sim *from, const int32_t *before, joining *join)
 {
     const drape_ride *ride = to->model->ride, *former = from->model->ride;
-    for (int32_t i = 0; ride && i < to->model->node_count; i++)
-        if (ride[i].collider >= 0 && to->model->pinned[i] &&
-            !(former && former[i].collider >= 0 && before[ride[i].collider] == former[i].collider))
+    for (int32_t i = 0; ride && i < to->model->node_count; i++) {
+        if (ride[i].collider < 0 || !to->model->pinned[i] ||
+            (former && former[i].collider >= 0 && before[ride[i].collider] == former[i].collider))
+            continue;
+        join->collider[i] = ride[i].triangle < 0 ? ride[i].collider : -1;
+        join->given[i] = false;
+        if (ride[i].triangle >= 0)
             attach(to, i, ride[i].collider, ride[i].triangle, false);
+    }
 }
 
-void drape_sim_continue_rides(drape_sim *to, const drape_sim *from, const int32_t *before)
+static drape_status join_all(drape_sim *to, const joining *join)
 {
-    continue_rides(to, from, before);
-    if (to->model->ride != from->model->ride)
-        begin_rides(to, from, before);
+    drape_status status = DRAPE_OK;
+    for (int32_t c = 0; !status && c < to->model->collider_count; c++) {
+        int32_t count = 0, *triangles = NULL;
+        for (int32_t i = 0; i < to->model->node_count; i++)
+            if (join->collider[i] == c)
+                join->nodes[count++] = i;
+        if (count > 0)
+            status = find_triangles(to, c, count, join->nodes, &triangles);
+        for (int32_t i = 0; !status && i < count; i++)
+            attach(to, join->nodes[i], c, triangles[i], join->given[join->nodes[i]]);
+        drape_free(to->ctx, triangles);
+    }
+    return status;
+}
+
+drape_status drape_sim_continue_rides(drape_sim *to, const drape_sim *from, const int32_t *before)
+{
+    const size_t nodes = (size_t)to->model->node_count;
+    drape_arena scratch = drape_arena_of(to->ctx);
+    joining join = {drape_arena_take(&scratch, nodes, sizeof *join.collider),
+                    drape_arena_take(&scratch, nodes, sizeof *join.given),
+                    drape_arena_take(&scratch, nodes, sizeof *join.nodes)};
+    drape_status status = drape_arena_status(&scratch);
+    for (size_t i = 0; !status && i < nodes; i++)
+        join.collider[i] = -1;
+    if (!status)
+        continue_rides(to, from, before, &join);
+    if (!status && to->model->ride != from->model->ride)
+        begin_rides(to, from, before, &join);
+    if (!status)
+        status = join_all(to, &join);
+    drape_arena_free(&scratch);
+    return status;
 }

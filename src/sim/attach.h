@@ -12,7 +12,7 @@ void drape_sim_ride_on(drape_sim *sim, int32_t node);
 
 /* Takes to a new sim the pins that colliders carry, where its model has these colliders: before
  * (collider_count), the number that each had; -1: it is new. Those that the scene attached only where the
- * new scene does, too. */
-void drape_sim_continue_rides(drape_sim *to, const drape_sim *from, const int32_t *before);
+ * new scene does, too. Errors: DRAPE_E_MEMORY. */
+drape_status drape_sim_continue_rides(drape_sim *to, const drape_sim *from, const int32_t *before);
 
 #endif

@@ -187,11 +187,11 @@ drape_status drape_sim_continue(drape_sim *to, drape_sim *from)
     match_colliders(to->model, from->model, before);
     copy_state(to, from);
     let_go(to, from);
-    drape_status status = drape_system_continue(to->system, from->system, before);
-    if (!status) {
-        drape_sim_continue_rides(to, from, before);
+    drape_status status = drape_system_continue(to->system, from->system, before, drape_sim_state(from)->t);
+    if (!status)
+        status = drape_sim_continue_rides(to, from, before);
+    if (!status)
         status = hold(to, from);
-    }
     if (!status)
         status = copy_driver(to, from);
     if (!status)

@@ -3,6 +3,8 @@
 #include "base/finite.h"
 #include "base/rotation.h"
 #include "base/vec3.h"
+#include "colliders/colliders.h"
+#include "geometry/mesh_distance.h"
 #include "sim/attach.h"
 #include "sim/place.h"
 
@@ -88,6 +90,24 @@ static void pivot_of(const drape_sim *sim, int32_t collider, double pivot[3])
     vec3_add_scaled(1, sim->model->colliders[collider].pivot, pivot);
 }
 
+/* A turn that is sent within a moment implies an angular velocity, as well. One that is placed instead turns
+ * only as it does on arrival. */
+static drape_status check_spin(const drape_sim *sim, const char *function, int32_t collider, double seconds,
+                               const drape_sent *to)
+{
+    double now[9], between[9], turn[3] = {0};
+    if (!to->rotation)
+        return DRAPE_OK;
+    drape_motion_rotation(drape_system_motion(sim->system), collider, drape_sim_state(sim)->t, now);
+    drape_rotation_between(to->rotation, now, between);
+    drape_rotation_log(between, turn);
+    if (vec3_norm(turn) <= MAX_SPIN * seconds)
+        return DRAPE_OK;
+    return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                      "%s: %s would turn by %.4g rad in %g s; its angular velocity is within %g rad/s",
+                      function, sim->model->colliders[collider].name, vec3_norm(turn), seconds, MAX_SPIN);
+}
+
 static drape_status send_collider(drape_sim *sim, const char *function, int32_t collider, double seconds,
                                   const drape_sent *to)
 {
@@ -100,6 +120,8 @@ static drape_status send_collider(drape_sim *sim, const char *function, int32_t 
                        "%s: displacement and velocity must be within %g m and m/s", function, MAX_DISTANCE);
     if (!status)
         status = drape_sim_teleport_collider(sim, collider, seconds, to);
+    if (!status)
+        status = check_spin(sim, function, collider, seconds, to);
     if (!status)
         drape_motion_send_collider(drape_system_steer(sim->system), collider, drape_sim_state(sim)->t,
                                    seconds, to->displacement, to->velocity, to->rotation,
@@ -187,7 +209,9 @@ static drape_status check_points(const drape_sim *sim, const drape_collider *c, 
     const drape_mesh mesh = {
         .triangle_count = c->shape.triangle_count, .triangle = c->shape.triangle, .x = x};
     const drape_mesh_source source = {.pointer = "", .part = "drape_sim_deform_collider: "};
-    const drape_status status = drape_mesh_validate_shapes(sim->ctx, &source, &mesh);
+    drape_status status = drape_mesh_validate_shapes(sim->ctx, &source, &mesh);
+    if (!status && drape_mesh_distance_side(c->shape.kept) != DRAPE_SIDE_NONE)
+        status = drape_shape_check_volume(sim->ctx, &source, &mesh);
     drape_free(sim->ctx, x);
     return status;
 }

@@ -135,11 +135,27 @@ static void find_collider_on(const query *q, int32_t collider, const double *ori
     vec3_add_scaled(t, direction, hit->point);
 }
 
+/* Of length 1, by the largest component first, so that no square over- or underflows. Returns whether there is
+ * such a direction. */
+static bool normalise(const double *along, double direction[3])
+{
+    const double largest = fmax(fmax(fabs(along[0]), fabs(along[1])), fabs(along[2]));
+    if (!(largest > 0) || !drape_all_finite(along, 3))
+        return false;
+    for (int k = 0; k < 3; k++)
+        direction[k] = along[k] / largest;
+    const double size = vec3_norm(direction);
+    for (int k = 0; k < 3; k++)
+        direction[k] /= size;
+    return true;
+}
+
 static void find_on_ray(const query *q, const double *origin, const double *along, double length,
                         drape_hit *hit)
 {
     const drape_sim *sim = q->sim;
-    const double size = vec3_norm(along), direction[3] = {along[0] / size, along[1] / size, along[2] / size};
+    double direction[3];
+    (void)normalise(along, direction);
     *hit = (drape_hit){.found = false};
     if (q->what & DRAPE_QUERY_CLOTH) {
         const drape_on_triangle at =
@@ -228,10 +244,9 @@ static drape_status check_directions(const drape_sim *sim, int32_t count, const 
                                      double length)
 {
     bool good = isfinite(length) && (count == 0 || directions);
-    for (int32_t i = 0; good && i < count; i++) {
-        const double size = vec3_norm(directions + 3 * (size_t)i);
-        good = size > 0 && isfinite(size);
-    }
+    double direction[3];
+    for (int32_t i = 0; good && i < count; i++)
+        good = normalise(directions + 3 * (size_t)i, direction);
     return good ? DRAPE_OK
                 : drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                              "drape_sim_cast: directions and length must be finite, and no direction 0");

@@ -1,5 +1,5 @@
 /*
- * teleport.c: pins and colliders that a host sends faster than teleport_speed. Cloth would be torn after them
+ * teleport.c: pins and colliders that a host sends or turns faster than teleport_speed. Cloth would be torn after them
  * for seconds; it is placed with them instead, by the rigid motion that fits its pins best in the sense of
  * least squares (Horn 1987, Closed-form solution of absolute orientation using unit quaternions, J. Opt. Soc.
  * Am. A 4, section 4), less the path that they would have covered at their own velocity.
@@ -241,38 +241,62 @@ static drape_status check_carried(const drape_sim *sim, int32_t collider, const 
     return status;
 }
 
-drape_status drape_sim_teleport_collider(drape_sim *sim, int32_t collider, double seconds,
-                                         const drape_sent *to)
+/* Whether some point of a collider would be too fast: at most as its pivot, and by the turn as the point that is
+ * farthest from it. */
+static bool is_swung_too_fast(const drape_sim *sim, int32_t collider, double seconds, const drape_sent *to,
+                              const double from[3], const double now[9])
 {
-    const drape_motion *motion = drape_system_motion(sim->system);
-    const double t = drape_sim_state(sim)->t, *pivot = sim->model->colliders[collider].pivot;
-    drape_placement by = {.given = true, .turn = DRAPE_NO_ROTATION};
-    double from[3], v[3], before[3], after[3];
-    drape_motion_collider(motion, collider, t, from);
-    if (!exceeds(sim, from, to->displacement, seconds))
-        return DRAPE_OK;
-    drape_motion_collider_arrival(motion, collider, t, v);
+    double path[3], between[9], turn[3] = {0};
+    vec3_sub(to->displacement, from, path);
     if (to->rotation) {
-        double now[9], back[9], start[9], turn[3] = {0};
-        drape_motion_rotation(motion, collider, t, now);
-        if (to->angular_velocity)
-            vec3_add_scaled(-seconds, to->angular_velocity, turn);
+        drape_rotation_between(to->rotation, now, between);
+        drape_rotation_log(between, turn);
+    }
+    return sim->teleport_speed > 0 &&
+           vec3_norm(path) + sim->model->colliders[collider].radius * vec3_norm(turn) >
+               sim->teleport_speed * seconds;
+}
+
+/* The placement from where a collider is, displaced by `from` and turned by `now`, to where it must be to
+ * arrive in time with the velocities v and w. */
+static drape_placement placement_to(const double pivot[3], const double from[3], const double now[9],
+                                    double seconds, const drape_sent *to, const double v[3],
+                                    const double w[3])
+{
+    drape_placement by = {.given = true, .turn = DRAPE_NO_ROTATION};
+    double back[9], start[9], turn[3] = {0}, before[3];
+    if (to->rotation) {
+        vec3_add_scaled(-seconds, w, turn);
         drape_rotation_exp(turn, back);
         drape_rotation_product(back, to->rotation, start);
         drape_rotation_between(start, now, by.turn);
     }
-    for (int k = 0; k < 3; k++) {
+    vec3_sub(to->displacement, from, by.shift); /* of the pivot; without a turn, free of its rounding */
+    vec3_add_scaled(-seconds, v, by.shift);
+    if (drape_rotation_is_none(by.turn))
+        return by;
+    for (int k = 0; k < 3; k++)
         before[k] = pivot[k] + from[k];
-        after[k] = pivot[k] + to->displacement[k];
-    }
-    vec3_add_scaled(-seconds, to->velocity ? to->velocity : v, after);
+    vec3_add_scaled(1, before, by.shift);
     drape_placement_turn(&by, before, before);
-    if (drape_rotation_is_none(by.turn)) { /* without the rounding of the pivot */
-        vec3_sub(to->displacement, from, by.shift);
-        vec3_add_scaled(-seconds, to->velocity ? to->velocity : v, by.shift);
-    } else {
-        vec3_sub(after, before, by.shift);
-    }
+    vec3_add_scaled(-1, before, by.shift);
+    return by;
+}
+
+drape_status drape_sim_teleport_collider(drape_sim *sim, int32_t collider, double seconds,
+                                         const drape_sent *to)
+{
+    const drape_motion *motion = drape_system_motion(sim->system);
+    const double t = drape_sim_state(sim)->t;
+    double from[3], now[9], v[3], w[3];
+    drape_motion_collider(motion, collider, t, from);
+    drape_motion_rotation(motion, collider, t, now);
+    if (!is_swung_too_fast(sim, collider, seconds, to, from, now))
+        return DRAPE_OK;
+    drape_motion_collider_arrival(motion, collider, t, v, w);
+    const drape_placement by =
+        placement_to(sim->model->colliders[collider].pivot, from, now, seconds, to,
+                     to->velocity ? to->velocity : v, to->angular_velocity ? to->angular_velocity : w);
     drape_status status = check_carried(sim, collider, &by);
     if (!status)
         status = drape_sim_place_parts(sim, &(drape_place_list){NULL, 0}, &(drape_place_list){&collider, 1},

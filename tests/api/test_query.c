@@ -245,6 +245,33 @@ START_TEST(rays)
 }
 END_TEST
 
+/* The length of a direction does not matter, whatever its square is; one that has none is refused. */
+START_TEST(rays_of_any_length)
+{
+    static const double sizes[] = {1, 1e200, 1e-200, 1e308, 1e-308};
+    failing_allocator memory = {0};
+    host h = draped(&memory, "");
+    const double origin[3] = {0.26, 0.5, -0.24};
+    double directions[15];
+    drape_hit hits[5];
+    for (int i = 0; i < 5; i++)
+        for (int k = 0; k < 3; k++)
+            directions[3 * i + k] = (k == 1 ? -1.5 : 0.1 * k) * sizes[i];
+    for (int what = DRAPE_QUERY_CLOTH; what <= DRAPE_QUERY_COLLIDERS; what++) {
+        for (int i = 0; i < 5; i++)
+            good(&h, drape_sim_cast(h.sim, what, 1, origin, directions + 3 * i, 5, &hits[i]));
+        for (int i = 0; i < 5; i++) /* to rounding */
+            ck_assert(hits[i].found && fabs(hits[i].distance - hits[0].distance) < 1e-14 &&
+                      distance(hits[i].point, hits[0].point) < 1e-14);
+    }
+    const double wrong[][3] = {{0, 0, 0}, {0, INFINITY, 0}, {1, NAN, 0}};
+    for (int i = 0; i < 3; i++)
+        says(&h, drape_sim_cast(h.sim, DRAPE_QUERY_CLOTH, 1, origin, wrong[i], 5, hits), DRAPE_E_ARGUMENT,
+             "directions and length must be finite, and no direction 0");
+    close_scene(&h, &memory);
+}
+END_TEST
+
 /* ---- Contacts ---- */
 
 static void check_contacts(const char *contact, bool by_nodes)
@@ -401,4 +428,5 @@ START_TEST(wrong_queries)
 }
 END_TEST
 
-SUITE("query", nearest_places, rays, contacts_have_the_forces, a_mesh_is_carried, wrong_queries)
+SUITE("query", nearest_places, rays, rays_of_any_length, contacts_have_the_forces, a_mesh_is_carried,
+      wrong_queries)

@@ -302,11 +302,56 @@ START_TEST(faults_of_a_host)
     }
     v[4] = NAN;
     ck_assert_int_eq(drape_sim_deform_collider(s.sim, 0, 1, POINTS, x, v), DRAPE_E_ARGUMENT);
+    for (int i = 0; i < 3 * POINTS; i += 3) /* mirrored */
+        x[i] = -x[i];
+    ck_assert_int_eq(drape_sim_deform_collider(s.sim, 0, 1, POINTS, x, NULL), DRAPE_E_ARGUMENT);
+    ck_assert_msg(strstr(drape_context_message(s.ctx),
+                         "drape_sim_deform_collider: the mesh is inside out: its volume is -"),
+                  "%s", drape_context_message(s.ctx));
+    for (int i = 0; i < 3 * POINTS; i += 3)
+        x[i] = -x[i];
     memcpy(x + 3, x + 6, 3 * sizeof *x);
     ck_assert_int_eq(drape_sim_deform_collider(s.sim, 0, 1, POINTS, x, NULL), DRAPE_E_ARGUMENT);
     ck_assert_msg(strstr(drape_context_message(s.ctx), "is degenerate"), "%s", drape_context_message(s.ctx));
     ck_assert_int_eq(drape_sim_collider_points(s.sim, 1, x, NULL), DRAPE_E_ARGUMENT);
     scene_close(&s);
+    frames_folder_remove(&f);
+}
+END_TEST
+
+/* A body that turns inside out, here in its third frame, is refused with the file and the frame; an open one has
+ * no inside. A number that is not finite is found in any frame. */
+START_TEST(later_frames_are_checked)
+{
+    const frames_folder f = frames_folder_make();
+    const struct {
+        double size;
+        const char *open, *message;
+    } cases[] = {{-0.2, "false", "frames.npy: frame 2: the mesh is inside out: its volume is -"},
+                 {-0.2, "true", NULL},
+                 {NAN, "true", "frames.npy: frame 2: node 0 is at (nan, nan, nan) m"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        scene s = scene_empty();
+        drape_scene *parsed = NULL;
+        char text[2048], collider[512];
+        write_frames(&f, "frames.npy", 3, (const double[]){0.2, 0.2, cases[i].size},
+                     (const double[]){0, 0, 0});
+        snprintf(collider, sizeof collider,
+                 "{'type': 'animated_mesh', 'file': '%s/frames.npy', 'mesh': '%s/ball.obj', 'open': %s}",
+                 f.path, f.path, cases[i].open);
+        snprintf(text, sizeof text, SHEET, collider);
+        for (char *c = text; *c; c++)
+            *c = *c == '\'' ? '"' : *c;
+        ck_assert_int_eq(drape_scene_parse(s.ctx, text, "test", &parsed), DRAPE_OK);
+        const drape_status status = drape_scene_compile(parsed, &s.model);
+        ck_assert_int_eq(status != DRAPE_OK, cases[i].message != NULL);
+        if (cases[i].message)
+            ck_assert_msg(strstr(drape_context_message(s.ctx), cases[i].message) &&
+                              strstr(drape_context_message(s.ctx), "/colliders/0/file"),
+                          "%s", drape_context_message(s.ctx));
+        drape_scene_destroy(&parsed);
+        scene_close(&s);
+    }
     frames_folder_remove(&f);
 }
 END_TEST
@@ -363,4 +408,4 @@ END_TEST
 
 SUITE("deform", rigid_motion_as_frames, ball_grows_in_a_ball_of_cloth, host_sends_points,
       queries_find_the_present_shape, velocity_goes_on_from_frame_to_frame, a_rigid_body_takes_its_place,
-      faults_of_a_host, inside_by_winding, verlet_is_refused)
+      faults_of_a_host, later_frames_are_checked, inside_by_winding, verlet_is_refused)
