@@ -1,25 +1,27 @@
 /*
  * verbs: what each function that changes, moves or reads a running sim costs, beside a step. A square sheet
  * of 1 m falls, held by two corners, on a ball with friction, next to a limb of 756 triangles that can
- * deform; it has contact with itself, its nodes are about 1/30 m or 1/100 m apart. Before and after each
- * call a step of 1/60 s is made: `cpu_us` is the median of the calls, `steps` is that over the median of the
- * steps before, `after` the median of the steps after it over the same. Calls of less than 1 ms that leave
- * the sim as it was are repeated. Every call does what its name says: changes take turns with their reverse.
- * CPU time of one thread.
+ * deform; it has contact with itself, its nodes are about 1/30 m or 1/100 m apart. For each call the sim is
+ * put into the same state, as it is after --settle steps, and makes a step of 1/60 s; then comes the call, a
+ * step, and the call that takes it back. `cpu_us` is the median of the calls, `steps` the same in steps:
+ * those without a call, whose median over the whole run is `step_ms`. `after` is the median of the steps that
+ * follow a call, in those that follow none. Calls of less than 1 ms are repeated where that is the same
+ * again. CPU time of one thread.
  *
- *     verbs [--csv FILE] [--repeats N] [--side N] [--method NAME] [--only TEXT] [--settle FRAMES]
- *         --repeats  calls of each (default 6, an even number)
+ *     verbs [--csv FILE] [--repeats N] [--side N] [--method NAME] [--only TEXT] [--settle STEPS]
+ *         --repeats  pairs of calls (default 4, above 2 500 nodes 2)
  *         --side     nodes along each side: run only this size (default 30 and 100)
  *         --method   run only this method (default newton_k and be)
  *         --only     run only the calls with this text in their names
- *         --settle   frames before the first call (default 12)
+ *         --settle   steps before the first call (default 60)
  *
  * Run it in the folder that has examples/.
  */
 #include "bench.h"
 
 #define STEP        (1.0 / 60)
-#define MAX_REPEATS 100
+#define MAX_REPEATS 50
+#define MAX_STEPS   (MAX_REPEATS * 100)
 #define POINTS      1000 /* of a query with many, and of rays */
 #define BALL        0    /* numbers of colliders */
 #define LIMB        1
@@ -31,14 +33,18 @@ typedef struct bench {
     drape_model *model, *other; /* other: as the host has compiled it for drape_sim_change_model */
     drape_sim *sim;
     drape_embedding *embedding;
-    int side, nodes, call; /* call: of this verb, from 0; every other one takes back what the one before did */
+    int side, nodes,
+        call; /* call: of this verb, from 0; every other one takes back what the one before did */
     double *vectors, *limb, *energies;           /* of nodes, of points of the limb, of nodes */
     float *vertices;                             /* of the embedding */
     double points[3 * POINTS], rays[3 * POINTS]; /* at random, in and around the sheet */
     drape_hit hits[POINTS];
     drape_contact_point *contacts;
     int32_t middle, room; /* a free node; of contacts */
-    char *bytes;          /* a checkpoint */
+    double t, *x, *v;     /* the state that each call begins in */
+    double steps[MAX_STEPS];
+    int step_count;
+    char *bytes; /* a checkpoint */
     size_t size, space;
 } bench;
 
@@ -50,7 +56,7 @@ static drape_status set(bench *b, const char *pointer, const char *value)
 /* Sets one of two values by turns and changes the sim. */
 static drape_status change(bench *b, const char *pointer, const char *first, const char *second)
 {
-    const drape_status status = set(b, pointer, b->call % 2 == 0 ? first : second);
+    const drape_status status = set(b, pointer, b->call == 0 ? first : second);
     return status ? status : drape_sim_change(b->sim, b->scene);
 }
 
@@ -58,11 +64,11 @@ static drape_status change(bench *b, const char *pointer, const char *first, con
 static drape_status change_list(bench *b, const char *array, int index, const char *item)
 {
     char pointer[64];
-    if (b->call % 2 == 0)
+    if (b->call == 0)
         snprintf(pointer, sizeof pointer, "%s/-", array);
     else
         snprintf(pointer, sizeof pointer, "%s/%d", array, index);
-    const drape_status status = set(b, pointer, b->call % 2 == 0 ? item : NULL);
+    const drape_status status = set(b, pointer, b->call == 0 ? item : NULL);
     return status ? status : drape_sim_change(b->sim, b->scene);
 }
 
@@ -115,7 +121,8 @@ static drape_status change_thickness(bench *b)
 
 static drape_status change_collider(bench *b)
 {
-    return change_list(b, "/colliders", 2, "{\"type\": \"box\", \"center\": [0, -2, 0], \"size\": [1, 1, 1]}");
+    return change_list(b, "/colliders", 2,
+                       "{\"type\": \"box\", \"center\": [0, -2, 0], \"size\": [1, 1, 1]}");
 }
 
 static drape_status change_enabled(bench *b)
@@ -135,31 +142,31 @@ static drape_status change_pins(bench *b)
 
 static drape_status change_model(bench *b)
 {
-    return drape_sim_change_model(b->sim, b->call % 2 == 0 ? b->other : b->model);
+    return drape_sim_change_model(b->sim, b->call == 0 ? b->other : b->model);
 }
 
 /* ---- Nodes ---- */
 
 static drape_status pin(bench *b)
 {
-    return (b->call % 2 == 0 ? drape_sim_pin : drape_sim_unpin)(b->sim, 1, &b->middle);
+    return (b->call == 0 ? drape_sim_pin : drape_sim_unpin)(b->sim, 1, &b->middle);
 }
 
 static drape_status attach(bench *b)
 {
-    return b->call % 2 == 0 ? drape_sim_attach(b->sim, BALL, 1, &b->middle, NULL)
-                            : drape_sim_detach(b->sim, 1, &b->middle);
+    return b->call == 0 ? drape_sim_attach(b->sim, BALL, 1, &b->middle, NULL)
+                        : drape_sim_detach(b->sim, 1, &b->middle);
 }
 
 static drape_status attach_pinned(bench *b)
 {
     const int32_t corner = 0;
-    return drape_sim_attach(b->sim, b->call % 2 == 0 ? BALL : LIMB, 1, &corner, NULL);
+    return drape_sim_attach(b->sim, b->call == 0 ? BALL : LIMB, 1, &corner, NULL);
 }
 
 static drape_status set_masses(bench *b)
 {
-    const double mass = drape_model_masses(b->model)[b->middle] * (b->call % 2 == 0 ? 2 : 1);
+    const double mass = drape_model_masses(b->model)[b->middle] * (b->call == 0 ? 2 : 1);
     return drape_sim_set_masses(b->sim, 1, &b->middle, &mass);
 }
 
@@ -208,7 +215,7 @@ static drape_status place(bench *b)
 {
     drape_place_def def;
     drape_place_def_init(&def, sizeof def);
-    def.translate[0] = b->call % 2 == 0 ? 1 : -1;
+    def.translate[0] = b->call == 0 ? 1 : -1;
     return drape_sim_place(b->sim, &def);
 }
 
@@ -221,14 +228,13 @@ static drape_status untangle(bench *b)
 
 static drape_status move_collider(bench *b)
 {
-    const double displacement[3] = {b->call % 2 == 0 ? 1e-4 : 0, 0, 0};
+    const double displacement[3] = {0, 0, 0};
     return drape_sim_move_collider(b->sim, BALL, STEP, displacement, NULL);
 }
 
 static drape_status move_collider_pose(bench *b)
 {
-    const double angle = b->call % 2 == 0 ? 1e-3 : 0, rotation[4] = {cos(angle), 0, sin(angle), 0},
-                 displacement[3] = {0, 0, 0};
+    const double rotation[4] = {1, 0, 0, 0}, displacement[3] = {0, 0, 0};
     return drape_sim_move_collider_pose(b->sim, BALL, STEP, displacement, rotation, NULL, NULL);
 }
 
@@ -398,65 +404,65 @@ static drape_status restore(bench *b)
 typedef struct verb {
     const char *name, *what; /* the function, and what is done with it */
     drape_status (*call)(bench *b);
-    bool again;                      /* repeated calls cost the same */
+    bool reads, again;                /* it changes nothing; repeated calls cost the same */
     drape_status (*before)(bench *b); /* not counted; NULL: none */
 } verb;
 
 /* Those that only read come first, restore last: what a change leaves, as its memory, costs the later ones
  * nothing. */
 static const verb verbs[] = {
-    {"drape_sim_closest", "1 point", closest_1, true},
-    {"drape_sim_closest", "1000 points", closest_many, true},
-    {"drape_sim_cast", "1 ray", cast_1, true},
-    {"drape_sim_cast", "1000 rays", cast_many, true},
-    {"drape_sim_contacts", "all", contacts, true},
-    {"drape_sim_contact_forces", "", contact_forces, true},
-    {"drape_sim_collider_force", "the ball", collider_force, true},
-    {"drape_sim_collider_torque", "the ball", collider_torque, true},
-    {"drape_sim_reactions", "", reactions, true},
-    {"drape_sim_normals", "", normals, true},
-    {"drape_sim_energy", "", energy, true},
-    {"drape_sim_energy_density", "", energy_density, true},
-    {"drape_sim_inside", "the ball", inside, true},
-    {"drape_sim_intersections", "the cloth with itself", intersections, true},
-    {"drape_sim_collider", "with _collider_rotation", collider, true},
-    {"drape_sim_collider_points", "380 points", collider_points, true},
-    {"drape_sim_hash", "", hash, true},
-    {"drape_sim_warning", "all", warnings, false},
-    {"drape_embedding_create", "as many vertices as nodes", embedding_create, true},
-    {"drape_embedding_carry", "as many vertices as nodes", embedding_carry, true},
-    {"drape_sim_save_to", "", save, true},
-    {"drape_sim_move_pins", "1 node", move_pins, true},
-    {"drape_sim_set_drag_spring", "", set_drag_spring, true},
-    {"drape_sim_set_drag_springs", "64", set_drag_springs, true},
-    {"drape_sim_set_drag_springs", "none", remove_drag_springs, true},
-    {"drape_sim_push", "", push, true},
-    {"drape_sim_set_wind", "", set_wind, true},
-    {"drape_sim_move_collider", "the ball", move_collider, true},
-    {"drape_sim_move_collider_pose", "the ball", move_collider_pose, true},
-    {"drape_sim_deform_collider", "380 points", deform_collider, true, collider_points},
-    {"drape_sim_set_state", "the same", set_state, false},
-    {"drape_sim_place", "all", place, false},
-    {"drape_sim_untangle", "nothing intersects", untangle, false},
-    {"drape_sim_pin", "and _unpin, 1 node", pin, false},
-    {"drape_sim_attach", "and _detach, 1 free node", attach, false},
-    {"drape_sim_attach", "1 pinned node", attach_pinned, false},
-    {"drape_sim_set_masses", "1 node", set_masses, false},
-    {"drape_sim_change", "nothing", change_nothing, false},
-    {"drape_sim_change", "gravity", change_gravity, false},
-    {"drape_sim_change", "young_modulus", change_material, false},
-    {"drape_sim_change", "density", change_density, false},
-    {"drape_sim_change", "coefficient of a term", change_term, false},
-    {"drape_sim_change", "a term more, and less", change_terms, false},
-    {"drape_sim_change", "friction of a collider", change_friction, false},
-    {"drape_sim_change", "distance of contact", change_distance, false},
-    {"drape_sim_change", "thickness of self-contact", change_thickness, false},
-    {"drape_sim_change", "a collider more, and less", change_collider, false},
-    {"drape_sim_change", "enabled of a collider", change_enabled, false},
-    {"drape_sim_change", "ignore of a cloth", change_ignore, false},
-    {"drape_sim_change", "a pin more, and less", change_pins, false},
-    {"drape_sim_change_model", "gravity, compiled before", change_model, false},
-    {"drape_sim_restore_from", "", restore, false, save},
+    {"drape_sim_closest", "1 point", closest_1, true, true},
+    {"drape_sim_closest", "1000 points", closest_many, true, true},
+    {"drape_sim_cast", "1 ray", cast_1, true, true},
+    {"drape_sim_cast", "1000 rays", cast_many, true, true},
+    {"drape_sim_contacts", "all", contacts, true, true},
+    {"drape_sim_contact_forces", "", contact_forces, true, true},
+    {"drape_sim_collider_force", "the ball", collider_force, true, true},
+    {"drape_sim_collider_torque", "the ball", collider_torque, true, true},
+    {"drape_sim_reactions", "", reactions, true, true},
+    {"drape_sim_normals", "", normals, true, true},
+    {"drape_sim_energy", "", energy, true, true},
+    {"drape_sim_energy_density", "", energy_density, true, true},
+    {"drape_sim_inside", "the ball", inside, true, true},
+    {"drape_sim_intersections", "the cloth with itself", intersections, true, true},
+    {"drape_sim_collider", "with _collider_rotation", collider, true, true},
+    {"drape_sim_collider_points", "380 points", collider_points, true, true},
+    {"drape_sim_hash", "", hash, true, true},
+    {"drape_sim_warning", "all", warnings, true, false},
+    {"drape_embedding_create", "as many vertices as nodes", embedding_create, true, true},
+    {"drape_embedding_carry", "as many vertices as nodes", embedding_carry, true, true},
+    {"drape_sim_save_to", "", save, true, true},
+    {"drape_sim_move_pins", "1 node", move_pins, false, true},
+    {"drape_sim_set_drag_spring", "", set_drag_spring, false, true},
+    {"drape_sim_set_drag_springs", "64", set_drag_springs, false, true},
+    {"drape_sim_set_drag_springs", "none", remove_drag_springs, false, true},
+    {"drape_sim_push", "", push, false, true},
+    {"drape_sim_set_wind", "", set_wind, false, true},
+    {"drape_sim_move_collider", "the ball", move_collider, false, true},
+    {"drape_sim_move_collider_pose", "the ball", move_collider_pose, false, true},
+    {"drape_sim_deform_collider", "380 points", deform_collider, false, true, collider_points},
+    {"drape_sim_set_state", "the same", set_state, false, false},
+    {"drape_sim_place", "all", place, false, false},
+    {"drape_sim_untangle", "nothing intersects", untangle, false, false},
+    {"drape_sim_pin", "and _unpin, 1 node", pin, false, false},
+    {"drape_sim_attach", "and _detach, 1 free node", attach, false, false},
+    {"drape_sim_attach", "1 pinned node", attach_pinned, false, false},
+    {"drape_sim_set_masses", "1 node", set_masses, false, false},
+    {"drape_sim_change", "nothing", change_nothing, false, false},
+    {"drape_sim_change", "gravity", change_gravity, false, false},
+    {"drape_sim_change", "young_modulus", change_material, false, false},
+    {"drape_sim_change", "density", change_density, false, false},
+    {"drape_sim_change", "coefficient of a term", change_term, false, false},
+    {"drape_sim_change", "a term more, and less", change_terms, false, false},
+    {"drape_sim_change", "friction of a collider", change_friction, false, false},
+    {"drape_sim_change", "distance of contact", change_distance, false, false},
+    {"drape_sim_change", "thickness of self-contact", change_thickness, false, false},
+    {"drape_sim_change", "a collider more, and less", change_collider, false, false},
+    {"drape_sim_change", "enabled of a collider", change_enabled, false, false},
+    {"drape_sim_change", "ignore of a cloth", change_ignore, false, false},
+    {"drape_sim_change", "a pin more, and less", change_pins, false, false},
+    {"drape_sim_change_model", "gravity, compiled before", change_model, false, false},
+    {"drape_sim_restore_from", "", restore, false, false, save},
 };
 
 #define VERBS ((int)(sizeof verbs / sizeof *verbs))
@@ -505,6 +511,8 @@ static void open_bench(bench *b, int side, const char *method)
         bench_fail(b->ctx, "the scene");
     drape_scene_destroy(&lighter);
     b->sim = bench_sim(b->ctx, b->model, method, NULL, NULL, NULL);
+    b->x = room_for(3 * (size_t)b->nodes);
+    b->v = room_for(3 * (size_t)b->nodes);
     b->vectors = room_for(3 * (size_t)b->nodes);
     b->energies = room_for((size_t)b->nodes);
     b->limb = room_for(3 * (size_t)drape_model_collider_points(b->model, LIMB));
@@ -532,6 +540,7 @@ static void close_bench(bench *b)
     drape_scene_destroy(&b->scene);
     drape_context_destroy(&b->ctx);
     free(b->vectors), free(b->energies), free(b->limb), free(b->contacts), free(b->vertices), free(b->bytes);
+    free(b->x), free(b->v);
 }
 
 /* [s] CPU time of one step. */
@@ -543,11 +552,30 @@ static double step(bench *b)
     return drape_clock_cpu_seconds() - start;
 }
 
+static void keep_state(bench *b)
+{
+    const size_t size = 3 * (size_t)b->nodes * sizeof(double);
+    b->t = drape_sim_time(b->sim);
+    memcpy(b->x, drape_sim_positions(b->sim), size);
+    memcpy(b->v, drape_sim_velocities(b->sim), size);
+}
+
+/* The first of the two steps, after which the history of the run is the same for all calls. */
+static double begin(bench *b)
+{
+    if (drape_sim_set_state(b->sim, b->t, b->x, b->v))
+        bench_fail(b->ctx, "the state");
+    return step(b);
+}
+
 /* [s] CPU time of one call. */
-static double call(bench *b, const verb *v)
+static double call(bench *b, const verb *v, int number)
 {
     int calls = 0;
     double seconds = 0;
+    b->call = number;
+    if (v->before && v->before(b))
+        bench_fail(b->ctx, "%s", v->name);
     const double start = drape_clock_cpu_seconds();
     do {
         if (v->call(b))
@@ -564,64 +592,94 @@ static double median(double *of, int count)
     return count % 2 ? of[count / 2] : 0.5 * (of[count / 2 - 1] + of[count / 2]);
 }
 
-static void measure(bench *b, const verb *v, const char *method, int repeats, FILE *csv)
+typedef struct times {
+    double call, after; /* [s] medians; after: 0 if it was not measured */
+} times;
+
+static times measure(bench *b, const verb *v, int repeats)
 {
-    double before[MAX_REPEATS], after[MAX_REPEATS], of[MAX_REPEATS];
+    double after[MAX_REPEATS] = {0}, of[2 * MAX_REPEATS];
     for (int i = 0; i < repeats; i++) {
-        b->call = i;
-        before[i] = step(b);
-        if (v->before && v->before(b))
-            bench_fail(b->ctx, "%s", v->name);
-        of[i] = call(b, v);
-        after[i] = step(b);
+        b->steps[b->step_count++] = begin(b);
+        of[2 * i] = call(b, v, 0);
+        if (!v->reads)
+            after[i] = step(b);
+        of[2 * i + 1] = call(b, v, 1);
     }
-    const double cpu = median(of, repeats), unit = median(before, repeats);
-    const double ratio = cpu / unit, next = median(after, repeats) / unit;
-    printf("%-9s %6d %-30s %-28s %10.2f %9.3f %9.5f %6.2f\n", method, b->nodes, v->name, v->what, 1e6 * cpu,
-           1e3 * unit, ratio, next);
+    return (times){median(of, 2 * repeats), median(after, repeats)};
+}
+
+static void print(const bench *b, const verb *v, const times *of, const char *method, double unit,
+                  double next, FILE *csv)
+{
+    char after[20] = "";
+    if (!v->reads)
+        snprintf(after, sizeof after, "%.3f", of->after / next);
+    printf("%-9s %6d %-30s %-28s %10.2f %9.3f %9.5f %6s\n", method, b->nodes, v->name, v->what,
+           1e6 * of->call, 1e3 * unit, of->call / unit, after);
     fflush(stdout);
     if (!csv)
         return;
     bench_csv_row(csv);
-    fprintf(csv, "%s,%d,%s,\"%s\",%.3f,%.4f,%.6f,%.3f\n", method, b->nodes, v->name, v->what, 1e6 * cpu,
-            1e3 * unit, ratio, next);
+    fprintf(csv, "%s,%d,%s,\"%s\",%.3f,%.4f,%.6f,%s\n", method, b->nodes, v->name, v->what, 1e6 * of->call,
+            1e3 * unit, of->call / unit, after);
     fflush(csv);
+}
+
+/* [s] median of the second steps, without a call before them. */
+static double second_step(bench *b, int repeats)
+{
+    double of[MAX_REPEATS];
+    for (int i = 0; i < repeats; i++) {
+        begin(b);
+        of[i] = step(b);
+    }
+    return median(of, repeats);
 }
 
 static int measure_all(int side, const char *method, const char *only, int settle, int repeats, FILE *csv)
 {
     bench b;
-    int measured = 0;
+    times of[VERBS];
+    bool measured[VERBS] = {false};
+    int count = 0;
     open_bench(&b, side, method);
     if (save(&b) || embedding_create(&b) || collider_points(&b))
         bench_fail(b.ctx, "%s", method);
     for (int i = 0; i < settle; i++)
         step(&b);
+    keep_state(&b);
+    const double next = second_step(&b, repeats + 1);
     for (int i = 0; i < VERBS; i++) {
         char name[100];
         snprintf(name, sizeof name, "%s %s", verbs[i].name, verbs[i].what);
         if (only && !strstr(name, only))
             continue;
-        measure(&b, &verbs[i], method, repeats, csv);
-        measured++;
+        of[i] = measure(&b, &verbs[i], repeats);
+        measured[i] = true;
+        count++;
     }
+    const double unit = count > 0 ? median(b.steps, b.step_count) : 1;
+    for (int i = 0; i < VERBS; i++)
+        if (measured[i])
+            print(&b, &verbs[i], &of[i], method, unit, next, csv);
     close_bench(&b);
-    return measured;
+    return count;
 }
 
 int main(int argc, char **argv)
 {
     static const char usage[] = "verbs [--csv FILE] [--repeats N] [--side N] [--method NAME] [--only TEXT] "
-                                "[--settle FRAMES]\n";
+                                "[--settle STEPS]\n";
     static const char *const methods[] = {"newton_k", "be"};
     static const int sides[] = {30, 100};
     const char *file = NULL, *method = NULL, *only = NULL;
-    int repeats = 6, side = 0, settle = 12, measured = 0;
+    int repeats = 0, side = 0, settle = 60, measured = 0;
     for (int i = 1; i < argc; i++) {
         const int number = i + 1 < argc ? atoi(argv[i + 1]) : 0;
         if (strcmp(argv[i], "--csv") == 0 && i + 1 < argc)
             file = argv[++i];
-        else if (strcmp(argv[i], "--repeats") == 0 && number > 1 && number <= MAX_REPEATS && number % 2 == 0)
+        else if (strcmp(argv[i], "--repeats") == 0 && number > 0 && number <= MAX_REPEATS)
             repeats = atoi(argv[++i]);
         else if (strcmp(argv[i], "--side") == 0 && number > 7)
             side = atoi(argv[++i]);
@@ -641,7 +699,8 @@ int main(int argc, char **argv)
         for (size_t m = 0; m < sizeof methods / sizeof *methods; m++) {
             if ((method && strcmp(method, methods[m]) != 0) || (side > 0 && s > 0))
                 continue;
-            measured += measure_all(side > 0 ? side : sides[s], methods[m], only, settle, repeats, csv);
+            const int nodes = side > 0 ? side : sides[s], calls = repeats > 0 ? repeats : nodes > 50 ? 2 : 4;
+            measured += measure_all(nodes, methods[m], only, settle, calls, csv);
         }
     if (measured == 0)
         fputs("no such method or call; see the head of bench/verbs.c\n", stderr);

@@ -37,7 +37,7 @@ typedef enum drape_half { DRAPE_LOWER, DRAPE_UPPER, DRAPE_HALVES } drape_half;
 typedef struct drape_fronts {
     const drape_pattern *pattern;
     drape_shared_elimination *shared;
-    drape_elimination e; /* that of `shared`, which has its arrays */
+    drape_elimination e;           /* that of `shared`, which has its arrays */
     drape_front *front;            /* (e.count) */
     int32_t *branch, branch_count; /* first and last front of each branch; children come before parents */
     int32_t *top, top_count;       /* the fronts in no branch, children first */

@@ -32,7 +32,7 @@ static host open_sheet(failing_allocator *memory, const char *method)
 
 /* What calls need; `nan` has a number that is not finite. */
 static const double zero[60], one[3] = {1, 1, 1}, nan_[60] = {NAN}, far[60] = {2e9}, spin[3] = {1e9, 0, 0},
-                             same[4] = {1, 0, 0, 0}, long_[4] = {100, 0, 0, 0};
+                              same[4] = {1, 0, 0, 0}, long_[4] = {100, 0, 0, 0};
 static const int32_t pin = 0, node = 7, out = 20, under = -1;
 static double forces[60];
 static drape_hit hit;
@@ -277,7 +277,8 @@ enum { WRONGS = sizeof wrongs / sizeof *wrongs };
 static void expect_as_before(const host *h, const bytes *before, const char *what)
 {
     const bytes after = bytes_save(h->sim);
-    ck_assert_msg(before->size == after.size && memcmp(before->data, after.data, after.size) == 0, "%s", what);
+    ck_assert_msg(before->size == after.size && memcmp(before->data, after.data, after.size) == 0, "%s",
+                  what);
     free(after.data);
 }
 
@@ -290,7 +291,8 @@ START_TEST(wrong_calls_change_nothing)
         drape_context_set_message(h.ctx, "%s", "");
         const drape_status status = wrongs[i].call(h.sim);
         const char *said = drape_context_message(h.ctx);
-        ck_assert_msg(status == DRAPE_E_ARGUMENT, "%s: %s: %s", wrongs[i].says, drape_status_name(status), said);
+        ck_assert_msg(status == DRAPE_E_ARGUMENT, "%s: %s: %s", wrongs[i].says, drape_status_name(status),
+                      said);
         ck_assert_msg(strncmp(said, wrongs[i].says, strlen(wrongs[i].says)) == 0, "\"%s\" does not begin: %s",
                       wrongs[i].says, said);
         ck_assert_msg(!strchr(said, '\n'), "%s", said);
@@ -364,9 +366,9 @@ static drape_status right_deform(drape_sim *sim)
 }
 
 static drape_status (*const changes[])(drape_sim *) = {
-    right_pin,   right_unpin,  right_mass, right_attach, right_spring,   right_springs,
-    right_model, right_place,  right_pins, right_move,   right_pose,     right_deform,
-    right_push,  right_wind,   right_untangle, right_advance, right_realtime, right_state};
+    right_pin,   right_unpin, right_mass,     right_attach,  right_spring,   right_springs,
+    right_model, right_place, right_pins,     right_move,    right_pose,     right_deform,
+    right_push,  right_wind,  right_untangle, right_advance, right_realtime, right_state};
 
 static drape_status watch(void *user, const drape_event *event)
 {
@@ -417,7 +419,8 @@ START_TEST(wrong_embeddings)
     const drape_status e = DRAPE_E_ARGUMENT;
     says(&h, drape_embedding_create(h.ctx, NULL, 0, 1, vertex, NULL, &mesh), e, "drape_embedding_create:");
     says(&h, drape_embedding_create(h.ctx, h.model, 1, 1, vertex, NULL, &mesh), e, "cloth 1");
-    says(&h, drape_embedding_create(h.ctx, h.model, 0, -1, vertex, NULL, &mesh), e, "drape_embedding_create:");
+    says(&h, drape_embedding_create(h.ctx, h.model, 0, -1, vertex, NULL, &mesh), e,
+         "drape_embedding_create:");
     says(&h, drape_embedding_create(h.ctx, h.model, 0, 1, NULL, NULL, &mesh), e, "drape_embedding_create:");
     says(&h, drape_embedding_create(h.ctx, h.model, 0, 1, bad, NULL, &mesh), e, "finite");
     says(&h, drape_embedding_create(h.ctx, h.model, 0, 1, vertex, bad, &mesh), e, "finite");
