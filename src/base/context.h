@@ -21,6 +21,7 @@ struct drape_context {
     int host_term_count;
     drape_collider_ops host_colliders[DRAPE_MAX_HOST_COLLIDERS];
     int host_collider_count;
+    struct drape_shared_elimination *eliminations; /* those in use (solvers/elimination.h); NULL: none */
 };
 
 /* User-defined entry number `index` of the context, of the terms that cloths or seams may have; NULL past the

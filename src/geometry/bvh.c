@@ -2,7 +2,6 @@
 #include "geometry/bvh.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define LEAF 1 /* elements per leaf */
@@ -19,26 +18,52 @@ typedef struct builder {
     entry *entries;
 } builder;
 
-static int compare(const entry *a, const entry *b, int axis)
+static bool is_before(const entry *a, const entry *b, int axis)
 {
     if (a->middle[axis] != b->middle[axis])
-        return a->middle[axis] < b->middle[axis] ? -1 : 1;
-    return a->element < b->element ? -1 : a->element > b->element;
+        return a->middle[axis] < b->middle[axis];
+    return a->element < b->element;
 }
 
-static int compare_x(const void *a, const void *b)
+static void swap(entry *a, entry *b)
 {
-    return compare(a, b, 0);
+    const entry kept = *a;
+    *a = *b;
+    *b = kept;
 }
 
-static int compare_y(const void *a, const void *b)
+/* Brings the first `half` entries along the axis to the front, in any order (Hoare 1961, Algorithm 65: Find).
+ * As no two entries are equal, which these are does not depend on how they are found. The pivot is the median
+ * of three, so entries that are in order already take linear time. */
+static void bring_first_half(entry *entries, int32_t count, int32_t half, int axis)
 {
-    return compare(a, b, 1);
-}
-
-static int compare_z(const void *a, const void *b)
-{
-    return compare(a, b, 2);
+    int32_t low = 0, high = count - 1;
+    while (low < high) {
+        entry *a = entries + low, *b = entries + low + (high - low) / 2, *c = entries + high;
+        if (is_before(b, a, axis))
+            swap(a, b);
+        if (is_before(c, b, axis)) {
+            swap(b, c);
+            if (is_before(b, a, axis))
+                swap(a, b);
+        }
+        const entry pivot = *b;
+        int32_t i = low, j = high;
+        while (i <= j) {
+            while (is_before(&entries[i], &pivot, axis))
+                i++;
+            while (is_before(&pivot, &entries[j], axis))
+                j--;
+            if (i <= j)
+                swap(&entries[i++], &entries[j--]);
+        }
+        if (half <= j)
+            high = j;
+        else if (half >= i)
+            low = i;
+        else
+            return;
+    }
 }
 
 static int longest_axis(const entry *entries, int32_t count)
@@ -47,8 +72,9 @@ static int longest_axis(const entry *entries, int32_t count)
     int axis = 0;
     for (int32_t i = 0; i < count; i++)
         for (int k = 0; k < 3; k++) {
-            low[k] = fmin(low[k], entries[i].middle[k]);
-            high[k] = fmax(high[k], entries[i].middle[k]);
+            const double at = entries[i].middle[k];
+            low[k] = at < low[k] ? at : low[k];
+            high[k] = at > high[k] ? at : high[k];
         }
     for (int k = 1; k < 3; k++)
         if (high[k] - low[k] > high[axis] - low[axis])
@@ -59,7 +85,6 @@ static int longest_axis(const entry *entries, int32_t count)
 /* Branches are stored in depth-first order: the first child of branch i is i + 1. */
 static void split(builder *b, int32_t first, int32_t count)
 {
-    static int (*const by_axis[])(const void *, const void *) = {compare_x, compare_y, compare_z};
     int32_t self = b->bvh->branch_count++;
     drape_bvh_branch *branch = &b->bvh->branches[self];
     branch->first = first;
@@ -67,7 +92,7 @@ static void split(builder *b, int32_t first, int32_t count)
     if (count <= LEAF)
         return;
     entry *entries = b->entries + first;
-    qsort(entries, (size_t)count, sizeof *entries, by_axis[longest_axis(entries, count)]);
+    bring_first_half(entries, count, count / 2, longest_axis(entries, count));
     split(b, first, count / 2);
     branch->second = b->bvh->branch_count;
     split(b, first + count / 2, count - count / 2);

@@ -184,7 +184,8 @@ static double squared_distance(const drape_box *b, const double *x)
 {
     double sum = 0;
     for (int k = 0; k < 3; k++) {
-        double beyond = fmax(fmax(b->low[k] - x[k], x[k] - b->high[k]), 0);
+        const double below = b->low[k] - x[k], above = x[k] - b->high[k];
+        const double beyond = below > 0 ? below : above > 0 ? above : 0; /* fmax may be a call */
         sum += beyond * beyond;
     }
     return sum;

@@ -76,7 +76,8 @@ static double distance_of(const search *s, const drape_box *box)
 {
     double sum = 0, enter = 0, leave = INFINITY;
     for (int k = 0; k < 3 && !s->direction; k++) {
-        const double away = fmax(fmax(box->low[k] - s->from[k], s->from[k] - box->high[k]), 0);
+        const double below = box->low[k] - s->from[k], above = s->from[k] - box->high[k];
+        const double away = below > 0 ? below : above > 0 ? above : 0;
         sum += away * away;
     }
     if (!s->direction)

@@ -81,7 +81,8 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
     [DRAPE_NEWTON_CORRECTION_TOLERANCE] = DRAPE_NUMBER(                                                      \
         "correction_tolerance", "m", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1,                               \
         "a solve also ends, whatever its residual, after a whole correction and a chord step by the same "   \
-        "matrix that lowers the residual and whose root mean square over the free nodes is at most this")
+        "matrix that lowers the residual and whose root mean square over the free nodes is at most this; "   \
+        "static ends by its residual only")
 
 /* Values of the choices among these parameters. */
 enum { DRAPE_NEWTON_FAILURE_REJECT, DRAPE_NEWTON_FAILURE_ACCEPT };

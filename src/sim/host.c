@@ -500,6 +500,8 @@ drape_status drape_sim_collider_torque(drape_sim *sim, int32_t collider, const d
         return status;
     if (!torque)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_torque: the array is NULL");
+    if (about && !drape_all_finite(about, 3))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_torque: the point is not finite");
     status = read_wrench(sim, "drape_sim_collider_torque", collider, about, force, sum);
     if (!status)
         memcpy(torque, sum, sizeof sum);

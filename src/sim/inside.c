@@ -117,9 +117,27 @@ static double depth_at(const search *s, const double *point)
     return -drape_collider_distance(s->collider, s->pose, point, NULL, NULL);
 }
 
+/* Whether no point of a triangle is inside. As it is a distance, it changes by no more than the way from the
+ * centroid, and rounding errors are far below TOUCH: most triangles need one evaluation, not that of all
+ * samples. */
+static bool is_outside(const search *s, const int32_t *node)
+{
+    double centroid[3] = {0, 0, 0}, radius = 0;
+    for (int a = 0; a < 3; a++)
+        vec3_add_scaled(1.0 / 3, s->cloth.x + 3 * (size_t)node[a], centroid);
+    for (int a = 0; a < 3; a++) {
+        double to[3];
+        vec3_sub(s->cloth.x + 3 * (size_t)node[a], centroid, to);
+        radius = fmax(radius, vec3_norm(to));
+    }
+    return depth_at(s, centroid) < -(1 + TOUCH) * radius - TOUCH;
+}
+
 static double deepest_sample(const search *s, const int32_t *node)
 {
     double deepest = 0;
+    if (is_outside(s, node))
+        return 0;
     for (int a = 0; a <= ACROSS; a++)
         for (int b = 0; a + b <= ACROSS; b++) {
             const double share[3] = {(double)(ACROSS - a - b) / ACROSS, (double)a / ACROSS,

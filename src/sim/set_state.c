@@ -1,6 +1,7 @@
 /*
- * set_state.c: a user-defined state. It is built in the state that the next attempt would overwrite, so
- * that a refused one changes nothing; the history that led to the present state is discarded.
+ * set_state.c: a user-defined state. It is built in the state that the next attempt would overwrite, once
+ * all is checked: that state may be the one in which the last step began, which is still read. The history
+ * that led to the present state is discarded.
  */
 #include "base/elementary.h"
 #include "base/finite.h"
@@ -37,18 +38,18 @@ static drape_status check_given(const drape_sim *sim, double t, const double *x,
 
 /* Places pinned nodes where their pins are at the time of the state, and those that the host moves at their
  * given positions. */
-static void place_pinned(const drape_sim *sim, const double *given, drape_state *state)
+static void place_pinned(const drape_sim *sim, const double *given, double t, double *x)
 {
     const drape_model *m = sim->model;
     const drape_motion *motion = drape_system_motion(sim->system);
     for (int32_t i = 0; i < m->node_count; i++)
         if (m->pinned[i])
-            drape_motion_place_fixed(motion, i, state->x + 3 * (size_t)i);
-    drape_motion_place_pins(motion, state->t, state->x);
+            drape_motion_place_fixed(motion, i, x + 3 * (size_t)i);
+    drape_motion_place_pins(motion, t, x);
     for (int32_t i = 0; i < motion->moved_count; i++) {
         size_t at = 3 * (size_t)motion->moved_node[i];
         if (motion->pin_path[i].given)
-            memcpy(state->x + at, given + at, 3 * sizeof *state->x);
+            memcpy(x + at, given + at, 3 * sizeof *x);
     }
 }
 
@@ -68,11 +69,11 @@ static void stop_fixed(const drape_sim *sim, const double *given, drape_state *s
     }
 }
 
-static drape_status check_pinned(const drape_sim *sim, const double *given, const drape_state *state)
+static drape_status check_pinned(const drape_sim *sim, const double *given, double t, const double *placed)
 {
     const drape_model *m = sim->model;
     for (int32_t i = 0; i < m->node_count; i++) {
-        const double *x = given + 3 * (size_t)i, *pin = state->x + 3 * (size_t)i;
+        const double *x = given + 3 * (size_t)i, *pin = placed + 3 * (size_t)i;
         const drape_cloth *cloth = &m->cloths[drape_model_cloth_of(m, i)];
         if (m->pinned[i] &&
             !(drape_hypot(drape_hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= PIN_SLIP * m->length))
@@ -80,7 +81,7 @@ static drape_status check_pinned(const drape_sim *sim, const double *given, cons
                               "drape_sim_set_state: node %d of %s is at (%g %g %g); its pin has it at (%g %g "
                               "%g) m at t = %g s",
                               (int)(i - cloth->first_node), cloth->name, x[0], x[1], x[2], pin[0], pin[1],
-                              pin[2], state->t);
+                              pin[2], t);
     }
     return DRAPE_OK;
 }
@@ -117,15 +118,18 @@ drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, cons
     if (status)
         return status;
     const drape_model *m = sim->model;
-    drape_state *now = &sim->states[sim->now], *next = &sim->states[sim->next];
-    next->t = t;
-    memcpy(next->x, x, 3 * (size_t)m->node_count * sizeof *x);
-    memcpy(next->v, v, 3 * (size_t)m->node_count * sizeof *v);
-    place_pinned(sim, x, next);
-    stop_fixed(sim, v, next);
-    status = check_pinned(sim, x, next);
+    const size_t size = 3 * (size_t)m->node_count * sizeof *x;
+    double *placed = sim->query_scratch;
+    memcpy(placed, x, size);
+    place_pinned(sim, x, t, placed);
+    status = check_pinned(sim, x, t, placed);
     if (status)
         return status;
+    drape_state *now = &sim->states[sim->now], *next = &sim->states[sim->next];
+    next->t = t;
+    memcpy(next->x, placed, size);
+    memcpy(next->v, v, size);
+    stop_fixed(sim, v, next);
     drape_motion_hold_pins(drape_system_steer(sim->system), next->x);
     drape_state_commit(m, now, next);
     sim->next = sim->now;

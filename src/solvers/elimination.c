@@ -374,11 +374,98 @@ static drape_status make(maker *m)
     return keep(m);
 }
 
-drape_status drape_elimination_create(drape_arena *arena, const drape_pattern *pattern, drape_elimination *e)
+/* ---- Sharing ---- */
+
+struct drape_shared_elimination {
+    drape_elimination e;
+    drape_arena arena;                /* of its arrays and the next two */
+    int32_t *block_start, *block_row; /* of its pattern, which need not live as long */
+    int64_t users;
+    drape_shared_elimination *next; /* of the same context */
+};
+
+static size_t start_bytes(const drape_pattern *p)
 {
-    maker m = {.arena = arena, .scratch = drape_arena_of(arena->ctx), .pattern = pattern, .e = e};
-    *e = (drape_elimination){.n = pattern->block_count};
-    drape_status status = make(&m);
+    return ((size_t)p->block_count + 1) * sizeof *p->block_start;
+}
+
+static size_t row_bytes(const drape_pattern *p)
+{
+    return (size_t)p->block_start[p->block_count] * sizeof *p->block_row;
+}
+
+static bool is_of(const drape_shared_elimination *shared, const drape_pattern *p)
+{
+    return shared->e.n == p->block_count &&
+           memcmp(shared->block_start, p->block_start, start_bytes(p)) == 0 &&
+           memcmp(shared->block_row, p->block_row, row_bytes(p)) == 0;
+}
+
+static drape_status make_shared(drape_shared_elimination *shared, const drape_pattern *pattern)
+{
+    maker m = {.arena = &shared->arena,
+               .scratch = drape_arena_of(shared->arena.ctx),
+               .pattern = pattern,
+               .e = &shared->e};
+    shared->e.n = pattern->block_count;
+    shared->block_start = drape_arena_take(&shared->arena, start_bytes(pattern), 1);
+    shared->block_row = drape_arena_take(&shared->arena, row_bytes(pattern), 1);
+    if (drape_arena_status(&shared->arena))
+        return DRAPE_E_MEMORY;
+    memcpy(shared->block_start, pattern->block_start, start_bytes(pattern));
+    memcpy(shared->block_row, pattern->block_row, row_bytes(pattern));
+    const drape_status status = make(&m);
     drape_arena_free(&m.scratch);
     return status;
+}
+
+drape_status drape_elimination_share(drape_context *ctx, const drape_pattern *pattern,
+                                     drape_shared_elimination **out)
+{
+    drape_shared_elimination *shared = ctx->eliminations;
+    *out = NULL;
+    while (shared && !is_of(shared, pattern))
+        shared = shared->next;
+    if (shared) {
+        shared->users++;
+        *out = shared;
+        return DRAPE_OK;
+    }
+    if (!(shared = drape_alloc(ctx, 1, sizeof *shared)))
+        return DRAPE_E_MEMORY;
+    *shared = (drape_shared_elimination){.arena = drape_arena_of(ctx), .users = 1};
+    const drape_status status = make_shared(shared, pattern);
+    if (status) {
+        drape_arena_free(&shared->arena);
+        drape_free(ctx, shared);
+        return status;
+    }
+    shared->next = ctx->eliminations;
+    ctx->eliminations = *out = shared;
+    return DRAPE_OK;
+}
+
+void drape_elimination_release(drape_shared_elimination **out)
+{
+    drape_shared_elimination *shared = *out;
+    *out = NULL;
+    if (!shared || --shared->users > 0)
+        return;
+    drape_context *ctx = shared->arena.ctx;
+    drape_shared_elimination **at = &ctx->eliminations;
+    while (*at != shared)
+        at = &(*at)->next;
+    *at = shared->next;
+    drape_arena_free(&shared->arena);
+    drape_free(ctx, shared);
+}
+
+const drape_elimination *drape_elimination_of(const drape_shared_elimination *shared)
+{
+    return &shared->e;
+}
+
+size_t drape_elimination_bytes(const drape_shared_elimination *shared)
+{
+    return sizeof *shared + shared->arena.bytes;
 }

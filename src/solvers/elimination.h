@@ -23,8 +23,20 @@ typedef struct drape_elimination {
     double *work;       /* (count) multiplications and additions of each front, roughly */
 } drape_elimination;
 
-/* Errors: DRAPE_E_MEMORY. */
-drape_status drape_elimination_create(drape_arena *arena, const drape_pattern *pattern, drape_elimination *e);
+/* An elimination depends on the pattern alone, and finding it takes as long as several factorisations of a
+ * small matrix: all solvers of a context that have equal patterns share one, which lives as long as one of
+ * them. So a sim that is made again for a changed model does not order its matrix again. */
+typedef struct drape_shared_elimination drape_shared_elimination;
+
+/* Finds the one of this pattern, or makes it. Errors: DRAPE_E_MEMORY; then *out is NULL. */
+drape_status drape_elimination_share(drape_context *ctx, const drape_pattern *pattern,
+                                     drape_shared_elimination **out);
+
+/* Gives it back and sets *shared to NULL, which it may be already. */
+void drape_elimination_release(drape_shared_elimination **shared);
+
+const drape_elimination *drape_elimination_of(const drape_shared_elimination *shared);
+size_t drape_elimination_bytes(const drape_shared_elimination *shared);
 
 static inline int32_t drape_front_columns(const drape_elimination *e, int32_t front)
 {

@@ -197,12 +197,10 @@ int64_t drape_fronts_scratch(const drape_fronts *s)
     return 5 * (int64_t)s->widest + s->tallest;
 }
 
-drape_status drape_fronts_create(drape_arena *arena, const drape_pattern *pattern, drape_fronts *s)
+static drape_status lay_out(drape_arena *arena, drape_fronts *s)
 {
-    *s = (drape_fronts){.pattern = pattern};
-    drape_status status = drape_elimination_create(arena, pattern, &s->e);
-    if (!status)
-        status = lay_out_fronts(arena, s);
+    const drape_pattern *pattern = s->pattern;
+    const drape_status status = lay_out_fronts(arena, s);
     if (status)
         return status;
     const size_t n = (size_t)pattern->n, rows = (size_t)s->e.row_start[s->e.count];
@@ -223,6 +221,24 @@ drape_status drape_fronts_create(drape_arena *arena, const drape_pattern *patter
     if (!find_entry_positions(s) || !find_row_positions(s))
         return drape_fail(arena->ctx, DRAPE_E_SOLVER, "the factors have a front of more than 2^31 entries");
     return DRAPE_OK;
+}
+
+drape_status drape_fronts_create(drape_arena *arena, const drape_pattern *pattern, drape_fronts *s)
+{
+    *s = (drape_fronts){.pattern = pattern};
+    drape_status status = drape_elimination_share(arena->ctx, pattern, &s->shared);
+    if (status)
+        return status;
+    s->e = *drape_elimination_of(s->shared);
+    status = lay_out(arena, s);
+    if (status)
+        drape_fronts_destroy(s);
+    return status;
+}
+
+void drape_fronts_destroy(drape_fronts *s)
+{
+    drape_elimination_release(&s->shared);
 }
 
 drape_status drape_fronts_take_upper_panels(drape_arena *arena, drape_fronts *s)

@@ -36,7 +36,8 @@ typedef enum drape_half { DRAPE_LOWER, DRAPE_UPPER, DRAPE_HALVES } drape_half;
 
 typedef struct drape_fronts {
     const drape_pattern *pattern;
-    drape_elimination e;
+    drape_shared_elimination *shared;
+    drape_elimination e;           /* that of `shared`, which has its arrays */
     drape_front *front;            /* (e.count) */
     int32_t *branch, branch_count; /* first and last front of each branch; children come before parents */
     int32_t *top, top_count;       /* the fronts in no branch, children first */
@@ -61,8 +62,11 @@ typedef struct drape_fronts {
 } drape_fronts;
 
 /* Orders the matrix and takes all memory for its lower half. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER (a front
- * is too large for 32-bit positions). */
+ * is too large for 32-bit positions); then there is nothing to destroy. */
 drape_status drape_fronts_create(drape_arena *arena, const drape_pattern *pattern, drape_fronts *s);
+
+/* Gives back what is not in the arena. */
+void drape_fronts_destroy(drape_fronts *s);
 
 /* Take the panels of the upper half, or its updates. Errors: DRAPE_E_MEMORY. */
 drape_status drape_fronts_take_upper_panels(drape_arena *arena, drape_fronts *s);

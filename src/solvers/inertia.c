@@ -18,6 +18,7 @@ drape_status drape_inertia(drape_context *ctx, const drape_pattern *p, const dou
         drape_general general = drape_general_of(&arena, &fronts);
         status = drape_general_inertia(&general, values, negative, known);
         drape_general_destroy(&general);
+        drape_fronts_destroy(&fronts);
     }
     drape_arena_free(&arena);
     return status;

@@ -66,7 +66,7 @@ struct drape_linear_ops {
     /* Releases what is not in the arena, before the arena is freed; callers use drape_linear_destroy. NULL:
      * everything is in the arena. */
     void (*destroy)(void **state);
-    /* Bytes that libraries took outside the arena, factors included. NULL: none. */
+    /* Bytes that were taken outside the arena, by libraries and for what is shared. NULL: none. */
     size_t (*bytes)(const void *state);
     /* NULL: it solves with its own method only. */
     void (*report)(const void *state, drape_linear_report *report);

@@ -49,8 +49,10 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     s->mirror = drape_arena_take(arena, lower, sizeof *s->mirror);
     s->diagonal = drape_arena_take(arena, n, sizeof *s->diagonal);
     s->inverse = drape_arena_take(arena, n, sizeof *s->inverse);
-    if (drape_arena_status(arena))
+    if (drape_arena_status(arena)) {
+        drape_fronts_destroy(&s->fronts);
         return DRAPE_E_MEMORY;
+    }
     find_mirrored_blocks(pattern, s->mirror);
     *state = s;
     return DRAPE_OK;
@@ -58,7 +60,9 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
 
 static void destroy(void **state)
 {
-    drape_general_destroy(&((multifrontal *)*state)->general);
+    multifrontal *s = *state;
+    drape_general_destroy(&s->general);
+    drape_fronts_destroy(&s->fronts);
 }
 
 static void use_threads(void *state, drape_pool *pool)
@@ -171,8 +175,10 @@ static drape_status solve(void *state, const double *b, double *x)
 
 static size_t bytes(const void *state)
 {
-    const drape_general *g = &((const multifrontal *)state)->general;
-    return g->klu ? drape_linear_bytes(&drape_linear_klu, g->klu) : 0;
+    const multifrontal *s = state;
+    const drape_general *g = &s->general;
+    return drape_elimination_bytes(s->fronts.shared) +
+           (g->klu ? drape_linear_bytes(&drape_linear_klu, g->klu) : 0);
 }
 
 static void report(const void *state, drape_linear_report *out)

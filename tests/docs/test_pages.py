@@ -255,6 +255,15 @@ def test_no_other_blocks():
             assert "```" not in line, f"{page}:{number}: a fence without its other end"
 
 
+# ---- Costs
+
+
+def test_costs():
+    """the table of costs is that of bench/results"""
+    result = subprocess.run([sys.executable, os.path.join(SOURCES, "tools", "costs"), "--check"], capture_output=True, text=True, check=False)
+    equal((result.returncode, result.stderr), (0, ""))
+
+
 # ---- Links
 
 

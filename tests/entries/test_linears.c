@@ -1,5 +1,6 @@
 /* test_linears.c: all linear solvers on the pattern of a cloth, against Gaussian elimination in long
  * double. */
+#include "solvers/elimination.h"
 #include "solvers/inertia.h"
 #include "solvers/linear.h"
 #include "solvers/refine.h"
@@ -921,7 +922,61 @@ START_TEST(a_nearby_matrix_is_corrected)
 }
 END_TEST
 
-SUITE("linears", entries_are_well_formed, random_systems_are_solved,
+/* ---- Orders ---- */
+
+static drape_model *small_model(drape_context *ctx, bool pinned)
+{
+    const drape_entry_def terms[] = {{.type = "stretch.edge"}};
+    return make_model(
+        ctx, &(model_def){.mesh = MESH_IRREGULAR, .terms = terms, .term_count = 1, .pinned = pinned});
+}
+
+/* Solvers with equal patterns share one order, also after the pattern that it was found for is gone; it goes
+ * with the last of them. Failed allocations leave nothing. */
+START_TEST(equal_patterns_share_an_order)
+{
+    failing_allocator memory = {0};
+    drape_context *ctx = failing_context(&memory);
+    drape_model *a = small_model(ctx, true), *b = small_model(ctx, true), *c = small_model(ctx, false);
+    drape_shared_elimination *of[4] = {NULL};
+    const long live = memory.live;
+    ck_assert_int_eq(drape_elimination_share(ctx, &a->pattern, &of[0]), DRAPE_OK);
+    drape_model_destroy(&a);
+    const long shared = memory.live, calls = memory.calls;
+    ck_assert_int_eq(drape_elimination_share(ctx, &b->pattern, &of[1]), DRAPE_OK);
+    ck_assert_int_eq(memory.calls, calls);
+    ck_assert_ptr_eq(of[0], of[1]);
+    ck_assert_int_eq(drape_elimination_share(ctx, &c->pattern, &of[2]), DRAPE_OK);
+    ck_assert_ptr_ne(of[2], of[0]);
+    ck_assert_int_ne(drape_elimination_of(of[2])->n, drape_elimination_of(of[0])->n);
+    ck_assert_uint_gt(drape_elimination_bytes(of[0]), 0);
+    drape_elimination_release(&of[2]);
+    drape_elimination_release(&of[0]);
+    ck_assert_ptr_null(of[0]);
+    ck_assert_int_eq(memory.live, shared);
+    ck_assert_int_eq(drape_elimination_share(ctx, &b->pattern, &of[3]), DRAPE_OK);
+    ck_assert_ptr_eq(of[3], of[1]);
+    drape_elimination_release(&of[1]);
+    drape_elimination_release(&of[3]);
+    drape_elimination_release(&of[3]);
+    ck_assert_int_lt(memory.live, live); /* without the model a */
+    drape_status status = DRAPE_E_MEMORY;
+    const long before = memory.live;
+    for (long n = 1; status; n++) {
+        memory.fail_at = memory.calls + n;
+        status = drape_elimination_share(ctx, &b->pattern, &of[0]);
+        memory.fail_at = 0;
+        ck_assert(!status || (status == DRAPE_E_MEMORY && memory.live == before && !of[0]));
+    }
+    drape_elimination_release(&of[0]);
+    ck_assert_int_eq(memory.live, before);
+    drape_model_destroy(&b), drape_model_destroy(&c);
+    drape_context_destroy(&ctx);
+    ck_assert_int_eq(memory.live, 0);
+}
+END_TEST
+
+SUITE("linears", entries_are_well_formed, equal_patterns_share_an_order, random_systems_are_solved,
       several_right_hand_sides_of_one_factorisation, broken_matrices_are_reported_and_good_ones_work_again,
       a_right_hand_side_that_is_not_finite_is_reported, kept_pivots_that_become_zero_are_chosen_again,
       a_small_part_that_is_not_symmetric_is_not_lost, fallbacks_are_counted, a_sheet_of_many_supernodes,

@@ -122,6 +122,25 @@ def what_comes_along(tree):
     assert "-ldrape" in libraries and not any("sundials" in flag or "klu" in flag for flag in libraries), libraries
 
 
+# Of SuiteSparse, what docs/licences.md names, and its prefixes; and what is under the GPL, as most of SuiteSparse's other parts are.
+INSIDE = {"KLU": r"klu_", "BTF": r"btf_", "AMD": r"amd_", "COLAMD": r"colamd", "SuiteSparse's configuration": r"SuiteSparse_"}
+NEVER = r"_*(cholmod_|umf(pack)?_|umfpack|umfdi|spqr|SuiteSparseQR|camd_|ccolamd|csymamd|ldl_|cs_(di|dl|ci|cl)?_|rbio|RB|gsl_|mongoose|slip_)"
+
+
+def what_the_library_contains(tree):
+    """What the page of licences says of SuiteSparse is what the linker took, local symbols included; nothing under the GPL."""
+    with open(os.path.join(SOURCE, "docs", "licences.md"), encoding="utf-8") as file:
+        page = file.read()
+    archives = "--wrap" in " ".join(tree.flags("--static", "--libs"))
+    for path in tree.shared(), tree.static():
+        names = symbols(path)
+        assert not [name for name in names if re.match(NEVER, name)], path
+        found = {part for part, prefix in INSIDE.items() if any(re.match("_*" + prefix, name) for name in names)}
+        if path.endswith(".so"):
+            assert found == (set(INSIDE) if archives else set()), (path, found)
+    assert all(part in page for part in INSIDE), page
+
+
 def check_host(output):
     lines = output.splitlines()
     assert len(lines) == int(FRAMES) // 30 and lines[0].startswith("t "), output
@@ -309,7 +328,7 @@ def the_program_runs(tree):
 
 
 TESTS = [what_is_installed, what_the_shared_library_shows, what_the_static_library_defines,
-         what_of_libm_the_static_library_calls, what_comes_along, host_in_c, body_in_c, host_in_c_static,
+         what_of_libm_the_static_library_calls, what_comes_along, what_the_library_contains, host_in_c, body_in_c, host_in_c_static,
          host_with_libraries_of_its_own, the_lab_links, documentation_is_installed, host_in_cpp,
          cmake_of_the_static_library, cmake_refuses_another_version, host_in_python, the_program_runs]
 
