@@ -162,8 +162,7 @@ typedef struct drape_modes {
  * without pinned nodes, and with the masses M of the nodes; or the lowest loads at which it buckles, by
  * linear extrapolation of K along the equilibrium path through it, with K' = dK/dfactor, all loads of the
  * scene (terms that act from outside, such as gravity) being multiplied by one factor. The state should be
- * an equilibrium: see `force`. Friction holds nothing, contact that acts is as stiff as it is, the wind
- * moves on.
+ * an equilibrium: see `force`. Friction holds nothing; contact that acts has its stiffness.
  *
  * Eigenvalues are found by ARPACK-NG with the inverse of K - shift M, and counted independently by the
  * inertia of a factorisation between the last mode and the next, so that none is missed, a repeated one
@@ -172,7 +171,8 @@ typedef struct drape_modes {
  * *out is empty after a failure. Errors: DRAPE_E_ARGUMENT (NULL, an invalid def, too many modes, no free
  * node, a stiffness that is not symmetric; for buckling: no load deforms the cloth, it is in contact, or
  * the state is unstable already), DRAPE_E_SOLVER (not all modes converged or were counted), DRAPE_E_STOPPED
- * (cancelled), DRAPE_E_MEMORY. Thread-safety: as the sim; of several calls at once, one at a time searches. */
+ * (cancelled), DRAPE_E_MEMORY. Thread-safety: as the sim; of several calls at once, one at a time
+ * searches. */
 DRAPE_API drape_status drape_sim_modes(drape_sim *sim, const drape_modes_def *def, drape_modes *out);
 
 /* Frees the modes and empties the struct, which belongs to the caller. NULL and an empty one are allowed. */

@@ -1,5 +1,5 @@
-/* cmd_modes.c: `drape modes`: eigenfrequencies or buckling loads about a state of a scene; a table, and frames
- * that show each mode. */
+/* cmd_modes.c: `drape modes`: eigenfrequencies or buckling loads about a state of a scene; a table, and
+ * frames that show each mode. */
 #include "cli/cli.h"
 #include "cli/signals.h"
 

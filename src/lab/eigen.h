@@ -1,7 +1,7 @@
 /*
- * eigen.h: the largest eigenvalues of a large operator that is symmetric in an inner product, by ARPACK-NG:
- * Lanczos' method with implicit restarts (Lehoucq, Sorensen & Yang 1998, ARPACK users' guide). ARPACK asks its
- * caller for each product with the operator, so that the factors may be our own.
+ * eigen.h: the largest eigenvalues of an operator that is symmetric in an inner product, by ARPACK-NG:
+ * Lanczos' method with implicit restarts (Lehoucq, Sorensen & Yang 1998, ARPACK users' guide). ARPACK asks
+ * its caller for each product with the operator, so that the factors may be our own.
  */
 #ifndef DRAPE_LAB_EIGEN_H
 #define DRAPE_LAB_EIGEN_H

@@ -6,11 +6,11 @@
  *
  * Buckling: K depends on the factor f of the loads, and is singular where the cloth buckles. To first order
  * along the path of equilibria dx/df = u1 = -K^-1 (loads), so that (K + (f - f0) K') u = 0 with K' = dK/df
- * (Bathe 1996, Finite element procedures, 6.8.2). K' is a derivative along the path, by differences of the
- * exact K, and not the matrix of the initial stress alone: it is the same for a flat sheet under loads in its
- * plane, holds for every term, and contains what loads that follow the cloth do to K. With K positive definite,
- * OP = -K^-1 K', symmetric in the inner product of K, has the eigenvalues 1/(f - f0): the largest belong to
- * the lowest loads above f0.
+ * (Bathe 1996, Finite element procedures, 6.8.2). K' is a derivative along the path, by differences of
+ * the exact K, and not the matrix of the initial stress alone: it is the same for a flat sheet under loads
+ * in its plane, holds for every term, and contains what loads that follow the cloth do to K. With K positive
+ * definite, OP = -K^-1 K', symmetric in the inner product of K, has the eigenvalues 1/(f - f0): the largest
+ * belong to the lowest loads above f0.
  *
  * Lanczos' method may miss an eigenvector of a repeated eigenvalue. By Sylvester's law of inertia the number
  * of eigenvalues below a value is that of the negative pivots of K - value M, or K + (value - f0) K'. What is
@@ -30,7 +30,7 @@
 
 #define PI 3.14159265358979323846
 /* The shift, in parts of the largest diagonal entry of M^-1 K: far enough from 0 that the rigid motions of a
- * free sheet leave S regular, near enough that they are told from the slowest bending. */
+ * free sheet leave S regular, near enough that they are distinct from the slowest bending. */
 #define SHIFT      1e-11
 #define SHIFT_STEP 8.0 /* while it is not below all eigenvalues */
 #define MAX_SHIFTS 16
@@ -236,8 +236,9 @@ static double widest_gap(const problem *p, int32_t wanted, int32_t *behind)
     return widest;
 }
 
-/* Counts all eigenvalues up to a gap behind the wanted ones, and how many of them are missing among the pairs;
- * *missing -1: it cannot be told here. */
+/* Counts all eigenvalues up to a gap behind the wanted ones, and those missing among the pairs;
+ * *missing -1: it is not
+ * known here. */
 static drape_status find_missing(const problem *p, int32_t wanted, int64_t *missing, int64_t *below)
 {
     int32_t behind;
@@ -294,12 +295,11 @@ static drape_status search_all(problem *p, int32_t wanted, int64_t *below)
             "only %d of %d buckling loads were found; with loads in this direction there may be "
             "no more",
             (int)p->count, (int)wanted);
-    return missing < 0
-               ? drape_fail(p->ctx, DRAPE_E_SOLVER,
-                            "%d modes were found, but whether these are all up to there cannot be told",
-                            (int)p->count)
-               : drape_fail(p->ctx, DRAPE_E_SOLVER, "%lld of the lowest %d modes did not converge",
-                            (long long)missing, (int)wanted);
+    return missing < 0 ? drape_fail(p->ctx, DRAPE_E_SOLVER,
+                                    "%d modes were found, but whether these are all up to there is not known",
+                                    (int)p->count)
+                       : drape_fail(p->ctx, DRAPE_E_SOLVER, "%lld of the lowest %d modes did not converge",
+                                    (long long)missing, (int)wanted);
 }
 
 /* ---- Results ---- */

@@ -1,7 +1,7 @@
 /*
- * tangent.h: the exact stiffness of a sim's present state, about which modes are computed: K = d2E/dx2 over the
- * free nodes, with the nodes at rest, so that only stiffness is in it; and how K changes with the loads. The
- * loads are the scene's external terms (drape_term_ops.external), all multiplied by the same factor.
+ * tangent.h: the exact stiffness of a sim's present state, about which modes are computed: K = d2E/dx2 over
+ * the free nodes, with the nodes at rest, so that only stiffness is in it; and how K changes with the loads.
+ * The loads are the scene's external terms (drape_term_ops.external), all multiplied by the same factor.
  */
 #ifndef DRAPE_LAB_TANGENT_H
 #define DRAPE_LAB_TANGENT_H

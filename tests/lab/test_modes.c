@@ -1,6 +1,6 @@
-/* test_modes.c: drape_sim_modes: eigenvalues that are known to rounding, motions without stiffness, states that
- * are unstable, repeated eigenvalues, what modes of a matrix have in common, loads at which strips buckle, and
- * refusals. The references of `drape validate` that are modes are below, too: they take a second. */
+/* test_modes.c: drape_sim_modes: eigenvalues that are known to rounding, motions without stiffness, states
+ * that are unstable, repeated eigenvalues, what modes of a matrix have in common, loads at which strips
+ * buckle, refusals; and the references of `drape validate` that are modes: they take a second. */
 #include "drape/lab.h"
 #include "lab/eigen.h"
 #include "lab/tangent.h"
@@ -49,9 +49,9 @@ static scene open_membrane(void)
         "'gravity': [0, 0, 0], 'integrator': {'method': 'static'}, 'duration': 1}");
 }
 
-/* Across the plane omega^2 = 4 T/m (sin^2 + sin^2) with T the tension over the length of a spring, and each mode
- * with m != n is there twice; along either axis of the plane, springs of that axis have k in place of T. Each
- * of some ten operations that make an entry of K rounds, relative to the largest eigenvalue, 8 k/m. */
+/* Across the plane omega^2 = 4 T/m (sin^2 + sin^2) with T the tension over the length of a spring, and each
+ * mode with m != n is there twice; along either axis of the plane, springs of that axis have k in place of
+ * T. Each of some ten operations that make an entry of K rounds, relative to the largest eigenvalue, 8 k/m. */
 START_TEST(a_membrane_has_the_modes_of_its_lattice)
 {
     static const struct {
@@ -119,7 +119,7 @@ START_TEST(modes_are_orthogonal_and_satisfy_the_equation)
 }
 END_TEST
 
-/* A search may find an eigenvector of an equal pair only; the next finds the other. Of diag(1, 2, 2, 3 ...) 
+/* A search may find an eigenvector of an equal pair only; the next finds the other. Of diag(1, 2, 2, 3 ...)
  * with known vectors e_0 and e_1, e_2 must be among the largest of 1/diag that are left. */
 static drape_status invert(void *user, const double *x, double *y)
 {
@@ -272,8 +272,8 @@ START_TEST(wrong_requests_are_refused)
 }
 END_TEST
 
-/* Slack cloth without bending has no stiffness across its plane: more equal modes than can be told apart are
- * not reported as found. */
+/* Slack cloth without bending has no stiffness across its plane: more equal modes than can be separated
+ * are not reported as found. */
 START_TEST(too_many_equal_modes_are_a_failure)
 {
     scene s = scene_open(
@@ -282,7 +282,7 @@ START_TEST(too_many_equal_modes_are_a_failure)
         "'terms': ['stretch.cst'], 'pins': [{'edge': 'top'}]}], 'gravity': [0, 0, 0], 'duration': 1}");
     drape_modes_def def;
     drape_modes_def_init(&def, sizeof def);
-    refuse(&s, def, DRAPE_E_SOLVER, "cannot be told");
+    refuse(&s, def, DRAPE_E_SOLVER, "is not known");
     scene_close(&s);
 }
 END_TEST
