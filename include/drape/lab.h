@@ -178,6 +178,72 @@ DRAPE_API drape_status drape_sim_modes(drape_sim *sim, const drape_modes_def *de
 /* Frees the modes and empties the struct, which belongs to the caller. NULL and an empty one are allowed. */
 DRAPE_API void drape_modes_free(drape_modes *modes);
 
+/* ---- Paths of equilibria ---- */
+
+/* What lies between a point of a path and the one before it. */
+typedef enum drape_path_event {
+    DRAPE_PATH_REGULAR,     /* nothing */
+    DRAPE_PATH_LIMIT,       /* a limit point: the factor has turned round */
+    DRAPE_PATH_BIFURCATION, /* the number of unstable modes has changed, and the factor has not turned round */
+    DRAPE_PATH_SWITCHED /* nothing: it is the first point of a branch, and the one before is where it begins */
+} drape_path_event;
+
+/* A point of a path: an equilibrium under the scene's loads times a factor. Valid during the call that it is
+ * passed to. */
+typedef struct drape_path_point {
+    int64_t number;         /* from 0 */
+    drape_path_event event; /* what lies before it */
+    double factor;          /* of the loads */
+    double arc;             /* [m] length of the path so far: root mean square over the masses of nodes */
+    double elastic;         /* [J] elastic energy */
+    double potential;       /* [J] potential of the loads at this factor */
+    int64_t unstable;       /* modes in which it is unstable: negative pivots of K; -1: not known */
+    int iterations;         /* of Newton's method */
+    double residual;        /* [N] largest force that is left on a free node */
+} drape_path_point;
+
+/* Called at each point, which is then the state of the sim. Returns 0 to continue; > 0: the path ends here, with
+ * DRAPE_OK; < 0: it ends with this status. It must not change the sim. */
+typedef drape_status drape_path_observer(void *user, drape_sim *sim, const drape_path_point *point);
+
+/* The definition of a path. Initialise with drape_path_def_init. */
+typedef struct drape_path_def {
+    size_t struct_size; /* set by drape_path_def_init */
+    double from;    /* factor of the loads at the first point, which Newton's method finds from the present
+                           state; default 0 */
+    double to;      /* factor at which the path ends, once it has reached it; default 1 */
+    double step;    /* first increment of the factor, > 0; default 0.05 */
+    double max_arc; /* [m] longest step along the arc; 0: a fiftieth of the scene; default 0 */
+    bool
+        load_control; /* steps of the factor instead of the arc: it cannot pass limit points; default false */
+    int branch; /* at the first bifurcation, 1 or -1: follow the branch to either side along the unstable
+                           mode; 0: stay on the path; default 0 */
+    int64_t max_points; /* after so many points the path ends with DRAPE_OK; default 1000 */
+    double tolerance;   /* of the residual, in parts of the largest force on a node; default 1e-8 */
+    drape_path_observer *observer; /* NULL: none */
+    void *user;                    /* passed to the observer */
+} drape_path_def;
+
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_path_def) as struct_size. Nothing if def is
+ * NULL. */
+DRAPE_API void drape_path_def_init(drape_path_def *def, size_t struct_size);
+
+/* Follows a path of equilibria: all loads of the scene, that is its terms that act from outside, such as
+ * gravity, are multiplied by one factor, which is one more unknown; pins are where they are at the time of the
+ * state. Each step is a prediction along the tangent and Newton's method with the exact stiffness and a
+ * constraint: corrections are normal to the step so far (Ramm 1981), so that the path may turn round at limit
+ * points. A step that fails (no convergence, a degenerate element, a matrix that cannot be solved with) is
+ * rejected and made again with half its length. Damping, velocities and the wind have no effect. The sim's
+ * state becomes each point in turn, with velocities 0; at another factor than 1 it is no equilibrium of the
+ * scene itself.
+ *
+ * Errors: DRAPE_E_ARGUMENT (NULL, an invalid def, no free node, a stiffness that is not symmetric, a scene
+ * with colliders or self-contact, loads that vanish), DRAPE_E_STEP_TOO_SMALL (steps fail, however short),
+ * DRAPE_E_SOLVER (the first point was not found, or the branch), DRAPE_E_STOPPED (cancelled), DRAPE_E_MEMORY,
+ * those of the observer. After one the sim is at the last point that was reported. Thread-safety: as the
+ * sim. */
+DRAPE_API drape_status drape_sim_path(drape_sim *sim, const drape_path_def *def);
+
 DRAPE_C_END
 
 #endif

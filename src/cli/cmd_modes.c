@@ -1,14 +1,12 @@
 /* cmd_modes.c: `drape modes`: eigenfrequencies or buckling loads about a state of a scene; a table, and
  * frames that show each mode. */
 #include "cli/cli.h"
+#include "cli/shapes.h"
 #include "cli/signals.h"
 
 #include "drape/lab.h"
 #include "io/csv.h"
-#include "io/export.h"
 #include "io/json.h"
-#include "io/recorder.h"
-#include "io/scene_copy.h"
 
 #include <limits.h>
 #include <math.h>
@@ -184,15 +182,7 @@ static drape_status emit_frame(const job *j, const double *start, const drape_mo
     for (size_t i = 0; i < n; i++)
         x[i] = start[i] + share * mode->shape[i];
     drape_status status = drape_sim_set_state(sim, drape_sim_time(sim), x, still);
-    if (status)
-        return status;
-    const drape_event event = {.kind = DRAPE_EVENT_FRAME,
-                               .sim = sim,
-                               .frame = frame,
-                               .time = (double)frame / sim->frame_rate,
-                               .positions = x,
-                               .velocities = still};
-    return drape_sim_notify(sim, &event);
+    return status ? status : cli_shapes_emit(sim, frame);
 }
 
 static drape_status emit_frames(const job *j)
@@ -217,28 +207,11 @@ static drape_status emit_frames(const job *j)
 
 static drape_status write_output(const job *j)
 {
-    static const char *const also[] = {TABLE, DRAPE_SCENE_COPY, DRAPE_SCENE_MESHES};
     const modes_request *request = j->request;
-    const char *scene = request->command.operand;
-    const drape_model *model = j->in.model;
-    const bool copies = !drape_scene_copy_is(scene, request->out);
-    const char **formats = drape_arena_take(request->command.arena, model->format_count + 1, sizeof *formats);
+    const cli_shapes shapes = {
+        .folder = request->out, .table = TABLE, .frames = (int64_t)j->modes.count * frames_of(request)};
     drape_recorder *recorder = NULL;
-    if (!formats)
-        return DRAPE_E_MEMORY;
-    for (size_t i = 0; i < model->format_count; i++)
-        formats[i] = model->formats[i];
-    formats[model->format_count] = "npy"; /* which drape render reads; twice counts once */
-    const drape_recorder_def def = {.folder = request->out,
-                                    .scene = scene,
-                                    .also = also,
-                                    .also_count = copies ? sizeof also / sizeof *also : 1,
-                                    .formats = formats,
-                                    .format_count = model->format_count + 1,
-                                    .frames = (int64_t)j->modes.count * frames_of(request)};
-    drape_status status = drape_recorder_create(j->in.ctx, j->in.sim, &def, &recorder);
-    if (!status && copies)
-        status = drape_scene_copy(j->in.ctx, j->in.scene, model, scene, drape_recorder_folder(recorder));
+    drape_status status = cli_shapes_open(&request->command, &j->in, &shapes, &recorder);
     if (!status)
         status = write_table(j, drape_recorder_folder(recorder));
     if (!status)
@@ -280,15 +253,6 @@ static int compute(job *j, const struct state *state)
     return fflush(stdout) ? CLI_FAILED : CLI_DONE;
 }
 
-static int check_folder(const modes_request *request)
-{
-    const cli_command *command = &request->command;
-    if (!request->out || command->setting_count == 0 || !drape_scene_copy_is(command->operand, request->out))
-        return CLI_GO_ON;
-    return cli_misuse(command->verb, "--out \"%.500s\": its " DRAPE_SCENE_COPY " is the scene itself",
-                      request->out);
-}
-
 static int run(const void *command)
 {
     const modes_request *request = command;
@@ -296,7 +260,7 @@ static int run(const void *command)
     const struct state *state = request->state ? find_state(request->state) : &states[0];
     if (!state)
         return cli_misuse("modes", "--state \"%.60s\": it is static, start or end", request->state);
-    int code = check_folder(request);
+    int code = cli_shapes_check(&request->command, request->out);
     if (code == CLI_GO_ON)
         code = cli_scene_load_with(&request->command, request->command.operand, choose,
                                    (void *)(uintptr_t)state, &j.in);

@@ -107,38 +107,48 @@ static drape_status count_negative(const problem *p, const double *values, int64
     return drape_inertia(p->ctx, p->tangent.pattern, values, NULL, negative, known);
 }
 
-static drape_status factor(problem *p)
+/* Factors the shifted matrix if it is positive definite. */
+static drape_status factor(problem *p, bool *definite)
 {
-    drape_status status = p->solver->create(&p->factor_arena, p->tangent.pattern, &p->factors);
-    if (!status)
-        status = p->solver->factor(p->factors, p->shifted);
-    return status > 0 ? drape_fail(p->ctx, DRAPE_E_SOLVER, "a shifted stiffness is singular") : status;
+    return lab_tangent_factor_definite(&p->tangent, p->solver, p->factors, p->shifted, definite);
 }
 
 /* Lowers the shift until it is below all eigenvalues, so that none of them is passed by. */
 static drape_status factor_below_all(problem *p)
 {
-    const double stiffest = p->stiffest;
-    double share = SHIFT;
-    for (int i = 0; i < MAX_SHIFTS; i++, share *= SHIFT_STEP) {
-        int64_t negative;
-        bool known;
-        p->shift = -share * stiffest;
+    bool definite = false;
+    drape_status status = DRAPE_OK;
+    p->shift = -SHIFT * p->stiffest;
+    for (int i = 0; !status && !definite && i < MAX_SHIFTS; i++) {
+        p->shift *= i > 0 ? SHIFT_STEP : 1;
         lab_tangent_shift(&p->tangent, -p->shift, NULL, p->shifted);
-        drape_status status = count_negative(p, p->shifted, &negative, &known);
-        if (status)
-            return status;
-        if (known && negative == 0)
-            return factor(p);
+        status = factor(p, &definite);
     }
-    return drape_fail(p->ctx, DRAPE_E_SOLVER, "no shift is below all eigenvalues of the stiffness");
+    return status || definite
+               ? status
+               : drape_fail(p->ctx, DRAPE_E_SOLVER, "no shift is below all eigenvalues of the stiffness");
+}
+
+/* Why a state has no buckling loads. */
+static drape_status refuse_unstable(const problem *p)
+{
+    int64_t negative;
+    bool known;
+    drape_status status = count_negative(p, p->shifted, &negative, &known);
+    if (status)
+        return status;
+    return drape_fail(p->ctx, DRAPE_E_ARGUMENT,
+                      known ? "the state has %lld unstable modes: it has buckled already; buckling loads are "
+                              "those of a stable state, such as the start without loads"
+                            : "the stiffness of the state is singular: buckling loads need a cloth that is "
+                              "held and has a stiffness against every motion (%lld negative pivots)",
+                      (long long)negative);
 }
 
 static drape_status prepare_buckling(problem *p)
 {
     const size_t n = (size_t)p->n;
-    int64_t negative;
-    bool known;
+    bool definite = false;
     double *load = drape_arena_take(&p->arena, n, sizeof *load);
     double *u = drape_arena_take(&p->arena, n, sizeof *u);
     p->slope = drape_arena_take(&p->arena, (size_t)p->tangent.pattern->nonzeros, sizeof *p->slope);
@@ -146,20 +156,12 @@ static drape_status prepare_buckling(problem *p)
         return DRAPE_E_MEMORY;
     p->shift = p->tangent.factor;
     lab_tangent_shift(&p->tangent, 0, NULL, p->shifted);
-    drape_status status = count_negative(p, p->shifted, &negative, &known);
-    if (!status && (!known || negative > 0))
-        return drape_fail(p->ctx, DRAPE_E_ARGUMENT,
-                          known ? "the state has %lld unstable modes: it has buckled already; buckling loads "
-                                  "are those of a stable state, such as the start without loads"
-                                : "the stiffness of the state is singular: buckling loads need a cloth that "
-                                  "is held and has a stiffness against every motion (%lld negative pivots)",
-                          (long long)negative);
-    if (!status)
-        status = factor(p);
-    if (!status)
-        status = lab_tangent_load(&p->tangent, load);
+    drape_status status = factor(p, &definite);
+    if (!status && !definite)
+        status = refuse_unstable(p);
     if (status)
         return status;
+    lab_tangent_evaluate(&p->tangent, drape_sim_state(p->tangent.sim)->x, p->shift, NULL, load, NULL);
     if (p->solver->solve(p->factors, load, u))
         return drape_fail(p->ctx, DRAPE_E_SOLVER, "the stiffness cannot be solved with");
     for (size_t i = 0; i < n; i++)
@@ -462,6 +464,9 @@ static drape_status compute(problem *p, drape_sim *sim, const drape_modes_def *d
     measure_stiffness(p);
     if (!(p->stiffest > 0))
         return drape_fail(p->ctx, DRAPE_E_ARGUMENT, "nothing in this scene has a stiffness");
+    status = p->solver->create(&p->factor_arena, p->tangent.pattern, &p->factors);
+    if (status)
+        return status;
     status = p->buckling ? prepare_buckling(p) : factor_below_all(p);
     if (!status)
         status = search_all(p, def->count, &below);

@@ -2,6 +2,7 @@
 #include "lab/tangent.h"
 
 #include "base/finite.h"
+#include "solvers/inertia.h"
 
 #include <math.h>
 #include <string.h>
@@ -27,18 +28,18 @@ static void add_loads(const lab_tangent *t, const drape_point *point, double *g,
             drape_system_term(t->system, i, point, NULL, g, values);
 }
 
-/* values = K at nodes x and a factor of the loads. scratch: (nonzeros). */
-static void evaluate(const lab_tangent *t, const double *x, double factor, double *scratch, double *values)
+/* values = K at nodes x and a factor of the loads. */
+static void evaluate(const lab_tangent *t, const double *x, double factor, double *values)
 {
     const drape_point point = point_at(t, x);
     const size_t count = (size_t)t->pattern->nonzeros;
     drape_system_jacobian_without(t->system, &point, 0, 0, t->loads, values);
     if (factor == 0)
         return;
-    memset(scratch, 0, count * sizeof *scratch);
-    add_loads(t, &point, NULL, scratch);
+    memset(t->scratch, 0, count * sizeof *t->scratch);
+    add_loads(t, &point, NULL, t->scratch);
     for (size_t i = 0; i < count; i++)
-        values[i] += factor * scratch[i];
+        values[i] += factor * t->scratch[i];
 }
 
 static void take_free(const drape_model *m, const double *nodes, double *free)
@@ -49,12 +50,12 @@ static void take_free(const drape_model *m, const double *nodes, double *free)
 
 /* A friction that does not slip has no stiffness, and one that slips none that is symmetric: both are left
  * out. Anything else that is not symmetric has no modes of the kind that are sought. */
-static drape_status make_symmetric(const lab_tangent *t, const drape_point *point, double *scratch)
+static drape_status make_symmetric(const lab_tangent *t, const drape_point *point)
 {
     const drape_pattern *p = t->pattern;
     const size_t count = (size_t)p->nonzeros;
     double largest = 0, difference = 0;
-    memcpy(scratch, t->values, count * sizeof *scratch);
+    memcpy(t->scratch, t->values, count * sizeof *t->scratch);
     if (drape_system_is_symmetric(t->system))
         drape_pattern_symmetrize(p, t->values);
     else
@@ -63,7 +64,7 @@ static drape_status make_symmetric(const lab_tangent *t, const drape_point *poin
         return DRAPE_OK;
     for (size_t i = 0; i < count; i++) {
         largest = fmax(largest, fabs(t->values[i]));
-        difference = fmax(difference, fabs(t->values[i] - scratch[i]));
+        difference = fmax(difference, fabs(t->values[i] - t->scratch[i]));
     }
     return difference <= MAX_ASYMMETRY * largest
                ? DRAPE_OK
@@ -86,13 +87,13 @@ static drape_status read_state(lab_tangent *t, drape_arena *arena)
         return status;
     t->pattern = drape_system_pattern(t->system);
     const size_t count = (size_t)t->pattern->nonzeros, nodes = 3 * (size_t)m->node_count;
-    double *scratch = drape_arena_take(arena, count, sizeof *scratch);
-    double *g = drape_arena_take(arena, nodes, sizeof *g);
-    double *loads = drape_arena_take(arena, nodes, sizeof *loads);
+    double *g = t->nodes = drape_arena_take(arena, 2 * nodes, sizeof *g);
+    t->scratch = drape_arena_take(arena, count, sizeof *t->scratch);
     t->values = drape_arena_take(arena, count, sizeof *t->values);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    evaluate(t, now->x, t->factor, scratch, t->values);
+    double *loads = g + nodes;
+    evaluate(t, now->x, t->factor, t->values);
     if (!drape_all_finite(t->values, count))
         return drape_fail(t->ctx, DRAPE_E_SOLVER, "the stiffness of this state is not finite");
     drape_system_force_without(t->system, &point, t->loads, g);
@@ -102,7 +103,7 @@ static drape_status read_state(lab_tangent *t, drape_arena *arena)
             const size_t at = 3 * (size_t)m->node_of_free[f] + (size_t)k;
             t->force = fmax(t->force, fabs(g[at] + t->factor * loads[at]));
         }
-    return make_symmetric(t, &point, scratch);
+    return make_symmetric(t, &point);
 }
 
 drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor, lab_tangent *t)
@@ -139,6 +140,22 @@ void lab_tangent_close(lab_tangent *t)
     drape_system_destroy(&t->system);
 }
 
+drape_status lab_tangent_factor_definite(const lab_tangent *t, const drape_linear_ops *solver, void *factors,
+                                         const double *values, bool *definite)
+{
+    int64_t negative = 0;
+    bool known = true;
+    drape_status status = DRAPE_OK;
+    if (!solver->factor_definite)
+        status = drape_inertia(t->ctx, t->pattern, values, NULL, &negative, &known);
+    *definite = known && negative == 0;
+    if (!status && *definite)
+        status = solver->factor_definite ? solver->factor_definite(factors, values)
+                                         : solver->factor(factors, values);
+    *definite = *definite && !status;
+    return status < 0 ? status : DRAPE_OK;
+}
+
 void lab_tangent_multiply(const lab_tangent *t, const double *values, const double *x, double *y)
 {
     const drape_pattern *p = t->pattern;
@@ -164,15 +181,28 @@ void lab_tangent_shift(const lab_tangent *t, double share, const double *other, 
     }
 }
 
-drape_status lab_tangent_load(const lab_tangent *t, double *g)
+double lab_tangent_evaluate(const lab_tangent *t, const double *x, double factor, double *force, double *load,
+                            double *values)
 {
-    const drape_point point = point_at(t, drape_sim_state(t->sim)->x);
-    double *all = drape_arena_take(t->arena, 3 * (size_t)t->sim->model->node_count, sizeof *all);
-    if (!all)
-        return DRAPE_E_MEMORY;
-    add_loads(t, &point, all, NULL);
-    take_free(t->sim->model, all, g);
-    return DRAPE_OK;
+    const drape_model *m = t->sim->model;
+    const drape_point point = point_at(t, x);
+    const size_t n = 3 * (size_t)m->node_count;
+    double *g = t->nodes, *loads = t->nodes + n, largest = 0;
+    if (values)
+        evaluate(t, x, factor, values);
+    memset(loads, 0, n * sizeof *loads);
+    add_loads(t, &point, loads, NULL);
+    if (load)
+        take_free(m, loads, load);
+    if (!force)
+        return 0;
+    drape_system_force_without(t->system, &point, t->loads, g);
+    for (size_t i = 0; i < n; i++) {
+        largest = fmax(largest, fabs(g[i]));
+        g[i] += factor * loads[i];
+    }
+    take_free(m, g, force);
+    return largest;
 }
 
 /* x = the state's nodes, moved by share u. */
@@ -211,7 +241,6 @@ drape_status lab_tangent_slope(const lab_tangent *t, const double *u, double *va
     const double change = largest_change(t, u);
     double *x = drape_arena_take(t->arena, 3 * (size_t)t->sim->model->node_count, sizeof *x);
     double *before = drape_arena_take(t->arena, count, sizeof *before);
-    double *scratch = drape_arena_take(t->arena, count, sizeof *scratch);
     if (drape_arena_status(t->arena))
         return DRAPE_E_MEMORY;
     if (!(change > 0) || !isfinite(change))
@@ -229,7 +258,7 @@ drape_status lab_tangent_slope(const lab_tangent *t, const double *u, double *va
             return drape_fail(t->ctx, DRAPE_E_ARGUMENT,
                               "cloth is in contact: its stiffness is not smooth in the loads, so that "
                               "buckling loads cannot be extrapolated");
-        evaluate(t, x, t->factor + side * h, scratch, side < 0 ? before : values);
+        evaluate(t, x, t->factor + side * h, side < 0 ? before : values);
     }
     for (size_t i = 0; i < count; i++)
         values[i] = (values[i] - before[i]) / (2 * h);
