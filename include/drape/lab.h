@@ -184,8 +184,8 @@ DRAPE_API void drape_modes_free(drape_modes *modes);
 typedef enum drape_path_event {
     DRAPE_PATH_REGULAR,     /* nothing */
     DRAPE_PATH_LIMIT,       /* a limit point: the factor has turned round */
-    DRAPE_PATH_BIFURCATION, /* the number of unstable modes has changed, and the factor has not turned round */
-    DRAPE_PATH_SWITCHED /* nothing: it is the first point of a branch, and the one before is where it begins */
+    DRAPE_PATH_BIFURCATION, /* the number of unstable modes has changed, but the factor goes on */
+    DRAPE_PATH_SWITCHED     /* nothing: it is the first point of a branch, and the one before is its origin */
 } drape_path_event;
 
 /* A point of a path: an equilibrium under the scene's loads times a factor. Valid during the call that it is
@@ -202,8 +202,8 @@ typedef struct drape_path_point {
     double residual;        /* [N] largest force that is left on a free node */
 } drape_path_point;
 
-/* Called at each point, which is then the state of the sim. Returns 0 to continue; > 0: the path ends here, with
- * DRAPE_OK; < 0: it ends with this status. It must not change the sim. */
+/* Called at each point, which is then the state of the sim. Returns 0 to continue; > 0: the path ends here,
+ * with DRAPE_OK; < 0: it ends with this status. It must not change the sim. */
 typedef drape_status drape_path_observer(void *user, drape_sim *sim, const drape_path_point *point);
 
 /* The definition of a path. Initialise with drape_path_def_init. */
@@ -229,8 +229,8 @@ typedef struct drape_path_def {
 DRAPE_API void drape_path_def_init(drape_path_def *def, size_t struct_size);
 
 /* Follows a path of equilibria: all loads of the scene, that is its terms that act from outside, such as
- * gravity, are multiplied by one factor, which is one more unknown; pins are where they are at the time of the
- * state. Each step is a prediction along the tangent and Newton's method with the exact stiffness and a
+ * gravity, are multiplied by one factor, which is one more unknown; pins are where they are at the time of
+ * the state. Each step is a prediction along the tangent and Newton's method with the exact stiffness and a
  * constraint: corrections are normal to the step so far (Ramm 1981), so that the path may turn round at limit
  * points. A step that fails (no convergence, a degenerate element, a matrix that cannot be solved with) is
  * rejected and made again with half its length. Damping, velocities and the wind have no effect. The sim's

@@ -208,7 +208,7 @@ static const cli_option options[] = {
      offsetof(path_request, from), 0, NULL},
     {"to", CLI_TEXT, "FACTOR", "factor at which the path ends (default 1)", offsetof(path_request, to), 0,
      NULL},
-    {"step", CLI_REAL, "FACTOR", "first increment of the factor (default: a twentieth of the way)",
+    {"step", CLI_REAL, "FACTOR", "first increment of the factor (default: a twentieth of all)",
      offsetof(path_request, step), 0, NULL},
     {"max-arc", CLI_REAL, "METRES",
      "longest step along the path, RMS of the nodes (default: a fiftieth of the scene)",

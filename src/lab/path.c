@@ -2,8 +2,8 @@
  * path.c: follows a path of equilibria F(x, f) = g(x) + f p(x) = 0, with g the gradient of the energy of the
  * cloth and f p that of its loads.
  *
- * A step begins along the tangent, K b = -p, dx = s b, df = s. A correction solves K dx' + p df' = -F with one
- * more equation, by the two solutions K a = -F and K b = -p:  dx' = a + df' b (Batoz & Dhatt 1979).
+ * A step begins along the tangent, K b = -p, dx = s b, df = s. A correction solves K dx' + p df' = -F with
+ * one more equation, by the two solutions K a = -F and K b = -p:  dx' = a + df' b (Batoz & Dhatt 1979).
  *     load control     df' = 0
  *     arc length       dx . dx' = 0, with the step dx so far: the updated normal plane (Ramm 1981, Strategies
  *                      for tracing the nonlinear response near limit points)
@@ -33,7 +33,7 @@
 #define NEAR            1e-3 /* of a step: so near a bifurcation is found before its branch is sought */
 #define MAX_BRANCH      12   /* trials of the first step on a branch */
 #define MODE_ITERATIONS 12   /* of inverse iteration for the unstable mode */
-#define ROUNDINGS       4.0 /* multiple of DBL_EPSILON in a force, relative to the stiffness times the scene */
+#define ROUNDINGS       4.0  /* multiple of DBL_EPSILON in a force, in parts of stiffness times size */
 #define MAX_ROUNDING    1e-4 /* of the loads: with more, an equilibrium is not known well enough */
 
 typedef enum control { CONTROL_LOAD, CONTROL_ARC, CONTROL_BRANCH } control;
@@ -193,7 +193,8 @@ static drape_status find_event(follower *p, drape_path_point *point)
     return status;
 }
 
-/* What the end of a converged step would be as a point. DRAPE_RETRY_DEGENERATE: it is none. */
+/* What the end of a converged step would be as a point. DRAPE_RETRY_DEGENERATE: it cannot
+ * be one. */
 static drape_status examine(follower *p, drape_path_point *point)
 {
     const drape_state *now = drape_sim_state(p->sim);
@@ -239,8 +240,8 @@ static drape_status open_step(follower *p)
     return factor(p);
 }
 
-/* The prediction of a step of that length: of the factor under load control, else of the arc. It goes on in the
- * direction of the last step; the first one towards `to`. */
+/* The prediction of a step of that length: of the factor under load control, else of the arc. It goes on in
+ * the direction of the last step; the first one towards `to`. */
 static void predict(follower *p, double length)
 {
     double change = length;

@@ -674,6 +674,28 @@ def test_modes():
     equal((result.returncode, os.path.exists("n")), (1, False), "modes without stiffness")
 
 
+def test_path():
+    """path prints a line and writes a row and a frame for each point; a branch needs one factor more"""
+    with open("column.json", "w", encoding="utf-8") as file:
+        file.write(PLATE.replace('"columns": 7, "rows": 7, "width": 1, "height": 1', '"columns": 17, "rows": 3, "width": 1, "height": 0.1')
+                   .replace("[-0.01, 0, 0]", "[-0.12, 0, 0]"))
+    out = good("path", "column.json", "--to", "2", "--branch", "-", "--node", "16", "--out", "p")
+    with open("p/path.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    equal(len(out.splitlines()), len(rows) + 1, "lines")
+    equal([row["point"] for row in rows], [str(i) for i in range(len(rows))], "points")
+    equal((float(rows[0]["factor"]), float(rows[-1]["factor"])), (0, 2), "factors")
+    equal([row["event"] for row in rows if row["event"]], ["branch"], "events")
+    equal({row["unstable"] for row in rows}, {"0"}, "unstable modes")
+    assert abs(float(rows[-1]["u16_z"])) + abs(float(rows[-1]["u16_y"])) > 0.3, rows[-1]
+    with open("p/energy.csv", encoding="utf-8") as file:
+        equal(len(list(csv.DictReader(file))), len(rows), "frames")
+    straight = good("path", "column.json", "--to", "2", "--points", "40")
+    assert "bifurcation" in straight, straight
+    for wrong in (["--from", "1"], ["--to", "x"], ["--branch", "2"], ["--node", "51"]):
+        refused("path", "column.json", *wrong)
+
+
 def test_no_reference():
     """a tradeoff whose reference does not complete leaves no folder behind"""
     write_scene()

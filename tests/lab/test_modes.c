@@ -51,7 +51,8 @@ static scene open_membrane(void)
 
 /* Across the plane omega^2 = 4 T/m (sin^2 + sin^2) with T the tension over the length of a spring, and each
  * mode with m != n is there twice; along either axis of the plane, springs of that axis have k in place
- * of T. Each of some ten operations that make an entry of K rounds, relative to the largest eigenvalue, 8 k/m. */
+ * of T. Each of some ten operations that make an entry of K rounds, relative to the largest eigenvalue,
+ * 8 k/m. */
 START_TEST(a_membrane_has_the_modes_of_its_lattice)
 {
     static const struct {
