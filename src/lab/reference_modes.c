@@ -1,8 +1,10 @@
-/* reference_modes.c: eigenfrequencies and buckling loads by drape_sim_modes. */
+/* reference_modes.c: eigenfrequencies and buckling loads by drape_sim_modes, and what follows buckling by
+ * drape_sim_path. */
 #include "drape/lab.h"
 #include "lab/strip.h"
 
 #include <gsl/gsl_sf_bessel.h>
+#include <gsl/gsl_sf_ellint.h>
 #include <math.h>
 #include <stdio.h>
 
@@ -261,3 +263,49 @@ DRAPE_REFERENCE(euler_clamped, .entry.summary = "P L^2/B at which a strip clampe
                 .unit = "1", DRAPE_CASES(0), .model = "stretch.cst, bend.midedge; irregular; modes",
                 .entry.reference = "4 pi^2; Euler 1744", .tolerance = 0.005, .expected = clamped,
                 .scene = clamped_scene, .measure = measure_clamped, .low = 0.9, .high = 1.1);
+
+/* ---- Euler's column, bent ---- */
+
+/* w/L of the end at P/P_E: P L^2/B = K(k)^2 and w/L = 2 k/K(k). */
+static double bent(double load)
+{
+    double low = 0, high = 0.99;
+    for (int i = 0; i < 60; i++) {
+        const double k = (low + high) / 2, complete = gsl_sf_ellint_Kcomp(k, GSL_PREC_DOUBLE);
+        *(4 * complete * complete / (PI * PI) < load ? &low : &high) = k;
+    }
+    return 2 * low / gsl_sf_ellint_Kcomp(low, GSL_PREC_DOUBLE);
+}
+
+/* At factor 1 the load is Euler's. */
+static int bent_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    (void)c;
+    char terms[200];
+    snprintf(terms, sizeof terms,
+             "'bend.midedge', {'type': 'load.line', 'edge': 'right', 'force': [%.17g, 0, 0]}",
+             -PI * PI / 4 * STRIP_RIGIDITY);
+    return STRIP_SCENE(text, .columns = 81, .rows = 4, .width = 0.02, .thickness = 0.004, .terms = terms,
+                       .tolerance = 1e-12);
+}
+
+static drape_status measure_bent(drape_reference_run *run, double *value)
+{
+    drape_path_def def;
+    drape_path_def_init(&def, sizeof def);
+    def.to = run->parameter;
+    def.branch = 1;
+    drape_status status = drape_sim_path(run->sim, &def);
+    const double *rest = drape_model_rest_positions(run->model), *x = drape_sim_positions(run->sim);
+    *value = 0;
+    for (size_t i = 0; i < (size_t)drape_model_node_count(run->model); i++)
+        if (rest[3 * i] > 1 - 1e-9)
+            *value = fmax(*value, fabs(x[3 * i + 1]));
+    return status;
+}
+
+DRAPE_REFERENCE(bent_column, .entry.summary = "w/L of the end of a strip that has buckled", .unit = "1",
+                .parameter = "P/P_E", DRAPE_CASES(1.05, 1.2, 1.5),
+                .model = "stretch.cst, bend.midedge, load.line; irregular; path",
+                .entry.reference = "w/L = 2 k/K(k), P L^2/B = K(k)^2; Euler 1744", .tolerance = 0.005,
+                .expected = bent, .scene = bent_scene, .measure = measure_bent);

@@ -87,22 +87,18 @@ static drape_status read_state(lab_tangent *t, drape_arena *arena)
         return status;
     t->pattern = drape_system_pattern(t->system);
     const size_t count = (size_t)t->pattern->nonzeros, nodes = 3 * (size_t)m->node_count;
-    double *g = t->nodes = drape_arena_take(arena, 2 * nodes, sizeof *g);
+    double *force = drape_arena_take(arena, (size_t)t->pattern->n, sizeof *force);
+    t->nodes = drape_arena_take(arena, 2 * nodes, sizeof *t->nodes);
     t->scratch = drape_arena_take(arena, count, sizeof *t->scratch);
     t->values = drape_arena_take(arena, count, sizeof *t->values);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    double *loads = g + nodes;
     evaluate(t, now->x, t->factor, t->values);
     if (!drape_all_finite(t->values, count))
         return drape_fail(t->ctx, DRAPE_E_SOLVER, "the stiffness of this state is not finite");
-    drape_system_force_without(t->system, &point, t->loads, g);
-    add_loads(t, &point, loads, NULL);
-    for (int32_t f = 0; f < m->free_count; f++)
-        for (int k = 0; k < 3; k++) {
-            const size_t at = 3 * (size_t)m->node_of_free[f] + (size_t)k;
-            t->force = fmax(t->force, fabs(g[at] + t->factor * loads[at]));
-        }
+    lab_tangent_evaluate(t, now->x, t->factor, force, NULL, NULL);
+    for (int64_t i = 0; i < t->pattern->n; i++)
+        t->force = fmax(t->force, fabs(force[i]));
     return make_symmetric(t, &point);
 }
 
