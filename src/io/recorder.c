@@ -44,6 +44,7 @@ struct drape_recorder {
     int64_t frames;
     double last_time; /* [s] of the last frame */
     bool moved;       /* a step was accepted after the last frame */
+    bool counted;     /* the def says how many frames come */
     bool finished;
     double seconds;
     drape_status failure; /* the first one; DRAPE_OK: none */
@@ -401,6 +402,9 @@ static drape_status prepare_checkpoints(drape_recorder *r, const drape_recorder_
     r->every = def->checkpoint_every;
     r->start = def->start;
     r->def = def_of(r->sim);
+    r->counted = def->frames > 0;
+    if (r->counted)
+        r->def.most_frames = def->frames;
     r->def.arena = &r->arena;
     r->def.folder = r->folder;
     r->def.durable = def->checkpoints;
@@ -563,7 +567,7 @@ drape_status drape_recorder_resume(drape_context *ctx, drape_sim *sim, const dra
 static bool last_frame_is_due(const drape_recorder *r)
 {
     double t = drape_sim_time(r->sim);
-    return r->frames == 0 || r->moved || fabs(t - r->last_time) > SAME_TIME * fabs(t);
+    return !r->counted && (r->frames == 0 || r->moved || fabs(t - r->last_time) > SAME_TIME * fabs(t));
 }
 
 drape_status drape_recorder_finish(drape_recorder *r)

@@ -18,7 +18,9 @@ typedef struct drape_recorder_def {
      * drape_recorder_checkpoint; 0: only the latter. */
     bool checkpoints;
     int64_t checkpoint_every;
-    double start; /* [s] clock when the run began: checkpoints contain how long it took */
+    double start;   /* [s] clock when the run began: checkpoints contain how long it took */
+    int64_t frames; /* so many frames come, whatever the scene's duration is, and none at the end; 0: those of
+                       the duration */
 } drape_recorder_def;
 
 typedef struct drape_recorder drape_recorder;

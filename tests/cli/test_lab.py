@@ -638,6 +638,64 @@ def test_folder_that_cannot_be_made():
     equal(drape("merge", "s", "--out", "file/x").returncode, 1, "merge")
 
 
+PLATE = """{"drape": 1, "cloth": [{"mesh": {"grid": "square", "columns": 7, "rows": 7, "width": 1, "height": 1},
+  "material": {"young_modulus": 1e7, "poisson_ratio": 0.3, "thickness": 0.004, "areal_density": 1},
+  "terms": ["stretch.cst", "bend.midedge", {"type": "load.line", "edge": "right", "force": [-0.01, 0, 0]}],
+  "pins": [{"edge": "left", "clamp": true}]}],
+  "gravity": [0, 0, 0], "integrator": {"method": "static"}, "duration": 1}"""
+
+
+def test_modes():
+    """modes prints a table or JSON, and writes modes.csv with frames of each mode that render draws"""
+    with open("plate.json", "w", encoding="utf-8") as file:
+        file.write(PLATE)
+    printed = json.loads(good("modes", "plate.json", "--json", "--state", "start"))
+    equal([m["kind"] for m in printed["modes"]], ["vibration"] * 6, "kinds")
+    out = good("modes", "plate.json", "--state", "start", "--count", "3", "--frames", "4", "--amplitude", "0.1", "--out", "m")
+    equal(len(out.splitlines()), 5, "lines of the table")
+    with open("m/modes.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    equal([row["first_frame"] for row in rows], ["0", "4", "8"], "first frames")
+    for row, mode in zip(rows, printed["modes"]):
+        assert abs(float(row["frequency"]) / mode["frequency"] - 1) < 1e-6, (row, mode)
+        assert float(row["error"]) < 1e-4 and float(row["residual"]) < 1e-6, row
+    with open("m/energy.csv", encoding="utf-8") as file:
+        energy = [float(row["elastic"]) for row in csv.DictReader(file)]
+    equal(len(energy), 12, "frames")
+    # At rest the first and the third frame of a mode are the state itself; a quarter of a period later it is bent by 0.1 m.
+    assert energy[0] == 0 and abs(energy[2]) < 1e-9 * energy[1] and energy[1] > 0 and energy[3] > 0, energy
+    buckling = json.loads(good("modes", "plate.json", "--state", "start", "--buckling", "--count", "2", "--json"))["modes"]
+    assert 0 < buckling[0]["value"] < buckling[1]["value"] and buckling[0]["kind"] == "buckling", buckling
+    refused("modes", "plate.json", "--state", "middle")
+    refused("modes", "plate.json", "--state", "start", "--count", "200")
+    with open("slack.json", "w", encoding="utf-8") as file:
+        file.write(PLATE.replace('"bend.midedge", ', ""))
+    result = drape("modes", "slack.json", "--state", "start", "--out", "n")
+    equal((result.returncode, os.path.exists("n")), (1, False), "modes without stiffness")
+
+
+def test_path():
+    """path prints a line and writes a row and a frame for each point; a branch needs one factor more"""
+    with open("column.json", "w", encoding="utf-8") as file:
+        file.write(PLATE.replace('"columns": 7, "rows": 7, "width": 1, "height": 1', '"columns": 17, "rows": 3, "width": 1, "height": 0.1')
+                   .replace("[-0.01, 0, 0]", "[-0.12, 0, 0]"))
+    out = good("path", "column.json", "--to", "2", "--branch", "-", "--node", "16", "--out", "p")
+    with open("p/path.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    equal(len(out.splitlines()), len(rows) + 1, "lines")
+    equal([row["point"] for row in rows], [str(i) for i in range(len(rows))], "points")
+    equal((float(rows[0]["factor"]), float(rows[-1]["factor"])), (0, 2), "factors")
+    equal([row["event"] for row in rows if row["event"]], ["branch"], "events")
+    equal({row["unstable"] for row in rows}, {"0"}, "unstable modes")
+    assert abs(float(rows[-1]["u16_z"])) + abs(float(rows[-1]["u16_y"])) > 0.3, rows[-1]
+    with open("p/energy.csv", encoding="utf-8") as file:
+        equal(len(list(csv.DictReader(file))), len(rows), "frames")
+    straight = good("path", "column.json", "--to", "2", "--points", "40")
+    assert "bifurcation" in straight, straight
+    for wrong in (["--from", "1"], ["--to", "x"], ["--branch", "2"], ["--node", "51"]):
+        refused("path", "column.json", *wrong)
+
+
 def test_no_reference():
     """a tradeoff whose reference does not complete leaves no folder behind"""
     write_scene()

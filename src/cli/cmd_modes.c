@@ -1,0 +1,306 @@
+/* cmd_modes.c: `drape modes`: eigenfrequencies or buckling loads about a state of a scene; a table, and
+ * frames that show each mode. */
+#include "cli/cli.h"
+#include "cli/shapes.h"
+#include "cli/signals.h"
+
+#include "drape/lab.h"
+#include "io/csv.h"
+#include "io/json.h"
+
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define TABLE          "modes.csv"
+#define DEFAULT_FRAMES 60   /* of each mode */
+#define DEFAULT_SIZE   0.05 /* of the scene, the largest displacement in a frame */
+#define PI             3.14159265358979323846
+
+typedef struct modes_request {
+    cli_command command;
+    const char *state, *out;
+    int count, frames; /* 0: not given */
+    double amplitude;  /* [m] 0: not given */
+    bool buckling, json;
+} modes_request;
+
+typedef struct job {
+    const modes_request *request;
+    cli_scene in;
+    double load_factor; /* of the state */
+    drape_modes modes;
+} job;
+
+/* ---- The state ---- */
+
+/* The states about which modes are sought. */
+static const struct state {
+    const char *name;
+    const char *integrator; /* NULL: the scene's */
+    bool advances;
+    double load_factor; /* under which it is an equilibrium */
+} states[] = {
+    {"static", "static", true, 1},
+    {"start", NULL, false, 0},
+    {"end", NULL, true, 1},
+};
+#define STATES (sizeof states / sizeof *states)
+
+static const struct state *find_state(const char *name)
+{
+    for (size_t i = 0; i < STATES; i++)
+        if (strcmp(states[i].name, name) == 0)
+            return &states[i];
+    return NULL;
+}
+
+static drape_status choose(void *user, const cli_scene *scene, drape_sim_def *def)
+{
+    const struct state *state = user;
+    (void)scene;
+    def->integrator = state->integrator;
+    return DRAPE_OK;
+}
+
+static drape_status reach(const job *j, const struct state *state)
+{
+    if (!state->advances)
+        return DRAPE_OK;
+    cli_signals_cancel(j->in.sim);
+    drape_status status = drape_sim_advance(j->in.sim, drape_model_duration(j->in.model));
+    cli_signals_cancel(NULL);
+    return status == DRAPE_E_STOPPED && drape_sim_stopped_by(j->in.sim) >= 0 ? DRAPE_OK : status;
+}
+
+/* ---- Tables ---- */
+
+static const char *kind_name(drape_mode_kind kind)
+{
+    switch (kind) {
+    case DRAPE_MODE_VIBRATION:
+        return "vibration";
+    case DRAPE_MODE_ZERO:
+        return "zero";
+    case DRAPE_MODE_UNSTABLE:
+        return "unstable";
+    case DRAPE_MODE_BUCKLING:
+        break;
+    }
+    return "buckling";
+}
+
+static int frames_of(const modes_request *request)
+{
+    return request->frames ? request->frames : DEFAULT_FRAMES;
+}
+
+static drape_status write_table(const job *j, drape_folder *folder)
+{
+    drape_file file = {0};
+    drape_status status =
+        drape_csv_open(j->in.ctx, folder, TABLE,
+                       "mode,kind,value,frequency,mass,residual,error,first_frame\n", false, &file);
+    for (int32_t k = 0; !status && k < j->modes.count; k++) {
+        const drape_mode *mode = &j->modes.modes[k];
+        drape_file_print(&file, "%d", (int)k + 1);
+        drape_csv_put_text(&file, kind_name(mode->kind));
+        drape_csv_put_number(&file, mode->value);
+        drape_csv_put_number(&file, mode->frequency);
+        drape_csv_put_number(&file, mode->mass);
+        drape_csv_put_number(&file, mode->residual);
+        drape_csv_put_number(&file, mode->error);
+        drape_csv_put_integer(&file, (int64_t)k * frames_of(j->request));
+        drape_file_put_text(&file, "\n");
+    }
+    if (!status)
+        status = drape_file_keep(&file);
+    const drape_status closed = drape_file_close(&file);
+    drape_file_destroy(&file);
+    return status ? status : closed;
+}
+
+static drape_status print_json(const job *j)
+{
+    json_t *list = json_array();
+    for (int32_t k = 0; k < j->modes.count; k++) {
+        const drape_mode *mode = &j->modes.modes[k];
+        json_t *object = drape_json_with(json_object(), "mode", json_integer(k + 1));
+        object = drape_json_with(object, "kind", json_string(kind_name(mode->kind)));
+        object = drape_json_with(object, "value", drape_json_number(mode->value));
+        object = drape_json_with(object, "frequency", drape_json_number(mode->frequency));
+        object = drape_json_with(object, "mass", drape_json_number(mode->mass));
+        object = drape_json_with(object, "residual", drape_json_number(mode->residual));
+        object = drape_json_with(object, "error", drape_json_number(mode->error));
+        list = drape_json_append(list, object);
+    }
+    json_t *all = drape_json_with(json_object(), "modes", list);
+    all = drape_json_with(all, "eigenvalues_below", json_integer(j->modes.below));
+    all = drape_json_with(all, "force", drape_json_number(j->modes.force));
+    char *text = all ? json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+    json_decref(all);
+    if (!text)
+        return DRAPE_E_MEMORY;
+    puts(text);
+    free(text);
+    return DRAPE_OK;
+}
+
+static void print_vibration(int32_t number, const drape_mode *mode)
+{
+    printf("%4d  %-9s  %16.9g  %14.9g  %11.5g  %8.1e  %8.1e\n", (int)number, kind_name(mode->kind),
+           mode->value, mode->frequency, mode->mass, mode->residual, mode->error);
+}
+
+static void print_load(int32_t number, const drape_mode *mode)
+{
+    printf("%4d  %16.9g  %8.1e  %8.1e\n", (int)number, mode->value, mode->residual, mode->error);
+}
+
+static void print_table(const job *j)
+{
+    const bool buckling = j->request->buckling;
+    fputs(buckling ? "mode       load factor  residual     error\n"
+                   : "mode  kind         omega^2 [1/s2]  frequency [Hz]    mass [kg]  residual     error\n",
+          stdout);
+    for (int32_t k = 0; k < j->modes.count; k++)
+        (buckling ? print_load : print_vibration)(k + 1, &j->modes.modes[k]);
+    printf("force on a free node up to %.3g N; %lld eigenvalues counted up to the gap behind these modes\n",
+           j->modes.force, (long long)j->modes.below);
+}
+
+/* ---- Frames ---- */
+
+/* Frame i of n in one period of a mode: x + a sin(2 pi i/n) u. */
+static drape_status emit_frame(const job *j, const double *start, const drape_mode *mode, double share,
+                               int64_t frame, double *x, const double *still)
+{
+    drape_sim *sim = j->in.sim;
+    const size_t n = 3 * (size_t)drape_model_node_count(j->in.model);
+    for (size_t i = 0; i < n; i++)
+        x[i] = start[i] + share * mode->shape[i];
+    drape_status status = drape_sim_set_state(sim, drape_sim_time(sim), x, still);
+    return status ? status : cli_shapes_emit(sim, frame);
+}
+
+static drape_status emit_frames(const job *j)
+{
+    const int frames = frames_of(j->request);
+    const size_t n = 3 * (size_t)drape_model_node_count(j->in.model);
+    const double size =
+        j->request->amplitude > 0 ? j->request->amplitude : DEFAULT_SIZE * j->in.model->length;
+    double *start = drape_arena_take(j->request->command.arena, 3 * n, sizeof *start);
+    drape_status status = start ? DRAPE_OK : DRAPE_E_MEMORY;
+    if (!status)
+        memcpy(start, drape_sim_positions(j->in.sim), n * sizeof *start);
+    for (int32_t k = 0; k < j->modes.count; k++)
+        for (int i = 0; !status && i < frames; i++) {
+            const double share = size * sin(2 * PI * i / frames);
+            status = cli_interrupted() ? DRAPE_E_STOPPED
+                                       : emit_frame(j, start, &j->modes.modes[k], share,
+                                                    (int64_t)k * frames + i, start + n, start + 2 * n);
+        }
+    return status;
+}
+
+static drape_status write_output(const job *j)
+{
+    const modes_request *request = j->request;
+    const cli_shapes shapes = {
+        .folder = request->out, .table = TABLE, .frames = (int64_t)j->modes.count * frames_of(request)};
+    drape_recorder *recorder = NULL;
+    drape_status status = cli_shapes_open(&request->command, &j->in, &shapes, &recorder);
+    if (!status)
+        status = write_table(j, drape_recorder_folder(recorder));
+    if (!status)
+        status = emit_frames(j);
+    if (!status)
+        status = drape_recorder_finish(recorder);
+    drape_recorder_destroy(&recorder);
+    return status;
+}
+
+/* ---- The verb ---- */
+
+static int code_of(const cli_command *command, drape_status status)
+{
+    if (cli_interrupted())
+        return cli_report_interrupted(command->verb);
+    return cli_report(command, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED);
+}
+
+static int compute(job *j, const struct state *state)
+{
+    const modes_request *request = j->request;
+    drape_modes_def def;
+    drape_modes_def_init(&def, sizeof def);
+    def.count = request->count ? request->count : def.count;
+    def.buckling = request->buckling;
+    def.load_factor = state->load_factor;
+    drape_status status = reach(j, state);
+    if (!status)
+        status = drape_sim_modes(j->in.sim, &def, &j->modes);
+    if (!status && request->out)
+        status = write_output(j);
+    if (status)
+        return code_of(&request->command, status);
+    if (!request->json)
+        print_table(j);
+    else if (print_json(j))
+        return cli_report(&request->command, CLI_FAILED);
+    return fflush(stdout) ? CLI_FAILED : CLI_DONE;
+}
+
+static int run(const void *command)
+{
+    const modes_request *request = command;
+    job j = {.request = request};
+    const struct state *state = request->state ? find_state(request->state) : &states[0];
+    if (!state)
+        return cli_misuse("modes", "--state \"%.60s\": it is static, start or end", request->state);
+    int code = cli_shapes_check(&request->command, request->out);
+    if (code == CLI_GO_ON)
+        code = cli_scene_load_with(&request->command, request->command.operand, choose,
+                                   (void *)(uintptr_t)state, &j.in);
+    if (code == CLI_GO_ON)
+        code = compute(&j, state);
+    drape_modes_free(&j.modes);
+    cli_scene_free(&j.in);
+    return code;
+}
+
+static const cli_option options[] = {
+    {"count", CLI_NUMBER, "N", "number of modes (default 6)", offsetof(modes_request, count), 100000, NULL},
+    {"state", CLI_TEXT, "STATE",
+     "static: the equilibrium that this integrator finds (default); start: as the scene begins; end: as it "
+     "ends",
+     offsetof(modes_request, state), 0, NULL},
+    {"buckling", CLI_FLAG, NULL, "factors of the scene's loads at which the cloth buckles",
+     offsetof(modes_request, buckling), 0, NULL},
+    {"out", CLI_TEXT, "DIR",
+     "folder for modes.csv, scene.json and frames of each mode; drape render draws it",
+     offsetof(modes_request, out), 0, NULL},
+    {"frames", CLI_NUMBER, "N", "frames of each mode, over one period (default 60)",
+     offsetof(modes_request, frames), 100000, NULL},
+    {"amplitude", CLI_REAL, "METRES", "largest displacement in a frame (default: a twentieth of the scene)",
+     offsetof(modes_request, amplitude), 0, NULL},
+    {"json", CLI_FLAG, NULL, "print JSON", offsetof(modes_request, json), 0, NULL},
+};
+
+const drape_verb drape_verb_modes = {
+    .entry = {.name = "modes", .summary = "eigenfrequencies or buckling loads about a state of a scene"},
+    .operand = "SCENE",
+    .takes_scene = true,
+    .details =
+        "Finds the lowest undamped vibrations about a state, K u = omega^2 M u with the exact stiffness of\n"
+        "that state, stress and loads included; with --buckling, the lowest factors of the scene's loads\n"
+        "(gravity, load.line ...) at which K becomes singular, extrapolated linearly from that state: from\n"
+        "the start, that is without loads, or from the equilibrium under all of them.\n"
+        "With --out, DIR gets frames of one period of each mode, one after the other.",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .request_size = sizeof(modes_request),
+    .run = run,
+};

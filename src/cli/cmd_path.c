@@ -1,0 +1,244 @@
+/* cmd_path.c: `drape path`: the equilibria of a scene as its loads grow; a table, and a frame of each. */
+#include "cli/shapes.h"
+#include "cli/signals.h"
+
+#include "drape/lab.h"
+#include "io/csv.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define TABLE          "path.csv"
+#define DEFAULT_POINTS 200
+
+typedef struct path_request {
+    cli_command command;
+    const char *out, *from, *to, *branch;
+    cli_texts nodes; /* whose displacements are columns */
+    double step, max_arc;
+    int points;
+    bool load_control;
+} path_request;
+
+typedef struct job {
+    const path_request *request;
+    cli_scene in;
+    int32_t node[CLI_MAX_TEXTS];
+    drape_recorder *recorder; /* NULL without --out */
+    drape_file table;
+} job;
+
+/* ---- Points ---- */
+
+static const char *event_name(drape_path_event event)
+{
+    switch (event) {
+    case DRAPE_PATH_LIMIT:
+        return "limit";
+    case DRAPE_PATH_BIFURCATION:
+        return "bifurcation";
+    case DRAPE_PATH_SWITCHED:
+        return "branch";
+    case DRAPE_PATH_REGULAR:
+        break;
+    }
+    return "";
+}
+
+/* The largest distance of a node from where it is at rest [m]. */
+static double largest_displacement(const drape_model *m, const double *x)
+{
+    double most = 0;
+    for (size_t i = 0; i < 3 * (size_t)m->node_count; i += 3)
+        most = fmax(most, sqrt(pow(x[i] - m->rest[i], 2) + pow(x[i + 1] - m->rest[i + 1], 2) +
+                               pow(x[i + 2] - m->rest[i + 2], 2)));
+    return most;
+}
+
+static drape_status write_row(job *j, const drape_path_point *point)
+{
+    const drape_model *m = j->in.model;
+    const double *x = drape_sim_positions(j->in.sim);
+    drape_file *file = &j->table;
+    drape_file_print(file, "%" PRId64, point->number);
+    drape_csv_put_text(file, event_name(point->event));
+    drape_csv_put_number(file, point->factor);
+    drape_csv_put_number(file, point->arc);
+    drape_csv_put_number(file, point->elastic);
+    drape_csv_put_number(file, point->potential);
+    drape_csv_put_integer(file, point->unstable);
+    drape_csv_put_integer(file, point->iterations);
+    drape_csv_put_number(file, point->residual);
+    drape_csv_put_number(file, largest_displacement(m, x));
+    for (size_t i = 0; i < j->request->nodes.count; i++)
+        for (size_t k = 0; k < 3; k++)
+            drape_csv_put_number(file, x[3 * (size_t)j->node[i] + k] - m->rest[3 * (size_t)j->node[i] + k]);
+    drape_file_put_text(file, "\n");
+    return drape_file_keep(file);
+}
+
+static drape_status open_table(job *j)
+{
+    char columns[64 + CLI_MAX_TEXTS * 64] =
+        "point,event,factor,arc,elastic,potential,unstable,iterations,residual,displacement";
+    size_t used = strlen(columns);
+    for (size_t i = 0; i < j->request->nodes.count; i++)
+        used += (size_t)snprintf(columns + used, sizeof columns - used, ",u%d_x,u%d_y,u%d_z", (int)j->node[i],
+                                 (int)j->node[i], (int)j->node[i]);
+    snprintf(columns + used, sizeof columns - used, "\n");
+    return drape_csv_open(j->in.ctx, drape_recorder_folder(j->recorder), TABLE, columns, false, &j->table);
+}
+
+static void print_point(const job *j, const drape_path_point *point)
+{
+    printf("%5" PRId64 "  %14.9g  %12.6g  %13.6g  %8" PRId64 "  %10d  %s\n", point->number, point->factor,
+           largest_displacement(j->in.model, drape_sim_positions(j->in.sim)),
+           point->elastic + point->potential, point->unstable, point->iterations, event_name(point->event));
+}
+
+static drape_status observe(void *user, drape_sim *sim, const drape_path_point *point)
+{
+    job *j = user;
+    drape_status status = DRAPE_OK;
+    if (j->recorder)
+        status = write_row(j, point);
+    if (!status && j->recorder)
+        status = cli_shapes_emit(sim, point->number);
+    print_point(j, point);
+    return status;
+}
+
+/* ---- The verb ---- */
+
+static bool read_number(const char *text, double *value)
+{
+    char *end = NULL;
+    if (!text)
+        return true;
+    errno = 0;
+    *value = strtod(text, &end);
+    return end != text && *end == 0 && errno == 0 && isfinite(*value);
+}
+
+/* The node numbers of --node count through all cloths. */
+static int read_nodes(job *j)
+{
+    for (size_t i = 0; i < j->request->nodes.count; i++) {
+        double number = -1;
+        if (!read_number(j->request->nodes.items[i], &number) || number != floor(number) || number < 0 ||
+            number >= j->in.model->node_count)
+            return cli_misuse("path", "--node \"%.60s\": it is a number from 0 to %d",
+                              j->request->nodes.items[i], (int)j->in.model->node_count - 1);
+        j->node[i] = (int32_t)number;
+    }
+    return CLI_GO_ON;
+}
+
+static int read_def(const path_request *request, drape_path_def *def)
+{
+    drape_path_def_init(def, sizeof *def);
+    if (!read_number(request->from, &def->from) || !read_number(request->to, &def->to) ||
+        def->from == def->to)
+        return cli_misuse("path", "--from and --to are two factors of the loads");
+    if (request->branch && strcmp(request->branch, "+") != 0 && strcmp(request->branch, "-") != 0)
+        return cli_misuse("path", "--branch \"%.60s\": it is + or -", request->branch);
+    def->branch = !request->branch ? 0 : request->branch[0] == '+' ? 1 : -1;
+    def->step = request->step > 0 ? request->step : fabs(def->to - def->from) / 20;
+    def->max_arc = request->max_arc;
+    def->load_control = request->load_control;
+    def->max_points = request->points ? request->points : DEFAULT_POINTS;
+    return CLI_GO_ON;
+}
+
+static int follow(job *j, drape_path_def *def)
+{
+    const cli_command *command = &j->request->command;
+    const cli_shapes shapes = {.folder = j->request->out, .table = TABLE, .frames = def->max_points};
+    drape_status status = DRAPE_OK;
+    def->observer = observe;
+    def->user = j;
+    if (shapes.folder)
+        status = cli_shapes_open(command, &j->in, &shapes, &j->recorder);
+    if (!status && j->recorder)
+        status = open_table(j);
+    if (!status) {
+        puts("point          factor  displacement     energy [J]  unstable  iterations  event");
+        status = drape_sim_path(j->in.sim, def);
+    }
+    fflush(stdout);
+    char message[DRAPE_MESSAGE_SIZE];
+    snprintf(message, sizeof message, "%s", drape_context_message(j->in.ctx));
+    drape_status closed = drape_file_close(&j->table);
+    if (!closed && j->recorder)
+        closed = drape_recorder_finish(j->recorder);
+    if (cli_interrupted())
+        return cli_report_interrupted(command->verb);
+    if (!status && !closed)
+        return CLI_DONE;
+    cli_print_message(command, status ? message : drape_context_message(j->in.ctx));
+    return status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED;
+}
+
+static int run(const void *command)
+{
+    const path_request *request = command;
+    job j = {.request = request};
+    drape_path_def def;
+    int code = read_def(request, &def);
+    if (code == CLI_GO_ON)
+        code = cli_shapes_check(&request->command, request->out);
+    if (code == CLI_GO_ON)
+        code = cli_scene_load(&request->command, request->command.operand, &j.in);
+    if (code == CLI_GO_ON)
+        code = read_nodes(&j);
+    if (code == CLI_GO_ON)
+        code = follow(&j, &def);
+    drape_file_destroy(&j.table);
+    drape_recorder_destroy(&j.recorder);
+    cli_scene_free(&j.in);
+    return code;
+}
+
+static const cli_option options[] = {
+    {"from", CLI_TEXT, "FACTOR", "factor of the loads at the first point (default 0)",
+     offsetof(path_request, from), 0, NULL},
+    {"to", CLI_TEXT, "FACTOR", "factor at which the path ends (default 1)", offsetof(path_request, to), 0,
+     NULL},
+    {"step", CLI_REAL, "FACTOR", "first increment of the factor (default: a twentieth of all)",
+     offsetof(path_request, step), 0, NULL},
+    {"max-arc", CLI_REAL, "METRES",
+     "longest step along the path, RMS of the nodes (default: a fiftieth of the scene)",
+     offsetof(path_request, max_arc), 0, NULL},
+    {"points", CLI_NUMBER, "N", "points after which the path ends (default 200)",
+     offsetof(path_request, points), 1000000, NULL},
+    {"load-control", CLI_FLAG, NULL, "steps of the factor, not of the arc: no limit point is passed",
+     offsetof(path_request, load_control), 0, NULL},
+    {"branch", CLI_TEXT, "+|-", "at the first bifurcation, follow the branch to this side",
+     offsetof(path_request, branch), 0, NULL},
+    {"node", CLI_TEXTS, "N", "columns with the displacement of this node; may be repeated",
+     offsetof(path_request, nodes), 0, NULL},
+    {"out", CLI_TEXT, "DIR", "folder for path.csv, scene.json and a frame of each point",
+     offsetof(path_request, out), 0, NULL},
+};
+
+const drape_verb drape_verb_path = {
+    .entry = {.name = "path",
+              .summary = "follow the equilibria of a scene as its loads grow, through limit points"},
+    .operand = "SCENE",
+    .takes_scene = true,
+    .details = "Multiplies all loads of the scene (gravity, load.line ...) by one factor and follows the "
+               "equilibrium\n"
+               "as the factor goes from 0 to 1, by arc length, so that the path may turn round at limit "
+               "points. Each\n"
+               "point has the number of modes in which it is unstable. A step that fails is made again with "
+               "half its\n"
+               "length. The scene has no colliders and no self-contact.",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .request_size = sizeof(path_request),
+    .run = run,
+};

@@ -1,0 +1,526 @@
+/*
+ * path.c: follows a path of equilibria F(x, f) = g(x) + f p(x) = 0, with g the gradient of the energy of the
+ * cloth and f p that of its loads.
+ *
+ * A step begins along the tangent, K b = -p, dx = s b, df = s. A correction solves K dx' + p df' = -F with
+ * one more equation, by the two solutions K a = -F and K b = -p:  dx' = a + df' b (Batoz & Dhatt 1979).
+ *     load control     df' = 0
+ *     arc length       dx . dx' = 0, with the step dx so far: the updated normal plane (Ramm 1981, Strategies
+ *                      for tracing the nonlinear response near limit points)
+ *     branch           u . dx' = 0, with the unstable mode u: the solution stays as far from the path
+ *                      (Wagner & Wriggers 1988, A simple method for the calculation of postcritical branches)
+ * Displacements are measured by |dx|^2 = sum m dx^2/sum m. The factor is not in the norm (Crisfield 1981), so
+ * that nothing depends on the size of the loads. At a limit point K is singular, but the step has a direction
+ * there: b dominates, and df = s |b|^-1.
+ */
+#include "base/elementary.h"
+#include "base/finite.h"
+#include "drape/lab.h"
+#include "lab/tangent.h"
+#include "solvers/inertia.h"
+#include "solvers/linear.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#define MAX_ITERATIONS  20
+#define WANTED          6    /* iterations of a step that is neither shortened nor lengthened */
+#define MAX_GROWTH      1.5  /* of the length of a step from one to the next */
+#define MAX_CORRECTION  3.0  /* of a step: a larger one has left the path */
+#define LEAST_STEP      1e-7 /* of the first step */
+#define LONGEST         0.02 /* of the scene: the default of max_arc */
+#define NEAR            1e-3 /* of a step: so near a bifurcation is found before its branch is sought */
+#define MAX_BRANCH      12   /* trials of the first step on a branch */
+#define MODE_ITERATIONS 12   /* of inverse iteration for the unstable mode */
+#define ROUNDINGS       4.0  /* multiple of DBL_EPSILON in a force, in parts of stiffness times size */
+#define MAX_ROUNDING    1e-4 /* of the loads: with more, an equilibrium is not known well enough */
+
+typedef enum control { CONTROL_LOAD, CONTROL_ARC, CONTROL_BRANCH } control;
+
+typedef struct follower {
+    drape_context *ctx;
+    drape_sim *sim;
+    const drape_path_def *def;
+    drape_arena arena, factor_arena;
+    lab_tangent tangent;
+    const drape_linear_ops *solver;
+    void *factors;
+    size_t n, nodes;
+    double mass;                  /* [kg] of all free nodes, once per coordinate */
+    double *x;                    /* (nodes) a trial */
+    double *still;                /* (nodes) velocities */
+    double *force, *load, *a, *b; /* (n) */
+    double *step, *before;        /* (n) the step so far; the last one that was accepted */
+    double *mode;                 /* (n) the unstable mode, |mode| = 1 */
+    double change;                /* of the factor in the step so far */
+    double change_before;         /* in the last accepted one */
+    double direction;             /* of the factor along the tangent at the beginning of the step: its sign */
+    double rounding;              /* [N] of a force */
+    drape_path_point point;       /* the last one */
+    bool moved;                   /* there is a step before */
+} follower;
+
+static double dot(const follower *p, const double *u, const double *v)
+{
+    double sum = 0;
+    for (size_t i = 0; i < p->n; i++)
+        sum += p->tangent.mass[i] * u[i] * v[i];
+    return sum / p->mass;
+}
+
+static double norm(const follower *p, const double *u)
+{
+    return sqrt(dot(p, u, u));
+}
+
+static double largest(const double *u, size_t n)
+{
+    double most = 0;
+    for (size_t i = 0; i < n; i++)
+        most = fmax(most, fabs(u[i]));
+    return most;
+}
+
+/* ---- Newton's method ---- */
+
+/* Moves the trial to the end of the step so far. */
+static void place(follower *p)
+{
+    const drape_model *m = p->sim->model;
+    memcpy(p->x, drape_sim_state(p->sim)->x, p->nodes * sizeof *p->x);
+    for (size_t i = 0; i < p->n; i++)
+        p->x[3 * (size_t)m->node_of_free[i / 3] + i % 3] += p->step[i];
+}
+
+/* Factors K at the trial, and solves K b = -p. DRAPE_RETRY_* if that is not possible. */
+static drape_status factor(follower *p)
+{
+    lab_tangent *t = &p->tangent;
+    lab_tangent_evaluate(t, p->x, p->point.factor + p->change, NULL, p->load, t->values);
+    if (!drape_all_finite(t->values, (size_t)t->pattern->nonzeros))
+        return DRAPE_RETRY_NONFINITE;
+    drape_status status = p->solver->factor(p->factors, t->values);
+    for (size_t i = 0; i < p->n; i++)
+        p->a[i] = -p->load[i];
+    return status ? status : p->solver->solve(p->factors, p->a, p->b);
+}
+
+/* The change of the factor in a correction a + df b. */
+static double correct_factor(const follower *p, control by)
+{
+    const double *normal = by == CONTROL_BRANCH ? p->mode : p->step;
+    if (by == CONTROL_LOAD)
+        return 0;
+    return -dot(p, normal, p->a) / dot(p, normal, p->b);
+}
+
+/* Whether the forces at the trial are an equilibrium; they are in p->force. *residual [N]. */
+static bool converged(follower *p, double *residual)
+{
+    const double factor = p->point.factor + p->change;
+    const double forces = lab_tangent_evaluate(&p->tangent, p->x, factor, p->force, p->load, NULL);
+    const double loads = largest(p->load, p->n), scale = fmax(forces, fabs(factor) * loads);
+    const double rounding = fmin(p->rounding, MAX_ROUNDING * fmax(fabs(factor), p->def->step) * loads);
+    *residual = drape_all_finite(p->force, p->n) ? largest(p->force, p->n) : INFINITY;
+    return *residual <= fmax(p->def->tolerance * scale, rounding);
+}
+
+/* Corrects the step so far until its end is an equilibrium. limit [m]: of a correction. DRAPE_RETRY_* if that
+ * fails. */
+static drape_status correct(follower *p, control by, double limit, drape_path_point *point)
+{
+    for (point->iterations = 0; point->iterations <= MAX_ITERATIONS; point->iterations++) {
+        place(p);
+        if (converged(p, &point->residual))
+            return DRAPE_OK;
+        if (!isfinite(point->residual))
+            return DRAPE_RETRY_NONFINITE;
+        drape_status status = drape_check_cancel(p->ctx);
+        if (!status)
+            status = factor(p);
+        if (status)
+            return status;
+        for (size_t i = 0; i < p->n; i++)
+            p->force[i] = -p->force[i];
+        status = p->solver->solve(p->factors, p->force, p->a);
+        if (status)
+            return status;
+        const double change = correct_factor(p, by);
+        for (size_t i = 0; i < p->n; i++)
+            p->a[i] += change * p->b[i];
+        if (!(norm(p, p->a) <= limit) || !isfinite(change))
+            return DRAPE_RETRY_NONLINEAR;
+        for (size_t i = 0; i < p->n; i++)
+            p->step[i] += p->a[i];
+        p->change += change;
+    }
+    return DRAPE_RETRY_NONLINEAR;
+}
+
+/* ---- Points ---- */
+
+static drape_status count_unstable(follower *p, double factor, int64_t *unstable)
+{
+    lab_tangent *t = &p->tangent;
+    bool known;
+    lab_tangent_evaluate(t, p->x, factor, NULL, NULL, t->values);
+    drape_pattern_symmetrize(t->pattern, t->values); /* rounding only: the path is of a potential */
+    *unstable = 0;
+    drape_status status = lab_tangent_factor_definite(t, p->solver, p->factors, t->values, &known);
+    if (status || known)
+        return status;
+    status = drape_inertia(p->ctx, t->pattern, t->values, NULL, unstable, &known);
+    *unstable = known ? *unstable : -1;
+    return status;
+}
+
+/* Where the number of unstable modes changes, K was singular in between: at a limit point if the factor rises
+ * along the tangent at one end of the step and falls at the other. Without that number, a limit is noted when
+ * the factor has turned round. */
+static drape_status find_event(follower *p, drape_path_point *point)
+{
+    const bool known = p->point.unstable >= 0 && point->unstable >= 0;
+    point->event = DRAPE_PATH_REGULAR;
+    if (point->number == 0)
+        return DRAPE_OK;
+    if (!known)
+        point->event = p->moved && p->change * p->change_before < 0 ? DRAPE_PATH_LIMIT : DRAPE_PATH_REGULAR;
+    if (!known || p->point.unstable == point->unstable)
+        return DRAPE_OK;
+    drape_status status = factor(p);
+    point->event = dot(p, p->step, p->b) * p->direction < 0 ? DRAPE_PATH_LIMIT : DRAPE_PATH_BIFURCATION;
+    return status;
+}
+
+/* What the end of a converged step would be as a point. DRAPE_RETRY_DEGENERATE: it cannot
+ * be one. */
+static drape_status examine(follower *p, drape_path_point *point)
+{
+    const drape_state *now = drape_sim_state(p->sim);
+    const char *reason;
+    drape_diagnostic diagnostic;
+    drape_status status =
+        drape_system_check(p->tangent.system, p->x, now->x, now->internal, &reason, &diagnostic);
+    point->factor = p->point.factor + p->change;
+    point->arc = p->point.arc + norm(p, p->step);
+    if (!status)
+        status = count_unstable(p, point->factor, &point->unstable);
+    point->number = p->point.number + 1;
+    return status ? status : find_event(p, point);
+}
+
+/* Makes the end of the step the state of the sim, and reports it. *ended: the observer wants no more. */
+static drape_status accept(follower *p, drape_path_point point, bool *ended)
+{
+    drape_status status = drape_sim_set_state(p->sim, drape_sim_time(p->sim), p->x, p->still);
+    if (status)
+        return status;
+    const drape_state *now = drape_sim_state(p->sim);
+    const drape_point at = {.x = now->x, .v = p->still, .internal = now->internal, .t = now->t};
+    drape_system_energy(p->tangent.system, &at, &point.elastic, &point.potential);
+    point.potential *= point.factor;
+    memcpy(p->before, p->step, p->n * sizeof *p->step);
+    p->change_before = p->change;
+    p->moved = point.number > 0;
+    p->point = point;
+    status = p->def->observer ? p->def->observer(p->def->user, p->sim, &p->point) : DRAPE_OK;
+    *ended = status > 0;
+    return status > 0 ? DRAPE_OK : status;
+}
+
+/* ---- Steps ---- */
+
+/* K and b at the last point. */
+static drape_status open_step(follower *p)
+{
+    memset(p->step, 0, p->n * sizeof *p->step);
+    p->change = 0;
+    place(p);
+    return factor(p);
+}
+
+/* The prediction of a step of that length: of the factor under load control, else of the arc. It goes on in
+ * the direction of the last step; the first one towards `to`. */
+static void predict(follower *p, double length)
+{
+    double change = length;
+    if (!p->def->load_control) {
+        const double size = norm(p, p->b);
+        change = (p->moved ? dot(p, p->before, p->b) : p->def->to - p->def->from) < 0 ? -length / size
+                                                                                      : length / size;
+    } else if (p->def->to < p->def->from)
+        change = -length;
+    for (size_t i = 0; i < p->n; i++)
+        p->step[i] = change * p->b[i];
+    p->change = p->direction = change;
+}
+
+static double limit_of(const follower *p)
+{
+    return MAX_CORRECTION * norm(p, p->step);
+}
+
+/* Tries a step of that length from the last point. */
+static drape_status attempt(follower *p, double length, drape_path_point *point)
+{
+    drape_status status = open_step(p);
+    if (status)
+        return status;
+    predict(p, length);
+    status = correct(p, p->def->load_control ? CONTROL_LOAD : CONTROL_ARC, limit_of(p), point);
+    return status ? status : examine(p, point);
+}
+
+/* Whether the step so far passes the last factor. */
+static bool passes_end(const follower *p)
+{
+    const double left = p->def->to - p->point.factor;
+    return left != 0 && p->change * left > 0 && fabs(p->change) >= fabs(left);
+}
+
+/* The step so far, shortened to end at the last factor. */
+static drape_status end_at(follower *p, drape_path_point *point)
+{
+    const double share = (p->def->to - p->point.factor) / p->change;
+    const double limit = limit_of(p);
+    for (size_t i = 0; i < p->n; i++)
+        p->step[i] *= share;
+    p->change = p->def->to - p->point.factor;
+    drape_status status = correct(p, CONTROL_LOAD, limit, point);
+    return status ? status : examine(p, point);
+}
+
+static drape_status too_small(const follower *p, drape_status why)
+{
+    return drape_fail(p->ctx, DRAPE_E_STEP_TOO_SMALL,
+                      "factor %.9g: steps along the path fail, however short (%s)%s", p->point.factor,
+                      drape_status_name(why),
+                      p->def->load_control ? "; at a limit point, load control cannot go on" : "");
+}
+
+/* ---- A branch ---- */
+
+/* The mode of K at the last point whose eigenvalue is nearest to 0, by inverse iteration, in M. */
+static drape_status find_mode(follower *p)
+{
+    drape_status status = open_step(p);
+    uint64_t state = 1;
+    for (size_t i = 0; i < p->n; i++) { /* a start without symmetry */
+        state = state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+        p->mode[i] = (double)(state >> 11) / 4503599627370496.0 - 1;
+    }
+    for (int k = 0; !status && k < MODE_ITERATIONS; k++) {
+        for (size_t i = 0; i < p->n; i++)
+            p->a[i] = p->tangent.mass[i] * p->mode[i];
+        status = p->solver->solve(p->factors, p->a, p->mode);
+        const double size = norm(p, p->mode);
+        for (size_t i = 0; i < p->n; i++)
+            p->mode[i] /= size;
+    }
+    /* Its sign: the component that is largest is positive. */
+    size_t top = 0;
+    for (size_t i = 0; i < p->n; i++)
+        top = fabs(p->mode[i]) > fabs(p->mode[top]) * (1 + 1e-6) ? i : top;
+    for (size_t i = 0; i < p->n; i++)
+        p->a[i] = p->mode[top] < 0 ? -p->mode[i] : p->mode[i];
+    memcpy(p->mode, p->a, p->n * sizeof *p->mode);
+    return status;
+}
+
+/* Moves to where the number of unstable modes is about to change, within a small part of the step of that
+ * length, which passed it. */
+static drape_status approach(follower *p, double length)
+{
+    double left = length;
+    bool ended = false;
+    drape_status status = DRAPE_OK;
+    while (status >= 0 && left > NEAR * length && !ended) {
+        drape_path_point point = {0};
+        left /= 2;
+        status = attempt(p, left, &point);
+        if (!status && point.unstable == p->point.unstable)
+            status = accept(p, point, &ended);
+    }
+    return status < 0 ? status : DRAPE_OK;
+}
+
+/* Leaves the path along the mode, first by *length, which becomes the length of the step that was made. */
+static drape_status leave(follower *p, double *length)
+{
+    drape_status status = find_mode(p);
+    for (int k = 0; status >= 0 && k < MAX_BRANCH; k++, *length /= 2) {
+        drape_path_point point = {0};
+        bool ended;
+        for (size_t i = 0; i < p->n; i++)
+            p->step[i] = (p->def->branch < 0 ? -*length : *length) * p->mode[i];
+        p->change = 0;
+        status = correct(p, CONTROL_BRANCH, MAX_CORRECTION * *length, &point);
+        if (!status)
+            status = examine(p, &point);
+        if (status)
+            continue;
+        point.event = DRAPE_PATH_SWITCHED;
+        return accept(p, point, &ended);
+    }
+    return status < 0 ? status
+                      : drape_fail(p->ctx, DRAPE_E_SOLVER,
+                                   "factor %.9g: there is a bifurcation, but its branch was not found",
+                                   p->point.factor);
+}
+
+/* ---- The path ---- */
+
+/* The equilibrium at the first factor, from the present state. */
+static drape_status begin(follower *p, bool *ended)
+{
+    drape_path_point point = {0};
+    p->point = (drape_path_point){.number = -1, .factor = p->def->from};
+    memset(p->step, 0, p->n * sizeof *p->step);
+    drape_status status = correct(p, CONTROL_LOAD, p->sim->model->length, &point);
+    if (!status)
+        status = examine(p, &point);
+    if (status > 0)
+        return drape_fail(p->ctx, DRAPE_E_SOLVER,
+                          "no equilibrium was found at the factor %.9g of the loads, from which the path "
+                          "begins (%s); begin it at one that `static` has found",
+                          p->def->from, drape_status_name(status));
+    point.arc = 0;
+    return status ? status : accept(p, point, ended);
+}
+
+static drape_status first_length(follower *p, double *length)
+{
+    drape_status status = open_step(p);
+    *length = p->def->step;
+    if (status > 0)
+        return drape_fail(p->ctx, DRAPE_E_SOLVER, "the stiffness at the first point is singular");
+    if (status || p->def->load_control)
+        return status;
+    *length = p->def->step * norm(p, p->b);
+    return *length > 0 && isfinite(*length)
+               ? DRAPE_OK
+               : drape_fail(p->ctx, DRAPE_E_ARGUMENT,
+                            "no load deforms the cloth: a path needs loads, such as gravity");
+}
+
+static drape_status follow(follower *p)
+{
+    bool ended = false, switched = p->def->branch == 0;
+    double length = 0;
+    drape_status status = begin(p, &ended);
+    if (!status && !ended)
+        status = first_length(p, &length);
+    const double first = length;
+    const double longest = p->def->load_control  ? INFINITY
+                           : p->def->max_arc > 0 ? p->def->max_arc
+                                                 : LONGEST * p->sim->model->length;
+    length = fmin(length, longest);
+    while (!status && !ended && p->point.number + 1 < p->def->max_points && p->point.factor != p->def->to) {
+        drape_path_point point = {0};
+        drape_status tried = attempt(p, length, &point);
+        const bool last = !tried && passes_end(p);
+        if (last)
+            tried = end_at(p, &point);
+        if (tried < 0)
+            return tried;
+        if (tried) {
+            length /= 2;
+            status = length >= LEAST_STEP * fmin(first, longest) ? DRAPE_OK : too_small(p, tried);
+            continue;
+        }
+        if (point.event == DRAPE_PATH_BIFURCATION && !switched) {
+            switched = true;
+            status = approach(p, length);
+            length = longest; /* the steps before say nothing about the branch */
+            if (!status)
+                status = leave(p, &length);
+            continue;
+        }
+        status = accept(p, point, &ended);
+        if (!last)
+            length *= fmin(MAX_GROWTH, sqrt((double)WANTED / fmax(1, point.iterations)));
+        length = fmin(length, longest);
+    }
+    return status;
+}
+
+static double stiffest_row(const lab_tangent *t)
+{
+    double most = 0;
+    for (int64_t j = 0; j < t->pattern->n; j++) {
+        double sum = 0;
+        for (int64_t k = t->pattern->column[j]; k < t->pattern->column[j + 1]; k++)
+            sum += fabs(t->values[k]);
+        most = fmax(most, sum);
+    }
+    return most;
+}
+
+static drape_status open(follower *p)
+{
+    const drape_model *m = p->sim->model;
+    if (m->collider_count > 0 || m->contact.self)
+        return drape_fail(p->ctx, DRAPE_E_ARGUMENT,
+                          "a path of equilibria is followed without contact: leave out colliders and "
+                          "self_contact");
+    drape_status status = lab_tangent_open(&p->arena, p->sim, p->def->from, &p->tangent);
+    if (status)
+        return status;
+    p->n = (size_t)p->tangent.pattern->n;
+    p->nodes = 3 * (size_t)m->node_count;
+    p->solver = drape_linear_best(p->tangent.pattern->n);
+    double **const arrays[] = {&p->force, &p->load, &p->a, &p->b, &p->step, &p->before, &p->mode};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+        *arrays[i] = drape_arena_take(&p->arena, p->n, sizeof **arrays[i]);
+    p->x = drape_arena_take(&p->arena, p->nodes, sizeof *p->x);
+    p->still = drape_arena_take(&p->arena, p->nodes, sizeof *p->still);
+    if (drape_arena_status(&p->arena))
+        return DRAPE_E_MEMORY;
+    for (size_t i = 0; i < p->n; i++)
+        p->mass += p->tangent.mass[i] / 3;
+    p->rounding = ROUNDINGS * DBL_EPSILON * stiffest_row(&p->tangent) * m->length;
+    return p->solver->create(&p->factor_arena, p->tangent.pattern, &p->factors);
+}
+
+void drape_path_def_init(drape_path_def *def, size_t struct_size)
+{
+    const drape_path_def defaults = {
+        .struct_size = struct_size, .to = 1, .step = 0.05, .max_points = 1000, .tolerance = 1e-8};
+    if (def)
+        memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
+}
+
+static bool is_valid(const drape_path_def *def)
+{
+    return isfinite(def->from) && isfinite(def->to) && def->from != def->to && def->step > 0 &&
+           isfinite(def->step) && def->max_arc >= 0 && isfinite(def->max_arc) && def->max_points >= 1 &&
+           def->tolerance > 0 && def->tolerance < 1 && def->branch >= -1 && def->branch <= 1;
+}
+
+drape_status drape_sim_path(drape_sim *sim, const drape_path_def *given)
+{
+    drape_path_def def;
+    drape_status status = sim ? drape_sim_guard(sim, "drape_sim_path") : DRAPE_E_ARGUMENT;
+    if (status)
+        return status;
+    drape_path_def_init(&def, sizeof def);
+    if (given)
+        memcpy(&def, given, given->struct_size < sizeof def ? given->struct_size : sizeof def);
+    if (!is_valid(&def))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "drape_sim_path: from and to are finite and differ, step > 0, max_arc >= 0, "
+                          "max_points >= 1, 0 < tolerance < 1, branch is -1, 0 or 1");
+    follower p = {.ctx = sim->ctx, .sim = sim, .def = &def};
+    p.arena = drape_arena_of(sim->ctx);
+    p.factor_arena = drape_arena_of(sim->ctx);
+    status = open(&p);
+    if (!status)
+        status = follow(&p);
+    if (p.solver)
+        drape_linear_destroy(p.solver, &p.factors);
+    drape_arena_free(&p.factor_arena);
+    lab_tangent_close(&p.tangent);
+    drape_arena_free(&p.arena);
+    return status;
+}

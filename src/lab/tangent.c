@@ -1,0 +1,263 @@
+/* tangent.c: see tangent.h. */
+#include "lab/tangent.h"
+
+#include "base/finite.h"
+#include "solvers/inertia.h"
+
+#include <math.h>
+#include <string.h>
+
+/* The largest change of an edge, in parts of its length, between the two tangents of a difference and the
+ * state. The error of the difference is of the order of its square; that of rounding, of 1e-16 over it. */
+#define DIFFERENCE 1e-4
+/* Relative to the largest diagonal entry: more than rounding, less than any load that follows the cloth. */
+#define MAX_ASYMMETRY 1e-10
+
+static drape_point point_at(const lab_tangent *t, const double *x)
+{
+    const drape_state *now = drape_sim_state(t->sim);
+    return (drape_point){
+        .x = x, .v = t->zero, .internal = now->internal, .t = now->t, .span = {now->t, now->t}};
+}
+
+/* Adds the part of the loads at factor 1: their energies g, values; NULL: not that. */
+static void add_loads(const lab_tangent *t, const drape_point *point, double *g, double *values)
+{
+    for (int32_t i = 0; i < t->sim->model->term_count; i++)
+        if (t->loads[i])
+            drape_system_term(t->system, i, point, NULL, g, values);
+}
+
+/* values = K at nodes x and a factor of the loads. */
+static void evaluate(const lab_tangent *t, const double *x, double factor, double *values)
+{
+    const drape_point point = point_at(t, x);
+    const size_t count = (size_t)t->pattern->nonzeros;
+    drape_system_jacobian_without(t->system, &point, 0, 0, t->loads, values);
+    if (factor == 0)
+        return;
+    memset(t->scratch, 0, count * sizeof *t->scratch);
+    add_loads(t, &point, NULL, t->scratch);
+    for (size_t i = 0; i < count; i++)
+        values[i] += factor * t->scratch[i];
+}
+
+static void take_free(const drape_model *m, const double *nodes, double *free)
+{
+    for (int32_t f = 0; f < m->free_count; f++)
+        memcpy(free + 3 * (size_t)f, nodes + 3 * (size_t)m->node_of_free[f], 3 * sizeof *free);
+}
+
+/* A friction that does not slip has no stiffness, and one that slips none that is symmetric: both are left
+ * out. Anything else that is not symmetric has no modes of the kind that are sought. */
+static drape_status make_symmetric(const lab_tangent *t, const drape_point *point)
+{
+    const drape_pattern *p = t->pattern;
+    const size_t count = (size_t)p->nonzeros;
+    double largest = 0, difference = 0;
+    memcpy(t->scratch, t->values, count * sizeof *t->scratch);
+    if (drape_system_is_symmetric(t->system))
+        drape_pattern_symmetrize(p, t->values);
+    else
+        drape_system_symmetrize(t->system, point, t->values);
+    if (!drape_system_is_symmetric(t->system))
+        return DRAPE_OK;
+    for (size_t i = 0; i < count; i++) {
+        largest = fmax(largest, fabs(t->values[i]));
+        difference = fmax(difference, fabs(t->values[i] - t->scratch[i]));
+    }
+    return difference <= MAX_ASYMMETRY * largest
+               ? DRAPE_OK
+               : drape_fail(t->ctx, DRAPE_E_ARGUMENT,
+                            "the stiffness of this state is not symmetric, by %.2g of its largest entry: a "
+                            "load follows the cloth, and modes are only computed of loads with a potential",
+                            difference / largest);
+}
+
+static drape_status read_state(lab_tangent *t, drape_arena *arena)
+{
+    const drape_model *m = t->sim->model;
+    const drape_state *now = drape_sim_state(t->sim);
+    const drape_point point = point_at(t, now->x);
+    bool changed;
+    drape_status status = drape_system_begin_reading(t->system, now);
+    if (!status)
+        status = drape_system_extend_pattern(t->system, &point, &changed);
+    if (status)
+        return status;
+    t->pattern = drape_system_pattern(t->system);
+    const size_t count = (size_t)t->pattern->nonzeros, nodes = 3 * (size_t)m->node_count;
+    double *force = drape_arena_take(arena, (size_t)t->pattern->n, sizeof *force);
+    t->nodes = drape_arena_take(arena, 2 * nodes, sizeof *t->nodes);
+    t->scratch = drape_arena_take(arena, count, sizeof *t->scratch);
+    t->values = drape_arena_take(arena, count, sizeof *t->values);
+    if (drape_arena_status(arena))
+        return DRAPE_E_MEMORY;
+    evaluate(t, now->x, t->factor, t->values);
+    if (!drape_all_finite(t->values, count))
+        return drape_fail(t->ctx, DRAPE_E_SOLVER, "the stiffness of this state is not finite");
+    lab_tangent_evaluate(t, now->x, t->factor, force, NULL, NULL);
+    for (int64_t i = 0; i < t->pattern->n; i++)
+        t->force = fmax(t->force, fabs(force[i]));
+    return make_symmetric(t, &point);
+}
+
+drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor, lab_tangent *t)
+{
+    const drape_model *m = sim->model;
+    *t = (lab_tangent){.ctx = sim->ctx, .sim = sim, .factor = factor, .arena = arena};
+    if (m->free_count == 0)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "all nodes are pinned: there are no modes");
+    int32_t *same = drape_arena_take(arena, (size_t)m->collider_count, sizeof *same);
+    t->zero = drape_arena_take(arena, 3 * (size_t)m->node_count, sizeof *t->zero);
+    t->mass = drape_arena_take(arena, 3 * (size_t)m->free_count, sizeof *t->mass);
+    t->loads = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->loads);
+    drape_status status = drape_arena_status(arena);
+    if (status)
+        return status;
+    for (int32_t c = 0; c < m->collider_count; c++)
+        same[c] = c;
+    for (int32_t i = 0; i < m->term_count; i++)
+        t->loads[i] = m->terms[i].ops->external;
+    for (int32_t i = 0; i < 3 * m->free_count; i++)
+        t->mass[i] = m->mass[m->node_of_free[i / 3]];
+    status = drape_system_create(arena, m, drape_pool_threads(drape_system_pool(sim->system)), &t->system);
+    if (!status && drape_system_contact(sim->system))
+        status = drape_system_add_contact(t->system);
+    if (!status)
+        status = drape_system_continue(t->system, sim->system, same);
+    if (!status)
+        drape_system_copy_wind(t->system, sim->system);
+    return status ? status : read_state(t, arena);
+}
+
+void lab_tangent_close(lab_tangent *t)
+{
+    drape_system_destroy(&t->system);
+}
+
+drape_status lab_tangent_factor_definite(const lab_tangent *t, const drape_linear_ops *solver, void *factors,
+                                         const double *values, bool *definite)
+{
+    int64_t negative = 0;
+    bool known = true;
+    drape_status status = DRAPE_OK;
+    if (!solver->factor_definite)
+        status = drape_inertia(t->ctx, t->pattern, values, NULL, &negative, &known);
+    *definite = known && negative == 0;
+    if (!status && *definite)
+        status = solver->factor_definite ? solver->factor_definite(factors, values)
+                                         : solver->factor(factors, values);
+    *definite = *definite && !status;
+    return status < 0 ? status : DRAPE_OK;
+}
+
+void lab_tangent_multiply(const lab_tangent *t, const double *values, const double *x, double *y)
+{
+    const drape_pattern *p = t->pattern;
+    for (int64_t j = 0; j < p->n; j++) {
+        double sum = 0;
+        for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
+            sum += values[k] * x[p->row[k]];
+        y[j] = sum;
+    }
+}
+
+void lab_tangent_shift(const lab_tangent *t, double share, const double *other, double *to)
+{
+    const drape_pattern *p = t->pattern;
+    memcpy(to, t->values, (size_t)p->nonzeros * sizeof *to);
+    for (int64_t i = 0; other && i < p->nonzeros; i++)
+        to[i] += share * other[i];
+    for (int32_t j = 0; !other && j < p->block_count; j++) {
+        int64_t stride;
+        double *block = drape_pattern_at(p, to, j, p->diagonal[j], &stride);
+        for (int k = 0; k < 3; k++)
+            block[k * stride + k] += share * t->mass[3 * j + k];
+    }
+}
+
+double lab_tangent_evaluate(const lab_tangent *t, const double *x, double factor, double *force, double *load,
+                            double *values)
+{
+    const drape_model *m = t->sim->model;
+    const drape_point point = point_at(t, x);
+    const size_t n = 3 * (size_t)m->node_count;
+    double *g = t->nodes, *loads = t->nodes + n, largest = 0;
+    if (values)
+        evaluate(t, x, factor, values);
+    memset(loads, 0, n * sizeof *loads);
+    add_loads(t, &point, loads, NULL);
+    if (load)
+        take_free(m, loads, load);
+    if (!force)
+        return 0;
+    drape_system_force_without(t->system, &point, t->loads, g);
+    for (size_t i = 0; i < n; i++) {
+        largest = fmax(largest, fabs(g[i]));
+        g[i] += factor * loads[i];
+    }
+    take_free(m, g, force);
+    return largest;
+}
+
+/* x = the state's nodes, moved by share u. */
+static void move(const lab_tangent *t, double share, const double *u, double *x)
+{
+    const drape_model *m = t->sim->model;
+    memcpy(x, drape_sim_state(t->sim)->x, 3 * (size_t)m->node_count * sizeof *x);
+    for (int32_t i = 0; i < 3 * m->free_count; i++)
+        x[3 * (size_t)m->node_of_free[i / 3] + (size_t)(i % 3)] += share * u[i];
+}
+
+/* The largest change of an edge along u, in parts of its length: of its length or of its direction. */
+static double largest_change(const lab_tangent *t, const double *u)
+{
+    const drape_model *m = t->sim->model;
+    const double *x = drape_sim_state(t->sim)->x;
+    double largest = 0;
+    for (int32_t e = 0; e < m->edge_count; e++) {
+        double moved = 0, length = 0;
+        const int32_t a = m->edge[2 * e], b = m->edge[2 * e + 1];
+        const int32_t fa = m->free_of_node[a], fb = m->free_of_node[b];
+        for (int k = 0; k < 3; k++) {
+            const double d = (fa < 0 ? 0 : u[3 * fa + k]) - (fb < 0 ? 0 : u[3 * fb + k]);
+            const double l = x[3 * (size_t)a + (size_t)k] - x[3 * (size_t)b + (size_t)k];
+            moved += d * d;
+            length += l * l;
+        }
+        largest = fmax(largest, sqrt(moved / length));
+    }
+    return largest;
+}
+
+drape_status lab_tangent_slope(const lab_tangent *t, const double *u, double *values)
+{
+    const size_t count = (size_t)t->pattern->nonzeros;
+    const double change = largest_change(t, u);
+    double *x = drape_arena_take(t->arena, 3 * (size_t)t->sim->model->node_count, sizeof *x);
+    double *before = drape_arena_take(t->arena, count, sizeof *before);
+    if (drape_arena_status(t->arena))
+        return DRAPE_E_MEMORY;
+    if (!(change > 0) || !isfinite(change))
+        return drape_fail(t->ctx, DRAPE_E_ARGUMENT,
+                          "no load deforms the cloth: without loads there is no buckling load");
+    const double h = DIFFERENCE / change;
+    for (int side = -1; side <= 1; side += 2) {
+        bool changed;
+        move(t, side * h, u, x);
+        const drape_point point = point_at(t, x);
+        drape_status status = drape_system_extend_pattern(t->system, &point, &changed);
+        if (status)
+            return status;
+        if (changed || drape_system_contact_energy(t->system, &point) > 0)
+            return drape_fail(t->ctx, DRAPE_E_ARGUMENT,
+                              "cloth is in contact: its stiffness is not smooth in the loads, so that "
+                              "buckling loads cannot be extrapolated");
+        evaluate(t, x, t->factor + side * h, side < 0 ? before : values);
+    }
+    for (size_t i = 0; i < count; i++)
+        values[i] = (values[i] - before[i]) / (2 * h);
+    drape_pattern_symmetrize(t->pattern, values);
+    return DRAPE_OK;
+}
