@@ -3,6 +3,7 @@ import ctypes
 import functools
 import glob
 import json
+import math
 import os
 import shutil
 import threading
@@ -122,8 +123,8 @@ class Memory:
 
     def __init__(self):
         self.blocks, self.shown = {}, {}  # address: size; address: weak reference to what keeps the block
-        self.found = {}  # address of an array: address of its block
-        blocks, shown, found, malloc, free = self.blocks, self.shown, self.found, _libc.malloc, _libc.free
+        self.views = {}  # (address, shape): an array that was made before, until any block is released
+        blocks, shown, views, malloc, free = self.blocks, self.shown, self.views, _libc.malloc, _libc.free
 
         @_Allocate
         def allocate(_, size):
@@ -135,7 +136,7 @@ class Memory:
         @_Release
         def release(_, address):
             blocks.pop(address, None)
-            found.clear()
+            views.clear()
             kept = shown.pop(address, None)
             lease = kept and kept()
             if lease is None:
@@ -147,12 +148,9 @@ class Memory:
 
     def lease(self, address: int) -> Optional["Lease"]:
         """What an array at this address must keep alive; None: the address is not of this memory."""
-        block = self.found.get(address)
+        block = next((start for start, size in list(self.blocks.items()) if start <= address < start + size), None)
         if block is None:
-            block = next((start for start, size in list(self.blocks.items()) if start <= address < start + size), None)
-            if block is None:
-                return None
-            self.found[address] = block
+            return None
         lease = self.shown.get(block)
         lease = lease and lease()
         if lease is None:
@@ -212,10 +210,17 @@ class Handle:
 
     def view(self, address: int, shape, dtype) -> np.ndarray:
         """A read-only array of the library's memory, without a copy."""
-        count = int(np.prod(shape))
-        buffer = (ctypes.c_char * (count * np.dtype(dtype).itemsize)).from_address(address or 0)
-        buffer.keep = self.context.memory.lease(address) or self
-        return np.frombuffer(memoryview(buffer).toreadonly(), dtype, count).reshape(shape)
+        memory = self.context.memory
+        array = memory.views.get((address, shape))
+        if array is None:
+            count = math.prod(shape)
+            lease = memory.lease(address)
+            buffer = (ctypes.c_char * (count * np.dtype(dtype).itemsize)).from_address(address)
+            buffer.keep = lease or self
+            array = np.frombuffer(memoryview(buffer).toreadonly(), dtype, count).reshape(shape)
+            if lease:
+                memory.views[address, shape] = array
+        return array
 
 
 # ---- Values in and out ----

@@ -3,6 +3,7 @@ import copy
 import ctypes
 import json
 import os
+import re
 import shutil
 import tempfile
 from typing import Any, Iterator, List, Mapping, Optional, Union
@@ -36,8 +37,7 @@ class Scene:
             handle = ctypes.c_void_p()
             context.check(lib.drape_scene_load(context.address, encode(source), handle))  # the syntax, with the library's message
             lib.drape_scene_destroy(handle)
-            with open(self.path, encoding="utf-8") as file:
-                self._loaded = json.load(file)
+            self._loaded = _read(self.path)
             self.data = copy.deepcopy(self._loaded)
         else:
             self.data, self._loaded = _copy(dict(source or {"drape": 1})), None
@@ -144,9 +144,7 @@ class Scene:
             data = _plain(self.data, name)
             if self.path and self._loaded is not None:
                 context.check(lib.drape_scene_load(context.address, encode(self.path), handle))
-                with open(self.path, encoding="utf-8") as file:
-                    changes = list(_changes(json.load(file), json.loads(to_json(data)), ""))
-                for pointer, value in changes:
+                for pointer, value in _changes(_read(self.path), json.loads(to_json(data)), ""):
                     context.check(lib.drape_scene_set(handle, encode(pointer), None if value is _ABSENT else encode(json.dumps(value))))
             else:
                 context.check(lib.drape_scene_parse(context.address, encode(to_json(data)), b"scene", handle))
@@ -264,6 +262,12 @@ class Model:
 # ---- Values of a scene ----
 
 _ABSENT = object()
+
+
+def _read(path: str):
+    """The value of a scene file, whose syntax the library has checked: JSON with comments."""
+    with open(path, encoding="utf-8-sig") as file:
+        return json.loads(re.sub(r'"(?:\\.|[^"\\])*"|//[^\n]*|/\*.*?\*/', lambda match: match[0] if match[0].startswith('"') else " ", file.read(), flags=re.S))
 
 
 def _copy(value):

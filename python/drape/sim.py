@@ -2,7 +2,7 @@
 import ctypes
 import math
 import os
-import signal
+import _signal as signal  # the module signal turns numbers into enumerators and back at each call, which takes longer than the rest of it
 import threading
 import weakref
 from typing import Any, Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
