@@ -214,12 +214,10 @@ class Handle:
         array = memory.views.get((address, shape))
         if array is None:
             count = math.prod(shape)
-            lease = memory.lease(address)
             buffer = (ctypes.c_char * (count * np.dtype(dtype).itemsize)).from_address(address)
-            buffer.keep = lease or self
-            array = np.frombuffer(memoryview(buffer).toreadonly(), dtype, count).reshape(shape)
-            if lease:
-                memory.views[address, shape] = array
+            buffer.keep = memory.lease(address)
+            assert buffer.keep, "an array of another context"
+            array = memory.views[address, shape] = np.frombuffer(memoryview(buffer).toreadonly(), dtype, count).reshape(shape)
         return array
 
 

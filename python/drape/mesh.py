@@ -11,7 +11,7 @@ class Mesh:
     """Triangles: positions (n x 3 [m]) and triangles (m x 3, from 0, counterclockwise seen from outside).
 
     It can stand in a scene wherever a mesh does: `scene["/cloth/0/mesh"] = drape.Mesh(positions, triangles)`. Members that a mesh of a scene may
-    have besides (`scale`, `rotate`, `translate`) are given by name."""
+    have besides are given by name: `transform={"scale": 0.01}`."""
 
     def __init__(self, positions, triangles, **settings: Any):
         self.positions = numbers(positions, "positions", -1, 3)

@@ -208,6 +208,12 @@ class Sim:
     def _view(self, function) -> np.ndarray:
         return self._handle.view(function(self._open()), self._shape, np.float64)
 
+    def _model_view(self, function, dtype) -> np.ndarray:
+        """An array of the nodes of the present model: that of the scene, or one of the sim's own, after pins or masses have changed."""
+        address = function(lib.drape_sim_model(self._open()))
+        owner = self._handle if self._context.memory.lease(address) else self.model._handle
+        return owner.view(address, self._shape[:1], dtype)
+
     time = property(lambda self: lib.drape_sim_time(self._open()), doc="[s] of the last accepted state.")
     hash = property(lambda self: lib.drape_sim_hash(self._open()), doc="64-bit hash of the last accepted state: equal hashes, equal bits.")
 
@@ -225,12 +231,12 @@ class Sim:
     @property
     def masses(self) -> np.ndarray:
         """[kg] of the nodes, read only, valid as positions."""
-        return self._handle.view(lib.drape_model_masses(lib.drape_sim_model(self._open())), self._shape[:1], np.float64)
+        return self._model_view(lib.drape_model_masses, np.float64)
 
     @property
     def pinned(self) -> np.ndarray:
         """Which nodes are pinned now (bool), read only, valid as positions."""
-        return self._handle.view(lib.drape_model_pinned(lib.drape_sim_model(self._open())), self._shape[:1], np.bool_)
+        return self._model_view(lib.drape_model_pinned, np.bool_)
 
     @header("drape_sim_set_state")
     def set_state(self, t: float, positions, velocities) -> None:
