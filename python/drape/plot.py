@@ -63,11 +63,11 @@ def stability(results: Any, x: str, y: Optional[str] = None, integrator: Optiona
     names = list(dict.fromkeys(columns["integrator"]))
     chosen = np.ones(len(columns["integrator"]), bool) if y is None else columns["integrator"] == (integrator or names[0])
     height = np.array([names.index(name) for name in columns["integrator"]], float) if y is None else columns[y].astype(float)
-    outcome = columns["outcome"]
-    for kind in dict.fromkeys(outcome):
-        mask = chosen & (outcome == kind)
+    status = np.where((columns["status"] == "ok") & (columns["rejected"] > 0), "ok, steps rejected", columns["status"])
+    for kind in dict.fromkeys(status):
+        mask = chosen & (status == kind)
         if mask.any():
-            ax.scatter(columns[x][mask].astype(float), height[mask], label=kind, marker="s" if kind == "completed" else "x")
+            ax.scatter(columns[x][mask].astype(float), height[mask], label=kind, marker="s" if kind.startswith("ok") else "x")
     ax.set(xlabel=x, xscale="log")
     if y is None:
         ax.set_yticks(range(len(names)), names)

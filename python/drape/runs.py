@@ -2,6 +2,7 @@
 import csv
 import html
 import json
+import math
 import os
 import subprocess
 import tempfile
@@ -23,7 +24,7 @@ _ENERGY = ("frame", "t", "t_state", "kinetic", "elastic", "gravity", "contact", 
 
 def table(columns: Mapping[str, Sequence]) -> Table:
     """Columns as a pandas.DataFrame, or as a dictionary of arrays where pandas is not installed."""
-    arrays = {name: np.asarray(column) for name, column in columns.items()}
+    arrays = {name: column if isinstance(column, np.ndarray) else _values(column) for name, column in columns.items()}
     try:
         import pandas
     except ImportError:
@@ -40,8 +41,14 @@ def read_csv(path) -> Table:
     return table({name: _column([row[k] for row in rows]) for k, name in enumerate(names)})
 
 
+def _values(column: Sequence) -> np.ndarray:
+    """Numbers, of which None is nan; else texts."""
+    numeric = all(item is None or isinstance(item, (int, float, np.number)) for item in column) and any(item is not None for item in column)
+    return np.array([math.nan if item is None else item for item in column]) if numeric else np.array(column, dtype=object)
+
+
 def _column(texts: List[str]) -> np.ndarray:
-    for kind in (np.int64, np.float64):
+    for kind in (np.int64, np.float64) if any(texts) else ():
         try:
             return np.array([text or "nan" for text in texts] if kind is np.float64 else texts, dtype=kind)
         except (ValueError, OverflowError):
