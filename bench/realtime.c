@@ -35,7 +35,7 @@
 #define MAX_FRAMES 4000
 #define TELEPORT   10.0 /* [s] */
 #define MAX_NODES  2500
-#define PINCHED    0.5  /* [s] after which a node that was relaxed counts among the others */
+#define PINCHED    0.5 /* [s] after which a node that was relaxed counts among the others */
 #define BODIES     6
 #define CAPES      3
 #define MATERIAL                                                                                             \
@@ -238,10 +238,10 @@ static double slower = 1;
 /* A sim of the run, and what its recovery is judged by. */
 typedef struct one {
     drape_sim *sim;
-    double debt;         /* [s] */
+    double debt;               /* [s] */
     double pinched[MAX_NODES]; /* [s] (nodes) */
-    double before;       /* the largest strain in the second before it was placed */
-    int recovery;        /* frames; -1: not yet */
+    double before;             /* the largest strain in the second before it was placed */
+    int recovery;              /* frames; -1: not yet */
 } one;
 
 static void judge_recovery(one *o, double t, double strain)
