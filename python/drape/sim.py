@@ -89,6 +89,7 @@ class Sim:
         self._pending: Optional[BaseException] = None  # raised in a callback, on its way to the caller
         self._advancing = self._wants_frame = False
         self._frame: Optional[Frame] = None
+        self._interrupt = _Interrupt()
         self._shape = (self.model.node_count, 3)
         self._needs["observer"] = _observer(weakref.ref(self))
         self._call(lib.drape_sim_observe, self._needs["observer"], None)
@@ -156,12 +157,12 @@ class Sim:
             address = self._open()
             self._pending, self._advancing = None, True
             try:
-                with _Interrupt(address) as interrupt:
+                with _Interrupt() as self._interrupt:
                     status = function(address, *arguments)
             finally:
                 self._advancing = False
-            if interrupt.came:
-                interrupt.pass_on()  # raises KeyboardInterrupt, unless the program has a handler of its own that does not
+            if self._interrupt.came:
+                self._interrupt.pass_on()  # raises KeyboardInterrupt, unless the program has a handler of its own that does not
             self._raise_pending()
             if status == Status.E_STOPPED and self._frame is not None:
                 return None
@@ -661,7 +662,7 @@ def _observer(sim_of):
             return 0
         try:
             event = pointer.contents
-            if sim._pending is not None:  # of the wind or an event
+            if sim._pending is not None or sim._interrupt.came:  # pending: of the wind or an event
                 return Status.E_STOPPED
             if sim._observers:
                 kind, public = event.kind, None
@@ -674,7 +675,7 @@ def _observer(sim_of):
             if sim._wants_frame and event.kind == EventKind.FRAME:
                 sim._frame = Frame(event.frame, event.time, _copy(event.positions, sim._shape), _copy(event.velocities, sim._shape))
                 return 1
-            return 0
+            return Status.E_STOPPED if sim._interrupt.came else Status.OK
         except BaseException as error:
             sim._pending = error
             return Status.E_STOPPED
@@ -698,8 +699,6 @@ def _copy(address: int, shape) -> np.ndarray:
 def _wind(sim_of, wind: Wind):
     def field(_, t, count, x, out, gradient):
         sim = sim_of()
-        if sim is None or sim._pending is not None:
-            return
         try:
             result = wind(t, _copy(x, (count, 3)))
             values, slope = result if isinstance(result, tuple) else (result, None)
@@ -709,9 +708,8 @@ def _wind(sim_of, wind: Wind):
                 slope = numbers(np.broadcast_to(slope, (count, 3, 3)), "the gradient of the wind", count, 3, 3)
                 ctypes.memmove(gradient, slope.ctypes.data, slope.nbytes)
         except BaseException as error:
-            sim._pending = error
-            if sim._advancing:
-                lib.drape_sim_cancel(sim._address)  # the step in progress is rolled back
+            sim._pending = sim._pending or error
+            ctypes.c_double.from_address(out).value = math.nan  # so that the attempt is rejected; then the observer ends the advance
 
     return c.drape_wind_field(field)
 
@@ -730,24 +728,24 @@ def _event_function(sim_of, function):
 
 
 class _Interrupt:
-    """While the main thread advances a sim, Ctrl-C cancels the sim. Otherwise the exception would be raised in one of the library's callbacks, before
-    that can catch it, and be lost."""
+    """While the main thread advances a sim, Ctrl-C is noted, and the observer stops the run. Otherwise the exception would be raised in one of the
+    library's callbacks, before that can catch it, and be lost."""
 
-    def __init__(self, address: int):
-        self.address, self.came, self.before = address, False, None
+    def __init__(self) -> None:
+        self.came: Tuple[Any, ...] = ()
+        self.before: Any = None
 
     def __enter__(self) -> "_Interrupt":
         if threading.current_thread() is threading.main_thread() and callable(signal.getsignal(signal.SIGINT)):
-            self.before = signal.signal(signal.SIGINT, self._cancel)
+            self.before = signal.signal(signal.SIGINT, self._note)
         return self
 
     def __exit__(self, *_: Any) -> None:
         if self.before is not None:
             signal.signal(signal.SIGINT, self.before)
 
-    def _cancel(self, *arguments: Any) -> None:
+    def _note(self, *arguments: Any) -> None:
         self.came = arguments
-        lib.drape_sim_cancel(self.address)
 
     def pass_on(self) -> None:
         self.before(*self.came)

@@ -219,13 +219,25 @@ def test_exceptions():
     error = raises(Mine, sim.advance, 0.2, says="from inside")
     assert any(frame.name == "fail" for frame in __import__("traceback").extract_tb(error.__traceback__))
     sim.unobserve(fail)
+    sim.advance(0.2)
+    equal(sim.hash, straight.hash)
+    sim = drape.Sim(sheet())
     sim.advance(0.04)
+    before = sim.hash
     sim.set_wind(fail)
     raises(Mine, sim.advance, 0.2)
     raises(Mine, lambda: sim.reactions)  # forces need the wind, too
     sim.set_wind(None)
-    sim.advance(0.2)
-    equal(sim.hash, straight.hash)
+    equal(sim.hash, before)
+    sim.advance(0.2)  # with other steps, as after any rejected attempt
+    assert abs(sim.positions - straight.positions).max() < 0.05
+    for integrator in ("verlet", "ida", "newton_k", "radau"):
+        other = drape.Sim(sheet(), integrator=integrator)
+        other.set_wind(fail)
+        raises(Mine, other.advance, 0.2)
+        equal(other.time, 0)
+        other.set_wind(None)
+        other.advance(0.05)
     other = drape.Sim(sheet())
     other.add_event("mine", fail)
     raises(Mine, other.advance, 0.2)
