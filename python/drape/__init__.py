@@ -17,10 +17,11 @@ from .mesh import Mesh
 from .runs import Page, Run, load, run
 from .scene import Model, Scene
 from .sim import Embedding, Event, Frame, Sim
+from .terms import Cloth, Term
 
 __version__: str = _lib.drape_version().decode()
 
-__all__ = ["ArgumentError", "Attempt", "CheckResult", "ClothRange", "ColliderMotion", "Diagnostic", "Embedding", "Energy", "Error", "Event", "EventKind",
+__all__ = ["ArgumentError", "Attempt", "CheckResult", "Cloth", "ClothRange", "ColliderMotion", "Diagnostic", "Embedding", "Energy", "Error", "Event", "EventKind",
            "EventRecord", "FileError", "Frame", "Mesh", "Model", "OutOfMemory", "Page", "ParseError", "Realtime", "Relaxed", "Run", "Scene", "SeamReport",
-           "Sim", "SolverError", "Statistics", "Status", "StepError", "Stopped", "Untangling", "VersionError", "Warning", "converge", "info", "load",
+           "Sim", "SolverError", "Statistics", "Status", "StepError", "Stopped", "Term", "Untangling", "VersionError", "Warning", "converge", "info", "load",
            "plot", "run", "schema", "stability", "tradeoff", "validate"]

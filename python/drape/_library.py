@@ -187,7 +187,8 @@ class Context:
             raise error_of(status, "no context could be created")
         self.address = handle.value
         self.lock = threading.RLock()
-        weakref.finalize(self, _destroy, lib.drape_context_destroy, handle, (self.memory, definition))
+        self.keep: list = []  # what must live as long as the context of the library
+        weakref.finalize(self, _destroy, lib.drape_context_destroy, handle, (self.memory, definition, self.keep))
 
     def message(self) -> str:
         return lib.drape_context_message(self.address).decode(errors="replace")

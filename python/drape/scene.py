@@ -6,7 +6,7 @@ import os
 import re
 import shutil
 import tempfile
-from typing import Any, Iterator, List, Mapping, Optional, Union
+from typing import Any, Iterator, List, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from . import _binding as c
 from ._binding import CheckResult, ClothRange, ColliderMotion
 from ._library import ArgumentError, Context, Handle, encode, header, lib, numbers, record, to_json
 from .mesh import Mesh
+from .terms import Term
 
 
 class Scene:
@@ -156,20 +157,29 @@ class Scene:
 
 
 class Model:
-    """A compiled scene: rest geometry, masses, elements. It does not change; sims in several threads may share one."""
+    """A compiled scene: rest geometry, masses, elements. It does not change; sims in several threads may share one. terms: those of Python (drape.Term)."""
 
-    def __init__(self, scene: Union[Scene, Mapping, str, os.PathLike]):
+    def __init__(self, scene: Union[Scene, Mapping, str, os.PathLike], terms: Sequence[Term] = ()):
         self.scene = scene if isinstance(scene, Scene) else Scene(scene)
+        self.terms = tuple(terms)
         self._context = Context()
+        for term in self.terms:
+            term.register(self._context)
         source, folder = self.scene._handle(self._context)
         model = ctypes.c_void_p()
         try:
-            self._context.check(lib.drape_scene_compile(source, model))
+            status = lib.drape_scene_compile(source, model)
+            self._raise_pending()
+            self._context.check(status)
         finally:
             lib.drape_scene_destroy(source)
             _remove(folder)
         self._handle = Handle(model, lib.drape_model_destroy, self._context)
         self._address = self._handle.address
+
+    def _raise_pending(self) -> None:
+        for term in self.terms:
+            term.raise_pending()
 
     node_count = property(lambda self: lib.drape_model_node_count(self._address), doc="Nodes of all cloths.")
     triangle_count = property(lambda self: lib.drape_model_triangle_count(self._address), doc="Triangles of all cloths.")
@@ -243,7 +253,9 @@ class Model:
         count = ctypes.c_int32()
         with self._context.lock:
             results = (c.drape_check_result * 256)()
-            self._context.check(lib.drape_model_check_derivatives(self._address, seed, results, 256, ctypes.addressof(count)))
+            status = lib.drape_model_check_derivatives(self._address, seed, results, 256, ctypes.addressof(count))
+            self._raise_pending()
+            self._context.check(status)
         return [record(result) for result in results[:min(count.value, 256)]]
 
     def mesh(self, cloth: Optional[int] = None, positions=None) -> Mesh:

@@ -127,6 +127,8 @@ class Sim:
                 raise error_of(status, self._context.message())
 
     def _raise_pending(self) -> None:
+        if self.model.terms and not self._advancing:
+            self.model._raise_pending()
         if self._pending is not None and not self._advancing:
             error, self._pending = self._pending, None
             raise error
@@ -663,6 +665,8 @@ def _observer(sim_of):
         try:
             event = pointer.contents
             if sim._pending is not None or sim._interrupt.came:  # pending: of the wind or an event
+                return Status.E_STOPPED
+            if sim.model.terms and any(term.failed for term in sim.model.terms):
                 return Status.E_STOPPED
             if sim._observers:
                 kind, public = event.kind, None
