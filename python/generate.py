@@ -210,7 +210,8 @@ class Header:
             out += [f"        ({field!r}, {self.ctype(kind, True)})," for field, kind, _ in self.structs[name]] + ["    ]"]
             if self.is_record(name):
                 out += ["", "", f"class {camel(name)}(NamedTuple):", f"    {self.docs[name]!r}"]
-                out += [f"    {python_name(field)}: {self.annotation(kind)}" for field, kind, _ in self.structs[name]]
+                ignore = {field: "  # type: ignore[assignment]" for field in ("count", "index")}  # tuples have methods of these names
+                out += [f"    {python_name(field)}: {self.annotation(kind)}{ignore.get(field, '')}" for field, kind, _ in self.structs[name]]
                 out += [""] + [f"{camel(name)}.{python_name(field)}.__doc__ = {' '.join(doc.split())!r}" for field, _, doc in self.structs[name] if doc]
         out += ["", "", "RECORDS = {"] + [f"    {name}: {camel(name)}," for name in self.order if name in self.structs and self.is_record(name)] + ["}"]
         out += ["", "# Name: (result, arguments).", "FUNCTIONS = {"]

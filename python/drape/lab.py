@@ -3,7 +3,7 @@ pandas, a dictionary of arrays. With `out`, the folder keeps cases, figures and 
 import json
 import os
 import tempfile
-from typing import Any, Mapping, Sequence, Union
+from typing import Any, List, Mapping, Optional, Sequence, Union
 
 from .runs import SceneFile, Table, arguments, call, read_csv, table
 from .scene import Scene
@@ -37,7 +37,7 @@ def converge(scene: AnyScene, *, out=None, **options: Any) -> Table:
 
 def validate(reference: Union[str, Sequence[str], None] = None) -> Table:
     """Runs the physical references (docs/validate.md), or some of them by name: a row for each case, with the values obtained and expected."""
-    names = [None] if reference is None else [reference] if isinstance(reference, str) else list(reference)
+    names: List[Optional[str]] = [None] if reference is None else [reference] if isinstance(reference, str) else list(reference)
     cases = []
     for name in names:
         cases += json.loads(call("validate", *([name] if name else []), "--json", accept=(0, 1)))

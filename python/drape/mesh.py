@@ -24,14 +24,18 @@ class Mesh:
     def of(cls, mesh: Any, **settings: Any) -> "Mesh":
         """A mesh from another package: a dictionary or an object with `vertices` and `faces`, as trimesh has, or with `points` and `cells`, as meshio
         has; quadrangles and larger polygons of meshio's cells are divided into triangles from their first corner."""
-        get = mesh.get if isinstance(mesh, Mapping) else lambda name: getattr(mesh, name, None)
+        if isinstance(mesh, Mapping):
+            get: Any = mesh.get
+        else:
+            def get(name):
+                return getattr(mesh, name, None)
         if isinstance(mesh, cls):
             return mesh
         if get("vertices") is not None and get("faces") is not None:
             return cls(get("vertices"), _fans([get("faces")]), **settings)
         if get("points") is not None and get("cells") is not None:
             cells = get("cells")
-            blocks = cells.items() if isinstance(cells, Mapping) else [b if isinstance(b, tuple) else (b.type, b.data) for b in cells]
+            blocks: Any = cells.items() if isinstance(cells, Mapping) else [b if isinstance(b, tuple) else (b.type, b.data) for b in cells]
             faces = [data for kind, data in blocks if kind in ("triangle", "quad", "polygon")]
             return cls(get("points"), _fans(faces), **settings)
         if get("positions") is not None and get("triangles") is not None:

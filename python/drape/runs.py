@@ -22,7 +22,7 @@ _STEPS = ("attempt", "t", "h", "accepted", "status", "reason", "iterations", "re
 _ENERGY = ("frame", "t", "t_state", "kinetic", "elastic", "gravity", "contact", "total", "dissipated", "numerical")
 
 
-def table(columns: Mapping[str, Sequence]) -> Table:
+def table(columns: Mapping[str, Any]) -> Table:
     """Columns as a pandas.DataFrame, or as a dictionary of arrays where pandas is not installed."""
     arrays = {name: column if isinstance(column, np.ndarray) else _values(column) for name, column in columns.items()}
     try:
@@ -36,7 +36,7 @@ def read_csv(path) -> Table:
     """A table that Drape wrote. Columns of numbers are arrays of float64 or, if all are whole, int64; others have texts."""
     with open(path, newline="", encoding="utf-8") as file:
         reader = csv.reader(file)
-        names = next(reader, [])
+        names: List[str] = next(reader, [])
         rows = [row for row in reader if len(row) == len(names)]  # a run that was killed may have left half a line
     return table({name: _column([row[k] for row in rows]) for k, name in enumerate(names)})
 
@@ -65,7 +65,8 @@ class Run:
     def __init__(self, scene: Scene, positions: Optional[np.ndarray], steps: Table, energy: Table, summary: Dict[str, Any], folder: Optional[str] = None,
                  model: Optional[Model] = None):
         self.scene, self.positions, self.steps, self.energy, self.summary, self.folder = scene, positions, steps, energy, summary, folder
-        self._model, self._temporary = model, None
+        self._model = model
+        self._temporary: Optional[tempfile.TemporaryDirectory] = None
 
     @property
     def model(self) -> Model:
@@ -81,6 +82,8 @@ class Run:
 
     def mesh(self, frame: int = -1, cloth: Optional[int] = None) -> Mesh:
         """The cloth in a frame."""
+        if self.positions is None:
+            raise FileError(f"{self}: has no positions.npy")
         return self.model.mesh(cloth, np.array(self.positions[frame]))
 
     def save(self, folder) -> "Run":

@@ -6,7 +6,7 @@ import os
 import re
 import shutil
 import tempfile
-from typing import Any, Iterator, List, Mapping, Optional, Sequence, Union
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
@@ -28,8 +28,10 @@ class Scene:
     `data` is the dictionary itself, and may be changed freely. numpy arrays and numbers may stand for lists and numbers, and a `drape.Mesh` for a mesh.
     Keys and values are checked when the scene is compiled."""
 
-    def __init__(self, source: Union[str, os.PathLike, Mapping, "Scene"] = None, /, **members: Any):
+    def __init__(self, source: Union[str, os.PathLike, Mapping, "Scene", None] = None, /, **members: Any):
         self.path: Optional[str] = None
+        self.data: Dict[str, Any]
+        self._loaded: Any = None
         if isinstance(source, Scene):
             self.path, self.data, self._loaded = source.path, _copy(source.data), source._loaded
         elif isinstance(source, (str, os.PathLike)):
@@ -41,7 +43,7 @@ class Scene:
             self._loaded = _read(self.path)
             self.data = copy.deepcopy(self._loaded)
         else:
-            self.data, self._loaded = _copy(dict(source or {"drape": 1})), None
+            self.data = _copy(dict(source or {"drape": 1}))
         self.data.update(members)
 
     # ---- A dictionary ----
@@ -134,7 +136,8 @@ class Scene:
 
     def _handle(self, context: Context):
         """The scene in the library, and what it needs until it is compiled: files of meshes."""
-        handle, folder = ctypes.c_void_p(), []
+        handle = ctypes.c_void_p()
+        folder: List[str] = []
 
         def name(number):
             if not folder:
@@ -181,12 +184,35 @@ class Model:
         for term in self.terms:
             term.raise_pending()
 
-    node_count = property(lambda self: lib.drape_model_node_count(self._address), doc="Nodes of all cloths.")
-    triangle_count = property(lambda self: lib.drape_model_triangle_count(self._address), doc="Triangles of all cloths.")
-    dof_count = property(lambda self: lib.drape_model_dof_count(self._address), doc="Unknowns: 3 a free node.")
-    nonzero_count = property(lambda self: lib.drape_model_nonzero_count(self._address), doc="Nonzeros of the full Jacobian.")
-    duration = property(lambda self: lib.drape_model_duration(self._address), doc="[s] of the scene.")
-    frame_rate = property(lambda self: lib.drape_model_frame_rate(self._address), doc="[1/s] of the scene.")
+    @property
+    def node_count(self) -> int:
+        """Nodes of all cloths."""
+        return lib.drape_model_node_count(self._address)
+
+    @property
+    def triangle_count(self) -> int:
+        """Triangles of all cloths."""
+        return lib.drape_model_triangle_count(self._address)
+
+    @property
+    def dof_count(self) -> int:
+        """Unknowns: 3 a free node."""
+        return lib.drape_model_dof_count(self._address)
+
+    @property
+    def nonzero_count(self) -> int:
+        """Nonzeros of the full Jacobian."""
+        return lib.drape_model_nonzero_count(self._address)
+
+    @property
+    def duration(self) -> float:
+        """[s] of the scene."""
+        return lib.drape_model_duration(self._address)
+
+    @property
+    def frame_rate(self) -> float:
+        """[1/s] of the scene."""
+        return lib.drape_model_frame_rate(self._address)
 
     @property
     def triangles(self) -> np.ndarray:
@@ -297,7 +323,7 @@ def _index(place: list, key: str, pointer: str) -> int:
 
 def _plain(value, mesh_name, folder: Optional[str] = None):
     """A scene without Mesh objects, which are written to files of these names. folder: relative names of files are made absolute against it."""
-    written = []
+    written: List[str] = []
 
     def plain(item, key=None):
         if isinstance(item, Mesh):

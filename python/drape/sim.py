@@ -5,7 +5,7 @@ import os
 import _signal as signal  # the module signal turns numbers into enumerators and back at each call, which takes longer than the rest of it
 import threading
 import weakref
-from typing import Any, Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -14,13 +14,16 @@ from ._binding import (Attempt, ColliderMotion, Energy, EventKind, EventRecord, 
 from ._library import ArgumentError, Context, Error, Handle, Stopped, encode, error_of, header, indices, lib, numbers, record
 from .scene import Model, Scene
 
+if TYPE_CHECKING:
+    from .runs import Page, Run
+
 Which = Union[int, str]
 
 
 class Frame(NamedTuple):
     """A frame of a run. Its arrays are its own."""
 
-    index: int
+    index: int  # type: ignore[assignment]
     """its number, from 0"""
     time: float
     """[s]"""
@@ -73,7 +76,8 @@ class Sim:
         self.model = scene if isinstance(scene, Model) else Model(scene)
         self._context = Context()
         self._lock = self._context.lock
-        definition, keep = c.drape_sim_def(), []
+        definition = c.drape_sim_def()
+        keep: List[Any] = []
         lib.drape_sim_def_init(definition, ctypes.sizeof(definition))
         definition.integrator, definition.controller = encode(integrator), encode(controller)
         definition.integrator_settings, definition.integrator_setting_count = _settings(integrator_settings, keep)
@@ -217,8 +221,15 @@ class Sim:
         owner = self._handle if self._context.memory.lease(address) else self.model._handle
         return owner.view(address, self._shape[:1], dtype)
 
-    time = property(lambda self: lib.drape_sim_time(self._open()), doc="[s] of the last accepted state.")
-    hash = property(lambda self: lib.drape_sim_hash(self._open()), doc="64-bit hash of the last accepted state: equal hashes, equal bits.")
+    @property
+    def time(self) -> float:
+        """[s] of the last accepted state."""
+        return lib.drape_sim_time(self._open())
+
+    @property
+    def hash(self) -> int:
+        """64-bit hash of the last accepted state: equal hashes, equal bits."""
+        return lib.drape_sim_hash(self._open())
 
     @property
     def positions(self) -> np.ndarray:
@@ -326,7 +337,8 @@ class Sim:
     @property
     def reasons(self) -> Dict[str, int]:
         """Why attempts were rejected, and how often."""
-        count, found = ctypes.c_int64(), {}
+        count = ctypes.c_int64()
+        found: Dict[str, int] = {}
         with self._lock:
             while (name := lib.drape_sim_reason(self._open(), len(found), ctypes.addressof(count))) is not None:
                 found[name.decode()] = count.value
@@ -336,7 +348,8 @@ class Sim:
     @header("drape_sim_warning")
     def warnings(self) -> List[Warning]:
         """Doubts about the run so far, each with a name and a text that says which setting would help."""
-        found, warning = [], c.drape_warning()
+        found: List[Warning] = []
+        warning = c.drape_warning()
         with self._lock:
             while lib.drape_sim_warning(self._open(), len(found), warning):
                 found.append(record(warning))
@@ -417,7 +430,7 @@ class Sim:
         """Sets the velocity of the air for drag terms: wind(t, x) returns velocities (count x 3 [m/s]) at the time t [s] and the points x (count x 3 [m]), or
         these and their gradient (count x 3 x 3 [1/s], d wind_i / d x_j), with which Newton's method converges as fast as without wind. A single vector
         stands for the same wind everywhere. None: still air. An exception in it ends the advance and comes out of it."""
-        field = c.drape_wind_field() if wind is None else _wind(weakref.ref(self), wind)
+        field: Any = c.drape_wind_field() if wind is None else _wind(weakref.ref(self), wind)  # type: ignore[call-overload]
         self._call(lib.drape_sim_set_wind, field, None)
         self._needs["wind"] = field
 
@@ -625,7 +638,7 @@ class Sim:
         from .runs import record_sim
         return record_sim(self, until)
 
-    def view(self, until: Optional[float] = None):
+    def view(self, until: Optional[float] = None) -> "Page":
         """Records the run until then, and shows the report of the program, with the cloth in motion, in a notebook."""
         return self.record(until).view()
 
@@ -689,9 +702,9 @@ def _observer(sim_of):
 
 def _event_of(sim: Sim, event) -> Event:
     attempt = record(event.attempt.contents) if event.attempt else None
-    arrays = [sim._handle.view(address, sim._shape, np.float64) if address else None for address in (event.positions, event.velocities)]
+    x, v = (sim._handle.view(address, sim._shape, np.float64) if address else None for address in (event.positions, event.velocities))
     time = sim.time if attempt else event.time
-    return Event(EventKind(event.kind), sim, time, event.frame, *arrays, attempt, event.name.decode() if event.name else "", event.value, event.direction)
+    return Event(EventKind(event.kind), sim, time, event.frame, x, v, attempt, event.name.decode() if event.name else "", event.value, event.direction)
 
 
 def _copy(address: int, shape) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Terms in Python: energies of elements, as functions of numpy arrays."""
 import ctypes
 import math
-from typing import Callable, NamedTuple, Optional, Tuple, Union
+from typing import Any, Callable, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
 
@@ -45,7 +45,7 @@ class Term:
         self.name, self.nodes, self.elements, self.energy = name, nodes, elements, energy
         self._error: Optional[BaseException] = None
         ops = self._ops = c.drape_term_ops()
-        kinds = dict(c.drape_term_ops._fields_)
+        kinds: Any = dict(c.drape_term_ops._fields_)  # type: ignore[arg-type]
         ops.struct_size = ctypes.sizeof(ops)
         ops.entry.name, ops.entry.summary, ops.entry.reference = encode(name), b"an energy in Python", encode(reference)
         ops.element_name, ops.nodes, ops.convex, ops.external = encode(element_name), nodes, convex, external
