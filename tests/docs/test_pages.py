@@ -152,7 +152,15 @@ def run_text(block):
 
 
 def run_python(block):
-    done([sys.executable, "-c", block.text], block.place, env={**os.environ, "LD_LIBRARY_PATH": BUILD + "/src"})
+    """With the package of the build folder."""
+    library = BUILD + "/src/libdrape.so.1"
+    if not os.path.exists(library):
+        raise Skip("no shared library in this build")
+    for module in ["numpy"] + ["matplotlib"] * ("drape.plot" in block.text):
+        if subprocess.run([sys.executable, "-c", f"import {module}"], stderr=subprocess.DEVNULL, check=False).returncode:
+            raise Skip(f"no {module}")
+    environment = {**os.environ, "PYTHONPATH": BUILD + "/python", "DRAPE_LIBRARY": library, "DRAPE_PROGRAM": PROGRAM, "MPLBACKEND": "agg"}
+    done([sys.executable, "-B", "-c", block.text], block.place, env=environment)
 
 
 def stands_in(block):

@@ -1,0 +1,146 @@
+#!/usr/bin/env python3
+"""test_runs.py: finished runs, the verbs of the program, plots, and the examples. See package.py."""
+import glob
+import os
+import shutil
+import subprocess
+import sys
+
+from package import ENVIRONMENT, SOURCES, Skip, equal, raises, run_tests, sheet
+import drape  # after package, which says where it is
+import numpy as np
+
+
+def columns(table):
+    return {name: np.asarray(table[name]) for name in table.keys()}
+
+
+def need(module):
+    try:
+        return __import__(module)
+    except ImportError:
+        raise Skip(f"no {module}") from None
+
+
+def test_runs():
+    """a run in memory has the bits, frames and tables of one by the program; saved and loaded, it is the same"""
+    scene = drape.Scene(sheet())
+    inside, outside = drape.run(scene), drape.run(scene, out="run")
+    equal(inside.summary["hash"], outside.summary["hash"])
+    assert isinstance(outside.positions, np.memmap) and np.array_equal(inside.positions, outside.positions)
+    for name, column in columns(inside.energy).items():
+        assert np.array_equal(column, columns(outside.energy)[name]), name
+    for name, column in columns(inside.steps).items():
+        other = columns(outside.steps)[name]
+        assert np.array_equal(column, other, equal_nan=column.dtype.kind == "f"), name
+    for key in ("status", "nodes", "dofs", "nnz", "frames", "time", "energy", "strain", "newton", "steps"):
+        equal(inside.summary[key], outside.summary[key], key)
+    again = drape.load(inside.save("saved").folder)
+    for one, other in ((inside.energy, again.energy), (inside.steps, again.steps)):
+        for name, column in columns(one).items():
+            assert np.array_equal(column, columns(other)[name], equal_nan=column.dtype.kind == "f"), name
+    assert np.array_equal(again.times, inside.times) and again.mesh(3).positions.shape == (36, 3)
+    equal(drape.Model(again.scene).node_count, 36)
+
+
+def test_failures():
+    """a run that fails has the status and the message; what the program refuses is an argument error"""
+    stops = sheet(controller={"type": "fixed"}, integrator={"dt": 0.01, "max_iterations": 1, "tolerance": 1e-12})
+    raises(drape.StepError, drape.run, stops, out="run", says="t=0")
+    run = drape.Sim(stops).record()
+    equal((run.summary["status"], "t=0" in run.summary["message"]), ("e_solver", True))
+    raises(drape.ArgumentError, drape.run, sheet(), {"/integrator/dt": -1}, out="other", says="/integrator/dt: -1 is not allowed")
+    raises(drape.FileError, drape.load, "nowhere", says="scene.json")
+    equal(os.path.exists("other"), False)
+
+
+def test_changes():
+    """values, meshes and options reach the program, and the scene of the caller stays as it is"""
+    mesh = drape.Model(sheet()).mesh(0)
+    scene = drape.Scene(sheet(mesh=mesh, pins=[{"nodes": [0]}]))
+    run = drape.run(scene, {"/duration": 0.05, "/gravity": np.zeros(3)}, out="run", format=["npy", "obj"], frame_rate=100)
+    equal((len(run.times), scene["/duration"], run.summary["nodes"]), (6, 0.2, 36))
+    assert np.ptp(run.positions, axis=0).max() < 1e-12 and len(glob.glob("run/*.obj")) > 5
+    equal(drape.load("run").model.node_count, 36)
+
+
+def test_report():
+    """the report of a run is a page that notebooks show"""
+    page = drape.Sim(sheet()).view(0.1)
+    assert "<html" in page.text and page._repr_html_().startswith("<iframe srcdoc=")
+    page.write("page.html")
+    run = drape.run(sheet(), out="run")
+    equal(run.report("other.html").path, os.path.abspath("other.html"))
+    equal(sorted(glob.glob("run/*.html")), [])
+
+
+def test_lab():
+    """the experiments give the tables that they write"""
+    if "tradeoff" not in subprocess.run([os.environ["DRAPE_PROGRAM"], "help"], capture_output=True, text=True, check=True).stdout:
+        raise Skip("no experiments in this build")
+    scene = sheet(colliders=[], duration=0.05)
+    maps = columns(drape.stability(scene, {"/integrator/dt": (1e-3, 1e-2, "2log")}, integrators=["be", "verlet"], out="maps"))
+    equal((len(maps["status"]), sorted(set(maps["integrator"])), set(maps["status"]) >= {"ok"}), (4, ["be", "verlet"], True))
+    assert os.path.exists("maps/report.html")
+    orders = columns(drape.converge(scene, integrators=["be"], levels=3))
+    equal(orders["value"].tolist(), sorted(orders["value"], reverse=True))
+    work = columns(drape.tradeoff(drape.Scene(scene), integrators=["be"], budget=0.1, set={"/duration": 0.02}))
+    assert len(work["case"]) and work["reference_error_m"].dtype.kind == "f"
+    cases = columns(drape.validate("oscillator"))
+    equal(set(cases["verdict"]), {"pass"})
+    assert np.all(abs(cases["error"]) < cases["tolerance"])
+    raises(drape.ArgumentError, drape.stability, scene, {"/integrator/dt": "1:2"})
+    equal(drape.info(scene)["nodes"], 36)
+    assert "properties" in drape.schema()
+
+
+def test_plots():
+    """plots are drawn of runs, sims, meshes and tables"""
+    need("matplotlib").use("agg")
+    run = drape.run(sheet())
+    ax = drape.plot.energy(run)
+    assert np.array_equal(ax.lines[0].get_ydata(), columns(run.energy)["kinetic"]) and "[J]" in ax.get_ylabel()
+    drape.plot.energy(run.energy, ["kinetic"], ax=ax)
+    drape.plot.steps(run)
+    sim = drape.Sim(sheet())
+    for what in (run, sim, run.mesh(0)):
+        drape.plot.cloth(what)
+    drape.plot.cloth(sim, values=sim.strain[:, 0], label="strain [1]").figure.savefig("cloth.png")
+    table = {"integrator": np.array(["be", "be", "verlet"]), "/integrator/dt": np.array([1e-3, 1e-2, 1e-2]), "E": np.array([1e4, 1e5, 1e5]),
+             "status": np.array(["ok", "ok", "exploded"]), "rejected": np.array([0, 3, 0]), "error": np.array([1e-3, 1e-2, 1e-1])}
+    drape.plot.stability(table, "/integrator/dt")
+    drape.plot.stability(table, "/integrator/dt", "E", "verlet")
+    drape.plot.converge(table, "/integrator/dt", "error").figure.savefig("orders.png")
+
+
+def test_tables():
+    """tables are data frames where pandas is installed"""
+    pandas = need("pandas")
+    run = drape.run(sheet())
+    assert isinstance(run.energy, pandas.DataFrame) and abs(run.energy.total.iloc[0]) < 1
+
+
+def test_examples():
+    """each example runs, and prints what its comments promise"""
+    programs = sorted(glob.glob(SOURCES + "/examples/python/*.py"))
+    assert len(programs) >= 4
+    skipped = []
+    for program in programs:
+        text = open(program, encoding="utf-8").read()
+        if "drape.plot" in text or "matplotlib" in text:
+            try:
+                need("matplotlib")
+            except Skip as reason:
+                skipped.append(f"{os.path.basename(program)}: {reason}")
+                continue
+        shutil.copy(program, ".")
+        result = subprocess.run([sys.executable, "-W", "error::DeprecationWarning:__main__", os.path.basename(program)], env=ENVIRONMENT, capture_output=True, text=True, check=False)
+        equal(result.returncode, 0, program + ": " + result.stderr)
+        for line in [line[len("# prints: "):] for line in text.splitlines() if line.startswith("# prints: ")]:
+            assert line in result.stdout, f"{program}: {line!r} is not in {result.stdout!r}"
+    if skipped:
+        raise Skip("; ".join(skipped))
+
+
+if __name__ == "__main__":
+    sys.exit(run_tests(globals()))

@@ -1,0 +1,468 @@
+#!/usr/bin/env python3
+"""test_sim.py: scenes and sims in Python. See package.py."""
+import gc
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import weakref
+
+from package import ENVIRONMENT, SOURCES, equal, raises, run_tests, sheet
+import drape  # after package, which says where it is
+import numpy as np
+
+KIND = drape.EventKind
+
+
+def moving(**changes):
+    sim = drape.Sim(sheet(**changes))
+    sim.advance(0.1)
+    return sim
+
+
+# ---- Scenes
+
+def test_pointers():
+    """a scene is a dictionary with pointers"""
+    scene = drape.Scene(sheet())
+    scene["/integrator/dt"] = 1e-3
+    scene["/contact/distance"] = 2e-3  # an object that was not there
+    scene["/colliders/-"] = {"type": "plane", "point": [0, -1, 0], "normal": [0, 1, 0]}
+    scene["/cloth/0/material"]["density"] = np.float64(150)
+    equal((scene["/integrator/dt"], scene["/colliders/1/type"], scene.get("/none", 3)), (1e-3, "plane", 3))
+    assert "/cloth/0/name" in scene and "/cloth/1" not in scene
+    model = scene.compile()
+    equal(model.collider_count, 2)
+    assert abs(model.masses.sum() - 150 * 1e-3 * 0.25) < 1e-12
+    del scene["/colliders/1"]
+    equal(drape.Model(scene).collider_count, 1)
+    raises(KeyError, lambda: scene["/nothing/at/all"])
+    raises(IndexError, lambda: scene["/colliders/7"])
+    other = scene.copy()
+    other["/duration"] = 9
+    equal(scene["/duration"], 0.2)
+
+
+def test_files():
+    """a scene from a file keeps its comments' lines in messages, its folder for meshes, and takes changes"""
+    drape.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).write("triangle.ply")
+    text = json.dumps(sheet(mesh={"file": "triangle.ply"}, pins=[{"nodes": [0]}]), indent=1)
+    os.mkdir("there")
+    os.rename("triangle.ply", "there/triangle.ply")
+    with open("there/scene.json", "w", encoding="utf-8") as file:
+        file.write('// "a" comment\n/* and /* another */' + text)
+    scene = drape.Scene("there/scene.json")
+    equal(drape.Model(scene).node_count, 3)
+    scene["/cloth/0/material/density"] = -1
+    raises(drape.ArgumentError, scene.compile, says="/cloth/0/material/density: -1 is not allowed")
+    scene["/cloth/0/material/density"] = 200
+    scene["/colliders"] = []
+    scene.write("moved.json")
+    equal(drape.Model("moved.json").node_count, 3)
+    for name in sorted(os.listdir(SOURCES + "/examples/scenes")):
+        if name.endswith(".json"):
+            drape.Scene(f"{SOURCES}/examples/scenes/{name}")  # all of them are read
+
+
+def test_errors():
+    """errors have the library's message and status, and are also Python's own kinds"""
+    error = raises(drape.ArgumentError, drape.Sim, {"drape": 1}, says='"cloth" is missing')
+    equal(error.status, drape.Status.E_ARGUMENT)
+    assert isinstance(error, ValueError) and isinstance(error, drape.Error)
+    raises(drape.FileError, drape.Scene, "none.json", says="none.json")
+    raises(OSError, drape.Scene, "none.json")
+    with open("broken.json", "w", encoding="utf-8") as file:
+        file.write("{")
+    raises(drape.ParseError, drape.Scene, "broken.json", says="broken.json:1:")
+    raises(drape.ArgumentError, drape.Sim, sheet(), integrator="nothing", says="nothing")
+    sim = drape.Sim(sheet(), controller="fixed", integrator_settings={"max_iterations": 1, "tolerance": 1e-12})
+    raises(drape.StepError, sim.advance, 0.2)
+    raises(drape.ArgumentError, sim.advance, float("nan"))
+    raises(drape.ArgumentError, sim.push, np.zeros((3, 3)), says="36 x 3")
+
+
+def test_meshes():
+    """meshes come from arrays and from dictionaries of trimesh and meshio, and go there"""
+    x, quads = [[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], [[0, 1, 2, 3]]
+    for given in ({"vertices": x, "faces": [[0, 1, 2], [0, 2, 3]]}, {"points": x, "cells": [("quad", np.array(quads))]}, {"points": x, "cells": {"quad": quads}}):
+        mesh = drape.Mesh.of(given)
+        equal(mesh.triangles.tolist(), [[0, 1, 2], [0, 2, 3]])
+    scene = drape.Scene(sheet(mesh=drape.Mesh(np.array(x) / 3, mesh.triangles, transform={"translate": [0, 1, 0]}), pins=[{"nodes": [0]}]))
+    scene["/cloth/0/mesh/transform/scale"] = 2.0
+    model = scene.compile()
+    assert np.array_equal(model.rest_positions, 2 * (np.array(x) / 3) + [0, 1, 0])  # all digits, as the file has
+    out = model.mesh(0)
+    assert np.array_equal(drape.Mesh.of(out.to_trimesh()).positions, out.positions) and np.array_equal(drape.Mesh.of(out.to_meshio()).triangles, mesh.triangles)
+    out.write("out.obj")
+    assert np.array_equal(drape.Model(sheet(mesh={"file": "out.obj"}, pins=[{"nodes": [0]}])).rest_positions, out.positions)
+    raises(drape.ArgumentError, drape.Mesh, x, [[0, 1, 9]])
+
+
+# ---- Arrays
+
+def test_views():
+    """positions are the library's own memory, read only"""
+    sim = moving()
+    x = sim.positions
+    equal((x.shape, x.dtype, x.flags.writeable, x.flags.owndata), ((36, 3), np.dtype(float), False, False))
+    equal(x.ctypes.data, drape._library.lib.drape_sim_positions(sim._address))
+    raises(ValueError, x.__setitem__, 0, 0)
+    raises(ValueError, setattr, x.flags, "writeable", True)
+    equal(sim.pinned.tolist(), drape.Model(sheet()).pinned.tolist())
+    assert np.array_equal(sim.velocities, drape.Sim.velocities.fget(sim))
+
+
+def test_views_outlive():
+    """arrays stay valid when the sim goes: closed, collected, changed, or another one is put in its place"""
+    def copies(sim):
+        arrays = [sim.positions, sim.velocities[3:7], sim.masses, sim.model.rest_positions, sim.model.triangles]
+        return arrays, [array.copy() for array in arrays]
+
+    def churn():  # memory that was freed would be used again
+        gc.collect()
+        other = [moving() for _ in range(3)]
+        del other
+        gc.collect()
+
+    for end in (lambda sim: sim.close(), lambda sim: None, lambda sim: sim.pin([7, 8]), lambda sim: sim.set_masses([3], 0.5), lambda sim: sim.change(sheet(gravity=[0, -1, 0])),
+                lambda sim: sim.restore_checkpoint(sim.checkpoint()), lambda sim: sim.attach("ball", [20])):
+        sim = moving()
+        arrays, before = copies(sim)
+        end(sim)
+        del sim
+        churn()
+        for array, copy in zip(arrays, before):
+            assert np.array_equal(array, copy)
+
+
+def test_nothing_is_kept():
+    """a sim without views is freed at once, and a view keeps its own block only"""
+    sim = moving()
+    memory, gone = sim._context.memory, weakref.ref(sim)
+    x = sim.positions
+    blocks = memory.blocks
+    del sim
+    assert gone() is None and len(blocks) <= 1, blocks  # without a collection; the block of the context goes with the view's
+    assert np.isfinite(x).all()
+
+
+def test_closing():
+    """a sim is closed once; afterwards calls are refused"""
+    with drape.Sim(sheet()) as sim:
+        pass
+    sim.close()
+    for call in (lambda: sim.time, lambda: sim.positions, lambda: sim.advance(1), lambda: sim.energy, lambda: sim.pin([3])):
+        raises(drape.ArgumentError, call, says="closed")
+    sim.cancel()
+    equal(repr(sim), "Sim(closed)")
+
+
+def test_interpreter_ends():
+    """the interpreter ends in order with sims, views and callbacks alive"""
+    code = f"import drape, json\nsim = drape.Sim(json.loads({json.dumps(sheet())!r}))\nx = sim.positions\nsim.observe(print, drape.EventKind.ROOT)\n" \
+           "sim.set_wind(lambda t, x: [1, 0, 0])\nsim.advance(0.05)\nf = sim.frames(0.2)\nnext(f)\n"
+    result = subprocess.run([sys.executable, "-X", "dev", "-c", code], env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    equal((result.returncode, result.stdout, result.stderr), (0, "", ""))
+
+
+# ---- Advancing
+
+def test_frames():
+    """iteration over frames makes the steps of one advance, to the bit, with every integrator that has a history"""
+    for integrator in ("be", "bdf2", "ida", "verlet"):
+        straight = drape.Sim(sheet(), integrator=integrator)
+        straight.advance(0.2)
+        sim = drape.Sim(sheet(), integrator=integrator)
+        frames = list(sim.frames())
+        equal([f.index for f in frames], list(range(7)))
+        assert np.allclose([f.time for f in frames], np.arange(7) / 30)
+        assert not np.array_equal(frames[3].positions, frames[4].positions)  # each has its own arrays
+        equal((sim.hash, sim.time), (straight.hash, 0.2), integrator)
+
+
+def test_observers():
+    """observers are called for their kinds, in order, and may stop the advance"""
+    sim, calls = drape.Sim(sheet()), []
+    sim.observe(lambda event: calls.append(("frame", event.frame, event.positions.shape)), KIND.FRAME)
+    sim.observe(lambda event: calls.append(("step", event.attempt.index, event.attempt.status)), KIND.ATTEMPT)
+    sim.advance(0.02)
+    equal(calls, [("frame", 0, (36, 3)), ("step", 0, 0), ("step", 1, 0)])
+
+    @sim.observe
+    def stop(event):
+        return event.kind == KIND.ATTEMPT and event.attempt.index >= 4
+
+    error = raises(drape.Stopped, sim.advance, 0.2)
+    equal((error.status, round(sim.time, 6)), (drape.Status.E_STOPPED, 0.05))
+    sim.unobserve(stop)
+    sim.advance(0.2)
+    straight = drape.Sim(sheet())
+    straight.advance(0.2)
+    equal(sim.hash, straight.hash)
+
+
+def test_exceptions():
+    """an exception in an observer, a wind or an event comes out of advance, and the sim goes on as if nothing had happened"""
+    straight = drape.Sim(sheet())
+    straight.advance(0.2)
+
+    class Mine(Exception):
+        pass
+
+    def fail(*_):
+        raise Mine("from inside")
+
+    sim = drape.Sim(sheet())
+    sim.observe(fail, KIND.FRAME)
+    error = raises(Mine, sim.advance, 0.2, says="from inside")
+    assert any(frame.name == "fail" for frame in __import__("traceback").extract_tb(error.__traceback__))
+    sim.unobserve(fail)
+    sim.advance(0.2)
+    equal(sim.hash, straight.hash)
+    sim = drape.Sim(sheet())
+    sim.advance(0.04)
+    before = sim.hash
+    sim.set_wind(fail)
+    raises(Mine, sim.advance, 0.2)
+    raises(Mine, lambda: sim.reactions)  # forces need the wind, too
+    sim.set_wind(None)
+    equal(sim.hash, before)
+    sim.advance(0.2)  # with other steps, as after any rejected attempt
+    assert abs(sim.positions - straight.positions).max() < 0.05
+    for integrator in ("verlet", "ida", "newton_k", "radau"):
+        other = drape.Sim(sheet(), integrator=integrator)
+        other.set_wind(fail)
+        raises(Mine, other.advance, 0.2)
+        equal(other.time, 0)
+        other.set_wind(None)
+        other.advance(0.05)
+    other = drape.Sim(sheet())
+    other.add_event("mine", fail)
+    raises(Mine, other.advance, 0.2)
+    equal(other.time, 0)
+
+
+def test_inside_callbacks():
+    """an observer may read and save, but not advance, change or close the sim"""
+    sim, found = drape.Sim(sheet()), []
+
+    def observe(event):
+        if event.kind == KIND.FRAME and event.frame == 2:
+            found.append((sim.energy, sim.reactions, sim.checkpoint()))
+            for call in (lambda: sim.advance(1), sim.close, lambda: sim.pin([5]), lambda: list(sim.frames(1)), lambda: sim.push(None)):
+                raises(drape.ArgumentError, call)
+
+    sim.observe(observe)
+    sim.advance(0.2)
+    equal(len(found), 1)
+    other = drape.Sim(sheet())
+    other.restore_checkpoint(found[0][2])
+    other.advance(0.2)
+    equal(other.hash, sim.hash)
+
+
+def test_threads():
+    """sims of one model run in threads, the interpreter is free meanwhile, and a sim that is in use is waited for"""
+    model = drape.Model(sheet())
+    sims = [drape.Sim(model) for _ in range(4)]
+    threads = [threading.Thread(target=sim.advance, args=(0.2,)) for sim in sims + sims]  # each of them twice
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    equal(len({sim.hash for sim in sims}), 1)
+    sim, running = drape.Sim(model), threading.Event()
+    sim.observe(lambda event: running.set())
+    outcome = []
+
+    def forever():
+        try:
+            sim.advance(1e6)
+        except drape.Stopped as error:
+            outcome.append(error.status)
+
+    thread = threading.Thread(target=forever)
+    thread.start()
+    running.wait()  # this thread runs while the other one advances
+    sim.cancel()
+    thread.join()
+    equal(outcome, [drape.Status.E_STOPPED])
+
+
+def test_interrupt():
+    """Ctrl-C ends an advance with KeyboardInterrupt; the sim goes on afterwards, and the handler is as before"""
+    before, sim = signal.getsignal(signal.SIGINT), drape.Sim(sheet())
+    sim.observe(lambda event: os.kill(os.getpid(), signal.SIGINT) if event.kind == KIND.ATTEMPT and event.attempt.index == 5 else None)
+    raises(KeyboardInterrupt, sim.advance, 0.2)
+    assert signal.getsignal(signal.SIGINT) is before and sim.time < 0.1
+    sim.advance(0.2)
+    straight = drape.Sim(sheet())
+    straight.advance(0.2)
+    equal(sim.hash, straight.hash)
+
+
+def test_saving():
+    """a checkpoint continues with the same bits, from a file and from bytes"""
+    sim = moving()
+    sim.save("checkpoint")
+    data = sim.checkpoint()
+    sim.advance(0.2)
+    for restore, source in (("restore", "checkpoint"), ("restore_checkpoint", data)):
+        other = drape.Sim(sheet())
+        getattr(other, restore)(source)
+        equal(round(other.time, 9), 0.1)
+        other.advance(0.2)
+        equal(other.hash, sim.hash)
+    raises(drape.ParseError, other.restore_checkpoint, data[:50])
+    x, v = sim.positions.copy(), sim.velocities.copy()
+    other = drape.Sim(sheet())
+    other.set_state(0.2, x, v)
+    assert np.array_equal(other.positions, x)
+
+
+# ---- What a host does and reads
+
+def test_reading():
+    """energies, forces, statistics and queries have the shapes and the sums that they must have"""
+    sim = drape.Sim(sheet(duration=2))
+    sim.advance(1.0)
+    energy, statistics = sim.energy, sim.statistics
+    assert energy.kinetic > 0 and energy.dissipated >= 0 and statistics.steps_accepted == 100 and sim.reasons == {}
+    free = ~sim.pinned
+    assert not sim.reactions[free].any() and sim.reactions[~free].any()
+    equal([array.shape for array in (sim.normals, sim.contact_forces, sim.energy_density, sim.strain)], [(36, 3), (36, 3), (36,), (50, 2)])
+    contacts = sim.contacts
+    assert len(contacts) and np.allclose(contacts["force"].sum(0), -sim.collider_force("ball"), atol=1e-12)
+    assert np.allclose(sim.contact_forces.sum(0), -sim.collider_force(0), atol=1e-9)
+    hit = sim.closest([[0.25, -0.12, -0.25]], cloth=False)
+    assert hit["found"][0] and abs(hit["distance"][0] + 0.1) < 1e-12 and hit["collider"][0] == 0
+    ray = sim.cast([[0.25, 1, -0.25]], [0, -1, 0], colliders=False)
+    assert ray["found"][0] and ray["triangle"][0] >= 0 and abs(ray["weights"][0].sum() - 1) < 1e-9
+    equal((sim.inside("ball")[0], sim.intersections(), sim.relaxed, sim.seams, sim.events, sim.untangling), (0, 0, [], [], [], None))
+    equal((sim.model.cloths[0].name, sim.model.collider("ball").type), ("sheet", "sphere"))
+    raises(drape.ArgumentError, sim.collider, "cube", says="ball")
+    report = sim.advance_realtime(1 / 60, 10)
+    assert report.kept and report.level == "full" and report.attempts >= 1
+    equal([w.name for w in drape.Sim(sheet(duration=0.02)).warnings], ["few_steps"])
+
+
+def test_moving():
+    """pins, masses, pushes, drags, colliders and placements do what they say"""
+    sim = moving()
+    sim.pin([35])
+    here = sim.positions[35].copy()
+    sim.move_pins(35, here + [0, 0.1, 0], 0.05)
+    sim.advance(0.2)
+    assert np.allclose(sim.positions[35], here + [0, 0.1, 0], atol=1e-12)
+    sim.unpin([35])
+    sim.set_masses([35], 0.25)
+    equal(sim.masses[35], 0.25)
+    sim.push(np.tile([0, 0.1, 0], (36, 1)))
+    sim.push(None)
+    sim.drag([10, 11], np.zeros((2, 3)), 5.0)
+    assert np.allclose(sim.drag_force, -5 * sim.positions[[10, 11]].sum(0))
+    sim.drag()
+    sim.move_collider("ball", [0, -0.5, 0], 0.05, rotation=[1, 0, 0, 0])
+    sim.advance(0.3)
+    assert np.allclose(sim.collider("ball").displacement, [0, -0.5, 0])
+    equal(sim.collider_rotation()[0].tolist(), [1, 0, 0, 0])
+    sim.attach("ball", [5])
+    equal((sim.attached(5), sim.attached(6)), (0, -1))
+    sim.detach([5])
+    x = sim.positions.copy()
+    sim.place(translate=[1, 0, 0], rotate=[0, 1, 0, 90], stop=True)
+    assert np.allclose(sim.positions, x @ np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]]) + [1, 0, 0], atol=1e-12) and not sim.velocities.any()
+    sim.change(sheet(gravity=[0, 0, 0], colliders=[]))
+    equal(sim.model.collider_count, 0)
+    assert sim.untangle().clear
+
+
+def test_wind():
+    """a wind from Python is the wind of a term, and a gradient of zero is none"""
+    wind = np.array([0.5, 1.0, -2.0])
+    steady = sheet(terms=["stretch.edge", {"type": "drag.wind", "wind": wind.tolist()}])
+    scenes = (steady, None), (sheet(terms=["stretch.edge", "drag.wind"]), wind), (sheet(terms=["stretch.edge", "drag.wind"]), (np.tile(wind, (36, 1)), np.zeros((3, 3))))
+    states = []
+    for scene, air in scenes:
+        sim = drape.Sim(scene)
+        if air is not None:
+            sim.set_wind(lambda t, x, air=air: air)
+        sim.advance(0.1)
+        states.append(sim.positions)
+    assert np.array_equal(states[1], states[2])
+    assert abs(states[0] - states[1]).max() < 1e-14  # the two winds are added in another order: some roundings of numbers below 1, over ten steps
+
+
+def test_events():
+    """events of the scene and of Python are located, and stop a run"""
+    scene = drape.Scene(sheet())
+    scene["/events"] = [{"type": "height", "of": "lowest", "height": -0.02, "name": "low", "action": "stop"}]
+    sim = drape.Sim(scene)
+    sim.add_event("mine", lambda t, x, v: x[:, 1].min() + 0.01)
+    seen = []
+    sim.observe(lambda event: seen.append(event.name), KIND.ROOT)
+    record = sim.advance(0.2)
+    equal((record.name, seen), ("low", ["mine", "low"]))
+    assert abs(sim.positions[:, 1].min() + 0.02) < 1e-9 and sim.time == record.last
+    assert sim.events[1].name == "mine" and sim.events[1].count == 1 and sim.events[1].first < record.first
+    equal(sim.advance(0.2), None)
+
+
+def test_embedding():
+    """a render mesh is carried by the cloth"""
+    model = drape.Model(sheet())
+    vertices = model.rest_positions.astype(np.float32)
+    embedding = drape.Embedding(model, vertices, model.normals(model.rest_positions))
+    sim = drape.Sim(model)
+    sim.advance(0.1)
+    x, normals = embedding.carry(sim.positions)
+    assert np.allclose(x, sim.positions, atol=1e-6) and np.allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-5)
+    assert all(result.pass_ for result in model.check_derivatives())
+
+
+def test_terms():
+    """an energy in Python moves the cloth as the same energy of the library does; its derivatives are checked; its exceptions come out"""
+    def springs(cloth):
+        a, b = cloth.rest[cloth.edges[:, 0]], cloth.rest[cloth.edges[:, 1]]
+        return cloth.edges, np.linalg.norm(b - a, axis=1)[:, None]
+
+    def energy(x, rest):  # k/2 (l - L)^2 of every edge
+        k, d = 20.0, x[:, 1] - x[:, 0]
+        length = np.linalg.norm(d, axis=1)
+        u, s = d / length[:, None], length - rest[:, 0]
+        outer = u[:, :, None] * u[:, None, :]
+        block = k * (outer + (s / length)[:, None, None] * (np.eye(3) - outer))
+        force = (k * s)[:, None] * u
+        return k / 2 * s * s, np.stack([-force, force], 1), np.block([[block, -block], [-block, block]])
+
+    scene = sheet(terms=["my.springs"])
+    model = drape.Model(scene, terms=[drape.Term("my.springs", 2, springs, energy, element_name="edge")])
+    results = model.check_derivatives()
+    assert len(results) >= 2 and all(result.pass_ for result in results), results
+    sim, same = drape.Sim(model), drape.Sim(sheet(terms=[{"type": "spring.structural", "stiffness": 20.0}], mesh=model.mesh(0), pins=[{"nodes": [0, 5]}]))
+    sim.advance(0.1)
+    same.advance(0.1)
+    # Both solve each step to a residual of some 1e-6 N, for nodes of 1e-3 kg: 1e-6 * h^2 / m = 1e-7 m a step, 10 steps.
+    assert abs(sim.positions - same.positions).max() < 1e-5, abs(sim.positions - same.positions).max()
+
+    class Mine(Exception):
+        pass
+
+    def fail(*_):
+        raise Mine("from a term")
+
+    raises(Mine, drape.Model, scene, terms=[drape.Term("my.springs", 2, fail, energy)])
+    raises(drape.ArgumentError, drape.Model, scene, terms=[drape.Term("my.springs", 2, lambda cloth: cloth.triangles, energy)], says="n x 2")
+    broken = drape.Term("my.springs", 2, springs, energy)
+    sim = drape.Sim(drape.Model(scene, terms=[broken]))
+    sim.advance(0.05)
+    broken.energy = fail
+    raises(Mine, sim.advance, 0.1)
+    broken.energy = energy
+    sim.advance(0.1)
+
+
+if __name__ == "__main__":
+    sys.exit(run_tests(globals()))
