@@ -220,11 +220,19 @@ static void stop_pinned(drape_model *model)
 
 drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape_model **out)
 {
-    static drape_status (*const stages[])(drape_model *, const drape_scene_def *) = {
-        copy_scene,           compile_cloths,        drape_compile_pins,
-        drape_compile_events, drape_compile_contact, drape_compile_colliders,
-        drape_compile_rides,  drape_compile_ignored, drape_compile_contact_stiffness,
-        drape_compile_seams,  drape_compile_terms};
+    static drape_status (*const stages[])(drape_model *,
+                                          const drape_scene_def *) = {copy_scene,
+                                                                      compile_cloths,
+                                                                      drape_compile_start,
+                                                                      drape_compile_pins,
+                                                                      drape_compile_events,
+                                                                      drape_compile_contact,
+                                                                      drape_compile_colliders,
+                                                                      drape_compile_rides,
+                                                                      drape_compile_ignored,
+                                                                      drape_compile_contact_stiffness,
+                                                                      drape_compile_seams,
+                                                                      drape_compile_terms};
     *out = NULL;
     drape_model *model = drape_alloc(ctx, 1, sizeof *model);
     if (!model)

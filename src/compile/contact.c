@@ -140,8 +140,8 @@ static double collider_speed(const drape_collider *collider)
 static double scene_speed(const drape_model *model)
 {
     double cloth = 0, collider = 0;
-    for (int32_t c = 0; c < model->cloth_count; c++)
-        cloth = fmax(cloth, norm(model->cloths[c].velocity));
+    for (size_t i = 0; i < (size_t)model->node_count; i++)
+        cloth = fmax(cloth, norm(model->velocity + 3 * i));
     for (int32_t t = 0; t < model->track_count; t++)
         cloth = fmax(cloth, track_speed(&model->tracks[t]));
     for (int32_t c = 0; c < model->collider_count; c++)

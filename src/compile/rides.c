@@ -52,12 +52,12 @@ static drape_status check_triangle(const drape_model *model, const char *pointer
                          collider->name, (int)collider->shape.triangle_count - 1);
 }
 
-/* The nodes of a pin begin where they are at rest. */
+/* The nodes of a pin begin where the cloth starts. */
 static void attach(drape_model *model, const drape_motion *motion, const drape_pin *pin, int32_t collider,
                    int32_t triangle)
 {
     for (int32_t i = 0; i < pin->node_count; i++) {
-        const double *x = model->rest + 3 * (size_t)pin->node[i];
+        const double *x = model->start + 3 * (size_t)pin->node[i];
         const int32_t on = triangle >= 0 ? triangle : drape_deformed_nearest(motion, collider, 0, x);
         drape_motion_ride_from(motion, collider, on, 0, x, &model->ride[pin->node[i]]);
     }

@@ -128,7 +128,7 @@ void drape_model_place_pins(const drape_model *model, double t, double *x)
         double displacement[3];
         drape_track_displacement(track->keys, track->key_count, t, displacement);
         for (int k = 0; k < 3; k++)
-            x[at + k] = model->rest[at + k] + displacement[k];
+            x[at + k] = model->start[at + k] + displacement[k];
     }
 }
 

@@ -276,6 +276,7 @@ struct drape_model {
     drape_cloth *cloths;
     drape_term *terms;     /* (term_count) in scene order, gravity last in each cloth; then those of seams */
     double *rest;          /* (node_count x 3) [m] */
+    double *start;         /* (node_count x 3) [m] at t = 0; rest itself if all cloths start there */
     double *velocity;      /* (node_count x 3) [m/s] at t = 0 */
     double *mass;          /* (node_count) [kg] */
     int32_t *triangle;     /* (triangle_count x 3) */

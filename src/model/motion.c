@@ -136,7 +136,7 @@ typedef struct course {
     const drape_turn_path *turn; /* of a collider; NULL: of a pin, which does not turn */
     const drape_turns *turns;
     const drape_placement *placed;
-    const double *rest; /* of a pin; NULL: displacements are asked for */
+    const double *start; /* of a pin; NULL: displacements are asked for */
 } course;
 
 static void pose_without_rates(const drape_motion *motion, int32_t collider, double t,
@@ -191,8 +191,8 @@ static void position_on(const course *c, double t, double x[3])
     memset(x, 0, 3 * sizeof *x);
     if (c->track && c->track->key_count > 0)
         drape_track_displacement(c->track->keys, c->track->key_count, t, x);
-    for (int k = 0; c->rest && k < 3; k++)
-        x[k] = c->rest[k] + x[k];
+    for (int k = 0; c->start && k < 3; k++)
+        x[k] = c->start[k] + x[k];
     if (c->placed->given)
         drape_placement_move(c->placed, x, x);
 }
@@ -371,7 +371,7 @@ static course pin_course(const drape_motion *motion, int32_t i)
                     .track = motion->moved_track[i] >= 0 ? &m->tracks[motion->moved_track[i]] : NULL,
                     .path = &motion->pin_path[i],
                     .placed = &motion->cloth_placed[drape_model_cloth_of(m, node)],
-                    .rest = m->rest + 3 * (size_t)node};
+                    .start = m->start + 3 * (size_t)node};
 }
 
 void drape_motion_place_pins(const drape_motion *motion, double t, double *x)
@@ -387,7 +387,7 @@ void drape_motion_place_fixed(const drape_motion *motion, int32_t node, double x
     const drape_path none = {.given = false};
     const course c = {.path = &none,
                       .placed = &motion->cloth_placed[drape_model_cloth_of(motion->model, node)],
-                      .rest = motion->model->rest + 3 * (size_t)node};
+                      .start = motion->model->start + 3 * (size_t)node};
     position_on(&c, 0, x);
 }
 

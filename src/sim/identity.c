@@ -137,6 +137,7 @@ static uint64_t add_nodes(uint64_t hash, const drape_model *m)
 {
     size_t nodes = (size_t)m->node_count;
     hash = add_doubles(hash, m->rest, 3 * nodes);
+    hash = add_doubles(hash, m->start, m->start == m->rest ? 0 : 3 * nodes);
     hash = add_doubles(hash, m->velocity, 3 * nodes);
     hash = add_doubles(hash, m->mass, nodes);
     hash = add(hash, m->triangle, 3 * (size_t)m->triangle_count * sizeof *m->triangle);
