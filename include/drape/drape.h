@@ -180,6 +180,11 @@ typedef struct drape_pin_def {
                            start, as by drape_sim_attach at t = 0; not with a track. NULL: none */
     int32_t triangle;   /* of a collider that deforms: the triangle that carries them, in the order of its
                            file, from 0; -1: for each node the nearest one at t = 0 */
+    double normal[3];   /* the nodes are held along this direction only: each stays in the plane across it
+                           through its start, as on rollers or in a symmetry plane; not with a track or
+                           attach. Default NaN: none */
+    double axis[3]; /* the nodes are held across this direction: each stays on a line along it, as on a rail;
+                           not with a normal. Default NaN: none */
 } drape_pin_def;
 
 /* Nodes of one cloth with masses of their own: a weight in a hem, a button, a fabric of varying weight.

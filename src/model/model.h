@@ -212,7 +212,15 @@ typedef struct drape_pin {
     int32_t *node; /* (node_count) ascending node numbers of the model */
     int32_t node_count;
     bool clamps;
+    bool slides; /* it holds them in some directions only */
 } drape_pin;
+
+/* A node that pins hold in some directions only (model/support.h). */
+typedef struct drape_support {
+    int32_t node;
+    int count;              /* 1 or 2 directions */
+    double direction[2][3]; /* of length 1, at right angles */
+} drape_support;
 
 /* Where a pin is on the collider that carries it, in that collider's own coordinates. */
 typedef struct drape_ride {
@@ -289,6 +297,9 @@ struct drape_model {
     int32_t *moved_node;  /* (moved_count) pinned nodes with a track or a ride */
     int32_t *moved_track; /* (moved_count) */
     int32_t moved_count, track_count;
+    drape_support
+        *supports; /* (support_count) ascending nodes; those that are pinned altogether do not count */
+    int32_t support_count;
     drape_track *tracks;       /* of a pin that a collider carries, without keys */
     drape_ride *ride;          /* (node_count) of pins that colliders carry; NULL: no pin of the scene */
     drape_collider *colliders; /* (collider_count) */

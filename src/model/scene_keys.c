@@ -58,6 +58,13 @@ static const drape_scene_key pin_keys[] = {
     {DRAPE_BOOLEAN("clamp", false,
                    "edges between these nodes keep the direction of the sheet across them; for bend.midedge"),
      IN(drape_pin_def, clamp)},
+    {DRAPE_VECTOR("normal", "1", DRAPE_DERIVED("none: held in all directions"), LOWEST, HIGHEST,
+                  "the only direction in which the nodes are held: each stays in the plane across it, as on "
+                  "rollers or in a symmetry plane"),
+     IN(drape_pin_def, normal)},
+    {DRAPE_VECTOR("axis", "1", DRAPE_DERIVED("none: held in all directions"), LOWEST, HIGHEST,
+                  "the only direction in which the nodes are free: each stays on a line, as on a rail"),
+     IN(drape_pin_def, axis)},
 };
 static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
 

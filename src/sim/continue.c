@@ -108,6 +108,7 @@ static drape_status hold(drape_sim *to, const drape_sim *from)
         else
             drape_motion_hold_pin(motion, i, x);
     }
+    drape_system_project(to->system, state->v);
     return status;
 }
 

@@ -145,6 +145,11 @@ static uint64_t add_nodes(uint64_t hash, const drape_model *m)
     hash = add(hash, m->pinned, nodes);
     hash = add(hash, m->moved_node, (size_t)m->moved_count * sizeof *m->moved_node);
     hash = add(hash, m->moved_track, (size_t)m->moved_count * sizeof *m->moved_track);
+    for (int32_t i = 0; i < m->support_count; i++) {
+        const int64_t held[] = {m->supports[i].node, m->supports[i].count};
+        hash = add(hash, held, sizeof held);
+        hash = add_doubles(hash, m->supports[i].direction[0], 6);
+    }
     for (size_t i = 0; m->ride && i < nodes; i++) {
         const int64_t on[] = {m->ride[i].collider, m->ride[i].triangle};
         hash = add(hash, on, sizeof on);
