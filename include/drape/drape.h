@@ -185,6 +185,10 @@ typedef struct drape_pin_def {
                            attach. Default NaN: none */
     double axis[3]; /* the nodes are held across this direction: each stays on a line along it, as on a rail;
                            not with a normal. Default NaN: none */
+    const drape_turn_key *turns; /* the nodes turn about the pivot as one rigid body, and the track displaces
+                                    them from there; not with attach or clamp. NULL: they do not turn */
+    size_t turn_count;           /* length of turns */
+    double pivot[3]; /* [m] at the start; default NaN: the mean of the positions at which the nodes start */
 } drape_pin_def;
 
 /* Nodes of one cloth with masses of their own: a weight in a hem, a button, a fabric of varying weight.

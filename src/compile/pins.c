@@ -118,10 +118,10 @@ static drape_status find_directions(pin_place *pin)
     pin->count = normal ? 1 : line ? 2 : 0;
     if (normal && line)
         return refuse(pin, "/axis", "a pin has a normal or an axis, not both");
-    if (pin->count > 0 && (def->key_count > 0 || def->attach))
+    if (pin->count > 0 && (def->key_count > 0 || def->turn_count > 0 || def->attach))
         return refuse(pin, normal ? "/normal" : "/axis",
-                      "a pin that holds its nodes in some directions only has no track and no collider "
-                      "that carries it");
+                      "a pin that holds its nodes in some directions only does not move: it has no "
+                      "track, turns or attach");
     if ((normal && vec3_norm(n) == 0) || (line && vec3_norm(axis) == 0))
         return refuse(pin, normal ? "/normal" : "/axis", "0 0 0 has no direction");
     if (!line)
@@ -143,13 +143,37 @@ static drape_status keep_track(pin_place *pin)
     pin->track = -1;
     if (pin->def->attach && pin->def->key_count > 0)
         return refuse(pin, "/attach", "a pin is carried by a collider or moves along a track, not both");
+    if (pin->def->turn_count > 0 && pin->def->attach)
+        return refuse(pin, "/turns", "a pin is carried by a collider or turns about a pivot, not both");
+    if (pin->def->turn_count > 0 && pin->def->clamp)
+        return refuse(pin, "/clamp",
+                      "a clamped edge keeps its direction in space; to turn it, pin two "
+                      "rows of nodes");
     if (pin->def->attach)
         pin->track = model->track_count++; /* without keys: drape_compile_rides has its motion */
-    if (pin->def->key_count == 0)
+    if (pin->def->key_count == 0 && pin->def->turn_count == 0)
         return DRAPE_OK;
     pin->track = model->track_count++;
-    return drape_compile_track(model, pin->pointer, pin->def->track, pin->def->key_count,
-                               &model->tracks[pin->track]);
+    drape_track *to = &model->tracks[pin->track];
+    drape_status status = DRAPE_OK;
+    if (pin->def->key_count > 0)
+        status = drape_compile_track(model, pin->pointer, pin->def->track, pin->def->key_count, to);
+    if (!status && pin->def->turn_count > 0)
+        status = drape_compile_turns(model, pin->pointer, pin->def->turns, pin->def->turn_count, &to->turns);
+    return status;
+}
+
+/* The point about which the nodes of a pin turn. */
+static void find_pivot(const pin_place *pin, const drape_pin *nodes)
+{
+    drape_track *track = pin->track >= 0 ? &pin->model->tracks[pin->track] : NULL;
+    if (!track)
+        return;
+    for (int32_t i = 0; i < nodes->node_count; i++)
+        vec3_add_scaled(1.0 / nodes->node_count, pin->model->start + 3 * (size_t)nodes->node[i],
+                        track->pivot);
+    if (!isnan(pin->def->pivot[0]))
+        memcpy(track->pivot, pin->def->pivot, sizeof track->pivot);
 }
 
 /* The name is unique among the pins of the cloth, of which this is number p. */
@@ -203,6 +227,8 @@ static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, in
             status = take_selection(pin);
         if (!status)
             status = list_nodes(pin, to);
+        if (!status)
+            find_pivot(pin, to);
     }
     return status;
 }

@@ -137,11 +137,6 @@ typedef struct drape_cloth {
     int law_count;
 } drape_cloth;
 
-typedef struct drape_track {
-    drape_track_key *keys;
-    size_t key_count;
-} drape_track;
-
 /* A key of a rotation: from here to the next key it turns steadily, about one axis. */
 typedef struct drape_turn {
     double time;        /* [s] */
@@ -154,6 +149,13 @@ typedef struct drape_turns {
     drape_turn *keys;
     size_t key_count;
 } drape_turns;
+
+typedef struct drape_track {
+    drape_track_key *keys;
+    size_t key_count;
+    drape_turns turns; /* of pins, about the pivot; of a collider it is a member of that */
+    double pivot[3];   /* [m] at the start */
+} drape_track;
 
 /* One obstacle. */
 typedef struct drape_collider {
@@ -300,7 +302,7 @@ struct drape_model {
     drape_support
         *supports; /* (support_count) ascending nodes; those that are pinned altogether do not count */
     int32_t support_count;
-    drape_track *tracks;       /* of a pin that a collider carries, without keys */
+    drape_track *tracks;       /* of a pin that a collider carries, without keys and turns */
     drape_ride *ride;          /* (node_count) of pins that colliders carry; NULL: no pin of the scene */
     drape_collider *colliders; /* (collider_count) */
     int32_t collider_count;

@@ -65,6 +65,12 @@ static const drape_scene_key pin_keys[] = {
     {DRAPE_VECTOR("axis", "1", DRAPE_DERIVED("none: held in all directions"), LOWEST, HIGHEST,
                   "the only direction in which the nodes are free: each stays on a line, as on a rail"),
      IN(drape_pin_def, axis)},
+    {SHAPED(DRAPE_SCENE_OBJECTS, "turns", DRAPE_DERIVED("none: they do not turn"),
+            "rotation of the nodes as one body about the pivot, steady between the times"),
+     ARRAY(drape_pin_def, turns, turn_count), .at_least = 1, .child = &drape_form_turn},
+    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the mean of the nodes"), LOWEST, HIGHEST,
+                  "the point about which they turn, at the start; the track displaces it"),
+     IN(drape_pin_def, pivot)},
 };
 static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
 

@@ -48,6 +48,19 @@ static uint64_t add_text(uint64_t hash, const char *text)
     return add(hash, text, strlen(text) + 1);
 }
 
+static uint64_t add_turns(uint64_t hash, const drape_turns *turns)
+{
+    hash = add_integer(hash, (int64_t)turns->key_count);
+    for (size_t k = 0; k < turns->key_count; k++) {
+        const drape_turn *turn = &turns->keys[k];
+        hash = add_doubles(hash, &turn->time, 1);
+        hash = add_doubles(hash, turn->rotation, 9);
+        hash = add_doubles(hash, turn->axis, 3);
+        hash = add_doubles(hash, &turn->degrees, 1);
+    }
+    return hash;
+}
+
 static uint64_t add_track(uint64_t hash, const drape_track *track)
 {
     hash = add_integer(hash, (int64_t)track->key_count);
@@ -55,6 +68,8 @@ static uint64_t add_track(uint64_t hash, const drape_track *track)
         hash = add_doubles(hash, &track->keys[k].time, 1);
         hash = add_doubles(hash, track->keys[k].displacement, 3);
     }
+    if (track->turns.key_count > 0)
+        hash = add_doubles(add_turns(hash, &track->turns), track->pivot, 3);
     return hash;
 }
 
@@ -100,14 +115,7 @@ static uint64_t add_collider(uint64_t hash, const drape_collider *collider)
     hash = add_doubles(hash, &collider->friction, 1);
     hash = add_doubles(hash, &collider->restitution, 1);
     hash = add_track(hash, &collider->track);
-    hash = add_integer(hash, (int64_t)collider->turns.key_count);
-    for (size_t k = 0; k < collider->turns.key_count; k++) {
-        const drape_turn *turn = &collider->turns.keys[k];
-        hash = add_doubles(hash, &turn->time, 1);
-        hash = add_doubles(hash, turn->rotation, 9);
-        hash = add_doubles(hash, turn->axis, 3);
-        hash = add_doubles(hash, &turn->degrees, 1);
-    }
+    hash = add_turns(hash, &collider->turns);
     return add_doubles(hash, collider->pivot, 3);
 }
 

@@ -82,6 +82,14 @@ static const struct test_case {
     {"/cloth/0/start/folds/0/side", SKIPPED, NULL, NULL}, /* with the others of a fold: the positions count */
     {"/cloth/0/start/folds/0/angle", SKIPPED, NULL, NULL},
     {"/cloth/0/start/folds/0/radius", SKIPPED, NULL, NULL},
+    {"/cloth/0/pins/0/turns/0/time", REFUSED, "/cloth/0/pins/1/turns",
+     "[{'time': 0, 'rotate': [0,1,0,0]}, {'time': 1, 'rotate': [0,1,0,90]}]"},
+    {"/cloth/0/pins/0/turns/0/rotate", REFUSED, "/cloth/0/pins/1/turns",
+     "[{'time': 0, 'rotate': [0,1,0,30]}]"},
+    {"/cloth/0/pins/0/turns/0/quaternion", REFUSED, "/cloth/0/pins/1/turns",
+     "[{'time': 0, 'quaternion': [1,0,1,0]}]"},
+    {"/cloth/0/pins/0/pivot", REFUSED, "/cloth/0/pins/1",
+     "{'nodes': [0], 'pivot': [1,0,0], 'turns': [{'time': 0, 'rotate': [0,1,0,30]}]}"},
     {"/cloth/0/pins/0/normal", REFUSED, "/cloth/0/pins/1", "{'nodes': [0], 'normal': [0, 1, 0]}"},
     {"/cloth/0/pins/0/axis", REFUSED, "/cloth/0/pins/1", "{'nodes': [0], 'axis': [0, 1, 0]}"},
     {"/cloth/0/masses/0/nodes", SKIPPED, NULL, NULL}, /* as for pins: the masses count */

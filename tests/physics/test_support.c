@@ -1,4 +1,5 @@
-/* test_support.c: pins that hold nodes in some directions only, under every integrator. */
+/* test_support.c: pins that hold nodes in some directions only, and pins that turn, under every integrator.
+ * */
 #include "integrators/integrator.h"
 #include "support/scene.h"
 
@@ -246,6 +247,74 @@ START_TEST(states_and_placements_of_a_host)
 }
 END_TEST
 
+/* ---- Pins that turn ---- */
+
+/* Both ends of a strip turn about the axis of the strip by 90 degrees in opposite senses, and one is drawn
+ * away: at every time the nodes are where the rotation by 90 t degrees and the displacement take them, by
+ * every method. */
+START_TEST(pins_turn_as_one_body_about_their_pivot)
+{
+    for (int m = 0; drape_integrators[m]; m++) {
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 3, 'width': 0.4, "
+            "'height': 0.2,"
+            "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, "
+            "'areal_density': 0.2},"
+            "'terms': ['stretch.cst', 'bend.hinge'], 'start': {'transform': {'translate': [0, 1, 0]}}, "
+            "'pins': ["
+            "{'edge': 'left', 'turns': [{'time': 0, 'rotate': [1, 0, 0, 0]}, {'time': 1, 'rotate': [1, 0, 0, "
+            "90]}]},"
+            "{'edge': 'right', 'pivot': [0.4, 1.1, 0], 'track': [[0, [0, 0, 0]], [1, [0.1, 0, 0]]],"
+            " 'turns': [{'time': 0, 'rotate': [1, 0, 0, 0]}, {'time': 1, 'rotate': [1, 0, 0, -90]}]}]}],"
+            "'integrator': {'method': '%s', 'dt': 0.01}, 'controller': {'type': '%s'}, 'duration': 1}",
+            drape_integrators[m]->entry.name, controller(drape_integrators[m]->entry.name));
+        const double middle = s.model->rest[3 * 5 + 2]; /* z of the middle row */
+        scene_advance(&s, 0.2);
+        for (int32_t i = 0; i < 15; i++) {
+            const double *x = scene_state(&s)->x + 3 * i, *rest = s.model->rest + 3 * i;
+            const bool left = i % 5 == 0, right = i % 5 == 4;
+            const double angle = (left ? 18 : -18) * acos(-1) / 180, y = left ? 0 : -0.1,
+                         z = left ? rest[2] - middle : rest[2];
+            const double to[3] = {rest[0] + (right ? 0.02 : 0),
+                                  (left ? 1 : 1.1) + cos(angle) * y - sin(angle) * z,
+                                  (left ? middle : 0) + sin(angle) * y + cos(angle) * z};
+            for (int k = 0; (left || right) && k < 3; k++)
+                ck_assert_msg(fabs(x[k] - to[k]) < 1e-14,
+                              "%s: node %d: "
+                              "%g",
+                              drape_integrators[m]->entry.name, (int)i, x[k] - to[k]);
+        }
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* A sheet whose edge has turned by a right angle is at equilibrium where the whole has turned with it: no
+ * energy and no reaction are left, to the residual of 1e-8 N. */
+START_TEST(a_sheet_follows_its_turned_edge)
+{
+    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 3, "
+                         "'width': 0.3, 'height': 0.2,"
+                         "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': "
+                         "1e-2, 'areal_density': 0.2},"
+                         "'terms': ['stretch.cst', 'bend.hinge'], 'pins': [{'box': [[-1, -1, -1], [0.11, "
+                         "1, 1]], 'pivot': [0, 0, 0],"
+                         "'turns': [{'time': 0, 'rotate': [0, 0, 1, 0]}, {'time': 1, 'rotate': [0, 0, 1, "
+                         "90]}]}]}], 'gravity': "
+                         "[0, 0, 0],"
+                         "'integrator': {'method': 'static', 'dt': 0.1, 'tolerance': 1e-10}, 'duration': 1}");
+    scene_advance(&s, 1);
+    for (int32_t i = 0; i < 12; i++) {
+        const double *x = scene_state(&s)->x + 3 * i, *rest = s.model->rest + 3 * i,
+                     to[3] = {-rest[1], rest[0], rest[2]};
+        for (int k = 0; k < 3; k++)
+            ck_assert_double_eq_tol(x[k], to[k], 1e-6);
+    }
+    scene_close(&s);
+}
+END_TEST
+
 SUITE("support", a_rail_leaves_its_direction_free, half_with_a_plane_of_symmetry_moves_as_the_whole,
       nodes_stay_in_an_inclined_plane, supports_combine_and_carry_the_weight,
-      the_jacobian_is_that_of_the_projected_forces, states_and_placements_of_a_host)
+      the_jacobian_is_that_of_the_projected_forces, states_and_placements_of_a_host,
+      pins_turn_as_one_body_about_their_pivot, a_sheet_follows_its_turned_edge)
