@@ -103,8 +103,8 @@ DRAPE_API const char *drape_context_message(const drape_context *ctx);
 /* ---- Scene in memory: structs that a host fills instead of writing a scene file ---- */
 
 /* Defs in this section begin with struct_size, set by their _init function; all defs of one array have the
- * same size. drape_setting, drape_entry_def, drape_track_key and drape_turn_key have no struct_size:
- * their layout is fixed. */
+ * same size. drape_setting, drape_entry_def, drape_track_key, drape_turn_key and drape_fold_def have no
+ * struct_size: their layout is fixed. */
 
 /* One parameter, given by name. Numbers and integers go into number, with text and vector NULL; choices and
  * file names go into text; booleans go into text as "true" or "false", or into number as 0 or 1; vectors go
@@ -140,9 +140,9 @@ typedef struct drape_mesh_def {
     void *reserved[4];                 /* must be NULL */
 } drape_mesh_def;
 
-/* A key of a track. A track is the displacement of pinned nodes from their rest positions, or of a collider
- * from the position that its parameters define, as a piecewise linear function of time; it is constant before
- * the first and after the last key. */
+/* A key of a track. A track is the displacement of pinned nodes from where they start, or of a collider
+ * from the position that its parameters define, as a piecewise linear function of time; it is constant
+ * before the first and after the last key. */
 typedef struct drape_track_key {
     double time;            /* [s], strictly increasing from key to key */
     double displacement[3]; /* [m] */
@@ -176,10 +176,19 @@ typedef struct drape_pin_def {
     bool clamp; /* edges between these nodes keep the direction of the sheet across them, for bending terms
                    that support it */
     const char *name;   /* for events, unique among the pins of the cloth; NULL: "pin0", "pin1" ... */
-    const char *attach; /* name of the collider that carries the nodes: they ride on it from where they are
-                           at rest, as by drape_sim_attach at t = 0; not with a track. NULL: none */
+    const char *attach; /* name of the collider that carries the nodes: they ride on it from where they
+                           start, as by drape_sim_attach at t = 0; not with a track. NULL: none */
     int32_t triangle;   /* of a collider that deforms: the triangle that carries them, in the order of its
                            file, from 0; -1: for each node the nearest one at t = 0 */
+    double normal[3];   /* the nodes are held along this direction only: each stays in the plane across it
+                           through its start, as on rollers or in a symmetry plane; not with a track or
+                           attach. Default NaN: none */
+    double axis[3]; /* the nodes are held across this direction: each stays on a line along it, as on a rail;
+                           not with a normal. Default NaN: none */
+    const drape_turn_key *turns; /* the nodes turn about the pivot as one rigid body, and the track displaces
+                                    them from there; not with attach or clamp. NULL: they do not turn */
+    size_t turn_count;           /* length of turns */
+    double pivot[3]; /* [m] at the start; default NaN: the mean of the positions at which the nodes start */
 } drape_pin_def;
 
 /* Nodes of one cloth with masses of their own: a weight in a hem, a button, a fabric of varying weight.
@@ -198,6 +207,42 @@ typedef struct drape_mass_def {
     double mass; /* [kg] of each of these nodes, in place of its mass so far, in (0, 1e12]; NaN: not given */
 } drape_mass_def;
 
+/* A fold of a cloth about a line. Its far side, beyond the line in the direction `side`, turns about the
+ * axis by the angle, which turns `side` about `axis` by the right-hand rule. With a radius the part next to
+ * the line is rolled onto a cylinder that touches the sheet at the line, by its arc length: a plane sheet
+ * is not stretched. */
+typedef struct drape_fold_def {
+    double point[3]; /* [m] on the line */
+    double axis[3];  /* direction of the line, of any length > 0 */
+    double side[3];  /* direction of what is folded over, across the axis; the part along it does not count */
+    double angle;    /* [degrees] in [-360, 360] */
+    double radius;   /* [m] of the cylinder, at the sheet; 0: a sharp fold */
+} drape_fold_def;
+
+/* The shape and motion in which a cloth starts, if it is not at rest; its mesh remains the shape without
+ * stress. Positions come from the rest shape, from a file or from an array, and are then folded, fold after
+ * fold, scaled, rotated and translated. Pinned nodes are held where they start, and tracks displace them from
+ * there. The velocity of a node is that of the cloth, plus that of the spin, plus its own. It is embedded in
+ * drape_cloth_def, so it can grow only into its reserved members. */
+typedef struct drape_start_def {
+    const char *file; /* an OBJ or PLY file with the nodes and triangles of the mesh, in their order; NULL:
+                                    none */
+    const double *positions;     /* (node_count x 3) [m], in place of a file; NULL: none */
+    size_t position_count;       /* numbers in positions, 3 for each node */
+    const drape_fold_def *folds; /* NULL: none */
+    size_t fold_count;           /* length of folds */
+    double scale[3];             /* default 1 1 1; after the folds */
+    double rotate[4];            /* axis x y z and angle [degrees], about the origin; default: no rotation */
+    double translate[3];         /* [m]; default 0; applied last */
+    double spin[3];              /* [rad/s] angular velocity; default 0 */
+    double pivot[3]; /* [m] the point that the spin does not move; default NaN: the centre of mass at the
+                                    start */
+    const char *velocity_file; /* an NPY file, nodes x 3 [m/s]; NULL: none */
+    const double *velocities;  /* (node_count x 3) [m/s], in place of a file; NULL: none */
+    size_t velocity_count;     /* numbers in velocities, 3 for each node */
+    void *reserved[4];         /* must be NULL */
+} drape_start_def;
+
 /* One piece of cloth. */
 typedef struct drape_cloth_def {
     size_t struct_size;  /* set by drape_cloth_def_init */
@@ -215,8 +260,9 @@ typedef struct drape_cloth_def {
         *ignore;         /* names of colliders and cloths that this cloth passes through; its own: itself */
     size_t ignore_count; /* length of ignore */
     const drape_mass_def
-        *masses;       /* applied in this order to the masses that the material gives; NULL: none */
-    size_t mass_count; /* length of masses */
+        *masses;           /* applied in this order to the masses that the material gives; NULL: none */
+    size_t mass_count;     /* length of masses */
+    drape_start_def start; /* in which shape and with which velocities it starts; default: at rest */
 } drape_cloth_def;
 
 /* One side of a seam: nodes of one cloth, in the order in which they are joined. They are selected as

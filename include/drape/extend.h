@@ -373,8 +373,8 @@ typedef struct drape_term_ops {
     void (*commit)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                    const double *before, double *after);
 
-    /* Computes the internal variables at rest, where x are the rest positions. after and before are indexed
-     * by element, like internal. */
+    /* Computes the internal variables at the start, where x are the positions in which the cloth starts, at
+     * rest or not. after and before are indexed by element, like internal. */
     void (*initial)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *after);
 
     /* Looks for an element that became degenerate in a step from before to x. Returns DRAPE_OK, or

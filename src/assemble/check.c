@@ -419,6 +419,7 @@ static double largest_direction_error(checker *c, double step, const drape_point
         double best = INFINITY, shorter = step;
         for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++)
             c->direction[i] = uniform(c);
+        drape_system_project(c->system, c->direction); /* displacements that supports allow */
         for (int k = 0; k < STEPS; k++, shorter *= SHORTER_STEP)
             best = fmin(best, direction_error(c, shorter, *point, of));
         error = fmax(error, best);

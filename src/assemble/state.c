@@ -14,13 +14,13 @@ drape_status drape_state_create(drape_arena *arena, const drape_model *model, dr
     state->internal = drape_arena_take(arena, (size_t)model->internal_count, sizeof *state->internal);
     if (!state->x || !state->v || !state->internal)
         return DRAPE_E_MEMORY;
-    memcpy(state->x, model->rest, n * sizeof *state->x);
+    memcpy(state->x, model->start, n * sizeof *state->x);
     memcpy(state->v, model->velocity, n * sizeof *state->v);
     drape_model_place_pins(model, 0, state->x);
     for (int32_t i = 0; i < model->term_count; i++) {
         const drape_term *term = &model->terms[i];
         if (term->ops->initial)
-            term->ops->initial(&term->elements, 0, drape_term_pieces(term).count, model->rest,
+            term->ops->initial(&term->elements, 0, drape_term_pieces(term).count, model->start,
                                state->internal + term->first_internal);
     }
     return DRAPE_OK;

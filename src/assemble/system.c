@@ -4,6 +4,7 @@
 #include "assemble/sum.h"
 #include "base/clock.h"
 #include "base/finite.h"
+#include "model/support.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -386,8 +387,8 @@ void drape_system_force(drape_system *system, const drape_point *point, double *
     drape_system_force_without(system, point, NULL, g);
 }
 
-void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
-                                double *g)
+/* The forces, also along the directions in which supports hold nodes. */
+static void add_up(drape_system *system, const drape_point *point, const bool *without, double *g)
 {
     drape_request want = {.point = point, .conservative = true, .dissipative = true, .without = without};
     drape_system_cancelled(system);
@@ -396,6 +397,34 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
     drape_system_add_loads(system, point->x, g);
     if (evaluate_contact(system, point))
         drape_contact_add_forces(system->contact, true, true, g);
+}
+
+void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
+                                double *g)
+{
+    add_up(system, point, without, g);
+    drape_supports_project(system->motion, g);
+}
+
+void drape_system_reactions(drape_system *system, const drape_point *point, double *g)
+{
+    add_up(system, point, NULL, g);
+    drape_supports_keep_reactions(system->motion, g);
+}
+
+void drape_system_project(const drape_system *system, double *nodes)
+{
+    drape_supports_project(system->motion, nodes);
+}
+
+void drape_system_project_free(const drape_system *system, double *free_nodes)
+{
+    drape_supports_project_free(system->motion, free_nodes);
+}
+
+void drape_system_project_matrix(const drape_system *system, double *values)
+{
+    drape_supports_project_matrix(system->motion, system->pattern, values);
 }
 
 void drape_system_dissipation(drape_system *system, const drape_point *point, double *g)
@@ -450,6 +479,7 @@ void drape_system_jacobian_without(drape_system *system, const drape_point *poin
                                    system->pattern, values);
     drape_drag_springs_add_hessian(&system->drag, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
+    drape_system_project_matrix(system, values);
 }
 
 void drape_system_predict_contact(drape_system *system, const double *p, double weight, double mass_weight)
@@ -468,6 +498,7 @@ void drape_system_symmetrize(drape_system *system, const drape_point *point, dou
     if (evaluate_contact(system, point))
         drape_contact_fix_friction(system->contact, point->weight, system->pattern, values);
     drape_pattern_symmetrize(system->pattern, values);
+    drape_system_project_matrix(system, values);
 }
 
 void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *point, double *h)
@@ -512,6 +543,7 @@ void drape_system_damping(drape_system *system, const drape_point *point, double
     drape_summer_add(system->summer, &want, &to);
     if (evaluate_contact(system, point))
         drape_contact_add_jacobian(system->contact, 0, DRAPE_CONTACT_VELOCITY, system->pattern, values);
+    drape_system_project_matrix(system, values);
 }
 
 /* ---- Energies ---- */

@@ -138,12 +138,21 @@ drape_status drape_system_leave_out(drape_system *system, const bool *terms);
  * contacts, or cancelled. */
 drape_status drape_system_status(const drape_system *system);
 
-/* g (node_count x 3) of all nodes, including pinned ones. */
+/* g (node_count x 3) of all nodes, including pinned ones; without what lies along the directions in which
+ * supports hold nodes (model/support.h). */
 void drape_system_force(drape_system *system, const drape_point *point, double *g);
 
 /* The same without the terms marked in `without` (term_count), for callers that sum those themselves. */
 void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
                                 double *g);
+
+/* The forces of pins and supports (node_count x 3), with the sign of g; 0 at nodes that are free. */
+void drape_system_reactions(drape_system *system, const drape_point *point, double *g);
+
+/* The projections of model/support.h, for callers that add forces and matrices of their own. */
+void drape_system_project(const drape_system *system, double *nodes);
+void drape_system_project_free(const drape_system *system, double *free_nodes);
+void drape_system_project_matrix(const drape_system *system, double *values);
 
 /* values (pattern.nonzeros) = mass_weight M + J over the free nodes. With positive_share from 0 to 1, each
  * element's Hessian H becomes H + positive_share (H+ - H), where H+ is its positive semidefinite part: 0 is

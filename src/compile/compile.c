@@ -2,6 +2,8 @@
  * terms, pattern. */
 #include "compile/compile.h"
 
+#include "base/vec3.h"
+
 #include "compile/stages.h"
 #include "model/scene.h"
 
@@ -210,21 +212,35 @@ static drape_status compile_cloths(drape_model *model, const drape_scene_def *de
 }
 
 /* Pinned nodes start at rest or with the velocity of their track: the initial velocity applies only to free
- * nodes. */
+ * nodes, and to those with supports without what is along the directions that are held. */
 static void stop_pinned(drape_model *model)
 {
     for (int32_t i = 0; i < model->node_count; i++)
         if (model->pinned[i])
             memset(model->velocity + 3 * (size_t)i, 0, 3 * sizeof *model->velocity);
+    for (int32_t i = 0; i < model->support_count; i++)
+        for (int d = 0; d < model->supports[i].count; d++) {
+            const double *n = model->supports[i].direction[d];
+            double *v = model->velocity + 3 * (size_t)model->supports[i].node;
+            vec3_add_scaled(-vec3_dot(n, v), n, v);
+        }
 }
 
 drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape_model **out)
 {
-    static drape_status (*const stages[])(drape_model *, const drape_scene_def *) = {
-        copy_scene,           compile_cloths,        drape_compile_pins,
-        drape_compile_events, drape_compile_contact, drape_compile_colliders,
-        drape_compile_rides,  drape_compile_ignored, drape_compile_contact_stiffness,
-        drape_compile_seams,  drape_compile_terms};
+    static drape_status (*const stages[])(drape_model *,
+                                          const drape_scene_def *) = {copy_scene,
+                                                                      compile_cloths,
+                                                                      drape_compile_start,
+                                                                      drape_compile_pins,
+                                                                      drape_compile_events,
+                                                                      drape_compile_contact,
+                                                                      drape_compile_colliders,
+                                                                      drape_compile_rides,
+                                                                      drape_compile_ignored,
+                                                                      drape_compile_contact_stiffness,
+                                                                      drape_compile_seams,
+                                                                      drape_compile_terms};
     *out = NULL;
     drape_model *model = drape_alloc(ctx, 1, sizeof *model);
     if (!model)

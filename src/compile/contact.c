@@ -140,10 +140,17 @@ static double collider_speed(const drape_collider *collider)
 static double scene_speed(const drape_model *model)
 {
     double cloth = 0, collider = 0;
-    for (int32_t c = 0; c < model->cloth_count; c++)
-        cloth = fmax(cloth, norm(model->cloths[c].velocity));
+    for (size_t i = 0; i < (size_t)model->node_count; i++)
+        cloth = fmax(cloth, norm(model->velocity + 3 * i));
     for (int32_t t = 0; t < model->track_count; t++)
         cloth = fmax(cloth, track_speed(&model->tracks[t]));
+    for (int32_t i = 0; i < model->moved_count; i++) {
+        const drape_track *track = &model->tracks[model->moved_track[i]];
+        double arm[3];
+        vec3_sub(model->start + 3 * (size_t)model->moved_node[i], track->pivot, arm);
+        if (track->turns.key_count > 0)
+            cloth = fmax(cloth, track_speed(track) + drape_turns_fastest(&track->turns) * norm(arm));
+    }
     for (int32_t c = 0; c < model->collider_count; c++)
         collider = fmax(collider, collider_speed(&model->colliders[c]));
     return cloth + collider;

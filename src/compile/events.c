@@ -97,12 +97,17 @@ static drape_status choose(const place *p, const char *key, const char *text, in
 /* The rest shapes of clamped edges contain the directions in which they are held. */
 static drape_status check_release(const place *p, const drape_model_event *to)
 {
-    char text[128];
+    char text[192];
     for (int32_t k = 0; k < to->pin_count; k++) {
         const drape_pin *pin = &p->model->pins[to->pin[k]];
         snprintf(text, sizeof text, "the pins \"%.60s\" clamp edges; such pins cannot be released",
                  pin->name);
         if (pin->clamps)
+            return refuse(p, "action", text);
+        snprintf(text, sizeof text,
+                 "the pins \"%.60s\" hold their nodes in some directions only; such pins cannot be released",
+                 pin->name);
+        if (pin->slides)
             return refuse(p, "action", text);
     }
     return to->pinned_count > 0 ? DRAPE_OK : refuse(p, "action", "there are no pins to release");

@@ -1,10 +1,15 @@
 /* pins.c: which nodes are pinned, along which track; numbers the free nodes. Pinned nodes are eliminated from
  * the system. */
+#include "base/vec3.h"
 #include "compile/select.h"
 #include "compile/stages.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
+
+#define PARALLEL                                                                                             \
+    1e-6 /* the part of a unit direction that lies along others, below which it adds nothing to them */
 
 /* One pin under construction: its place in the scene, and the cloth that it pins. */
 typedef struct pin_place {
@@ -16,6 +21,10 @@ typedef struct pin_place {
     int32_t *track_of_node; /* (node_count) -1: fixed or free */
     uint8_t *clamped;       /* (node_count) 1: held by a pin that clamps */
     uint8_t *held;          /* (node_count) 1: held by this pin */
+    int count;              /* of the directions in which this pin holds its nodes; 0: in all */
+    double direction[2][3];
+    int32_t *directions; /* (node_count) in which pins with directions hold a node, at most 3 */
+    double *all;         /* (node_count x 2 x 3) the first two of them */
 } pin_place;
 
 static drape_status refuse(const pin_place *pin, const char *key, const char *text)
@@ -25,10 +34,32 @@ static drape_status refuse(const pin_place *pin, const char *key, const char *te
     return drape_fail_at(pin->model->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
 }
 
+/* What of a direction the others of a node do not hold already: planes that meet at a node leave it a line,
+ * and three of them nothing. */
+static void add_direction(const double *direction, int32_t *count, double *all)
+{
+    double n[3] = {direction[0], direction[1], direction[2]};
+    for (int32_t i = 0; i < *count && i < 2; i++)
+        vec3_add_scaled(-vec3_dot(all + 3 * i, n), all + 3 * i, n);
+    const double length = vec3_norm(n);
+    if (*count == 3 || !(length > PARALLEL))
+        return;
+    for (int k = 0; k < 3 && *count < 2; k++)
+        all[3 * *count + k] = n[k] / length;
+    ++*count;
+}
+
 static drape_status take_node(void *user, const char *key, int32_t local)
 {
     pin_place *pin = user;
     int32_t node = pin->cloth->first_node + local;
+    if (pin->count > 0) {
+        for (int i = 0; i < pin->count && !pin->held[node]; i++)
+            add_direction(pin->direction[i], &pin->directions[node], pin->all + 6 * (size_t)node);
+        pin->clamped[node] |= pin->def->clamp;
+        pin->held[node] = 1;
+        return DRAPE_OK;
+    }
     if (pin->model->pinned[node] && pin->track_of_node[node] != pin->track) {
         char text[128];
         snprintf(text, sizeof text, "node %d is pinned twice, along different tracks or colliders",
@@ -63,19 +94,86 @@ static drape_status take_selection(pin_place *pin)
     return drape_select_nodes(&selection);
 }
 
+/* A vector of the scene, of length 1; false if it is not given. */
+static bool unit_vector(const double *given, double *unit)
+{
+    const double largest = fmax(fabs(given[0]), fmax(fabs(given[1]), fabs(given[2])));
+    if (isnan(given[0]))
+        return false;
+    for (int k = 0; k < 3; k++)
+        unit[k] = largest > 0 ? given[k] / largest : 0;
+    const double length = vec3_norm(unit);
+    for (int k = 0; k < 3 && length > 0; k++)
+        unit[k] /= length;
+    return true;
+}
+
+/* The directions in which the pin holds its nodes, if not in all. Along an axis of space they are exactly
+ * the other two. */
+static drape_status find_directions(pin_place *pin)
+{
+    const drape_pin_def *def = pin->def;
+    double axis[3], *n = pin->direction[0];
+    const bool normal = unit_vector(def->normal, n), line = unit_vector(def->axis, axis);
+    pin->count = normal ? 1 : line ? 2 : 0;
+    if (normal && line)
+        return refuse(pin, "/axis", "a pin has a normal or an axis, not both");
+    if (pin->count > 0 && (def->key_count > 0 || def->turn_count > 0 || def->attach))
+        return refuse(pin, normal ? "/normal" : "/axis",
+                      "a pin that holds its nodes in some directions only does not move: it has no "
+                      "track, turns or attach");
+    if ((normal && vec3_norm(n) == 0) || (line && vec3_norm(axis) == 0))
+        return refuse(pin, normal ? "/normal" : "/axis", "0 0 0 has no direction");
+    if (!line)
+        return DRAPE_OK;
+    int least = 0;
+    for (int k = 1; k < 3; k++)
+        least = fabs(axis[k]) < fabs(axis[least]) ? k : least;
+    memset(n, 0, 3 * sizeof *n);
+    n[least] = 1;
+    vec3_add_scaled(-axis[least], axis, n);
+    unit_vector(n, n);
+    vec3_cross(axis, n, pin->direction[1]);
+    return DRAPE_OK;
+}
+
 static drape_status keep_track(pin_place *pin)
 {
     drape_model *model = pin->model;
     pin->track = -1;
     if (pin->def->attach && pin->def->key_count > 0)
         return refuse(pin, "/attach", "a pin is carried by a collider or moves along a track, not both");
+    if (pin->def->turn_count > 0 && pin->def->attach)
+        return refuse(pin, "/turns", "a pin is carried by a collider or turns about a pivot, not both");
+    if (pin->def->turn_count > 0 && pin->def->clamp)
+        return refuse(pin, "/clamp",
+                      "a clamped edge keeps its direction in space; to turn it, pin two "
+                      "rows of nodes");
     if (pin->def->attach)
         pin->track = model->track_count++; /* without keys: drape_compile_rides has its motion */
-    if (pin->def->key_count == 0)
+    if (pin->def->key_count == 0 && pin->def->turn_count == 0)
         return DRAPE_OK;
     pin->track = model->track_count++;
-    return drape_compile_track(model, pin->pointer, pin->def->track, pin->def->key_count,
-                               &model->tracks[pin->track]);
+    drape_track *to = &model->tracks[pin->track];
+    drape_status status = DRAPE_OK;
+    if (pin->def->key_count > 0)
+        status = drape_compile_track(model, pin->pointer, pin->def->track, pin->def->key_count, to);
+    if (!status && pin->def->turn_count > 0)
+        status = drape_compile_turns(model, pin->pointer, pin->def->turns, pin->def->turn_count, &to->turns);
+    return status;
+}
+
+/* The point about which the nodes of a pin turn. */
+static void find_pivot(const pin_place *pin, const drape_pin *nodes)
+{
+    drape_track *track = pin->track >= 0 ? &pin->model->tracks[pin->track] : NULL;
+    if (!track)
+        return;
+    for (int32_t i = 0; i < nodes->node_count; i++)
+        vec3_add_scaled(1.0 / nodes->node_count, pin->model->start + 3 * (size_t)nodes->node[i],
+                        track->pivot);
+    if (!isnan(pin->def->pivot[0]))
+        memcpy(track->pivot, pin->def->pivot, sizeof track->pivot);
 }
 
 /* The name is unique among the pins of the cloth, of which this is number p. */
@@ -121,11 +219,16 @@ static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, in
         snprintf(pin->pointer, sizeof pin->pointer, "/cloth/%d/pins/%zu", (int)c, p);
         status = name_pin(pin, p, to);
         if (!status)
+            status = find_directions(pin);
+        to->slides = pin->count > 0;
+        if (!status)
             status = keep_track(pin);
         if (!status)
             status = take_selection(pin);
         if (!status)
             status = list_nodes(pin, to);
+        if (!status)
+            find_pivot(pin, to);
     }
     return status;
 }
@@ -136,6 +239,33 @@ static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, p
     for (int32_t c = 0; !status && c < model->cloth_count; c++)
         status = pin_cloth(model, def, c, pin);
     return status;
+}
+
+/* Nodes that are held in three directions are pinned. The others that have directions are free nodes with
+ * supports, unless another pin holds them altogether. */
+static drape_status list_supports(drape_model *model, const pin_place *pin)
+{
+    for (int pass = 0; pass < 2; pass++) {
+        int32_t count = 0;
+        for (int32_t i = 0; i < model->node_count; i++) {
+            if (pin->directions[i] == 3)
+                model->pinned[i] = 1;
+            if (pin->directions[i] == 0 || model->pinned[i])
+                continue;
+            if (pass == 1) {
+                drape_support *to = &model->supports[count];
+                *to = (drape_support){.node = i, .count = pin->directions[i]};
+                memcpy(to->direction, pin->all + 6 * (size_t)i, sizeof to->direction);
+            }
+            count++;
+        }
+        if (pass == 0)
+            model->supports = drape_arena_take(&model->arena, (size_t)count, sizeof *model->supports);
+        if (!model->supports)
+            return DRAPE_E_MEMORY;
+        model->support_count = count;
+    }
+    return DRAPE_OK;
 }
 
 /* Finds the edges that keep the direction of the sheet across them. */
@@ -195,11 +325,20 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
     int32_t *track_of_node = drape_arena_take(&scratch, nodes, sizeof *track_of_node);
     uint8_t *clamped = drape_arena_take(&scratch, nodes, sizeof *clamped);
     uint8_t *held = drape_arena_take(&scratch, nodes, sizeof *held);
+    int32_t *directions = drape_arena_take(&scratch, nodes, sizeof *directions);
+    double *all = drape_arena_take(&scratch, nodes, 6 * sizeof *all);
     drape_status status = drape_arena_status(&model->arena) ? DRAPE_E_MEMORY : drape_arena_status(&scratch);
     if (!status) {
         memset(track_of_node, 0xff, nodes * sizeof *track_of_node); /* all -1 */
-        pin_place pin = {.model = model, .track_of_node = track_of_node, .clamped = clamped, .held = held};
+        pin_place pin = {.model = model,
+                         .track_of_node = track_of_node,
+                         .clamped = clamped,
+                         .held = held,
+                         .directions = directions,
+                         .all = all};
         status = pin_cloths(model, def, &pin);
+        if (!status)
+            status = list_supports(model, &pin);
         if (!status)
             status = clamp_edges(model, clamped);
         if (!status)

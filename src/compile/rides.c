@@ -52,7 +52,7 @@ static drape_status check_triangle(const drape_model *model, const char *pointer
                          collider->name, (int)collider->shape.triangle_count - 1);
 }
 
-/* The nodes of a pin begin where they are at rest. */
+/* The nodes of a pin begin where the cloth starts. */
 static drape_status attach(drape_model *model, const drape_motion *motion, const drape_pin *pin,
                            int32_t collider, int32_t triangle)
 {
@@ -64,9 +64,9 @@ static drape_status attach(drape_model *model, const drape_motion *motion, const
     drape_status status = DRAPE_OK;
     if (triangle < 0)
         status = drape_deformed_nearest(model->ctx, motion, collider, 0, pin->node_count, pin->node,
-                                        model->rest, on);
+                                        model->start, on);
     for (int32_t i = 0; !status && i < pin->node_count; i++)
-        drape_motion_ride_from(motion, collider, on[i], 0, model->rest + 3 * (size_t)pin->node[i],
+        drape_motion_ride_from(motion, collider, on[i], 0, model->start + 3 * (size_t)pin->node[i],
                                &model->ride[pin->node[i]]);
     drape_free(model->ctx, on);
     return status;

@@ -17,6 +17,9 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
 drape_status drape_compile_masses(drape_model *model, const char *pointer, const drape_cloth_def *def,
                                   drape_cloth *cloth);
 
+/* Computes where all cloths start and their initial velocities, after the meshes and masses. */
+drape_status drape_compile_start(drape_model *model, const drape_scene_def *def);
+
 /* Marks the pinned nodes of all cloths, numbers the free ones, and stores the tracks. */
 drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def);
 

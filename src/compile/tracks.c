@@ -152,7 +152,7 @@ drape_status drape_compile_turns(drape_model *model, const char *pointer, const 
         char at[192];
         snprintf(at, sizeof at, "%s/turns", pointer);
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
-                             "%.6g rad/s is not allowed; a collider turns by "
+                             "%.6g rad/s is not allowed; colliders and pins turn by "
                              "at most %g rad/s",
                              drape_turns_fastest(turns), DRAPE_MAX_SPIN);
     }

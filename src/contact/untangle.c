@@ -233,6 +233,8 @@ static drape_status set_up(drape_untangler *u, const drape_motion *motion, doubl
         u->mobility[i] = m->pinned[i] ? 0 : 1;
         u->area += u->broad.node_area[i];
     }
+    for (int32_t i = 0; i < m->support_count; i++) /* they would leave their planes */
+        u->mobility[m->supports[i].node] = 0;
     status = place_bodies(u, motion, t);
     if (!status)
         status = take_sheets(u);

@@ -179,4 +179,5 @@ void drape_verlet_force_sum(drape_verlet_force *f, const drape_point *point, dou
         planes_to(n, f->g, g);
         drape_system_add_loads(f->system, point->x, g);
     }
+    drape_system_project(f->system, g);
 }

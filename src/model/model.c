@@ -123,12 +123,8 @@ double drape_model_frame_rate(const drape_model *model)
 void drape_model_place_pins(const drape_model *model, double t, double *x)
 {
     for (int32_t i = 0; i < model->moved_count; i++) {
-        const drape_track *track = &model->tracks[model->moved_track[i]];
-        size_t at = 3 * (size_t)model->moved_node[i];
-        double displacement[3];
-        drape_track_displacement(track->keys, track->key_count, t, displacement);
-        for (int k = 0; k < 3; k++)
-            x[at + k] = model->rest[at + k] + displacement[k];
+        const size_t at = 3 * (size_t)model->moved_node[i];
+        drape_track_point(&model->tracks[model->moved_track[i]], model->start + at, t, x + at);
     }
 }
 

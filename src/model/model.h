@@ -137,11 +137,6 @@ typedef struct drape_cloth {
     int law_count;
 } drape_cloth;
 
-typedef struct drape_track {
-    drape_track_key *keys;
-    size_t key_count;
-} drape_track;
-
 /* A key of a rotation: from here to the next key it turns steadily, about one axis. */
 typedef struct drape_turn {
     double time;        /* [s] */
@@ -154,6 +149,13 @@ typedef struct drape_turns {
     drape_turn *keys;
     size_t key_count;
 } drape_turns;
+
+typedef struct drape_track {
+    drape_track_key *keys;
+    size_t key_count;
+    drape_turns turns; /* of pins, about the pivot; of a collider it is a member of that */
+    double pivot[3];   /* [m] at the start */
+} drape_track;
 
 /* One obstacle. */
 typedef struct drape_collider {
@@ -213,7 +215,15 @@ typedef struct drape_pin {
     int32_t *node; /* (node_count) ascending node numbers of the model */
     int32_t node_count;
     bool clamps;
+    bool slides; /* it holds them in some directions only */
 } drape_pin;
+
+/* A node that pins hold in some directions only (model/support.h). */
+typedef struct drape_support {
+    int32_t node;
+    int count;              /* 1 or 2 directions */
+    double direction[2][3]; /* of length 1, at right angles */
+} drape_support;
 
 /* Where a pin is on the collider that carries it, in that collider's own coordinates. */
 typedef struct drape_ride {
@@ -277,6 +287,7 @@ struct drape_model {
     drape_cloth *cloths;
     drape_term *terms;     /* (term_count) in scene order, gravity last in each cloth; then those of seams */
     double *rest;          /* (node_count x 3) [m] */
+    double *start;         /* (node_count x 3) [m] at t = 0; rest itself if all cloths start there */
     double *velocity;      /* (node_count x 3) [m/s] at t = 0 */
     double *mass;          /* (node_count) [kg] */
     int32_t *triangle;     /* (triangle_count x 3) */
@@ -289,7 +300,10 @@ struct drape_model {
     int32_t *moved_node;  /* (moved_count) pinned nodes with a track or a ride */
     int32_t *moved_track; /* (moved_count) */
     int32_t moved_count, track_count;
-    drape_track *tracks;       /* of a pin that a collider carries, without keys */
+    drape_support
+        *supports; /* (support_count) ascending nodes; those that are pinned altogether do not count */
+    int32_t support_count;
+    drape_track *tracks;       /* of a pin that a collider carries, without keys and turns */
     drape_ride *ride;          /* (node_count) of pins that colliders carry; NULL: no pin of the scene */
     drape_collider *colliders; /* (collider_count) */
     int32_t collider_count;

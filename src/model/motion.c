@@ -133,10 +133,10 @@ typedef struct course {
     const drape_ride *ride;   /* NULL: of a pin that no collider carries, or of a collider */
     const drape_track *track; /* NULL: none */
     const drape_path *path;
-    const drape_turn_path *turn; /* of a collider; NULL: of a pin, which does not turn */
+    const drape_turn_path *turn; /* of a collider; NULL: of a pin, whose track turns it */
     const drape_turns *turns;
     const drape_placement *placed;
-    const double *rest; /* of a pin; NULL: displacements are asked for */
+    const double *start; /* of a pin; NULL: displacements are asked for */
 } course;
 
 static void pose_without_rates(const drape_motion *motion, int32_t collider, double t,
@@ -189,10 +189,12 @@ static void position_on(const course *c, double t, double x[3])
         return;
     }
     memset(x, 0, 3 * sizeof *x);
-    if (c->track && c->track->key_count > 0)
+    if (c->start && c->track)
+        drape_track_point(c->track, c->start, t, x);
+    else if (c->start)
+        memcpy(x, c->start, 3 * sizeof *x);
+    else if (c->track && c->track->key_count > 0)
         drape_track_displacement(c->track->keys, c->track->key_count, t, x);
-    for (int k = 0; c->rest && k < 3; k++)
-        x[k] = c->rest[k] + x[k];
     if (c->placed->given)
         drape_placement_move(c->placed, x, x);
 }
@@ -208,7 +210,9 @@ static void velocity_on(const course *c, double t, double within, double v[3])
         return;
     }
     memset(v, 0, 3 * sizeof *v);
-    if (c->track && c->track->key_count > 0)
+    if (c->start && c->track)
+        drape_track_point_velocity(c->track, c->start, t, within, v);
+    else if (c->track && c->track->key_count > 0)
         drape_track_velocity(c->track->keys, c->track->key_count, within, v);
     if (c->placed->given)
         drape_placement_turn(c->placed, v, v);
@@ -269,7 +273,7 @@ static double next_kink_of(const course *c, double t, double end)
     for (size_t i = 0; !path->given && !c->ride && c->track && i < c->track->key_count; i++)
         if (c->track->keys[i].time > t && c->track->keys[i].time < end)
             end = c->track->keys[i].time;
-    for (size_t i = 0; !path->given && c->turns && i < c->turns->key_count; i++)
+    for (size_t i = 0; !path->given && !c->ride && c->turns && i < c->turns->key_count; i++)
         if (c->turns->keys[i].time > t && c->turns->keys[i].time < end)
             end = c->turns->keys[i].time;
     return end;
@@ -305,7 +309,7 @@ static bool leading_velocity(const course *c, double t, double v[3])
         return false;
     }
     velocity_on(c, t, t, v);
-    return path->given || !c->track || c->track->key_count == 0;
+    return path->given || !c->track || !drape_track_moves(c->track);
 }
 
 /* The same for the angular velocity. */
@@ -369,9 +373,10 @@ static course pin_course(const drape_motion *motion, int32_t i)
     return (course){.motion = motion,
                     .ride = motion->ride[i].collider >= 0 ? &motion->ride[i] : NULL,
                     .track = motion->moved_track[i] >= 0 ? &m->tracks[motion->moved_track[i]] : NULL,
+                    .turns = motion->moved_track[i] >= 0 ? &m->tracks[motion->moved_track[i]].turns : NULL,
                     .path = &motion->pin_path[i],
                     .placed = &motion->cloth_placed[drape_model_cloth_of(m, node)],
-                    .rest = m->rest + 3 * (size_t)node};
+                    .start = m->start + 3 * (size_t)node};
 }
 
 void drape_motion_place_pins(const drape_motion *motion, double t, double *x)
@@ -387,7 +392,7 @@ void drape_motion_place_fixed(const drape_motion *motion, int32_t node, double x
     const drape_path none = {.given = false};
     const course c = {.path = &none,
                       .placed = &motion->cloth_placed[drape_model_cloth_of(motion->model, node)],
-                      .rest = motion->model->rest + 3 * (size_t)node};
+                      .start = motion->model->start + 3 * (size_t)node};
     position_on(&c, 0, x);
 }
 

@@ -47,7 +47,7 @@ static const drape_scene_key pin_keys[] = {
                   "nodes inside a box of rest coordinates after the transform, boundary included"),
      .shape = DRAPE_SCENE_BOX, BOX(drape_pin_def)},
     {DRAPE_VECTOR("track", "s and m", DRAPE_DERIVED("none: fixed"), LOWEST, HIGHEST,
-                  "displacement from rest, linear between the times"),
+                  "displacement from the start, linear between the times"),
      .shape = DRAPE_SCENE_TRACK, ARRAY(drape_pin_def, track, key_count), .at_least = 1},
     {DRAPE_TEXT("attach", "name of the collider that carries the nodes, which ride on it from where they are",
                 .derived = "none"),
@@ -58,6 +58,19 @@ static const drape_scene_key pin_keys[] = {
     {DRAPE_BOOLEAN("clamp", false,
                    "edges between these nodes keep the direction of the sheet across them; for bend.midedge"),
      IN(drape_pin_def, clamp)},
+    {DRAPE_VECTOR("normal", "1", DRAPE_DERIVED("none: held in all directions"), LOWEST, HIGHEST,
+                  "the only direction in which the nodes are held: each stays in the plane across it, as on "
+                  "rollers or in a symmetry plane"),
+     IN(drape_pin_def, normal)},
+    {DRAPE_VECTOR("axis", "1", DRAPE_DERIVED("none: held in all directions"), LOWEST, HIGHEST,
+                  "the only direction in which the nodes are free: each stays on a line, as on a rail"),
+     IN(drape_pin_def, axis)},
+    {SHAPED(DRAPE_SCENE_OBJECTS, "turns", DRAPE_DERIVED("none: they do not turn"),
+            "rotation of the nodes as one body about the pivot, steady between the times"),
+     ARRAY(drape_pin_def, turns, turn_count), .at_least = 1, .child = &drape_form_turn},
+    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the mean of the nodes"), LOWEST, HIGHEST,
+                  "the point about which they turn, at the start; the track displaces it"),
+     IN(drape_pin_def, pivot)},
 };
 static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
 
@@ -122,14 +135,18 @@ static const drape_scene_object material = {.name = "material",
 
 /* ---- Mesh ---- */
 
-static const drape_scene_key transform_keys[] = {
-    {DRAPE_VECTOR("translate", "m", 0, LOWEST, HIGHEST, "applied last"), IN(drape_mesh_def, translate)},
-    {DRAPE_TURN("rotate", 0, LOWEST, HIGHEST,
-                "axis and angle, or a vector along the axis whose length is the angle"),
-     IN(drape_mesh_def, rotate)},
-    {DRAPE_VECTOR("scale", "1", 1, DRAPE_ABOVE(0), HIGHEST, "applied first", .uniform = true),
-     IN(drape_mesh_def, scale)},
-};
+/* Of a mesh and of a start. */
+#define TRANSFORM_KEYS(def)                                                                                  \
+    {DRAPE_VECTOR("translate", "m", 0, LOWEST, HIGHEST, "applied last"), IN(def, translate)},                \
+        {DRAPE_TURN("rotate", 0, LOWEST, HIGHEST,                                                            \
+                    "axis and angle, or a vector along the axis whose length is the angle"),                 \
+         IN(def, rotate)},                                                                                   \
+    {                                                                                                        \
+        DRAPE_VECTOR("scale", "1", 1, DRAPE_ABOVE(0), HIGHEST, "applied first", .uniform = true),            \
+            IN(def, scale)                                                                                   \
+    }
+
+static const drape_scene_key transform_keys[] = {TRANSFORM_KEYS(drape_mesh_def)};
 const drape_scene_object drape_form_transform = {.name = "transform", KEYS(transform_keys)};
 
 static const drape_scene_key mesh_keys[] = {
@@ -148,6 +165,46 @@ const drape_scene_object drape_form_mesh = {.name = "mesh",
                                             .open_with = "grid",
                                             .def_size = sizeof(drape_mesh_def)};
 
+/* ---- Start ---- */
+
+static const drape_scene_key fold_keys[] = {
+    {DRAPE_VECTOR("point", "m", DRAPE_REQUIRED, LOWEST, HIGHEST,
+                  "a point on the line about which it is folded"),
+     IN(drape_fold_def, point)},
+    {DRAPE_VECTOR("axis", "1", DRAPE_REQUIRED, LOWEST, HIGHEST, "direction of the line"),
+     IN(drape_fold_def, axis)},
+    {DRAPE_VECTOR("side", "1", DRAPE_REQUIRED, LOWEST, HIGHEST,
+                  "from the line to the part that is folded over"),
+     IN(drape_fold_def, side)},
+    {DRAPE_NUMBER("angle", "degrees", 180, -360, 360, "by which that part turns about the axis"),
+     IN(drape_fold_def, angle)},
+    {DRAPE_NUMBER("radius", "m", 0, 0, 1e6, "of the cylinder that the sheet is bent around; 0: a sharp fold"),
+     IN(drape_fold_def, radius)},
+};
+static const drape_scene_object fold = {.name = "fold", KEYS(fold_keys), .def_size = sizeof(drape_fold_def)};
+
+static const drape_scene_key start_transform_keys[] = {TRANSFORM_KEYS(drape_start_def)};
+static const drape_scene_object start_transform = {.name = "transform", KEYS(start_transform_keys)};
+
+static const drape_scene_key start_keys[] = {
+    {DRAPE_TEXT("file", "an OBJ or PLY file with the nodes and triangles of the mesh, relative to the scene",
+                .derived = "none: the mesh at rest"),
+     IN(drape_start_def, file)},
+    {SHAPED(DRAPE_SCENE_OBJECTS, "folds", NONE, "lines about which it is folded, in this order"),
+     ARRAY(drape_start_def, folds, fold_count), .child = &fold},
+    {SHAPED(DRAPE_SCENE_OBJECT, "transform", NONE, "scale, rotation, translation after the folds"),
+     .child = &start_transform},
+    {DRAPE_VECTOR("spin", "rad/s", 0, -1e9, 1e9, "angular velocity"), IN(drape_start_def, spin)},
+    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the centre of mass at the start"), LOWEST, HIGHEST,
+                  "the point that the spin does not move"),
+     IN(drape_start_def, pivot)},
+    {DRAPE_TEXT("velocities", "an NPY file, nodes x 3, of velocities in m/s; relative to the scene",
+                .derived = "none"),
+     IN(drape_start_def, velocity_file)},
+};
+static const drape_scene_object start = {
+    .name = "start", KEYS(start_keys), .def_size = sizeof(drape_start_def)};
+
 /* ---- Cloth ---- */
 
 static const drape_scene_key cloth_keys[] = {
@@ -161,6 +218,9 @@ static const drape_scene_key cloth_keys[] = {
      ARRAY(drape_cloth_def, pins, pin_count), .child = &drape_form_pin},
     {DRAPE_VECTOR("velocity", "m/s", 0, -1e9, 1e9, "initial velocity of every node"),
      IN(drape_cloth_def, velocity)},
+    {SHAPED(DRAPE_SCENE_OBJECT, "start", DRAPE_DERIVED("the mesh at rest"),
+            "another shape than at rest in which it starts, and initial velocities"),
+     IN(drape_cloth_def, start), .child = &start},
     {DRAPE_TEXT("ignore", "names of colliders and cloths that it passes through; its own name: itself",
                 .derived = "none"),
      .shape = DRAPE_SCENE_LIST, ARRAY(drape_cloth_def, ignore, ignore_count)},

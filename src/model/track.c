@@ -88,6 +88,48 @@ void drape_turns_velocity(const drape_turns *turns, double t, double velocity[3]
         vec3_add_scaled(key->degrees * (PI / 180) / (key[1].time - key->time), key->axis, velocity);
 }
 
+/* ---- Pins ---- */
+
+bool drape_track_moves(const drape_track *track)
+{
+    return track->key_count > 0 || track->turns.key_count > 0;
+}
+
+/* A pin without turns gets the bits of start + displacement. */
+void drape_track_point(const drape_track *track, const double start[3], double t, double x[3])
+{
+    double displacement[3], rotation[9], arm[3];
+    drape_track_displacement(track->keys, track->key_count, t, displacement);
+    for (int i = 0; i < 3; i++)
+        x[i] = start[i] + displacement[i];
+    if (track->turns.key_count == 0)
+        return;
+    drape_turns_rotation(&track->turns, t, rotation);
+    if (drape_rotation_is_none(rotation))
+        return;
+    vec3_sub(start, track->pivot, arm);
+    drape_rotation_turn(rotation, arm, arm);
+    for (int i = 0; i < 3; i++)
+        x[i] = track->pivot[i] + arm[i] + displacement[i];
+}
+
+void drape_track_point_velocity(const drape_track *track, const double start[3], double t, double within,
+                                double v[3])
+{
+    double rotation[9], arm[3], w[3], turning[3];
+    memset(v, 0, 3 * sizeof *v);
+    if (track->key_count > 0)
+        drape_track_velocity(track->keys, track->key_count, within, v);
+    if (track->turns.key_count == 0)
+        return;
+    drape_turns_rotation(&track->turns, t, rotation);
+    drape_turns_velocity(&track->turns, within, w);
+    vec3_sub(start, track->pivot, arm);
+    drape_rotation_turn(rotation, arm, arm);
+    vec3_cross(w, arm, turning);
+    vec3_add_scaled(1, turning, v);
+}
+
 double drape_turns_fastest(const drape_turns *turns)
 {
     double fastest = 0;

@@ -19,6 +19,15 @@ void drape_turns_rotation(const drape_turns *turns, double t, double rotation[9]
 /* Computes the angular velocity [rad/s] at a time between two keys; 0 before the first and after the last. */
 void drape_turns_velocity(const drape_turns *turns, double t, double velocity[3]);
 
+/* Whether a track moves pins at all. */
+bool drape_track_moves(const drape_track *track);
+
+/* Computes the position [m] at time t [s] of a pinned node: turned about the pivot, then displaced; and its
+ * velocity [m/s] at t, with the slopes of a time `within` that lies between two keys. */
+void drape_track_point(const drape_track *track, const double start[3], double t, double x[3]);
+void drape_track_point_velocity(const drape_track *track, const double start[3], double t, double within,
+                                double v[3]);
+
 /* Whether the path of a host from span[0] to span[1] has just come to its end: the next moment that a host
  * computes may differ by rounding. */
 static inline bool drape_has_arrived(const double span[2], double t)

@@ -84,6 +84,7 @@ void drape_approx_jacobian_multiply(const drape_approx_jacobian *s, const double
     multiply_scalars(s, x, y);
     add_pairs(s, x, y);
     add_remainder(s, x, y);
+    drape_system_project_free(s->system, y);
 }
 
 static void multiply(const void *owner, const double *x, double *y)
@@ -102,6 +103,7 @@ static void precondition(const void *owner, const double *r, double *z)
     drape_prolong_restrict(&c->prolong, r, c->b);
     if (c->linear->solve(c->solver, c->b, c->x) == DRAPE_OK)
         drape_prolong_add(&c->prolong, c->x, z);
+    drape_system_project_free(s->system, z);
 }
 
 /* ---- Update ---- */

@@ -154,6 +154,7 @@ static drape_status assemble(drape_factored_jacobian *s, const drape_point *at, 
     add_scalars(s, s->linear->values);
     if (!s->nonsymmetric)
         drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
+    drape_system_project_matrix(s->system, s->linear->values);
     return DRAPE_OK;
 }
 
@@ -204,6 +205,7 @@ static void multiply(const void *owner, const double *x, double *y)
         for (int32_t k = c->start[i]; k < c->start[i + 1]; k++)
             for (size_t r = 0; s->block[k] < 0 && r < 3; r++)
                 y[3 * (size_t)i + r] += c->sum[k] * (x[3 * (size_t)c->column[k] + r] - x[3 * (size_t)i + r]);
+    drape_system_project_free(s->system, y);
 }
 
 /* z = N^-1 r. Without a solution it is 0, where conjugate gradients end. */

@@ -239,7 +239,8 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
     return true;
 }
 
-/* The mean velocity of the free nodes, by mass, and their kinetic energy relative to it. */
+/* The mean velocity of the free nodes, by mass, and their kinetic energy relative to it. With supports,
+ * which take momentum and allow no other velocity, it is 0. */
 static double internal_kinetic(const drape_model *m, const double *v, double mean[3])
 {
     double mass = 0, moving = 0;
@@ -250,7 +251,7 @@ static double internal_kinetic(const drape_model *m, const double *v, double mea
             mean[k] += m->mass[i] * v[3 * i + k];
     }
     for (size_t k = 0; k < 3; k++) {
-        mean[k] /= mass;
+        mean[k] = m->support_count > 0 ? 0 : mean[k] / mass;
         moving += 0.5 * mass * mean[k] * mean[k];
     }
     return kinetic(m, v) - moving;

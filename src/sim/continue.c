@@ -2,6 +2,7 @@
  * beside the present one, as when a checkpoint is restored, and has the same cloth. Terms, colliders and
  * events are the same if their names are. The integrator and the controller start anew, as after a kink. */
 #include "base/elementary.h"
+#include "model/track.h"
 #include "sim/attach.h"
 
 #include <math.h>
@@ -80,7 +81,7 @@ static drape_status refuse_pin(const drape_sim *sim, int32_t node, const double 
 static bool has_track(const drape_motion *motion, int32_t i)
 {
     const int32_t track = motion->moved_track[i];
-    return track >= 0 && motion->model->tracks[track].key_count > 0;
+    return track >= 0 && drape_track_moves(&motion->model->tracks[track]);
 }
 
 /* Pinned nodes are where they were, carried on from there by their collider, or held there unless their
@@ -108,6 +109,7 @@ static drape_status hold(drape_sim *to, const drape_sim *from)
         else
             drape_motion_hold_pin(motion, i, x);
     }
+    drape_system_project(to->system, state->v);
     return status;
 }
 

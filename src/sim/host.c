@@ -347,10 +347,7 @@ static drape_status read_status(const drape_sim *sim)
 
 drape_status drape_sim_reactions_at(drape_sim *sim, const drape_point *point, double *forces)
 {
-    drape_system_force(sim->system, point, forces);
-    for (int32_t f = 0; f < sim->model->free_count; f++)
-        for (int k = 0; k < 3; k++)
-            forces[3 * (size_t)sim->model->node_of_free[f] + (size_t)k] = 0;
+    drape_system_reactions(sim->system, point, forces);
     return read_status(sim);
 }
 

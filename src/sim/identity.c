@@ -48,6 +48,19 @@ static uint64_t add_text(uint64_t hash, const char *text)
     return add(hash, text, strlen(text) + 1);
 }
 
+static uint64_t add_turns(uint64_t hash, const drape_turns *turns)
+{
+    hash = add_integer(hash, (int64_t)turns->key_count);
+    for (size_t k = 0; k < turns->key_count; k++) {
+        const drape_turn *turn = &turns->keys[k];
+        hash = add_doubles(hash, &turn->time, 1);
+        hash = add_doubles(hash, turn->rotation, 9);
+        hash = add_doubles(hash, turn->axis, 3);
+        hash = add_doubles(hash, &turn->degrees, 1);
+    }
+    return hash;
+}
+
 static uint64_t add_track(uint64_t hash, const drape_track *track)
 {
     hash = add_integer(hash, (int64_t)track->key_count);
@@ -55,6 +68,8 @@ static uint64_t add_track(uint64_t hash, const drape_track *track)
         hash = add_doubles(hash, &track->keys[k].time, 1);
         hash = add_doubles(hash, track->keys[k].displacement, 3);
     }
+    if (track->turns.key_count > 0)
+        hash = add_doubles(add_turns(hash, &track->turns), track->pivot, 3);
     return hash;
 }
 
@@ -100,14 +115,7 @@ static uint64_t add_collider(uint64_t hash, const drape_collider *collider)
     hash = add_doubles(hash, &collider->friction, 1);
     hash = add_doubles(hash, &collider->restitution, 1);
     hash = add_track(hash, &collider->track);
-    hash = add_integer(hash, (int64_t)collider->turns.key_count);
-    for (size_t k = 0; k < collider->turns.key_count; k++) {
-        const drape_turn *turn = &collider->turns.keys[k];
-        hash = add_doubles(hash, &turn->time, 1);
-        hash = add_doubles(hash, turn->rotation, 9);
-        hash = add_doubles(hash, turn->axis, 3);
-        hash = add_doubles(hash, &turn->degrees, 1);
-    }
+    hash = add_turns(hash, &collider->turns);
     return add_doubles(hash, collider->pivot, 3);
 }
 
@@ -137,6 +145,7 @@ static uint64_t add_nodes(uint64_t hash, const drape_model *m)
 {
     size_t nodes = (size_t)m->node_count;
     hash = add_doubles(hash, m->rest, 3 * nodes);
+    hash = add_doubles(hash, m->start, m->start == m->rest ? 0 : 3 * nodes);
     hash = add_doubles(hash, m->velocity, 3 * nodes);
     hash = add_doubles(hash, m->mass, nodes);
     hash = add(hash, m->triangle, 3 * (size_t)m->triangle_count * sizeof *m->triangle);
@@ -144,6 +153,11 @@ static uint64_t add_nodes(uint64_t hash, const drape_model *m)
     hash = add(hash, m->pinned, nodes);
     hash = add(hash, m->moved_node, (size_t)m->moved_count * sizeof *m->moved_node);
     hash = add(hash, m->moved_track, (size_t)m->moved_count * sizeof *m->moved_track);
+    for (int32_t i = 0; i < m->support_count; i++) {
+        const int64_t held[] = {m->supports[i].node, m->supports[i].count};
+        hash = add(hash, held, sizeof held);
+        hash = add_doubles(hash, m->supports[i].direction[0], 6);
+    }
     for (size_t i = 0; m->ride && i < nodes; i++) {
         const int64_t on[] = {m->ride[i].collider, m->ride[i].triangle};
         hash = add(hash, on, sizeof on);

@@ -53,8 +53,9 @@ static void place_pinned(const drape_sim *sim, const double *given, double t, do
     }
 }
 
-/* Fixed nodes have no velocity, nor have those at rest where the host put them; pinned nodes that move keep
- * the given one until a step sets it to the mean over their displacement. */
+/* Fixed nodes have no velocity, those with supports none along what is held, nor have those at rest where
+ * the host put them; pinned nodes that move keep the given one until a step sets it to the mean over their
+ * displacement. */
 static void stop_fixed(const drape_sim *sim, const double *given, drape_state *state)
 {
     const drape_model *m = sim->model;
@@ -62,6 +63,7 @@ static void stop_fixed(const drape_sim *sim, const double *given, drape_state *s
     for (int32_t i = 0; i < m->node_count; i++)
         if (m->pinned[i])
             memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
+    drape_system_project(sim->system, state->v);
     for (int32_t i = 0; i < motion->moved_count; i++) {
         size_t at = 3 * (size_t)motion->moved_node[i];
         if (!motion->pin_path[i].given)

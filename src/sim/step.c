@@ -6,6 +6,7 @@
 #include "base/clock.h"
 #include "base/finite.h"
 #include "base/reason.h"
+#include "model/support.h"
 #include "sim/dense.h"
 #include "sim/hold.h"
 #include "sim/relaxed.h"
@@ -84,6 +85,7 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
         drape_sim_energy(sim); /* for the check, while contact is where the step begins */
     if (!status)
         status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
+    drape_supports_hold(drape_system_motion(sim->system), drape_sim_state(sim)->x, next->x, next->v);
     if (status == DRAPE_E_STOPPED)
         info->reason = drape_reason_name(DRAPE_REASON_CANCELLED);
     if (status && !info->usable)

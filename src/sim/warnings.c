@@ -146,7 +146,7 @@ static bool describe_inside(drape_sim *sim, const double *x, bool start, char *t
 /* The report of an untangled start says what was inside. */
 static bool starts_inside(drape_sim *sim, char *text, size_t size)
 {
-    return !sim->model->untangle.given && describe_inside(sim, sim->model->rest, true, text, size);
+    return !sim->model->untangle.given && describe_inside(sim, sim->model->start, true, text, size);
 }
 
 static bool ends_inside(drape_sim *sim, char *text, size_t size)

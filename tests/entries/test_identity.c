@@ -31,6 +31,9 @@ typedef enum outcome {
     SKIPPED  /* it has only one value, or the case of another key covers it */
 } outcome;
 
+#define FOLD(point, axis, angle)                                                                             \
+    "[{'point': " point ", 'axis': " axis ", 'side': [1,0,0], 'angle': " angle "}]"
+
 /* Keys whose value is not changed automatically: the value that `at` is set to instead, which is the key
  * itself if NULL. */
 static const struct test_case {
@@ -70,7 +73,26 @@ static const struct test_case {
     {"/cloth/0/pins/0/track", REFUSED, NULL, "[[0, [0,0,0]], [1, [0,0.2,0]]]"},
     {"/cloth/0/pins/0/attach", REFUSED, "/cloth/0/pins/1", "{'nodes': [0], 'attach': 'ball'}"},
     {"/cloth/0/pins/0/triangle", SKIPPED, NULL, NULL}, /* needs the files of a body: physics/riding */
-    {"/cloth/0/masses/0/nodes", SKIPPED, NULL, NULL},  /* as for pins: the masses count */
+    {"/cloth/0/start/file", SKIPPED, NULL, NULL},      /* needs a file: physics/start; its positions count */
+    {"/cloth/0/start/velocities", SKIPPED, NULL, NULL},
+    {"/cloth/0/start/pivot", SKIPPED, NULL, NULL}, /* without a spin it has no effect */
+    {"/cloth/0/start/folds/0/point", REFUSED, "/cloth/0/start/folds",
+     FOLD("[0.2,0,0]", "[0,0,1]", "90, 'radius': 0.01")},
+    {"/cloth/0/start/folds/0/axis", REFUSED, "/cloth/0/start/folds", FOLD("[0.1,0,0]", "[0,0,-1]", "90")},
+    {"/cloth/0/start/folds/0/side", SKIPPED, NULL, NULL}, /* with the others of a fold: the positions count */
+    {"/cloth/0/start/folds/0/angle", SKIPPED, NULL, NULL},
+    {"/cloth/0/start/folds/0/radius", SKIPPED, NULL, NULL},
+    {"/cloth/0/pins/0/turns/0/time", REFUSED, "/cloth/0/pins/1/turns",
+     "[{'time': 0, 'rotate': [0,1,0,0]}, {'time': 1, 'rotate': [0,1,0,90]}]"},
+    {"/cloth/0/pins/0/turns/0/rotate", REFUSED, "/cloth/0/pins/1/turns",
+     "[{'time': 0, 'rotate': [0,1,0,30]}]"},
+    {"/cloth/0/pins/0/turns/0/quaternion", REFUSED, "/cloth/0/pins/1/turns",
+     "[{'time': 0, 'quaternion': [1,0,1,0]}]"},
+    {"/cloth/0/pins/0/pivot", REFUSED, "/cloth/0/pins/1",
+     "{'nodes': [0], 'pivot': [1,0,0], 'turns': [{'time': 0, 'rotate': [0,1,0,30]}]}"},
+    {"/cloth/0/pins/0/normal", REFUSED, "/cloth/0/pins/1", "{'nodes': [0], 'normal': [0, 1, 0]}"},
+    {"/cloth/0/pins/0/axis", REFUSED, "/cloth/0/pins/1", "{'nodes': [0], 'axis': [0, 1, 0]}"},
+    {"/cloth/0/masses/0/nodes", SKIPPED, NULL, NULL}, /* as for pins: the masses count */
     {"/cloth/0/masses/0/corner", SKIPPED, NULL, NULL},
     {"/cloth/0/masses/0/edge", SKIPPED, NULL, NULL},
     {"/cloth/0/masses/0/row", SKIPPED, NULL, NULL},

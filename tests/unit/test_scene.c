@@ -1258,7 +1258,9 @@ END_TEST
 
 static const char whole[] =
     "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g', 'transform': {}}, 'terms': [{'type': 't'}],"
-    "'pins': [{'nodes': [0]}], 'masses': [{'nodes': [0], 'add': 1}]}], 'colliders': [{'type': 'c', 'turns': "
+    "'start': {'transform': {}, 'folds': [{'point': [0, 0, 0], 'axis': [0, 0, 1], 'side': [1, 0, 0]}]},"
+    "'pins': [{'nodes': [0], 'turns': [{'time': 0, 'rotate': [0, 0, 1]}]}], 'masses': [{'nodes': [0], 'add': "
+    "1}]}], 'colliders': [{'type': 'c', 'turns': "
     "[{'time': 0, 'rotate': [0, 0, 1]}]}],"
     "'events': [{'type': 'e'}], 'integrator': {}, 'controller': {}, 'output': {},"
     "'seams': [{'type': 's', 'a': {'cloth': 'c', 'nodes': [0]}, 'b': {'cloth': 'c', 'nodes': [1]}}]}";

@@ -1,0 +1,320 @@
+/* test_support.c: pins that hold nodes in some directions only, and pins that turn, under every integrator.
+ * */
+#include "integrators/integrator.h"
+#include "support/scene.h"
+
+#define GRAVITY 9.81
+
+/* The methods that step in time, and newton_k with its other matrix. */
+static const char *methods[64];
+static size_t method_count;
+
+__attribute__((constructor)) static void list_methods(void)
+{
+    for (int i = 0; drape_integrators[i]; i++)
+        if (!drape_integrators[i]->steady_state)
+            methods[method_count++] = drape_integrators[i]->entry.name;
+    methods[method_count++] = "newton_k', 'corrections': 'conjugate_gradients";
+}
+
+static const char *controller(const char *method)
+{
+    return strcmp(method, "verlet") == 0 ? "stable" : "halving";
+}
+/* How far a node has gone along a direction of length 1. */
+static double along(const scene *s, const double *x, int32_t i, const double n[3])
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++)
+        sum += n[k] * (x[3 * i + k] - s->model->rest[3 * i + k]);
+    return sum;
+}
+
+/* A sheet on inclined rails slides as one that falls freely with the part of gravity along the rails, by
+ * every method: to rounding of 1 m and, as both solve their steps to a residual, 1e-9 m. */
+START_TEST(a_rail_leaves_its_direction_free)
+{
+    static const double g[3] = {1, -9, 2}, a[3] = {2.0 / 3, -1.0 / 3, 2.0 / 3};
+    const double fall = g[0] * a[0] + g[1] * a[1] + g[2] * a[2];
+    for (size_t i = 0; i < method_count; i++) {
+        double x[2][27];
+        for (int railed = 0; railed < 2; railed++) {
+            scene s = scene_open(
+                "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': "
+                "0.2, 'height': 0.2},"
+                "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2}, "
+                "'velocity': [0.4, -0.2, 0.4],"
+                "'terms': ['stretch.cst', 'bend.midedge'], %s}], 'gravity': [%.17g, %.17g, %.17g],"
+                "'integrator': {'method': '%s', 'dt': 0.01, 'atol_v': 1e-6, 'atol_x': 1e-7, "
+                "'iterations': 5, 'linear_tolerance': 1e-12}, "
+                "'controller': {'type': '%s'}, 'duration': 1}",
+                railed ? "'pins': [{'box': [[-1, -1, -1], [1, 1, 1]], 'axis': [2, -1, 2]}]" : "'pins': []",
+                railed ? g[0] : fall * a[0], railed ? g[1] : fall * a[1], railed ? g[2] : fall * a[2],
+                methods[i], controller(methods[i]));
+            ck_assert_int_eq(s.model->free_count, 9);
+            scene_advance(&s, 0.1);
+            memcpy(x[railed], scene_state(&s)->x, sizeof x[railed]);
+            scene_close(&s);
+        }
+        for (int k = 0; k < 27; k++)
+            ck_assert_msg(fabs(x[0][k] - x[1][k]) < 1e-9, "%s: %g", methods[i], x[0][k] - x[1][k]);
+    }
+}
+END_TEST
+
+/* A bar of springs between two walls, that sags, and its half with a plane of symmetry in the middle, where
+ * masses are halved. All nodes stay in their planes z, so that the springs across carry nothing. */
+static scene bar(const char *method, bool half)
+{
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': %d, 'rows': 2, 'width': %g, "
+        "'height': 0.1,"
+        "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, "
+        "'areal_density': 0.2},"
+        "'terms': [{'type': 'spring.structural', 'stiffness': 100, 'damping': 0.01}, {'type': "
+        "'spring.shear', 'stiffness': 20}],"
+        "'masses': [{'box': [[-9, -9, -9], [9, 9, 9]], 'mass': 0.01}%s], 'pins': [{'edge': 'left'},"
+        "{'edge': 'right'%s}, {'box': [[-9, -9, -9], [9, 9, 9]], 'normal': [0, 0, 3]}]}],"
+        "'integrator': {'method': '%s', 'dt': 0.005, 'tolerance': 1e-10, 'rtol': 1e-7, 'error': 1e-9, "
+        "'iterations': 5,"
+        "'linear_tolerance': 1e-10}, 'controller': {'type': '%s'}, 'duration': 1}",
+        half ? 5 : 9, half ? 0.5 : 1.0, half ? ", {'edge': 'right', 'mass': 0.005}" : "",
+        half ? ", "
+               "'normal': [1, 0, 0]"
+             : "",
+        method, controller(method));
+}
+
+/* Methods that solve their steps, to a residual of 1e-10 N, differ by that; those that choose their steps,
+ * by their error of 1e-7 of the size. Both sag by more than 5 cm in 0.1 s. Along the directions of space
+ * what is held does not move at all. */
+START_TEST(half_with_a_plane_of_symmetry_moves_as_the_whole)
+{
+    for (size_t i = 0; i < method_count; i++) {
+        scene whole = bar(methods[i], false), half = bar(methods[i], true);
+        ck_assert_int_eq(half.model->free_count, 8);
+        ck_assert_int_eq(half.model->support_count, 8);
+        ck_assert_int_eq(half.model->supports[3].count, 2);
+        scene_advance(&whole, 0.1);
+        scene_advance(&half, 0.1);
+        const double *x = scene_state(&whole)->x, *y = scene_state(&half)->x;
+        double most = 0;
+        for (int row = 0; row < 2; row++)
+            for (int c = 0; c < 5; c++)
+                for (int k = 0; k < 3; k++)
+                    most = fmax(most, fabs(x[3 * (9 * row + c) + k] - y[3 * (5 * row + c) + k]));
+        printf("# %s: %.2g, sag %.3g\n", methods[i], most, -x[13]);
+        ck_assert_double_gt(-x[13], 0.02);
+        ck_assert_msg(most < 2e-6, "%s: %g", methods[i], most);
+        for (int32_t j = 0; j < half.model->node_count; j++) {
+            ck_assert_double_eq(y[3 * j + 2], half.model->rest[3 * j + 2]);
+            if (j % 5 == 4)
+                ck_assert_double_eq(y[3 * j], half.model->rest[3 * j]);
+        }
+        scene_close(&whole), scene_close(&half);
+    }
+}
+END_TEST
+
+/* A sheet with its edges on an inclined plane: its nodes stay in it to rounding, and the results do not
+ * depend on threads. */
+START_TEST(nodes_stay_in_an_inclined_plane)
+{
+    static const double n[3] = {2.0 / 7, 3.0 / 7, 6.0 / 7};
+    for (int m = 0; drape_integrators[m]; m++) {
+        uint64_t hash[2];
+        for (int threads = 1; threads <= 3; threads += 2) {
+            scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, "
+                                  "'rows': 5, 'width': 0.3, 'height': 0.3},"
+                                  "'material': {'young_modulus': 1e4, 'thickness': 1e-3, "
+                                  "'areal_density': 0.2},"
+                                  "'terms': ['stretch.cst', 'bend.hinge', {'type': 'damp.kelvin_voigt', "
+                                  "'beta': 0.01}],"
+                                  "'pins': [{'corner': 'top-left'}, {'edge': 'right', 'normal': [2, 3, "
+                                  "6]}, {'edge': 'left', 'normal': [2, 3, 6]}]}],"
+                                  "'integrator': {'method': '%s', 'dt': 0.01}, 'duration': 1}",
+                                  drape_integrators[m]->entry.name);
+            drape_sim_def def;
+            drape_sim_def_init(&def, sizeof def);
+            def.threads = threads;
+            scene_start(&s, &def);
+            scene_advance(&s, 0.05);
+            const drape_state *now = scene_state(&s);
+            for (int32_t i = 0; i < s.model->support_count; i++) {
+                const int32_t node = s.model->supports[i].node;
+                ck_assert_double_le(fabs(along(&s, now->x, node, n)), 1e-15);
+                ck_assert_double_le(
+                    fabs(n[0] * now->v[3 * node] + n[1] * now->v[3 * node + 1] + n[2] * now->v[3 * node + 2]),
+                    1e-14);
+            }
+            hash[threads / 2] = drape_state_hash(s.model, now);
+            scene_close(&s);
+        }
+        ck_assert_uint_eq(hash[0], hash[1]);
+    }
+}
+END_TEST
+
+/* Supports in three planes leave nothing free; a plane given twice counts once; a pin that holds its node
+ * altogether goes before them. The supports of a resting sheet carry its weight, along their directions
+ * only. */
+START_TEST(supports_combine_and_carry_the_weight)
+{
+    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
+                         "'width': 0.3, 'height': 0.3,"
+                         "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': "
+                         "1e-3, 'areal_density': 0.2},"
+                         "'terms': ['stretch.cst', 'bend.hinge'],"
+                         "'pins': [{'box': [[-9, -9, -9], [9, 9, 9]], 'normal': [0, 1, 0]}, {'nodes': "
+                         "[5], 'normal': [0, -2, 0]},"
+                         "{'nodes': [0], 'normal': [1, 0, 0]}, {'nodes': [0], 'axis': [1, 1, 0]}, "
+                         "{'nodes': [3]}, {'nodes': [6], 'axis': [1, 0, 0]}]}],"
+                         "'gravity': [0, %g, 0], 'integrator': {'method': 'static'}, 'duration': 1}",
+                         -GRAVITY);
+    double force[48], sum[3] = {0};
+    ck_assert_int_eq(s.model->free_count, 14);
+    ck_assert(s.model->pinned[0] && s.model->pinned[3]);
+    for (int32_t i = 0; i < s.model->support_count; i++)
+        ck_assert_int_eq(s.model->supports[i].count, s.model->supports[i].node == 6 ? 2 : 1);
+    scene_advance(&s, 1);
+    ck_assert_int_eq(drape_sim_reactions(s.sim, force), DRAPE_OK);
+    for (int i = 0; i < 48; i++) {
+        sum[i % 3] += force[i];
+        if (i % 3 != 1)
+            ck_assert_double_le(fabs(force[i]), 1e-12);
+    }
+    ck_assert_double_eq_tol(sum[1], GRAVITY * 0.2 * 0.09, 1e-12);
+    scene_close(&s);
+}
+END_TEST
+
+/* The matrix is that of the projected forces: differences of these along displacements that the supports
+ * allow. */
+START_TEST(the_jacobian_is_that_of_the_projected_forces)
+{
+    drape_check_result rows[64];
+    int32_t count = 0, jacobians = 0;
+    scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
+                          "'width': 0.3, 'height': 0.3},"
+                          "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
+                          "'terms': ['stretch.cst', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': "
+                          "0.01}, {'type': 'drag.viscous', 'coefficient': 1}],"
+                          "'pins': [{'row': 0, 'normal': [1, 2, 3]}, {'row': 2, 'axis': [1, -1, 1]}]}], "
+                          "'duration': 1}");
+    ck_assert_int_eq(drape_model_check_derivatives(s.model, 1, rows, 64, &count), DRAPE_OK);
+    for (int32_t i = 0; i < count && i < 64; i++) {
+        ck_assert_msg(rows[i].pass, "%s %s: %g", rows[i].term, rows[i].what, rows[i].error);
+        jacobians += strcmp(rows[i].term, "assembled") == 0;
+    }
+    ck_assert_int_gt(jacobians, 0);
+    scene_close(&s);
+}
+END_TEST
+
+/* A host's velocities lose what is held; placed cloth takes its directions along: on a slope of 30 degrees
+ * the sheet, which was held in a level plane, slides along the slope. */
+START_TEST(states_and_placements_of_a_host)
+{
+    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 2, 'rows': 2, "
+                         "'width': 0.3, 'height': 0.3,"
+                         "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': "
+                         "1e-3, 'areal_density': 0.2},"
+                         "'terms': ['stretch.cst'], 'velocity': [1, 2, 3], 'pins': [{'row': 0, 'normal': "
+                         "[0, 1, 0]},"
+                         "{'row': 1, 'normal': [0, 1, 0]}]}], 'integrator': {'dt': 0.01, 'tolerance': "
+                         "1e-12}, 'duration': 1}");
+    double x[12], v[12];
+    drape_place_def def;
+    for (int i = 0; i < 12; i++)
+        ck_assert_double_eq(scene_state(&s)->v[i], i % 3 == 1 ? 0 : i % 3 + 1);
+    memcpy(x, scene_state(&s)->x, sizeof x);
+    memset(v, 0, sizeof v);
+    for (int i = 0; i < 4; i++)
+        v[3 * i + 1] = 5;
+    ck_assert_int_eq(drape_sim_set_state(s.sim, 0, x, v), DRAPE_OK);
+    for (int i = 0; i < 12; i++)
+        ck_assert_double_eq(scene_state(&s)->v[i], 0);
+    drape_place_def_init(&def, sizeof def);
+    def.rotate[2] = 1, def.rotate[3] = 30;
+    ck_assert_int_eq(drape_sim_place(s.sim, &def), DRAPE_OK);
+    memcpy(x, scene_state(&s)->x, sizeof x);
+    scene_advance(&s, 0.1);
+    /* backward Euler, 10 steps: h^2 a (1 + 2 + ... + 10) */
+    const double fall = 9.81 * 0.5 * 1e-4 * 55, to[3] = {-fall * sqrt(0.75), -fall * 0.5, 0};
+    for (int i = 0; i < 12; i++)
+        ck_assert_double_eq_tol(scene_state(&s)->x[i] - x[i], to[i % 3], 1e-9);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Pins that turn ---- */
+
+/* Both ends of a strip turn about the axis of the strip by 90 degrees in opposite senses, and one is drawn
+ * away: at every time the nodes are where the rotation by 90 t degrees and the displacement take them, by
+ * every method. */
+START_TEST(pins_turn_as_one_body_about_their_pivot)
+{
+    for (int m = 0; drape_integrators[m]; m++) {
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 3, 'width': 0.4, "
+            "'height': 0.2,"
+            "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, "
+            "'areal_density': 0.2},"
+            "'terms': ['stretch.cst', 'bend.hinge'], 'start': {'transform': {'translate': [0, 1, 0]}}, "
+            "'pins': ["
+            "{'edge': 'left', 'turns': [{'time': 0, 'rotate': [1, 0, 0, 0]}, {'time': 1, 'rotate': [1, 0, 0, "
+            "90]}]},"
+            "{'edge': 'right', 'pivot': [0.4, 1.1, 0], 'track': [[0, [0, 0, 0]], [1, [0.1, 0, 0]]],"
+            " 'turns': [{'time': 0, 'rotate': [1, 0, 0, 0]}, {'time': 1, 'rotate': [1, 0, 0, -90]}]}]}],"
+            "'integrator': {'method': '%s', 'dt': 0.01}, 'controller': {'type': '%s'}, 'duration': 1}",
+            drape_integrators[m]->entry.name, controller(drape_integrators[m]->entry.name));
+        const double middle = s.model->rest[3 * 5 + 2]; /* z of the middle row */
+        scene_advance(&s, 0.2);
+        for (int32_t i = 0; i < 15; i++) {
+            const double *x = scene_state(&s)->x + 3 * i, *rest = s.model->rest + 3 * i;
+            const bool left = i % 5 == 0, right = i % 5 == 4;
+            const double angle = (left ? 18 : -18) * acos(-1) / 180, y = left ? 0 : -0.1,
+                         z = left ? rest[2] - middle : rest[2];
+            const double to[3] = {rest[0] + (right ? 0.02 : 0),
+                                  (left ? 1 : 1.1) + cos(angle) * y - sin(angle) * z,
+                                  (left ? middle : 0) + sin(angle) * y + cos(angle) * z};
+            for (int k = 0; (left || right) && k < 3; k++)
+                ck_assert_msg(fabs(x[k] - to[k]) < 1e-14,
+                              "%s: node %d: "
+                              "%g",
+                              drape_integrators[m]->entry.name, (int)i, x[k] - to[k]);
+        }
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* A sheet whose edge has turned by a right angle is at equilibrium where the whole has turned with it: no
+ * energy and no reaction are left, to the residual of 1e-8 N. */
+START_TEST(a_sheet_follows_its_turned_edge)
+{
+    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 3, "
+                         "'width': 0.3, 'height': 0.2,"
+                         "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': "
+                         "1e-2, 'areal_density': 0.2},"
+                         "'terms': ['stretch.cst', 'bend.hinge'], 'pins': [{'box': [[-1, -1, -1], [0.11, "
+                         "1, 1]], 'pivot': [0, 0, 0],"
+                         "'turns': [{'time': 0, 'rotate': [0, 0, 1, 0]}, {'time': 1, 'rotate': [0, 0, 1, "
+                         "90]}]}]}], 'gravity': "
+                         "[0, 0, 0],"
+                         "'integrator': {'method': 'static', 'dt': 0.1, 'tolerance': 1e-10}, 'duration': 1}");
+    scene_advance(&s, 1);
+    for (int32_t i = 0; i < 12; i++) {
+        const double *x = scene_state(&s)->x + 3 * i, *rest = s.model->rest + 3 * i,
+                     to[3] = {-rest[1], rest[0], rest[2]};
+        for (int k = 0; k < 3; k++)
+            ck_assert_double_eq_tol(x[k], to[k], 1e-6);
+    }
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("support", a_rail_leaves_its_direction_free, half_with_a_plane_of_symmetry_moves_as_the_whole,
+      nodes_stay_in_an_inclined_plane, supports_combine_and_carry_the_weight,
+      the_jacobian_is_that_of_the_projected_forces, states_and_placements_of_a_host,
+      pins_turn_as_one_body_about_their_pivot, a_sheet_follows_its_turned_edge)
