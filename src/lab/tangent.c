@@ -125,7 +125,7 @@ drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor,
     if (!status && drape_system_contact(sim->system))
         status = drape_system_add_contact(t->system);
     if (!status)
-        status = drape_system_continue(t->system, sim->system, same);
+        status = drape_system_continue(t->system, sim->system, same, drape_sim_state(sim)->t);
     if (!status)
         drape_system_copy_wind(t->system, sim->system);
     return status ? status : read_state(t, arena);
