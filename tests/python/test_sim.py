@@ -291,6 +291,19 @@ def test_threads():
     equal(outcome, [drape.Status.E_STOPPED])
 
 
+def test_callbacks_in_threads():
+    """a wind and a term in Python are called from the threads of a sim, with the same result"""
+    hashes = set()
+    for threads in (1, 3):
+        term = drape.Term("my.weight", 1, lambda cloth: (np.arange(len(cloth.rest))[:, None], cloth.node_mass[:, None]),
+                          lambda x, mass: (mass[:, 0] * x[:, 0, 1], mass[:, :, None] * [0, 1, 0], np.zeros((3, 3))), external=True)
+        sim = drape.Sim(drape.Model(sheet(terms=["stretch.edge", "drag.wind", "my.weight"]), terms=[term]), threads=threads)
+        sim.set_wind(lambda t, x: np.sin(x + t))
+        sim.advance(0.1)
+        hashes.add(sim.hash)
+    equal(len(hashes), 1)
+
+
 def test_interrupt():
     """Ctrl-C ends an advance with KeyboardInterrupt; the sim goes on afterwards, and the handler is as before"""
     before, sim = signal.getsignal(signal.SIGINT), drape.Sim(sheet())
