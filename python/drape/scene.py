@@ -303,7 +303,7 @@ class Model:
 # ---- Values of a scene ----
 
 _ABSENT = object()
-_FILES = ("file", "mesh", "times")  # keys whose texts are names of files: of meshes and of colliders
+_FILES = ("file", "mesh", "times", "velocities")  # keys whose texts are names of files
 
 
 def _read(path: str):
