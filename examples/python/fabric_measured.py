@@ -20,7 +20,7 @@ def strip(fabric, length):
     along = {"warp_direction": [1, 0, 0]}
     return drape.Sim({
         "drape": 1, "duration": 1, "gravity": [0, -g, 0], "integrator": {"method": "static", "tolerance": 1e-10},
-        "cloth": [{"mesh": {"grid": "irregular", "columns": 31, "rows": 5, "width": length, "height": 0.1 * length}, "material": {"fabric": fabric},
+        "cloth": [{"mesh": {"grid": "irregular", "columns": 21, "rows": 4, "width": length, "height": 0.1 * length}, "material": {"fabric": fabric},
                    "terms": [{"type": "stretch.cst", **along}, {"type": "bend.midedge", **along}], "pins": [{"edge": "left", "clamp": True}]}]})
 
 
