@@ -20,7 +20,7 @@ def strip(fabric, length):
     along = {"warp_direction": [1, 0, 0]}
     return drape.Sim({
         "drape": 1, "duration": 1, "gravity": [0, -g, 0], "integrator": {"method": "static", "tolerance": 1e-10},
-        "cloth": [{"mesh": {"grid": "irregular", "columns": 31, "rows": 5, "width": length, "height": 0.1 * length}, "material": {"fabric": fabric},
+        "cloth": [{"mesh": {"grid": "irregular", "columns": 21, "rows": 4, "width": length, "height": 0.1 * length}, "material": {"fabric": fabric},
                    "terms": [{"type": "stretch.cst", **along}, {"type": "bend.midedge", **along}], "pins": [{"edge": "left", "clamp": True}]}]})
 
 
@@ -46,7 +46,6 @@ print(f"{len(expected)} fabrics, the largest deviation is {100 * abs(obtained / 
 # %%
 import matplotlib.pyplot as plt
 
-ax = plt.figure().add_subplot()
-ax.plot(1e3 * expected, 1e3 * obtained, "o")
-ax.plot([0, 1e3 * expected.max()], [0, 1e3 * expected.max()], lw=0.5)
-ax.set(xlabel="lengthening by the measured curve [mm]", ylabel="simulated [mm]")
+ax = plt.figure(constrained_layout=True).add_subplot()
+ax.bar(range(1, len(expected) + 1), 100 * (obtained / expected - 1))
+ax.set(xlabel="fabric, by its place in `drape list fabrics`", ylabel="lengthening, simulated over measured, minus 1 [%]")

@@ -12,7 +12,7 @@ from . import plot
 from ._binding import (Attempt, CheckResult, ClothRange, ColliderMotion, Diagnostic, Energy, EventKind, EventRecord, Realtime, Relaxed, SeamReport,
                        Statistics, Status, Untangling, Warning)
 from ._library import (ArgumentError, Error, FileError, OutOfMemory, ParseError, SolverError, StepError, Stopped, VersionError, lib as _lib)
-from .lab import converge, info, schema, stability, tradeoff, validate
+from .lab import converge, info, modes, path, schema, stability, tradeoff, validate
 from .mesh import Mesh
 from .runs import Page, Run, load, run
 from .scene import Model, Scene
@@ -24,4 +24,4 @@ __version__: str = _lib.drape_version().decode()
 __all__ = ["ArgumentError", "Attempt", "CheckResult", "Cloth", "ClothRange", "ColliderMotion", "Diagnostic", "Embedding", "Energy", "Error", "Event", "EventKind",
            "EventRecord", "FileError", "Frame", "Mesh", "Model", "OutOfMemory", "Page", "ParseError", "Realtime", "Relaxed", "Run", "Scene", "SeamReport",
            "Sim", "SolverError", "Statistics", "Status", "StepError", "Stopped", "Term", "Untangling", "VersionError", "Warning", "converge", "info", "load",
-           "plot", "run", "schema", "stability", "tradeoff", "validate"]
+           "modes", "path", "plot", "run", "schema", "stability", "tradeoff", "validate"]

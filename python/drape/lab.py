@@ -11,11 +11,11 @@ from .scene import Scene
 AnyScene = Union[Scene, Mapping, str, os.PathLike]
 
 
-def _experiment(verb: str, scene: AnyScene, out, options: Mapping[str, Any]) -> Table:
+def _experiment(verb: str, scene: AnyScene, out, options: Mapping[str, Any], name: str = "results.csv", more: Sequence[str] = ()) -> Table:
     with tempfile.TemporaryDirectory(prefix="drape-") as folder, SceneFile(scene) as path:
         out = os.path.join(folder, "out") if out is None else os.fspath(out)
-        call(verb, path, "--out", out, *arguments(options))
-        return read_csv(os.path.join(out, "results.csv"))
+        call(verb, path, "--out", out, *arguments(options), *more)
+        return read_csv(os.path.join(out, name))
 
 
 def tradeoff(scene: AnyScene, *, out=None, **options: Any) -> Table:
@@ -33,6 +33,18 @@ def stability(scene: AnyScene, axis: Mapping[str, Union[str, tuple]], *, out=Non
 def converge(scene: AnyScene, *, out=None, **options: Any) -> Table:
     """Orders of convergence in time and, with space=True, of the mesh. Options are those of `drape converge --help`."""
     return _experiment("converge", scene, out, options)
+
+
+def modes(scene: AnyScene, *, out=None, **options: Any) -> Table:
+    """Eigenfrequencies about a state of the scene or, with buckling=True, buckling loads: a row for each mode. Options are those of `drape modes --help`:
+    count=10, state="end" ..."""
+    return _experiment("modes", scene, out, options, "modes.csv")
+
+
+def path(scene: AnyScene, *, out=None, nodes: Sequence[int] = (), **options: Any) -> Table:
+    """The path of equilibria as all loads grow: a row for each point, with the displacements of these nodes. Options are those of `drape path --help`:
+    to=1.2, branch="+" ..."""
+    return _experiment("path", scene, out, options, "path.csv", [text for node in nodes for text in ("--node", str(node))])
 
 
 def validate(reference: Union[str, Sequence[str], None] = None) -> Table:

@@ -12,7 +12,7 @@ def _axes(ax: Any, **options: Any) -> Any:
     if ax is not None:
         return ax
     import matplotlib.pyplot as plt
-    return plt.figure(figsize=(6, 4)).add_subplot(**options)
+    return plt.figure(figsize=(6, 4), constrained_layout=True).add_subplot(**options)
 
 
 def energy(run: Union[Run, Any], which: Sequence[str] = ("kinetic", "elastic", "gravity", "contact", "total", "dissipated", "numerical"), ax: Any = None) -> Any:
@@ -46,14 +46,14 @@ def cloth(what: Union[Run, Sim, Mesh], frame: int = -1, values: Optional[np.ndar
     else:
         mesh = what
     ax = _axes(ax, projection="3d")
-    x = mesh.positions
-    surface = ax.plot_trisurf(x[:, 0], x[:, 2], x[:, 1], triangles=mesh.triangles, color=None if values is not None else "tab:blue", cmap="viridis" if values is not None else None,
-                              edgecolor=(0, 0, 0, 0.2), linewidth=0.2)
+    x = mesh.positions[:, [2, 0, 1]]  # matplotlib's third axis points up
+    colour = {"color": "tab:blue"} if values is None else {"cmap": "viridis"}
+    surface = ax.plot_trisurf(x[:, 0], x[:, 1], x[:, 2], triangles=mesh.triangles, edgecolor=(0, 0, 0, 0.2), linewidth=0.2, **colour)
     if values is not None:
         surface.set_array(np.asarray(values))
-        ax.figure.colorbar(surface, ax=ax, label=label)
-    ax.set(xlabel="x [m]", ylabel="z [m]", zlabel="y [m]")
-    ax.set_box_aspect(np.maximum(np.ptp(x[:, [0, 2, 1]], axis=0), 1e-3 * np.ptp(x)))
+        ax.figure.colorbar(surface, ax=ax, label=label, shrink=0.7, pad=0.12)
+    ax.set(xlabel="z [m]", ylabel="x [m]", zlabel="y [m]")
+    ax.set_box_aspect(np.maximum(np.ptp(x, axis=0), 1e-3 * np.ptp(x)))
     return ax
 
 
@@ -73,7 +73,7 @@ def stability(results: Any, x: str, y: Optional[str] = None, integrator: Optiona
         ax.set_yticks(range(len(names)), names)
     else:
         ax.set(ylabel=y, yscale="log", title=integrator or names[0])
-    ax.legend()
+    ax.legend(loc="upper left", bbox_to_anchor=(1, 1))
     return ax
 
 

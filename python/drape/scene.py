@@ -179,6 +179,7 @@ class Model:
             _remove(folder)
         self._handle = Handle(model, lib.drape_model_destroy, self._context)
         self._address = self._handle.address
+        self._colliders: Optional[List[str]] = None  # their names, once they are asked for
 
     def _raise_pending(self) -> None:
         for term in self.terms:
@@ -250,7 +251,9 @@ class Model:
 
     def collider_index(self, which: Union[int, str]) -> int:
         """The number of a collider that is given by number or name."""
-        names = [lib.drape_model_collider(self._address, k, 0.0).name.decode() for k in range(self.collider_count)]
+        if self._colliders is None:
+            self._colliders = [lib.drape_model_collider(self._address, k, 0.0).name.decode() for k in range(self.collider_count)]
+        names = self._colliders
         if isinstance(which, str) and which in names:
             return names.index(which)
         if isinstance(which, str) or not 0 <= which < len(names):
@@ -300,6 +303,7 @@ class Model:
 # ---- Values of a scene ----
 
 _ABSENT = object()
+_FILES = ("file", "mesh", "times", "velocities")  # keys whose texts are names of files
 
 
 def _read(path: str):
@@ -335,7 +339,7 @@ def _plain(value, mesh_name, folder: Optional[str] = None):
             return {name: plain(part, name) for name, part in item.items()}
         if isinstance(item, (list, tuple)):
             return [plain(part) for part in item]
-        if folder and key == "file" and isinstance(item, str) and not os.path.isabs(item):
+        if folder and key in _FILES and isinstance(item, str) and not os.path.isabs(item):
             return os.path.join(folder, item)
         return item
 

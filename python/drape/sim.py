@@ -76,6 +76,7 @@ class Sim:
         self.model = scene if isinstance(scene, Model) else Model(scene)
         self._context = Context()
         self._lock = self._context.lock
+        self._alive = threading.RLock()  # so that cancel(), which does not wait for the sim, does not meet close()
         definition = c.drape_sim_def()
         keep: List[Any] = []
         lib.drape_sim_def_init(definition, ctypes.sizeof(definition))
@@ -105,7 +106,8 @@ class Sim:
         with self._lock:
             if self._advancing:
                 raise ArgumentError("a callback must not close the sim that calls it")
-            self._address = None
+            with self._alive:
+                self._address = None
             self._handle.close()
 
     def __enter__(self) -> "Sim":
@@ -195,9 +197,9 @@ class Sim:
 
     def cancel(self) -> None:
         """Ends the running advance, or the next one, with the exception Stopped. May be called from any thread."""
-        address = self._address
-        if address is not None:
-            lib.drape_sim_cancel(address)
+        with self._alive:
+            if self._address is not None:
+                lib.drape_sim_cancel(self._address)
 
     @header("drape_sim_observe")
     def observe(self, observer: Observer, *kinds: EventKind) -> Observer:

@@ -94,6 +94,22 @@ def test_lab():
     assert "properties" in drape.schema()
 
 
+def test_modes():
+    """frequencies and paths of equilibria are tables"""
+    verbs = subprocess.run([os.environ["DRAPE_PROGRAM"], "help"], capture_output=True, text=True, check=True).stdout
+    if "  modes " not in verbs:
+        raise Skip("no modes in this build")
+    strip = sheet(mesh={"grid": "irregular", "columns": 21, "rows": 3, "width": 1, "height": 0.04}, pins=[{"edge": "left", "clamp": True}], colliders=[], gravity=[0, 0, 0],
+                  material={"young_modulus": 1200, "poisson_ratio": 0, "thickness": 0.01, "areal_density": 0.1},
+                  terms=["stretch.cst", "bend.midedge", {"type": "load.line", "edge": "right", "force": [-2.4674e-4, 0, 0]}], integrator={"method": "static"})
+    found = columns(drape.modes(strip, count=3, state="start"))
+    assert found["kind"].tolist() == ["vibration"] * 3 and np.all(np.diff(found["frequency"]) > 0)
+    loads = columns(drape.modes(strip, count=1, state="start", buckling=True))
+    assert abs(loads["value"][0] - 1) < 0.01  # Euler's load by the choice of the force; the mesh has 21 columns
+    points = columns(drape.path(strip, to=0.5, nodes=[20], out="path"))
+    assert points["factor"][-1] == 0.5 and "u20_x" in points and os.path.exists("path/path.csv")
+
+
 def test_plots():
     """plots are drawn of runs, sims, meshes and tables"""
     need("matplotlib").use("agg")

@@ -63,7 +63,10 @@ def test_files():
     equal(drape.Model("moved.json").node_count, 3)
     for name in sorted(os.listdir(SOURCES + "/examples/scenes")):
         if name.endswith(".json"):
-            drape.Scene(f"{SOURCES}/examples/scenes/{name}")  # all of them are read
+            scene = drape.Scene(f"{SOURCES}/examples/scenes/{name}")  # all of them are read
+            scene.write("moved.json")
+    drape.Scene(SOURCES + "/examples/scenes/limb.json").write("limb.json")  # has a mesh that is animated by another file
+    equal(drape.Model("limb.json").node_count, drape.Model(SOURCES + "/examples/scenes/limb.json").node_count)
 
 
 def test_errors():
@@ -291,6 +294,19 @@ def test_threads():
     equal(outcome, [drape.Status.E_STOPPED])
 
 
+def test_callbacks_in_threads():
+    """a wind and a term in Python are called from the threads of a sim, with the same result"""
+    hashes = set()
+    for threads in (1, 3):
+        term = drape.Term("my.weight", 1, lambda cloth: (np.arange(len(cloth.rest))[:, None], cloth.node_mass[:, None]),
+                          lambda x, mass: (mass[:, 0] * x[:, 0, 1], mass[:, :, None] * [0, 1, 0], np.zeros((3, 3))), external=True)
+        sim = drape.Sim(drape.Model(sheet(terms=["stretch.edge", "drag.wind", "my.weight"]), terms=[term]), threads=threads)
+        sim.set_wind(lambda t, x: np.sin(x + t))
+        sim.advance(0.1)
+        hashes.add(sim.hash)
+    equal(len(hashes), 1)
+
+
 def test_interrupt():
     """Ctrl-C ends an advance with KeyboardInterrupt; the sim goes on afterwards, and the handler is as before"""
     before, sim = signal.getsignal(signal.SIGINT), drape.Sim(sheet())
@@ -377,6 +393,38 @@ def test_moving():
     sim.change(sheet(gravity=[0, 0, 0], colliders=[]))
     equal(sim.model.collider_count, 0)
     assert sim.untangle().clear
+
+
+def test_deforming():
+    """the points of a collider that deforms are sent and read"""
+    corners = np.array([[0.1, -0.3, -0.4], [0.4, -0.3, -0.4], [0.25, -0.3, -0.1], [0.25, -0.15, -0.3]])
+    drape.Mesh(corners, [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]).write("body.obj")
+    sim = drape.Sim(sheet(colliders=[{"type": "animated_mesh", "name": "body", "file": "body.obj"}], contact={"distance": 0.01}))
+    sent = corners + [0, -0.1, 0]
+    sim.deform_collider("body", sent, 0.1)
+    sim.advance(0.05)
+    x, v = sim.collider_points("body")
+    assert np.allclose(x, (corners + sent) / 2) and np.allclose(v, [0, -1, 0])
+    sim.advance(0.1)
+    assert np.allclose(sim.collider_points("body")[0], sent, atol=1e-12)
+    raises(drape.ArgumentError, sim.deform_collider, "body", sent[:3], 0.1)
+
+
+def test_seams():
+    """seams report what they join and carry"""
+    scene = drape.Scene(sheet(colliders=[]))
+    other = json.loads(json.dumps(scene["/cloth/0"]))
+    other.update(name="other", pins=[])
+    other["mesh"]["transform"] = {"translate": [0, 0, -0.55]}
+    scene["/cloth/-"] = other
+    scene["/seams"] = [{"type": "stitch", "closing": 0.05, "a": {"cloth": "sheet", "edge": "bottom"}, "b": {"cloth": "other", "edge": "top"}}]
+    sim = drape.Sim(scene)
+    sim.advance(0.1)
+    (seam,) = sim.seams
+    equal((seam.name, seam.type, seam.cloth, seam.pairs), ("seam0", "stitch", (0, 1), 6))
+    assert seam.gap_max < 0.05 and seam.tension > 0
+    equal([piece.name for piece in sim.model.cloths], ["sheet", "other"])
+    equal(sim.model.mesh(1).triangles.min(), 0)
 
 
 def test_wind():
