@@ -33,7 +33,7 @@ static void evaluate(const lab_tangent *t, const double *x, double factor, doubl
 {
     const drape_point point = point_at(t, x);
     const size_t count = (size_t)t->pattern->nonzeros;
-    drape_system_jacobian_without(t->system, &point, 0, 0, t->loads, values);
+    drape_system_jacobian_without(t->system, &point, 0, 0, t->without, values);
     if (factor == 0)
         return;
     memset(t->scratch, 0, count * sizeof *t->scratch);
@@ -112,13 +112,16 @@ drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor,
     t->zero = drape_arena_take(arena, 3 * (size_t)m->node_count, sizeof *t->zero);
     t->mass = drape_arena_take(arena, 3 * (size_t)m->free_count, sizeof *t->mass);
     t->loads = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->loads);
+    t->without = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->without);
     drape_status status = drape_arena_status(arena);
     if (status)
         return status;
     for (int32_t c = 0; c < m->collider_count; c++)
         same[c] = c;
-    for (int32_t i = 0; i < m->term_count; i++)
+    for (int32_t i = 0; i < m->term_count; i++) {
         t->loads[i] = m->terms[i].ops->external;
+        t->without[i] = t->loads[i] || m->terms[i].ops->dissipation;
+    }
     for (int32_t i = 0; i < 3 * m->free_count; i++)
         t->mass[i] = m->mass[m->node_of_free[i / 3]];
     status = drape_system_create(arena, m, drape_pool_threads(drape_system_pool(sim->system)), &t->system);
@@ -192,7 +195,7 @@ double lab_tangent_evaluate(const lab_tangent *t, const double *x, double factor
         take_free(m, loads, load);
     if (!force)
         return 0;
-    drape_system_force_without(t->system, &point, t->loads, g);
+    drape_system_force_without(t->system, &point, t->without, g);
     for (size_t i = 0; i < n; i++) {
         largest = fmax(largest, fabs(g[i]));
         g[i] += factor * loads[i];

@@ -21,7 +21,9 @@ typedef struct lab_tangent {
     double *scratch; /* (pattern.nonzeros) */
     double *nodes;   /* (2 x nodes x 3) scratch */
     bool *loads;     /* (term_count) the external terms */
-    double factor;   /* of the loads */
+    bool *without; /* (term_count) these, and those that dissipate energy, such as drag in the wind: they have
+                        no part in an equilibrium or in K */
+    double factor; /* of the loads */
     drape_arena *arena;
 } lab_tangent;
 
