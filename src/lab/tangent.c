@@ -20,8 +20,8 @@ static drape_point point_at(const lab_tangent *t, const double *x)
         .x = x, .v = t->zero, .internal = now->internal, .t = now->t, .span = {now->t, now->t}};
 }
 
-/* values = K at nodes x and a factor of the loads: K without the loads, and the factor times the difference that
- * they make. */
+/* values = K at nodes x and a factor of the loads: K without the loads, and the factor times the difference
+ * that they make. */
 static void evaluate(const lab_tangent *t, const double *x, double factor, double *values)
 {
     const drape_point point = point_at(t, x);
