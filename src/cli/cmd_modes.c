@@ -3,6 +3,7 @@
 #include "cli/cli.h"
 #include "cli/shapes.h"
 #include "cli/signals.h"
+#include "cli/state.h"
 
 #include "drape/lab.h"
 #include "io/csv.h"
@@ -30,50 +31,8 @@ typedef struct modes_request {
 typedef struct job {
     const modes_request *request;
     cli_scene in;
-    double load_factor; /* of the state */
     drape_modes modes;
 } job;
-
-/* ---- The state ---- */
-
-/* The states about which modes are sought. */
-static const struct state {
-    const char *name;
-    const char *integrator; /* NULL: the scene's */
-    bool advances;
-    double load_factor; /* under which it is an equilibrium */
-} states[] = {
-    {"static", "static", true, 1},
-    {"start", NULL, false, 0},
-    {"end", NULL, true, 1},
-};
-#define STATES (sizeof states / sizeof *states)
-
-static const struct state *find_state(const char *name)
-{
-    for (size_t i = 0; i < STATES; i++)
-        if (strcmp(states[i].name, name) == 0)
-            return &states[i];
-    return NULL;
-}
-
-static drape_status choose(void *user, const cli_scene *scene, drape_sim_def *def)
-{
-    const struct state *state = user;
-    (void)scene;
-    def->integrator = state->integrator;
-    return DRAPE_OK;
-}
-
-static drape_status reach(const job *j, const struct state *state)
-{
-    if (!state->advances)
-        return DRAPE_OK;
-    cli_signals_cancel(j->in.sim);
-    drape_status status = drape_sim_advance(j->in.sim, drape_model_duration(j->in.model));
-    cli_signals_cancel(NULL);
-    return status == DRAPE_E_STOPPED && drape_sim_stopped_by(j->in.sim) >= 0 ? DRAPE_OK : status;
-}
 
 /* ---- Tables ---- */
 
@@ -231,7 +190,7 @@ static int code_of(const cli_command *command, drape_status status)
     return cli_report(command, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED);
 }
 
-static int compute(job *j, const struct state *state)
+static int compute(job *j, const cli_state *state)
 {
     const modes_request *request = j->request;
     drape_modes_def def;
@@ -239,7 +198,7 @@ static int compute(job *j, const struct state *state)
     def.count = request->count ? request->count : def.count;
     def.buckling = request->buckling;
     def.load_factor = state->load_factor;
-    drape_status status = reach(j, state);
+    drape_status status = cli_state_reach(state, &j->in);
     if (!status)
         status = drape_sim_modes(j->in.sim, &def, &j->modes);
     if (!status && request->out)
@@ -257,13 +216,12 @@ static int run(const void *command)
 {
     const modes_request *request = command;
     job j = {.request = request};
-    const struct state *state = request->state ? find_state(request->state) : &states[0];
-    if (!state)
-        return cli_misuse("modes", "--state \"%.60s\": it is static, start or end", request->state);
-    int code = cli_shapes_check(&request->command, request->out);
+    const cli_state *state = NULL;
+    int code = cli_state_find(&request->command, request->state ? request->state : "static", &state);
     if (code == CLI_GO_ON)
-        code = cli_scene_load_with(&request->command, request->command.operand, choose,
-                                   (void *)(uintptr_t)state, &j.in);
+        code = cli_shapes_check(&request->command, request->out);
+    if (code == CLI_GO_ON)
+        code = cli_state_load(&request->command, state, &j.in);
     if (code == CLI_GO_ON)
         code = compute(&j, state);
     drape_modes_free(&j.modes);
@@ -273,10 +231,7 @@ static int run(const void *command)
 
 static const cli_option options[] = {
     {"count", CLI_NUMBER, "N", "number of modes (default 6)", offsetof(modes_request, count), 100000, NULL},
-    {"state", CLI_TEXT, "STATE",
-     "static: the equilibrium that this integrator finds (default); start: as the scene begins; end: as it "
-     "ends",
-     offsetof(modes_request, state), 0, NULL},
+    {"state", CLI_TEXT, "STATE", CLI_STATES " (default static)", offsetof(modes_request, state), 0, NULL},
     {"buckling", CLI_FLAG, NULL, "factors of the scene's loads at which the cloth buckles",
      offsetof(modes_request, buckling), 0, NULL},
     {"out", CLI_TEXT, "DIR",

@@ -1,6 +1,7 @@
 /* cmd_path.c: `drape path`: the equilibria of a scene as its loads grow; a table, and a frame of each. */
 #include "cli/shapes.h"
 #include "cli/signals.h"
+#include "cli/state.h"
 
 #include "drape/lab.h"
 #include "io/csv.h"
@@ -17,7 +18,7 @@
 
 typedef struct path_request {
     cli_command command;
-    const char *out, *from, *to, *branch;
+    const char *out, *state, *from, *to, *branch;
     cli_texts nodes; /* whose displacements are columns */
     double step, max_arc;
     int points;
@@ -138,9 +139,11 @@ static int read_nodes(job *j)
     return CLI_GO_ON;
 }
 
-static int read_def(const path_request *request, drape_path_def *def)
+static int read_def(const path_request *request, const cli_state *state, drape_path_def *def)
 {
     drape_path_def_init(def, sizeof *def);
+    def->from = state->load_factor;
+    def->to = 1 + state->load_factor;
     if (!read_number(request->from, &def->from) || !read_number(request->to, &def->to) ||
         def->from == def->to)
         return cli_misuse("path", "--from and --to are two factors of the loads");
@@ -154,14 +157,14 @@ static int read_def(const path_request *request, drape_path_def *def)
     return CLI_GO_ON;
 }
 
-static int follow(job *j, drape_path_def *def)
+static int follow(job *j, const cli_state *state, drape_path_def *def)
 {
     const cli_command *command = &j->request->command;
     const cli_shapes shapes = {.folder = j->request->out, .table = TABLE, .frames = def->max_points};
-    drape_status status = DRAPE_OK;
+    drape_status status = cli_state_reach(state, &j->in);
     def->observer = observe;
     def->user = j;
-    if (shapes.folder)
+    if (!status && shapes.folder)
         status = cli_shapes_open(command, &j->in, &shapes, &j->recorder);
     if (!status && j->recorder)
         status = open_table(j);
@@ -188,15 +191,18 @@ static int run(const void *command)
     const path_request *request = command;
     job j = {.request = request};
     drape_path_def def;
-    int code = read_def(request, &def);
+    const cli_state *state = NULL;
+    int code = cli_state_find(&request->command, request->state ? request->state : "start", &state);
+    if (code == CLI_GO_ON)
+        code = read_def(request, state, &def);
     if (code == CLI_GO_ON)
         code = cli_shapes_check(&request->command, request->out);
     if (code == CLI_GO_ON)
-        code = cli_scene_load(&request->command, request->command.operand, &j.in);
+        code = cli_state_load(&request->command, state, &j.in);
     if (code == CLI_GO_ON)
         code = read_nodes(&j);
     if (code == CLI_GO_ON)
-        code = follow(&j, &def);
+        code = follow(&j, state, &def);
     drape_file_destroy(&j.table);
     drape_recorder_destroy(&j.recorder);
     cli_scene_free(&j.in);
@@ -204,10 +210,11 @@ static int run(const void *command)
 }
 
 static const cli_option options[] = {
-    {"from", CLI_TEXT, "FACTOR", "factor of the loads at the first point (default 0)",
+    {"state", CLI_TEXT, "STATE", CLI_STATES " (default start)", offsetof(path_request, state), 0, NULL},
+    {"from", CLI_TEXT, "FACTOR", "factor of the loads at the first point (default 0 from the start, else 1)",
      offsetof(path_request, from), 0, NULL},
-    {"to", CLI_TEXT, "FACTOR", "factor at which the path ends (default 1)", offsetof(path_request, to), 0,
-     NULL},
+    {"to", CLI_TEXT, "FACTOR", "factor at which the path ends (default 1 from the start, else 2)",
+     offsetof(path_request, to), 0, NULL},
     {"step", CLI_REAL, "FACTOR", "first increment of the factor (default: a twentieth of all)",
      offsetof(path_request, step), 0, NULL},
     {"max-arc", CLI_REAL, "METRES",

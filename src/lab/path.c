@@ -28,6 +28,7 @@
 #define WANTED          6    /* iterations of a step that is neither shortened nor lengthened */
 #define MAX_GROWTH      1.5  /* of the length of a step from one to the next */
 #define MAX_CORRECTION  3.0  /* of a step: a larger one has left the path */
+#define LEAST_COSINE    0.8  /* of the angle between a step and its prediction */
 #define LEAST_STEP      1e-7 /* of the first step */
 #define LONGEST         0.02 /* of the scene: the default of max_arc */
 #define NEAR            1e-3 /* of a step: so near a bifurcation is found before its branch is sought */
@@ -52,6 +53,7 @@ typedef struct follower {
     double *still;                /* (nodes) velocities */
     double *force, *load, *a, *b; /* (n) */
     double *step, *before;        /* (n) the step so far; the last one that was accepted */
+    double *ahead;                /* (n) the prediction */
     double *mode;                 /* (n) the unstable mode, |mode| = 1 */
     double change;                /* of the factor in the step so far */
     double change_before;         /* in the last accepted one */
@@ -177,16 +179,13 @@ static drape_status count_unstable(follower *p, double factor, int64_t *unstable
 
 /* Where the number of unstable modes changes, K was singular in between: at a limit point if the factor rises
  * along the tangent at one end of the step and falls at the other. Without that number, a limit is noted when
- * the factor has turned round. */
+ * the factor has turned round, in this step or in the one before. */
 static drape_status find_event(follower *p, drape_path_point *point)
 {
     const bool known = p->point.unstable >= 0 && point->unstable >= 0;
-    point->event = DRAPE_PATH_REGULAR;
-    if (point->number == 0)
-        return DRAPE_OK;
-    if (!known)
-        point->event = p->moved && p->change * p->change_before < 0 ? DRAPE_PATH_LIMIT : DRAPE_PATH_REGULAR;
-    if (!known || p->point.unstable == point->unstable)
+    const bool turned = p->moved && p->change * p->change_before < 0;
+    point->event = turned && p->point.event != DRAPE_PATH_LIMIT ? DRAPE_PATH_LIMIT : DRAPE_PATH_REGULAR;
+    if (point->number == 0 || !known || p->point.unstable == point->unstable)
         return DRAPE_OK;
     drape_status status = factor(p);
     point->event = dot(p, p->step, p->b) * p->direction < 0 ? DRAPE_PATH_LIMIT : DRAPE_PATH_BIFURCATION;
@@ -261,6 +260,13 @@ static double limit_of(const follower *p)
     return MAX_CORRECTION * norm(p, p->step);
 }
 
+/* Whether a step has left the direction of its prediction: the correction has then found another part of the
+ * path, such as the one that leads back. */
+static bool turns_away(const follower *p)
+{
+    return dot(p, p->step, p->ahead) < LEAST_COSINE * norm(p, p->step) * norm(p, p->ahead);
+}
+
 /* Tries a step of that length from the last point. */
 static drape_status attempt(follower *p, double length, drape_path_point *point)
 {
@@ -268,7 +274,10 @@ static drape_status attempt(follower *p, double length, drape_path_point *point)
     if (status)
         return status;
     predict(p, length);
+    memcpy(p->ahead, p->step, p->n * sizeof *p->step);
     status = correct(p, p->def->load_control ? CONTROL_LOAD : CONTROL_ARC, limit_of(p), point);
+    if (!status && !p->def->load_control && turns_away(p))
+        return DRAPE_RETRY_NONLINEAR;
     return status ? status : examine(p, point);
 }
 
@@ -470,7 +479,7 @@ static drape_status open(follower *p)
     p->n = (size_t)p->tangent.pattern->n;
     p->nodes = 3 * (size_t)m->node_count;
     p->solver = drape_linear_best(p->tangent.pattern->n);
-    double **const arrays[] = {&p->force, &p->load, &p->a, &p->b, &p->step, &p->before, &p->mode};
+    double **const arrays[] = {&p->force, &p->load, &p->a, &p->b, &p->step, &p->before, &p->ahead, &p->mode};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         *arrays[i] = drape_arena_take(&p->arena, p->n, sizeof **arrays[i]);
     p->x = drape_arena_take(&p->arena, p->nodes, sizeof *p->x);

@@ -20,26 +20,18 @@ static drape_point point_at(const lab_tangent *t, const double *x)
         .x = x, .v = t->zero, .internal = now->internal, .t = now->t, .span = {now->t, now->t}};
 }
 
-/* Adds the part of the loads at factor 1: their energies g, values; NULL: not that. */
-static void add_loads(const lab_tangent *t, const drape_point *point, double *g, double *values)
-{
-    for (int32_t i = 0; i < t->sim->model->term_count; i++)
-        if (t->loads[i])
-            drape_system_term(t->system, i, point, NULL, g, values);
-}
-
-/* values = K at nodes x and a factor of the loads. */
+/* values = K at nodes x and a factor of the loads: K without the loads, and the factor times the difference
+ * that they make. */
 static void evaluate(const lab_tangent *t, const double *x, double factor, double *values)
 {
     const drape_point point = point_at(t, x);
     const size_t count = (size_t)t->pattern->nonzeros;
-    drape_system_jacobian_without(t->system, &point, 0, 0, t->loads, values);
-    if (factor == 0)
+    drape_system_jacobian_without(t->system, &point, 0, 0, t->without, values);
+    if (factor == 0 || t->linear)
         return;
-    memset(t->scratch, 0, count * sizeof *t->scratch);
-    add_loads(t, &point, NULL, t->scratch);
+    drape_system_jacobian_without(t->system, &point, 0, 0, t->dissipative, t->scratch);
     for (size_t i = 0; i < count; i++)
-        values[i] += factor * t->scratch[i];
+        values[i] += factor * (t->scratch[i] - values[i]);
 }
 
 static void take_free(const drape_model *m, const double *nodes, double *free)
@@ -111,14 +103,20 @@ drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor,
     int32_t *same = drape_arena_take(arena, (size_t)m->collider_count, sizeof *same);
     t->zero = drape_arena_take(arena, 3 * (size_t)m->node_count, sizeof *t->zero);
     t->mass = drape_arena_take(arena, 3 * (size_t)m->free_count, sizeof *t->mass);
-    t->loads = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->loads);
+    t->dissipative = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->dissipative);
+    t->without = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->without);
     drape_status status = drape_arena_status(arena);
     if (status)
         return status;
     for (int32_t c = 0; c < m->collider_count; c++)
         same[c] = c;
-    for (int32_t i = 0; i < m->term_count; i++)
-        t->loads[i] = m->terms[i].ops->external;
+    t->linear = true;
+    for (int32_t i = 0; i < m->term_count; i++) {
+        const drape_term_ops *ops = m->terms[i].ops;
+        t->dissipative[i] = ops->dissipation;
+        t->without[i] = ops->dissipation || ops->external;
+        t->linear = t->linear && (!ops->external || ops->linear);
+    }
     for (int32_t i = 0; i < 3 * m->free_count; i++)
         t->mass[i] = m->mass[m->node_of_free[i / 3]];
     status = drape_system_create(arena, m, drape_pool_threads(drape_system_pool(sim->system)), &t->system);
@@ -186,18 +184,19 @@ double lab_tangent_evaluate(const lab_tangent *t, const double *x, double factor
     double *g = t->nodes, *loads = t->nodes + n, largest = 0;
     if (values)
         evaluate(t, x, factor, values);
-    memset(loads, 0, n * sizeof *loads);
-    add_loads(t, &point, loads, NULL);
-    if (load)
-        take_free(m, loads, load);
-    if (!force)
+    if (!force && !load)
         return 0;
-    drape_system_force_without(t->system, &point, t->loads, g);
+    drape_system_force_without(t->system, &point, t->without, g);
+    drape_system_force_without(t->system, &point, t->dissipative, loads);
     for (size_t i = 0; i < n; i++) {
         largest = fmax(largest, fabs(g[i]));
+        loads[i] -= g[i];
         g[i] += factor * loads[i];
     }
-    take_free(m, g, force);
+    if (load)
+        take_free(m, loads, load);
+    if (force)
+        take_free(m, g, force);
     return largest;
 }
 

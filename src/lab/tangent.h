@@ -14,14 +14,17 @@ typedef struct lab_tangent {
     const drape_sim *sim;
     drape_system *system; /* of its own: reading leaves no trace in the sim's */
     const drape_pattern *pattern;
-    double *mass;    /* (n) [kg] of each degree of freedom */
-    double *values;  /* (pattern.nonzeros) K [N/m] at the load factor that it was opened for */
-    double force;    /* [N] the largest force on a free node there; 0 in an equilibrium */
-    double *zero;    /* (nodes x 3) velocities */
-    double *scratch; /* (pattern.nonzeros) */
-    double *nodes;   /* (2 x nodes x 3) scratch */
-    bool *loads;     /* (term_count) the external terms */
-    double factor;   /* of the loads */
+    double *mass;      /* (n) [kg] of each degree of freedom */
+    double *values;    /* (pattern.nonzeros) K [N/m] at the load factor that it was opened for */
+    double force;      /* [N] the largest force on a free node there; 0 in an equilibrium */
+    double *zero;      /* (nodes x 3) velocities */
+    double *scratch;   /* (pattern.nonzeros) */
+    double *nodes;     /* (2 x nodes x 3) scratch */
+    bool *dissipative; /* (term_count) terms such as drag in the wind: they have no part in an equilibrium or
+                          in K */
+    bool *without;     /* (term_count) these, and the loads */
+    bool linear;       /* no load has a part in K */
+    double factor;     /* of the loads */
     drape_arena *arena;
 } lab_tangent;
 

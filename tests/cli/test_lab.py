@@ -692,7 +692,9 @@ def test_path():
         equal(len(list(csv.DictReader(file))), len(rows), "frames")
     straight = good("path", "column.json", "--to", "2", "--points", "40")
     assert "bifurcation" in straight, straight
-    for wrong in (["--from", "1"], ["--to", "x"], ["--branch", "2"], ["--node", "51"]):
+    hung = good("path", "column.json", "--state", "static", "--to", "1.5")
+    equal([hung.splitlines()[i].split()[1] for i in (1, -1)], ["1", "1.5"], "factors from an equilibrium")
+    for wrong in (["--from", "1"], ["--to", "x"], ["--branch", "2"], ["--node", "51"], ["--state", "middle"]):
         refused("path", "column.json", *wrong)
 
 
