@@ -22,7 +22,7 @@ static void take_set(drape_arena *arena, const drape_broad_phase *broad, drape_c
 drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, double margin,
                                      drape_candidates *out)
 {
-    *out = (drape_candidates){.arena = arena, .broad = broad, .margin = margin};
+    *out = (drape_candidates){.arena = arena, .broad = broad, .margin = margin, .sorter.arena = arena};
     const size_t marks = (size_t)(broad->points + broad->model->collider_count);
     for (int i = 0; i < DRAPE_CANDIDATE_SETS; i++)
         take_set(arena, broad, &out->set[i]);
@@ -157,7 +157,7 @@ static drape_status collect(drape_candidates *c, drape_candidate_set *set, const
     set->count = 0;
     set->known = true;
     drape_candidates_find(c->broad, &own, c->margin, marked, add, &(collector){c->arena, set});
-    return set->known ? DRAPE_OK : DRAPE_E_MEMORY;
+    return set->known ? drape_sort_pairs(&c->sorter, &set->pairs, &set->room, set->count) : DRAPE_E_MEMORY;
 }
 
 /* ---- Distance from the paths ---- */
@@ -368,14 +368,6 @@ static bool is_of(const drape_candidates *c, const drape_pair *pair, int set)
     return level == set;
 }
 
-static bool is_before(const drape_pair *a, const drape_pair *b)
-{
-    for (int i = 0; i < 3; i++)
-        if (a->rank[i] != b->rank[i])
-            return a->rank[i] < b->rank[i];
-    return false;
-}
-
 const drape_pair *drape_candidates_next(const drape_candidates *c, const drape_distances *away,
                                         drape_candidate_cursor *cursor)
 {
@@ -388,7 +380,7 @@ const drape_pair *drape_candidates_next(const drape_candidates *c, const drape_d
                                    (c->sets > 1 && !is_of(c, &set->pairs[at], i))))
             at++;
         cursor->at[i] = at;
-        if (at < set->count && (!next || is_before(&set->pairs[at], next))) {
+        if (at < set->count && (!next || drape_pair_is_before(&set->pairs[at], next))) {
             next = &set->pairs[at];
             from = i;
         }

@@ -13,6 +13,7 @@
 #define DRAPE_CONTACT_CANDIDATES_H
 
 #include "contact/broad_phase.h"
+#include "contact/sort_pairs.h"
 
 /* All points move straight from one end to the other. */
 typedef struct drape_straight_path {
@@ -40,14 +41,15 @@ typedef struct drape_candidates {
     uint8_t *level; /* (points + collider_count) the last set for which a point or collider was marked; 0 */
     bool *marked;   /* (points + collider_count) of the search in progress */
     bool *stale;    /* (collider_count) whose pairs have another activation distance by now */
+    drape_pair_sorter sorter;
 } drape_candidates;
 
 /* arena and broad must outlive the candidates. */
 drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, double margin,
                                      drape_candidates *out);
 
-/* Calls visit, by increasing rank, for all pairs that can become active while no point is farther than margin
- * from the path; marked: NULL for all, or (points + collider_count) those of which a pair must have one. The
+/* Calls visit, in the order of the broad phase, for all pairs that can become active while no point is farther
+ * than margin from the path; marked: NULL for all, or (points + collider_count) those of which a pair must have one. The
  * points of a marked collider must be marked, too. */
 void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *path, double margin,
                            const bool *marked, drape_broad_phase_visit *visit, void *user);

@@ -6,6 +6,7 @@
 #include "base/vec3.h"
 #include "contact/bound.h"
 
+#include <float.h>
 #include <string.h>
 
 #define KEEP_ITERATE 0.5 /* of what a gap has above the least, kept when a Newton iterate is cut short */
@@ -50,7 +51,8 @@ static bool comes_near(const path *p, const drape_pair *pair, double gap)
 
 /* A pair that does not come near limits nothing, so it makes no difference whether it is a candidate. Does
  * not search beyond the step fraction that another pair leaves: if forces throw nodes very far, a pair
- * approaches so slowly relative to its speed that searching each to its own end would take for ever. */
+ * approaches so slowly relative to its speed that searching each to its own end would take for ever. Of equal
+ * fractions that of the pair of lower rank counts, in whichever order pairs come. */
 static void follow(void *user, const drape_pair *pair)
 {
     path *p = user;
@@ -59,13 +61,13 @@ static void follow(void *user, const drape_pair *pair)
         drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius + p->stray ||
         drape_relaxed_factor(p->relaxed, pair) > 0)
         return;
-    const double limit = p->of_node ? 1 : p->fraction;
+    const double limit = p->of_node ? 1 : fmin((1 + 4 * DBL_EPSILON) * p->fraction, 1);
     const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->swings, p->keep, limit);
     if (fraction >= limit || !comes_near(p, pair, drape_pair_gap_value(pair, &from)))
         return;
     if (p->of_node)
         share(p, pair, fraction);
-    if (fraction >= p->fraction)
+    if (fraction > p->fraction || (fraction == p->fraction && !drape_pair_is_before(pair, &p->limiting)))
         return;
     p->fraction = fraction;
     p->limiting = *pair;
