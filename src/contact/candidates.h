@@ -38,9 +38,10 @@ typedef struct drape_candidates {
     drape_candidate_set
         set[DRAPE_CANDIDATE_SETS]; /* of all pairs, and patches, each later than those before */
     int sets;                      /* that are in use; 0: no search was made */
-    uint8_t *level; /* (points + collider_count) the last set for which a point or collider was marked; 0 */
-    bool *marked;   /* (points + collider_count) of the search in progress */
-    bool *stale;    /* (collider_count) whose pairs have another activation distance by now */
+    uint8_t *level;  /* (points + collider_count) the last set for which a point or collider was marked; 0 */
+    bool *marked;    /* (points + collider_count) of the search in progress */
+    uint8_t *beyond; /* (points + collider_count) bits of the sets from whose path it is too far */
+    bool *stale;     /* (collider_count) whose pairs have another activation distance by now */
     drape_pair_sorter sorter;
 } drape_candidates;
 
@@ -74,7 +75,7 @@ typedef struct drape_distances {
 } drape_distances;
 
 /* The distances of a path: as far as its ends are, at most. INFINITY if there was no search, or if a position
- * is not finite; those after one that is above the margin are not measured. */
+ * is not finite or beyond the margin; those after such a one are not measured. */
 drape_distances drape_candidates_distances(const drape_candidates *candidates,
                                            const drape_straight_path *path);
 

@@ -25,11 +25,13 @@ typedef struct path {
     const drape_swings *swings; /* NULL: no collider turns */
     double stray;               /* [m] how far points of colliders leave straight paths */
     const drape_keep *keep;
-    double fraction;
+    double fraction; /* of pairs of features */
+    double surface_fraction;
     drape_pair limiting;
     double *of_node; /* (nodes) the smallest fraction of a pair at each node; NULL: not wanted */
     int32_t nodes;
     const drape_relaxed_set *relaxed; /* their pairs limit nothing */
+    const drape_contact *surfaces;    /* its surfaces limit nodes, too; NULL: they do not */
 } path;
 
 /* The fraction of a pair that limits the displacement, for each of its nodes. */
@@ -49,6 +51,26 @@ static bool comes_near(const path *p, const drape_pair *pair, double gap)
     return gap < pair->distance || drape_pair_step_fraction(pair, p->x, p->y, p->swings, &near, 1) < 1;
 }
 
+/* A node that stays beyond the distance by which a path from beyond is cut short is not limited by a surface. So
+ * only candidates are, of colliders whose pairs are listed from that distance on. */
+static bool lists_limits(const drape_contact *c, int32_t collider)
+{
+    return c->broad.distance[collider] >= c->model->contact.distance;
+}
+
+/* A node and the smooth surface of a collider that rests. */
+static void follow_surface(const drape_contact *c, int32_t collider, int32_t node, path *p)
+{
+    const size_t at = 3 * (size_t)node;
+    const drape_collider_pose *pose = &c->path_pose[collider];
+    if (!c->model->colliders[collider].ops->smooth || drape_contact_lets_in(c, collider, &node, 1))
+        return;
+    const double own = drape_contact_march(c, collider, pose, pose, NULL, p->x + at, p->y + at, p->keep);
+    p->surface_fraction = fmin(p->surface_fraction, own);
+    if (p->of_node)
+        p->of_node[node] = fmin(p->of_node[node], own);
+}
+
 /* A pair that does not come near limits nothing, so it makes no difference whether it is a candidate. Does
  * not search beyond the step fraction that another pair leaves: if forces throw nodes very far, a pair
  * approaches so slowly relative to its speed that searching each to its own end would take for ever. Of equal
@@ -57,8 +79,12 @@ static void follow(void *user, const drape_pair *pair)
 {
     path *p = user;
     const drape_configuration from = {.x = p->x};
-    if (drape_pair_points(pair) == 1 ||
-        drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius + p->stray ||
+    if (drape_pair_points(pair) == 1) {
+        if (p->surfaces && lists_limits(p->surfaces, pair->collider))
+            follow_surface(p->surfaces, pair->collider, pair->node[0], p);
+        return;
+    }
+    if (drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius + p->stray ||
         drape_relaxed_factor(p->relaxed, pair) > 0)
         return;
     const double limit = p->of_node ? 1 : fmin((1 + 4 * DBL_EPSILON) * p->fraction, 1);
@@ -112,7 +138,7 @@ double drape_contact_stray(const drape_collider *collider, double angle)
 
 double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *straight,
                                    const drape_swing *swing, const drape_keep *keep, double *of_node,
-                                   drape_pair *limiting)
+                                   double *of_surfaces, drape_pair *limiting)
 {
     const drape_swings swings = {.of = swing, .nodes = c->model->node_count};
     double stray = 0;
@@ -127,6 +153,8 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
               .fraction = 1,
               .of_node = of_node,
               .nodes = c->model->node_count,
+              .surface_fraction = 1,
+              .surfaces = of_surfaces ? c : NULL,
               .relaxed = &c->relaxed};
     drape_distances away;
     drape_candidate_cursor cursor = {0};
@@ -139,6 +167,11 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
         drape_candidates_find(&c->broad, straight, stray / 2, NULL, follow, &p);
         c->search_seconds += drape_clock_seconds() - start;
     }
+    for (int32_t k = 0; of_surfaces && k < c->model->collider_count; k++)
+        for (int32_t i = 0; !lists_limits(c, k) && i < c->model->free_count; i++)
+            follow_surface(c, k, c->model->node_of_free[i], &p);
+    if (of_surfaces)
+        *of_surfaces = p.surface_fraction;
     *limiting = p.limiting;
     return p.fraction;
 }
@@ -244,23 +277,9 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
     drape_contact_fill(c, y, c->path_pose, c->to);
     const drape_straight_path straight = {{{.model = c->model, .x = c->from, .pose = c->path_pose},
                                            {.model = c->model, .x = c->to, .pose = c->path_pose}}};
-    double fraction = drape_contact_free_fraction(c, &straight, NULL, &keep, of_node, &limiting);
-    for (int32_t k = 0; k < c->model->collider_count; k++) {
-        const drape_collider *collider = &c->model->colliders[k];
-        if (!collider->ops->smooth)
-            continue;
-        for (int32_t i = 0; i < c->model->free_count; i++) {
-            const int32_t node = c->model->node_of_free[i];
-            const size_t at = 3 * (size_t)node;
-            if (drape_contact_lets_in(c, k, &node, 1))
-                continue;
-            const double own =
-                drape_contact_march(c, k, &c->path_pose[k], &c->path_pose[k], NULL, x + at, y + at, &keep);
-            fraction = fmin(fraction, own);
-            if (of_node)
-                of_node[node] = fmin(of_node[node], own);
-        }
-    }
+    double of_surfaces;
+    const double of_features =
+        drape_contact_free_fraction(c, &straight, NULL, &keep, of_node, &of_surfaces, &limiting);
     c->seconds += drape_clock_seconds() - start;
-    return fraction;
+    return fmin(of_features, of_surfaces);
 }
