@@ -70,16 +70,14 @@ static double least_gap(const search *s, const drape_pair *pair, double enough)
 {
     const drape_configuration *end = s->path->end;
     const bool surface = drape_pair_points(pair) == 1;
-    double bound = -INFINITY;
-    if (!surface)
-        bound = drape_bound_by_axes(pair, end[0].x, s->moves ? end[1].x : NULL) - pair->radius;
-    if (bound >= enough)
-        return bound;
+    if (!surface && drape_bound_is_apart(pair, end[0].x, s->moves ? end[1].x : NULL, enough + pair->radius))
+        return enough;
     const double first = drape_pair_gap_value(pair, &end[0]);
     if (!s->moves)
         return first;
     const double change =
         surface ? move_to_surface(s->path, pair) : drape_bound_change(pair, end[0].x, end[1].x);
+    const double bound = surface ? -INFINITY : drape_bound_by_axes(pair, end[0].x, end[1].x) - pair->radius;
     return fmax(bound, 0.5 * (first + drape_pair_gap_value(pair, &end[1]) - change));
 }
 

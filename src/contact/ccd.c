@@ -17,7 +17,8 @@
 #define MARCH_SHARE 0.9
 #define MAX_MARCHES 10000 /* maximum number of steps of a node along its path */
 
-#define MAX_PATH 8.0 /* in mean edges: the candidates of a longer path may be too many to keep */
+#define MAX_PATH  8.0 /* in mean edges: the candidates of a longer path may be too many to keep */
+#define MAX_THROW 1.0 /* in mean edges: to what a displacement beyond the size of the scene is shortened */
 
 /* A displacement of all points, and the first pair that limits it. */
 typedef struct path {
@@ -84,7 +85,7 @@ static void follow(void *user, const drape_pair *pair)
             follow_surface(p->surfaces, pair->collider, pair->node[0], p);
         return;
     }
-    if (drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius + p->stray ||
+    if (drape_bound_is_apart(pair, p->x, p->y, pair->distance + pair->radius + p->stray) ||
         drape_relaxed_factor(p->relaxed, pair) > 0)
         return;
     const double limit = p->of_node ? 1 : fmin((1 + 4 * DBL_EPSILON) * p->fraction, 1);
@@ -241,12 +242,35 @@ double drape_contact_march(const drape_contact *c, int32_t k, const drape_collid
     return t;
 }
 
+/* How far the node goes that goes farthest, beyond the mean motion of all, which brings nothing together. */
+static double farthest_throw(const drape_contact *c, const double *x, const double *y)
+{
+    const size_t nodes = (size_t)c->model->node_count;
+    double largest = 0, mean[3] = {0}, move[3];
+    for (size_t i = 0; i < 3 * nodes; i++)
+        mean[i % 3] += (y[i] - x[i]) / (double)nodes;
+    for (size_t i = 0; i < nodes; i++) {
+        vec3_sub(y + 3 * i, x + 3 * i, move);
+        vec3_sub(move, mean, move);
+        largest = fmax(largest, vec3_dot(move, move));
+    }
+    return sqrt(largest);
+}
+
+/* A correction that throws nodes farther than the scene is large is of no use, and a search among nodes that all
+ * go several edges in any direction would take many times as long as the rest of an iteration. Such a one is
+ * shortened without a look at pairs. Returns the length [m] to which; INFINITY if it is none. */
+static double thrown_length(const drape_contact *c, double farthest)
+{
+    return farthest > c->model->length ? MAX_THROW * c->mean_edge : INFINITY;
+}
+
 /* Lowers the fractions of nodes that go farther than a path whose candidates can be kept. A correction
  * throws nodes so far only if it is of no use there; to search each pair on its own path would take seconds.
  * Returns the least fraction. */
 static double shorten_long(const drape_contact *c, const double *x, const double *y, double *fraction)
 {
-    const double longest = MAX_PATH * c->mean_edge;
+    const double longest = fmin(thrown_length(c, farthest_throw(c, x, y)), MAX_PATH * c->mean_edge);
     double least = 1, move[3];
     for (int32_t i = 0; i < c->model->node_count; i++) {
         vec3_sub(y + 3 * (size_t)i, x + 3 * (size_t)i, move);
@@ -259,6 +283,13 @@ static double shorten_long(const drape_contact *c, const double *x, const double
     return least;
 }
 
+/* The fraction that leaves the whole displacement no longer than that. */
+static double shorten_whole(const drape_contact *c, const double *x, const double *y)
+{
+    const double farthest = farthest_throw(c, x, y), longest = thrown_length(c, farthest);
+    return farthest > longest && isfinite(farthest) ? longest / farthest : 1;
+}
+
 double drape_contact_step_fraction(drape_contact *c, const double *x, const double *y, double t,
                                    double *of_node)
 {
@@ -269,17 +300,22 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
                              .below = KEEP_ITERATE,
                              .arrival = ARRIVAL};
     drape_pair limiting;
-    const double shortened = of_node ? shorten_long(c, x, y, of_node) : 1;
-    if (shortened < 1)
-        return shortened;
+    double of_surfaces;
+    if (of_node) {
+        const double shortened = shorten_long(c, x, y, of_node);
+        if (shortened < 1)
+            return shortened;
+    }
+    const double whole = of_node ? 1 : shorten_whole(c, x, y);
     drape_contact_poses(c, t, c->path_pose);
     drape_contact_fill(c, x, c->path_pose, c->from);
     drape_contact_fill(c, y, c->path_pose, c->to);
+    for (size_t i = 0; whole < 1 && i < 3 * (size_t)c->model->node_count; i++)
+        c->to[i] = x[i] + whole * (y[i] - x[i]);
     const drape_straight_path straight = {{{.model = c->model, .x = c->from, .pose = c->path_pose},
                                            {.model = c->model, .x = c->to, .pose = c->path_pose}}};
-    double of_surfaces;
     const double of_features =
         drape_contact_free_fraction(c, &straight, NULL, &keep, of_node, &of_surfaces, &limiting);
     c->seconds += drape_clock_seconds() - start;
-    return fmin(of_features, of_surfaces);
+    return whole * fmin(of_features, of_surfaces);
 }

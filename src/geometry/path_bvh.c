@@ -77,7 +77,10 @@ static inline drape_box box_of(const int32_t *node, int nodes, const double *x)
 
 static drape_box leaf_box(const drape_path_bvh *bvh, int32_t element, const double *x, const double *grow)
 {
-    drape_box box = box_of(bvh->node + (size_t)element * (size_t)bvh->nodes, bvh->nodes, x);
+    const int32_t *node = bvh->node + (size_t)element * (size_t)bvh->nodes;
+    drape_box box = bvh->nodes == 2   ? box_of(node, 2, x) /* with loops of a known length */
+                    : bvh->nodes == 3 ? box_of(node, 3, x)
+                                      : box_of(node, bvh->nodes, x);
     for (int k = 0; grow && k < 3; k++) {
         box.low[k] -= grow[element];
         box.high[k] += grow[element];
@@ -282,6 +285,8 @@ LANES_INLINE int32_t meet(const drape_path_bvh *const tree[2], const meeting *at
         query q;
         boxes_of(from, i, reach, ends, &q);
         const lanes_mask apart = find_apart(to, &q, ends);
+        if (apart[0] & apart[1] & apart[2] & apart[3])
+            continue;
         for (int32_t l = itself ? i : 0; l < to->count; l++) {
             const int32_t child[2] = {from->child[i], to->child[l]};
             if (apart[l] != 0 || !(from->marked[i] | to->marked[l]))

@@ -659,6 +659,8 @@ START_TEST(test_bounds)
                 at[i] = x[i] + 0.1 * step * (y[i] - x[i]);
             const double gap = drape_pair_gap_value(&pair, &(drape_configuration){.x = at});
             ck_assert_double_ge(gap, bound - 1e-12);
+            ck_assert(bound < 1e-9 || (drape_bound_is_apart(&pair, x, y, bound * (1 - 1e-9)) &&
+                                       !drape_bound_is_apart(&pair, x, y, bound * (1 + 1e-9))));
             ck_assert_double_le(fabs(gap - start), change + 1e-12);
             if (step == 0)
                 ck_assert_double_le(drape_bound_by_axes(&pair, x, NULL), gap + 1e-12);
