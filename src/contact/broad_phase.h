@@ -43,9 +43,10 @@ typedef struct drape_broad_query {
     const bool *marked; /* (points) only pairs with a marked point; NULL: all */
 } drape_broad_query;
 
-/* Calls visit for every such pair, in an order that does not depend on the positions; sorted by rank they have
- * one that does not depend on the search either. Left out are pairs whose nodes are all pinned, pairs
- * that the model ignores, and pairs with surfaces, since every free node is paired with all of them. */
+/* Calls visit for every such pair, in an order that does not depend on the positions; sorted by rank they
+ * have one that does not depend on the search either. Left out are pairs whose nodes are all pinned,
+ * pairs that the model ignores, and pairs with surfaces, since every free node is paired with all of
+ * them. */
 typedef void drape_broad_phase_visit(void *user, const drape_pair *pair);
 void drape_broad_phase_pairs(drape_broad_phase *broad, const drape_broad_query *want,
                              drape_broad_phase_visit *visit, void *user);

@@ -299,8 +299,8 @@ double drape_candidates_farthest(const drape_candidates *c, const drape_distance
     return largest <= c->margin ? largest : INFINITY;
 }
 
-/* Notes of which sets the path is beyond the margin at each point and collider. Returns false if a position is
- * not finite. */
+/* Notes of which sets the path is beyond the margin at each point and collider. Returns false if a
+ * position is not finite. */
 static bool note_beyond(drape_candidates *c, const drape_straight_path *path)
 {
     const int32_t points = c->broad->points, count = points + c->broad->model->collider_count;
@@ -323,8 +323,8 @@ static bool note_beyond(drape_candidates *c, const drape_straight_path *path)
     return true;
 }
 
-/* Marks what a patch must have whose set follows the first `sets` ones, of what was noted. Returns the number of
- * nodes among it. */
+/* Marks what a patch must have whose set follows the first `sets` ones, of what was noted. Returns the
+ * number of nodes among it. */
 static int32_t mark(drape_candidates *c, int sets)
 {
     const drape_broad_phase *broad = c->broad;

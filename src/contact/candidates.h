@@ -49,9 +49,9 @@ typedef struct drape_candidates {
 drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, double margin,
                                      drape_candidates *out);
 
-/* Calls visit, in the order of the broad phase, for all pairs that can become active while no point is farther
- * than margin from the path; marked: NULL for all, or (points + collider_count) those of which a pair must have one. The
- * points of a marked collider must be marked, too. */
+/* Calls visit, in the order of the broad phase, for all pairs that can become active while no point is
+ * farther than margin from the path; marked: NULL for all, or (points + collider_count) those of which a pair
+ * must have one. The points of a marked collider must be marked, too. */
 void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *path, double margin,
                            const bool *marked, drape_broad_phase_visit *visit, void *user);
 

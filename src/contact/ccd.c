@@ -52,8 +52,8 @@ static bool comes_near(const path *p, const drape_pair *pair, double gap)
     return gap < pair->distance || drape_pair_step_fraction(pair, p->x, p->y, p->swings, &near, 1) < 1;
 }
 
-/* A node that stays beyond the distance by which a path from beyond is cut short is not limited by a surface. So
- * only candidates are, of colliders whose pairs are listed from that distance on. */
+/* A node that stays beyond the distance by which a path from beyond is cut short is not limited by a
+ * surface. So only candidates are, of colliders whose pairs are listed from that distance on. */
 static bool lists_limits(const drape_contact *c, int32_t collider)
 {
     return c->broad.distance[collider] >= c->model->contact.distance;
@@ -257,9 +257,10 @@ static double farthest_throw(const drape_contact *c, const double *x, const doub
     return sqrt(largest);
 }
 
-/* A correction that throws nodes farther than the scene is large is of no use, and a search among nodes that all
- * go several edges in any direction would take many times as long as the rest of an iteration. Such a one is
- * shortened without a look at pairs. Returns the length [m] to which; INFINITY if it is none. */
+/* A correction that throws nodes farther than the scene is large is of no use, and a search among nodes
+ * that all go several edges in any direction would take many times as long as the rest of an iteration.
+ * Such a one is shortened without a look at pairs. Returns the length [m] to which; INFINITY if it is
+ * none. */
 static double thrown_length(const drape_contact *c, double farthest)
 {
     return farthest > c->model->length ? MAX_THROW * c->mean_edge : INFINITY;

@@ -1,6 +1,6 @@
 /*
- * sort_pairs.h: pairs by rank (pair.h), in time proportional to their number: those of a search come by stage, but
- * within a stage in the order of trees of boxes.
+ * sort_pairs.h: pairs by rank (pair.h), in time proportional to their number: those of a search come by
+ * stage, but within a stage in the order of trees of boxes.
  */
 #ifndef DRAPE_CONTACT_SORT_PAIRS_H
 #define DRAPE_CONTACT_SORT_PAIRS_H
@@ -25,8 +25,8 @@ typedef struct drape_pair_sorter {
     int32_t room, first_room;
 } drape_pair_sorter;
 
-/* Sorts `count` pairs, whose stages ascend already, into a list that it exchanges with *pairs (of *room). Errors:
- * DRAPE_E_MEMORY, and the pairs stay as they are. */
+/* Sorts `count` pairs, whose stages ascend already, into a list that it exchanges with *pairs (of *room).
+ * Errors: DRAPE_E_MEMORY, and the pairs stay as they are. */
 drape_status drape_sort_pairs(drape_pair_sorter *sorter, drape_pair **pairs, int32_t *room, int32_t count);
 
 #endif

@@ -271,8 +271,8 @@ LANES_INLINE void boxes_of(const drape_path_branch *branch, int32_t lane, double
         }
 }
 
-/* Tests one child, or all, of a branch against all children of the other branch. A branch that meets itself has
- * each pair of its children once. */
+/* Tests one child, or all, of a branch against all children of the other branch. A branch that meets
+ * itself has each pair of its children once. */
 LANES_INLINE int32_t meet(const drape_path_bvh *const tree[2], const meeting *at, double reach, int ends,
                           bool itself, meeting *next, drape_path_bvh_meet *visit, void *user)
 {

@@ -34,7 +34,8 @@ drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, 
                                   const double *x, drape_path_bvh *bvh);
 
 /* Refits the boxes to the paths of the elements from x to y; y NULL: to the elements at x. Marks elements
- * with a marked point; NULL: all. grow: (count) [m] by which the box of each element is enlarged; NULL: none is. */
+ * with a marked point; NULL: all. grow: (count) [m] by which the box of each element is enlarged; NULL:
+ * none is. */
 void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const bool *marked,
                         const double *grow);
 

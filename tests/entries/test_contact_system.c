@@ -410,9 +410,9 @@ START_TEST(landing_takes_few_iterations)
 }
 END_TEST
 
-/* A correction that throws a node farther than the size of the scene is of no use, and to look at all pairs that
- * nodes meet on such a path takes far longer than the rest of an iteration: it is cut to about an edge, of 0.075
- * to 0.107 m here. A motion of all nodes alike is not. */
+/* A correction that throws a node farther than the size of the scene is of no use, and to look at all
+ * pairs that nodes meet on such a path takes far longer than the rest of an iteration: it is cut to about
+ * an edge, of 0.075 to 0.107 m here. A motion of all nodes alike is not. */
 START_TEST(a_thrown_node_is_stopped)
 {
     probe t = open_flat(1);

@@ -460,7 +460,8 @@ static bool is_marked(const bool *marked, const int32_t *edge)
     return !marked || marked[edge[0]] || marked[edge[1]];
 }
 
-/* Every element, marked if this is wanted, that no axis separates from the query is found once, in the order of its place, also after the positions have changed. */
+/* Every element, marked if this is wanted, that no axis separates from the query is found once, in the
+ * order of its place, also after the positions have changed. */
 static void check_tree(drape_arena *arena, int32_t count)
 {
     uint64_t seed = 5;
@@ -521,8 +522,8 @@ static void note_meeting(void *user, int32_t a, int32_t b)
     ((meetings *)user)->times[a][b]++;
 }
 
-/* Two trees, one with boxes that are enlarged, meet in every pair with a marked element that no axis separates,
- * once, and a tree meets itself in every such pair of different elements. */
+/* Two trees, one with boxes that are enlarged, meet in every pair with a marked element that no axis
+ * separates, once, and a tree meets itself in every such pair of different elements. */
 static void check_join(drape_arena *arena, int32_t count, int32_t others)
 {
     static meetings met, itself;
@@ -588,7 +589,8 @@ START_TEST(test_join)
 }
 END_TEST
 
-/* Pairs of two stages, each in any order, some with the same piece: by rank, all of them, and what is sorted stays. */
+/* Pairs of two stages, each in any order, some with the same piece: by rank, all of them, and what is
+ * sorted stays. */
 START_TEST(test_sort)
 {
     drape_context *ctx = NULL;
