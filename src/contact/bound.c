@@ -60,6 +60,24 @@ double drape_bound_by_axes(const drape_pair *pair, const double *x, const double
     return bound;
 }
 
+bool drape_bound_is_apart(const drape_pair *pair, const double *x, const double *y, double distance)
+{
+    const int split = split_of(pair), ends = y ? 2 : 1;
+    double at[2][4][3], axis[3];
+    gather(pair, x, x, at[0]);
+    if (y)
+        gather(pair, x, y, at[1]);
+    for (int end = 0; end < ends; end++) {
+        axis_between(split, at[end], axis);
+        double least = lead_along(split, axis, at[0]);
+        const double last = y ? lead_along(split, axis, at[1]) : least;
+        least = last < least ? last : least;
+        if (least > 0 && least * least >= distance * distance * vec3_dot(axis, axis))
+            return true;
+    }
+    return false;
+}
+
 double drape_bound_change(const drape_pair *pair, const double *x, const double *y)
 {
     const int split = split_of(pair);

@@ -46,6 +46,8 @@ static void list_features(drape_broad_phase *s)
 {
     int32_t first = s->model->node_count, segments = 0, triangles = 0;
     memcpy(s->rest, s->model->rest, 3 * (size_t)first * sizeof *s->rest);
+    for (int32_t i = 0; i < s->points; i++)
+        s->point[i] = i;
     for (int32_t i = 0; i < s->model->collider_count; i++) {
         s->first_point[i] = first;
         list_collider(s, i, first, &segments, &triangles);
@@ -79,6 +81,27 @@ static void share_areas(drape_broad_phase *s)
             0.5 * (s->node_area[m->edge[2 * (size_t)e]] + s->node_area[m->edge[2 * (size_t)e + 1]]);
 }
 
+/* Trees of what can meet something. */
+static drape_status build_trees(drape_arena *arena, drape_broad_phase *s, int32_t corners, int32_t triangles)
+{
+    const drape_model *m = s->model;
+    const bool self = m->contact.self, met = corners > 0 || self;
+    const struct {
+        drape_path_bvh *tree;
+        int32_t count, nodes;
+        const int32_t *node;
+    } of[] = {{&s->nodes, self || triangles > 0 ? m->node_count : 0, 1, s->point},
+              {&s->faces, met ? m->triangle_count : 0, 3, m->triangle},
+              {&s->edges, met ? m->edge_count : 0, 2, m->edge},
+              {&s->corners, corners, 1, s->point + m->node_count},
+              {&s->segment_tree, s->segments, 2, s->segment},
+              {&s->obstacles, triangles, 3, s->triangle}};
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < sizeof of / sizeof *of; i++)
+        status = drape_path_bvh_build(arena, of[i].count, of[i].nodes, of[i].node, s->rest, of[i].tree);
+    return status;
+}
+
 drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, drape_broad_phase *s)
 {
     int32_t points, triangles;
@@ -94,8 +117,10 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->triangle_collider = drape_arena_take(arena, (size_t)triangles, sizeof *s->triangle_collider);
     s->distance = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->distance);
     s->side = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->side);
-    s->near_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near_node);
-    s->near_edge = drape_arena_take(arena, (size_t)m->edge_count, sizeof *s->near_edge);
+    s->point = drape_arena_take(arena, (size_t)s->points, sizeof *s->point);
+    s->corner_reach = drape_arena_take(arena, (size_t)points, sizeof *s->corner_reach);
+    s->segment_reach = drape_arena_take(arena, (size_t)s->segments, sizeof *s->segment_reach);
+    s->obstacle_reach = drape_arena_take(arena, (size_t)triangles, sizeof *s->obstacle_reach);
     s->node_area = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->node_area);
     s->edge_area = drape_arena_take(arena, (size_t)m->edge_count, sizeof *s->edge_area);
     s->face_area = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->face_area);
@@ -108,12 +133,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
             s->obstacle_radius = fmax(s->obstacle_radius, m->colliders[i].shape.radius);
     list_features(s);
     share_areas(s);
-    const bool met = points > 0 || m->contact.self; /* faces and edges can meet something */
-    drape_status status =
-        drape_path_bvh_build(arena, met ? m->triangle_count : 0, 3, m->triangle, m->rest, &s->faces);
-    if (!status)
-        status = drape_path_bvh_build(arena, met ? m->edge_count : 0, 2, m->edge, m->rest, &s->edges);
-    return status ? status : drape_path_bvh_build(arena, triangles, 3, s->triangle, s->rest, &s->obstacles);
+    return build_trees(arena, s, points, triangles);
 }
 
 /* ---- Constants of a pair ---- */
@@ -148,16 +168,13 @@ static void set_collider(const drape_broad_phase *s, int32_t collider, drape_pai
 /* Stages of a search, after those of the smooth colliders, which have negative numbers. */
 enum { OWN_FACES, OWN_EDGES, FEATURE_FACES, FEATURE_EDGES, OBSTACLES };
 
-/* A piece that is tested against those in a tree. */
+/* A search in progress. */
 typedef struct query {
     drape_broad_phase *broad;
     const drape_broad_query *want;
     drape_broad_phase_visit *visit;
     void *user;
-    drape_pair pair; /* its constants, as far as they depend on this piece alone */
-    int32_t piece;   /* number of the point, edge or segment */
-    const drape_path_bvh *tree;
-    bool scans; /* the trees of the cloth are not fitted */
+    drape_pair pair; /* its constants, as far as they depend on the stage alone */
 } query;
 
 static bool is_free(const drape_broad_phase *s, int32_t point)
@@ -173,65 +190,149 @@ static bool is_ignored(const drape_broad_phase *s, const drape_pair *pair)
                               : drape_model_ignores(s->model, pair->collider, n[0] < nodes ? n[0] : n[3]);
 }
 
-static void report(query *q, int32_t element)
+/* Reports a pair of a piece and of an element of a tree. */
+static void report(query *q, int32_t piece, const drape_path_bvh *tree, int32_t element)
 {
     const int32_t *n = q->pair.node;
     const drape_broad_phase *s = q->broad;
     if (s->model->ignored && is_ignored(s, &q->pair))
         return;
-    q->pair.rank[2] = q->tree->place[element];
+    q->pair.rank[1] = piece;
+    q->pair.rank[2] = tree->place[element];
     if (is_free(s, n[0]) || is_free(s, n[1]) || is_free(s, n[2]) || is_free(s, n[3]))
         q->visit(q->user, &q->pair);
 }
 
-static void own_face(void *user, int32_t face)
+static void meet_own_face(void *user, int32_t node, int32_t face)
 {
     query *q = user;
-    const int32_t *t = q->broad->model->triangle + 3 * (size_t)face;
-    if (drape_model_share_node(q->broad->model, &q->piece, 1, t, 3))
+    const drape_broad_phase *s = q->broad;
+    const int32_t *t = s->model->triangle + 3 * (size_t)face;
+    if (drape_model_share_node(s->model, &node, 1, t, 3))
         return;
-    set_nodes(&q->pair, q->piece, t[0], t[1], t[2]);
-    report(q, face);
+    q->pair.area = s->node_area[node];
+    set_nodes(&q->pair, node, t[0], t[1], t[2]);
+    report(q, node, &s->faces, face);
 }
 
-static void own_edge(void *user, int32_t edge)
+static void meet_own_edge(void *user, int32_t a, int32_t b)
 {
     query *q = user;
-    const int32_t *e = q->broad->model->edge + 2 * (size_t)edge,
-                  *f = q->broad->model->edge + 2 * (size_t)q->piece;
-    if (drape_model_share_node(q->broad->model, e, 2, f, 2))
+    const drape_broad_phase *s = q->broad;
+    const int32_t first = a < b ? a : b, second = a < b ? b : a, *f = s->model->edge + 2 * (size_t)first,
+                  *e = s->model->edge + 2 * (size_t)second;
+    if (drape_model_share_node(s->model, e, 2, f, 2))
         return;
+    q->pair.area = 0.5 * (s->edge_area[second] + s->edge_area[first]);
     set_nodes(&q->pair, f[0], f[1], e[0], e[1]);
-    q->pair.area = 0.5 * (q->broad->edge_area[edge] + q->broad->edge_area[q->piece]);
-    report(q, edge);
+    report(q, first, &s->edges, second);
 }
 
-static void feature_face(void *user, int32_t face)
+static void meet_face(void *user, int32_t corner, int32_t face)
 {
     query *q = user;
-    const int32_t *t = q->broad->model->triangle + 3 * (size_t)face;
-    set_nodes(&q->pair, q->piece, t[0], t[1], t[2]);
-    q->pair.area = q->broad->face_area[face];
-    report(q, face);
+    const drape_broad_phase *s = q->broad;
+    const int32_t point = s->model->node_count + corner, *t = s->model->triangle + 3 * (size_t)face;
+    set_collider(s, s->point_collider[corner], &q->pair);
+    set_nodes(&q->pair, point, t[0], t[1], t[2]);
+    q->pair.area = s->face_area[face];
+    report(q, point, &s->faces, face);
 }
 
-static void feature_edge(void *user, int32_t edge)
+static void meet_edge(void *user, int32_t segment, int32_t edge)
 {
     query *q = user;
-    const int32_t *e = q->broad->model->edge + 2 * (size_t)edge,
-                  *f = q->broad->segment + 2 * (size_t)q->piece;
+    const drape_broad_phase *s = q->broad;
+    const int32_t *e = s->model->edge + 2 * (size_t)edge, *f = s->segment + 2 * (size_t)segment;
+    set_collider(s, s->segment_collider[segment], &q->pair);
     set_nodes(&q->pair, e[0], e[1], f[0], f[1]);
-    q->pair.area = q->broad->edge_area[edge];
-    report(q, edge);
+    q->pair.area = s->edge_area[edge];
+    report(q, segment, &s->edges, edge);
 }
 
-static void obstacle_face(void *user, int32_t face)
+static void meet_obstacle(void *user, int32_t node, int32_t triangle)
 {
     query *q = user;
-    const int32_t *t = q->broad->triangle + 3 * (size_t)face;
-    set_collider(q->broad, q->broad->triangle_collider[face], &q->pair);
-    set_nodes(&q->pair, q->piece, t[0], t[1], t[2]);
-    report(q, face);
+    const drape_broad_phase *s = q->broad;
+    const int32_t *t = s->triangle + 3 * (size_t)triangle;
+    set_collider(s, s->triangle_collider[triangle], &q->pair);
+    set_nodes(&q->pair, node, t[0], t[1], t[2]);
+    q->pair.area = s->node_area[node];
+    report(q, node, &s->obstacles, triangle);
+}
+
+static void begin_stage(query *q, int32_t stage, drape_pair_kind kind)
+{
+    q->pair = (drape_pair){.kind = kind, .collider = -1, .rank = {stage}};
+}
+
+/* How far from the features of each collider contact begins. */
+static void set_reaches(drape_broad_phase *s)
+{
+    const struct {
+        const int32_t *collider;
+        double *reach;
+        int32_t count;
+    } of[] = {{s->point_collider, s->corner_reach, s->corners.count},
+              {s->segment_collider, s->segment_reach, s->segment_tree.count},
+              {s->triangle_collider, s->obstacle_reach, s->obstacles.count}};
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++)
+        for (int32_t k = 0; k < of[i].count; k++) {
+            const int32_t collider = of[i].collider[k];
+            of[i].reach[k] = s->model->colliders[collider].shape.radius + s->distance[collider];
+        }
+}
+
+static void fit(drape_broad_phase *s, const drape_broad_query *want)
+{
+    const struct {
+        drape_path_bvh *tree;
+        const double *reach;
+    } of[] = {{&s->nodes, NULL},
+              {&s->faces, NULL},
+              {&s->edges, NULL},
+              {&s->corners, s->corner_reach},
+              {&s->segment_tree, s->segment_reach},
+              {&s->obstacles, s->obstacle_reach}};
+    set_reaches(s);
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++)
+        drape_path_bvh_fit(of[i].tree, want->x, want->y, want->marked, of[i].reach);
+}
+
+static void search_self(query *q)
+{
+    drape_broad_phase *s = q->broad;
+    const double distance = 2 * s->model->contact.self_thickness, reach = distance + q->want->reach;
+    begin_stage(q, OWN_FACES, DRAPE_PAIR_TRIANGLE);
+    q->pair.distance = distance;
+    drape_path_bvh_join(&s->nodes, &s->faces, q->want->y, reach, meet_own_face, q);
+    begin_stage(q, OWN_EDGES, DRAPE_PAIR_SEGMENTS);
+    q->pair.distance = distance;
+    drape_path_bvh_join(&s->edges, &s->edges, q->want->y, reach, meet_own_edge, q);
+}
+
+static void search_features(query *q)
+{
+    drape_broad_phase *s = q->broad;
+    begin_stage(q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
+    drape_path_bvh_join(&s->corners, &s->faces, q->want->y, q->want->reach, meet_face, q);
+    begin_stage(q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS);
+    drape_path_bvh_join(&s->segment_tree, &s->edges, q->want->y, q->want->reach, meet_edge, q);
+    begin_stage(q, OBSTACLES, DRAPE_PAIR_TRIANGLE);
+    drape_path_bvh_join(&s->nodes, &s->obstacles, q->want->y, q->want->reach, meet_obstacle, q);
+}
+
+/* A feature whose elements of cloth are scanned. */
+typedef struct scan {
+    query *query;
+    int32_t feature;
+    drape_path_bvh_meet *meet;
+} scan;
+
+static void scanned(void *user, int32_t element)
+{
+    const scan *of = user;
+    of->meet(of->query, of->feature, element);
 }
 
 static bool is_marked(const bool *marked, const int32_t *node, int nodes)
@@ -242,130 +343,44 @@ static bool is_marked(const bool *marked, const int32_t *node, int nodes)
     return !marked;
 }
 
-/* Tests a piece against those in a tree with numbers above `after`: its nodes are the `nodes` ones from
- * `node` on. */
-static void search_tree(query *q, int32_t piece, const int32_t *node, int nodes, int32_t after,
-                        const drape_path_bvh *tree, drape_bvh_visit *visit)
+static void scan_tree(query *q, const drape_path_bvh *features, const double *reach,
+                      const drape_path_bvh *tree, drape_path_bvh_meet *meet)
 {
-    const drape_path_query want = {.node = node,
-                                   .nodes = nodes,
-                                   .x = q->want->x,
-                                   .y = q->want->y,
-                                   .reach = q->pair.distance + q->pair.radius + q->want->reach,
-                                   .after = after,
-                                   .only_marked = !is_marked(q->want->marked, node, nodes)};
-    q->piece = q->pair.rank[1] = piece;
-    q->tree = tree;
-    if (q->scans)
-        drape_path_bvh_scan(tree, &want, q->broad->model->node_count, q->want->marked, q->broad->side, visit,
-                            q);
-    else
-        drape_path_bvh_query(tree, &want, visit, q);
-}
-
-static void note_nodes(void *user, int32_t face)
-{
-    drape_broad_phase *s = user;
-    for (int a = 0; a < 3; a++)
-        s->near_node[s->model->triangle[3 * (size_t)face + (size_t)a]] = true;
-}
-
-static void note_edge(void *user, int32_t edge)
-{
-    ((drape_broad_phase *)user)->near_edge[edge] = true;
-}
-
-static void note_near(drape_broad_phase *s, const drape_broad_query *want, double reach,
-                      const drape_path_bvh *tree, drape_bvh_visit *visit)
-{
-    drape_path_query from = {.nodes = tree->nodes, .x = want->x, .y = want->y, .reach = reach, .after = -1};
-    for (int32_t e = 0; e < tree->count; e++) {
-        from.node = tree->node + (size_t)e * (size_t)tree->nodes;
-        if (is_marked(want->marked, from.node, tree->nodes))
-            drape_path_bvh_query(tree, &from, visit, s);
+    const drape_broad_query *want = q->want;
+    for (int32_t i = 0; i < features->count; i++) {
+        const int32_t *node = features->node + (size_t)i * (size_t)features->nodes;
+        const drape_path_query from = {.node = node,
+                                       .nodes = features->nodes,
+                                       .x = want->x,
+                                       .y = want->y,
+                                       .reach = reach[i] + want->reach,
+                                       .only_marked = !is_marked(want->marked, node, features->nodes)};
+        drape_path_bvh_scan(tree, &from, q->broad->model->node_count, want->marked, q->broad->side, scanned,
+                            &(scan){q, i, meet});
     }
 }
 
-/* Finds the nodes and edges that may meet a marked face or edge: most meet none. */
-static void find_near(drape_broad_phase *s, const drape_broad_query *want)
-{
-    const double reach = 2 * s->model->contact.self_thickness + want->reach;
-    const bool all = !want->marked;
-    memset(s->near_node, all, (size_t)s->model->node_count * sizeof *s->near_node);
-    memset(s->near_edge, all, (size_t)s->model->edge_count * sizeof *s->near_edge);
-    if (all)
-        return;
-    note_near(s, want, reach, &s->faces, note_nodes);
-    note_near(s, want, reach, &s->edges, note_edge);
-}
-
-static void search_self(query *q)
+/* The features of colliders without triangles, if they are few, by looking at all of the cloth. */
+static void scan_features(query *q)
 {
     drape_broad_phase *s = q->broad;
-    q->pair = (drape_pair){.kind = DRAPE_PAIR_TRIANGLE,
-                           .collider = -1,
-                           .distance = 2 * s->model->contact.self_thickness,
-                           .rank = {OWN_FACES}};
-    find_near(s, q->want);
-    for (int32_t i = 0; i < s->model->node_count; i++) {
-        q->pair.area = s->node_area[i];
-        if (s->near_node[i] || q->want->marked[i])
-            search_tree(q, i, &i, 1, -1, &s->faces, own_face);
-    }
-    q->pair.kind = DRAPE_PAIR_SEGMENTS;
-    q->pair.rank[0] = OWN_EDGES;
-    for (int32_t e = 0; e < s->model->edge_count; e++)
-        if (s->near_edge[e]) /* as every marked edge: it meets itself */
-            search_tree(q, e, s->model->edge + 2 * (size_t)e, 2, e, &s->edges, own_edge);
-}
-
-static void search_features(query *q)
-{
-    const drape_broad_phase *s = q->broad;
-    q->pair = (drape_pair){.kind = DRAPE_PAIR_TRIANGLE, .rank = {FEATURE_FACES}};
-    for (int32_t i = s->model->node_count; i < s->points; i++) {
-        set_collider(s, s->point_collider[i - s->model->node_count], &q->pair);
-        search_tree(q, i, &i, 1, -1, &s->faces, feature_face);
-    }
-    q->pair.kind = DRAPE_PAIR_SEGMENTS;
-    q->pair.rank[0] = FEATURE_EDGES;
-    for (int32_t i = 0; i < s->segments; i++) {
-        set_collider(s, s->segment_collider[i], &q->pair);
-        search_tree(q, i, s->segment + 2 * (size_t)i, 2, -1, &s->edges, feature_edge);
-    }
-}
-
-static void search_obstacles(query *q)
-{
-    const drape_broad_phase *s = q->broad;
-    double largest = 0;
-    for (int32_t i = 0; i < s->model->collider_count; i++)
-        largest = fmax(largest, s->distance[i]);
-    for (int32_t i = 0; s->obstacles.count > 0 && i < s->model->node_count; i++) {
-        q->pair = (drape_pair){.kind = DRAPE_PAIR_TRIANGLE,
-                               .radius = s->obstacle_radius,
-                               .area = s->node_area[i],
-                               .distance = largest,
-                               .rank = {OBSTACLES}};
-        search_tree(q, i, &i, 1, -1, &s->obstacles, obstacle_face);
-    }
+    set_reaches(s);
+    begin_stage(q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
+    scan_tree(q, &s->corners, s->corner_reach, &s->faces, meet_face);
+    begin_stage(q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS);
+    scan_tree(q, &s->segment_tree, s->segment_reach, &s->edges, meet_edge);
 }
 
 void drape_broad_phase_pairs(drape_broad_phase *s, const drape_broad_query *want,
                              drape_broad_phase_visit *visit, void *user)
 {
     query q = {.broad = s, .want = want, .visit = visit, .user = user};
-    const int32_t features = s->points - s->model->node_count + s->segments;
-    q.scans = features <= FEW && !s->model->contact.self;
-    if (!q.scans) {
-        drape_path_bvh_fit(&s->faces, want->x, want->y, want->marked);
-        drape_path_bvh_fit(&s->edges, want->x, want->y, want->marked);
+    if (s->corners.count + s->segments <= FEW && s->obstacles.count == 0 && !s->model->contact.self) {
+        scan_features(&q);
+        return;
     }
-    drape_path_bvh_fit(&s->obstacles, want->x, want->y, want->marked);
+    fit(s, want);
     if (s->model->contact.self)
         search_self(&q);
-    if (features > 0)
-        search_features(&q);
-    q.scans = false;
-    search_obstacles(&q);
+    search_features(&q);
 }

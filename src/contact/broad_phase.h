@@ -11,19 +11,22 @@
 
 typedef struct drape_broad_phase {
     const drape_model *model;
-    int32_t points;              /* nodes, and points of colliders */
-    int32_t *point_collider;     /* (points - node_count) */
-    int32_t *first_point;        /* (collider_count) */
-    double *rest;                /* (points x 3): nodes at rest, points of undisplaced colliders */
-    drape_path_bvh faces, edges; /* of the cloths */
-    drape_path_bvh obstacles;    /* triangles of colliders without a smooth distance */
-    int32_t *segment;            /* (segments x 2) of colliders */
+    int32_t points;                       /* nodes, and points of colliders */
+    int32_t *point_collider;              /* (points - node_count) */
+    int32_t *first_point;                 /* (collider_count) */
+    double *rest;                         /* (points x 3): nodes at rest, points of undisplaced colliders */
+    int32_t *point;                       /* (points) their numbers: the elements of trees of points */
+    drape_path_bvh nodes, faces, edges;   /* of the cloths */
+    drape_path_bvh corners, segment_tree; /* points and segments of colliders; */
+    drape_path_bvh obstacles; /* their triangles, of those without a smooth distance: their boxes are
+                                 enlarged by how far from them contact begins */
+    double *corner_reach, *segment_reach, *obstacle_reach; /* [m] that */
+    int32_t *segment;                                      /* (segments x 2) of colliders */
     int32_t *segment_collider;
     int32_t segments;
     int32_t *triangle; /* (obstacles.count x 3) of colliders */
     int32_t *triangle_collider;
-    uint8_t *side;               /* (node_count) scratch of drape_path_bvh_scan */
-    bool *near_node, *near_edge; /* of a search of marked pairs: what may meet a marked face or edge */
+    uint8_t *side;                             /* (node_count) scratch of drape_path_bvh_scan */
     double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
     double *distance;       /* (collider_count) activation distance of cloth and each collider [m] */
     double rounding;        /* what rounding can change in a gap, set by who moves the points [m] */
@@ -40,8 +43,10 @@ typedef struct drape_broad_query {
     const bool *marked; /* (points) only pairs with a marked point; NULL: all */
 } drape_broad_query;
 
-/* Calls visit for every such pair, by increasing rank. Left out are pairs whose nodes are all pinned, pairs
- * that the model ignores, and pairs with surfaces, since every free node is paired with all of them. */
+/* Calls visit for every such pair, in an order that does not depend on the positions; sorted by rank they
+ * have one that does not depend on the search either. Left out are pairs whose nodes are all pinned,
+ * pairs that the model ignores, and pairs with surfaces, since every free node is paired with all of
+ * them. */
 typedef void drape_broad_phase_visit(void *user, const drape_pair *pair);
 void drape_broad_phase_pairs(drape_broad_phase *broad, const drape_broad_query *want,
                              drape_broad_phase_visit *visit, void *user);

@@ -1,6 +1,7 @@
 /* candidates.c: see candidates.h. */
 #include "contact/candidates.h"
 
+#include "base/lanes.h"
 #include "base/vec3.h"
 #include "contact/bound.h"
 #include "contact/list.h"
@@ -8,7 +9,7 @@
 #include <string.h>
 
 #define ROUNDING  1e-12 /* of the model's length: larger than the rounding of a bound of a gap */
-#define MAX_PATCH 0.1   /* of the nodes: if more have left their path, all pairs are searched */
+#define MAX_PATCH 0.3   /* of the nodes: if more have left their path, all pairs are searched */
 
 static void take_set(drape_arena *arena, const drape_broad_phase *broad, drape_candidate_set *set)
 {
@@ -22,12 +23,13 @@ static void take_set(drape_arena *arena, const drape_broad_phase *broad, drape_c
 drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, double margin,
                                      drape_candidates *out)
 {
-    *out = (drape_candidates){.arena = arena, .broad = broad, .margin = margin};
+    *out = (drape_candidates){.arena = arena, .broad = broad, .margin = margin, .sorter.arena = arena};
     const size_t marks = (size_t)(broad->points + broad->model->collider_count);
     for (int i = 0; i < DRAPE_CANDIDATE_SETS; i++)
         take_set(arena, broad, &out->set[i]);
     out->level = drape_arena_take(arena, marks, sizeof *out->level);
     out->marked = drape_arena_take(arena, marks, sizeof *out->marked);
+    out->beyond = drape_arena_take(arena, marks, sizeof *out->beyond);
     out->stale = drape_arena_take(arena, (size_t)broad->model->collider_count, sizeof *out->stale);
     return drape_arena_status(arena);
 }
@@ -68,16 +70,14 @@ static double least_gap(const search *s, const drape_pair *pair, double enough)
 {
     const drape_configuration *end = s->path->end;
     const bool surface = drape_pair_points(pair) == 1;
-    double bound = -INFINITY;
-    if (!surface)
-        bound = drape_bound_by_axes(pair, end[0].x, s->moves ? end[1].x : NULL) - pair->radius;
-    if (bound >= enough)
-        return bound;
+    if (!surface && drape_bound_is_apart(pair, end[0].x, s->moves ? end[1].x : NULL, enough + pair->radius))
+        return enough;
     const double first = drape_pair_gap_value(pair, &end[0]);
     if (!s->moves)
         return first;
     const double change =
         surface ? move_to_surface(s->path, pair) : drape_bound_change(pair, end[0].x, end[1].x);
+    const double bound = surface ? -INFINITY : drape_bound_by_axes(pair, end[0].x, end[1].x) - pair->radius;
     return fmax(bound, 0.5 * (first + drape_pair_gap_value(pair, &end[1]) - change));
 }
 
@@ -157,20 +157,38 @@ static drape_status collect(drape_candidates *c, drape_candidate_set *set, const
     set->count = 0;
     set->known = true;
     drape_candidates_find(c->broad, &own, c->margin, marked, add, &(collector){c->arena, set});
-    return set->known ? DRAPE_OK : DRAPE_E_MEMORY;
+    return set->known ? drape_sort_pairs(&c->sorter, &set->pairs, &set->room, set->count) : DRAPE_E_MEMORY;
 }
 
 /* ---- Distance from the paths ---- */
 
+/* Sums of path . (x - x0) and of path . path over all coordinates. */
+LANES_DISPATCH static void sum_along(const double *x, const double *x0, const double *x1, size_t count,
+                                     double *along, double *square)
+{
+    lanes a = {0}, b = {0};
+    size_t i = 0;
+    for (; i + LANES <= count; i += LANES) {
+        const lanes from = lanes_load(x0 + i), path = lanes_load(x1 + i) - from;
+        a += path * (lanes_load(x + i) - from);
+        b += path * path;
+    }
+    *along = *square = 0;
+    for (; i < count; i++) {
+        *along += (x1[i] - x0[i]) * (x[i] - x0[i]);
+        *square += (x1[i] - x0[i]) * (x1[i] - x0[i]);
+    }
+    for (int l = 0; l < LANES; l++) {
+        *along += a[l];
+        *square += b[l];
+    }
+}
+
 /* The step fraction of the path at which it is nearest to a configuration, in the mean over all points. */
 static double nearest_fraction(const drape_candidates *c, const drape_candidate_set *set, const double *x)
 {
-    double along = 0, square = 0;
-    for (size_t i = 0; i < 3 * (size_t)c->broad->points; i++) {
-        const double path = set->x[1][i] - set->x[0][i];
-        along += path * (x[i] - set->x[0][i]);
-        square += path * path;
-    }
+    double along, square;
+    sum_along(x, set->x[0], set->x[1], 3 * (size_t)c->broad->points, &along, &square);
     return along > 0 ? fmin(along / square, 1) : 0;
 }
 
@@ -220,25 +238,27 @@ static double square_of_collider(const drape_candidates *c, int set, const drape
     return away * away;
 }
 
+static double square_of_point(const drape_candidate_set *from, const double *x, int32_t point, double t)
+{
+    const size_t i = 3 * (size_t)point;
+    return square_away(x + i, from->x[0] + i, from->x[1] + i, t);
+}
+
 /* The largest distance from the path of a set, of the points and colliders that were not marked for a later
- * one. Marks those of which it exceeds the margin, unless marked is NULL. */
-static double distance_from(const drape_candidates *c, int set, const drape_configuration *at, bool *marked)
+ * one. INFINITY if it is above the margin. */
+static double distance_from(const drape_candidates *c, int set, const drape_configuration *at)
 {
     const drape_candidate_set *from = &c->set[set];
     const int32_t points = c->broad->points;
     const double t = nearest_fraction(c, from, at->x), limit = c->margin * c->margin;
     double largest = 0;
     for (int32_t i = 0; i < points + c->broad->model->collider_count; i++) {
-        const int32_t k = i - points;
         if (c->level[i] > set)
             continue;
-        const double square = k < 0 ? square_away(at->x + 3 * (size_t)i, from->x[0] + 3 * (size_t)i,
-                                                  from->x[1] + 3 * (size_t)i, t)
-                                    : square_of_collider(c, set, at, k, t);
-        if (isnan(square))
+        const double square =
+            i < points ? square_of_point(from, at->x, i, t) : square_of_collider(c, set, at, i - points, t);
+        if (!(square <= limit))
             return INFINITY;
-        if (marked)
-            marked[i] = marked[i] || square > limit;
         largest = square > largest ? square : largest;
     }
     return sqrt(largest);
@@ -246,15 +266,10 @@ static double distance_from(const drape_candidates *c, int set, const drape_conf
 
 static double measure(const drape_candidates *c, int set, const drape_straight_path *path)
 {
-    double largest = 0;
-    for (int end = 0; end < 2; end++) {
-        if (end > 0 && path->end[1].x == path->end[0].x && path->end[1].pose == path->end[0].pose)
-            break;
-        largest = fmax(largest, distance_from(c, set, &path->end[end], NULL));
-        if (!(largest <= c->margin))
-            break;
-    }
-    return largest;
+    const double first = distance_from(c, set, &path->end[0]);
+    if (isinf(first) || (path->end[1].x == path->end[0].x && path->end[1].pose == path->end[0].pose))
+        return first;
+    return fmax(first, distance_from(c, set, &path->end[1]));
 }
 
 static bool has_stale(const drape_candidates *c)
@@ -284,21 +299,40 @@ double drape_candidates_farthest(const drape_candidates *c, const drape_distance
     return largest <= c->margin ? largest : INFINITY;
 }
 
-/* Marks what a patch on the path must have whose set follows the first `sets` ones. Returns the number of
- * nodes among it; more than there are if these sets are of no use there. */
-static int32_t mark(drape_candidates *c, int sets, const drape_straight_path *path)
+/* Notes of which sets the path is beyond the margin at each point and collider. Returns false if a
+ * position is not finite. */
+static bool note_beyond(drape_candidates *c, const drape_straight_path *path)
+{
+    const int32_t points = c->broad->points, count = points + c->broad->model->collider_count;
+    const double limit = c->margin * c->margin;
+    memset(c->beyond, 0, (size_t)count * sizeof *c->beyond);
+    for (int set = 0; set < c->sets; set++)
+        for (int end = 0; end < 2; end++) {
+            const drape_configuration *at = &path->end[end];
+            const double t = nearest_fraction(c, &c->set[set], at->x);
+            for (int32_t i = 0; i < count; i++) {
+                if (c->level[i] > set)
+                    continue;
+                const double square = i < points ? square_of_point(&c->set[set], at->x, i, t)
+                                                 : square_of_collider(c, set, at, i - points, t);
+                if (isnan(square))
+                    return false;
+                c->beyond[i] |= (uint8_t)((square > limit) << set);
+            }
+        }
+    return true;
+}
+
+/* Marks what a patch must have whose set follows the first `sets` ones, of what was noted. Returns the
+ * number of nodes among it. */
+static int32_t mark(drape_candidates *c, int sets)
 {
     const drape_broad_phase *broad = c->broad;
     const int32_t nodes = broad->model->node_count, points = broad->points;
+    const unsigned int kept = (1u << sets) - 1;
     int32_t count = 0;
-    for (int32_t i = 0; i < points; i++)
-        c->marked[i] = c->level[i] >= sets;
-    for (int32_t i = 0; i < broad->model->collider_count; i++)
-        c->marked[points + i] = c->stale[i] || c->level[points + i] >= sets;
-    for (int i = 0; i < sets; i++)
-        for (int end = 0; end < 2; end++)
-            if (isinf(distance_from(c, i, &path->end[end], c->marked)))
-                return nodes + 1;
+    for (int32_t i = 0; i < points + broad->model->collider_count; i++)
+        c->marked[i] = c->level[i] >= sets || (c->beyond[i] & kept) || (i >= points && c->stale[i - points]);
     for (int32_t i = nodes; i < points; i++) /* a collider with all of its points */
         c->marked[points + broad->point_collider[i - nodes]] |= c->marked[i];
     for (int32_t i = nodes; i < points; i++)
@@ -313,13 +347,13 @@ static int32_t mark(drape_candidates *c, int sets, const drape_straight_path *pa
 static int choose_set(drape_candidates *c, const drape_straight_path *path)
 {
     const int32_t nodes = c->broad->model->node_count;
-    const bool room = c->sets > 1 && c->sets < DRAPE_CANDIDATE_SETS;
-    const int32_t after_all = room ? mark(c, c->sets, path) : nodes + 1,
-                  after_first = c->sets > 0 ? mark(c, 1, path) : nodes + 1;
-    const int sets = after_first <= after_all ? 1 : c->sets;
-    if (sets > 1)
-        mark(c, sets, path);
-    return (sets > 1 ? after_all : after_first) <= MAX_PATCH * nodes ? sets : 0;
+    if (c->sets == 0 || !note_beyond(c, path))
+        return 0;
+    const int32_t after_all = c->sets > 1 && c->sets < DRAPE_CANDIDATE_SETS ? mark(c, c->sets) : nodes + 1,
+                  after_first = mark(c, 1);
+    if (after_all < after_first)
+        return mark(c, c->sets) <= MAX_PATCH * nodes ? c->sets : 0;
+    return after_first <= MAX_PATCH * nodes ? 1 : 0;
 }
 
 bool drape_candidates_patch_serves(drape_candidates *c, const drape_straight_path *path)
@@ -368,14 +402,6 @@ static bool is_of(const drape_candidates *c, const drape_pair *pair, int set)
     return level == set;
 }
 
-static bool is_before(const drape_pair *a, const drape_pair *b)
-{
-    for (int i = 0; i < 3; i++)
-        if (a->rank[i] != b->rank[i])
-            return a->rank[i] < b->rank[i];
-    return false;
-}
-
 const drape_pair *drape_candidates_next(const drape_candidates *c, const drape_distances *away,
                                         drape_candidate_cursor *cursor)
 {
@@ -388,7 +414,7 @@ const drape_pair *drape_candidates_next(const drape_candidates *c, const drape_d
                                    (c->sets > 1 && !is_of(c, &set->pairs[at], i))))
             at++;
         cursor->at[i] = at;
-        if (at < set->count && (!next || is_before(&set->pairs[at], next))) {
+        if (at < set->count && (!next || drape_pair_is_before(&set->pairs[at], next))) {
             next = &set->pairs[at];
             from = i;
         }

@@ -13,6 +13,7 @@
 #define DRAPE_CONTACT_CANDIDATES_H
 
 #include "contact/broad_phase.h"
+#include "contact/sort_pairs.h"
 
 /* All points move straight from one end to the other. */
 typedef struct drape_straight_path {
@@ -37,18 +38,20 @@ typedef struct drape_candidates {
     drape_candidate_set
         set[DRAPE_CANDIDATE_SETS]; /* of all pairs, and patches, each later than those before */
     int sets;                      /* that are in use; 0: no search was made */
-    uint8_t *level; /* (points + collider_count) the last set for which a point or collider was marked; 0 */
-    bool *marked;   /* (points + collider_count) of the search in progress */
-    bool *stale;    /* (collider_count) whose pairs have another activation distance by now */
+    uint8_t *level;  /* (points + collider_count) the last set for which a point or collider was marked; 0 */
+    bool *marked;    /* (points + collider_count) of the search in progress */
+    uint8_t *beyond; /* (points + collider_count) bits of the sets from whose path it is too far */
+    bool *stale;     /* (collider_count) whose pairs have another activation distance by now */
+    drape_pair_sorter sorter;
 } drape_candidates;
 
 /* arena and broad must outlive the candidates. */
 drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, double margin,
                                      drape_candidates *out);
 
-/* Calls visit, by increasing rank, for all pairs that can become active while no point is farther than margin
- * from the path; marked: NULL for all, or (points + collider_count) those of which a pair must have one. The
- * points of a marked collider must be marked, too. */
+/* Calls visit, in the order of the broad phase, for all pairs that can become active while no point is
+ * farther than margin from the path; marked: NULL for all, or (points + collider_count) those of which a pair
+ * must have one. The points of a marked collider must be marked, too. */
 void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *path, double margin,
                            const bool *marked, drape_broad_phase_visit *visit, void *user);
 
@@ -72,7 +75,7 @@ typedef struct drape_distances {
 } drape_distances;
 
 /* The distances of a path: as far as its ends are, at most. INFINITY if there was no search, or if a position
- * is not finite; those after one that is above the margin are not measured. */
+ * is not finite or beyond the margin; those after such a one are not measured. */
 drape_distances drape_candidates_distances(const drape_candidates *candidates,
                                            const drape_straight_path *path);
 

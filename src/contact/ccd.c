@@ -6,6 +6,7 @@
 #include "base/vec3.h"
 #include "contact/bound.h"
 
+#include <float.h>
 #include <string.h>
 
 #define KEEP_ITERATE 0.5 /* of what a gap has above the least, kept when a Newton iterate is cut short */
@@ -16,7 +17,8 @@
 #define MARCH_SHARE 0.9
 #define MAX_MARCHES 10000 /* maximum number of steps of a node along its path */
 
-#define MAX_PATH 8.0 /* in mean edges: the candidates of a longer path may be too many to keep */
+#define MAX_PATH  8.0 /* in mean edges: the candidates of a longer path may be too many to keep */
+#define MAX_THROW 1.0 /* in mean edges: to what a displacement beyond the size of the scene is shortened */
 
 /* A displacement of all points, and the first pair that limits it. */
 typedef struct path {
@@ -24,11 +26,13 @@ typedef struct path {
     const drape_swings *swings; /* NULL: no collider turns */
     double stray;               /* [m] how far points of colliders leave straight paths */
     const drape_keep *keep;
-    double fraction;
+    double fraction; /* of pairs of features */
+    double surface_fraction;
     drape_pair limiting;
     double *of_node; /* (nodes) the smallest fraction of a pair at each node; NULL: not wanted */
     int32_t nodes;
     const drape_relaxed_set *relaxed; /* their pairs limit nothing */
+    const drape_contact *surfaces;    /* its surfaces limit nodes, too; NULL: they do not */
 } path;
 
 /* The fraction of a pair that limits the displacement, for each of its nodes. */
@@ -48,24 +52,49 @@ static bool comes_near(const path *p, const drape_pair *pair, double gap)
     return gap < pair->distance || drape_pair_step_fraction(pair, p->x, p->y, p->swings, &near, 1) < 1;
 }
 
+/* A node that stays beyond the distance by which a path from beyond is cut short is not limited by a
+ * surface. So only candidates are, of colliders whose pairs are listed from that distance on. */
+static bool lists_limits(const drape_contact *c, int32_t collider)
+{
+    return c->broad.distance[collider] >= c->model->contact.distance;
+}
+
+/* A node and the smooth surface of a collider that rests. */
+static void follow_surface(const drape_contact *c, int32_t collider, int32_t node, path *p)
+{
+    const size_t at = 3 * (size_t)node;
+    const drape_collider_pose *pose = &c->path_pose[collider];
+    if (!c->model->colliders[collider].ops->smooth || drape_contact_lets_in(c, collider, &node, 1))
+        return;
+    const double own = drape_contact_march(c, collider, pose, pose, NULL, p->x + at, p->y + at, p->keep);
+    p->surface_fraction = fmin(p->surface_fraction, own);
+    if (p->of_node)
+        p->of_node[node] = fmin(p->of_node[node], own);
+}
+
 /* A pair that does not come near limits nothing, so it makes no difference whether it is a candidate. Does
  * not search beyond the step fraction that another pair leaves: if forces throw nodes very far, a pair
- * approaches so slowly relative to its speed that searching each to its own end would take for ever. */
+ * approaches so slowly relative to its speed that searching each to its own end would take for ever. Of equal
+ * fractions that of the pair of lower rank counts, in whichever order pairs come. */
 static void follow(void *user, const drape_pair *pair)
 {
     path *p = user;
     const drape_configuration from = {.x = p->x};
-    if (drape_pair_points(pair) == 1 ||
-        drape_bound_by_axes(pair, p->x, p->y) >= pair->distance + pair->radius + p->stray ||
+    if (drape_pair_points(pair) == 1) {
+        if (p->surfaces && lists_limits(p->surfaces, pair->collider))
+            follow_surface(p->surfaces, pair->collider, pair->node[0], p);
+        return;
+    }
+    if (drape_bound_is_apart(pair, p->x, p->y, pair->distance + pair->radius + p->stray) ||
         drape_relaxed_factor(p->relaxed, pair) > 0)
         return;
-    const double limit = p->of_node ? 1 : p->fraction;
+    const double limit = p->of_node ? 1 : fmin((1 + 4 * DBL_EPSILON) * p->fraction, 1);
     const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->swings, p->keep, limit);
     if (fraction >= limit || !comes_near(p, pair, drape_pair_gap_value(pair, &from)))
         return;
     if (p->of_node)
         share(p, pair, fraction);
-    if (fraction >= p->fraction)
+    if (fraction > p->fraction || (fraction == p->fraction && !drape_pair_is_before(pair, &p->limiting)))
         return;
     p->fraction = fraction;
     p->limiting = *pair;
@@ -110,7 +139,7 @@ double drape_contact_stray(const drape_collider *collider, double angle)
 
 double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *straight,
                                    const drape_swing *swing, const drape_keep *keep, double *of_node,
-                                   drape_pair *limiting)
+                                   double *of_surfaces, drape_pair *limiting)
 {
     const drape_swings swings = {.of = swing, .nodes = c->model->node_count};
     double stray = 0;
@@ -125,6 +154,8 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
               .fraction = 1,
               .of_node = of_node,
               .nodes = c->model->node_count,
+              .surface_fraction = 1,
+              .surfaces = of_surfaces ? c : NULL,
               .relaxed = &c->relaxed};
     drape_distances away;
     drape_candidate_cursor cursor = {0};
@@ -137,6 +168,11 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
         drape_candidates_find(&c->broad, straight, stray / 2, NULL, follow, &p);
         c->search_seconds += drape_clock_seconds() - start;
     }
+    for (int32_t k = 0; of_surfaces && k < c->model->collider_count; k++)
+        for (int32_t i = 0; !lists_limits(c, k) && i < c->model->free_count; i++)
+            follow_surface(c, k, c->model->node_of_free[i], &p);
+    if (of_surfaces)
+        *of_surfaces = p.surface_fraction;
     *limiting = p.limiting;
     return p.fraction;
 }
@@ -206,12 +242,36 @@ double drape_contact_march(const drape_contact *c, int32_t k, const drape_collid
     return t;
 }
 
+/* How far the node goes that goes farthest, beyond the mean motion of all, which brings nothing together. */
+static double farthest_throw(const drape_contact *c, const double *x, const double *y)
+{
+    const size_t nodes = (size_t)c->model->node_count;
+    double largest = 0, mean[3] = {0}, move[3];
+    for (size_t i = 0; i < 3 * nodes; i++)
+        mean[i % 3] += (y[i] - x[i]) / (double)nodes;
+    for (size_t i = 0; i < nodes; i++) {
+        vec3_sub(y + 3 * i, x + 3 * i, move);
+        vec3_sub(move, mean, move);
+        largest = fmax(largest, vec3_dot(move, move));
+    }
+    return sqrt(largest);
+}
+
+/* A correction that throws nodes farther than the scene is large is of no use, and a search among nodes
+ * that all go several edges in any direction would take many times as long as the rest of an iteration.
+ * Such a one is shortened without a look at pairs. Returns the length [m] to which; INFINITY if it is
+ * none. */
+static double thrown_length(const drape_contact *c, double farthest)
+{
+    return farthest > c->model->length ? MAX_THROW * c->mean_edge : INFINITY;
+}
+
 /* Lowers the fractions of nodes that go farther than a path whose candidates can be kept. A correction
  * throws nodes so far only if it is of no use there; to search each pair on its own path would take seconds.
  * Returns the least fraction. */
 static double shorten_long(const drape_contact *c, const double *x, const double *y, double *fraction)
 {
-    const double longest = MAX_PATH * c->mean_edge;
+    const double longest = fmin(thrown_length(c, farthest_throw(c, x, y)), MAX_PATH * c->mean_edge);
     double least = 1, move[3];
     for (int32_t i = 0; i < c->model->node_count; i++) {
         vec3_sub(y + 3 * (size_t)i, x + 3 * (size_t)i, move);
@@ -224,6 +284,13 @@ static double shorten_long(const drape_contact *c, const double *x, const double
     return least;
 }
 
+/* The fraction that leaves the whole displacement no longer than that. */
+static double shorten_whole(const drape_contact *c, const double *x, const double *y)
+{
+    const double farthest = farthest_throw(c, x, y), longest = thrown_length(c, farthest);
+    return farthest > longest && isfinite(farthest) ? longest / farthest : 1;
+}
+
 double drape_contact_step_fraction(drape_contact *c, const double *x, const double *y, double t,
                                    double *of_node)
 {
@@ -234,31 +301,22 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
                              .below = KEEP_ITERATE,
                              .arrival = ARRIVAL};
     drape_pair limiting;
-    const double shortened = of_node ? shorten_long(c, x, y, of_node) : 1;
-    if (shortened < 1)
-        return shortened;
+    double of_surfaces;
+    if (of_node) {
+        const double shortened = shorten_long(c, x, y, of_node);
+        if (shortened < 1)
+            return shortened;
+    }
+    const double whole = of_node ? 1 : shorten_whole(c, x, y);
     drape_contact_poses(c, t, c->path_pose);
     drape_contact_fill(c, x, c->path_pose, c->from);
     drape_contact_fill(c, y, c->path_pose, c->to);
+    for (size_t i = 0; whole < 1 && i < 3 * (size_t)c->model->node_count; i++)
+        c->to[i] = x[i] + whole * (y[i] - x[i]);
     const drape_straight_path straight = {{{.model = c->model, .x = c->from, .pose = c->path_pose},
                                            {.model = c->model, .x = c->to, .pose = c->path_pose}}};
-    double fraction = drape_contact_free_fraction(c, &straight, NULL, &keep, of_node, &limiting);
-    for (int32_t k = 0; k < c->model->collider_count; k++) {
-        const drape_collider *collider = &c->model->colliders[k];
-        if (!collider->ops->smooth)
-            continue;
-        for (int32_t i = 0; i < c->model->free_count; i++) {
-            const int32_t node = c->model->node_of_free[i];
-            const size_t at = 3 * (size_t)node;
-            if (drape_contact_lets_in(c, k, &node, 1))
-                continue;
-            const double own =
-                drape_contact_march(c, k, &c->path_pose[k], &c->path_pose[k], NULL, x + at, y + at, &keep);
-            fraction = fmin(fraction, own);
-            if (of_node)
-                of_node[node] = fmin(of_node[node], own);
-        }
-    }
+    const double of_features =
+        drape_contact_free_fraction(c, &straight, NULL, &keep, of_node, &of_surfaces, &limiting);
     c->seconds += drape_clock_seconds() - start;
-    return fraction;
+    return whole * fmin(of_features, of_surfaces);
 }

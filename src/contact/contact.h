@@ -146,9 +146,10 @@ drape_status drape_contact_continue(drape_contact *contact, const drape_contact 
 void drape_contact_archive(drape_contact *contact, drape_archive *a);
 
 /* The largest step fraction from x to y (node_count x 3) on which no two pieces pass through each other,
- * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered at
- * each node to the smallest fraction of its pairs; where a displacement is longer than a few edges, to such a
- * length without a look at pairs. */
+ * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered
+ * at each node to the smallest fraction of its pairs; where a displacement is longer than a few edges, to
+ * such a length without a look at pairs. One that throws nodes farther than the scene is large is
+ * shortened to about an edge. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
                                    double *of_node);
 

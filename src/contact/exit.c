@@ -102,8 +102,7 @@ bool drape_exit_is_pierced(const drape_contact *c, int32_t collider, int32_t fac
     if (piercing)
         memcpy(piercing, q.x[0], 3 * sizeof *piercing);
     if (!c->model->colliders[collider].ops->smooth && shape->triangle_count > 0) {
-        drape_path_bvh_query(&c->broad.obstacles,
-                             &(drape_path_query){.node = n, .nodes = 3, .x = c->x, .after = -1},
+        drape_path_bvh_query(&c->broad.obstacles, &(drape_path_query){.node = n, .nodes = 3, .x = c->x},
                              meet_triangle, &q);
         return q.found;
     }

@@ -156,10 +156,12 @@ void drape_contact_velocities(const drape_contact *c, const drape_active_contact
 /* The largest step fraction from one configuration to another on which all pairs of features keep what
  * they must of their gaps, and the pair that limits it. Nodes move straight, and so do the points of
  * colliders, except those that turn by their swing (collider_count; NULL: none turns). of_node
- * (node_count), unless NULL, is lowered at each node to the smallest fraction of its pairs. */
+ * (node_count), unless NULL, is lowered at each node to the smallest fraction of its pairs. of_surfaces,
+ * unless NULL, is set to the smallest fraction of nodes and smooth surfaces, which must rest at
+ * c->path_pose; of_node then counts these, too. */
 double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *straight,
                                    const drape_swing *swing, const drape_keep *keep, double *of_node,
-                                   drape_pair *limiting);
+                                   double *of_surfaces, drape_pair *limiting);
 
 /* The same for the path of a node from x to y, and the smooth surface of a collider, which goes from one pose
  * to another, by its swing unless that is NULL. */

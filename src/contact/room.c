@@ -477,7 +477,7 @@ drape_status drape_room_review(drape_contact *c, double t, bool *changed)
     drape_relaxed_update(&c->relaxed, t, max_factor(c));
     *changed = c->relaxed.t != before;
     if (c->relaxed.count > 0)
-        drape_path_bvh_fit(&c->broad.obstacles, c->x, NULL, NULL); /* for is_pierced */
+        drape_path_bvh_fit(&c->broad.obstacles, c->x, NULL, NULL, NULL); /* for is_pierced */
     *changed = drape_relaxed_remove(&c->relaxed, is_out, c) > 0 || *changed;
     return drape_exit_find(c, t);
 }

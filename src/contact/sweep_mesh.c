@@ -115,11 +115,10 @@ bool drape_contact_sweep_meshes(drape_contact *c, double *y)
     bool moved = false;
     for (int32_t k = 0; k < c->model->collider_count; k++)
         reach = fmax(reach, c->broad.obstacle_radius + c->broad.distance[k]);
-    drape_path_bvh_fit(tree, c->start, y, NULL);
+    drape_path_bvh_fit(tree, c->start, y, NULL, NULL);
     for (int32_t f = 0; f < c->model->free_count; f++) {
         meeting m = {.contact = c, .y = y, .node = c->model->node_of_free[f], .fraction = 1, .gap = INFINITY};
-        const drape_path_query query = {
-            .node = &m.node, .nodes = 1, .x = c->start, .y = y, .reach = reach, .after = -1};
+        const drape_path_query query = {.node = &m.node, .nodes = 1, .x = c->start, .y = y, .reach = reach};
         drape_path_bvh_query(tree, &query, meet, &m);
         if (m.fraction < 1)
             moved = slide(&m, y + 3 * (size_t)m.node) || moved;

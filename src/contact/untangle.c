@@ -352,7 +352,8 @@ drape_status drape_untangle(drape_context *ctx, const drape_motion *motion, doub
                             drape_untangle_outcome *outcome)
 {
     drape_arena arena = drape_arena_of(ctx);
-    drape_untangler u = {.ctx = ctx, .arena = &arena, .model = motion->model, .def = limits};
+    drape_untangler u = {
+        .ctx = ctx, .arena = &arena, .model = motion->model, .def = limits, .sorter.arena = &arena};
     drape_status status = set_up(&u, motion, t, x);
     if (!status)
         status = sweep_all(&u, cancel, outcome);

@@ -119,9 +119,19 @@ static void bound_pair(drape_untangler *u, const drape_pair *pair, const drape_c
     drape_untangle_bound(u, &bound);
 }
 
-static void consider(void *user, const drape_pair *found)
+static void gather(void *user, const drape_pair *pair)
 {
-    gathering *g = user;
+    drape_untangler *u = user;
+    drape_pair *near = drape_list_grow(u->arena, u->near, u->near_count, &u->near_room, sizeof *near);
+    u->out_of_memory = u->out_of_memory || !near;
+    if (!near)
+        return;
+    u->near = near;
+    u->near[u->near_count++] = *pair;
+}
+
+static void consider(const gathering *g, const drape_pair *found)
+{
     drape_untangler *u = g->u;
     drape_pair pair = *found;
     double x[4][3];
@@ -154,6 +164,11 @@ drape_status drape_untangle_gaps(drape_untangler *u)
                    .rest = {.model = u->model, .x = u->broad.rest, .pose = u->pose},
                    .reach = REACH * drape_untangle_stride(u)};
     const drape_broad_query want = {.x = u->x, .reach = g.reach};
-    drape_broad_phase_pairs(&u->broad, &want, consider, &g);
+    u->near_count = 0;
+    drape_broad_phase_pairs(&u->broad, &want, gather, u);
+    if (u->out_of_memory || drape_sort_pairs(&u->sorter, &u->near, &u->near_room, u->near_count))
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < u->near_count; i++)
+        consider(&g, &u->near[i]);
     return u->out_of_memory ? DRAPE_E_MEMORY : DRAPE_OK;
 }

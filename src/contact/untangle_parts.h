@@ -8,6 +8,7 @@
 #define DRAPE_CONTACT_UNTANGLE_PARTS_H
 
 #include "contact/broad_phase.h"
+#include "contact/sort_pairs.h"
 #include "contact/untangle.h"
 #include "geometry/nearest.h"
 
@@ -58,6 +59,9 @@ typedef struct drape_untangler {
     const drape_model *model;
     const drape_untangle_limits *def;
     drape_broad_phase broad;
+    drape_pair *near; /* (near_count of near_room) pairs that may be near each other, by rank */
+    int32_t near_count, near_room;
+    drape_pair_sorter sorter;
     drape_collider_pose *pose;   /* (collider_count) */
     const drape_collider **body; /* (collider_count) as they are at the time */
     bool *open;                  /* (collider_count) it has no inside */

@@ -20,33 +20,19 @@ static int children_of(const drape_bvh *from, int32_t branch, int32_t child[LANE
     return count;
 }
 
-static int32_t merge(drape_path_bvh *bvh, const drape_bvh *from, int32_t branch);
-
-/* Makes a branch of the binary tree the child in a lane. Returns its largest element. */
-static int32_t take_child(drape_path_bvh *bvh, drape_path_branch *self, int lane, const drape_bvh *from,
-                          int32_t branch)
-{
-    const bool leaf = from->branches[branch].second == 0;
-    self->child[lane] = leaf ? -1 - from->order[from->branches[branch].first] : bvh->branch_count;
-    self->last[lane] = leaf ? -1 - self->child[lane] : merge(bvh, from, branch);
-    return self->last[lane];
-}
-
-/* Stored in depth-first order: children come after their parent. Returns the largest element below. */
-static int32_t merge(drape_path_bvh *bvh, const drape_bvh *from, int32_t branch)
+/* Stored in depth-first order: children come after their parent. */
+static void merge(drape_path_bvh *bvh, const drape_bvh *from, int32_t branch)
 {
     drape_path_branch *self = &bvh->branches[bvh->branch_count++];
-    int32_t child[LANES], last = -1;
-    if (from->branches[branch].second == 0) { /* a tree of one element */
-        self->count = 1;
-        return take_child(bvh, self, 0, from, branch);
-    }
-    self->count = children_of(from, branch, child);
+    int32_t child[LANES] = {branch};
+    const bool single = from->branches[branch].second == 0; /* a tree of one element */
+    self->count = single ? 1 : children_of(from, branch, child);
     for (int i = 0; i < self->count; i++) {
-        const int32_t below = take_child(bvh, self, i, from, child[i]);
-        last = below > last ? below : last;
+        const bool leaf = from->branches[child[i]].second == 0;
+        self->child[i] = leaf ? -1 - from->order[from->branches[child[i]].first] : bvh->branch_count;
+        if (!leaf)
+            merge(bvh, from, child[i]);
     }
-    return last;
 }
 
 drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, const int32_t *node,
@@ -89,11 +75,25 @@ static inline drape_box box_of(const int32_t *node, int nodes, const double *x)
     return box;
 }
 
+static drape_box leaf_box(const drape_path_bvh *bvh, int32_t element, const double *x, const double *grow)
+{
+    const int32_t *node = bvh->node + (size_t)element * (size_t)bvh->nodes;
+    drape_box box = bvh->nodes == 2   ? box_of(node, 2, x) /* with loops of a known length */
+                    : bvh->nodes == 3 ? box_of(node, 3, x)
+                                      : box_of(node, bvh->nodes, x);
+    for (int k = 0; grow && k < 3; k++) {
+        box.low[k] -= grow[element];
+        box.high[k] += grow[element];
+    }
+    return box;
+}
+
 /* The box of a child at one end. */
-static drape_box child_box(const drape_path_bvh *bvh, int32_t child, int end, const double *x)
+static drape_box child_box(const drape_path_bvh *bvh, int32_t child, int end, const double *x,
+                           const double *grow)
 {
     if (child < 0)
-        return box_of(bvh->node + (size_t)(-1 - child) * (size_t)bvh->nodes, bvh->nodes, x);
+        return leaf_box(bvh, -1 - child, x, grow);
     const drape_path_branch *from = &bvh->branches[child];
     drape_box box;
     for (int k = 0; k < 3; k++) {
@@ -120,7 +120,8 @@ static bool is_marked(const drape_path_bvh *bvh, int32_t child, const bool *mark
 }
 
 /* Children are stored after their parent: going backwards refits them first. */
-void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const bool *marked)
+void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const bool *marked,
+                        const double *grow)
 {
     const double *const ends[2] = {x, y};
     for (int32_t i = bvh->branch_count - 1; i >= 0; i--) {
@@ -129,7 +130,7 @@ void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, c
             branch->marked[l] = is_marked(bvh, branch->child[l], marked);
         for (int end = 0; end < 2 && ends[end]; end++)
             for (int32_t l = 0; l < branch->count; l++) {
-                const drape_box box = child_box(bvh, branch->child[l], end, ends[end]);
+                const drape_box box = child_box(bvh, branch->child[l], end, ends[end], grow);
                 for (int k = 0; k < 3; k++) {
                     branch->low[end][k][l] = box.low[k];
                     branch->high[end][k][l] = box.high[k];
@@ -142,7 +143,7 @@ void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, c
 
 typedef struct query {
     lanes low[2][3], high[2][3]; /* the same number in all lanes */
-    int32_t after, marked;       /* the least value of marked */
+    int32_t marked;              /* the least value of marked */
 } query;
 
 /* Which children an axis separates from the query: -1 in their lanes. */
@@ -178,8 +179,7 @@ LANES_INLINE void traverse(const drape_path_bvh *bvh, const query *q, int ends, 
         const lanes_mask apart = find_apart(branch, q, ends);
         for (int l = LANES - 1; l >= 0; l--) { /* writes always, without a branch to mispredict */
             waiting[count] = branch->child[l];
-            count += (apart[l] == 0) & (l < branch->count) & (branch->last[l] > q->after) &
-                     (branch->marked[l] >= q->marked);
+            count += (apart[l] == 0) & (l < branch->count) & (branch->marked[l] >= q->marked);
         }
     }
 }
@@ -200,7 +200,7 @@ void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *fro
                           void *user)
 {
     const double *const ends[2] = {from->x, from->y};
-    query q = {.after = from->after, .marked = from->only_marked};
+    query q = {.marked = from->only_marked};
     for (int end = 0; end < 2 && ends[end]; end++) {
         const drape_box box = box_of(from->node, from->nodes, ends[end]);
         for (int k = 0; k < 3; k++) {
@@ -244,7 +244,103 @@ void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *from
         unsigned int common = side[node[0]];
         for (int a = 1; a < bvh->nodes; a++)
             common &= side[node[a]];
-        if (common == 0 && e > from->after && (!from->only_marked || is_marked(bvh, -1 - e, marked)))
+        if (common == 0 && (!from->only_marked || is_marked(bvh, -1 - e, marked)))
             visit(user, e);
     }
+}
+
+/* ---- Two trees ---- */
+
+/* A child of one tree, or all children of a branch, and a branch of the other, which are to be tested. */
+typedef struct meeting {
+    int32_t branch[2];
+    int32_t lane; /* of the child; -1: all */
+    int32_t from; /* the tree of the child */
+} meeting;
+
+/* Each meeting leaves at most LANES^2 others, one level deeper in one tree. */
+#define MEETINGS (LANES * LANES * DRAPE_BVH_DEPTH)
+
+/* The boxes of a child, enlarged by reach. */
+LANES_INLINE void boxes_of(const drape_path_branch *branch, int32_t lane, double reach, int ends, query *q)
+{
+    for (int end = 0; end < ends; end++)
+        for (int k = 0; k < 3; k++) {
+            q->low[end][k] = branch->low[end][k][lane] - reach - (lanes){0};
+            q->high[end][k] = branch->high[end][k][lane] + reach - (lanes){0};
+        }
+}
+
+/* Tests one child, or all, of a branch against all children of the other branch. A branch that meets
+ * itself has each pair of its children once. */
+LANES_INLINE int32_t meet(const drape_path_bvh *const tree[2], const meeting *at, double reach, int ends,
+                          bool itself, meeting *next, drape_path_bvh_meet *visit, void *user)
+{
+    const int own = at->from, other = !own;
+    const drape_path_branch *from = &tree[own]->branches[at->branch[own]],
+                            *to = &tree[other]->branches[at->branch[other]];
+    const int32_t first = at->lane < 0 ? 0 : at->lane, last = at->lane < 0 ? from->count - 1 : at->lane;
+    int32_t count = 0;
+    for (int32_t i = first; i <= last; i++) {
+        query q;
+        boxes_of(from, i, reach, ends, &q);
+        const lanes_mask apart = find_apart(to, &q, ends);
+        if (apart[0] & apart[1] & apart[2] & apart[3])
+            continue;
+        for (int32_t l = itself ? i : 0; l < to->count; l++) {
+            const int32_t child[2] = {from->child[i], to->child[l]};
+            if (apart[l] != 0 || !(from->marked[i] | to->marked[l]))
+                continue;
+            if (child[0] < 0 && child[1] < 0) {
+                if (!itself || i != l)
+                    visit(user, -1 - child[own], -1 - child[other]);
+                continue;
+            }
+            meeting *into = &next[count++];
+            *into = (meeting){.lane = -1};
+            into->branch[own] = child[0] < 0 ? at->branch[own] : child[0];
+            into->branch[other] = child[1] < 0 ? at->branch[other] : child[1];
+            if (child[0] < 0 || child[1] < 0) {
+                into->lane = child[0] < 0 ? i : l;
+                into->from = child[0] < 0 ? own : other;
+            }
+        }
+    }
+    return count;
+}
+
+LANES_INLINE void join(const drape_path_bvh *const tree[2], double reach, int ends,
+                       drape_path_bvh_meet *visit, void *user)
+{
+    meeting waiting[MEETINGS];
+    int32_t count = 0;
+    if (tree[0]->branch_count > 0 && tree[1]->branch_count > 0)
+        waiting[count++] = (meeting){.lane = -1};
+    while (count > 0) {
+        const meeting at = waiting[--count];
+        const bool itself = tree[0] == tree[1] && at.lane < 0 && at.branch[0] == at.branch[1];
+        count += meet(tree, &at, reach, ends, itself, waiting + count, visit, user);
+    }
+}
+
+LANES_DISPATCH static void join_points(const drape_path_bvh *const tree[2], double reach,
+                                       drape_path_bvh_meet *visit, void *user)
+{
+    join(tree, reach, 1, visit, user);
+}
+
+LANES_DISPATCH static void join_paths(const drape_path_bvh *const tree[2], double reach,
+                                      drape_path_bvh_meet *visit, void *user)
+{
+    join(tree, reach, 2, visit, user);
+}
+
+void drape_path_bvh_join(const drape_path_bvh *a, const drape_path_bvh *b, bool moves, double reach,
+                         drape_path_bvh_meet *visit, void *user)
+{
+    const drape_path_bvh *const tree[2] = {a, b};
+    if (moves)
+        join_paths(tree, reach, visit, user);
+    else
+        join_points(tree, reach, visit, user);
 }

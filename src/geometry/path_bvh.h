@@ -15,7 +15,6 @@
 typedef struct drape_path_branch {
     double low[2][3][LANES], high[2][3][LANES]; /* by end, axis and child */
     int32_t child[LANES];                       /* a later branch; -1 - e: the element e */
-    int32_t last[LANES];                        /* the largest number of an element in each child */
     int32_t marked[LANES];                      /* whether an element in it is marked */
     int32_t count;                              /* of children */
 } drape_path_branch;
@@ -24,7 +23,7 @@ typedef struct drape_path_bvh {
     int32_t count; /* number of elements */
     int nodes;     /* nodes per element */
     const int32_t *node;
-    int32_t *place; /* (count) of each element in the order of queries, */
+    int32_t *place; /* (count) of each element in the order of the tree, */
     int32_t *order; /* (count) and the element in each place */
     drape_path_branch *branches;
     int32_t branch_count;
@@ -35,8 +34,10 @@ drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, 
                                   const double *x, drape_path_bvh *bvh);
 
 /* Refits the boxes to the paths of the elements from x to y; y NULL: to the elements at x. Marks elements
- * with a marked point; NULL: all. */
-void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const bool *marked);
+ * with a marked point; NULL: all. grow: (count) [m] by which the box of each element is enlarged; NULL:
+ * none is. */
+void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const bool *marked,
+                        const double *grow);
 
 /* What is searched: elements that no axis separates, by more than reach at both ends, from some nodes on
  * their path. */
@@ -45,11 +46,10 @@ typedef struct drape_path_query {
     int nodes;
     const double *x, *y; /* y NULL as in the last fit */
     double reach;
-    int32_t after;    /* only elements with larger numbers */
     bool only_marked; /* only marked elements */
 } drape_path_query;
 
-/* Calls visit for every such element, in an order that does not depend on the positions. */
+/* Calls visit for every such element, by increasing place. */
 void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *query, drape_bvh_visit *visit,
                           void *user);
 
@@ -58,5 +58,13 @@ void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *que
  * scratch. */
 void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *query, int32_t points,
                          const bool *marked, uint8_t *side, drape_bvh_visit *visit, void *user);
+
+/* Calls visit for every pair of elements, one of each tree, of which one is marked and that no axis separates
+ * by more than reach at both ends; both trees were fitted to the same ends. Branches that are apart are met
+ * once for all of their elements, so this takes a fraction of the time of a query for each element. With a ==
+ * b every pair of different elements is visited once. The order does not depend on the positions. */
+typedef void drape_path_bvh_meet(void *user, int32_t a, int32_t b);
+void drape_path_bvh_join(const drape_path_bvh *a, const drape_path_bvh *b, bool moves, double reach,
+                         drape_path_bvh_meet *visit, void *user);
 
 #endif

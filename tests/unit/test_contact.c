@@ -8,6 +8,7 @@
 #include "contact/friction.h"
 #include "contact/pair.h"
 #include "contact/predict.h"
+#include "contact/sort_pairs.h"
 #include "geometry/path_bvh.h"
 #include "support/suite.h"
 
@@ -459,8 +460,8 @@ static bool is_marked(const bool *marked, const int32_t *edge)
     return !marked || marked[edge[0]] || marked[edge[1]];
 }
 
-/* Every element with a number above a limit, marked if this is wanted, that no axis separates from the
- * query is found once, in the order of its place, also after the positions have changed. */
+/* Every element, marked if this is wanted, that no axis separates from the query is found once, in the
+ * order of its place, also after the positions have changed. */
 static void check_tree(drape_arena *arena, int32_t count)
 {
     uint64_t seed = 5;
@@ -481,14 +482,13 @@ static void check_tree(drape_arena *arena, int32_t count)
                                         .x = x,
                                         .y = k % 2 ? y : NULL,
                                         .reach = 0.3,
-                                        .after = k % 3 ? -1 : k,
                                         .only_marked = marks && k % 4 == 1};
         found f = {.count = 0};
         fill(&seed, 1, x, 300);
         fill(&seed, 1, y, 300);
         for (int i = 0; i < 100; i++)
             marked[i] = next_number(&seed) > 0.8;
-        drape_path_bvh_fit(&tree, x, k % 2 ? y : NULL, marks);
+        drape_path_bvh_fit(&tree, x, k % 2 ? y : NULL, marks, NULL);
         drape_path_bvh_query(&tree, &query, note, &f);
         uint8_t side[100];
         found scanned = {.count = 0};
@@ -506,11 +506,123 @@ static void check_tree(drape_arena *arena, int32_t count)
             }
             for (int i = 0; i < f.count; i++)
                 times += f.elements[i] == e;
-            ck_assert_int_eq(times, e > query.after && stay_together(own, box) &&
+            ck_assert_int_eq(times, stay_together(own, box) &&
                                         (!query.only_marked || is_marked(marks, edge + 2 * e)));
         }
     }
 }
+
+/* How often two elements met. */
+typedef struct meetings {
+    int times[100][100];
+} meetings;
+
+static void note_meeting(void *user, int32_t a, int32_t b)
+{
+    ((meetings *)user)->times[a][b]++;
+}
+
+/* Two trees, one with boxes that are enlarged, meet in every pair with a marked element that no axis
+ * separates, once, and a tree meets itself in every such pair of different elements. */
+static void check_join(drape_arena *arena, int32_t count, int32_t others)
+{
+    static meetings met, itself;
+    uint64_t seed = 11;
+    double x[300], y[300], grow[100];
+    int32_t edge[200], point[100];
+    bool marked[100];
+    drape_path_bvh edges, points;
+    fill(&seed, 1, x, 300);
+    for (int i = 0; i < 200; i++)
+        edge[i] = (int32_t)(fabs(next_number(&seed)) * 99.9);
+    for (int i = 0; i < 100; i++) {
+        point[i] = i;
+        grow[i] = 0.3 * fabs(next_number(&seed));
+    }
+    ck_assert_int_eq(drape_path_bvh_build(arena, count, 2, edge, x, &edges), DRAPE_OK);
+    ck_assert_int_eq(drape_path_bvh_build(arena, others, 1, point, x, &points), DRAPE_OK);
+    for (int k = 0; k < 8; k++) {
+        const bool moves = k % 2, *marks = k % 4 < 2 ? marked : NULL;
+        const double *const ends[2] = {x, moves ? y : x};
+        memset(&met, 0, sizeof met);
+        memset(&itself, 0, sizeof itself);
+        fill(&seed, 1, x, 300);
+        fill(&seed, 1, y, 300);
+        for (int i = 0; i < 100; i++)
+            marked[i] = next_number(&seed) > 0.8;
+        drape_path_bvh_fit(&edges, x, moves ? y : NULL, marks, NULL);
+        drape_path_bvh_fit(&points, x, moves ? y : NULL, marks, grow);
+        drape_path_bvh_join(&points, &edges, moves, 0.1, note_meeting, &met);
+        drape_path_bvh_join(&edges, &edges, moves, 0.2, note_meeting, &itself);
+        for (int32_t a = 0; a < 100; a++)
+            for (int32_t b = 0; b < 100; b++) {
+                drape_box of_point[2], of_edge[2], own[2];
+                for (int end = 0; end < 2; end++) {
+                    of_point[end] = drape_box_of(point + a, 1, ends[end], 0.1 + grow[a]);
+                    of_edge[end] = drape_box_of(edge + 2 * b, 2, ends[end], 0);
+                    own[end] = drape_box_of(edge + 2 * a, 2, ends[end], 0.2);
+                }
+                ck_assert_int_eq(met.times[a][b], a < others && b < count &&
+                                                      stay_together(of_point, of_edge) &&
+                                                      (is_marked(marks, edge + 2 * b) || !marks || marks[a]));
+                if (a < b)
+                    ck_assert_int_eq(itself.times[a][b] + itself.times[b][a],
+                                     b < count && stay_together(own, of_edge) &&
+                                         (is_marked(marks, edge + 2 * a) || is_marked(marks, edge + 2 * b)));
+                ck_assert(a != b || itself.times[a][b] == 0);
+            }
+    }
+}
+
+START_TEST(test_join)
+{
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    drape_arena arena = drape_arena_of(ctx);
+    for (int32_t count = 0; count < 6; count++)
+        check_join(&arena, count, 5 - count);
+    check_join(&arena, 100, 1);
+    check_join(&arena, 3, 100);
+    check_join(&arena, 100, 77);
+    drape_arena_free(&arena);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* Pairs of two stages, each in any order, some with the same piece: by rank, all of them, and what is
+ * sorted stays. */
+START_TEST(test_sort)
+{
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    drape_arena arena = drape_arena_of(ctx);
+    drape_pair_sorter sorter = {.arena = &arena};
+    int32_t room = 300;
+    drape_pair *pairs = drape_arena_take(&arena, (size_t)room, sizeof *pairs);
+    uint64_t seed = 3;
+    for (int round = 0; round < 3; round++) {
+        double sum = 0;
+        for (int32_t i = 0; i < 250; i++) {
+            const int32_t stage = i < 5 ? -1 : i > 150;
+            pairs[i] = (drape_pair){.area = i,
+                                    .rank = {stage, stage < 0 ? i : (int32_t)(fabs(next_number(&seed)) * 40),
+                                             stage < 0 ? 0 : (int32_t)(fabs(next_number(&seed)) * 9000)}};
+        }
+        ck_assert_int_eq(drape_sort_pairs(&sorter, &pairs, &room, 250), DRAPE_OK);
+        ck_assert_int_ge(room, 250);
+        for (int32_t i = 0; i < 250; i++) {
+            sum += pairs[i].area;
+            ck_assert(i == 0 || !drape_pair_is_before(&pairs[i], &pairs[i - 1]));
+        }
+        ck_assert_double_eq(sum, 250 * 249 / 2);
+        const drape_pair *before = pairs;
+        ck_assert_int_eq(drape_sort_pairs(&sorter, &pairs, &room, 250), DRAPE_OK);
+        ck_assert_ptr_eq(pairs, before);
+    }
+    drape_arena_free(&arena);
+    drape_context_destroy(&ctx);
+}
+END_TEST
 
 START_TEST(test_tree)
 {
@@ -549,6 +661,8 @@ START_TEST(test_bounds)
                 at[i] = x[i] + 0.1 * step * (y[i] - x[i]);
             const double gap = drape_pair_gap_value(&pair, &(drape_configuration){.x = at});
             ck_assert_double_ge(gap, bound - 1e-12);
+            ck_assert(bound < 1e-9 || (drape_bound_is_apart(&pair, x, y, bound * (1 - 1e-9)) &&
+                                       !drape_bound_is_apart(&pair, x, y, bound * (1 + 1e-9))));
             ck_assert_double_le(fabs(gap - start), change + 1e-12);
             if (step == 0)
                 ck_assert_double_le(drape_bound_by_axes(&pair, x, NULL), gap + 1e-12);
@@ -591,4 +705,4 @@ END_TEST
 
 SUITE("contact", test_predicted, test_triangle, test_segments, test_parallel, test_mollified_away,
       test_barrier, test_bounded_barrier, test_step_fraction, test_arrival, test_no_gap_is_exempt, test_tree,
-      test_bounds)
+      test_join, test_sort, test_bounds)
