@@ -639,13 +639,15 @@ DRAPE_API bool drape_sim_untangling(const drape_sim *sim, drape_untangling *out,
  *
  * What goes on: time, positions and velocities to the bit; the internal variables of a term that the new
  * model has, too, on the same cloth; the motion and placement of pins and colliders, and which pairs of
- * contact are inside or relaxed: colliders and events are the same if their names are. A collider whose pivot
- * changes stays where it is, with its velocities, and goes on turning about the new pivot; the pose that it has
- * been sent to stays the same, too. A pivot that no scene gives is the middle of the shape and moves with it. So do the drag
+ * contact are inside or relaxed: colliders and events are the same if their names are. So do the drag
  * springs, drape_sim_push, the wind, observers, frames, statistics and the energy account, which takes the
  * change of the energies as given by the host. Integrator, controller, steps, frame rate and threads are
  * those of the sim, whatever the scene says. Integrators and controllers start anew, as after
  * drape_sim_place; an event whose quantity the change takes past its bound has no root there.
+ *
+ * A collider whose pivot changes stays where it is, with its velocities, and goes on turning about the new
+ * pivot; the pose that it has been sent to stays the same, too. A pivot that no scene gives is the middle of
+ * the shape and moves with it.
  *
  * A node that becomes free goes on with the velocity of its pin. One that becomes pinned is held where it is
  * until drape_sim_move_pins moves it, unless the model has a track for it that leads through there; one that
@@ -709,10 +711,10 @@ DRAPE_API drape_status drape_sim_set_masses(drape_sim *sim, int32_t count, const
  * collider has them at t.
  *
  * Attaching nodes that are pinned already allocates nothing unless contact needs more, or the nearest
- * triangles of a collider that deforms are to be found; otherwise both take what drape_sim_pin takes. Checkpoints keep what is attached. Must not be called by an observer. Errors,
- * after which nothing has changed: those of drape_sim_pin; DRAPE_E_ARGUMENT (no such collider, node or
- * triangle; triangles of a collider that is rigid; a node to detach that no collider carries).
- * Thread-safety: as the sim. */
+ * triangles of a collider that deforms are to be found; otherwise both take what drape_sim_pin takes.
+ * Checkpoints keep what is attached. Must not be called by an observer. Errors, after which nothing has
+ * changed: those of drape_sim_pin; DRAPE_E_ARGUMENT (no such collider, node or triangle; triangles of a
+ * collider that is rigid; a node to detach that no collider carries). Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_attach(drape_sim *sim, int32_t collider, int32_t count, const int32_t *nodes,
                                         const int32_t *triangles);
 DRAPE_API drape_status drape_sim_detach(drape_sim *sim, int32_t count, const int32_t *nodes);
@@ -775,8 +777,8 @@ DRAPE_API drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const 
 /* The same for a whole collider: moves it to a displacement [m] from the position that its parameters
  * define, turned as it is now; a collider that turned stops turning. One that would have to be faster than
  * teleport_speed is placed there, less the path and the turn at its velocities on arrival: the given ones, or
- * else those that it has; its speed is that of its pivot plus that of the farthest point of its shape about it. drape_sim_collider returns its present
- * position. */
+ * else those that it has; its speed is that of its pivot plus that of the farthest point of its shape about
+ * it. drape_sim_collider returns its present position. */
 DRAPE_API drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double seconds,
                                                const double displacement[3], const double *velocity);
 

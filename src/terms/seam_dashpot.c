@@ -1,9 +1,10 @@
 /*
- * dashpot: a dashpot between each node of one side and that of the other, along the line d between them, with the
- * relative velocity w:
+ * dashpot: a dashpot between each node of one side and that of the other, along the line d between them,
+ * with the relative velocity w:
  *     force c (d . w) d / (l^2 + s^2),    l = |d|,
- * which is c times the rate of l where l is much larger than s. It has no torque, takes nothing from a motion of
- * both nodes as one body, and is smooth where the nodes meet: there it vanishes, as a direction along d does.
+ * which is c times the rate of l where l is much larger than s. It has no torque, takes nothing from a
+ * motion of both nodes as one body, and is smooth where the nodes meet: there it vanishes, as a direction
+ * along d does.
  */
 #include "terms/terms.h"
 

@@ -208,7 +208,8 @@ END_TEST
 
 /* ---- Damping ---- */
 
-/* Two panels as stiff as boards, one below the other on threads that stay 5 cm long, and dashpots beside them. */
+/* Two panels as stiff as boards, one below the other on threads that stay 5 cm long, and dashpots beside
+ * them. */
 #define BOARD                                                                                                \
     "'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.2, 'height': 0.2, 'orientation': "       \
     "'vertical', 'transform': {'translate': [0, %g, 0]}}, 'material': {'young_modulus': 1e8, "               \
@@ -221,9 +222,10 @@ END_TEST
     "}, {'type': 'dashpot', 'coefficient': %g, 'smoothing': 1e-5, " SIDES                                    \
     "}], 'integrator': {'method': 'dirk', 'dt': 0.001, 'rtol': 1e-7}, 'duration': 2}"
 
-/* A board of the mass M that is let go hangs on n threads and dashpots: M e'' = F - n k e - n c e', e(0) = e'(0) =
- * 0, whose solution is known. A board gives by n k/(E h) = 1.8e-3 of what threads do, and its waves take as much: 1 %. In the end half of the
- * work of the weight is dissipated, 1/2 F^2/(n k). With (s/l)^2 = 4e-8, the smoothing is not seen. */
+/* A board of the mass M that is let go hangs on n threads and dashpots: M e'' = F - n k e - n c e', e(0) =
+ * e'(0) = 0, whose solution is known. A board gives by n k/(E h) = 1.8e-3 of what threads do, and its waves
+ * take as much: 1 %. In the end half of the work of the weight is dissipated, 1/2 F^2/(n k). With (s/l)^2 =
+ * 4e-8, the smoothing is not seen. */
 START_TEST(dashpots_damp_threads)
 {
     const double c = 0.1, n = 3, k = 60, M = 0.2 * 0.2 * 0.2, F = M * 9.81, decay = n * c / (2 * M),
@@ -250,7 +252,8 @@ START_TEST(dashpots_damp_threads)
 }
 END_TEST
 
-/* The force of the dashpots of BOARDS at velocities v: its sum and its torque, the sum of magnitudes, and its power. */
+/* The force of the dashpots of BOARDS at velocities v: its sum and its torque, the sum of magnitudes, and
+ * its power. */
 static void measure_dashpots(const scene *s, const double *v, double net[6], double *size, double *power)
 {
     const drape_state *now = drape_sim_state(s->sim);
@@ -273,8 +276,8 @@ static void measure_dashpots(const scene *s, const double *v, double net[6], dou
     }
 }
 
-/* Derivatives are exact, also where the nodes meet. Net force and torque vanish, to 100 roundings; power is taken by
- * any motion, but for those of all as one body. */
+/* Derivatives are exact, also where the nodes meet. Net force and torque vanish, to 100 roundings; power is
+ * taken by any motion, but for those of all as one body. */
 START_TEST(dashpots_act_between_nodes)
 {
     for (int i = 0; i < 2; i++) {
