@@ -691,6 +691,10 @@ DRAPE_API bool drape_sim_untangling(const drape_sim *sim, drape_untangling *out,
  * those of the sim, whatever the scene says. Integrators and controllers start anew, as after
  * drape_sim_place; an event whose quantity the change takes past its bound has no root there.
  *
+ * A collider whose pivot changes stays where it is, with its velocities, and goes on turning about the new
+ * pivot; the pose that it has been sent to stays the same, too. A pivot that no scene gives is the middle of
+ * the shape and moves with it.
+ *
  * A node that becomes free goes on with the velocity of its pin. One that becomes pinned is held where it is
  * until drape_sim_move_pins moves it, unless the model has a track for it that leads through there; one that
  * was pinned already may get another track only if that leads through where it is. Nodes that drape_sim_pin,
@@ -752,11 +756,11 @@ DRAPE_API drape_status drape_sim_set_masses(drape_sim *sim, int32_t count, const
  * If there is no such collider, they are held where they are. drape_sim_set_state: they must be where the
  * collider has them at t.
  *
- * Attaching nodes that are pinned already allocates nothing unless contact needs more; otherwise both take
- * what drape_sim_pin takes. Checkpoints keep what is attached. Must not be called by an observer. Errors,
- * after which nothing has changed: those of drape_sim_pin; DRAPE_E_ARGUMENT (no such collider, node or
- * triangle; triangles of a collider that is rigid; a node to detach that no collider carries).
- * Thread-safety: as the sim. */
+ * Attaching nodes that are pinned already allocates nothing unless contact needs more, or the nearest
+ * triangles of a collider that deforms are to be found; otherwise both take what drape_sim_pin takes.
+ * Checkpoints keep what is attached. Must not be called by an observer. Errors, after which nothing has
+ * changed: those of drape_sim_pin; DRAPE_E_ARGUMENT (no such collider, node or triangle; triangles of a
+ * collider that is rigid; a node to detach that no collider carries). Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_attach(drape_sim *sim, int32_t collider, int32_t count, const int32_t *nodes,
                                         const int32_t *triangles);
 DRAPE_API drape_status drape_sim_detach(drape_sim *sim, int32_t count, const int32_t *nodes);
@@ -818,8 +822,9 @@ DRAPE_API drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const 
 
 /* The same for a whole collider: moves it to a displacement [m] from the position that its parameters
  * define, turned as it is now; a collider that turned stops turning. One that would have to be faster than
- * teleport_speed is placed there, less the path at its velocity. drape_sim_collider returns its present
- * position. */
+ * teleport_speed is placed there, less the path and the turn at its velocities on arrival: the given ones, or
+ * else those that it has; its speed is that of its pivot plus that of the farthest point of its shape about
+ * it. drape_sim_collider returns its present position. */
 DRAPE_API drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double seconds,
                                                const double displacement[3], const double *velocity);
 
@@ -829,8 +834,8 @@ DRAPE_API drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider,
  * those on arrival, both in space and about the pivot: displacement and rotation then are smooth, and
  * continue the motion before. If both are NULL, it moves and turns at constant speed. The rotation is
  * interpolated by a cubic of the rotation vector from the present one. Errors: as drape_sim_move_collider;
- * DRAPE_E_ARGUMENT also if the rotation is NULL or far from length 1, one velocity is given alone, or an
- * angular velocity is not finite or beyond 1e4 rad/s. */
+ * DRAPE_E_ARGUMENT also if the rotation is NULL or far from length 1, one velocity is given alone, an angular
+ * velocity is not finite or beyond 1e4 rad/s, or the turn would need more than that and is not placed. */
 DRAPE_API drape_status drape_sim_move_collider_pose(drape_sim *sim, int32_t collider, double seconds,
                                                     const double displacement[3], const double rotation[4],
                                                     const double *velocity, const double *angular_velocity);
@@ -842,7 +847,8 @@ DRAPE_API drape_status drape_sim_move_collider_pose(drape_sim *sim, int32_t coll
  * Coordinates are the collider's own, which are those of space unless it is moved or turned as a whole,
  * too. The arrays are copied. Points are never placed elsewhere (teleport_speed). Errors: DRAPE_E_ARGUMENT
  * (no such collider, one that is rigid, another number of points, seconds not in (0, 1e9], a value that is
- * not finite or beyond 1e9 m or m/s, or a triangle with an altitude below 1e-12 of its longest edge). */
+ * not finite or beyond 1e9 m or m/s, a triangle with an altitude below 1e-12 of its longest edge, or a closed
+ * mesh whose volume is not positive). */
 DRAPE_API drape_status drape_sim_deform_collider(drape_sim *sim, int32_t collider, double seconds,
                                                  int32_t points, const double *positions,
                                                  const double *velocities);

@@ -71,6 +71,8 @@ drape_status drape_deformed_nearest(drape_context *ctx, const drape_motion *moti
             drape_motion_points(motion, collider, t, points);
         if (!status)
             status = drape_bvh_build(&arena, c->shape.triangle_count, 3, c->shape.triangle, points, &tree);
+        if (!status)
+            drape_bvh_fit(&tree, points);
     }
     for (int32_t i = 0; !status && i < count; i++) {
         double own[3];

@@ -757,7 +757,7 @@ void drape_motion_place_collider(drape_motion *motion, int32_t collider, const d
 /* ---- Another motion ---- */
 
 /* A path begins anew at time t: the motion up to there is forgotten, that from there on is the same but for
- * the way between the ends of a turn. */
+ * the poses between the ends of a turn. */
 static void cut_path(const course *c, double t, drape_path *path, drape_turn_path *turn)
 {
     drape_path rest = *path;
@@ -779,8 +779,8 @@ static void cut_path(const course *c, double t, drape_path *path, drape_turn_pat
     *turn = after;
 }
 
-/* With the rotation R about the pivot p' in place of p, a displacement d' = d + p - p' - R (p - p') is that of
- * the same pose; by = p - p'. */
+/* With the rotation R about the pivot p' in place of p, a displacement d' = d + p - p' - R (p - p') is that
+ * of the same pose; by = p - p'. */
 static void shift_by_pivot(const double R[9], const double by[3], double d[3])
 {
     double turned[3];

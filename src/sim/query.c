@@ -135,8 +135,8 @@ static void find_collider_on(const query *q, int32_t collider, const double *ori
     vec3_add_scaled(t, direction, hit->point);
 }
 
-/* Of length 1, by the largest component first, so that no square over- or underflows. Returns whether there is
- * such a direction. */
+/* Of length 1, by the largest component first, so that no square over- or underflows. Returns whether there
+ * is such a direction. */
 static bool normalise(const double *along, double direction[3])
 {
     const double largest = fmax(fmax(fabs(along[0]), fabs(along[1])), fabs(along[2]));

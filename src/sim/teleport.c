@@ -1,8 +1,9 @@
 /*
- * teleport.c: pins and colliders that a host sends or turns faster than teleport_speed. Cloth would be torn after them
- * for seconds; it is placed with them instead, by the rigid motion that fits its pins best in the sense of
- * least squares (Horn 1987, Closed-form solution of absolute orientation using unit quaternions, J. Opt. Soc.
- * Am. A 4, section 4), less the path that they would have covered at their own velocity.
+ * teleport.c: pins and colliders that a host sends or turns faster than teleport_speed. Cloth would be torn
+ * after them for seconds; it is placed with them instead, by the rigid motion that fits its pins best in
+ * the sense of least squares (Horn 1987, Closed-form solution of absolute orientation using unit
+ * quaternions, J. Opt. Soc. Am. A 4, section 4), less the path that they would have covered at their own
+ * velocity.
  */
 #include "base/rotation.h"
 #include "base/vec3.h"
@@ -241,8 +242,8 @@ static drape_status check_carried(const drape_sim *sim, int32_t collider, const 
     return status;
 }
 
-/* Whether some point of a collider would be too fast: at most as its pivot, and by the turn as the point that is
- * farthest from it. */
+/* Whether some point of a collider would be too fast: at most as its pivot, and by the turn as the point
+ * that is farthest from it. */
 static bool is_swung_too_fast(const drape_sim *sim, int32_t collider, double seconds, const drape_sent *to,
                               const double from[3], const double now[9])
 {

@@ -2,8 +2,7 @@
  * stitch: a thread from each node of one side to that of the other, of which no more than r(t) is left:
  *     E = 1/2 k max(0, l - r)^2,    r = gap (1 - progress).
  * It pulls and never pushes, so that E is convex in every state and, once r is 0, E = 1/2 k d.d is smooth
- * where the nodes meet. A thread has no dashpot: a force along the relative velocity of two nodes that are
- * apart would resist a rotation of both, and one along the thread has no direction where they meet.
+ * where the nodes meet. A seam of the type `dashpot` damps it.
  */
 #include "terms/terms.h"
 

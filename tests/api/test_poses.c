@@ -1,5 +1,5 @@
-/* test_poses.c: the poses of colliders that a host turns: pivots that change, turns that are sent within a moment,
- * teleports of what turns. */
+/* test_poses.c: the poses of colliders that a host turns: pivots that change, turns that are sent within a
+ * moment, teleports of what turns. */
 #include <float.h>
 
 #include "support/host.h"
@@ -50,8 +50,8 @@ static void advance(const turned *t, double seconds)
     good(&t->h, drape_sim_advance(t->h.sim, drape_sim_time(t->h.sim) + seconds));
 }
 
-/* The pose in space: where a corner of the box is, by rotation and pivot as they are reported, and the velocity
- * of that corner. */
+/* The pose in space: where a corner of the box is, by rotation and pivot as they are reported, and the
+ * velocity of that corner. */
 static void corner_of(const turned *t, const double own_pivot[3], double x[3], double v[3])
 {
     const double own[3] = {0.1, 0.1, -0.1};
@@ -121,8 +121,9 @@ START_TEST(a_turning_body_stays_where_it_is)
 }
 END_TEST
 
-/* A body on its path to a pose that a host has sent has the same pose and the same velocities at the moment of
- * the change, and the pose that was sent at its end; also if the change comes at the end, or after it. */
+/* A body on its path to a pose that a host has sent has the same pose and the same velocities at the moment
+ * of the change, and the pose that was sent at its end; also if the change comes at the end, or after it.
+ * */
 START_TEST(a_sent_body_arrives_where_it_was_sent)
 {
     for (int frames = 1; frames <= 5; frames += 2)
@@ -162,8 +163,8 @@ START_TEST(a_sent_body_arrives_where_it_was_sent)
 }
 END_TEST
 
-/* The pivot that no scene gives is the middle of the shape: a box that is put elsewhere in the scene turns about
- * its middle there. */
+/* The pivot that no scene gives is the middle of the shape: a box that is put elsewhere in the scene turns
+ * about its middle there. */
 START_TEST(a_middle_moves_with_its_shape)
 {
     failing_allocator memory = {0};
@@ -186,8 +187,8 @@ END_TEST
 
 /* ---- Spins ---- */
 
-/* Half a turn in a microsecond would be 3.1e6 rad/s: it is refused, with one line, and nothing changes; in 1 ms
- * it is allowed. */
+/* Half a turn in a microsecond would be 3.1e6 rad/s: it is refused, with one line, and nothing changes; in
+ * 1 ms it is allowed. */
 START_TEST(a_turn_within_a_moment_is_refused)
 {
     failing_allocator memory = {0};
@@ -207,9 +208,9 @@ START_TEST(a_turn_within_a_moment_is_refused)
 }
 END_TEST
 
-/* With a teleport_speed of 5 m/s a body that would have to turn by 2 rad in 1/64 s is there at once, less the turn
- * at its velocity on arrival, whether that is given or is the one that it had. Its corners are .37 m from the
- * pivot at most: a turn of .1 rad, at 2.4 m/s, is made. */
+/* With a teleport_speed of 5 m/s a body that would have to turn by 2 rad in 1/64 s is there at once, less
+ * the turn at its velocity on arrival, whether that is given or is the one that it had. Its corners are .37
+ * m from the pivot at most: a turn of .1 rad, at 2.4 m/s, is made. */
 START_TEST(what_turns_too_fast_is_placed)
 {
     for (int given = 0; given < 2; given++) {

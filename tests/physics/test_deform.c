@@ -319,8 +319,8 @@ START_TEST(faults_of_a_host)
 }
 END_TEST
 
-/* A body that turns inside out, here in its third frame, is refused with the file and the frame; an open one has
- * no inside. A number that is not finite is found in any frame. */
+/* A body that turns inside out, here in its third frame, is refused with the file and the frame; an open
+ * one has no inside. A number that is not finite is found in any frame. */
 START_TEST(later_frames_are_checked)
 {
     const frames_folder f = frames_folder_make();

@@ -206,6 +206,101 @@ START_TEST(derivatives)
 }
 END_TEST
 
+/* ---- Damping ---- */
+
+/* Two panels as stiff as boards, one below the other on threads that stay 5 cm long, and dashpots beside
+ * them. */
+#define BOARD                                                                                                \
+    "'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.2, 'height': 0.2, 'orientation': "       \
+    "'vertical', 'transform': {'translate': [0, %g, 0]}}, 'material': {'young_modulus': 1e8, "               \
+    "'poisson_ratio': 0, 'thickness': 1e-3, 'areal_density': 0.2}, 'terms': ['stretch.cst']"
+#define SIDES "'a': {'cloth': 'upper', 'edge': 'bottom'}, 'b': {'cloth': 'lower', 'edge': 'top'}"
+#define BOARDS                                                                                               \
+    "{'drape': 1, 'cloth': [{'name': 'upper', " BOARD                                                        \
+    ", 'pins': [{'box': [[-1, -1, -1], [1, 1, 1]]}]}, {'name': 'lower', " BOARD                              \
+    "}], 'seams': [{'type': 'stitch', 'stiffness': 60, 'start': 10, " SIDES                                  \
+    "}, {'type': 'dashpot', 'coefficient': %g, 'smoothing': 1e-5, " SIDES                                    \
+    "}], 'integrator': {'method': 'dirk', 'dt': 0.001, 'rtol': 1e-7}, 'duration': 2}"
+
+/* A board of the mass M that is let go hangs on n threads and dashpots: M e'' = F - n k e - n c e', e(0) =
+ * e'(0) = 0, whose solution is known. A board gives by n k/(E h) = 1.8e-3 of what threads do, and its waves
+ * take as much: 1 %. In the end half of the work of the weight is dissipated, 1/2 F^2/(n k). With (s/l)^2 =
+ * 4e-8, the smoothing is not seen. */
+START_TEST(dashpots_damp_threads)
+{
+    const double c = 0.1, n = 3, k = 60, M = 0.2 * 0.2 * 0.2, F = M * 9.81, decay = n * c / (2 * M),
+                 omega = sqrt(n * k / M - decay * decay);
+    scene s = scene_open(BOARDS, 0.5, 0.25, c);
+    drape_seam_report seam;
+    ck_assert_int_eq(drape_sim_seam(s.sim, -1, NULL), 2);
+    double dissipated = 0;
+    for (int i = 1; i <= 40; i++) {
+        const double t = 0.005 * i,
+                     e = F / (n * k) *
+                         (1 - exp(-decay * t) * (cos(omega * t) + decay / omega * sin(omega * t)));
+        scene_advance(&s, t);
+        drape_sim_seam(s.sim, 0, &seam);
+        assert_below(fabs(seam.gap_mean - 0.05 - e), 0.01 * F / (n * k));
+        ck_assert_double_ge(drape_sim_energy(s.sim).dissipated, dissipated);
+        dissipated = drape_sim_energy(s.sim).dissipated;
+    }
+    drape_sim_seam(s.sim, 1, &seam);
+    ck_assert_str_eq(seam.type, "dashpot");
+    scene_advance(&s, 0.8);
+    assert_below(fabs(drape_sim_energy(s.sim).dissipated - F * F / (2 * n * k)), 0.01 * F * F / (2 * n * k));
+    scene_close(&s);
+}
+END_TEST
+
+/* The force of the dashpots of BOARDS at velocities v: its sum and its torque, the sum of magnitudes, and
+ * its power. */
+static void measure_dashpots(const scene *s, const double *v, double net[6], double *size, double *power)
+{
+    const drape_state *now = drape_sim_state(s->sim);
+    const drape_point point = {.x = now->x, .v = v, .internal = now->internal, .t = now->t};
+    double g[3 * 18] = {0};
+    ck_assert_int_eq(s->model->node_count, 18);
+    drape_system_term(s->sim->system, s->model->seams[1].term, &point, NULL, g, NULL);
+    memset(net, 0, 6 * sizeof *net);
+    *size = *power = 0;
+    for (int i = 0; i < 18; i++) {
+        const double *x = now->x + 3 * (size_t)i, *f = g + 3 * i;
+        double torque[3];
+        vec3_cross(x, f, torque);
+        for (int k = 0; k < 3; k++) {
+            net[k] += f[k];
+            net[3 + k] += torque[k];
+            *size += fabs(f[k]);
+            *power += f[k] * v[3 * i + k];
+        }
+    }
+}
+
+/* Derivatives are exact, also where the nodes meet. Net force and torque vanish, to 100 roundings; power is
+ * taken by any motion, but for those of all as one body. */
+START_TEST(dashpots_act_between_nodes)
+{
+    for (int i = 0; i < 2; i++) {
+        scene s = scene_open(BOARDS, i ? 0.45 : 0.5, 0.25, 0.3);
+        double v[3 * 18], net[6], size, power;
+        check_model(s.model, "dashpot", 2);
+        scene_advance(&s, 0.01); /* threads are taut */
+        for (int k = 0; k < 3 * 18; k++)
+            v[k] = sin(5.0 * k);
+        measure_dashpots(&s, v, net, &size, &power);
+        ck_assert(size > 0 && power > 0);
+        for (int k = 0; k < 6; k++)
+            assert_below(fabs(net[k]), 100 * DBL_EPSILON * size);
+        const double full = size, w[3] = {1, -2, 0.5};
+        for (int k = 0; k < 18; k++)
+            vec3_cross(w, drape_sim_positions(s.sim) + 3 * (size_t)k, v + 3 * k);
+        measure_dashpots(&s, v, net, &size, &power);
+        assert_below(size, 100 * DBL_EPSILON * full);
+        scene_close(&s);
+    }
+}
+END_TEST
+
 /* ---- Order, the same cloth ---- */
 
 /* Sides in reverse, of a list and of a box that is sorted along its longest side; and a cloth with itself. */
@@ -458,5 +553,5 @@ START_TEST(refusals)
 END_TEST
 
 SUITE("seams", carries_a_known_load, holds_before_it_closes, closes, stability_counts_slack_threads,
-      closes_explicitly, is_not_in_contact, derivatives, orders_of_sides, same_bits, term_of_a_host,
-      collider_of_a_host, refusals)
+      closes_explicitly, is_not_in_contact, derivatives, dashpots_damp_threads, dashpots_act_between_nodes,
+      orders_of_sides, same_bits, term_of_a_host, collider_of_a_host, refusals)

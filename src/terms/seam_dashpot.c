@@ -1,0 +1,107 @@
+/*
+ * dashpot: a dashpot between each node of one side and that of the other, along the line d between them,
+ * with the relative velocity w:
+ *     force c (d . w) d / (l^2 + s^2),    l = |d|,
+ * which is c times the rate of l where l is much larger than s. It has no torque, takes nothing from a
+ * motion of both nodes as one body, and is smooth where the nodes meet: there it vanishes, as a direction
+ * along d does.
+ */
+#include "terms/terms.h"
+
+#include <math.h>
+
+enum { COEFFICIENT, SMOOTHING };
+enum { REST_COEFFICIENT, REST_SMOOTHING, REST_COUNT };
+
+#define SHARE 1e-3 /* of the distance between neighbouring nodes */
+
+static const drape_param params[] = {
+    DRAPE_NUMBER("coefficient", "N s/m", DRAPE_REQUIRED, 0, 1e12,
+                 "c of each pair of nodes: force over the rate of their distance"),
+    DRAPE_NUMBER("smoothing", "m",
+                 DRAPE_DERIVED("0.001 of the distance of neighbouring nodes: the root of a node's mean area"),
+                 DRAPE_ABOVE(0), 1e3, "s: nodes that are nearer than this are damped less"),
+};
+
+/* The root of the mean area of the nodes that the seam joins. */
+static double spacing_of(const drape_seam_view *seam)
+{
+    double area = 0;
+    for (int32_t i = 0; i < 2 * seam->pair_count; i++) {
+        const int side = i % 2;
+        area += seam->cloth[side]->node_area[seam->pair[i] - seam->first_node[side]] / (2 * seam->pair_count);
+    }
+    return sqrt(area);
+}
+
+static drape_status build(const drape_seam_view *seam, const double *values, drape_term_builder *builder)
+{
+    const double smoothing = isnan(values[SMOOTHING]) ? SHARE * spacing_of(seam) : values[SMOOTHING],
+                 rest[REST_COUNT] = {[REST_COEFFICIENT] = values[COEFFICIENT], [REST_SMOOTHING] = smoothing};
+    const drape_status status = drape_term_reserve(builder, seam->pair_count, REST_COUNT);
+    for (int32_t i = 0; !status && i < seam->pair_count; i++)
+        drape_term_set(builder, i, seam->pair + 2 * (size_t)i, rest);
+    return status;
+}
+
+/* From the 3 x 3 block of the second node on itself, that of the element: nodes act on each other in opposite
+ * directions, and only by their difference. */
+static void spread(const double block[9], double *out)
+{
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j < 6; j++)
+            out[6 * i + j] = ((i < 3) == (j < 3) ? 1 : -1) * block[3 * (i % 3) + j % 3];
+}
+
+static void damp(const double d[3], const double w[3], double c, double s, double *g, double *dg_dx,
+                 double *dg_dv)
+{
+    const double q = 1 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + s * s),
+                 rate = q * (d[0] * w[0] + d[1] * w[1] + d[2] * w[2]); /* force c rate d */
+    double by_x[9], by_v[9];
+    for (int i = 0; i < 3; i++) {
+        g[i] = -c * rate * d[i];
+        g[3 + i] = c * rate * d[i];
+        for (int j = 0; j < 3; j++) {
+            by_v[3 * i + j] = c * q * d[i] * d[j];
+            by_x[3 * i + j] = c * (d[i] * (q * w[j] - 2 * rate * q * d[j]) + (i == j ? rate : 0));
+        }
+    }
+    if (dg_dx)
+        spread(by_x, dg_dx);
+    if (dg_dv)
+        spread(by_v, dg_dv);
+}
+
+static void dissipation(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                        const double *v, double *g, double *dg_dx, double *dg_dv)
+{
+    for (int32_t i = 0; i < count; i++) {
+        const size_t a = 3 * (size_t)el->node[2 * (first + i)], b = 3 * (size_t)el->node[2 * (first + i) + 1],
+                     row = (size_t)i;
+        double d[3], w[3];
+        for (int k = 0; k < 3; k++) {
+            d[k] = x[b + (size_t)k] - x[a + (size_t)k];
+            w[k] = v[b + (size_t)k] - v[a + (size_t)k];
+        }
+        damp(d, w, drape_rest_of(el, REST_COEFFICIENT, first + i),
+             drape_rest_of(el, REST_SMOOTHING, first + i), g + 6 * row, dg_dx ? dg_dx + 36 * row : NULL,
+             dg_dv ? dg_dv + 36 * row : NULL);
+    }
+}
+
+const drape_term_ops drape_seam_dashpot = {
+    .struct_size = sizeof(drape_term_ops),
+    .entry =
+        {.name = "dashpot",
+         .summary =
+             "dashpots that damp the distance of the nodes of both sides: force c (d . w) d / (l^2 + s^2)",
+         .reference = "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth "
+                      "behavior: a viscous damper, here along the line between the nodes",
+         DRAPE_PARAMS(params)},
+    .element_name = "dashpot",
+    .nodes = 2,
+    .build_seam = build,
+    .dissipation = dissipation,
+    .dissipative = true,
+};
