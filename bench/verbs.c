@@ -2,11 +2,11 @@
  * verbs: what each function that changes, moves or reads a running sim costs, beside a step. A square sheet
  * of 1 m falls, held by two corners, on a ball with friction, next to a limb of 756 triangles that can
  * deform; it has contact with itself, its nodes are about 1/30 m or 1/100 m apart. For each call the sim is
- * put into the same state, as it is after --settle steps of newton_k, and makes a step of 1/60 s; then comes the call, a
- * step, and the call that takes it back. `cpu_us` is the median of the calls, `steps` the same in steps:
- * those without a call, whose median over the whole run is `step_ms`. `after` is the median of the steps that
- * follow a call, in those that follow none. Calls of less than 1 ms are repeated where that is the same
- * again. CPU time of one thread.
+ * put into the same state, as it is after --settle steps of newton_k, and makes a step of 1/60 s; then
+ * comes the call, a step, and the call that takes it back. `cpu_us` is the median of the calls, `steps` the
+ * same in steps: those without a call, whose median over the whole run is `step_ms`. `after` is the median of
+ * the steps that follow a call, in those that follow none. Calls of less than 1 ms are repeated where that is
+ * the same again. CPU time of one thread.
  *
  *     verbs [--csv FILE] [--repeats N] [--side N] [--method NAME] [--only TEXT] [--settle STEPS]
  *         --repeats  pairs of calls (default 4, above 2 500 nodes 2)
