@@ -794,8 +794,9 @@ DRAPE_API void drape_sim_cancel(drape_sim *sim);
 /* ---- Sim: what a host moves ----
  *
  * For a host that moves pins and colliders itself, frame by frame: it sets where they are to be at the end of
- * the frame, advances by the frame, and sets the next positions. None of these functions allocates memory or
- * may be called by an observer, and after an error nothing has changed. Thread-safety: as the sim. */
+ * the frame, advances by the frame, and sets the next positions. None of these functions allocates memory,
+ * apart from the copy of points that drape_sim_deform_collider checks, or may be called by an observer, and
+ * after an error nothing has changed. Thread-safety: as the sim. */
 
 /* Moves pinned nodes, whether fixed or on tracks, along user-defined paths. In the next `seconds` of
  * simulated time node nodes[i] moves from its present position to positions[3 i ...] [m]; there it rests

@@ -117,9 +117,8 @@ static double depth_at(const search *s, const double *point)
     return -drape_collider_distance(s->collider, s->pose, point, NULL, NULL);
 }
 
-/* Whether no point of a triangle is inside. As it is a distance, it changes by no more than the way from the
- * centroid, and rounding errors are far below TOUCH: most triangles need one evaluation, not that of all
- * samples. */
+/* Whether no point of a triangle is inside. A distance changes by no more than that from the centroid, and
+ * rounding errors are far below TOUCH: most triangles need one evaluation, not that of all samples. */
 static bool is_outside(const search *s, const int32_t *node)
 {
     double centroid[3] = {0, 0, 0}, radius = 0;

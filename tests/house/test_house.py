@@ -129,9 +129,10 @@ def messages_are_of_the_library(files):
     for path, text in sources(files, "src").items():
         if path.startswith(DRAWS_OR_PRINTS):
             continue
-        for match in re.finditer(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', text, flags=re.S):
-            if match.group().startswith('"') and re.search(r"(?<![\w-])--[a-z]|\bdrape [a-z]+ |\bdrape (?:run|list|info|check|help)\b|command line", match.group()):
-                complaints.append(f"{path}:{line_of(text, match.start())}: {match.group()[:60]}: of the program, not of the library")
+        for match in re.finditer(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"(?:\s*"(?:\\.|[^"\\\n])*")*', text, flags=re.S):
+            said = re.sub(r'"\s*"', "", match.group())  # adjacent literals are one
+            if said.startswith('"') and re.search(r"(?<![\w-])--[a-z]|\bdrape [a-z]+ |\bdrape (?:run|list|info|check|help)\b|command[ -]line", said):
+                complaints.append(f"{path}:{line_of(text, match.start())}: {said[:60]}: of the program, not of the library")
     return complaints
 
 

@@ -124,7 +124,7 @@ def what_comes_along(tree):
 
 # Of SuiteSparse, what docs/licences.md names, and its prefixes; and what is under the GPL, as most of SuiteSparse's other parts are.
 INSIDE = {"KLU": r"klu_", "BTF": r"btf_", "AMD": r"amd_", "COLAMD": r"colamd", "SuiteSparse's configuration": r"SuiteSparse_"}
-NEVER = r"_*(cholmod_|umf(pack)?_|umfpack|umfdi|spqr|SuiteSparseQR|camd_|ccolamd|csymamd|ldl_|cs_(di|dl|ci|cl)?_|rbio|RB|gsl_|mongoose|SLIP_)"
+NEVER = r"_*(cholmod_|umf_|umfpack|spqr|SuiteSparseQR|camd_|ccolamd|csymamd|gsl_|mongoose)"
 
 
 def what_the_library_contains(tree):
