@@ -79,8 +79,9 @@ static scene inflated(int n, bool symmetric, const double *point)
     return s;
 }
 
-/* The elastic energy over that of an octant of a thin sphere, whose stress is p r / (2 h) and whose radius grows by
- * p r^2 (1 - nu) / (2 E h): p/2 times the volume that the octant gains, which is half of the work of the pressure. */
+/* The elastic energy over that of an octant of a thin sphere, whose stress is p r / (2 h) and whose radius
+ * grows by p r^2 (1 - nu) / (2 E h): p/2 times the volume that the octant gains, which is half of the work
+ * of the pressure. */
 static double swelling(int n)
 {
     static const double centre[3] = {0};
@@ -96,9 +97,9 @@ static double swelling(int n)
     return elastic / (PRESSURE / 2 * acos(-1) / 2 * RADIUS * RADIUS * grown);
 }
 
-/* Facets of side l err by (l/r)^2, and so does the energy of what the corners of the octant disturb around them: a factor of
- * 4 from one mesh to the next. What is left after extrapolation is a few times smaller than the last change of 1 %; the load
- * stiffness p r adds strains of 1e-5. */
+/* Facets of side l err by (l/r)^2, and so does the energy of what the corners of the octant disturb around
+ * them: a factor of 4 from one mesh to the next. What is left after extrapolation is a few times smaller
+ * than the last change of 1 %; the load stiffness p r adds strains of 1e-5. */
 START_TEST(a_sphere_swells_by_its_membrane_stress)
 {
     const double coarse = swelling(4), middle = swelling(8), fine = swelling(16);
