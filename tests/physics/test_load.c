@@ -169,8 +169,8 @@ static scene loaded(const char *method, const char *terms, double gravity)
                       terms, gravity, method);
 }
 
-/* Equal masses with equal forces, of two loads, move as under gravity, by every method and to what it leaves: residuals,
- * or errors of 1e-6 of a size of 0.3 m. */
+/* Equal masses with equal forces, of two loads, move as under gravity, by every method and to what it
+ * leaves: residuals, or errors of 1e-6 of a size of 0.3 m. */
 START_TEST(equal_forces_on_equal_masses_are_gravity)
 {
     for (int m = 0; drape_integrators[m]; m++) {

@@ -247,9 +247,9 @@ START_TEST(states_and_placements_of_a_host)
 }
 END_TEST
 
-/* The sides of a strip, held in planes of symmetry and clamped there, turn in these planes as the strip bends:
- * without lateral contraction it deflects as without clamps. The diagonals of the mesh twist free sides by
- * some 1e-6 of that. */
+/* The sides of a strip, held in planes of symmetry and clamped there, turn in these planes as the strip
+ * bends: without lateral contraction it deflects as without clamps. The diagonals of the mesh twist free
+ * sides by some 1e-6 of that. */
 START_TEST(a_clamped_edge_turns_in_its_plane)
 {
     double drop[2];
