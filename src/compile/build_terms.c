@@ -231,7 +231,7 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
 {
     drape_term *term = &model->terms[model->term_count];
     drape_cloth *cloth = &model->cloths[c];
-    for (int32_t i = 0; i < model->term_count; i++)
+    for (int32_t i = 0; i < model->term_count && !ops->external; i++) /* loads may act on several places */
         if (model->terms[i].cloth == c && model->terms[i].ops == ops)
             return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "the term \"%s\" is named twice",
                                  def->type);

@@ -10,7 +10,7 @@ const char *const drape_load_edges[] = {
 /* Slack as for pins, so that coordinates meant to be on a side of the box are in it. */
 #define ROUND_OFF 1e-14
 
-static bool in_box(const double *x, const double *low, const double *high)
+bool drape_load_in_box(const double *x, const double *low, const double *high)
 {
     for (int k = 0; k < 3; k++) {
         const double slack = ROUND_OFF * fmax(fabs(x[k]), 1);
@@ -37,8 +37,8 @@ bool drape_load_takes(const drape_cloth_view *cloth, const double *values, int32
         return false;
     for (int k = 0; k < 2; k++)
         if ((side != ALL && !on_side(cloth, side, end[k])) ||
-            !in_box(cloth->rest + 3 * (size_t)end[k], values + DRAPE_LOAD_BOX_MIN,
-                    values + DRAPE_LOAD_BOX_MAX))
+            !drape_load_in_box(cloth->rest + 3 * (size_t)end[k], values + DRAPE_LOAD_BOX_MIN,
+                               values + DRAPE_LOAD_BOX_MAX))
             return false;
     return true;
 }

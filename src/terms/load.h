@@ -24,6 +24,9 @@ drape_status drape_load_count(const drape_cloth_view *cloth, const double *value
 /* Whether edge e is one of them. */
 bool drape_load_takes(const drape_cloth_view *cloth, const double *values, int32_t e);
 
+/* Whether a point lies in a box, boundary and rounding included. */
+bool drape_load_in_box(const double *x, const double *low, const double *high);
+
 #define DRAPE_LOAD_PARAMS                                                                                    \
     [DRAPE_LOAD_LIST_EDGE] =                                                                                 \
         DRAPE_CHOICE("edge", 0, drape_load_edges, "a side of a grid, or all of the boundary"),               \

@@ -222,14 +222,17 @@ static double min_altitude(const double *x0, const double *x1, const double *x2)
     return vec3_norm(n) / sqrt(fmax(vec3_dot(a, a), fmax(vec3_dot(b, b), vec3_dot(c, c))));
 }
 
-/* r of a clamped edge: in the plane of the triangle, from the middle of the edge away from it. */
+/* r of a clamped edge: in the plane of the triangle, across the edge and away from the apex. An edge that
+ * is held in a plane may turn in it: a part of r along the edge would then come to lie across the sheet. */
 static void clamp_of(const drape_cloth_view *cloth, const drape_midedge *patch, int h, double r[3])
 {
     const double *a = cloth->rest + 3 * (size_t)patch->node[h],
                  *b = cloth->rest + 3 * (size_t)patch->node[(h + 1) % 3];
     const double *apex = cloth->rest + 3 * (size_t)patch->node[(h + 2) % 3];
-    for (int k = 0; k < 3; k++)
-        r[k] = (a[k] + b[k]) / 2 - apex[k];
+    double edge[3];
+    vec3_sub(b, a, edge);
+    vec3_sub(a, apex, r);
+    vec3_add_scaled(-vec3_dot(r, edge) / vec3_dot(edge, edge), edge, r);
 }
 
 /* The angle of a part at rest, by the function that steps use, so that a cloth at rest has no force to the

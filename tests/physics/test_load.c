@@ -1,0 +1,224 @@
+/* test_load.c: loads that follow the surface or act on nodes, against closed forms. */
+#include "integrators/integrator.h"
+#include "support/scene.h"
+
+#define RADIUS    0.1  /* [m] */
+#define THICKNESS 1e-3 /* [m] */
+#define MODULUS   1e7  /* [Pa] */
+#define POISSON   0.3
+#define PRESSURE  3.0 /* [Pa]: strains of 1e-5 */
+
+enum { FINEST = 16, NODES = (FINEST + 1) * (FINEST + 2) / 2, TRIANGLES = FINEST * FINEST };
+
+/* ---- An octant of a sphere ---- */
+
+static int32_t number(int n, int i, int j)
+{
+    return i * (n + 1) - i * (i - 1) / 2 + j;
+}
+
+/* The triangle between the axes, n parts a side, projected onto the sphere. Triangles turn counterclockwise
+ * from outside. */
+static void octant(int n, double *x, int32_t *triangle)
+{
+    for (int i = 0; i <= n; i++)
+        for (int j = 0; i + j <= n; j++) {
+            const double a[3] = {i, j, n - i - j}, length = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+            for (int k = 0; k < 3; k++)
+                x[3 * number(n, i, j) + k] = RADIUS * a[k] / length;
+        }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; i + j < n; j++) {
+            const int32_t a = number(n, i, j), b = number(n, i + 1, j), c = number(n, i, j + 1);
+            memcpy(triangle, (int32_t[]){a, b, c}, 3 * sizeof *triangle), triangle += 3;
+            if (i + j + 1 < n)
+                memcpy(triangle, (int32_t[]){b, number(n, i + 1, j + 1), c}, 3 * sizeof *triangle),
+                    triangle += 3;
+        }
+}
+
+/* With planes of symmetry, or free. */
+static scene inflated(int n, bool symmetric, const double *point)
+{
+    static double x[3 * NODES];
+    static int32_t triangle[3 * TRIANGLES];
+    const drape_setting material[] = {{.name = "young_modulus", .number = MODULUS},
+                                      {.name = "poisson_ratio", .number = POISSON},
+                                      {.name = "thickness", .number = THICKNESS},
+                                      {.name = "areal_density", .number = 0.1}};
+    const drape_setting pressure[] = {{.name = "pressure", .number = PRESSURE},
+                                      {.name = "point", .vector = point, .vector_count = 3}};
+    const drape_setting tolerance[] = {{.name = "tolerance", .number = 1e-12}};
+    const drape_entry_def terms[] = {{"stretch.cst", NULL, 0}, {"load.pressure", pressure, 2}};
+    scene s = scene_empty();
+    drape_cloth_def cloth;
+    drape_scene_def def;
+    drape_pin_def pins[3];
+    drape_cloth_def_init(&cloth, sizeof cloth);
+    drape_scene_def_init(&def, sizeof def);
+    octant(n, x, triangle);
+    cloth.mesh.positions = x, cloth.mesh.node_count = (size_t)(n + 1) * (size_t)(n + 2) / 2;
+    cloth.mesh.triangles = triangle, cloth.mesh.triangle_count = (size_t)n * (size_t)n;
+    cloth.material = material, cloth.material_count = 4;
+    cloth.terms = terms, cloth.term_count = 2;
+    for (int k = 0; k < 3; k++) {
+        drape_pin_def_init(&pins[k], sizeof pins[k]);
+        pins[k].has_box = true;
+        for (int i = 0; i < 3; i++) {
+            pins[k].box_min[i] = i == k ? 0 : -1;
+            pins[k].box_max[i] = i == k ? 0 : 1;
+            pins[k].normal[i] = i == k;
+        }
+    }
+    cloth.pins = pins, cloth.pin_count = symmetric ? 3 : 0;
+    def.cloths = &cloth, def.cloth_count = 1;
+    memset(def.gravity, 0, sizeof def.gravity);
+    def.integrator = (drape_entry_def){"static", tolerance, 1};
+    ck_assert_msg(drape_model_create(s.ctx, &def, &s.model) == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    scene_start(&s, NULL);
+    return s;
+}
+
+/* The elastic energy over that of an octant of a thin sphere, whose stress is p r / (2 h) and whose radius
+ * grows by p r^2 (1 - nu) / (2 E h): p/2 times the volume that the octant gains, which is half of the work
+ * of the pressure. */
+static double swelling(int n)
+{
+    static const double centre[3] = {0};
+    scene s = inflated(n, true, centre);
+    double elastic = 0, pressure = 0;
+    const double grown = PRESSURE * RADIUS * RADIUS * (1 - POISSON) / (2 * MODULUS * THICKNESS);
+    ck_assert_int_eq(s.model->support_count, 3 * n);
+    scene_advance(&s, 1);
+    const drape_state *end = scene_state(&s);
+    drape_system_energy(s.sim->system, &(drape_point){.x = end->x, .v = end->v, .internal = end->internal},
+                        &elastic, &pressure);
+    scene_close(&s);
+    return elastic / (PRESSURE / 2 * acos(-1) / 2 * RADIUS * RADIUS * grown);
+}
+
+/* Facets of side l err by (l/r)^2, and so does the energy of what the corners of the octant disturb around
+ * them: a factor of 4 from one mesh to the next. What is left after extrapolation is a few times smaller
+ * than the last change of 1 %; the load stiffness p r adds strains of 1e-5. */
+START_TEST(a_sphere_swells_by_its_membrane_stress)
+{
+    const double coarse = swelling(4), middle = swelling(8), fine = swelling(16);
+    printf("# %g %g %g, extrapolated %g\n", coarse, middle, fine, (4 * fine - middle) / 3);
+    ck_assert_double_lt(fabs(fine - 1), 0.02);
+    ck_assert_double_eq_tol((coarse - middle) / (middle - fine), 4, 1);
+    ck_assert_double_eq_tol((4 * fine - middle) / 3, 1, 0.002);
+}
+END_TEST
+
+/* On nodes in the interior the force is a third of p times the areas around them as vectors, wherever the
+ * point is; and its derivatives, which in one triangle depend on the point, are exact. */
+START_TEST(pressure_on_the_interior_does_not_depend_on_the_point)
+{
+    static const double points[2][3] = {{0}, {0.3, -0.2, 0.5}};
+    enum { N = 6, COUNT = (N + 1) * (N + 2) / 2 };
+    double g[2][3 * COUNT], exact[3 * COUNT] = {0};
+    for (int c = 0; c < 2; c++) {
+        scene s = inflated(N, false, points[c]);
+        const drape_state *state = scene_state(&s);
+        drape_check_result rows[32];
+        int32_t count = 0;
+        memset(g[c], 0, sizeof g[c]);
+        drape_system_term(s.sim->system, 1,
+                          &(drape_point){.x = state->x, .v = state->v, .internal = state->internal}, NULL,
+                          g[c], NULL);
+        ck_assert_str_eq(s.model->terms[1].ops->entry.name, "load.pressure");
+        for (int32_t t = 0; c == 0 && t < s.model->triangle_count; t++) {
+            const int32_t *n = s.model->triangle + 3 * t;
+            double a[3], b[3], area[3];
+            for (int k = 0; k < 3; k++) {
+                a[k] = state->x[3 * n[1] + k] - state->x[3 * n[0] + k];
+                b[k] = state->x[3 * n[2] + k] - state->x[3 * n[0] + k];
+            }
+            for (int k = 0; k < 3; k++)
+                area[k] = (a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]) / 2;
+            for (int i = 0; i < 9; i++)
+                exact[3 * n[i / 3] + i % 3] -= PRESSURE * area[i % 3] / 3;
+        }
+        ck_assert_int_eq(drape_model_check_derivatives(s.model, 1, rows, 32, &count), DRAPE_OK);
+        for (int32_t i = 0; i < count && i < 32; i++)
+            ck_assert_msg(rows[i].pass, "%s %s: %g", rows[i].term, rows[i].what, rows[i].error);
+        scene_close(&s);
+    }
+    for (int i = 1; i < N; i++)
+        for (int j = 1; i + j < N; j++)
+            for (int c = 0; c < 6; c++)
+                ck_assert_double_eq_tol(g[c / 3][3 * number(N, i, j) + c % 3],
+                                        exact[3 * number(N, i, j) + c % 3],
+                                        64 * DBL_EPSILON * PRESSURE); /* terms of p |X|^2 < p 1 m2 cancel */
+}
+END_TEST
+
+/* ---- Point loads ---- */
+
+static scene loaded(const char *method, const char *terms, double gravity)
+{
+    return scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 3, "
+                      "'width': 0.3, 'height': 0.2},"
+                      "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
+                      "'masses': [{'box': [[-1, -1, -1], [1, 1, 1]], 'mass': 0.01}],"
+                      "'terms': [%s 'stretch.cst', 'bend.hinge'], 'pins': [{'nodes': [0]}]}], 'gravity': "
+                      "[0, %g, 0],"
+                      "'integrator': {'method': '%s', 'dt': 0.01, 'atol_v': 1e-6, 'atol_x': 1e-7, "
+                      "'tolerance': 1e-9,"
+                      "'error': 1e-7, 'substeps': 20}, 'duration': 1}",
+                      terms, gravity, method);
+}
+
+/* Equal masses with equal forces, of two loads, move as under gravity, by every method and to what it
+ * leaves: residuals, or errors of 1e-6 of a size of 0.3 m. */
+START_TEST(equal_forces_on_equal_masses_are_gravity)
+{
+    for (int m = 0; drape_integrators[m]; m++) {
+        const char *name = drape_integrators[m]->entry.name;
+        scene a = loaded(name, "", -5), b = loaded(name,
+                                                   "{'type': 'load.point', 'force': [0, -0.02, 0]},"
+                                                   "{'type': 'load.point', 'force': [0, -0.03, 0]},",
+                                                   0);
+        double most = 0;
+        scene_advance(&a, 0.05);
+        scene_advance(&b, 0.05);
+        for (int i = 0; i < 36; i++)
+            most = fmax(most, fabs(scene_state(&a)->x[i] - scene_state(&b)->x[i]));
+        printf("# %s: %.2g\n", name, most);
+        ck_assert_msg(most < 1e-6, "%s: %g", name, most);
+        scene_close(&a), scene_close(&b);
+    }
+}
+END_TEST
+
+/* A ramp rises as s^2 (3 - 2 s): backward Euler gives a free sheet of mass m the momentum sum h f(t_k),
+ * exactly; and the work is that on the moving nodes, so that the energy account closes. */
+START_TEST(a_ramp_adds_up_to_its_impulse)
+{
+    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 2, 'rows': 2, "
+                         "'width': 0.3, 'height': 0.2},"
+                         "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
+                         "'masses': [{'box': [[-1, -1, -1], [1, 1, 1]], 'mass': 0.01}], 'terms': "
+                         "['stretch.cst',"
+                         "{'type': 'load.point', 'force': [0.01, 0, 0.02], 'ramp': 0.2}]}], 'gravity': "
+                         "[0, 0, 0],"
+                         "'integrator': {'dt': 0.01, 'tolerance': 1e-13}, 'controller': {'type': "
+                         "'fixed'}, 'duration': 1}");
+    double sum = 0;
+    scene_advance(&s, 0.3);
+    for (int k = 1; k <= 30; k++) {
+        const double r = fmin(0.01 * k / 0.2, 1);
+        sum += 0.01 * r * r * (3 - 2 * r);
+    }
+    for (int i = 0; i < 4; i++) {
+        const double *v = scene_state(&s)->v + 3 * i;
+        ck_assert_double_eq_tol(v[0], sum, 1e-10);
+        ck_assert_double_eq_tol(v[1], 0, 1e-10);
+        ck_assert_double_eq_tol(v[2], 2 * sum, 1e-10);
+    }
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("load", a_sphere_swells_by_its_membrane_stress, pressure_on_the_interior_does_not_depend_on_the_point,
+      equal_forces_on_equal_masses_are_gravity, a_ramp_adds_up_to_its_impulse)
