@@ -79,7 +79,7 @@ static drape_status wave_speed(drape_system *system, drape_arena *scratch, doubl
     return status;
 }
 
-drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, bool *better)
+drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, bool *better, bool *needed)
 {
     const drape_model *m = drape_system_model(system);
     drape_arena scratch = drape_arena_of(m->ctx);
@@ -90,9 +90,10 @@ drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, 
         status = drape_scalar_stiffness_covers(system, flat);
     if (!status)
         status = wave_speed(system, &scratch, &speed);
-    *better = m->free_count <= FEW_NODES || has_coupled_drag(m) || speed * dt > MAX_TRAVEL * m->length;
+    *needed = m->free_count <= FEW_NODES || has_coupled_drag(m);
     for (int32_t t = 0; !status && t < m->term_count; t++)
-        *better |= m->terms[t].ops->measure && !m->terms[t].ops->pair && !flat[t];
+        *needed |= m->terms[t].ops->measure && !m->terms[t].ops->pair && !flat[t];
+    *better = *needed || speed * dt > MAX_TRAVEL * m->length;
     drape_arena_free(&scratch);
     return status;
 }

@@ -289,7 +289,7 @@ void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info
         e.kinetic -= taken;
         e.numerical += taken;
     }
-    const double driven = fmin(fmin(before - e.numerical, info->residual_work), info->dissipated);
+    const double driven = fmin(before - e.numerical, info->dissipated);
     if (driven > 0) {
         info->dissipated -= driven;
         e.dissipated -= driven;
