@@ -10,8 +10,8 @@
  *                      and cape are placed 6 m away (drape_sim_place)
  *     elbow            an arm and a forearm, two capsules that overlap at the elbow, bend to 150 degrees and
  *                      straighten in 3 s, and pinch a sheet of 0.3 m with 16 x 16 nodes that lies over them
- *     pinch            two balls close upon the middle of a hung sheet of 0.5 m with 30 x 30 nodes, overlap by
- *                      4 cm for half a second, and part, every 2 s
+ *     pinch            two balls close upon the middle of a hung sheet of 0.5 m with 30 x 30 nodes, overlap
+ *                      by 4 cm for half a second, and part, every 2 s
  * A frame is missed if its call took longer than its budget; starved ones are not counted.
  * `strain` is the largest of any edge at the end of a frame, `apart` that of edges without a node that is
  * relaxed, because bodies leave it no room, or was in the half second before, `inside` the depth of cloth in
