@@ -361,8 +361,8 @@ START_TEST(a_capstan_holds_by_its_angle)
 }
 END_TEST
 
-/* A sheet that is thrown on a slope steeper than the angle of friction slides on: after the impact it has lost
- * mu times the normal impulse, from the closed form of a body,
+/* A sheet that is thrown on a slope steeper than the angle of friction slides on: after the impact it has
+ * lost mu times the normal impulse, from the closed form of a body,
  *     v = |v0 + g t|_tangential - mu |v0 + g t|_normal
  * newton_k may be off by its bound of a thousandth of the diagonal in a step, 0.085 m/s, in each of the six
  * steps from the first corner's impact to the last one's: a quarter. It fails where the guess of a step
