@@ -274,11 +274,11 @@ static double take_back(const drape_model *m, double energy, double *v)
 }
 
 /* The dissipation is that of forces at the end of the step, which the residual drives, too: its work may go
- * these forces may be balanced by those of the barrier, however large: a pair that began within the step
- * these forces may be balanced by those of the barrier, however large: a pair that began within the step and
- * separates at its end by the mean velocity of a body that turns pushes with next to nothing, and restitution
- * times the whole displacement was 6.6 J where contact stored 0.14 and the body did 0.02. So no more is
- * counted than there was. */
+ * there and never have been in the motion. Taking back goes by what the motion has lost altogether. In
+ * contact these forces may be balanced by those of the barrier, however large: a pair that began within the
+ * step and separates at its end by the mean velocity of a body that turns pushes with next to nothing, and
+ * restitution times the whole displacement was 6.6 J where contact stored 0.14 and the body did 0.02. So no
+ * more is counted than there was. */
 void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info *info)
 {
     const drape_audit *audit = &sim->audit;
