@@ -27,7 +27,8 @@ struct drape_factored_jacobian {
     bool nonsymmetric; /* there is drag that couples nodes */
     bool lumps;        /* N is factored, in a pattern without what only C couples; else A */
     drape_scalar_stiffness scalar;
-    int32_t *block; /* (entries of C) in the pattern; -1: lumped */
+    int32_t *block;  /* (entries of C) in the pattern; -1: lumped */
+    int64_t version; /* of the pattern */
     drape_pcg pcg;
     SUNContext sun;
     drape_sun_linear *linear;
@@ -134,6 +135,7 @@ static void add_scalars(const drape_factored_jacobian *s, double *values)
 static drape_status take_pattern(drape_factored_jacobian *s)
 {
     drape_status status = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->system));
+    s->version = drape_system_pattern_version(s->system);
     place_scalars(s);
     return status;
 }
@@ -145,7 +147,7 @@ static drape_status assemble(drape_factored_jacobian *s, const drape_point *at, 
     drape_point point = *at;
     point.contact = DRAPE_CONTACT_GAUSS_NEWTON;
     drape_status status = drape_system_extend_pattern(s->system, at, &changed);
-    s->linear->stale |= changed;
+    s->linear->stale |= s->version != drape_system_pattern_version(s->system);
     if (!status && s->linear->stale)
         status = take_pattern(s);
     if (status)
