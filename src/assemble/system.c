@@ -21,6 +21,7 @@ struct drape_system {
     const drape_pattern *pattern; /* the model's, or the extended one */
     drape_arena extension;        /* holds the extended pattern and its block slots */
     drape_pattern extended;       /* without some terms, or with the pairs of nodes that contact couples */
+    int64_t pattern_version;      /* counts the changes of `pattern` */
     int32_t **blocks;             /* (term_count) slots in the extended pattern; NULL: it is not in use */
     const bool *left_out;         /* (term_count) terms without slots in it; NULL: none */
     drape_status status;          /* of drape_system_status */
@@ -298,6 +299,7 @@ const drape_pattern *drape_system_pattern(const drape_system *system)
 
 static void forget_extension(drape_system *system)
 {
+    system->pattern_version++;
     drape_arena_free(&system->extension);
     system->blocks = NULL;
     system->pattern = &system->model->pattern;
@@ -344,6 +346,11 @@ static drape_status extend(drape_system *system, int32_t pairs, const int32_t *n
     else
         system->pattern = &system->extended;
     return status;
+}
+
+int64_t drape_system_pattern_version(const drape_system *system)
+{
+    return system->pattern_version;
 }
 
 drape_status drape_system_leave_out(drape_system *system, const bool *terms)

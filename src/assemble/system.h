@@ -129,6 +129,9 @@ void drape_system_end_step(drape_system *system);
 const drape_pattern *drape_system_pattern(const drape_system *system);
 drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed);
 
+/* Differs after each change of the pattern, for whoever has a matrix in it and is not the only one. */
+int64_t drape_system_pattern_version(const drape_system *system);
+
 /* From now on the pattern is without what only these terms (term_count) couple, which no matrix in it may
  * then contain; NULL: it has all of them, as at first. terms must outlive the system. Errors: DRAPE_E_MEMORY,
  * after which the pattern has all of them until it changes. */

@@ -63,7 +63,7 @@ static bool sweep(drape_contact *c, int32_t collider, double *y)
     const drape_collider *k = &c->model->colliders[collider];
     const drape_collider_pose *from = &c->start_pose[collider], *to = &c->path_pose[collider];
     bool moved = false;
-    if (c->deformed[collider] || !drape_pose_differs(from, to))
+    if (c->deformed[collider])
         return false;
     for (int32_t i = 0; i < c->model->free_count; i++) {
         const int32_t node = c->model->node_of_free[i];

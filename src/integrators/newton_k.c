@@ -203,6 +203,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         .error = s->values[PARAM_ERROR],
         .deadline = s->deadline,
         .linear_tolerance = linear_tolerance(s),
+        .cheap = s->effort > 0,
         .follows = follows,
         .pins_ahead = pins_ahead(s, in, h),
         .max_linear_iterations =

@@ -168,7 +168,7 @@ static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_poi
     if (!s->remainder.values)
         return DRAPE_OK;
     drape_status status = drape_system_extend_pattern(s->system, point, &changed);
-    if (!status && changed)
+    if (!status && s->remainder.version != drape_system_pattern_version(s->system))
         status = drape_approx_jacobian_extend(s);
     if (status)
         return status;

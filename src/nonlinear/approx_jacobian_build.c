@@ -213,6 +213,7 @@ drape_status drape_approx_jacobian_extend(drape_approx_jacobian *s)
     drape_arena_free(&r->arena);
     r->values = NULL;
     r->count = 0;
+    r->version = drape_system_pattern_version(s->system);
     if (!drape_system_has_remainder(s->system))
         return DRAPE_OK;
     size_t lower = ((size_t)p->block_start[p->block_count] + (size_t)p->block_count) / 2;

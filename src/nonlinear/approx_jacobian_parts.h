@@ -29,6 +29,7 @@ typedef struct coarse_matrix {
 typedef struct remainder_matrix {
     drape_arena arena; /* holds the arrays */
     double *values;    /* of the system's pattern; NULL: there is no R */
+    int64_t version;   /* of that pattern */
     int32_t count;
     int32_t *row, *column; /* (lower blocks of the pattern) */
     double *block;         /* (9 x lower blocks) row by row; diagonal ones symmetric */

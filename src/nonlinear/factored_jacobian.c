@@ -27,7 +27,8 @@ struct drape_factored_jacobian {
     bool nonsymmetric; /* there is drag that couples nodes */
     bool lumps;        /* N is factored, in a pattern without what only C couples; else A */
     drape_scalar_stiffness scalar;
-    int32_t *block; /* (entries of C) in the pattern; -1: lumped */
+    int32_t *block;  /* (entries of C) in the pattern; -1: lumped */
+    int64_t version; /* of the pattern */
     drape_pcg pcg;
     SUNContext sun;
     drape_sun_linear *linear;
@@ -79,7 +80,7 @@ static drape_status wave_speed(drape_system *system, drape_arena *scratch, doubl
     return status;
 }
 
-drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, bool *better)
+drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, bool *better, bool *needed)
 {
     const drape_model *m = drape_system_model(system);
     drape_arena scratch = drape_arena_of(m->ctx);
@@ -90,9 +91,10 @@ drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, 
         status = drape_scalar_stiffness_covers(system, flat);
     if (!status)
         status = wave_speed(system, &scratch, &speed);
-    *better = m->free_count <= FEW_NODES || has_coupled_drag(m) || speed * dt > MAX_TRAVEL * m->length;
+    *needed = m->free_count <= FEW_NODES || has_coupled_drag(m);
     for (int32_t t = 0; !status && t < m->term_count; t++)
-        *better |= m->terms[t].ops->measure && !m->terms[t].ops->pair && !flat[t];
+        *needed |= m->terms[t].ops->measure && !m->terms[t].ops->pair && !flat[t];
+    *better = *needed || speed * dt > MAX_TRAVEL * m->length;
     drape_arena_free(&scratch);
     return status;
 }
@@ -133,6 +135,7 @@ static void add_scalars(const drape_factored_jacobian *s, double *values)
 static drape_status take_pattern(drape_factored_jacobian *s)
 {
     drape_status status = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->system));
+    s->version = drape_system_pattern_version(s->system);
     place_scalars(s);
     return status;
 }
@@ -144,7 +147,7 @@ static drape_status assemble(drape_factored_jacobian *s, const drape_point *at, 
     drape_point point = *at;
     point.contact = DRAPE_CONTACT_GAUSS_NEWTON;
     drape_status status = drape_system_extend_pattern(s->system, at, &changed);
-    s->linear->stale |= changed;
+    s->linear->stale |= s->version != drape_system_pattern_version(s->system);
     if (!status && s->linear->stale)
         status = take_pattern(s);
     if (status)

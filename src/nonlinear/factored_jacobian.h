@@ -33,8 +33,9 @@ typedef struct drape_factored_jacobian drape_factored_jacobian;
 
 /* *better: whether the model needs this matrix for steps of dt: a term of it is neither a measure of pairs
  * nor flat bending, or is drag that couples nodes, or its membrane is so stiff that conjugate gradients need
- * many iterations, or it has so few nodes that factors cost no more. Errors: DRAPE_E_MEMORY. */
-drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, bool *better);
+ * many iterations, or it has so few nodes that factors cost no more. *needed: not only for the membrane, so
+ * that nothing is gained without factors. Errors: DRAPE_E_MEMORY. */
+drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, bool *better, bool *needed);
 
 /* For a system with at least one free node, whose pattern may then leave out what only bending couples
  * (drape_system_leave_out). dt: the nominal step. The arena must outlive it. Errors: DRAPE_E_MEMORY,

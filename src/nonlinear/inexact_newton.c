@@ -38,6 +38,8 @@
  * down upright, for .16 of the time of be, instead of .066 m for .39, though .031 instead of .022 m on a
  * ball. Eight are .036 and .035 m off, instead of .039 and .022 m. */
 #define FEW_ITERATIONS 4
+/* Iterations where cloth touches something, however little time there is. */
+#define MIN_IN_CONTACT 3
 /* In edges: by how much pins may be ahead before the step begins with the linearized equation. */
 #define MAX_AHEAD 0.1
 /* Without contact, in sizes of the scene: how far nodes would move in a step with the energy that is left,
@@ -84,30 +86,31 @@ typedef struct contraction {
 
 struct drape_inexact_newton {
     drape_step_equation *equation;
-    /* One of them; both NULL without free nodes. */
+    /* One of them, or both; both NULL without free nodes. */
     drape_approx_jacobian *approximate;
-    drape_factored_jacobian *factored;
-    drape_stress_predictor predictor; /* with factors */
-    double share;                     /* of the positive parts in the next matrix; with factors */
-    double used_share, repair_share;  /* in the last matrix; in the last one that was indefinite without */
-    bool indefinite;                  /* one in this solve was */
-    bool linearized;                  /* this solve began with the linearized equation */
-    bool unstable;                    /* the last matrix of this solve was, as far as it was tried */
-    bool shortened;                   /* a correction of this solve was, by the line search */
-    double length;                    /* that the line search gave the last correction */
-    double edge;                      /* [m] mean length of an edge */
-    contraction first;                /* of the first correction */
-    bool nonlinear;                   /* forces are, along the correction of the last estimate */
-    double *p, *minus_f, *trial;      /* free DOFs */
-    double *fraction;                 /* nodes; NULL without contact */
-    double *f, *g;                    /* free DOFs, nodes: kept while F is evaluated elsewhere */
+    drape_factored_jacobian *factors;
+    drape_factored_jacobian *factored; /* the factors in solves that use them, NULL in others */
+    drape_stress_predictor predictor;  /* with factors */
+    double share;                      /* of the positive parts in the next matrix; with factors */
+    double used_share, repair_share;   /* in the last matrix; in the last one that was indefinite without */
+    bool indefinite;                   /* one in this solve was */
+    bool linearized;                   /* this solve began with the linearized equation */
+    bool unstable;                     /* the last matrix of this solve was, as far as it was tried */
+    bool shortened;                    /* a correction of this solve was, by the line search */
+    double length;                     /* that the line search gave the last correction */
+    double edge;                       /* [m] mean length of an edge */
+    contraction first;                 /* of the first correction */
+    bool nonlinear;                    /* forces are, along the correction of the last estimate */
+    double *p, *minus_f, *trial;       /* free DOFs */
+    double *fraction;                  /* nodes; NULL without contact */
+    double *f, *g;                     /* free DOFs, nodes: kept while F is evaluated elsewhere */
 };
 
 /* Conjugate gradients leave a part of the stretch of a correction, which predicted stress would not see. */
 static drape_status create_factored(drape_arena *arena, drape_inexact_newton *s, double dt)
 {
     drape_status status = drape_stress_predictor_init(arena, s->equation->system, &s->predictor);
-    return status ? status : drape_factored_jacobian_create(arena, s->equation->system, dt, &s->factored);
+    return status ? status : drape_factored_jacobian_create(arena, s->equation->system, dt, &s->factors);
 }
 
 drape_status drape_inexact_newton_create(drape_arena *arena, drape_step_equation *equation,
@@ -130,21 +133,23 @@ drape_status drape_inexact_newton_create(drape_arena *arena, drape_step_equation
         s->fraction = drape_arena_take(arena, equation->nodes / 3, sizeof *s->fraction);
     if (drape_arena_status(arena) || equation->dofs == 0)
         return drape_arena_status(arena);
-    bool factored = matrix == DRAPE_INEXACT_FACTORED;
-    if (matrix == DRAPE_INEXACT_AUTO) {
-        drape_status status = drape_factored_jacobian_is_better(equation->system, dt, &factored);
-        if (status)
-            return status;
-    }
-    return factored ? create_factored(arena, s, dt)
-                    : drape_approx_jacobian_create(arena, equation->system, coarse_spacing, &s->approximate);
+    bool factored = matrix == DRAPE_INEXACT_FACTORED, only = true;
+    drape_status status = DRAPE_OK;
+    if (matrix == DRAPE_INEXACT_AUTO)
+        status = drape_factored_jacobian_is_better(equation->system, dt, &factored, &only);
+    only |= !equation->x_ahead;
+    if (!status && factored)
+        status = create_factored(arena, s, dt);
+    if (!status && !(factored && only))
+        status = drape_approx_jacobian_create(arena, equation->system, coarse_spacing, &s->approximate);
+    return status;
 }
 
 void drape_inexact_newton_destroy(drape_inexact_newton **newton)
 {
     if (*newton) {
         drape_approx_jacobian_destroy(&(*newton)->approximate);
-        drape_factored_jacobian_destroy(&(*newton)->factored);
+        drape_factored_jacobian_destroy(&(*newton)->factors);
     }
     *newton = NULL;
 }
@@ -154,9 +159,10 @@ void drape_inexact_newton_destroy(drape_inexact_newton **newton)
 /* Stiff elements are left with more stress than the solution has: little displacement, but far more force
  * than the inertia of light cloth balances. In the first matrix it would make cloth soft or hard at random.
  * The stress that was predicted along the last correction of the step before is free of that. */
-static void begin(drape_inexact_newton *s, bool follows)
+static void begin(drape_inexact_newton *s, bool follows, bool cheap)
 {
     drape_step_equation *e = s->equation;
+    s->factored = cheap && s->approximate ? NULL : s->factors;
     drape_step_equation_begin(e);
     s->share = 1;
     if (!follows || s->first.mass_weight != e->mass_weight)
@@ -460,6 +466,17 @@ static bool has_time(const drape_inexact_settings *settings, double seconds)
     return settings->deadline == INFINITY || drape_clock_seconds() + seconds <= settings->deadline;
 }
 
+/* Where cloth touches something, so many iterations are made whatever the time, unless fewer meet the bound:
+ * what one leaves throws the cloth about, so that later steps need more (docs/realtime.md, "What is saved
+ * first"). */
+static int least_iterations(const drape_inexact_newton *s)
+{
+    double gap;
+    return s->fraction && drape_contact_active(drape_system_contact(s->equation->system), &gap) > 0
+               ? MIN_IN_CONTACT
+               : 0;
+}
+
 /* Of one solve. */
 typedef struct progress {
     int iteration;
@@ -545,7 +562,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
                             drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
-    begin(s, settings->follows);
+    begin(s, settings->follows, settings->cheap);
     drape_status status = guess_linearized(s, settings, d);
     if (status) {
         report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
@@ -560,7 +577,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
     for (;; p.iteration++) {
         const bool least = p.iteration >= settings->iterations,
                    most = p.iteration >= settings->iterations + settings->rescue_iterations ||
-                          (least && !has_time(settings, 0));
+                          (least && p.iteration >= least_iterations(s) && !has_time(settings, 0));
         const double left = drape_step_equation_dot(e, e->f, e->f);
         report->iterations = p.iteration;
         bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;
@@ -586,7 +603,8 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         const bool lost = report->error > e->model->length; /* nowhere near the solution */
         const bool measures = s->nonlinear && p.iteration == 1 && goes_by_error(s);
         const double aim = (s->factored || s->fraction ? 1 : CHEAP_SHARE) * settings->error;
-        const bool ends = most || (report->error <= aim && !measures) || !has_time(settings, p.seconds);
+        const bool ends = most || (report->error <= aim && !measures) ||
+                          (p.iteration >= least_iterations(s) && !has_time(settings, p.seconds));
         if (converged || (fell && !lost && ends && is_quiet(s, report->error)))
             return DRAPE_OK;
         if (most) {
@@ -630,7 +648,7 @@ drape_status drape_inexact_newton_solve(drape_inexact_newton *s, const drape_ine
     *report =
         (drape_solve_report){.tolerance = NAN, .error = NAN}; /* the residual is reported but not bounded */
     if (e->dofs == 0) {
-        begin(s, settings->follows);
+        begin(s, settings->follows, settings->cheap);
         drape_step_equation_evaluate(e, d);
         report->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
         report->error = report->residual = 0;
@@ -656,15 +674,15 @@ void drape_inexact_newton_archive(drape_inexact_newton *s, drape_archive *a)
     drape_archive_int32(a, &s->first.steps);
     if (s->approximate)
         drape_approx_jacobian_archive(s->approximate, a);
-    if (!s->factored)
+    if (!s->factors)
         return;
     drape_archive_double(a, &s->repair_share);
     drape_stress_predictor_archive(&s->predictor, a);
-    drape_factored_jacobian_archive(s->factored, a);
+    drape_factored_jacobian_archive(s->factors, a);
 }
 
 size_t drape_inexact_newton_bytes(const drape_inexact_newton *s)
 {
     return (s->approximate ? drape_approx_jacobian_bytes(s->approximate) : 0) +
-           (s->factored ? drape_factored_jacobian_bytes(s->factored) : 0);
+           (s->factors ? drape_factored_jacobian_bytes(s->factors) : 0);
 }

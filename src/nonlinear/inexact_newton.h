@@ -46,14 +46,17 @@ typedef struct drape_inexact_settings {
     double tolerance;                  /* [N] largest component of F below which iterations end */
     double error;    /* [m] bound on the estimated RMS distance of the nodes to the solution */
     double deadline; /* [s of drape_clock_seconds] by which iterations end that only reduce this error,
-                        and after which no other is begun beyond `iterations` */
+                        and after which no other is begun beyond `iterations`, and, in contact, some more
+                        that keep cloth from being thrown about */
     double linear_tolerance; /* relative residual that conjugate gradients leave in each correction */
     int max_linear_iterations;
+    bool cheap;        /* where the solver has both matrices, corrections are made without factors */
     bool follows;      /* the step begins with the result of the last solve */
     double pins_ahead; /* [m] largest coordinate by which moved pins are ahead of where the guess has them */
 } drape_inexact_settings;
 
-/* auto: whichever factored_jacobian.h says. */
+/* auto: whichever factored_jacobian.h says; with contact, where both serve, both: contact needs most of its
+ * iterations for the active set, which costs less without factors. */
 typedef enum { DRAPE_INEXACT_AUTO, DRAPE_INEXACT_APPROXIMATE, DRAPE_INEXACT_FACTORED } drape_inexact_matrix;
 
 /* dt: the nominal step, by which auto chooses. coarse_spacing: see approx_jacobian.h. The equation and the

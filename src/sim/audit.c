@@ -275,7 +275,11 @@ static double take_back(const drape_model *m, double energy, double *v)
 }
 
 /* The dissipation is that of forces at the end of the step, which the residual drives, too: its work may go
- * there and never have been in the motion. Taking back goes by what the motion has lost altogether. */
+ * there and never have been in the motion. Taking back goes by what the motion has lost altogether. In
+ * contact these forces may be balanced by those of the barrier, however large: a pair that began within the
+ * step and separates at its end by the mean velocity of a body that turns pushes with next to nothing, and
+ * restitution times the whole displacement was 6.6 J where contact stored 0.14 and the body did 0.02. So no
+ * more is counted than there was. */
 void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info *info)
 {
     const drape_audit *audit = &sim->audit;
@@ -290,7 +294,10 @@ void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info
         e.kinetic -= taken;
         e.numerical += taken;
     }
-    const double driven = fmin(fmin(before - e.numerical, info->residual_work), info->dissipated);
+    /* of a step that is solved to its tolerance, what is dissipated is what the method says */
+    const bool solved = info->residual <= info->tolerance;
+    const double gained = before - e.numerical,
+                 driven = fmin(solved ? fmin(gained, info->residual_work) : gained, info->dissipated);
     if (driven > 0) {
         info->dissipated -= driven;
         e.dissipated -= driven;

@@ -5,6 +5,7 @@
  * (a nanosecond); those in between are for the bench.
  */
 #include "contact/parts.h"
+#include "support/bytes.h"
 #include "support/scene.h"
 
 #define PLENTY  3600.0 /* [s] */
@@ -544,7 +545,74 @@ START_TEST(wrong_arguments_are_reported)
 }
 END_TEST
 
-SUITE("realtime", few_iterations_are_near_the_converged_step, light_cloth_is_near_the_converged_step,
+/* A stiff sheet over which waves cross in a step, which has both matrices, lies on a ball, and there is never
+ * time: steps in contact have up to three iterations, because one throws the cloth about, with conjugate
+ * gradients in place of factors, which would take one linear iteration in each solution. A sim that is
+ * restored from a checkpoint has the same. Without contact one iteration is all. */
+START_TEST(steps_in_contact_keep_their_iterations)
+{
+    static const char text[] =
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 16, 'rows': 16, 'width': 1, 'height': "
+        "1, 'orientation': 'horizontal', 'transform': {'translate': [-0.5, %s, 0.5]}},"
+        "'material': {'young_modulus': 1e7, 'thickness': 1e-3, 'areal_density': 0.2},"
+        "'terms': ['stretch.edge', 'bend.hinge']}],"
+        "'colliders': [{'type': 'sphere', 'center': [0.02, 0, 0.01], 'radius': 0.3}],"
+        "'integrator': {'method': 'newton_k'}, 'duration': 4}";
+    for (int touches = 0; touches < 2; touches++) {
+        scene s = scene_open(text, touches ? "0.3015" : "1.5");
+        for (int i = 0; i < 12; i++)
+            advance(&s, 1. / 60, NOTHING);
+        const drape_statistics a = drape_sim_statistics(s.sim);
+        bytes b = bytes_save(s.sim);
+        scene other = scene_open(text, touches ? "0.3015" : "1.5");
+        ck_assert_int_eq(drape_sim_restore_from(other.sim, b.data, b.size), DRAPE_OK);
+        free(b.data);
+        const drape_realtime r = advance(&s, 1. / 60, NOTHING), q = advance(&other, 1. / 60, NOTHING);
+        const drape_statistics c = drape_sim_statistics(s.sim);
+        const long iterations = (long)(c.newton_iterations - a.newton_iterations);
+        if (touches) {
+            ck_assert_int_eq(r.attempts, 1);
+            ck_assert_int_eq(r.effort, 1);
+            ck_assert(iterations > 1 && iterations <= 3);
+            ck_assert(c.linear_iterations - a.linear_iterations > 2 * iterations);
+            ck_assert_int_eq(q.attempts, 1);
+            ck_assert_uint_eq(drape_sim_hash(s.sim), drape_sim_hash(other.sim));
+        } else
+            ck_assert(iterations <= r.attempts);
+        scene_close(&s);
+        scene_close(&other);
+    }
+}
+END_TEST
+
+/* Two sheets, one of which falls on the other: the pattern of the matrices grows with what touches, in calls
+ * with all the time, which use factors, and in calls without any, which do not. Each matrix has to follow the
+ * growth that the other one found: else it writes beyond its end. */
+START_TEST(both_matrices_follow_the_pattern)
+{
+    static const char *const sheet =
+        "{'mesh': {'grid': 'square', 'columns': 12, 'rows': 12, 'width': 1, 'height': 1, 'orientation': "
+        "'horizontal', 'transform': {'translate': [%s, 0.5], 'rotate': [0, 1, 0, %s]}},"
+        "'material': {'young_modulus': 1e7, 'thickness': 1e-3, 'areal_density': 0.2},"
+        "'terms': ['stretch.edge', 'bend.hinge'] %s}";
+    char text[2000], low[600], high[600];
+    snprintf(low, sizeof low, sheet, "-0.5, 0", "0", ", 'pins': [{'edge': 'left'}, {'edge': 'right'}]");
+    snprintf(high, sizeof high, sheet, "-0.5, 0.02", "20", ", 'velocity': [1, -1, 0]");
+    snprintf(text, sizeof text,
+             "{'drape': 1, 'cloth': [%s, %s], 'self_contact': {'thickness': 0.01},"
+             "'integrator': {'method': 'newton_k'}, 'duration': 4}",
+             low, high);
+    scene s = scene_open("%s", text);
+    int efforts = 0;
+    for (int i = 0; i < 24; i++)
+        efforts |= 1 << advance(&s, 1. / 60, i / 2 % 2 ? NOTHING : PLENTY).effort;
+    ck_assert_int_eq(efforts, 3);
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("realtime", both_matrices_follow_the_pattern, steps_in_contact_keep_their_iterations,
+      few_iterations_are_near_the_converged_step, light_cloth_is_near_the_converged_step,
       with_many_iterations_the_step_is_backward_euler, the_step_includes_contact_and_damping,
       measured_fabrics_fall, stiff_sheets_fall, contact_holds_back_only_what_it_touches,
       a_ball_that_moves_does_not_stop_it, frame_rates_differ_by_the_order_of_the_method,
