@@ -1,5 +1,6 @@
 /* test_load.c: loads that follow the surface or act on nodes, against closed forms. */
 #include "integrators/integrator.h"
+#include "support/bytes.h"
 #include "support/scene.h"
 
 #define RADIUS    0.1  /* [m] */
@@ -220,5 +221,44 @@ START_TEST(a_ramp_adds_up_to_its_impulse)
 }
 END_TEST
 
+/* A folded, spinning cloth on supports, with a pin that turns and loads that rise, goes on from a checkpoint
+ * with the same bits, under every integrator. */
+static scene everything(const char *method)
+{
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.3, "
+        "'height': 0.3},"
+        "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
+        "'start': {'folds': [{'point': [0.15, 0, 0], 'axis': [0, 0, 1], 'side': [1, 0, 0], 'angle': 60,"
+        "'radius': 0.02}], 'spin': [0, 1, 0]}, 'terms': ['stretch.cst', 'bend.midedge',"
+        "{'type': 'load.pressure', 'pressure': 2, 'ramp': 0.1},"
+        "{'type': 'load.point', 'node': 10, 'force': [0, 0.01, 0], 'ramp': 0.2}],"
+        "'pins': [{'edge': 'left', 'normal': [1, 1, 0]}, {'corner': 'bottom-right', 'pivot': [0, 0, 0],"
+        "'turns': [{'time': 0, 'rotate': [0, 1, 0, 0]}, {'time': 0.3, 'rotate': [0, 1, 0, 90]}]}]}],"
+        "'integrator': {'method': '%s', 'dt': 0.01}, 'controller': {'type': '%s'}, 'duration': 1}",
+        method, strcmp(method, "verlet") == 0 ? "stable" : "halving");
+}
+
+START_TEST(all_of_it_goes_on_from_a_checkpoint)
+{
+    for (int m = 0; drape_integrators[m]; m++) {
+        const char *name = drape_integrators[m]->entry.name;
+        bytes saved = {0};
+        scene a = everything(name), b = everything(name);
+        scene_advance(&a, 0.05);
+        ck_assert_int_eq(drape_sim_save_to(a.sim, bytes_keep, &saved), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_restore_from(b.sim, saved.data, saved.size), DRAPE_OK);
+        scene_advance(&a, 0.1);
+        scene_advance(&b, 0.1);
+        ck_assert_msg(drape_state_hash(a.model, scene_state(&a)) ==
+                          drape_state_hash(b.model, scene_state(&b)),
+                      "%s", name);
+        scene_close(&a), scene_close(&b);
+        free(saved.data);
+    }
+}
+END_TEST
+
 SUITE("load", a_sphere_swells_by_its_membrane_stress, pressure_on_the_interior_does_not_depend_on_the_point,
-      equal_forces_on_equal_masses_are_gravity, a_ramp_adds_up_to_its_impulse)
+      equal_forces_on_equal_masses_are_gravity, a_ramp_adds_up_to_its_impulse,
+      all_of_it_goes_on_from_a_checkpoint)
