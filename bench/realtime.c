@@ -472,7 +472,8 @@ static void judge(const scene *s, const variant *v, const result *r, const resul
     }
     if (s->move == bend || s->move == pinch) {
         require(s, v, "strain apart from the pinch [%]", 100 * r->apart, 10);
-        require(s, v, "calls in a row without progress", r->still, 0);
+        require(s, v, "simulated time that was dropped [%]", 100 * r->dropped / (s->sims * r->frames * FRAME),
+                10);
         require(s, v, "bodies at the pinch that no report named", 2 - r->bodies, 0);
     }
     require(s, v, "calls that failed", r->errors, 0);
