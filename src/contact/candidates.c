@@ -157,7 +157,7 @@ static drape_status collect(drape_candidates *c, drape_candidate_set *set, const
     set->count = 0;
     set->known = true;
     drape_candidates_find(c->broad, &own, c->margin, marked, add, &(collector){c->arena, set});
-    return set->known ? drape_sort_pairs(&c->sorter, &set->pairs, &set->room, set->count) : DRAPE_E_MEMORY;
+    return set->known ? drape_sort_pairs(&c->sorter, set->pairs, set->count) : DRAPE_E_MEMORY;
 }
 
 /* ---- Distance from the paths ---- */

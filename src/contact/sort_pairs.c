@@ -11,12 +11,18 @@ static bool are_sorted(const drape_pair *pairs, int32_t count)
     return true;
 }
 
-static drape_status reserve(drape_pair_sorter *s, const drape_pair *pairs, int32_t room, int32_t count)
+static int32_t room_for(int32_t count, int32_t room)
+{
+    return count <= room ? room : count <= INT32_MAX / 2 ? 2 * count : count;
+}
+
+static drape_status reserve(drape_pair_sorter *s, const drape_pair *pairs, int32_t count)
 {
     int32_t last = 0;
     for (int32_t i = 0; i < count; i++)
         for (int k = 1; k < 3; k++)
             last = pairs[i].rank[k] > last ? pairs[i].rank[k] : last;
+    const int32_t room = room_for(count, s->room), first_room = room_for(last + 2, s->first_room);
     if (room > s->room) {
         drape_pair *to = drape_arena_resize(s->arena, s->pairs, (size_t)room, sizeof *to);
         s->pairs = to ? to : s->pairs;
@@ -27,12 +33,12 @@ static drape_status reserve(drape_pair_sorter *s, const drape_pair *pairs, int32
         }
         s->room = to ? room : s->room;
     }
-    if (last + 2 > s->first_room) {
-        int32_t *first = drape_arena_resize(s->arena, s->first, (size_t)last + 2, sizeof *first);
+    if (first_room > s->first_room) {
+        int32_t *first = drape_arena_resize(s->arena, s->first, (size_t)first_room, sizeof *first);
         s->first = first ? first : s->first;
-        s->first_room = first ? last + 2 : s->first_room;
+        s->first_room = first ? first_room : s->first_room;
     }
-    return room > s->room || last + 2 > s->first_room ? DRAPE_E_MEMORY : DRAPE_OK;
+    return room > s->room || first_room > s->first_room ? DRAPE_E_MEMORY : DRAPE_OK;
 }
 
 /* Writes the numbers of the pairs by one of their ranks, those with the same one as they were; from NULL:
@@ -54,25 +60,20 @@ static void order_by(const drape_pair_sorter *s, int which, const drape_pair *pa
     }
 }
 
-drape_status drape_sort_pairs(drape_pair_sorter *s, drape_pair **pairs, int32_t *room, int32_t count)
+drape_status drape_sort_pairs(drape_pair_sorter *s, drape_pair *pairs, int32_t count)
 {
-    drape_pair *from = *pairs;
-    const int32_t whole = *room;
-    if (are_sorted(from, count))
+    if (are_sorted(pairs, count))
         return DRAPE_OK;
-    if (reserve(s, from, whole, count))
+    if (reserve(s, pairs, count))
         return DRAPE_E_MEMORY;
     for (int32_t i = 0, end; i < count; i = end) { /* a stage; those of surfaces are sorted */
-        for (end = i + 1; end < count && from[end].rank[0] == from[i].rank[0]; end++)
+        for (end = i + 1; end < count && pairs[end].rank[0] == pairs[i].rank[0]; end++)
             ;
-        order_by(s, 2, from + i, end - i, NULL, s->order[0]);
-        order_by(s, 1, from + i, end - i, s->order[0], s->order[1]);
+        order_by(s, 2, pairs + i, end - i, NULL, s->order[0]);
+        order_by(s, 1, pairs + i, end - i, s->order[0], s->order[1]);
         for (int32_t k = i; k < end; k++)
-            s->pairs[k] = from[i + s->order[1][k - i]];
+            s->pairs[k] = pairs[i + s->order[1][k - i]];
     }
-    *pairs = s->pairs;
-    *room = s->room;
-    s->pairs = from;
-    s->room = whole;
+    memcpy(pairs, s->pairs, (size_t)count * sizeof *pairs);
     return DRAPE_OK;
 }

@@ -25,8 +25,7 @@ typedef struct drape_pair_sorter {
     int32_t room, first_room;
 } drape_pair_sorter;
 
-/* Sorts `count` pairs, whose stages ascend already, into a list that it exchanges with *pairs (of *room).
- * Errors: DRAPE_E_MEMORY, and the pairs stay as they are. */
-drape_status drape_sort_pairs(drape_pair_sorter *sorter, drape_pair **pairs, int32_t *room, int32_t count);
+/* Sorts `count` pairs, whose stages ascend already. Errors: DRAPE_E_MEMORY, and the pairs stay as they are. */
+drape_status drape_sort_pairs(drape_pair_sorter *sorter, drape_pair *pairs, int32_t count);
 
 #endif

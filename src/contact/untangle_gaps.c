@@ -166,7 +166,7 @@ drape_status drape_untangle_gaps(drape_untangler *u)
     const drape_broad_query want = {.x = u->x, .reach = g.reach};
     u->near_count = 0;
     drape_broad_phase_pairs(&u->broad, &want, gather, u);
-    if (u->out_of_memory || drape_sort_pairs(&u->sorter, &u->near, &u->near_room, u->near_count))
+    if (u->out_of_memory || drape_sort_pairs(&u->sorter, u->near, u->near_count))
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < u->near_count; i++)
         consider(&g, &u->near[i]);
