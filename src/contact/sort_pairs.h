@@ -25,7 +25,7 @@ typedef struct drape_pair_sorter {
     int32_t room, first_room;
 } drape_pair_sorter;
 
-/* Sorts `count` pairs, whose stages ascend already. Errors: DRAPE_E_MEMORY, and the pairs stay as they are. */
+/* Sorts `count` pairs, whose stages ascend already. Errors: DRAPE_E_MEMORY, the pairs stay as they are. */
 drape_status drape_sort_pairs(drape_pair_sorter *sorter, drape_pair *pairs, int32_t count);
 
 #endif
