@@ -44,19 +44,6 @@ void drape_sim_ride_on(drape_sim *sim, int32_t node)
 
 /* ---- For hosts ---- */
 
-static drape_status check_nodes(const drape_sim *sim, const char *function, int32_t count,
-                                const int32_t *nodes)
-{
-    if (count < 0 || (count > 0 && !nodes))
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: %d nodes, but no list of them", function,
-                          (int)count);
-    for (int32_t i = 0; i < count; i++)
-        if (nodes[i] < 0 || nodes[i] >= sim->model->node_count)
-            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: node %d; there are 0 to %d", function,
-                              (int)nodes[i], (int)sim->model->node_count - 1);
-    return DRAPE_OK;
-}
-
 static drape_status check_triangles(const drape_sim *sim, int32_t collider, int32_t count,
                                     const int32_t *triangles)
 {
@@ -130,7 +117,7 @@ drape_status drape_sim_attach(drape_sim *sim, int32_t collider, int32_t count, c
     if (collider < 0 || collider >= sim->model->collider_count)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_attach: collider %d; the model has %d",
                           (int)collider, (int)sim->model->collider_count);
-    status = check_nodes(sim, "drape_sim_attach", count, nodes);
+    status = drape_sim_check_nodes(sim, "drape_sim_attach", count, nodes);
     if (!status)
         status = check_triangles(sim, collider, count, triangles);
     int32_t *nearest = NULL;
@@ -148,7 +135,7 @@ drape_status drape_sim_detach(drape_sim *sim, int32_t count, const int32_t *node
 {
     drape_status status = drape_sim_guard(sim, "drape_sim_detach");
     if (!status)
-        status = check_nodes(sim, "drape_sim_detach", count, nodes);
+        status = drape_sim_check_nodes(sim, "drape_sim_detach", count, nodes);
     for (int32_t i = 0; !status && i < count; i++)
         if (drape_sim_carrier(sim, nodes[i]) < 0)
             status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT,

@@ -9,19 +9,16 @@
 static drape_status check_masses(const drape_sim *sim, int32_t count, const int32_t *nodes,
                                  const double *masses)
 {
-    if (count < 0 || (count > 0 && (!nodes || !masses)))
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "drape_sim_set_masses: %d nodes, but no list of them or of masses", (int)count);
-    for (int32_t i = 0; i < count; i++) {
-        if (nodes[i] < 0 || nodes[i] >= sim->model->node_count)
-            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_masses: node %d; there are 0 to %d",
-                              (int)nodes[i], (int)sim->model->node_count - 1);
+    const drape_status status = drape_sim_check_nodes(sim, "drape_sim_set_masses", count, nodes);
+    if (!status && count > 0 && !masses)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_masses: %d nodes, but no list of masses",
+                          (int)count);
+    for (int32_t i = 0; !status && i < count; i++)
         if (!(masses[i] > 0 && masses[i] <= MAX_MASS))
             return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                               "drape_sim_set_masses: mass of node %d = %g kg; it is in (0, %g]",
                               (int)nodes[i], masses[i], MAX_MASS);
-    }
-    return DRAPE_OK;
+    return status;
 }
 
 static drape_status reweigh(drape_sim *sim, const double *masses)

@@ -21,25 +21,12 @@ drape_status drape_sim_repin(drape_sim *sim, const uint8_t *pinned)
 
 /* ---- For hosts ---- */
 
-static drape_status check_nodes(const drape_sim *sim, const char *function, int32_t count,
-                                const int32_t *nodes)
-{
-    if (count < 0 || (count > 0 && !nodes))
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: %d nodes, but no list of them", function,
-                          (int)count);
-    for (int32_t i = 0; i < count; i++)
-        if (nodes[i] < 0 || nodes[i] >= sim->model->node_count)
-            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: node %d; there are 0 to %d", function,
-                              (int)nodes[i], (int)sim->model->node_count - 1);
-    return DRAPE_OK;
-}
-
 static drape_status set_pins(drape_sim *sim, const char *function, int32_t count, const int32_t *nodes,
                              uint8_t pin)
 {
     drape_status status = drape_sim_guard(sim, function);
     if (!status)
-        status = check_nodes(sim, function, count, nodes);
+        status = drape_sim_check_nodes(sim, function, count, nodes);
     if (status)
         return status;
     const size_t size = (size_t)sim->model->node_count * sizeof *sim->pinned;

@@ -366,6 +366,19 @@ drape_status drape_sim_guard(drape_sim *sim, const char *function)
     return DRAPE_OK;
 }
 
+drape_status drape_sim_check_nodes(const drape_sim *sim, const char *function, int32_t count,
+                                   const int32_t *nodes)
+{
+    if (count < 0 || (count > 0 && !nodes))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: %d nodes, but no list of them", function,
+                          (int)count);
+    for (int32_t i = 0; i < count; i++)
+        if (nodes[i] < 0 || nodes[i] >= sim->model->node_count)
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: node %d; there are 0 to %d", function,
+                              (int)nodes[i], (int)sim->model->node_count - 1);
+    return DRAPE_OK;
+}
+
 drape_status drape_sim_notify(drape_sim *sim, const drape_event *event)
 {
     for (int i = 0; i < sim->observer_count; i++) {

@@ -119,6 +119,10 @@ struct drape_sim {
  * call comes from one of its observers). */
 drape_status drape_sim_guard(drape_sim *sim, const char *function);
 
+/* Checks a list of nodes that a host gives to a function. Errors: DRAPE_E_ARGUMENT. */
+drape_status drape_sim_check_nodes(const drape_sim *sim, const char *function, int32_t count,
+                                   const int32_t *nodes);
+
 /* Creates a new sim of a compiled model with the same choices, at the beginning and without an energy
  * account, which the caller copies or reads. pinned (node_count): the nodes that are pinned; masses
  * (node_count) [kg]; NULL: those of the model. */
