@@ -351,7 +351,7 @@ static bool is_mirrored(const reader *r, const part *p)
     return drape_gltf_map_determinant(&map) < 0;
 }
 
-/* Where a map mirrors, the triangles go the other way round (section 3.7.4), so that their outside stays the
+/* Where a map mirrors, the order of the corners is reversed (section 3.7.4), so that their outside stays the
  * same. That must hold in all frames: triangles do not change between them. */
 static drape_status check_mirrors(reader *r, int32_t frame, drape_mesh *mesh)
 {
