@@ -624,9 +624,10 @@ typedef struct drape_untangle_def {
     size_t struct_size; /* set by drape_untangle_def_init */
     int sweeps;         /* searches for what passes through what, at most; default 400 */
     double gap;         /* gap that layers and colliders are to have afterwards, in activation distances of
-                           contact, in [0.01, 1]; default 0.5 */
-    bool keep; /* if it does not come apart, the sim gets the positions with the fewest intersections; default
-                  false: it stays as it is */
+                           contact, in [0.01, 1]; default 1: contact begins without forces */
+    bool keep; /* if it does not come apart, the sim gets the positions with the fewest intersections of those
+                  that have not more pairs or triangles in colliders than the present ones, edges strained by
+                  a quarter at most, and finite energies; default false: it stays as it is */
 } drape_untangle_def;
 
 /* Fills *def with the defaults. Pass the caller's sizeof(drape_untangle_def) as struct_size. Nothing if def

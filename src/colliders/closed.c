@@ -47,7 +47,7 @@ static drape_status check_closed(drape_context *ctx, const drape_mesh_source *so
         if (beside[1] < 0)
             return drape_mesh_fail(ctx, source, 0,
                                    "the mesh is not closed: edge %d %d has one triangle, %d; a collider is a "
-                                   "closed surface",
+                                   "closed surface, unless it is an animated_mesh with \"open\": true",
                                    (int)ends[0], (int)ends[1], (int)beside[0]);
         if (runs_along(mesh, beside[0], ends[0], ends[1]) == runs_along(mesh, beside[1], ends[0], ends[1]))
             return drape_mesh_fail(

@@ -91,9 +91,12 @@ static drape_status read_frames(const double *values, drape_collider_shape *shap
     char at[sizeof builder->ctx->pointer];
     snprintf(at, sizeof at, "%s/file", builder->pointer);
     const drape_mesh_source file = {.pointer = at, .file = def.file},
+                            first = {.pointer = at, .file = def.file, .part = "frame 0: "},
                             transformed = {.pointer = builder->pointer};
     drape_status status =
         drape_sequence_read(builder->arena, builder->pointer, builder->folder, &def, mesh, frames);
+    if (!status)
+        status = drape_mesh_validate_positions(builder->ctx, &first, mesh);
     if (!status)
         status = drape_shape_check_mesh(builder->ctx, &file, values[OPEN] == 0, mesh);
     if (!status)

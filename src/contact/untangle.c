@@ -18,6 +18,10 @@
 #define LESS     0.05                /* of the strain: by which a sweep that is worth it lessens it */
 #define POLISH   6                   /* sweeps without such a gain that end it, once it is clear */
 #define PATIENCE 30                  /* the same while gaps are too small */
+#define STRETCH  2.0                 /* of an edge, at most: else the cloth is torn */
+#define SQUEEZE  0.25                /* of an edge, at least: else it has collapsed */
+#define SHARE    0.25                /* of a strain like these that is allowed if something still crosses */
+#define NARROW   0.01                /* of the area that a triangle was given with, at least: the same */
 
 /* ---- Topology ---- */
 
@@ -114,6 +118,16 @@ static double between(const double *x, const int32_t *pair)
     return vec3_norm(d);
 }
 
+static double area_of(const drape_untangler *u, int32_t face)
+{
+    const int32_t *t = u->model->triangle + 3 * (size_t)face;
+    double v[3], w[3], n[3];
+    vec3_sub(u->x + 3 * (size_t)t[1], u->x + 3 * (size_t)t[0], v);
+    vec3_sub(u->x + 3 * (size_t)t[2], u->x + 3 * (size_t)t[0], w);
+    vec3_cross(v, w, n);
+    return vec3_norm(n) / 2;
+}
+
 static void list_sheets(drape_untangler *u)
 {
     const drape_model *m = u->model;
@@ -136,6 +150,33 @@ static void list_sheets(drape_untangler *u)
     }
     for (int32_t h = 0; h < u->hinge_count; h++)
         u->hinge_length[h] = between(u->x, u->hinge + 2 * (size_t)h);
+    for (int32_t f = 0; f < m->triangle_count; f++)
+        u->face_area[f] = area_of(u, f);
+}
+
+/* Numbers the pieces of cloth that hang together. */
+static void list_pieces(drape_untangler *u)
+{
+    const drape_sheets *s = &u->sheets;
+    const int32_t nodes = u->model->node_count;
+    for (int32_t i = 0; i < nodes; i++)
+        u->piece[i] = -1;
+    for (int32_t i = 0; i < nodes; i++) {
+        int32_t listed = 0;
+        if (u->piece[i] >= 0)
+            continue;
+        u->piece[i] = u->piece_count++;
+        u->queue[listed++] = i;
+        for (int32_t next = 0; next < listed; next++)
+            for (int32_t a = s->first[u->queue[next]]; a < s->first[u->queue[next] + 1]; a++)
+                for (int k = 0; k < 2; k++) {
+                    const int32_t other = s->edge[2 * (size_t)s->around[a] + (size_t)k];
+                    if (u->piece[other] >= 0)
+                        continue;
+                    u->piece[other] = u->piece[i];
+                    u->queue[listed++] = other;
+                }
+    }
 }
 
 /* A tree for each cloth, and for each open collider. */
@@ -208,6 +249,10 @@ static drape_status take_arrays(drape_untangler *u)
     u->colour = drape_arena_take(u->arena, points, sizeof *u->colour);
     u->queue = drape_arena_take(u->arena, points, sizeof *u->queue);
     u->sunk = drape_arena_take(u->arena, (size_t)u->model->node_count, sizeof *u->sunk);
+    u->depth = drape_arena_take(u->arena, (size_t)u->model->node_count, sizeof *u->depth);
+    u->outward = drape_arena_take(u->arena, (size_t)u->model->node_count, 3 * sizeof *u->outward);
+    u->piece = drape_arena_take(u->arena, (size_t)u->model->node_count, sizeof *u->piece);
+    u->face_area = drape_arena_take(u->arena, (size_t)u->model->triangle_count, sizeof *u->face_area);
     u->length = drape_arena_take(u->arena, edges, sizeof *u->length);
     return drape_arena_status(u->arena);
 }
@@ -241,8 +286,10 @@ static drape_status set_up(drape_untangler *u, const drape_motion *motion, doubl
     if (status)
         return status;
     list_sheets(u);
+    list_pieces(u);
+    u->exit = drape_arena_take(u->arena, (size_t)u->piece_count, sizeof *u->exit);
     set_rounding(u);
-    return build_trees(u);
+    return u->exit ? build_trees(u) : DRAPE_E_MEMORY;
 }
 
 void drape_untangle_bound(drape_untangler *u, const drape_half_space *bound)
@@ -285,20 +332,41 @@ static double strain_of(const drape_untangler *u)
     return strain;
 }
 
+/* Whether it is still the cloth that was given: no edge is torn, and nothing has collapsed. */
+static bool is_sound(const drape_untangler *u)
+{
+    const double share = u->crossing_count + u->sunk_count > 0 ? SHARE : 1, most = 1 + share * (STRETCH - 1),
+                 least = 1 - share * (1 - SQUEEZE);
+    for (int32_t e = 0; e < u->model->edge_count; e++) {
+        const double length = between(u->x, u->model->edge + 2 * (size_t)e);
+        if (!(length <= most * u->length[e] && length >= least * u->length[e]))
+            return false;
+    }
+    for (int32_t f = 0; f < u->model->triangle_count; f++)
+        if (!(area_of(u, f) >= NARROW * u->face_area[f]))
+            return false;
+    return true;
+}
+
 /* What was reached in a sweep. Fewer crossings are better; then gaps of a part of the wanted ones, or
  * larger ones; then less strain. */
 typedef struct rank {
-    int64_t crossings;
+    bool sound;
+    int64_t crossings, sunk;
     double gap, strain;
 } rank;
 
 static rank rank_of(const drape_untangler *u)
 {
-    return (rank){u->crossing_count + u->sunk_count, fmin(u->min_wanted, ENOUGH), strain_of(u)};
+    return (rank){is_sound(u), u->crossing_count + u->sunk_count, u->sunk_count, fmin(u->min_wanted, ENOUGH),
+                  strain_of(u)};
 }
 
-static bool is_better(const rank *a, const rank *b)
+/* Whether a is better than b, and in no count worse than the start. */
+static bool is_better(const rank *a, const rank *b, const rank *first)
 {
+    if (!a->sound || a->sunk > first->sunk || a->crossings - a->sunk > first->crossings - first->sunk)
+        return false;
     if (a->crossings != b->crossings)
         return a->crossings < b->crossings;
     return a->gap != b->gap ? a->gap > b->gap : a->strain < b->strain;
@@ -316,7 +384,7 @@ static void keep(drape_untangler *u, drape_untangle_outcome *outcome)
  * less. */
 static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, drape_untangle_outcome *outcome)
 {
-    rank best = {0};
+    rank first = {0}, best = {0};
     int since = 0; /* sweeps since the best one */
     for (int i = 0;; i++) {
         if ((cancel && atomic_load(cancel)) || drape_check_cancel(u->ctx))
@@ -326,8 +394,10 @@ static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, dra
             return status;
         outcome->sweeps = i;
         const rank here = rank_of(u);
+        if (i == 0)
+            first = here;
         const double gain = best.strain - here.strain;
-        const bool better = i == 0 || is_better(&here, &best);
+        const bool better = i == 0 || is_better(&here, &best, &first);
         if (i == 0)
             outcome->min_share_before = u->min_share;
         since = better && (i == 0 || here.crossings < best.crossings || here.gap > best.gap ||

@@ -1,7 +1,8 @@
 /*
- * untangle_bodies.c: nodes and faces in closed colliders are pushed out along the signed distance. Of a face
- * that is in one between its nodes, it is the deepest of a grid of points, or the middle of where edges of
- * the collider pass through it.
+ * untangle_bodies.c: nodes and faces in closed colliders are pushed out along the signed distance. A piece of
+ * cloth that is inside by a quarter or more would be torn where its nodes leave in different directions: it
+ * leaves in one. Of a face that is in a collider between its nodes, it is the deepest of a grid of points, or
+ * the middle of where edges of the collider pass through it.
  */
 #include "contact/untangle_parts.h"
 
@@ -14,7 +15,10 @@
 #define ACROSS     6    /* parts of a side of a face: 28 points of it are tested */
 #define TOUCH      1e-9 /* [m] a point less deep than this is not inside */
 #define TURN       6.283185307179586
-#define DIRECTIONS 24 /* in which a face is searched around an edge that passes through it */
+#define AGREE      0.5  /* cosine of the angle to their mean within which directions tear nothing */
+#define MARCH      200  /* evaluations of the distance, at most, to find the length of a path out */
+#define CREEP      0.01 /* mean edges that such a path goes on at least with each of them */
+#define DIRECTIONS 24   /* in which a face is searched around an edge that passes through it */
 
 static double distance_at(const drape_untangler *u, int32_t collider, const double *x, double n[3])
 {
@@ -52,6 +56,160 @@ static void push(drape_untangler *u, int32_t collider, const int32_t *node, cons
     drape_untangle_bound(u, &bound);
 }
 
+/* ---- Nodes ---- */
+
+/* The depth of all nodes in the body in which they are deepest, and the gradient of the distance there. */
+static void measure(drape_untangler *u)
+{
+    const drape_model *m = u->model;
+    for (int32_t i = 0; i < m->node_count; i++)
+        u->depth[i] = 0;
+    for (int32_t c = 0; c < m->collider_count; c++)
+        for (int32_t i = 0; i < m->node_count && !u->open[c]; i++) {
+            double n[3];
+            if (drape_model_ignores(m, c, i) || !is_near(u, c, &i, 1, 0))
+                continue;
+            const double d = distance_at(u, c, u->x + 3 * (size_t)i, n);
+            if (!(d < u->depth[i]))
+                continue;
+            u->depth[i] = d;
+            memcpy(u->outward + 3 * (size_t)i, n, sizeof n);
+        }
+}
+
+/* The signed distance of a point from all bodies that a node does not ignore, as far as it is in one. */
+static double depth_at(const drape_untangler *u, int32_t node, const double *x)
+{
+    double depth = 0;
+    for (int32_t c = 0; c < u->model->collider_count; c++) {
+        double(*const box)[3] = u->box[c];
+        bool within = !u->open[c] && !drape_model_ignores(u->model, c, node);
+        for (int k = 0; k < 3; k++)
+            within = within && x[k] >= box[0][k] && x[k] <= box[1][k];
+        if (within)
+            depth = fmin(depth, distance_at(u, c, x, NULL));
+    }
+    return depth;
+}
+
+/* The length of the path out of all bodies, in a direction, from a point of the piece of a node; infinite: it
+ * does not lead out. */
+static double exit_length(const drape_untangler *u, int32_t node, const double *x, const double direction[3])
+{
+    double length = 0;
+    for (int k = 0; k < MARCH; k++) {
+        double p[3] = {x[0], x[1], x[2]};
+        vec3_add_scaled(length, direction, p);
+        const double d = depth_at(u, node, p);
+        if (d >= -TOUCH)
+            return length;
+        length += fmax(-d, CREEP * u->mean_edge);
+    }
+    return INFINITY;
+}
+
+static bool is_in(const drape_untangler *u, int32_t node, int32_t piece)
+{
+    return u->piece[node] == piece && u->depth[node] < -TOUCH;
+}
+
+/* A direction is as good as the longest of the paths of the nodes is short. */
+static void try_direction(const drape_untangler *u, int32_t piece, const double v[3], double *shortest,
+                          drape_untangle_exit *out)
+{
+    const double norm = vec3_norm(v);
+    double direction[3], longest = 0;
+    if (!(norm > 0))
+        return;
+    for (int k = 0; k < 3; k++)
+        direction[k] = v[k] / norm;
+    for (int32_t i = 0; i < u->model->node_count && longest < *shortest; i++)
+        if (is_in(u, i, piece))
+            longest = fmax(longest, exit_length(u, i, u->x + 3 * (size_t)i, direction));
+    if (!(longest < *shortest))
+        return;
+    *shortest = longest;
+    out->chosen = true;
+    memcpy(out->direction, direction, sizeof direction);
+}
+
+static void add_normal(const drape_untangler *u, const int32_t *node, double sum[3])
+{
+    double v[3], w[3], n[3];
+    vec3_sub(u->x + 3 * (size_t)node[1], u->x + 3 * (size_t)node[0], v);
+    vec3_sub(u->x + 3 * (size_t)node[2], u->x + 3 * (size_t)node[0], w);
+    vec3_cross(v, w, n);
+    vec3_add_scaled(1, n, sum);
+}
+
+/* Of a piece that is inside, unless its nodes agree. Directions that are tried: the mean of those
+ * of its nodes, that of the least deep node, and both sides of the sheet, which needs no room sideways. */
+static void choose_exit(drape_untangler *u, int32_t piece, drape_untangle_exit *out)
+{
+    const drape_model *m = u->model;
+    double mean[3] = {0}, normal[3] = {0}, back[3], shortest = INFINITY;
+    bool agree = true;
+    int32_t least = -1;
+    for (int32_t i = 0; i < m->node_count; i++) {
+        if (!is_in(u, i, piece))
+            continue;
+        vec3_add_scaled(1, u->outward + 3 * (size_t)i, mean);
+        if (least < 0 || u->depth[i] > u->depth[least])
+            least = i;
+    }
+    for (int32_t i = 0; i < m->node_count; i++)
+        agree = agree &&
+                (!is_in(u, i, piece) || vec3_dot(u->outward + 3 * (size_t)i, mean) > AGREE * vec3_norm(mean));
+    if (agree)
+        return;
+    for (int32_t f = 0; f < m->triangle_count; f++)
+        if (u->piece[m->triangle[3 * (size_t)f]] == piece)
+            add_normal(u, m->triangle + 3 * (size_t)f, normal);
+    for (int k = 0; k < 3; k++)
+        back[k] = -normal[k];
+    try_direction(u, piece, normal, &shortest, out);
+    try_direction(u, piece, back, &shortest, out);
+    try_direction(u, piece, u->outward + 3 * (size_t)least, &shortest, out);
+    try_direction(u, piece, mean, &shortest, out);
+}
+
+/* An exit that was chosen holds until the whole piece is out. */
+static drape_status choose_exits(drape_untangler *u)
+{
+    drape_arena arena = drape_arena_within(u->arena);
+    int32_t *in = drape_arena_take(&arena, (size_t)u->piece_count, sizeof *in),
+            *out = drape_arena_take(&arena, (size_t)u->piece_count, sizeof *out);
+    const drape_status status = drape_arena_status(&arena);
+    for (int32_t i = 0; !status && i < u->model->node_count; i++) {
+        if (!(u->mobility[i] > 0))
+            out[u->piece[i]] = u->model->node_count; /* it stays */
+        else if (u->depth[i] < -TOUCH)
+            in[u->piece[i]]++;
+        else
+            out[u->piece[i]]++;
+    }
+    for (int32_t k = 0; !status && k < u->piece_count; k++) {
+        drape_untangle_exit *leave = &u->exit[k];
+        leave->chosen = leave->chosen && in[k] > 0;
+        if (!leave->chosen && 3 * in[k] > out[k])
+            choose_exit(u, k, leave);
+    }
+    drape_arena_free(&arena);
+    return status;
+}
+
+/* Where a point at x of the piece of a node, which is in a body, is to go: the direction, and the signed
+ * distance d along it. */
+static void turn_to_exit(const drape_untangler *u, int32_t node, const double *x, double *d, double n[3])
+{
+    const drape_untangle_exit *leave = &u->exit[u->piece[node]];
+    const double length = leave->chosen ? exit_length(u, node, x, leave->direction) : INFINITY;
+    if (!isfinite(length))
+        return;
+    *d = -length;
+    memcpy(n, leave->direction, sizeof leave->direction);
+}
+
 static void push_nodes(drape_untangler *u, int32_t collider)
 {
     const drape_model *m = u->model;
@@ -64,7 +222,7 @@ static void push_nodes(drape_untangler *u, int32_t collider)
         double n[3];
         if (drape_model_ignores(m, collider, i) || !is_near(u, collider, &i, 1, reach))
             continue;
-        const double d = distance_at(u, collider, u->x + 3 * (size_t)i, n);
+        double d = distance_at(u, collider, u->x + 3 * (size_t)i, n);
         if (d >= reach)
             continue;
         u->min_share = fmin(u->min_share, d / least);
@@ -72,6 +230,7 @@ static void push_nodes(drape_untangler *u, int32_t collider)
         if (d < -TOUCH) {
             u->sunk_count++;
             u->sunk[i] = true;
+            turn_to_exit(u, i, u->x + 3 * (size_t)i, &d, n);
         }
         push(u, collider, &i, &one, 1, d, n);
     }
@@ -91,9 +250,10 @@ static void push_point(drape_untangler *u, int32_t collider, const int32_t *node
 {
     double x[3], n[3];
     point_of(u, node, weight, x);
-    const double d = distance_at(u, collider, x, n);
+    double d = distance_at(u, collider, x, n);
     if (!(d < -TOUCH))
         return;
+    turn_to_exit(u, node[0], x, &d, n);
     u->sunk_count++;
     for (int a = 0; a < 3; a++)
         u->sunk[node[a]] = true;
@@ -241,14 +401,16 @@ drape_status drape_untangle_bodies(drape_untangler *u)
 {
     memset(u->sunk, 0, (size_t)u->model->node_count * sizeof *u->sunk);
     u->sunk_count = 0;
-    for (int32_t c = 0; c < u->model->collider_count; c++) {
+    measure(u);
+    drape_status status = choose_exits(u);
+    for (int32_t c = 0; !status && c < u->model->collider_count; c++) {
         if (u->open[c])
             continue;
         push_nodes(u, c);
         push_faces(u, c);
-        const drape_status status = push_pierced(u, c);
-        if (status)
-            return status;
+        status = push_pierced(u, c);
     }
+    if (status)
+        return status;
     return u->out_of_memory ? DRAPE_E_MEMORY : DRAPE_OK;
 }

@@ -53,6 +53,12 @@ typedef struct drape_passage {
     int32_t point, sheet;
 } drape_passage;
 
+/* The direction out of closed colliders for a piece of cloth that is inside for the most part. */
+typedef struct drape_untangle_exit {
+    bool chosen;
+    double direction[3];
+} drape_untangle_exit;
+
 typedef struct drape_untangler {
     drape_context *ctx;
     drape_arena *arena;
@@ -76,6 +82,7 @@ typedef struct drape_untangler {
     bool *moved;            /* (points) it has moved in some sweep */
     double *length;         /* (edges of the model) [m] in the state that was given */
     int32_t *hinge;         /* (hinge_count x 2) nodes opposite of an edge */
+    double *face_area;      /* (triangles of the model) [m2] in the state that was given */
     double *hinge_length;   /* (hinge_count) [m] in the state that was given */
     int32_t hinge_count;
     drape_half_spaces bounds; /* of this sweep */
@@ -85,15 +92,20 @@ typedef struct drape_untangler {
     int32_t record_count, record_room;
     drape_passage *passage; /* (passage_count of passage_room) sorted */
     int32_t passage_count, passage_room;
-    bool *passes;       /* (points) it has a passage */
-    int8_t *colour;     /* (points) scratch of a curve */
-    int32_t *queue;     /* (points) scratch */
-    int32_t *block;     /* (edge_count) scratch: how often the curve passes through the edge */
-    bool *sunk;         /* (node_count) in a collider, or a corner of a face that is */
-    int64_t sunk_count; /* nodes, and faces between them, that are in a collider */
-    double min_share;   /* the smallest gap, in least gaps */
-    double min_wanted;  /* the smallest gap, in wanted gaps */
-    bool out_of_memory; /* of a list, in a callback */
+    bool *passes;    /* (points) it has a passage */
+    int8_t *colour;  /* (points) scratch of a curve */
+    int32_t *queue;  /* (points) scratch */
+    int32_t *block;  /* (edge_count) scratch: how often the curve passes through the edge */
+    bool *sunk;      /* (node_count) in a collider, or a corner of a face that is */
+    double *depth;   /* (node_count) signed distance from the body in which it is deepest; 0: in none */
+    double *outward; /* (node_count x 3) its gradient, where it is not 0 */
+    int32_t *piece;  /* (node_count) number of the piece of cloth that hangs together */
+    int32_t piece_count;
+    drape_untangle_exit *exit; /* (piece_count) */
+    int64_t sunk_count;        /* nodes, and faces between them, that are in a collider */
+    double min_share;          /* the smallest gap, in least gaps */
+    double min_wanted;         /* the smallest gap, in wanted gaps */
+    bool out_of_memory;        /* of a list, in a callback */
 } drape_untangler;
 
 /* Adds a bound; notes if memory is out. */

@@ -120,14 +120,34 @@ static bool take_integer(const json_t *value, double low, double high, int64_t *
     return true;
 }
 
+/* A value as a message says it. */
+static const char *describe(const json_t *value, char *text, size_t size)
+{
+    static const char *const names[] = {[JSON_OBJECT] = "an object",
+                                        [JSON_ARRAY] = "an array",
+                                        [JSON_TRUE] = "true",
+                                        [JSON_FALSE] = "false",
+                                        [JSON_NULL] = "null"};
+    if (json_is_number(value))
+        snprintf(text, size, "%.17g", json_number_value(value));
+    else if (json_is_string(value))
+        snprintf(text, size, "\"%.30s\"", json_string_value(value));
+    else
+        snprintf(text, size, "%s", value ? names[json_typeof(value)] : "missing");
+    return text;
+}
+
 drape_status drape_gltf_index_of(const drape_gltf *g, const char *owner, const json_t *value, int32_t limit,
                                  int32_t *index)
 {
     int64_t number;
+    char given[40];
     if (limit == 0)
-        return FAIL(g, "%s: the file has nothing that it could refer to", owner);
+        return FAIL(g, "%s: %s; the file has nothing that it could refer to", owner,
+                    describe(value, given, sizeof given));
     if (!take_integer(value, 0, (double)limit - 1, &number))
-        return FAIL(g, "%s: it must be an integer from 0 to %d", owner, (int)limit - 1);
+        return FAIL(g, "%s: %s; it must be an integer from 0 to %d", owner,
+                    describe(value, given, sizeof given), (int)limit - 1);
     *index = (int32_t)number;
     return DRAPE_OK;
 }
@@ -264,10 +284,12 @@ static drape_status read_sparse(const drape_gltf *g, const char *owner, const js
     const json_t *indices = json_object_get(sparse, "indices"), *values = json_object_get(sparse, "values");
     int64_t count, code = 0, before = -1;
     stretch number, value;
-    char part[120];
+    char part[120], text[40];
     snprintf(part, sizeof part, "%s, sparse", owner);
-    if (!take_integer(json_object_get(sparse, "count"), 0, (double)out->count, &count))
-        return FAIL(g, "%s: \"count\" must be an integer from 0 to %" PRId64, part, out->count);
+    const json_t *given = json_object_get(sparse, "count");
+    if (!take_integer(given, 0, (double)out->count, &count))
+        return FAIL(g, "%s: \"count\": %s; it must be an integer from 0 to %" PRId64, part,
+                    describe(given, text, sizeof text), out->count);
     take_integer(json_object_get(indices, "componentType"), 0, 65536, &code);
     const component *type = find_component(code);
     if (!type || type->largest == 0 || type->negative)
@@ -314,14 +336,16 @@ drape_status drape_gltf_read(const drape_gltf *g, drape_arena *arena, int32_t ac
 {
     const json_t *object = drape_gltf_item(g, "accessors", accessor);
     const char *type = json_string_value(json_object_get(object, "type"));
-    char owner[96];
+    char owner[96], text[40];
     int64_t code = 0;
     snprintf(owner, sizeof owner, "accessor %d (%s)", (int)accessor, want->purpose);
     *out = (drape_gltf_array){.width = width_of(want->type)};
     if (!type || strcmp(type, want->type) != 0)
         return FAIL(g, "%s: its type is %.20s; %s is needed", owner, type ? type : "missing", want->type);
-    if (!take_integer(json_object_get(object, "count"), 1, 0x1p31, &out->count))
-        return FAIL(g, "%s: its \"count\" must be an integer from 1 to 2^31", owner);
+    const json_t *count = json_object_get(object, "count");
+    if (!take_integer(count, 1, 0x1p31, &out->count))
+        return FAIL(g, "%s: \"count\": %s; it must be an integer from 1 to 2^31", owner,
+                    describe(count, text, sizeof text));
     if (want->expected >= 0 && out->count != want->expected)
         return FAIL(g, "%s: %" PRId64 " elements; %" PRId64 " are needed", owner, out->count, want->expected);
     if (want->expected < 0 && !json_object_get(object, "bufferView"))

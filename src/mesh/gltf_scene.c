@@ -14,6 +14,8 @@
     1e-6 /* [rad] quaternions nearer than this are interpolated linearly: the difference is below
                              1e-18 */
 
+#define LARGEST 1e9 /* of a number; of times in s */
+
 #define FAIL(g, ...) drape_mesh_fail((g)->ctx, (g)->file, 0, __VA_ARGS__)
 
 /* Places of a transform in drape_gltf_node.rest. */
@@ -52,6 +54,13 @@ drape_gltf_map drape_gltf_map_product(const drape_gltf_map *a, const drape_gltf_
     return out;
 }
 
+double drape_gltf_map_determinant(const drape_gltf_map *map)
+{
+    double cross[3];
+    vec3_cross(map->column[0], map->column[1], cross);
+    return vec3_dot(cross, map->column[2]);
+}
+
 drape_gltf_map drape_gltf_map_of(const double matrix[16])
 {
     drape_gltf_map out;
@@ -80,12 +89,22 @@ static drape_status check_transform(const drape_gltf *g, const char *owner, cons
     double turn = 0;
     bool finite = true;
     for (int i = 0; i < 10; i++)
-        finite = finite && fabs(at[i]) <= 1e9;
+        finite = finite && fabs(at[i]) <= LARGEST;
     for (int i = 0; i < 4; i++)
         turn += at[ROTATION + i] * at[ROTATION + i];
     if (!finite)
         return FAIL(g, "%s: numbers must be finite and within 1e9", owner);
     return turn > 1e-12 ? DRAPE_OK : FAIL(g, "%s: a rotation must not be 0", owner);
+}
+
+drape_status drape_gltf_check_finite(const drape_gltf *g, const char *owner, const char *what, size_t count,
+                                     const double *number)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!(fabs(number[i]) <= LARGEST))
+            return FAIL(g, "%s: number %zu of its %s is %g; it must be finite and within %g", owner, i, what,
+                        number[i], LARGEST);
+    return DRAPE_OK;
 }
 
 static drape_status read_transform(const drape_gltf *g, const char *owner, const json_t *object,
@@ -95,7 +114,12 @@ static drape_status read_transform(const drape_gltf *g, const char *owner, const
     const double rest[10] = {0, 0, 0, 0, 0, 0, 1, 1, 1, 1};
     memcpy(n->rest, rest, sizeof rest);
     n->fixed = json_object_get(object, "matrix");
+    if (n->fixed && (json_object_get(object, "translation") || json_object_get(object, "rotation") ||
+                     json_object_get(object, "scale")))
+        return FAIL(g, "%s: it has \"matrix\" beside \"translation\", \"rotation\" or \"scale\"", owner);
     drape_status status = drape_gltf_numbers(g, owner, object, "matrix", 16, matrix);
+    if (!status && n->fixed)
+        status = drape_gltf_check_finite(g, owner, "matrix", 16, matrix);
     if (!status)
         status = drape_gltf_numbers(g, owner, object, "translation", 3, n->rest + TRANSLATION);
     if (!status)
@@ -224,6 +248,9 @@ static drape_status find_path(const drape_gltf_scene *s, const char *owner, cons
     for (size_t i = 0; path && i < sizeof paths / sizeof *paths; i++)
         if (strcmp(path, paths[i].name) == 0) {
             c->place = paths[i].place;
+            if (c->place >= 0 && s->nodes[c->node].fixed)
+                return FAIL(s->gltf, "%s: node %d has a \"matrix\": its %s cannot be animated", owner,
+                            (int)c->node, path);
             c->width = c->place < 0 ? s->nodes[c->node].weight_count : paths[i].width;
             return c->width > 0 ? DRAPE_OK
                                 : FAIL(s->gltf, "%s: node %d has no morph targets", owner, (int)c->node);
@@ -236,11 +263,11 @@ static drape_status check_keys(const drape_gltf_scene *s, const char *owner, con
 {
     const int64_t count = c->time.count, each = (c->kind == CUBIC ? 3 : 1) * (int64_t)c->width;
     for (int64_t k = 0; k < count; k++)
-        if (!(fabs(c->time.value[k]) <= 1e9) || (k > 0 && !(c->time.value[k] > c->time.value[k - 1])))
-            return FAIL(s->gltf, "%s: key %" PRId64 " is at %g s; times must be finite and increase", owner,
-                        k, c->time.value[k]);
+        if (!(fabs(c->time.value[k]) <= LARGEST) || (k > 0 && !(c->time.value[k] > c->time.value[k - 1])))
+            return FAIL(s->gltf, "%s: key %" PRId64 " is at %g s; times must be within %g s and increase",
+                        owner, k, c->time.value[k], LARGEST);
     for (int64_t i = 0; i < count * each; i++)
-        if (!(fabs(c->value[i]) <= 1e9))
+        if (!(fabs(c->value[i]) <= LARGEST))
             return FAIL(s->gltf, "%s: key %" PRId64 ": %g; values must be finite and within 1e9", owner,
                         i / each, c->value[i]);
     return DRAPE_OK;
@@ -319,6 +346,8 @@ static drape_status read_animation(drape_gltf_scene *s)
                  *channels = json_object_get(animation, "channels"), *channel;
     size_t i;
     drape_status status = DRAPE_OK;
+    if (animation && json_array_size(channels) == 0)
+        return FAIL(s->gltf, "animation 0, which is the one that is read, has no channels");
     s->channels = drape_arena_take(s->arena, json_array_size(channels), sizeof *s->channels);
     if (!s->channels)
         return DRAPE_E_MEMORY;

@@ -47,6 +47,13 @@ void drape_gltf_scene_pose(drape_gltf_scene *scene, double t);
 void drape_gltf_map_point(const drape_gltf_map *map, const double x[3], double y[3]);
 drape_gltf_map drape_gltf_map_product(const drape_gltf_map *a, const drape_gltf_map *b); /* x -> a(b(x)) */
 
+/* Negative: it mirrors. */
+double drape_gltf_map_determinant(const drape_gltf_map *map);
+
+/* Refuses numbers that are not finite or beyond 1e9; what: of the owner, in messages. */
+drape_status drape_gltf_check_finite(const drape_gltf *gltf, const char *owner, const char *what,
+                                     size_t count, const double *number);
+
 /* The map of the 16 numbers of a matrix, column by column, whose last row is 0 0 0 1. */
 drape_gltf_map drape_gltf_map_of(const double matrix[16]);
 

@@ -97,7 +97,7 @@ static drape_status set_times(drape_arena *scratch, const char *pointer, const c
         return read_times(scratch, &(drape_mesh_source){.pointer = at, .file = def->times}, folder,
                           def->start, out);
     for (int32_t f = 0; f < out->frame_count; f++)
-        out->time[f] = def->start + (out->first + out->step * f) / def->rate;
+        out->time[f] = def->start + fmin(out->first + out->step * f, out->last) / def->rate;
     return check_times(scratch->ctx, file, out);
 }
 
@@ -130,7 +130,7 @@ drape_status drape_sequence_read(drape_arena *arena, const char *pointer, const 
     const drape_sequence_ops *format = find_format(def->file);
     const drape_sequence_source source = {
         .ctx = ctx, .file = {.pointer = at_file, .file = def->file}, .folder = folder, .rate = def->rate};
-    *out = (drape_sequence){.arena = arena, .step = 1};
+    *out = (drape_sequence){.arena = arena, .step = 1, .last = INFINITY};
     if (!format)
         return unknown_ending(ctx, at_file, def->file);
     if (format->has_triangles && def->mesh)

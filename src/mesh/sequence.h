@@ -22,8 +22,9 @@ typedef struct drape_sequence {
     double *x;    /* (frame_count x node_count x 3) [m] */
     double *time; /* (frame_count) [s] increasing */
     double first,
-        step; /* of a format with frame numbers: the number of the first frame, and the difference of
+        step;    /* of a format with frame numbers: the number of the first frame, and the difference of
                            two numbers; 0 and 1 */
+    double last; /* the number of the last frame, if it comes sooner after that before it; infinite */
 } drape_sequence;
 
 /* A file in the hands of its format. */

@@ -4,6 +4,7 @@
  * split a point where its normal or texture has a seam: points that coincide in all frames become one, and
  * points without triangles are left out, so that a surface is as closed as it looks.
  */
+#include "base/vec3.h"
 #include "mesh/contents.h"
 #include "mesh/gltf_scene.h"
 #include "mesh/sequence.h"
@@ -14,7 +15,7 @@
 #include <string.h>
 
 #define TRIANGLES   4    /* the mode of a primitive */
-#define MAX_SETS    4    /* of four joints each, of one point */
+#define MODES       7    /* of primitives */
 #define ENOUGH      1e-6 /* of a frame, by which the last may be behind the end of the animation */
 #define MOST_FRAMES 1e15 /* for a conversion to int64; far more than are allowed */
 
@@ -28,12 +29,13 @@ typedef struct skin {
 
 /* A primitive at a node. */
 typedef struct part {
-    int32_t node, first, count; /* its points, among all */
-    int32_t triangles;          /* those before it are of other parts */
-    const double *x;            /* (count x 3) */
-    const double **target;      /* (targets) each (count x 3); NULL: it moves nothing */
-    int32_t targets, sets;
-    const double *joint[MAX_SETS], *weight[MAX_SETS]; /* (count x 4) each */
+    int32_t node, first, count;  /* its points, among all */
+    int64_t triangle, triangles; /* its first, among all; their number */
+    bool mirrored;               /* its map turns it inside out, so that its triangles are turned, too */
+    const double *x;             /* (count x 3) */
+    const double **target;       /* (targets) each (count x 3); NULL: it moves nothing */
+    int32_t targets, sets;       /* sets of four joints each */
+    double **joint, **weight;    /* (sets) each (count x 4) */
 } part;
 
 typedef struct reader {
@@ -75,6 +77,9 @@ static drape_status read_skin(reader *r, int32_t index)
         status =
             drape_gltf_read(&r->gltf, &r->arena, matrices,
                             &(drape_gltf_want){"inverse bind matrices", "MAT4", false, s->count}, &inverse);
+    if (!status && inverse.value)
+        status = drape_gltf_check_finite(&r->gltf, owner, "inverse bind matrices", 16 * (size_t)s->count,
+                                         inverse.value);
     for (int32_t k = 0; !status && k < s->count; k++) {
         static const double none[16] = {[0] = 1, [5] = 1, [10] = 1, [15] = 1};
         s->inverse[k] = drape_gltf_map_of(inverse.value ? inverse.value + 16 * (size_t)k : none);
@@ -108,14 +113,14 @@ static drape_status read_attribute(reader *r, const char *owner, const json_t *a
 }
 
 /* Weights are scaled to a sum of 1. */
-static drape_status check_influences(reader *r, const char *owner, const part *p, double *weight[MAX_SETS])
+static drape_status check_influences(reader *r, const char *owner, const part *p)
 {
     const int32_t joints = r->skins[r->scene.nodes[p->node].skin].count;
     for (size_t i = 0; i < (size_t)p->count; i++) {
         double sum = 0;
         for (int k = 0; k < 4 * p->sets; k++) {
             const double joint = p->joint[k / 4][4 * i + (size_t)(k % 4)],
-                         w = weight[k / 4][4 * i + (size_t)(k % 4)];
+                         w = p->weight[k / 4][4 * i + (size_t)(k % 4)];
             if (!(w >= 0 && w <= 1e9))
                 return FAIL(r, "%s: point %zu: weight %g; weights must be finite and not negative", owner, i,
                             w);
@@ -127,34 +132,53 @@ static drape_status check_influences(reader *r, const char *owner, const part *p
         if (!(sum > 0))
             return FAIL(r, "%s: point %zu has no weights", owner, i);
         for (int k = 0; k < 4 * p->sets; k++)
-            weight[k / 4][4 * i + (size_t)(k % 4)] /= sum;
+            p->weight[k / 4][4 * i + (size_t)(k % 4)] /= sum;
     }
     return DRAPE_OK;
 }
 
+/* How many attributes have a name that begins so. */
+static int32_t count_sets(const json_t *attributes, const char *start)
+{
+    const char *name;
+    json_t *value;
+    int32_t count = 0;
+    json_object_foreach((json_t *)attributes, name, value) count += strncmp(name, start, strlen(start)) == 0;
+    return count;
+}
+
+/* Sets are numbered from 0 on without a gap. */
 static drape_status read_influences(reader *r, const char *owner, const json_t *attributes, part *p)
 {
-    drape_gltf_array joint, weight;
-    double *values[MAX_SETS] = {NULL};
-    drape_status status = DRAPE_OK;
-    for (p->sets = 0; p->sets < MAX_SETS; p->sets++) {
-        char name[2][16];
-        snprintf(name[0], sizeof name[0], "JOINTS_%d", (int)p->sets);
-        snprintf(name[1], sizeof name[1], "WEIGHTS_%d", (int)p->sets);
-        status = read_attribute(r, owner, attributes, name[0],
-                                &(drape_gltf_want){name[0], "VEC4", true, p->count}, &joint);
+    p->sets = count_sets(attributes, "JOINTS_");
+    if (p->sets == 0)
+        return FAIL(r, "%s: its node has a skin, and it has no JOINTS_0 and WEIGHTS_0", owner);
+    if (count_sets(attributes, "WEIGHTS_") != p->sets)
+        return FAIL(r, "%s: it has %d sets of joints, and %d of weights", owner, (int)p->sets,
+                    (int)count_sets(attributes, "WEIGHTS_"));
+    p->joint = drape_arena_take(&r->arena, (size_t)p->sets, sizeof *p->joint);
+    p->weight = drape_arena_take(&r->arena, (size_t)p->sets, sizeof *p->weight);
+    if (!p->joint || !p->weight)
+        return DRAPE_E_MEMORY;
+    for (int32_t k = 0; k < p->sets; k++) {
+        drape_gltf_array joint, weight;
+        char name[2][24];
+        snprintf(name[0], sizeof name[0], "JOINTS_%d", (int)k);
+        snprintf(name[1], sizeof name[1], "WEIGHTS_%d", (int)k);
+        drape_status status = read_attribute(r, owner, attributes, name[0],
+                                             &(drape_gltf_want){name[0], "VEC4", true, p->count}, &joint);
         if (!status)
             status = read_attribute(r, owner, attributes, name[1],
                                     &(drape_gltf_want){name[1], "VEC4", false, p->count}, &weight);
+        if (!status && (!joint.value || !weight.value))
+            status = FAIL(r, "%s: of %d sets of joints and weights it has no %s", owner, (int)p->sets,
+                          joint.value ? name[1] : name[0]);
         if (status)
             return status;
-        if (!joint.value || !weight.value)
-            break;
-        p->joint[p->sets] = joint.value;
-        p->weight[p->sets] = values[p->sets] = weight.value;
+        p->joint[k] = joint.value;
+        p->weight[k] = weight.value;
     }
-    return p->sets > 0 ? check_influences(r, owner, p, values)
-                       : FAIL(r, "%s: its node has a skin, and it has no JOINTS_0 and WEIGHTS_0", owner);
+    return check_influences(r, owner, p);
 }
 
 static drape_status read_targets(reader *r, const char *owner, const json_t *primitive, part *p)
@@ -216,19 +240,20 @@ static drape_status read_triangles(reader *r, const char *owner, const json_t *p
 
 static drape_status read_primitive(reader *r, int32_t node, int32_t mesh, const json_t *primitive, int number)
 {
-    const json_t *attributes = json_object_get(primitive, "attributes"),
-                 *mode = json_object_get(primitive, "mode");
-    part p = {.node = node, .first = (int32_t)r->point_count};
+    const json_t *attributes = json_object_get(primitive, "attributes");
+    part p = {.node = node, .first = (int32_t)r->point_count, .triangle = r->triangle_count};
+    int32_t mode;
     drape_gltf_array x;
     char owner[80];
     snprintf(owner, sizeof owner, "mesh %d, primitive %d", (int)mesh, number);
-    if (mode && json_number_value(mode) >= 0 && json_number_value(mode) < TRIANGLES)
-        return DRAPE_OK; /* points and lines */
-    if (mode && json_number_value(mode) != TRIANGLES)
-        return FAIL(r, "%s: its mode is %g; triangles, 4, are read, and no strips and fans", owner,
-                    json_number_value(mode));
-    drape_status status = read_attribute(r, owner, attributes, "POSITION",
-                                         &(drape_gltf_want){"POSITION", "VEC3", false, -1}, &x);
+    drape_status status = drape_gltf_index(&r->gltf, owner, primitive, "mode", MODES, &mode);
+    if (!status && mode > TRIANGLES)
+        status =
+            FAIL(r, "%s: its mode is %d; triangles, 4, are read, and no strips and fans", owner, (int)mode);
+    if (status || (mode >= 0 && mode < TRIANGLES))
+        return status; /* points and lines show no triangles */
+    status = read_attribute(r, owner, attributes, "POSITION",
+                            &(drape_gltf_want){"POSITION", "VEC3", false, -1}, &x);
     if (status)
         return status;
     if (!x.value)
@@ -238,6 +263,7 @@ static drape_status read_primitive(reader *r, int32_t node, int32_t mesh, const 
     p.x = x.value;
     p.count = (int32_t)x.count;
     status = read_triangles(r, owner, primitive, &p);
+    p.triangles = r->triangle_count - p.triangle;
     if (!status)
         status = read_targets(r, owner, primitive, &p);
     if (!status && r->scene.nodes[node].skin >= 0)
@@ -309,6 +335,43 @@ static void place_point(const reader *r, const part *p, size_t point, double *ou
         out[axis] = sum[axis] + 0.0; /* no -0, so that equal points have equal bytes */
 }
 
+/* Whether the map of a part mirrors it; of one with a skin, that of its first point. */
+static bool is_mirrored(const reader *r, const part *p)
+{
+    const drape_gltf_node *node = &r->scene.nodes[p->node];
+    drape_gltf_map map = {.column = {{0}}};
+    if (p->sets == 0)
+        return drape_gltf_map_determinant(&node->world) < 0;
+    for (int k = 0; k < 4 * p->sets; k++) {
+        const double weight = p->weight[k / 4][k % 4];
+        for (int i = 0; weight > 0 && i < 3; i++)
+            vec3_add_scaled(weight, r->skins[node->skin].now[(int32_t)p->joint[k / 4][k % 4]].column[i],
+                            map.column[i]);
+    }
+    return drape_gltf_map_determinant(&map) < 0;
+}
+
+/* Where a map mirrors, the order of the corners is reversed (section 3.7.4), so that their outside stays the
+ * same. That must hold in all frames: triangles do not change between them. */
+static drape_status check_mirrors(reader *r, int32_t frame, drape_mesh *mesh)
+{
+    for (int32_t k = 0; k < r->part_count; k++) {
+        part *p = &r->parts[k];
+        const bool mirrored = is_mirrored(r, p);
+        if (frame > 0 && mirrored != p->mirrored)
+            return FAIL(r, "frame %d: node %d %s its mesh, and in frame 0 it %s", (int)frame, (int)p->node,
+                        mirrored ? "mirrors" : "does not mirror", mirrored ? "does not" : "does");
+        p->mirrored = mirrored;
+        for (int64_t t = p->triangle; frame == 0 && mirrored && t < p->triangle + p->triangles; t++) {
+            int32_t *corner = mesh->triangle + 3 * t;
+            const int32_t second = corner[1];
+            corner[1] = corner[2];
+            corner[2] = second;
+        }
+    }
+    return DRAPE_OK;
+}
+
 static drape_status sample(reader *r, drape_mesh *mesh, drape_sequence *out)
 {
     const drape_gltf_scene *scene = &r->scene;
@@ -321,15 +384,24 @@ static drape_status sample(reader *r, drape_mesh *mesh, drape_sequence *out)
     if (status)
         return status;
     out->first = scene->start * rate;
+    out->last = scene->end * rate;
     memcpy(mesh->triangle, r->corner, 3 * (size_t)r->triangle_count * sizeof *mesh->triangle);
-    for (int32_t f = 0; f < out->frame_count; f++) {
+    for (int32_t f = 0; !status && f < out->frame_count; f++) {
         double *x = out->x + 3 * (size_t)f * (size_t)mesh->node_count;
         pose(r, fmin(scene->start + f / rate, scene->end));
+        status = check_mirrors(r, f, mesh);
         for (int32_t k = 0; k < r->part_count; k++)
             for (int32_t i = 0; i < r->parts[k].count; i++)
                 place_point(r, &r->parts[k], (size_t)i, x + 3 * (size_t)(r->parts[k].first + i));
+        const drape_mesh frame = {.node_count = mesh->node_count, .x = x};
+        char text[32];
+        snprintf(text, sizeof text, "frame %d: ", (int)f);
+        const drape_mesh_source source = {
+            .pointer = r->source->file.pointer, .file = r->source->file.file, .part = text};
+        if (!status)
+            status = drape_mesh_validate_positions(r->source->ctx, &source, &frame);
     }
-    return DRAPE_OK;
+    return status;
 }
 
 /* ---- Points that are one ---- */

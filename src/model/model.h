@@ -200,7 +200,7 @@ typedef struct drape_contact_def {
 
 /* Whether the start of a run is untangled, and how (contact/untangle.h). */
 #define DRAPE_UNTANGLE_DEFAULT_SWEEPS 400
-#define DRAPE_UNTANGLE_DEFAULT_GAP    0.5
+#define DRAPE_UNTANGLE_DEFAULT_GAP    1.0
 typedef struct drape_model_untangle {
     bool given;   /* by the scene */
     int sweeps;   /* at most */

@@ -194,14 +194,18 @@ static drape_status check_points(const drape_sim *sim, const drape_collider *c, 
                                  const double *positions, const double *velocities)
 {
     const char *const function = "drape_sim_deform_collider";
+    const double no_velocity[3] = {0};
     if (points != c->shape.point_count || !positions)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: %d points%s; %s has %d", function, (int)points,
                           positions ? "" : ", but no positions", c->name, (int)c->shape.point_count);
     for (size_t i = 0; i < (size_t)points; i++)
-        if (!is_within_limits(positions + 3 * i, velocities ? velocities + 3 * i : NULL))
+        if (!is_within_limits(positions + 3 * i, velocities ? velocities + 3 * i : NULL)) {
+            const double *x = positions + 3 * i, *v = velocities ? velocities + 3 * i : no_velocity;
             return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                              "%s: position and velocity of point %zu must be within %g m and m/s", function,
-                              i, MAX_DISTANCE);
+                              "%s: point %zu is at (%g, %g, %g) m with (%g, %g, %g) m/s; they must be finite "
+                              "and within %g m and m/s",
+                              function, i, x[0], x[1], x[2], v[0], v[1], v[2], MAX_DISTANCE);
+        }
     double *x = drape_alloc(sim->ctx, 3 * (size_t)points, sizeof *x);
     if (!x)
         return DRAPE_E_MEMORY;

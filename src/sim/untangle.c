@@ -159,6 +159,16 @@ static drape_status refuse(const drape_sim *sim, const finding *found, const dra
 
 /* ---- Untangling ---- */
 
+/* Whether positions are no worse than the present ones in what a host can count, and steps can begin with
+ * them. */
+static bool is_worth_keeping(const drape_sim *sim, const double *x, const finding *before,
+                             const finding *after)
+{
+    const drape_energy e = drape_sim_energy_of(sim, drape_sim_time(sim), x, drape_sim_velocities(sim));
+    return after->pairs <= before->pairs && after->inside <= before->inside && isfinite(e.elastic) &&
+           isfinite(e.contact);
+}
+
 /* Positions of the next state become the present ones; velocities stay. */
 static void commit(drape_sim *sim)
 {
@@ -193,6 +203,11 @@ static drape_status untangle(drape_sim *sim, const drape_untangle_def *def, drap
         status = find(sim, x, &after);
     if (status)
         return status;
+    if (!is_worth_keeping(sim, x, &before, &after)) {
+        memcpy(x, drape_sim_positions(sim), size);
+        after = before;
+        outcome.min_share = outcome.min_share_before;
+    }
     *u = (drape_untangling){.clear = is_clear(&after, &outcome),
                             .time = drape_sim_time(sim),
                             .sweeps = outcome.sweeps,

@@ -167,6 +167,23 @@ static const tangle tangles[] = {
                                      "-0.2, 0.02, 0.47") "}], 'colliders': [{'type': 'mesh', "
                                                          "'file': 'SOURCE/examples/scenes/limb.obj'}], " REST,
      NULL, 0.3, 0.1},
+    /* wholly inside, where nodes have different nearest faces: one side of the sheet is near for all */
+    {"a sheet on the middle plane of a box",
+     "{'drape': 1, 'cloth': [" SHEET("a", "0, 1, 0, 0",
+                                     "-0.5, 0, 0.5") "}], 'colliders': [{'type': 'box', "
+                                                     "'center': [0, 0, 0], 'size': 2}], " REST,
+     NULL, 1.02, 0.05},
+    {"a sheet through the middle of a ball",
+     "{'drape': 1, 'cloth': [" SHEET("a", "0, 1, 0, 0",
+                                     "-0.5, 0, 0.5") "}], 'colliders': [{'type': 'sphere', "
+                                                     "'center': [0, 0, 0], 'radius': 0.9}], " REST,
+     NULL, 0.92, 0.05},
+    {"a sheet on the axis of a capsule, which ends in a box",
+     "{'drape': 1, 'cloth': [" SHEET(
+         "a", "0, 1, 0, 0", "-0.5, 0, 0.5") "}], 'colliders': [{'type': 'capsule', 'a': [-1, 0, 0], 'b': [1, "
+                                            "0, 0], 'radius': 0.6}, "
+                                            "{'type': 'box', 'center': [0.6, 0, 0], 'size': 0.8}], " REST,
+     NULL, 0.7, 0.05},
 };
 
 START_TEST(tangles_come_apart)
@@ -212,11 +229,13 @@ START_TEST(sheets_in_one_place_get_their_gap)
     ck_assert_int_eq(u.pairs_before, 0);
     ck_assert_double_eq(u.least_gap_before, 0);
     ck_assert_double_ge(u.least_gap, 1);
-    /* half of the activation distance of 8 mm, shared by both; a few times that where both push a node */
+    /* half of the activation distance of 8 mm, and of the thickness; twice that where both push a node */
     ck_assert_double_le(u.displacement, 0.01);
     for (int32_t i = 0; i < 100; i++)
         ck_assert_double_gt(drape_sim_positions(s.sim)[3 * (i + 100) + 1],
                             drape_sim_positions(s.sim)[3 * i + 1]);
+    /* gaps are the activation distance but for rounding, and the energy is its square: 1e-32 of some J */
+    ck_assert_double_le(drape_sim_energy(s.sim).contact, 1e-20);
     scene_close(&s);
 }
 END_TEST

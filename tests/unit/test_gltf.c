@@ -248,6 +248,134 @@ START_TEST(skins_and_morph_targets_move)
 }
 END_TEST
 
+/* A node that mirrors its mesh turns the triangles, of a skin the joints that move it do; a node above
+ * counts as well. Two mirrors are none, and a mirror that an animation makes is refused. */
+START_TEST(mirrors_turn_triangles)
+{
+    static const int32_t as_given[] = {0, 1, 2, 0, 2, 3}, turned[] = {0, 2, 1, 0, 3, 2};
+    static const struct {
+        bool skin;
+        const char *from, *to;
+        const int32_t *triangle;
+    } cases[] = {
+        {false, "'scale': [2, 2, 2]", "'scale': [2, 2, -2]", turned},
+        {false, "'scale': [2, 2, 2]", "'scale': [-2, 2, -2]", as_given},
+        {false, "{'children': [1]}", "{'children': [1], 'scale': [-1, 1, 1]}", turned},
+        {true, "{'children': [1]}", "{'children': [1], 'scale': [-1, 1, 1]}", turned},
+        {true, "'translation': [5, 5, 5]", "'scale': [-1, 1, 1]", as_given},
+    };
+    const frames_folder f = frames_folder_make();
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        glb g = cases[i].skin ? make_skin() : make_square();
+        replace(&g, cases[i].from, cases[i].to);
+        write_glb(&f, &g);
+        reading r = read_it(&f, 2);
+        ck_assert_msg(r.status == DRAPE_OK, "%s", drape_context_message(r.ctx));
+        ck_assert_int_eq(r.mesh.triangle_count, 2);
+        ck_assert_mem_eq(r.mesh.triangle, cases[i].triangle, sizeof as_given);
+        close_it(&r);
+    }
+    glb g = make_square();
+    replace(&g, "'path': 'translation'", "'path': 'scale'");
+    const float mirror[] = {1, 1, 1, 1, 1, -1};
+    memcpy(g.bytes + 80, mirror, sizeof mirror);
+    write_glb(&f, &g);
+    reading r = read_it(&f, 2);
+    ck_assert_int_eq(r.status, DRAPE_E_PARSE);
+    ck_assert_ptr_nonnull(
+        strstr(drape_context_message(r.ctx), "frame 3: node 1 mirrors its mesh, and in frame 0"));
+    close_it(&r);
+    frames_folder_remove(&f);
+}
+END_TEST
+
+/* The last frame is at the end of the animation, 3 s, whatever the rate is. */
+START_TEST(the_last_frame_is_the_end)
+{
+    const frames_folder f = frames_folder_make();
+    const glb g = make_square();
+    write_glb(&f, &g);
+    static const double rates[] = {0.3, 0.7, 1.75};
+    for (size_t i = 0; i < COUNT(rates); i++) {
+        reading r = read_it(&f, rates[i]);
+        ck_assert_msg(r.status == DRAPE_OK, "%s", drape_context_message(r.ctx));
+        const int last = r.frames.frame_count - 1;
+        ck_assert_int_eq(last, (int)ceil(2 * rates[i]));
+        ck_assert_double_eq_tol(r.frames.time[last], 13, 1e-14); /* rounding of a product and a quotient */
+        if (last > 1)
+            ck_assert_double_eq_tol(r.frames.time[1], 11 + 1 / rates[i], 1e-14);
+        assert_point(&r, last, 2, -2, 2, 2);
+        close_it(&r);
+    }
+    frames_folder_remove(&f);
+}
+END_TEST
+
+/* Five sets of joints of a point count as one set does. */
+START_TEST(all_sets_of_joints_count)
+{
+    static const char all[] =
+        "'JOINTS_0': 6, 'WEIGHTS_0': 7, 'JOINTS_1': 6, 'WEIGHTS_1': 9, 'JOINTS_2': 6, "
+        "'WEIGHTS_2': 9, 'JOINTS_3': 6, 'WEIGHTS_3': 9, 'JOINTS_4': 10, 'WEIGHTS_4': 11";
+    const frames_folder f = frames_folder_make();
+    glb g = make_skin();
+    /* of the last set each point has joint 1 with weight 1; of the sets before it the weights are 0 */
+    static const unsigned char joints[] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0},
+                               weights[] = {255, 0, 0, 0, 255, 0, 0, 0, 255, 0, 0, 0, 255, 0, 0, 0},
+                               none[16] = {0};
+    replace(&g, "'JOINTS_0': 6, 'WEIGHTS_0': 7", all);
+    replace(&g, "'WEIGHTS_0': 7", "'WEIGHTS_0': 9");
+    replace(&g, "'type': 'SCALAR'}],",
+            "'type': 'SCALAR'},"
+            " {'bufferView': 1, 'componentType': 5121, 'normalized': true, 'count': 4, 'type': 'VEC4'},"
+            " {'bufferView': 1, 'byteOffset': 16, 'componentType': 5121, 'count': 4, 'type': 'VEC4'},"
+            " {'bufferView': 1, 'byteOffset': 32, 'componentType': 5121, 'normalized': true, 'count': 4, "
+            "'type': 'VEC4'}],");
+    replace(&g, "'byteLength': 291}]",
+            "'byteLength': 291}, {'buffer': 0, 'byteOffset': 292, 'byteLength': 48}]");
+    replace(&g, "'buffers': [{'byteLength': 291}]", "'buffers': [{'byteLength': 340}]");
+    put_bytes(&g, 1, none);
+    put_bytes(&g, COUNT(none), none);
+    put_bytes(&g, COUNT(joints), joints);
+    put_bytes(&g, COUNT(weights), weights);
+    write_glb(&f, &g);
+    reading r = read_it(&f, 2);
+    ck_assert_msg(r.status == DRAPE_OK, "%s", drape_context_message(r.ctx));
+    assert_point(&r, 2, 0, 1, 0, 1);
+    assert_point(&r, 2, 1, 1, 0, -1);
+    close_it(&r);
+    frames_folder_remove(&f);
+}
+END_TEST
+
+/* Numbers of the buffer that are not finite are named. */
+START_TEST(values_are_finite)
+{
+    static const struct {
+        bool skin;
+        size_t at;
+        const char *message;
+    } cases[] = {
+        {false, 0, "frame 0: node 0 is at (nan, nan, nan) m; coordinates must be finite"},
+        {true, 48 + 4 * 20, "skin 0: number 20 of its inverse bind matrices is nan; it must be finite"},
+        {false, 76, "key 1 is at nan s; times must be within 1e+09 s"},
+    };
+    const frames_folder f = frames_folder_make();
+    const float nan = NAN;
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        glb g = cases[i].skin ? make_skin() : make_square();
+        memcpy(g.bytes + cases[i].at, &nan, sizeof nan);
+        write_glb(&f, &g);
+        reading r = read_it(&f, 2);
+        ck_assert_int_eq(r.status, DRAPE_E_PARSE);
+        ck_assert_msg(strstr(drape_context_message(r.ctx), cases[i].message), "%s\nfor %s",
+                      drape_context_message(r.ctx), cases[i].message);
+        close_it(&r);
+    }
+    frames_folder_remove(&f);
+}
+END_TEST
+
 START_TEST(faults_name_the_part)
 {
     static const struct {
@@ -257,8 +385,9 @@ START_TEST(faults_name_the_part)
         {false, "'count': 6", "'count': 9",
          "a.glb: accessor 0 (POSITION): 9 elements from byte 0 on; buffer view 0"},
         {false, "'count': 6", "'count': 5", "mesh 0, primitive 0: 5 corners of triangles"},
-        {false, "'count': 6", "'count': 1e300", "accessor 0 (POSITION): its \"count\" must be"},
-        {false, "'count': 6", "'count': -1", "accessor 0 (POSITION): its \"count\" must be"},
+        {false, "'count': 6", "'count': 1e300",
+         "accessor 0 (POSITION): \"count\": 1.0000000000000001e+300; it must be"},
+        {false, "'count': 6", "'count': -1", "accessor 0 (POSITION): \"count\": -1; it must be"},
         {false, "'type': 'VEC3'", "'type': 'VEC2'",
          "accessor 0 (POSITION): its type is VEC2; VEC3 is needed"},
         {false, "5126", "5123", "accessor 0 (POSITION): its numbers have the type 5123; floats or"},
@@ -268,14 +397,14 @@ START_TEST(faults_name_the_part)
          "its bytes or their stride are out of"},
         {false, "'buffers': [{", "'buffers': [{'uri': 'x.bin', ", "buffer view 0 is not in the binary chunk"},
         {false, "'POSITION': 0", "'POSITION': 4",
-         "mesh 0, primitive 0: \"POSITION\": it must be an integer from 0 to 3"},
+         "mesh 0, primitive 0: \"POSITION\": 4; it must be an integer from 0 to 3"},
         {false, "'POSITION': 0", "'NORMAL': 0", "mesh 0, primitive 0 has no POSITION"},
         {false, "{'attributes'", "{'mode': 5, 'attributes'", "its mode is 5; triangles, 4, are read"},
         {false, "{'attributes'", "{'mode': 1, 'attributes'", "its scene shows no triangles"},
         {false, "[{'nodes': [0]}]", "[{'nodes': [9]}]",
-         "\"scenes\": a node: it must be an integer from 0 to 2"},
+         "\"scenes\": a node: 9; it must be an integer from 0 to 2"},
         {false, "'nodes': [{", "'knots': [{",
-         "\"scenes\": a node: the file has nothing that it could refer to"},
+         "\"scenes\": a node: 0; the file has nothing that it could refer to"},
         {false, "'children': [1]", "'children': [0]", "a node is its own ancestor"},
         {false, "'children': [1]", "'children': [1, 1]", "node 1 is the child of nodes 0 and 0"},
         {false, "'scale': [2, 2, 2]", "'scale': [2, 2]", "node 1: \"scale\" must have 3 numbers"},
@@ -285,12 +414,27 @@ START_TEST(faults_name_the_part)
         {false, "'LINEAR'", "'EASE'", "channel 1: its interpolation is EASE; LINEAR, STEP or CUBICSPLINE"},
         {false, "'LINEAR'", "'CUBICSPLINE'", "accessor 3 (values of an animation): 2 elements; 6 are needed"},
         {false, "'byteOffset': 72", "'byteOffset': 76",
-         "channel 0: key 1 is at 0 s; times must be finite and increase"},
+         "channel 0: key 1 is at 0 s; times must be within 1e+09 s and increase"},
+        {false, "{'attributes'", "{'mode': '4', 'attributes'",
+         "\"mode\": \"4\"; it must be an integer from 0 to 6"},
+        {false, "'scale': [2, 2, 2]", "'matrix': [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]",
+         "channel 0: node 1 has a \"matrix\": its translation cannot be animated"},
+        {false, "'scale': [2, 2, 2]",
+         "'matrix': [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], 'scale': [1, 1, 1]",
+         "node 1: it has \"matrix\" beside \"translation\""},
+        {false, "'animations': [", "'animations': [{'channels': []}, ",
+         "animation 0, which is the one that is"},
+        {false, "'scale': [2, 2, 2]", "'scale': [1e9, 1e9, 1e9]",
+         "frame 1: node 2 is at (5.41196e+08, 1.30656e+09, 0.5) m"},
+        {true, "'WEIGHTS_0': 7", "'WEIGHTS_0': 7, 'JOINTS_1': 6",
+         "it has 2 sets of joints, and 1 of weights"},
+        {true, "'JOINTS_0': 6", "'JOINTS_0': 6, 'WEIGHTS_2': 7, 'JOINTS_2': 6",
+         "of 2 sets of joints and weights it has no JOINTS_1"},
         {false, "'asset'", "'extensionsRequired': ['KHR_draco_mesh_compression'], 'asset'",
          "it needs the extension KHR_draco_mesh_compression"},
         {false, "'asset'", "asset", "a.glb: its JSON, byte"},
         {true, "'JOINTS_0': 6, ", "", "mesh 0, primitive 0: its node has a skin, and it has no JOINTS_0"},
-        {true, "'joints': [0, 1]", "'joints': [0, 7]", "skin 0: it must be an integer from 0 to 2"},
+        {true, "'joints': [0, 1]", "'joints': [0, 7]", "skin 0: 7; it must be an integer from 0 to 2"},
         {true, "'joints': [0, 1], 'inverseBindMatrices': 1", "'joints': [0]",
          "point 1: joint 1; the skin has joints 0 to 0"},
         {true, "'joints': [0, 1]", "'joints': [0, 1, 1]",
@@ -300,7 +444,7 @@ START_TEST(faults_name_the_part)
         {true, "'byteOffset': 290", "'byteOffset': 272",
          "accessor 5 (POSITION of a morph target), sparse: index 255"},
         {true, "'sparse': {'count': 1", "'sparse': {'count': 5",
-         "sparse: \"count\" must be an integer from 0 to 4"},
+         "sparse: \"count\": 5; it must be an integer from 0 to 4"},
         {true, "'byteOffset': 284", "'byteOffset': 285", "mesh 0, primitive 0: index"},
         {true, "'indices': 8", "'indices': 2",
          "accessor 2 (indices): its numbers have the type 5126; unsigned"},
@@ -359,5 +503,5 @@ START_TEST(hostile_bytes_are_read_or_refused)
 }
 END_TEST
 
-SUITE("gltf", nodes_move, skins_and_morph_targets_move, faults_name_the_part,
-      hostile_bytes_are_read_or_refused)
+SUITE("gltf", nodes_move, skins_and_morph_targets_move, mirrors_turn_triangles, the_last_frame_is_the_end,
+      all_sets_of_joints_count, values_are_finite, faults_name_the_part, hostile_bytes_are_read_or_refused)
