@@ -91,7 +91,7 @@ static drape_status create_integrator(drape_sim *sim)
     return status;
 }
 
-/* Pins that move from the start have the velocity of their motion there, which frames of the first step show. */
+/* Pins that move from the start have the velocity of their motion there; frames of the first step show it. */
 static void start_pins(drape_sim *sim)
 {
     const drape_motion *motion = drape_system_motion(sim->system);
