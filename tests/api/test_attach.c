@@ -152,8 +152,9 @@ START_TEST(pins_of_a_moving_body_begin_with_its_velocity)
 END_TEST
 
 /* Without weight, a body that begins to turn moves its pins at right angles to the sheet, which stretches by
- * the square of that: forces are tiny at first, and shrink faster than a step that is halved. The acceleration
- * at the start must be that of each attempt: that of a longer one, kept, was all the energy there was. */
+ * the square of that: forces are tiny at first, and shrink faster than a step that is halved. The
+ * acceleration at the start must be that of each attempt: that of a longer one, kept, was all the energy
+ * there was. */
 START_TEST(a_body_begins_to_turn_without_weight)
 {
     for (int i = 0; i < METHODS; i++) {
