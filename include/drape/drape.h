@@ -713,8 +713,9 @@ DRAPE_API drape_status drape_sim_change_model(drape_sim *sim, const drape_model 
 
 /* Pins nodes where they are, or lets them go, as drape_sim_change does with a model that has other pins;
  * count numbers of nodes of the sim. Nodes that are so already are left alone; if all are, nothing happens.
- * Otherwise the sim goes on with a model of its own, which shares all but the numbers of unknowns and the
- * sparsity with the one that was compiled. Checkpoints keep these pins. Must not be called by an observer.
+ * A drag spring of a node that becomes pinned is removed. Otherwise the sim goes on with a model of its own,
+ * which shares all but the numbers of unknowns and the sparsity with the one that was compiled. Checkpoints
+ * keep these pins. Must not be called by an observer.
  * Errors, after which nothing has changed: DRAPE_E_ARGUMENT (no such node), DRAPE_E_MEMORY, DRAPE_E_SOLVER,
  * DRAPE_E_STOPPED. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_pin(drape_sim *sim, int32_t count, const int32_t *nodes);
@@ -738,15 +739,15 @@ DRAPE_API drape_status drape_sim_set_masses(drape_sim *sim, int32_t count, const
  * projection onto the triangle's plane and at its offset along the triangle's normal, both of which are
  * kept; triangles (count) gives the triangles in the order of the file, NULL: the nearest one of each
  * node. A node beside its triangle is carried by the plane. At any time within a step, and in any frame,
- * the nodes are where the collider's motion has them, with its velocity there; kinks of its motion are
- * theirs. They touch nothing that is pinned, as other pins do not; cloth around them touches the collider,
- * so it is best to attach nodes outside of it by the contact distance or more, or to let the cloth
- * `ignore` it.
+ * the nodes are where the collider's motion has them, with its velocity there (after a step of "be",
+ * "newton_k", "bdf2" or "midpoint" its mean over the step); kinks of its motion are theirs. They touch
+ * nothing that is pinned, as other pins do not; cloth around them touches the collider, so it is best to
+ * attach nodes outside of it by the contact distance or more, or to let the cloth `ignore` it.
  *
- * Free nodes are pinned, as by drape_sim_pin; all others stay pinned, and leave their track, path or
- * collider. drape_sim_detach lets nodes go with the velocity of their collider, as drape_sim_unpin does;
- * they must be carried by one. drape_sim_move_pins takes a node off its collider, too. drape_sim_attached
- * returns the collider that carries a node; -1: none, or no such node.
+ * Free nodes are pinned, as by drape_sim_pin, which removes their drag springs; all others stay pinned, and
+ * leave their track, path or collider. drape_sim_detach lets nodes go with the velocity of their collider,
+ * as drape_sim_unpin does; they must be carried by one. drape_sim_move_pins takes a node off its collider,
+ * too. drape_sim_attached returns the collider that carries a node; -1: none, or no such node.
  *
  * drape_sim_place: nodes whose cloth is placed together with the collider stay where they are on it. If
  * one is placed without the other, they stay where they are in the cloth and ride on from there. A
@@ -836,8 +837,8 @@ DRAPE_API drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider,
  * those on arrival, both in space and about the pivot: displacement and rotation then are smooth, and
  * continue the motion before. If both are NULL, it moves and turns at constant speed. The rotation is
  * interpolated by a cubic of the rotation vector from the present one. Errors: as drape_sim_move_collider;
- * DRAPE_E_ARGUMENT also if the rotation is NULL or far from length 1, one velocity is given alone, an angular
- * velocity is not finite or beyond 1e4 rad/s, or the turn would need more than that and is not placed. */
+ * DRAPE_E_ARGUMENT also if the rotation is NULL or not of length 0.99 to 1.01, one velocity is given alone,
+ * an angular velocity is not finite or beyond 1e4 rad/s, or the turn would need more and is not placed. */
 DRAPE_API drape_status drape_sim_move_collider_pose(drape_sim *sim, int32_t collider, double seconds,
                                                     const double displacement[3], const double rotation[4],
                                                     const double *velocity, const double *angular_velocity);

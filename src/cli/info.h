@@ -73,6 +73,18 @@ double cli_other_jacobian_seconds(const cli_info *info);
 void cli_info_text(const cli_info *info);    /* on stdout */
 json_t *cli_info_json(const cli_info *info); /* a new reference; NULL: out of memory */
 
+/* The value of a key in a def, a new reference; NULL: none is given, or out of memory. */
+json_t *cli_key_json(const drape_scene_key *key, const void *def);
+
+/* An object of a scene with the values of its def, those by default included; a new reference. */
+json_t *cli_form_json(const drape_scene_object *form, const void *def);
+
+/* Of a cloth, as in a scene, new references: its pins with the nodes that they select, the triangles that
+ * carry them and the pivot about which they turn; its masses; how it starts, NULL: at rest. */
+json_t *cli_pins_json(const cli_info *info, int32_t c);
+json_t *cli_masses_json(const cli_info *info, int32_t c);
+json_t *cli_start_json(const cli_info *info, int32_t c);
+
 /* The grid of a cloth, with its values; NULL if its mesh is not a grid. */
 const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values);
 

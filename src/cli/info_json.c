@@ -55,8 +55,7 @@ static json_t *params_of(const drape_param *params, int param_count, const doubl
     return object;
 }
 
-/* The value of a key in a def; NULL if none is given. */
-static json_t *key_value(const drape_scene_key *key, const void *def)
+json_t *cli_key_json(const drape_scene_key *key, const void *def)
 {
     const char *const *texts;
     drape_setting value;
@@ -83,7 +82,7 @@ static json_t *with_keys(json_t *object, const drape_scene_object *form, const v
         const bool has = key->shape == DRAPE_SCENE_LIST ||
                          (key->shape == DRAPE_SCENE_VALUE && drape_scene_value(key, def, &given));
         if (has && !named)
-            object = drape_json_with(object, key->param.name, key_value(key, def));
+            object = drape_json_with(object, key->param.name, cli_key_json(key, def));
     }
     return object;
 }
@@ -101,15 +100,8 @@ static json_t *track(const drape_track *track)
 static json_t *turns(const drape_collider_def *def)
 {
     json_t *keys = json_array();
-    for (size_t k = 0; k < def->turn_count; k++) {
-        const drape_turn_key *key = &def->turns[k];
-        json_t *object = drape_json_with(json_object(), "time", drape_json_number(key->time));
-        const double *q = key->quaternion;
-        const bool quaternion = q[0] != 0 || q[1] != 0 || q[2] != 0 || q[3] != 0;
-        keys = drape_json_append(
-            keys, drape_json_with(object, quaternion ? "quaternion" : "rotate",
-                                  drape_json_numbers(quaternion ? key->quaternion : key->rotate, 4)));
-    }
+    for (size_t k = 0; k < def->turn_count; k++)
+        keys = drape_json_append(keys, cli_form_json(&drape_form_turn, &def->turns[k]));
     return keys;
 }
 
@@ -239,6 +231,15 @@ static json_t *material(const drape_cloth *cloth)
                                    : object;
 }
 
+/* Adds a list unless it is empty. */
+static json_t *with_list(json_t *object, const char *key, json_t *list)
+{
+    if (json_array_size(list) > 0 || !list)
+        return drape_json_with(object, key, list);
+    json_decref(list);
+    return object;
+}
+
 static json_t *cloth(const cli_info *info, int32_t c)
 {
     const drape_cloth *from = &info->model->cloths[c];
@@ -252,6 +253,11 @@ static json_t *cloth(const cli_info *info, int32_t c)
     object = drape_json_with(object, "pinned", count(more->pinned));
     object = drape_json_with(object, "moved", count(more->moved));
     object = with_keys(object, &drape_form_cloth, &info->def.cloths[c]);
+    object = with_list(object, "pins", cli_pins_json(info, c));
+    object = with_list(object, "masses", cli_masses_json(info, c));
+    json_t *start = cli_start_json(info, c);
+    if (start)
+        object = drape_json_with(object, "start", start);
     object = drape_json_with(object, "mesh", mesh(from, &info->def.cloths[c].mesh));
     return drape_json_with(object, "material", material(from));
 }

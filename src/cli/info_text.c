@@ -5,9 +5,11 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
-#define MAX_LISTED 12 /* nodes that are listed by number */
+#define MAX_LISTED  12  /* nodes that are listed by number */
+#define MAX_WRITTEN 200 /* bytes of a list in a pin, masses or a start; --json has all of it */
 
 /* ---- Scene and cloths ---- */
 
@@ -131,6 +133,61 @@ static void print_material(const drape_cloth *cloth)
     print_woven("bending", "N m", "twist", &cloth->bending);
 }
 
+/* Up to MAX_WRITTEN bytes of a value. */
+static void print_member(json_t *value)
+{
+    char *text = json_is_string(value) ? NULL : json_dumps(value, JSON_ENCODE_ANY | JSON_REAL_PRECISION(9));
+    if (text)
+        printf("%.*s%s", MAX_WRITTEN, text, strlen(text) > MAX_WRITTEN ? " ..." : "");
+    else if (json_is_string(value))
+        fputs(CLI_SHOWN(json_string_value(value)), stdout);
+    free(text);
+}
+
+/* The members of an object of a scene; those that are objects themselves below their name. */
+static void print_object(const char *indent, const drape_scene_object *form, json_t *object)
+{
+    const char *name;
+    json_t *value;
+    char further[16];
+    snprintf(further, sizeof further, "%s  ", indent);
+    json_object_foreach(object, name, value)
+    {
+        const drape_scene_key *key = drape_scene_key_of(form, name);
+        const bool has_unit = key && key->shape == DRAPE_SCENE_VALUE && strcmp(key->param.unit, "1") != 0;
+        if (strcmp(name, "name") == 0)
+            continue;
+        if (json_is_object(value)) {
+            printf("%s%s\n", indent, name);
+            print_object(further, key->child, value);
+            continue;
+        }
+        printf("%s%-16s ", indent, name);
+        print_member(value);
+        printf("%s%s\n", has_unit ? " " : "", has_unit ? key->param.unit : "");
+    }
+}
+
+static void print_objects(const char *what, const drape_scene_object *form, json_t *list)
+{
+    for (size_t i = 0; i < json_array_size(list); i++) {
+        json_t *object = json_array_get(list, i);
+        const char *name = json_string_value(json_object_get(object, "name"));
+        printf("  %s%s%s\n", what, name ? " " : "", name ? CLI_SHOWN(name) : "");
+        print_object("    ", form, object);
+    }
+    json_decref(list);
+}
+
+static void print_start(json_t *start)
+{
+    if (start) {
+        puts("  start");
+        print_object("    ", drape_scene_key_of(&drape_form_cloth, "start")->child, start);
+    }
+    json_decref(start);
+}
+
 static void print_cloth(const cli_info *info, int32_t c)
 {
     const drape_cloth *cloth = &info->model->cloths[c];
@@ -147,6 +204,9 @@ static void print_cloth(const cli_info *info, int32_t c)
     printf("  mass      %.9g kg on %.9g m2\n", info->cloths[c].mass, info->cloths[c].area);
     print_keys("  ", 9, &drape_form_cloth, &info->def.cloths[c], &defaults);
     print_pins(info->model, cloth, &info->cloths[c]);
+    print_objects("pin", &drape_form_pin, cli_pins_json(info, c));
+    print_objects("masses", &drape_form_mass, cli_masses_json(info, c));
+    print_start(cli_start_json(info, c));
     print_material(cloth);
 }
 

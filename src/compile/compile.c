@@ -211,8 +211,8 @@ static drape_status compile_cloths(drape_model *model, const drape_scene_def *de
     return status ? status : gather(model);
 }
 
-/* Pinned nodes start at rest or with the velocity of their track: the initial velocity applies only to free
- * nodes, and to those with supports without what is along the directions that are held. */
+/* The initial velocity applies only to free nodes, and to those with supports without what is along the
+ * directions that are held. That of pins which move is of their motion, which a sim has. */
 static void stop_pinned(drape_model *model)
 {
     for (int32_t i = 0; i < model->node_count; i++)

@@ -69,7 +69,7 @@ typedef struct alpha_state {
     double *a, *a1;       /* nodes [m/s2]: of the last accepted state; at the end of the last attempt */
     double *v0, *g0, *a0; /* nodes: at the start of the step, with the velocities of pins; forces; a for h */
     double known, made;   /* [s] times of a and a1; NAN: unknown */
-    double h, h1;         /* [s] the steps that led to them; 0: none, a is that of the time itself */
+    double h, h1;         /* [s] the steps that led to them; 0: of backward Euler, at a kink */
 } alpha_state;
 
 static drape_status choose(drape_context *ctx, const double *values, coefficients *s)
@@ -148,7 +148,8 @@ static void settle(alpha_state *s, const drape_state *in)
     s->made = NAN;
 }
 
-/* g0, and a0 for a step of size h. */
+/* g0, and a0 for a step of size h. Without a known one it is that of the forces, in each attempt anew: the
+ * velocities of moved pins in them are means over parts of the step. */
 static void evaluate_start(alpha_state *s, const drape_state *in, double h)
 {
     const drape_step_equation *e = &s->common.equation;
@@ -163,15 +164,10 @@ static void evaluate_start(alpha_state *s, const drape_state *in, double h)
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
         const double now = -s->g0[at] / e->model->mass[at / 3];
-        if (!known)
-            s->a[at] = now;
-        s->a0[at] = s->a[at];
+        s->a0[at] = known ? s->a[at] : now;
         if (known && s->usual.m != s->usual.f && s->h > 0 && s->h != h)
             s->a0[at] = now + h / s->h * (s->a[at] - now);
     }
-    if (!known)
-        s->h = 0;
-    s->known = in->t;
 }
 
 static void set_equation(alpha_state *s, const drape_state *in, double h, const coefficients *k)

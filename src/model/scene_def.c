@@ -54,7 +54,7 @@ bool drape_scene_value(const drape_scene_key *key, const void *def, drape_settin
     case DRAPE_PARAM_INTEGER:
         memcpy(&integer, at, sizeof integer);
         out->number = integer;
-        return integer >= key->param.min || !isnan(key->param.default_value);
+        return integer >= key->param.min || integer < -1 || !isnan(key->param.default_value);
     case DRAPE_PARAM_BOOLEAN:
         memcpy(&boolean, at, sizeof boolean);
         out->number = boolean;

@@ -14,7 +14,7 @@
 #define MAX_SECONDS  1e9 /* [s] the limit of a scene's duration */
 #define MAX_DISTANCE 1e9 /* [m], [m/s] the limit of a track's keys */
 #define MAX_SPIN     DRAPE_MAX_SPIN
-#define MIN_SQUARES  1e-2 /* of the length of a quaternion that is meant to be 1 */
+#define LENGTH_OFF   0.01 /* of a quaternion that is meant to have length 1: far beyond rounding in float */
 
 static bool is_within_limits(const double *x, const double *v)
 {
@@ -147,12 +147,14 @@ drape_status drape_sim_move_collider_pose(drape_sim *sim, int32_t collider, doub
     const drape_status guarded = drape_sim_guard(sim, function);
     if (guarded)
         return guarded;
-    for (int i = 0; rotation && i < 4; i++)
+    if (!rotation)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: the rotation is NULL", function);
+    for (int i = 0; i < 4; i++)
         squares += rotation[i] * rotation[i];
-    if (!(squares > MIN_SQUARES && squares < 1 / MIN_SQUARES))
+    if (!(fabs(sqrt(squares) - 1) <= LENGTH_OFF))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "%s: the rotation is a quaternion w x y z of length 1; this one has %g", function,
-                          sqrt(squares));
+                          "%s: the rotation has length %g; it is a quaternion w x y z of length %g to %g",
+                          function, sqrt(squares), 1 - LENGTH_OFF, 1 + LENGTH_OFF);
     if (!velocity != !angular_velocity)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "%s: velocity and angular velocity are given both, or neither", function);

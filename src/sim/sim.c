@@ -91,6 +91,15 @@ static drape_status create_integrator(drape_sim *sim)
     return status;
 }
 
+/* Pins that move from the start have the velocity of their motion there; frames of the first step show it. */
+static void start_pins(drape_sim *sim)
+{
+    const drape_motion *motion = drape_system_motion(sim->system);
+    drape_state *now = &sim->states[sim->now];
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        drape_motion_pin_velocity(motion, i, now->t, now->t, now->v + 3 * (size_t)motion->moved_node[i]);
+}
+
 static double tolerance_of(const drape_sim *sim)
 {
     const drape_integrator_ops *integrator = sim->chosen.integrator;
@@ -156,6 +165,8 @@ static drape_status start_sim(drape_sim *sim, int threads)
         status = drape_check_cancel(sim->ctx);
     if (!status)
         status = create_system(sim, threads);
+    if (!status)
+        start_pins(sim);
     if (!status)
         status = drape_check_cancel(sim->ctx);
     if (!status)

@@ -768,6 +768,45 @@ def test_every_key_is_everywhere():
     assert {"gravity", "frame_rate", "friction", "translate", "up", "formats", "velocity", "action", "once"} <= seen, seen
 
 
+def test_info_of_pins():
+    """info shows every pin with its nodes and what carries it, masses and the start, with each key that a scene may give them"""
+    pins = [{"nodes": [0, 1], "attach": "rigid", "clamp": True}, {"nodes": [2], "attach": "soft"}, {"nodes": [3], "attach": "soft", "triangle": 1},
+            {"nodes": [4], "normal": [0, 1, 0]}, {"nodes": [5], "axis": [1, 0, 0]},
+            {"nodes": [6, 7], "name": "wheel", "track": [[0, [0, 0, 0]], [1, [0, 0, 1]]],
+             "turns": [{"time": 0, "rotate": [0, 1, 0, 0]}, {"time": 1, "quaternion": [0.8, 0, 0.6, 0]}]}]
+    masses = [{"corner": "top-left", "add": 0.01}, {"box": [[-9, -9, -9], [9, 9, 9]], "mass": 0.5}, {"nodes": [15], "add": 1}]
+    start = {"folds": [{"point": [9, 0, 0], "axis": [0, 0, 1], "side": [1, 0, 0], "radius": 0.02}], "spin": [0, 1, 0]}
+    rest = [[0, -5, 0], [1, -5, 0], [0, -5, 1], [0, -6, 0]]
+    faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    with open("soft.obj", "w", encoding="utf-8") as file:
+        file.write("".join("v {} {} {}\n".format(*x) for x in rest) + "".join("f {} {} {}\n".format(*(i + 1 for i in f)) for f in faces))
+    head = b"{'descr': '<f8', 'fortran_order': False, 'shape': (2, 4, 3), }".ljust(117) + b"\n"
+    with open("soft.npy", "wb") as file:
+        file.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head + 2 * struct.pack("<12d", *(c for x in rest for c in x)))
+    cloth = scene(pins=pins)["cloth"]
+    cloth[0].update(masses=masses, start=start)
+    write_scene(cloth=cloth, colliders=[
+        {"type": "box", "name": "rigid", "center": [0, 5, 0], "size": 0.05},
+        {"type": "animated_mesh", "name": "soft", "file": "soft.npy", "mesh": "soft.obj", "frame_rate": 10}])
+    found = json.loads(good("info", "scene.json", "--json"))["cloths"][0]
+    shown = {pin["name"]: pin for pin in found["pins"]}
+    equal(list(shown), ["pin0", "pin1", "pin2", "pin3", "pin4", "wheel"])
+    equal((shown["pin0"]["nodes"], shown["pin0"]["attach"], shown["pin0"]["clamp"], "triangles" in shown["pin0"]), ([0, 1], "rigid", True, False))
+    assert shown["pin1"]["attach"] == "soft" and 0 <= shown["pin1"]["triangles"][0] < 4, shown["pin1"]
+    equal(shown["pin2"]["triangles"], [1])
+    equal((shown["pin3"]["normal"], shown["pin4"]["axis"]), ([0, 1, 0], [1, 0, 0]))
+    equal((shown["wheel"]["track"], shown["wheel"]["turns"], len(shown["wheel"]["pivot"])), (pins[-1]["track"], pins[-1]["turns"], 3))
+    equal(found["masses"], masses)
+    equal((found["start"]["spin"], found["start"]["folds"]), ([0, 1, 0], [{**start["folds"][0], "angle": 180}]))
+    words = good("info", "scene.json")
+    for part in (r"  pin pin2\n(    .*\n)*    attach +soft\n(    .*\n)*    triangles +\[1\]\n", r"  pin wheel\n(    .*\n)*    turns +\[.*0\.8", r"    pivot .* m\n",
+                 r"  masses\n(    .*\n)*    add +0\.01 kg\n", r"  start\n(    .*\n)*    spin +\[0\.0, 1\.0, 0\.0\] rad/s\n"):
+        assert re.search(part, words), (part, words)
+    write_scene(pins=[])
+    found = json.loads(good("info", "scene.json", "--json"))["cloths"][0]
+    assert not {"pins", "masses", "start"} & set(found), found
+
+
 def test_info_of_contact():
     """info shows colliders and contact if they are modelled, and how many nodes start inside"""
     write_scene()
