@@ -91,13 +91,15 @@ static drape_status create_integrator(drape_sim *sim)
     return status;
 }
 
-/* Pins that move from the start have the velocity of their motion there; frames of the first step show it. */
+/* Pins that bodies carry have the velocity of the body at the start, which frames of the first step show.
+ * Those with a track of their own begin at rest, and jump to its velocity. */
 static void start_pins(drape_sim *sim)
 {
     const drape_motion *motion = drape_system_motion(sim->system);
     drape_state *now = &sim->states[sim->now];
     for (int32_t i = 0; i < motion->moved_count; i++)
-        drape_motion_pin_velocity(motion, i, now->t, now->t, now->v + 3 * (size_t)motion->moved_node[i]);
+        if (drape_motion_carrier(motion, i) >= 0)
+            drape_motion_pin_velocity(motion, i, now->t, now->t, now->v + 3 * (size_t)motion->moved_node[i]);
 }
 
 static double tolerance_of(const drape_sim *sim)
