@@ -195,13 +195,14 @@ static void write_velocities(const char *path)
 START_TEST(shape_and_velocities_come_from_files)
 {
     static const double x[12] = {0, 0, 1, 1, 0, 1, 0, 2, 1, 1, 1, 1};
+    static const char flat[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n";
     char shape[512], velocities[512];
     in_build("shape.obj", shape, sizeof shape);
     in_build("velocities.npy", velocities, sizeof velocities);
     char *rest = strdup(shape);
     strcpy(strstr(rest, "shape.obj"), "flat.obj");
     write_file(shape, obj, sizeof obj - 1);
-    write_file(rest, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n", 50);
+    write_file(rest, flat, sizeof flat - 1);
     write_velocities(velocities);
     scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'file': '%s'}, 'start': {'file': '%s', 'velocities': '%s'}, "
