@@ -250,6 +250,7 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
         return guarded;
     sim->ctx->message[0] = 0;
     drape_status status = check_arguments(sim, frame_dt, budget);
+    sim->advancing = true;
     if (!status)
         status = drape_sim_untangle_start(sim);
     if (!status) {
@@ -268,6 +269,7 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
         report.seconds = drape_clock_seconds() - start;
         report.kept = report.seconds <= budget;
     }
+    sim->advancing = false;
     if (out)
         *out = report;
     return status;

@@ -376,6 +376,9 @@ drape_status drape_sim_guard(drape_sim *sim, const char *function)
     if (sim->notifying)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "%s: an observer must not call it while the sim advances", function);
+    if (sim->advancing)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "%s: a wind, a term or an event must not call it while the sim advances", function);
     return DRAPE_OK;
 }
 

@@ -113,10 +113,11 @@ struct drape_sim {
     void *observer_users[DRAPE_MAX_OBSERVERS];
     int observer_count;
     bool notifying; /* an observer is being called */
+    bool advancing; /* between steps and within them: functions of the host are called */
 };
 
 /* Refuses a call that would change the sim at a wrong time. Errors: DRAPE_E_ARGUMENT (sim is NULL, or the
- * call comes from one of its observers). */
+ * call comes from one of its observers, or from a wind, a term or an event while it advances). */
 drape_status drape_sim_guard(drape_sim *sim, const char *function);
 
 /* Checks a list of nodes that a host gives to a function. Errors: DRAPE_E_ARGUMENT. */

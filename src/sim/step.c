@@ -516,16 +516,10 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     return drape_events_act(sim);
 }
 
-drape_status drape_sim_advance(drape_sim *sim, double t_end)
+static drape_status advance(drape_sim *sim, double t_end)
 {
     double t1, h;
     drape_attempt attempt = {.reason = ""};
-    drape_status guarded = drape_sim_guard(sim, "drape_sim_advance");
-    if (guarded)
-        return guarded;
-    sim->ctx->message[0] = 0; /* so that after a failure the message belongs to this advance */
-    if (!isfinite(t_end))
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");
     drape_status status = drape_sim_untangle_start(sim);
     if (!status)
         status =
@@ -542,5 +536,19 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
         if (!status)
             status = drape_sim_step(sim, t1, h, &attempt);
     }
+    return status;
+}
+
+drape_status drape_sim_advance(drape_sim *sim, double t_end)
+{
+    drape_status status = drape_sim_guard(sim, "drape_sim_advance");
+    if (status)
+        return status;
+    sim->ctx->message[0] = 0; /* so that after a failure the message belongs to this advance */
+    if (!isfinite(t_end))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");
+    sim->advancing = true;
+    status = advance(sim, t_end);
+    sim->advancing = false;
     return status;
 }

@@ -551,6 +551,39 @@ START_TEST(a_step_can_be_cancelled)
 }
 END_TEST
 
+/* A wind that would change the sim, or advance it, in the middle of a step. */
+static void meddle(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
+{
+    trigger *now = user;
+    const int32_t node = 20;
+    (void)t, (void)count, (void)x, (void)wind, (void)gradient;
+    now->calls++;
+    now->at += drape_sim_pin(now->sim, 1, &node) == DRAPE_E_ARGUMENT &&
+               drape_sim_advance(now->sim, 1) == DRAPE_E_ARGUMENT &&
+               drape_sim_push(now->sim, NULL) == DRAPE_E_ARGUMENT;
+}
+
+/* Functions of a host that are called while the sim advances are refused what would change it, and the run
+ * goes on as with one that does not try. */
+START_TEST(a_wind_changes_nothing)
+{
+    uint64_t hash[2];
+    for (int i = 0; i < 2; i++) {
+        failing_allocator memory = {0};
+        host h = open_scene(&memory, SHEET, ", {'type': 'drag.viscous', 'coefficient': 0.1}", pins,
+                            "'method': 'be', 'dt': 0.0078125", "");
+        trigger t = {.sim = h.sim};
+        good(&h, drape_sim_set_wind(h.sim, i ? meddle : still_air, &t));
+        good(&h, drape_sim_advance(h.sim, 0.0625));
+        ck_assert(i == 0 || (t.calls > 0 && t.at == t.calls));
+        hash[i] = drape_sim_hash(h.sim);
+        good(&h, drape_sim_push(h.sim, NULL));
+        close_scene(&h, &memory);
+    }
+    ck_assert_uint_eq(hash[0], hash[1]);
+}
+END_TEST
+
 static drape_sim *volatile signalled;
 
 static void on_alarm(int number)
@@ -901,6 +934,6 @@ SUITE("host", pins_go_where_they_are_sent, a_host_is_as_good_as_a_track, velocit
       observers_read_forces, a_push_does_its_work, every_integrator_is_pushed,
       springs_of_verlet_are_pushed_and_pulled, contact_carries_the_weight, wind_takes_cloth_along,
       a_steady_wind_is_that_of_the_term, a_field_without_gradient_takes_longer, a_cancelled_advance_can_go_on,
-      a_step_can_be_cancelled, a_signal_and_a_thread_can_cancel, normals_are_of_length_one,
-      a_checkpoint_keeps_what_the_host_moves, hosts_in_threads_share_a_model, a_host_needs_no_memory,
-      wrong_arguments_are_refused)
+      a_step_can_be_cancelled, a_wind_changes_nothing, a_signal_and_a_thread_can_cancel,
+      normals_are_of_length_one, a_checkpoint_keeps_what_the_host_moves, hosts_in_threads_share_a_model,
+      a_host_needs_no_memory, wrong_arguments_are_refused)
