@@ -190,7 +190,10 @@ drape_status drape_system_status(const drape_system *system)
 
 drape_status drape_system_add_contact(drape_system *system)
 {
-    return drape_contact_create(system->arena, system->motion, &system->contact);
+    const drape_status status = drape_contact_create(system->arena, system->motion, &system->contact);
+    if (system->contact)
+        drape_contact_watch(system->contact, &system->cancel);
+    return status;
 }
 
 const drape_contact *drape_system_contact(const drape_system *system)
