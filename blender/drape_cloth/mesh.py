@@ -11,7 +11,7 @@ def split(polygons: List[Tuple[int, ...]], fans: np.ndarray, fan_of: np.ndarray,
     """The triangles of polygons: triangles x 3 node numbers, in the order of the polygons.
 
     Quads are cut along the shorter diagonal. Those whose diagonals are about equal are cut like the fields of a chessboard, in turn along one and the
-    other, since a sheet whose diagonals all run one way is stiffer along them. Other polygons are cut as Blender does: fans are its triangles and
+    other, since a sheet whose diagonals all run in one direction is stiffer along them. Other polygons are cut as Blender does: fans are its triangles and
     fan_of the number of the polygon of each."""
     colour = _two_colours(polygons, len(x))
     fan_start = np.searchsorted(fan_of, np.arange(len(polygons) + 1))
@@ -19,12 +19,12 @@ def split(polygons: List[Tuple[int, ...]], fans: np.ndarray, fan_of: np.ndarray,
     for number, corners in enumerate(polygons):
         if len(corners) == 4:
             a, b, c, d = corners
-            ways = [((a, b, c), (a, c, d)), ((b, c, d), (b, d, a))]
+            cuts = [((a, b, c), (a, c, d)), ((b, c, d), (b, d, a))]
             lengths = [np.linalg.norm(x[a] - x[c]), np.linalg.norm(x[b] - x[d])]
             second = lengths[1] < 0.99 * lengths[0] or lengths[1] < 1.01 * lengths[0] and colour[a] == 1
-            if _folded(ways[second], x) and not _folded(ways[not second], x):
+            if _folded(cuts[second], x) and not _folded(cuts[not second], x):
                 second = not second  # a quad with a reentrant corner has one diagonal inside
-            triangles += ways[second]
+            triangles += cuts[second]
         else:
             triangles += [tuple(fan) for fan in fans[fan_start[number]:fan_start[number + 1]]]
     return np.array(triangles, np.int64).reshape(-1, 3)

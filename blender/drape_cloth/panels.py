@@ -32,11 +32,10 @@ class DRAPE_PT_drape(Panel, bpy.types.Panel):
 
     def draw(self, context):
         thing, layout = context.object, self.columns()
-        if thing.type == "MESH":
-            layout.prop(thing.drape, "role", expand=True)
-        else:
-            layout.prop_enum(thing.drape, "role", "NONE")
-            layout.prop_enum(thing.drape, "role", "COLLIDER")
+        row = self.layout.row()
+        row.use_property_split = False
+        for role in ("NONE", "CLOTH", "COLLIDER") if thing.type == "MESH" else ("NONE", "COLLIDER"):
+            row.prop_enum(thing.drape, "role", role)
         if thing.drape.role == "COLLIDER":
             layout.prop(thing.drape, "shape")
             layout.prop(thing.drape, "friction")
@@ -61,7 +60,7 @@ class DRAPE_PT_drape(Panel, bpy.types.Panel):
         part = row.row(align=True)
         part.enabled = os.path.exists(os.path.join(operators.folder_of(thing), program.RUN, "checkpoint.drape"))
         part.operator("drape.resume", icon="PLAY")
-        row.operator("drape.clear", icon="TRASH")
+        row.operator("drape.clear", text="", icon="TRASH")
 
 
 class DRAPE_PT_material(Panel, bpy.types.Panel):
