@@ -4,7 +4,7 @@ import os
 import re
 import shutil
 import tempfile
-from typing import Any, Dict, List, NamedTuple, Optional
+from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 import bpy
 import numpy as np
@@ -88,7 +88,7 @@ class Surface:
             x = x.reshape(-1, 3)
             shape = len(surface.vertices), len(surface.loops)
             if self.triangles is None:
-                self.shape, self.triangles = shape, triangles_of(surface)
+                self.shape, self.triangles = shape, fans_of(surface)[0]
             elif shape != self.shape:
                 raise Problem(f"{self.name}: has {shape[0]} vertices in frame {bpy.context.scene.frame_current}, and {self.shape[0]} in the first one: "
                               "the vertices of an object must keep their numbers while the cloth is baked")
@@ -104,15 +104,13 @@ class Surface:
         return mesh.transformed(self.matrices[frame], self.local[frame].astype(float))
 
 
-def triangles_of(surface) -> np.ndarray:
-    """Triangles with the numbers of the vertices of a mesh of Blender."""
+def fans_of(surface) -> Tuple[np.ndarray, np.ndarray]:
+    """The triangles that Blender cuts the polygons of a mesh into, and the polygon of each."""
     surface.calc_loop_triangles()
     fans, fan_of = np.empty(3 * len(surface.loop_triangles), np.int32), np.empty(len(surface.loop_triangles), np.int32)
     surface.loop_triangles.foreach_get("vertices", fans)
     surface.loop_triangles.foreach_get("polygon_index", fan_of)
-    x = np.empty(3 * len(surface.vertices))
-    surface.vertices.foreach_get("co", x)
-    return mesh.split([tuple(polygon.vertices) for polygon in surface.polygons], fans.reshape(-1, 3), fan_of, x.reshape(-1, 3))
+    return fans.reshape(-1, 3), fan_of
 
 
 class Samples:
@@ -200,7 +198,8 @@ def _cloth(thing, samples: Samples, folder: str, times: np.ndarray) -> Dict[str,
     if min(np.linalg.svd(matrix[:3, :3], compute_uv=False)) < 1e-9:
         raise Problem(f"{thing.name}: is scaled to nothing along an axis")
     rest = mesh.transformed(matrix, local.astype(float))
-    mesh.write_obj(os.path.join(folder, "cloth.obj"), rest, triangles_of(thing.data))
+    triangles = mesh.split([tuple(polygon.vertices) for polygon in thing.data.polygons], *fans_of(thing.data), rest)
+    mesh.write_obj(os.path.join(folder, "cloth.obj"), rest, triangles)
     warp = matrix[:3, "XYZ".index(settings.warp)]
     warp = (warp / np.linalg.norm(warp)).tolist()
     material: Dict[str, Any] = {}
@@ -217,7 +216,7 @@ def _cloth(thing, samples: Samples, folder: str, times: np.ndarray) -> Dict[str,
         terms.append({"type": "drag.wind", "wind": samples.wind[0].tolist(), "density": settings.air_density})
     made = {"name": thing.name, "mesh": {"file": "cloth.obj"}, "material": material, "terms": terms, "pins": _pins(thing, cloth, pinned_nodes(thing), times)}
     if not np.array_equal(cloth.local[0], local):
-        mesh.write_obj(os.path.join(folder, "start.obj"), cloth.points(0), triangles_of(thing.data))
+        mesh.write_obj(os.path.join(folder, "start.obj"), cloth.points(0), triangles)
         made["start"] = {"file": "start.obj"}
     return made
 

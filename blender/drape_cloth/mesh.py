@@ -13,26 +13,24 @@ def split(polygons: List[Tuple[int, ...]], fans: np.ndarray, fan_of: np.ndarray,
     Quads are cut along the shorter diagonal. Those whose diagonals are about equal are cut like the fields of a chessboard, in turn along one and the
     other, since a sheet whose diagonals all run in one direction is stiffer along them. Other polygons are cut as Blender does: fans are its triangles and
     fan_of the number of the polygon of each."""
-    colour = _two_colours(polygons, len(x))
-    fan_start = np.searchsorted(fan_of, np.arange(len(polygons) + 1))
-    triangles: List[Tuple[int, ...]] = []
-    for number, corners in enumerate(polygons):
-        if len(corners) == 4:
-            a, b, c, d = corners
-            cuts = [((a, b, c), (a, c, d)), ((b, c, d), (b, d, a))]
-            lengths = [np.linalg.norm(x[a] - x[c]), np.linalg.norm(x[b] - x[d])]
-            second = lengths[1] < 0.99 * lengths[0] or lengths[1] < 1.01 * lengths[0] and colour[a] == 1
-            if _folded(cuts[second], x) and not _folded(cuts[not second], x):
-                second = not second  # a quad with a reentrant corner has one diagonal inside
-            triangles += cuts[second]
-        else:
-            triangles += [tuple(fan) for fan in fans[fan_start[number]:fan_start[number + 1]]]
-    return np.array(triangles, np.int64).reshape(-1, 3)
+    is_quad = np.array([len(corners) == 4 for corners in polygons], bool)
+    a, b, c, d = np.array([corners for corners in polygons if len(corners) == 4], int).reshape(-1, 4).T
+    cuts = np.stack([a, b, c, a, c, d], 1).reshape(-1, 2, 3), np.stack([b, c, d, b, d, a], 1).reshape(-1, 2, 3)
+    lengths = np.linalg.norm(x[a] - x[c], axis=1), np.linalg.norm(x[b] - x[d], axis=1)
+    second = (lengths[1] < 0.99 * lengths[0]) | (lengths[1] < 1.01 * lengths[0]) & (_two_colours(polygons, len(x))[a] == 1)
+    folded = [_folded(cut, x) for cut in cuts]
+    second = np.where(folded[0] != folded[1], folded[0], second)  # a quad with a reentrant corner has one diagonal inside
+    chosen = np.where(second[:, None, None], cuts[1], cuts[0]).reshape(-1, 3)
+    other = ~is_quad[fan_of]
+    order = np.argsort(np.concatenate([np.repeat(np.flatnonzero(is_quad), 2), fan_of[other]]), kind="stable")
+    return np.concatenate([chosen, fans[other]])[order]
 
 
-def _folded(pair, x: np.ndarray) -> bool:
-    first, second = (np.cross(x[q] - x[p], x[r] - x[p]) for p, q, r in pair)
-    return float(first @ second) <= 0
+def _folded(pairs: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Of each of these pairs of triangles (pairs x 2 x 3 node numbers), whether they face different sides."""
+    p, q, r = (x[pairs[:, :, k]] for k in range(3))
+    normals = np.cross(q - p, r - p)
+    return np.einsum("ij,ij->i", normals[:, 0], normals[:, 1]) <= 0
 
 
 def _two_colours(polygons, count: int) -> np.ndarray:

@@ -67,13 +67,13 @@ class Baking:
     def end(self, context) -> set:
         """After the end of the process: the frames so far are shown, whatever ended it."""
         del running[self.cloth]
-        names = program.Names.of(program.read_scene(self.folder))
-        failed = self.bake.result(names)
-        done = self.bake.done()
-        for text in self.bake.warnings(names):
-            self.report({"WARNING"}, text)
         thing = context.scene.objects.get(self.cloth)
+        done, failed = self.bake.done(), None
         try:
+            names = program.Names.of(program.read_scene(self.folder))
+            failed = self.bake.result(names)
+            for text in self.bake.warnings(names):
+                self.report({"WARNING"}, text)
             if done and thing:
                 attach(context, thing, self.folder, cache.write(self.folder))
         except (program.Problem, OSError) as problem:
