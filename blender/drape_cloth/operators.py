@@ -110,6 +110,7 @@ class Baking:
         except (program.Problem, OSError) as problem:
             self.report({"ERROR"}, str(problem))
             return {"CANCELLED"}
+        self.shown = -1
         self.timer = context.window_manager.event_timer_add(0.25, window=context.window)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -117,10 +118,12 @@ class Baking:
     def modal(self, context, event):
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        for window in context.window_manager.windows:
-            for area in window.screen.areas:
-                if area.type == "PROPERTIES":
-                    area.tag_redraw()
+        if self.shown != self.bake.done():
+            self.shown = self.bake.done()
+            for window in context.window_manager.windows:
+                for area in window.screen.areas:
+                    if area.type == "PROPERTIES":
+                        area.tag_redraw()
         if self.bake.running():
             return {"PASS_THROUGH"}
         context.window_manager.event_timer_remove(self.timer)
