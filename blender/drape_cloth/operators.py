@@ -59,6 +59,9 @@ class Baking:
         self.cloth, self.folder = thing.name, folder_of(thing)
         preferences = addon_preferences()
         path = find_program()
+        for other in bpy.data.objects:
+            if other != thing and other.type == "MESH" and other.drape.role == "CLOTH" and folder_of(other) == self.folder:
+                raise program.Problem(f"{thing.name}: {other.name} has the same folder, {self.folder}: choose another one")
         frames, warnings = self.scene(context, thing, self.folder)
         for text in warnings:
             self.report({"WARNING"}, f"{thing.name}: {text}")

@@ -3,6 +3,7 @@ its lamp. Written for Blender 3.4."""
 import importlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -393,6 +394,9 @@ def test_errors():
         pass
     assert "has files of something else" in refused(cloth) and os.listdir(folder) == ["thesis.txt"]
     cloth.drape.folder = "//elsewhere/"
+    other = sheet(name="Other", folder="//elsewhere")
+    assert "Other: Tablecloth has the same folder, " in refused(other)
+    bpy.data.objects.remove(other)
     bpy.context.scene.frame_end = 1
     assert "one frame only" in refused(cloth)
     bpy.context.scene.frame_end = FRAMES
@@ -433,6 +437,21 @@ def test_choices():
     for name in names:
         cloth.drape.fabric = name
         assert scene_of(bake(cloth))["cloth"][0]["material"] == {"fabric": name}
+
+
+def test_page():
+    """the script of docs/blender.md bakes its table cloth; here it has fewer nodes and frames"""
+    new_file()
+    with open(os.environ["DRAPE_SOURCE"] + "/docs/blender.md", encoding="utf-8") as file:
+        script, = re.findall(r"```python\n(.*?)```", file.read(), re.S)
+    for old, new in ("=30", "=8"), ("frame_end = 50", "frame_end = 4"), ("/tmp/table.blend", os.path.abspath("table.blend")):
+        assert old in script, old
+        script = script.replace(old, new)
+    exec(compile(script, "docs/blender.md", "exec"), {})  # pylint: disable=exec-used
+    bpy.ops.wm.open_mainfile(filepath="table.blend")
+    cloth = bpy.data.objects["Grid"]
+    assert len(plays(cloth, operators.folder_of(cloth))) == 4 and cloth.drape.fabric == "wang2011_tablecloth"
+    assert cloth.modifiers["Drape"].filepath == "//drape_Grid/cloth.pc2", cloth.modifiers["Drape"].filepath
 
 
 def test_quads():
