@@ -282,16 +282,14 @@ def numbers(values, name: str, *shape, dtype=np.float64) -> np.ndarray:
 
 
 def _whole_numbers(given: np.ndarray, name: str, dtype) -> np.ndarray:
-    if not given.size:
-        return np.ascontiguousarray(given, dtype)
-    if given.dtype == object and all(isinstance(item, int) for item in given.flat):
-        pass  # numbers beyond 64 bits
-    elif not np.issubdtype(given.dtype, np.integer):
+    if given.dtype == object:  # numbers beyond 64 bits
+        given = np.array([operator.index(item) for item in given.flat], object).reshape(given.shape)
+    elif given.dtype.kind not in "iu" and given.size:
         raise ArgumentError(f"{name}: needs whole numbers, has {given.dtype}")
     limits = np.iinfo(dtype)
-    low, high = int(given.min()), int(given.max())
-    if low < limits.min or high > limits.max:
-        raise ArgumentError(f"{name}: {low if low < limits.min else high} is not allowed; whole numbers are from {limits.min} to {limits.max}")
+    for number in (given.min(), given.max()) if given.size else ():
+        if not limits.min <= number <= limits.max:
+            raise ArgumentError(f"{name}: {number} is not allowed; whole numbers are from {limits.min} to {limits.max}")
     return np.ascontiguousarray(given, dtype)
 
 
