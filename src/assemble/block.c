@@ -360,7 +360,8 @@ static void evaluate_measures(const drape_term *term, const drape_request *want,
 static drape_elements elements_at(const drape_term *term, const drape_point *point)
 {
     drape_elements el = term->elements;
-    el.progress = point->done ? 1 : drape_term_progress(term, point->t) + point->progressed;
+    const bool full = point->done || (point->full && term->ops->external);
+    el.progress = full ? 1 : drape_term_progress(term, point->t) + point->progressed;
     return el;
 }
 

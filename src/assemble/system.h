@@ -30,6 +30,7 @@ typedef struct drape_point {
     const double *stress;   /* (measure_count) the f before ddq in a Jacobian; NULL: the forces here */
     double t;               /* [s] time of the colliders' poses, and of terms that depend on it */
     bool done;              /* energies that depend on time are taken at progress 1 */
+    bool full;              /* those of loads from outside are taken at progress 1 */
     double progressed;      /* added to their progress, for differences */
     double span[2]; /* [s] over which the velocities of colliders are taken; equal: they are at rest */
     bool instant;   /* those that turn have their velocities of time t instead, as the pins of methods that

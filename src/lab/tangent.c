@@ -16,8 +16,12 @@
 static drape_point point_at(const lab_tangent *t, const double *x)
 {
     const drape_state *now = drape_sim_state(t->sim);
-    return (drape_point){
-        .x = x, .v = t->zero, .internal = now->internal, .t = now->t, .span = {now->t, now->t}};
+    return (drape_point){.x = x,
+                         .v = t->zero,
+                         .internal = now->internal,
+                         .t = now->t,
+                         .full = t->full,
+                         .span = {now->t, now->t}};
 }
 
 /* values = K at nodes x and a factor of the loads: K without the loads, and the factor times the difference
@@ -110,6 +114,7 @@ drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor,
         return status;
     for (int32_t c = 0; c < m->collider_count; c++)
         same[c] = c;
+    t->full = drape_sim_state(sim)->t == 0;
     t->linear = true;
     for (int32_t i = 0; i < m->term_count; i++) {
         const drape_term_ops *ops = m->terms[i].ops;

@@ -1,7 +1,9 @@
 /*
  * tangent.h: the exact stiffness of a sim's present state, about which modes are computed: K = d2E/dx2 over
  * the free nodes, with the nodes at rest, so that only stiffness is in it; and how K changes with the loads.
- * The loads are the scene's external terms (drape_term_ops.external), all multiplied by the same factor.
+ * The loads are the scene's external terms (drape_term_ops.external), all multiplied by the same factor. At
+ * the time 0 of a sim they have the values that the scene gives, even if they rise from 0 in time; later on
+ * those of the time.
  */
 #ifndef DRAPE_LAB_TANGENT_H
 #define DRAPE_LAB_TANGENT_H
@@ -25,6 +27,7 @@ typedef struct lab_tangent {
     bool *without;     /* (term_count) these, and the loads */
     bool linear;       /* no load has a part in K */
     double factor;     /* of the loads */
+    bool full;         /* loads have the values that the scene gives, whatever they are at this time */
     drape_arena *arena;
 } lab_tangent;
 

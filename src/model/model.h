@@ -121,8 +121,9 @@ typedef struct drape_choice {
 typedef struct drape_cloth {
     char *name;
     drape_mesh mesh;
-    drape_choice grid; /* its type is "" if the mesh is not a grid */
-    char *file;        /* NULL if the mesh is not from a file */
+    drape_choice grid;                /* its type is "" if the mesh is not a grid */
+    char *file;                       /* NULL if the mesh is not from a file */
+    char *start_file, *velocity_file; /* of the start; NULL: none */
     double scale[3], rotate[4], translate[3];
     double material_values[DRAPE_MAX_PARAMS]; /* in the order of the parameters of drape_material_entry */
     drape_material material;

@@ -68,8 +68,8 @@ static const drape_scene_key pin_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECTS, "turns", DRAPE_DERIVED("none: they do not turn"),
             "rotation of the nodes as one body about the pivot, steady between the times"),
      ARRAY(drape_pin_def, turns, turn_count), .at_least = 1, .child = &drape_form_turn},
-    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the mean of the nodes"), LOWEST, HIGHEST,
-                  "the point about which they turn, at the start; the track displaces it"),
+    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the mean of the nodes"), -1e9, 1e9,
+                  "the point about which they turn, at the start; the track displaces it; with `turns`"),
      IN(drape_pin_def, pivot)},
 };
 static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
@@ -195,7 +195,7 @@ static const drape_scene_key start_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECT, "transform", NONE, "scale, rotation, translation after the folds"),
      .child = &start_transform},
     {DRAPE_VECTOR("spin", "rad/s", 0, -1e9, 1e9, "angular velocity"), IN(drape_start_def, spin)},
-    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the centre of mass at the start"), LOWEST, HIGHEST,
+    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the centre of mass at the start"), -1e9, 1e9,
                   "the point that the spin does not move"),
      IN(drape_start_def, pivot)},
     {DRAPE_TEXT("velocities", "an NPY file, nodes x 3, of velocities in m/s; relative to the scene",
@@ -265,8 +265,8 @@ static const drape_scene_key collider_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECTS, "turns", DRAPE_DERIVED("none: it does not turn"),
             "rotation about the pivot, steady between the times"),
      ARRAY(drape_collider_def, turns, turn_count), .at_least = 1, .child = &drape_form_turn},
-    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the middle of its shape; of a plane, the origin"), LOWEST,
-                  HIGHEST, "the point about which it turns, where its parameters define it"),
+    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the middle of its shape; of a plane, the origin"), -1e9, 1e9,
+                  "the point about which it turns, where its parameters define it"),
      IN(drape_collider_def, pivot)},
     {DRAPE_BOOLEAN("enabled", true, "cloth touches it"), IN(drape_collider_def, enabled)},
 };
