@@ -474,7 +474,8 @@ static void measure_stiffness(problem *p)
 static drape_status compute(problem *p, drape_sim *sim, const drape_modes_def *def, drape_modes *out)
 {
     int64_t below = 0;
-    drape_status status = lab_tangent_open(&p->arena, sim, def->buckling ? def->load_factor : 1, &p->tangent);
+    drape_status status =
+        lab_tangent_open(&p->arena, sim, def->buckling ? def->load_factor : 1, true, &p->tangent);
     if (status)
         return status;
     p->n = p->tangent.pattern->n;

@@ -167,7 +167,9 @@ static drape_status count_unstable(follower *p, double factor, int64_t *unstable
     lab_tangent *t = &p->tangent;
     bool known;
     lab_tangent_evaluate(t, p->x, factor, NULL, NULL, t->values);
-    drape_pattern_symmetrize(t->pattern, t->values); /* rounding only: the path is of a potential */
+    *unstable = -1; /* of a load without a potential the signs of pivots say nothing */
+    if (!lab_tangent_is_symmetric(t, t->values))
+        return DRAPE_OK;
     *unstable = 0;
     drape_status status = lab_tangent_factor_definite(t, p->solver, p->factors, t->values, &known);
     if (status || known)
@@ -489,7 +491,7 @@ static drape_status open(follower *p)
         return drape_fail(p->ctx, DRAPE_E_ARGUMENT,
                           "a path of equilibria is followed without contact: leave out colliders and "
                           "self_contact");
-    drape_status status = lab_tangent_open(&p->arena, p->sim, p->def->from, &p->tangent);
+    drape_status status = lab_tangent_open(&p->arena, p->sim, p->def->from, false, &p->tangent);
     if (status)
         return status;
     p->n = (size_t)p->tangent.pattern->n;

@@ -358,6 +358,27 @@ const drape_scene_object drape_form_seam = {
     .least_size = sizeof(drape_seam_def),
 };
 
+/* ---- Histories ---- */
+
+static const char *const interpolations[] = {"linear", "cubic", NULL};
+
+static const drape_scene_key history_keys[] = {
+    {DRAPE_TEXT("name", "unique name, which loads give as their history"), IN(drape_history_def, name)},
+    {DRAPE_NUMBER("times", "s", DRAPE_REQUIRED, -1e9, 1e9, "increasing"), .shape = DRAPE_SCENE_LIST,
+     ARRAY(drape_history_def, times, time_count), .at_least = 1},
+    {DRAPE_NUMBER("values", "1", DRAPE_REQUIRED, -1e9, 1e9,
+                  "the factors of a load at these times; before the first and after the last it is constant"),
+     .shape = DRAPE_SCENE_LIST, ARRAY(drape_history_def, values, value_count), .at_least = 1},
+    {DRAPE_CHOICE("interpolation", 0, interpolations,
+                  "between them; cubic: with a continuous slope, 0 at the ends, and beyond no value"),
+     IN(drape_history_def, interpolation)},
+};
+
+const drape_scene_object drape_form_history = {.name = "history",
+                                               KEYS(history_keys),
+                                               .def_size = sizeof(drape_history_def),
+                                               .least_size = sizeof(drape_history_def)};
+
 /* ---- Scene ---- */
 
 static const drape_scene_key output_keys[] = {
@@ -404,6 +425,12 @@ static const drape_scene_key scene_keys[] = {
      ARRAY(drape_scene_def, events, event_count), .at_most = DRAPE_MAX_EVENTS, .child = &drape_form_event},
     {SHAPED(DRAPE_SCENE_OBJECTS, "seams", NONE, "nodes that are sewn together, of two cloths or one"),
      ARRAY(drape_scene_def, seams, seam_count), .at_most = DRAPE_MAX_SEAMS, .child = &drape_form_seam},
+    {SHAPED(DRAPE_SCENE_OBJECTS, "histories", NONE, "factors over time, by which loads are multiplied"),
+     ARRAY(drape_scene_def, histories, history_count), .at_most = DRAPE_MAX_HISTORIES,
+     .child = &drape_form_history},
+    {DRAPE_TEXT("gravity_history", "name of the history by which gravity is multiplied",
+                .derived = "none: gravity is constant"),
+     IN(drape_scene_def, gravity_history)},
 };
 
 const drape_scene_object drape_form_scene = {.name = "scene",
