@@ -118,8 +118,25 @@ void drape_frame_files_close(drape_frame_files *frames);
 
 /* ---- Pieces of OBJ ---- */
 
+/* The name of the material of faces that have none, in files in which others have one. */
+#define DRAPE_NO_MATERIAL "cloth"
+
+/* What has been written to an OBJ file. */
+typedef struct drape_obj {
+    drape_file *file;
+    int32_t uvs;          /* number of texture coordinates */
+    const char *material; /* of the next face; NULL: none was named */
+} drape_obj;
+
+/* A statement with a name. Control characters, such as line breaks, are replaced: names contain any. */
+void drape_obj_put_name(drape_file *file, const char *statement, const char *name);
+/* `mtllib file` of all cloths, each file once. */
+void drape_obj_put_material_files(drape_file *file, const drape_model *model);
 /* `v x y z` of nodes, with 17 digits; `f a b c` of triangles, whose array counts nodes from 0. */
 void drape_obj_put_nodes(drape_file *file, const double *x, int32_t count);
 void drape_obj_put_triangles(drape_file *file, const int32_t *triangle, int32_t count);
+/* The faces of a cloth as its file had them, with `vt u v` and `usemtl name`; its triangles if it has no such
+ * faces. Nodes are counted from 1 over all cloths. */
+void drape_obj_put_faces(drape_obj *obj, const drape_model *model, int32_t cloth);
 
 #endif
