@@ -10,6 +10,16 @@
 
 #define FRAME_WORD "frame_"
 
+void drape_export_body_vertex(const drape_frame *frame, const drape_export_body *body, int32_t number,
+                              int32_t vertex, double x[3])
+{
+    for (size_t k = 0; k < 3; k++)
+        x[k] = body->deforms ? frame->points[3 * (size_t)(body->first_point + vertex) + k]
+                             : (double)body->vertex[6 * (size_t)vertex + k];
+    if (!body->deforms)
+        drape_pose_point(&frame->poses[number], x, x);
+}
+
 /* ---- One file ---- */
 
 drape_status drape_export_begin(drape_context *ctx, drape_folder *folder, const char *name, drape_file *file)
