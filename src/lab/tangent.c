@@ -51,7 +51,7 @@ static drape_status make_symmetric(const lab_tangent *t, const drape_point *poin
     if (drape_system_is_symmetric(t->system))
         drape_pattern_symmetrize(p, t->values);
     else
-        drape_system_symmetrize(t->system, point, t->values);
+        drape_system_symmetrize(t->system, point, 0, t->values);
     if (!drape_system_is_symmetric(t->system))
         return DRAPE_OK;
     for (size_t i = 0; i < count; i++) {
