@@ -488,8 +488,7 @@ void drape_system_jacobian_without(drape_system *system, const drape_point *poin
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (evaluate_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight,
-                                   positive_share > 0 ? DRAPE_CONTACT_GAUSS_NEWTON : point->contact,
+        drape_contact_add_jacobian(system->contact, point->weight, point->contact, positive_share,
                                    system->pattern, values);
     drape_drag_springs_add_hessian(&system->drag, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
@@ -507,10 +506,12 @@ bool drape_system_is_symmetric(const drape_system *system)
     return !system->contact || drape_contact_is_symmetric(system->contact);
 }
 
-void drape_system_symmetrize(drape_system *system, const drape_point *point, double *values)
+void drape_system_symmetrize(drape_system *system, const drape_point *point, double positive_share,
+                             double *values)
 {
     if (evaluate_contact(system, point))
-        drape_contact_fix_friction(system->contact, point->weight, system->pattern, values);
+        drape_contact_fix_friction(system->contact, point->weight, 1 - positive_share, system->pattern,
+                                   values);
     drape_pattern_symmetrize(system->pattern, values);
     drape_system_project_matrix(system, values);
 }
@@ -534,7 +535,7 @@ void drape_system_remainder(drape_system *system, const drape_point *point, doub
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (evaluate_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight, DRAPE_CONTACT_GAUSS_NEWTON,
+        drape_contact_add_jacobian(system->contact, point->weight, DRAPE_CONTACT_GAUSS_NEWTON, 1,
                                    system->pattern, values);
 }
 
@@ -556,7 +557,7 @@ void drape_system_damping(drape_system *system, const drape_point *point, double
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (evaluate_contact(system, point))
-        drape_contact_add_jacobian(system->contact, 0, DRAPE_CONTACT_VELOCITY, system->pattern, values);
+        drape_contact_add_jacobian(system->contact, 0, DRAPE_CONTACT_VELOCITY, 0, system->pattern, values);
     drape_system_project_matrix(system, values);
 }
 
@@ -708,7 +709,7 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
     if (g)
         drape_contact_add_forces(system->contact, true, friction, g);
     if (values)
-        drape_contact_add_jacobian(system->contact, point->weight, DRAPE_CONTACT_EXACT, system->pattern,
+        drape_contact_add_jacobian(system->contact, point->weight, DRAPE_CONTACT_EXACT, 0, system->pattern,
                                    values);
 }
 

@@ -159,8 +159,8 @@ void drape_system_project_matrix(const drape_system *system, double *values);
 
 /* values (pattern.nonzeros) = mass_weight M + J over the free nodes. With positive_share from 0 to 1, each
  * element's Hessian H becomes H + positive_share (H+ - H), where H+ is its positive semidefinite part: 0 is
- * exact, 1 is positive semidefinite. Contact has no such shares: for any share above 0 its matrix is the
- * positive semidefinite approximation of drape_contact_add_jacobian. */
+ * exact, 1 is positive semidefinite. So does that of contact, whose positive semidefinite part is
+ * DRAPE_CONTACT_GAUSS_NEWTON. */
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
                            double positive_share, double *values);
 
@@ -174,9 +174,10 @@ void drape_system_predict_contact(drape_system *system, const double *p, double 
 /* Whether the Jacobian of contact is symmetric in every state. */
 bool drape_system_is_symmetric(const drape_system *system);
 
-/* Makes the values of drape_system_jacobian at a point, without positive parts, symmetric: takes out how
- * friction changes with the normal force and the place of contact, and of the rest, what is antisymmetric. */
-void drape_system_symmetrize(drape_system *system, const drape_point *point, double *values);
+/* Makes the values of drape_system_jacobian at a point with a share of the positive parts symmetric: takes out
+ * how friction changes with the normal force and the place of contact, and of the rest, what is antisymmetric. */
+void drape_system_symmetrize(drape_system *system, const drape_point *point, double positive_share,
+                             double *values);
 
 /* The parts of an approximate Jacobian that is cheaper than J (nonlinear/approx_jacobian.h), term by term.
  *

@@ -115,9 +115,10 @@ typedef enum drape_contact_derivatives {
                                   contact/friction.h) */
 } drape_contact_derivatives;
 
-/* Adds them to values in the pattern, which must have their blocks. */
+/* Adds them to values in the pattern, which must have their blocks: with the share `positive_share`, from 0 to
+ * 1, of the difference between them and DRAPE_CONTACT_GAUSS_NEWTON. */
 void drape_contact_add_jacobian(drape_contact *contact, double weight, drape_contact_derivatives which,
-                                const drape_pattern *pattern, double *values);
+                                double positive_share, const drape_pattern *pattern, double *values);
 
 /* Predicts the normal forces (contact/predict.h) at the end of a correction p (node_count x 3) from the last
  * point, where the Jacobian had these weights; p NULL: forgets what was predicted. The next Jacobians use
@@ -127,11 +128,11 @@ void drape_contact_predict(drape_contact *contact, const double *p, double weigh
 /* Whether DRAPE_CONTACT_SYMMETRIC is symmetric: no friction follows the normal force within a step. */
 bool drape_contact_is_symmetric(const drape_contact *contact);
 
-/* Takes out of values, to which drape_contact_add_jacobian added DRAPE_CONTACT_SYMMETRIC with the same
- * weight, how friction changes with the normal force and with the place of contact: what remains of friction
+/* Takes out of values, to which drape_contact_add_jacobian added a share of DRAPE_CONTACT_SYMMETRIC with the
+ * same weight, how friction changes with the normal force and with the place of contact: what remains of friction
  * is symmetric, and positive semidefinite for each contact in its tangential plane. */
-void drape_contact_fix_friction(drape_contact *contact, double weight, const drape_pattern *pattern,
-                                double *values);
+void drape_contact_fix_friction(drape_contact *contact, double weight, double share,
+                                const drape_pattern *pattern, double *values);
 
 /* Whether the pattern has the blocks of all active contacts. */
 bool drape_contact_is_in_pattern(const drape_contact *contact, const drape_pattern *pattern);

@@ -67,7 +67,7 @@ static void make_symmetric(const lab_tangent *t, const drape_point *point)
     if (drape_system_is_symmetric(t->system))
         lab_tangent_is_symmetric(t, t->values);
     else
-        drape_system_symmetrize(t->system, point, t->values);
+        drape_system_symmetrize(t->system, point, 0, t->values);
 }
 
 static drape_status read_state(lab_tangent *t, drape_arena *arena, bool needs_potential)
