@@ -119,8 +119,7 @@ static double longest_move(const drape_contact *c, const path *p)
 static const drape_candidates *with_stray(const drape_candidates *candidates, double stray,
                                           drape_distances *away)
 {
-    for (int i = 0; candidates && stray > 0 && i < DRAPE_CANDIDATE_SETS; i++)
-        away->set[i] += stray;
+    away->stray = stray;
     return candidates && drape_candidates_farthest(candidates, away) <= candidates->margin ? candidates
                                                                                            : NULL;
 }

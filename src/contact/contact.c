@@ -699,6 +699,7 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     c->ahead_t = NAN;
     c->refused = false;
     drape_contact_set_rounding(c, c->x);
+    drape_distant_update(&c->broad.distant, c->x, c->pose, c->broad.rounding);
     const bool retry = is_retry(c);
     if (!status)
         status = adapt_distances(c, t, retry);
