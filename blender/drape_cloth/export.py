@@ -156,19 +156,18 @@ def _track(times: np.ndarray, d: np.ndarray) -> List[Any]:
     return [[t, place] for t, place in zip(times.tolist(), d.tolist())]
 
 
-def _pins(thing, cloth: Surface, nodes: np.ndarray, times: np.ndarray) -> List[Dict[str, Any]]:
-    """Nodes that stay as one pin; nodes that move with the object, an armature or shape keys with a track for each motion."""
+def _pins(cloth: Surface, nodes: np.ndarray, times: np.ndarray) -> List[Dict[str, Any]]:
+    """Nodes that stay, or move with a rigid object, as one pin; nodes that an armature, shape keys and the like move with a track for each motion."""
     if not len(nodes):
         return []
-    still, moving = [], {}
+    rotations = None if cloth.deforms() else mesh.rigid_motion(np.array(cloth.matrices))
+    if rotations is not None:
+        return [{"name": "pinned", "nodes": nodes.tolist(), **_motion(cloth, rotations, times)}]
+    motions: Dict[bytes, Tuple[List[int], np.ndarray]] = {}
     paths = np.stack([cloth.points(k)[nodes] for k in range(len(times))], 1)  # nodes x frames x 3
-    for node, path in zip(nodes.tolist(), paths):
-        if (path == path[0]).all():
-            still.append(node)
-        else:
-            moving.setdefault((path - path[0]).tobytes(), []).append((node, path - path[0]))
-    pins: List[Dict[str, Any]] = [{"name": "pinned", "nodes": still}] if still else []
-    return pins + [{"nodes": [node for node, _ in group], "track": _track(times, group[0][1])} for group in moving.values()]
+    for node, path in zip(nodes.tolist(), paths - paths[:, :1]):
+        motions.setdefault(path.tobytes(), ([], path))[0].append(node)
+    return [{"nodes": group, **({"track": _track(times, path)} if path.any() else {})} for group, path in motions.values()]
 
 
 def pinned_nodes(thing) -> np.ndarray:
@@ -214,7 +213,7 @@ def _cloth(thing, samples: Samples, folder: str, times: np.ndarray) -> Dict[str,
         terms.append({"type": "damp.kelvin_voigt", "beta": settings.damping})
     if settings.air:
         terms.append({"type": "drag.wind", "wind": samples.wind[0].tolist(), "density": settings.air_density})
-    made = {"name": thing.name, "mesh": {"file": "cloth.obj"}, "material": material, "terms": terms, "pins": _pins(thing, cloth, pinned_nodes(thing), times)}
+    made = {"name": thing.name, "mesh": {"file": "cloth.obj"}, "material": material, "terms": terms, "pins": _pins(cloth, pinned_nodes(thing), times)}
     if not np.array_equal(cloth.local[0], local):
         mesh.write_obj(os.path.join(folder, "start.obj"), cloth.points(0), triangles)
         made["start"] = {"file": "start.obj"}
