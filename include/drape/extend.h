@@ -39,7 +39,9 @@ typedef enum drape_param_kind {
     DRAPE_PARAM_TURN,    /* a rotation as three values: a vector along the axis whose length is the angle
                             [degrees], to which the range applies; may also be given as axis and angle, four
                             numbers */
-    DRAPE_PARAM_TEXT     /* a text, such as a file name; its numerical value is always 0 */
+    DRAPE_PARAM_TEXT     /* a text, such as a file name; its numerical value is always 0. Of a term, one that
+                            is called "history" names a history of the scene: the library multiplies an external
+                            load by its factor, and other terms read it in el->factor */
 } drape_param_kind;
 
 /* One parameter. All values are stored as doubles: integers exactly, booleans as 0 or 1, choices by index. A
@@ -290,6 +292,7 @@ typedef struct drape_elements {
     const drape_parts *parts; /* NULL: the term has none */
     void *user;               /* of the term's ops */
     double progress;          /* for the function energy of a term with drape_term_timed: 0 to 1; else 0 */
+    double factor; /* of the history that a parameter "history" names, at the present time; else 1 */
 } drape_elements;
 
 /* The fault that a check found, for the message of a rejected step. */

@@ -24,6 +24,8 @@
 #include <math.h>
 #include <string.h>
 
+#define LEAST_STIFFNESS 1e-100 /* [N m] */
+
 enum {
     PARAM_REST = DRAPE_ORTHOTROPIC_COUNT,
     PARAM_CURVATURE,
@@ -273,6 +275,18 @@ static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch,
     }
 }
 
+/* The squares of a patch are found from products of stiffnesses, which must not underflow. */
+static drape_status check_law(const double law[9], drape_term_builder *builder)
+{
+    for (int i = 0; i < 3; i++)
+        if (!(law[4 * i] >= LEAST_STIFFNESS))
+            return drape_term_refuse(builder,
+                                     "a bending stiffness of %g N m is too small to be computed with; it is "
+                                     "at least %g N m",
+                                     law[4 * i], LEAST_STIFFNESS);
+    return DRAPE_OK;
+}
+
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     const double *bend = values + PARAM_CURVATURE;
@@ -281,7 +295,9 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     drape_orthotropic_law(values, cloth->bending,
                           m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio), m->poisson_ratio,
                           law);
-    drape_status status = reserve(cloth, values, law, builder);
+    drape_status status = check_law(law, builder);
+    if (!status)
+        status = reserve(cloth, values, law, builder);
     int32_t element = 0, clamps = cloth->hinge_count;
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
         drape_midedge patch;
