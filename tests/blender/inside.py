@@ -321,7 +321,7 @@ def test_deforming_collider():
 
 
 def test_wind():
-    """the force fields of the type Wind add up to the wind of the scene, in m/s along their z axes; without air there is none"""
+    """the force fields of the type Wind add up to the wind, in m/s along their z axes; it and gravity may change in time; without air there is none"""
     scene = new_file()
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     bpy.ops.object.effector_add(type="WIND", rotation=(0, radians(90), 0))
@@ -337,16 +337,31 @@ def test_wind():
     assert np.allclose(wind["wind"], [5, 0, -2], atol=1e-5) and np.isclose(wind["density"], 1.225), wind
     x = plays(cloth, folder)
     assert x[-1][:, 0].mean() > x[0][:, 0].mean() + 0.1, x[-1][:, 0].mean() - x[0][:, 0].mean()
-    field = next(thing.field for thing in scene.objects if thing.field and thing.field.type == "WIND")
-    assert export.export(bpy.context, cloth, os.path.abspath("other")).warnings == []
-    field.keyframe_insert("strength", frame=1)
-    field.strength *= 2
-    field.keyframe_insert("strength", frame=FRAMES)
+    fields = [thing for thing in scene.objects if thing.field and thing.field.type == "WIND"]
+    for thing in fields:
+        thing.field.keyframe_insert("strength", frame=1)
+        thing.field.strength *= -2
+        thing.field.keyframe_insert("strength", frame=2 * FRAMES)
+    scene.keyframe_insert("gravity", frame=1)
+    scene.gravity = 0, 0, -2 * 9.81
+    scene.keyframe_insert("gravity", frame=2 * FRAMES)
+    made = scene_of(bake(cloth))
+    wind, = [term for term in made["cloth"][0]["terms"] if term["type"] == "drag.wind"]
+    assert np.allclose(wind["wind"], [-10, 0, 4], atol=1e-5) and wind["history"] == "wind" and made["gravity_history"] == "gravity"
+    assert np.allclose(made["gravity"], [0, -2 * 9.81, 0])
+    courses = {course["name"]: course for course in made["histories"]}
+    assert np.allclose([courses["wind"]["values"][k] for k in (0, -1)], [-0.5, 1]) and np.allclose([courses["gravity"]["values"][k] for k in (0, -1)], [0.5, 1])
+    assert np.allclose(courses["wind"]["times"], np.arange(2 * FRAMES) / RATE)
+    assert plays(cloth, operators.folder_of(cloth))[-1][:, 0].mean() < x[-1][:, 0].mean()
+    fields[0].keyframe_insert("rotation_euler", frame=1)
+    fields[0].rotation_euler.z += 1
+    fields[0].keyframe_insert("rotation_euler", frame=2 * FRAMES)
     warning, = export.export(bpy.context, cloth, os.path.abspath("other")).warnings
-    assert warning.startswith("the wind (") and "is animated: the cloth feels that of the first frame" in warning
+    assert warning.startswith("the wind (") and "changes its direction: the cloth feels that of the first frame" in warning
     cloth.drape.air = False
     scene.use_gravity = False
     made = scene_of(bake(cloth))
+    assert "histories" not in made and "gravity_history" not in made
     assert [term["type"] for term in made["cloth"][0]["terms"]] == ["stretch.cst", "bend.midedge", "damp.kelvin_voigt"] and made["gravity"] == [0, 0, 0]
 
 
