@@ -113,6 +113,22 @@ def fans_of(surface) -> Tuple[np.ndarray, np.ndarray]:
     return fans.reshape(-1, 3), fan_of
 
 
+class Course:
+    """A vector that may change from frame to frame. Drape multiplies one of constant direction by a history, which is linear between the frames."""
+
+    def __init__(self, name: str, about: str, samples: List[np.ndarray], times: np.ndarray):
+        values = np.array(samples)
+        largest = values[np.argmax(np.einsum("ij,ij->i", values, values))]
+        self.vector, self.history, self.warning = values[0], None, ""
+        if (values == values[0]).all():
+            return
+        factors = values @ largest / (largest @ largest)
+        if np.abs(values - np.outer(factors, largest)).max() > mesh.RIGID * np.abs(largest).max():
+            self.warning = f"the {about} changes its direction: the cloth feels that of the first frame throughout"
+            return
+        self.vector, self.history = largest, {"name": name, "times": times.tolist(), "values": factors.tolist()}
+
+
 class Samples:
     """Everything that changes from frame to frame, from the first to the last frame of the scene."""
 
@@ -125,9 +141,10 @@ class Samples:
         self.colliders = [Surface(other) for other in colliders_of(context, thing)]
         winds = [other for other in scene.objects if other.field and other.field.type == "WIND" and other.name in context.view_layer.objects
                  and not other.hide_viewport] if thing.drape.air else []
-        self.winds = [other.name for other in winds]
-        self.wind: List[np.ndarray] = []
-        self.gravity: List[np.ndarray] = []
+        rate = scene.render.fps / scene.render.fps_base
+        self.rate, self.times = rate, np.arange(scene.frame_end - scene.frame_start + 1) / rate
+        wind: List[np.ndarray] = []
+        gravity: List[np.ndarray] = []
         hidden = [modifier for modifier in list(thing.modifiers)[before_cloth(thing):] if modifier.show_viewport]
         now = scene.frame_current, scene.frame_subframe
         try:
@@ -138,12 +155,14 @@ class Samples:
                 depsgraph = context.evaluated_depsgraph_get()
                 for surface in [self.cloth, *self.colliders]:
                     surface.sample(depsgraph, self.axes)
-                self.gravity.append(self.axes[:3, :3] @ np.array(scene.gravity) * scene.use_gravity)
-                self.wind.append(sum((self._wind(other.evaluated_get(depsgraph)) for other in winds), np.zeros(3)))
+                gravity.append(self.axes[:3, :3] @ np.array(scene.gravity) * scene.use_gravity)
+                wind.append(sum((self._wind(other.evaluated_get(depsgraph)) for other in winds), np.zeros(3)))
         finally:
             for modifier in hidden:
                 modifier.show_viewport = True
             scene.frame_set(now[0], subframe=now[1])
+        self.gravity = Course("gravity", "gravity", gravity, self.times)
+        self.wind = Course("wind", f"wind ({', '.join(other.name for other in winds)})", wind, self.times)
 
     def _wind(self, field) -> np.ndarray:
         """[m/s]: the strength of a field along its z axis."""
@@ -156,19 +175,18 @@ def _track(times: np.ndarray, d: np.ndarray) -> List[Any]:
     return [[t, place] for t, place in zip(times.tolist(), d.tolist())]
 
 
-def _pins(thing, cloth: Surface, nodes: np.ndarray, times: np.ndarray) -> List[Dict[str, Any]]:
-    """Nodes that stay as one pin; nodes that move with the object, an armature or shape keys with a track for each motion."""
+def _pins(cloth: Surface, nodes: np.ndarray, times: np.ndarray) -> List[Dict[str, Any]]:
+    """Nodes that stay, or move with a rigid object, as one pin; nodes that an armature, shape keys and the like move with a track for each motion."""
     if not len(nodes):
         return []
-    still, moving = [], {}
+    rotations = None if cloth.deforms() else mesh.rigid_motion(np.array(cloth.matrices))
+    if rotations is not None:
+        return [{"name": "pinned", "nodes": nodes.tolist(), **_motion(cloth, rotations, times)}]
+    motions: Dict[bytes, Tuple[List[int], np.ndarray]] = {}
     paths = np.stack([cloth.points(k)[nodes] for k in range(len(times))], 1)  # nodes x frames x 3
-    for node, path in zip(nodes.tolist(), paths):
-        if (path == path[0]).all():
-            still.append(node)
-        else:
-            moving.setdefault((path - path[0]).tobytes(), []).append((node, path - path[0]))
-    pins: List[Dict[str, Any]] = [{"name": "pinned", "nodes": still}] if still else []
-    return pins + [{"nodes": [node for node, _ in group], "track": _track(times, group[0][1])} for group in moving.values()]
+    for node, path in zip(nodes.tolist(), paths - paths[:, :1]):
+        motions.setdefault(path.tobytes(), ([], path))[0].append(node)
+    return [{"nodes": group, **({"track": _track(times, path)} if path.any() else {})} for group, path in motions.values()]
 
 
 def pinned_nodes(thing) -> np.ndarray:
@@ -186,7 +204,7 @@ def pinned_nodes(thing) -> np.ndarray:
     return np.array(nodes)
 
 
-def _cloth(thing, samples: Samples, folder: str, times: np.ndarray) -> Dict[str, Any]:
+def _cloth(thing, samples: Samples, folder: str) -> Dict[str, Any]:
     settings, cloth = thing.drape, samples.cloth
     x = np.empty(3 * len(thing.data.vertices), np.float32)
     thing.data.vertices.foreach_get("co", x)
@@ -213,8 +231,10 @@ def _cloth(thing, samples: Samples, folder: str, times: np.ndarray) -> Dict[str,
     if settings.damping > 0:
         terms.append({"type": "damp.kelvin_voigt", "beta": settings.damping})
     if settings.air:
-        terms.append({"type": "drag.wind", "wind": samples.wind[0].tolist(), "density": settings.air_density})
-    made = {"name": thing.name, "mesh": {"file": "cloth.obj"}, "material": material, "terms": terms, "pins": _pins(thing, cloth, pinned_nodes(thing), times)}
+        terms.append({"type": "drag.wind", "wind": samples.wind.vector.tolist(), "density": settings.air_density})
+        if samples.wind.history:
+            terms[-1]["history"] = samples.wind.history["name"]
+    made = {"name": thing.name, "mesh": {"file": "cloth.obj"}, "material": material, "terms": terms, "pins": _pins(cloth, pinned_nodes(thing), samples.times)}
     if not np.array_equal(cloth.local[0], local):
         mesh.write_obj(os.path.join(folder, "start.obj"), cloth.points(0), triangles)
         made["start"] = {"file": "start.obj"}
@@ -260,8 +280,8 @@ def _body(surface: Surface, settings) -> Optional[Dict[str, Any]]:
     return None
 
 
-def _collider(number: int, surface: Surface, folder: str, times: np.ndarray, rate: float) -> Dict[str, Any]:
-    settings = surface.thing.drape
+def _collider(number: int, surface: Surface, folder: str, samples: Samples) -> Dict[str, Any]:
+    settings, times = surface.thing.drape, samples.times
     common = {"name": surface.name, "friction": settings.friction}
     if settings.shape != "PLANE" and not len(surface.triangles):
         raise Problem(f"{surface.name}: has no faces")
@@ -282,7 +302,7 @@ def _collider(number: int, surface: Surface, folder: str, times: np.ndarray, rat
         return {"type": "mesh", "file": obj, **common, **_motion(surface, rotations, times)}
     moves = rotations is None or any((matrix != surface.matrices[0]).any() for matrix in surface.matrices)
     np.save(os.path.join(folder, npy), np.stack([surface.points(k)[nodes] for k in range(len(times) if moves else 1)]))
-    return {"type": "animated_mesh", "file": npy, "mesh": obj, "frame_rate": rate, "open": not closed, "thickness": settings.surface_thickness, **common}
+    return {"type": "animated_mesh", "file": npy, "mesh": obj, "frame_rate": samples.rate, "open": not closed, "thickness": settings.surface_thickness, **common}
 
 
 def export(context, thing, folder: str) -> Exported:
@@ -293,34 +313,35 @@ def export(context, thing, folder: str) -> Exported:
     if os.path.isdir(folder) and os.listdir(folder) and SCENE not in os.listdir(folder):
         raise Problem(f"the folder {folder} has files of something else: choose another one")
     samples = Samples(context, thing)
-    rate = scene.render.fps / scene.render.fps_base
     with tempfile.TemporaryDirectory() as made:
-        _write(thing, samples, np.arange(len(samples.gravity)) / rate, rate, made)
+        _write(thing, samples, made)
         os.makedirs(folder, exist_ok=True)
         for name in os.listdir(folder):
             if EXPORTED.fullmatch(name):
                 os.remove(os.path.join(folder, name))
         for name in os.listdir(made):
             shutil.move(os.path.join(made, name), os.path.join(folder, name))
-    warnings = [f"the {what} is animated: the cloth feels that of the first frame throughout"
-                for what, values in (("gravity", samples.gravity), (f"wind ({', '.join(samples.winds)})", samples.wind))
-                if any((value != values[0]).any() for value in values)]
-    return Exported(len(samples.gravity), warnings)
+    return Exported(len(samples.times), [course.warning for course in (samples.gravity, samples.wind) if course.warning])
 
 
-def _write(thing, samples: Samples, times: np.ndarray, rate: float, folder: str) -> None:
+def _write(thing, samples: Samples, folder: str) -> None:
     settings = thing.drape
     made: Dict[str, Any] = {
         "drape": 1,
         "description": f"{thing.name}, of {bpy.path.basename(bpy.data.filepath) or 'a file without a name'}",
-        "cloth": [_cloth(thing, samples, folder, times)],
-        "gravity": samples.gravity[0].tolist(),
-        "colliders": [_collider(number, surface, folder, times, rate) for number, surface in enumerate(samples.colliders)],
+        "cloth": [_cloth(thing, samples, folder)],
+        "gravity": samples.gravity.vector.tolist(),
+        "colliders": [_collider(number, surface, folder, samples) for number, surface in enumerate(samples.colliders)],
         "contact": {"distance": settings.contact_distance} if settings.contact_distance > 0 else {},
-        "integrator": integrator(settings, rate),
-        "duration": times[-1],
-        "frame_rate": rate,
+        "integrator": integrator(settings, samples.rate),
+        "duration": samples.times[-1],
+        "frame_rate": samples.rate,
         "output": {"formats": ["npy"]}}
+    histories = [course.history for course in (samples.gravity, samples.wind) if course.history]
+    if histories:
+        made["histories"] = histories
+    if samples.gravity.history:
+        made["gravity_history"] = samples.gravity.history["name"]
     if settings.self_contact:
         made["self_contact"] = {"thickness": settings.layer_distance / 2, "friction": settings.layer_friction}
     if settings.untangle:

@@ -122,7 +122,7 @@ class Bake:
         if code == 0 or self.cancelled and code in (INTERRUPTED, -signal.SIGTERM, -signal.SIGKILL):
             return None
         said = [line for line in self.log().splitlines() if line.strip() and not line.startswith("warning: ")]
-        return names.explain(said[-1]) if said else f"drape ended with {code}"
+        return names.explain(said[-1] if said else f"drape ended with {code}")
 
     def warnings(self, names: "Names") -> List[str]:
         """What the program found unusual about the run."""

@@ -180,6 +180,15 @@ def test_transform_and_unit():
 
 def test_pins():
     """vertices of a group are held from the threshold on, and move with the object; deforming modifiers before the cloth move them, too"""
+    def held(cloth):
+        """How far the pins of a bake are at most from where Blender has them without the cloth."""
+        x = plays(cloth, bake(cloth))
+        cloth.modifiers["Drape"].show_viewport = False
+        expected = np.stack([world(cloth, k)[:8] for k in range(1, FRAMES + 1)])
+        cloth.modifiers["Drape"].show_viewport = True
+        bpy.context.scene.frame_set(1)
+        return np.abs(x[:, :8] - expected).max()
+
     new_file()
     cloth = sheet(z=3, quality="DRAFT", pin_group="rim", pin_threshold=0.5)
     group = cloth.vertex_groups.new(name="rim")
@@ -190,10 +199,14 @@ def test_pins():
     x = plays(cloth, folder)
     assert (x[:, :8] == x[0, :8]).all() and x[-1, 63, 2] < x[0, 63, 2] - 0.1
 
-    bpy.ops.drape.clear()
     cloth.keyframe_insert("rotation_euler", frame=1)
     cloth.rotation_euler.z = radians(30)
     cloth.keyframe_insert("rotation_euler", frame=FRAMES)
+    assert held(cloth) < 1e-5
+    pin, = scene_of(folder)["cloth"][0]["pins"]
+    assert pin["nodes"] == list(range(8)) and len(pin["turns"]) == FRAMES and "track" not in pin
+
+    bpy.ops.drape.clear()
     hooked = cloth.modifiers.new("Hook", "HOOK")  # carries node 3 up by 0.2 m
     bpy.ops.object.empty_add(location=(0, 0, 3))
     hook = bpy.context.object
@@ -204,13 +217,8 @@ def test_pins():
     hook.keyframe_insert("location", frame=FRAMES)
     bpy.context.scene.frame_set(1)
     bpy.ops.object.select_all(action="DESELECT")
-    folder = bake(cloth)
-    assert [modifier.name for modifier in cloth.modifiers] == ["Hook", "Drape"]
-    cloth.modifiers["Drape"].show_viewport = False
-    expected = np.stack([world(cloth, k)[:8] for k in range(1, FRAMES + 1)])
-    cloth.modifiers["Drape"].show_viewport = True
-    x = plays(cloth, folder)
-    assert np.abs(x[:, :8] - expected).max() < 1e-5, np.abs(x[:, :8] - expected).max()
+    assert held(cloth) < 1e-5 and [modifier.name for modifier in cloth.modifiers] == ["Hook", "Drape"]
+    x = z_up(positions(folder))
     assert abs(x[-1, 3, 2] - 3.2) < 1e-5 and np.abs(x[-1, 0] - x[0, 0])[:2].max() > 0.1
 
     cloth.drape.pin_threshold = 0.9
@@ -313,7 +321,7 @@ def test_deforming_collider():
 
 
 def test_wind():
-    """the force fields of the type Wind add up to the wind of the scene, in m/s along their z axes; without air there is none"""
+    """the force fields of the type Wind add up to the wind, in m/s along their z axes; it and gravity may change in time; without air there is none"""
     scene = new_file()
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     bpy.ops.object.effector_add(type="WIND", rotation=(0, radians(90), 0))
@@ -329,9 +337,31 @@ def test_wind():
     assert np.allclose(wind["wind"], [5, 0, -2], atol=1e-5) and np.isclose(wind["density"], 1.225), wind
     x = plays(cloth, folder)
     assert x[-1][:, 0].mean() > x[0][:, 0].mean() + 0.1, x[-1][:, 0].mean() - x[0][:, 0].mean()
+    fields = [thing for thing in scene.objects if thing.field and thing.field.type == "WIND"]
+    for thing in fields:
+        thing.field.keyframe_insert("strength", frame=1)
+        thing.field.strength *= -2
+        thing.field.keyframe_insert("strength", frame=2 * FRAMES)
+    scene.keyframe_insert("gravity", frame=1)
+    scene.gravity = 0, 0, -2 * 9.81
+    scene.keyframe_insert("gravity", frame=2 * FRAMES)
+    made = scene_of(bake(cloth))
+    wind, = [term for term in made["cloth"][0]["terms"] if term["type"] == "drag.wind"]
+    assert np.allclose(wind["wind"], [-10, 0, 4], atol=1e-5) and wind["history"] == "wind" and made["gravity_history"] == "gravity"
+    assert np.allclose(made["gravity"], [0, -2 * 9.81, 0])
+    courses = {course["name"]: course for course in made["histories"]}
+    assert np.allclose([courses["wind"]["values"][k] for k in (0, -1)], [-0.5, 1]) and np.allclose([courses["gravity"]["values"][k] for k in (0, -1)], [0.5, 1])
+    assert np.allclose(courses["wind"]["times"], np.arange(2 * FRAMES) / RATE)
+    assert plays(cloth, operators.folder_of(cloth))[-1][:, 0].mean() < x[-1][:, 0].mean()
+    fields[0].keyframe_insert("rotation_euler", frame=1)
+    fields[0].rotation_euler.z += 1
+    fields[0].keyframe_insert("rotation_euler", frame=2 * FRAMES)
+    warning, = export.export(bpy.context, cloth, os.path.abspath("other")).warnings
+    assert warning.startswith("the wind (") and "changes its direction: the cloth feels that of the first frame" in warning
     cloth.drape.air = False
     scene.use_gravity = False
     made = scene_of(bake(cloth))
+    assert "histories" not in made and "gravity_history" not in made
     assert [term["type"] for term in made["cloth"][0]["terms"]] == ["stretch.cst", "bend.midedge", "damp.kelvin_voigt"] and made["gravity"] == [0, 0, 0]
 
 
@@ -369,6 +399,27 @@ def test_cancel_and_resume():
     again = run_again(folder)
     for name in "positions.npy", "steps.csv", "energy.csv":
         same_bytes(f"{folder}/run/{name}", f"{again}/{name}")
+
+
+def test_crash():
+    """if the program ends in the middle of a bake, the frames so far are shown, and the bake resumes"""
+    new_file(frames=60)
+    cloth = sheet(side=12, pin_group="rim")
+    cloth.vertex_groups.new(name="rim").add([0, 11], 1, "REPLACE")
+
+    def crash():
+        while cloth.name not in operators.running or operators.running[cloth.name].done() < 12:
+            time.sleep(0.01)
+        operators.running[cloth.name]._process.kill()
+
+    thread = threading.Thread(target=crash)
+    thread.start()
+    assert "Tablecloth: drape ended with -9" in refused(cloth)
+    thread.join()
+    folder = operators.folder_of(cloth)
+    x = plays(cloth, folder)
+    assert 12 <= len(x) < 60
+    assert (z_up(positions(bake(cloth, "resume")))[:len(x)] == x).all() and len(positions(folder)) == 60
 
 
 def test_errors():
