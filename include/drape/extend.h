@@ -40,8 +40,8 @@ typedef enum drape_param_kind {
                             [degrees], to which the range applies; may also be given as axis and angle, four
                             numbers */
     DRAPE_PARAM_TEXT     /* a text, such as a file name; its numerical value is always 0. Of a term, one that
-                            is called "history" names a history of the scene: the library multiplies an external
-                            load by its factor, and other terms read it in el->factor */
+                            is called "history" names a history of the scene: the library multiplies an
+                            external load by its factor, and other terms read it in el->factor */
 } drape_param_kind;
 
 /* One parameter. All values are stored as doubles: integers exactly, booleans as 0 or 1, choices by index. A
