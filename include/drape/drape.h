@@ -108,12 +108,12 @@ DRAPE_API const char *drape_context_message(const drape_context *ctx);
 
 /* One parameter, given by name. Numbers and integers go into number, with text and vector NULL; choices and
  * file names go into text; booleans go into text as "true" or "false", or into number as 0 or 1; vectors go
- * into vector. */
+ * into vector, and so do points of a curve, as x0 y0 x1 y1 ... */
 typedef struct drape_setting {
     const char *name;     /* name of the parameter */
-    double number;        /* value of a number, integer or boolean */
+    double number;        /* value of a number, integer or boolean; with vector 0, or 2 if it is of pairs */
     const char *text;     /* value of a choice, file name or boolean; NULL: none */
-    const double *vector; /* vector_count numbers: 3, or 4 for axis and angle [degrees] */
+    const double *vector; /* vector_count numbers: 3, 4 for axis and angle [degrees], or those of points */
     size_t vector_count;  /* length of vector */
 } drape_setting;
 

@@ -33,6 +33,8 @@ static json_t *value_of(const drape_param *param, const double *value, const dra
         return vector(value);
     case DRAPE_PARAM_TEXT:
         return drape_json_text(choice ? cli_text_of(choice, param->name) : "");
+    case DRAPE_PARAM_POINTS: /* their number */
+        return count((int64_t)*value);
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
         break;

@@ -125,6 +125,7 @@ static json_t *default_of(const drape_param *p, const double *values)
         return three(values);
     case DRAPE_PARAM_TEXT:
         return json_string(p->derived);
+    case DRAPE_PARAM_POINTS: /* they have no default */
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
         break;
@@ -161,6 +162,9 @@ static json_t *value_of(const drape_param *p)
         return vector_of(p);
     case DRAPE_PARAM_TURN:
         return numbers(3, 4);
+    case DRAPE_PARAM_POINTS:
+        return drape_json_with(drape_json_with(typed("array"), "items", numbers(2, 2)), "minItems",
+                               json_integer(1));
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
         break;

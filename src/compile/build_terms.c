@@ -59,6 +59,17 @@ void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t 
         builder->rest[(size_t)k * (size_t)el->count + (size_t)element] = rest[k];
 }
 
+double *drape_term_share(drape_term_builder *builder, int32_t count)
+{
+    drape_elements *el = &builder->term->elements;
+    if (el->shared || count <= 0)
+        return NULL;
+    double *shared = drape_arena_take(&builder->model->arena, (size_t)count, sizeof *shared);
+    el->shared = shared;
+    el->shared_count = shared ? count : 0;
+    return shared;
+}
+
 drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
 {
     char text[512];
@@ -130,7 +141,10 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .gravity = {model->gravity[0], model->gravity[1], model->gravity[2]},
                               .tension = cloth->tension.warp > 0 ? &cloth->tension : NULL,
                               .bending = cloth->bending.warp > 0 ? &cloth->bending : NULL,
-                              .user = user};
+                              .user = user,
+                              .warp_curve = cloth->curves[DRAPE_CURVE_WARP],
+                              .weft_curve = cloth->curves[DRAPE_CURVE_WEFT],
+                              .shear_curve = cloth->curves[DRAPE_CURVE_SHEAR]};
 }
 
 static bool is_owned(const drape_term_builder *builder, int32_t node)

@@ -33,7 +33,8 @@ static drape_status take_file(drape_model *model, const char *pointer, const cha
         status = drape_mesh_fail(
             model->ctx, &source, 0, "%d nodes and %d triangles; the mesh of the cloth has %d and %d",
             (int)read.node_count, (int)read.triangle_count, (int)mesh->node_count, (int)mesh->triangle_count);
-    for (int32_t t = 0; !status && t < mesh->triangle_count; t++) {
+    const bool same = !status && drape_faces_same(&read, mesh);
+    for (int32_t t = 0; !status && !same && t < mesh->triangle_count; t++) {
         const int32_t *a = read.triangle + 3 * (size_t)t, *b = mesh->triangle + 3 * (size_t)t;
         if (memcmp(a, b, 3 * sizeof *a) != 0)
             status = drape_mesh_fail(

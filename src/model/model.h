@@ -133,6 +133,9 @@ typedef struct drape_choice {
     size_t setting_count;
 } drape_choice;
 
+/* The measured curves of a material. */
+enum { DRAPE_CURVE_WARP, DRAPE_CURVE_WEFT, DRAPE_CURVE_SHEAR, DRAPE_CURVE_COUNT };
+
 /* One cloth: its mesh at rest and the data of the scene. */
 typedef struct drape_cloth {
     char *name;
@@ -143,8 +146,9 @@ typedef struct drape_cloth {
     double scale[3], rotate[4], translate[3];
     double material_values[DRAPE_MAX_PARAMS]; /* in the order of the parameters of drape_material_entry */
     drape_material material;
-    drape_woven tension, bending; /* of a measured fabric; warp 0: not a measured fabric */
-    double *material_mass;        /* (mesh.node_count) [kg] of the material alone */
+    drape_woven tension, bending;           /* of a measured fabric; warp 0: not a measured fabric */
+    drape_points curves[DRAPE_CURVE_COUNT]; /* measured: see drape_cloth_view */
+    double *material_mass;                  /* (mesh.node_count) [kg] of the material alone */
     double *node_mass;     /* (mesh.node_count) [kg] with the "masses" of the scene; material_mass itself
                                      if there are none */
     uint8_t *edge_clamped; /* (mesh.edge_count) 1: both nodes are held by pins that clamp */

@@ -67,6 +67,9 @@ bool drape_scene_value(const drape_scene_key *key, const void *def, drape_settin
     case DRAPE_PARAM_CHOICE:
     case DRAPE_PARAM_TEXT:
         memcpy(&out->text, at, sizeof out->text);
+        break;
+    case DRAPE_PARAM_POINTS: /* only settings are points */
+        break;
     }
     return out->text;
 }
@@ -112,6 +115,9 @@ void drape_scene_store(const drape_scene_key *key, const drape_setting *setting,
         break;
     case DRAPE_PARAM_TEXT:
         word = setting->text;
+        break;
+    case DRAPE_PARAM_POINTS:
+        return;
     }
     memcpy(at, &word, sizeof word);
 }

@@ -151,7 +151,7 @@ static int32_t hinge_at(const drape_cloth_view *cloth, int32_t edge)
  * first. Returns the sign of its angle in the patch, which depends on the orientation of the triangle. */
 static int part_nodes(const drape_cloth_view *cloth, const drape_midedge *patch, int h, int32_t node[4])
 {
-    const int *local = drape_midedge_hinge[h];
+    const int *local = drape_patch_hinge[h];
     if (h < 3 && patch->clamped[h]) {
         for (int a = 0; a < 4; a++)
             node[a] = patch->node[local[a % 3]];

@@ -36,7 +36,7 @@
 
 typedef struct drawn {
     drape_setting setting[DRAPE_MAX_PARAMS];
-    double vector[DRAPE_MAX_PARAMS][3];
+    double vector[DRAPE_MAX_PARAMS][4];
     size_t count;
 } drawn;
 
@@ -70,7 +70,12 @@ static void draw_value(fuzz_bytes *in, const drape_param *p, int span, drape_set
         s->number = draw_number(in, p);
     else if (p->kind == DRAPE_PARAM_TEXT)
         s->text = strcmp(p->name, "history") == 0 ? HISTORY : "missing.obj";
-    else {
+    else if (p->kind == DRAPE_PARAM_POINTS) { /* one point, or a second one that may lie lower */
+        vector[0] = draw_number(in, p), vector[1] = fuzz_magnitude(in, 1e-9, 1e15);
+        vector[2] = draw_number(in, p), vector[3] = fuzz_magnitude(in, 1e-9, 1e15);
+        s->vector = vector;
+        s->vector_count = fuzz_below(in, 2) ? 4 : 2;
+    } else {
         for (int k = 0; k < 3; k++)
             vector[k] = fuzz_between(in, fmax(p->min + (p->open_min ? 1e-3 : 0), -1), fmin(p->max, 1));
         s->vector = vector;
