@@ -642,9 +642,9 @@ static void measure_load(drape_system *system, const drape_term *term, const dra
         *rate += g[i] * at->v[i];
 }
 
-/* The work of a load E = f(t) E0(x) whose factor changes, int f' E0 dt = [f E0] - int f E0' dt, with E0 as the
- * cubic through its values and rates at both ends, by Gauss's rule of three points; f counts from its value at
- * the beginning, so that a constant one does no work. */
+/* The work of a load E = f(t) E0(x) whose factor changes, int f' E0 dt = [f E0] - int f E0' dt, with E0 as
+ * the cubic through its values and rates at both ends, by Gauss's rule of three points; f counts from its
+ * value at the beginning, so that a constant one does no work. */
 static double history_work(drape_system *system, const drape_term *term, const drape_point *from,
                            const drape_point *to)
 {

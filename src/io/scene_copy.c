@@ -1,5 +1,5 @@
-/* scene_copy.c: see scene_copy.h. A scene names files as sources of the meshes of cloths and of their starts, and in
- * the text parameters of colliders. */
+/* scene_copy.c: see scene_copy.h. A scene names files as sources of the meshes of cloths and of their
+ * starts, and in the text parameters of colliders. */
 #include "io/scene_copy.h"
 
 #include <errno.h>

@@ -12,8 +12,8 @@
 /* Called for each file that a scene names, with its path and the JSON pointer of its name. */
 typedef drape_status drape_file_visit(void *user, const char *path, const char *pointer);
 
-/* Visits the meshes of cloths and colliders and the files of starts of a scene, whose file is at `scene`; "": in the working
- * directory. Errors: those of visit, DRAPE_E_MEMORY. */
+/* Visits the meshes of cloths and colliders and the files of starts of a scene, whose file is at `scene`;
+ * "": in the working directory. Errors: those of visit, DRAPE_E_MEMORY. */
 drape_status drape_scene_files(drape_context *ctx, const drape_model *model, const char *scene,
                                drape_file_visit *visit, void *user);
 

@@ -44,8 +44,8 @@ static void take_free(const drape_model *m, const double *nodes, double *free)
         memcpy(free + 3 * (size_t)f, nodes + 3 * (size_t)m->node_of_free[f], 3 * sizeof *free);
 }
 
-/* Refuses loads without a potential, by the stiffness of these alone: as the cloth is held it may be symmetric
- * after all, as under the pressure on cloth that is pinned all round. */
+/* Refuses loads without a potential, by the stiffness of these alone: as the cloth is held it may be
+ * symmetric after all, as under the pressure on cloth that is pinned all round. */
 static drape_status check_potential(const lab_tangent *t, const drape_point *point)
 {
     if (!t->follows)

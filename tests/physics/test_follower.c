@@ -1,5 +1,5 @@
-/* test_follower.c: load.follower: its resultant on any cloth, the reactions of a rim, a strip with open sides
- * inflated to an arc, against closed forms; the same forces as load.pressure inside. */
+/* test_follower.c: load.follower: its resultant on any cloth, the reactions of a rim, a strip with open
+ * sides inflated to an arc, against closed forms; the same forces as load.pressure inside. */
 #include "support/scene.h"
 
 #define PRESSURE 50.0
@@ -55,9 +55,9 @@ START_TEST(the_resultant_is_pressure_times_area)
 }
 END_TEST
 
-/* A square membrane, pinned all round, carries the pressure on the area of its rim, 0.3 m x 0.3 m, whatever its
- * shape: to the residual of the nodes inside, 1e-9 N each here. load.pressure, with its apex in the plane of
- * the rim, leaves the rim a third of the pressure on the triangles at it: it does not. */
+/* A square membrane, pinned all round, carries the pressure on the area of its rim, 0.3 m x 0.3 m,
+ * whatever its shape: to the residual of the nodes inside, 1e-9 N each here. load.pressure, with its apex
+ * in the plane of the rim, leaves the rim a third of the pressure on the triangles at it: it does not. */
 START_TEST(a_rim_carries_pressure_times_area)
 {
     for (int k = 0; k < 2; k++) {
@@ -89,10 +89,10 @@ START_TEST(a_rim_carries_pressure_times_area)
 END_TEST
 
 /* A strip of length L between two pinned ends, its sides open, is inflated to an arc of radius R and half
- * angle a, stretched l = a/sin a: R = L/(2 sin a), and with Green's strain the tension E h (l^2 - 1)/2 l is p R
- * (nu = 0). Chords of n segments are shorter than the arc by (a/n)^2/6 of its excess; with 24 of them and a =
- * 0.6 that is 1e-4 of the height, and bending, over sqrt(D/N) = 2 mm at the ends, 1e-3: 0.3 % in all. The sides
- * are as high as the middle, to the same. */
+ * angle a, stretched l = a/sin a: R = L/(2 sin a), and with Green's strain the tension E h (l^2 - 1)/2 l
+ * is p R (nu = 0). Chords of n segments are shorter than the arc by (a/n)^2/6 of its excess; with 24 of
+ * them and a = 0.6 that is 1e-4 of the height, and bending, over sqrt(D/N) = 2 mm at the ends, 1e-3: 0.3 %
+ * in all. The sides are as high as the middle, to the same. */
 START_TEST(a_strip_with_open_sides_is_an_arc)
 {
     static const char *const methods[] = {"static", "be"};

@@ -1,14 +1,14 @@
-/* test_history.c: loads that vary in time: the factors, the same bits as loads of that size, impulses and work,
- * steps that end where the course of a load has a kink; refusals. */
+/* test_history.c: loads that vary in time: the factors, the same bits as loads of that size, impulses and
+ * work, steps that end where the course of a load has a kink; refusals. */
 #include "integrators/integrator.h"
 #include "model/history.h"
 #include "support/scene.h"
 
 /* ---- The factor ---- */
 
-/* Linear and cubic through (0, 1), (1, 3), (3, 2), (4, 2): constant outside, through the values, beyond none of
- * them, the cubic with a continuous slope: a difference over d = 1e-6 misses the slope by d/2 f'' < 1e-5 or, at
- * a key, twice that. A cubic over one interval is the smooth step s^2 (3 - 2 s) to the bit. */
+/* Linear and cubic through (0, 1), (1, 3), (3, 2), (4, 2): constant outside, through the values, beyond
+ * none of them, the cubic with a continuous slope: a difference over d = 1e-6 misses the slope by d/2 f''
+ * < 1e-5 or, at a key, twice that. A cubic over one interval is the smooth step s^2 (3 - 2 s) to the bit. */
 START_TEST(factors_are_those_of_the_keys)
 {
     double time[] = {0, 1, 3, 4}, value[] = {1, 3, 2, 2}, slope[4];
@@ -95,8 +95,8 @@ START_TEST(a_history_multiplies_every_load)
 }
 END_TEST
 
-/* Backward Euler gives a free sheet the velocity g sum h f(t_k) to rounding, under gravity with a history that
- * is linear from 0 to 2 in 0.1 s, and then falls to -1 in 0.2 s. */
+/* Backward Euler gives a free sheet the velocity g sum h f(t_k) to rounding, under gravity with a history
+ * that is linear from 0 to 2 in 0.1 s, and then falls to -1 in 0.2 s. */
 START_TEST(gravity_with_a_history_adds_up_to_its_impulse)
 {
     scene s =
@@ -155,8 +155,8 @@ START_TEST(steps_end_at_kinks)
 END_TEST
 
 /* A free sheet of mass m under gravity f(t) g from rest, f = t/T: v = g t^2/(2 T) = 1 m/s. The potential
- * -m g f y and the work of the changing factor are both in the account, which closes although radau makes few
- * steps: to the errors of its tolerance, 1e-8 of the energy. */
+ * -m g f y and the work of the changing factor are both in the account, which closes although radau makes
+ * few steps: to the errors of its tolerance, 1e-8 of the energy. */
 START_TEST(the_energy_account_closes)
 {
     for (int cubic = 0; cubic < 2; cubic++) {
@@ -181,8 +181,8 @@ END_TEST
 
 /* ---- Statics ---- */
 
-/* An equilibrium has the loads of its time: a quarter of the load with the factor 4, to the residual of static,
- * 1e-10 N over 10 N/m. */
+/* An equilibrium has the loads of its time: a quarter of the load with the factor 4, to the residual of
+ * static, 1e-10 N over 10 N/m. */
 START_TEST(an_equilibrium_has_the_load_of_its_time)
 {
     scene a = loaded("'type': 'load.line', 'edge': 'right', 'force': [0.2, 0, 0]", "", "static");
