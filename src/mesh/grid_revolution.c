@@ -4,7 +4,7 @@
  * bottom circle at y = -height; columns are meridians, c angle/(columns - 1) from x towards -z, the first and
  * the last one not joined, at 360 degrees neither: a slit. Between the circles, a meridian is straight, or an
  * arc of arc_radius that bulges away from the axis; nodes divide it evenly. A sphere has arc_radius R,
- * top_radius R sin t, bottom_radius R sin b and height R (cos t - cos b), with t and b the angles from the axis.
+ * top_radius R sin t, bottom_radius R sin b and height R (cos t - cos b), t and b the angles from the axis.
  *
  * Triangles are counterclockwise as seen from outside or, if the bottom circle is the larger one, from above.
  */

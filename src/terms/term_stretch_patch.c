@@ -12,8 +12,9 @@
  *
  * Curvature. Straight edges of a bent sheet are shorter than at rest. With x,ab the second derivatives of the
  * sheet, an isometric bending has x,a.x,bcd = -x,ab.x,cd, so that
- *     d.d = g(d,d) - |x,dd|^2/12,  a.a = g(a,a) - |x,aa|^2/12,  d.a = g(d,a) - x,da.(x,dd + x,aa)/24
- * up to terms of fourth order, g the metric of the sheet at the middle. What is missing differs from edge to
+ *     d.d = g(d,d) - |x,dd|^2/12,  a.a = g(a,a) - |x,aa|^2/12,
+ *     d.a = g(d,a) - x,da.(x,dd + x,aa)/24 - x,do.x,ao/2
+ * up to terms of fourth order, g the metric of the sheet, o from the middle of d to that of a. What is missing differs from edge to
  * edge; in general no displacement in the plane balances it, and triangles resist: membrane locking
  * (Stolarski & Belytschko 1983). Here it is added, with second derivatives that are sums of c_k x_k over the
  * six nodes of the patch, exact for quadratics in the plane of the triangle at rest (Cirak, Ortiz & Schroeder
@@ -150,8 +151,8 @@ static void positive(const drape_elements *el, int32_t first, int32_t count, con
 
 /* ---- Second derivatives ---- */
 
-/* The second derivatives of the sheet at a triangle. They are taken in coordinates in which it is equilateral,
- * so that a mesh of thin triangles is fitted as well as one of good ones. */
+/* The second derivatives of the sheet at a triangle. They are taken in coordinates in which it is
+ * equilateral, so that a mesh of thin triangles is fitted as well as one of good ones. */
 typedef struct fit {
     const drape_patch *patch;
     int extra[3];       /* places in the patch of the nodes besides those of the triangle; 0: none */
@@ -159,7 +160,8 @@ typedef struct fit {
     double cost;        /* squares of the c of the others, and of what they do not determine */
 } fit;
 
-/* A vector of the plane in these coordinates; lambda (2) are its components along the sides of the triangle. */
+/* A vector of the plane in these coordinates; lambda (2) are its components along two sides of the
+ * triangle. */
 static void transform(const double *flat, const double v[2], double lambda[2], double to[2])
 {
     const double a[2] = {flat[2] - flat[0], flat[3] - flat[1]}, b[2] = {flat[4] - flat[0], flat[5] - flat[1]};
@@ -170,8 +172,8 @@ static void transform(const double *flat, const double v[2], double lambda[2], d
     to[1] = lambda[1] * sqrt(3) / 2;
 }
 
-/* A function is larger at another node than continued linearly from the triangle by x,11 m0 + x,22 m1 + 2 x,12
- * m2: equations for c. */
+/* A function is larger at another node than continued linearly from the triangle by x,11 m0 + x,22 m1 + 2
+ * x,12 m2: equations for c. */
 static void fit_nodes(const drape_patch *patch, const int extra[3], fit *out)
 {
     const double *flat = patch->flat;
@@ -283,12 +285,19 @@ static void difference(const fit *f, int from, int to, double rest[2], double of
 static void add_inner_edge(const fit *f, int edge, const double l[3], double share, double w[NODES * NODES])
 {
     const int *hinge = drape_patch_hinge[edge];
-    double flat[6] = {0}, weight[3], d[NODES], a[NODES], dd[NODES], da[NODES], aa[NODES];
+    double flat[6] = {0}, o[2], weight[3], d[NODES], a[NODES], dd[NODES], da[NODES], aa[NODES], od[NODES],
+           oa[NODES];
     difference(f, hinge[0], hinge[1], flat + 2, d);
     difference(f, hinge[3], hinge[2], flat + 4, a);
+    for (int k = 0; k < 2; k++)
+        o[k] = (f->patch->flat[2 * hinge[2] + k] + f->patch->flat[2 * hinge[3] + k] -
+                f->patch->flat[2 * hinge[0] + k] - f->patch->flat[2 * hinge[1] + k]) /
+               2;
     second_derivative(f, flat + 2, flat + 2, dd);
     second_derivative(f, flat + 2, flat + 4, da);
     second_derivative(f, flat + 4, flat + 4, aa);
+    second_derivative(f, o, flat + 2, od);
+    second_derivative(f, o, flat + 4, oa);
     drape_strain_weights(l, flat, weight);
     for (int k = 0; k < 3; k++)
         weight[k] *= share;
@@ -298,6 +307,7 @@ static void add_inner_edge(const fit *f, int edge, const double l[3], double sha
     add_product(weight[0] / 24, dd, dd, w);
     add_product(weight[1] / 24, da, dd, w);
     add_product(weight[1] / 24, da, aa, w);
+    add_product(weight[1] / 2, od, oa, w);
     add_product(weight[2] / 24, aa, aa, w);
 }
 
