@@ -39,7 +39,9 @@ typedef enum drape_param_kind {
     DRAPE_PARAM_TURN,    /* a rotation as three values: a vector along the axis whose length is the angle
                             [degrees], to which the range applies; may also be given as axis and angle, four
                             numbers */
-    DRAPE_PARAM_TEXT,    /* a text, such as a file name; its numerical value is always 0 */
+    DRAPE_PARAM_TEXT,    /* a text, such as a file name; its numerical value is always 0. Of a term, one that
+                            is called "history" names a history of the scene: the library multiplies an external
+                            load by its factor, and other terms read it in el->factor */
     DRAPE_PARAM_POINTS   /* points of an increasing curve that begins at 0, 0, which is not one of them: pairs
                             of numbers, both increasing from point to point. The range applies to the first;
                             the second is from 1e-9 to 1e15. The numerical value is the number of points */
@@ -327,8 +329,9 @@ typedef struct drape_elements {
     const drape_parts *parts; /* NULL: the term has none */
     void *user;               /* of the term's ops */
     double progress;          /* for the function energy of a term with drape_term_timed: 0 to 1; else 0 */
-    int32_t shared_count;     /* length of shared */
-    const double *shared;     /* numbers of drape_term_share; NULL: none */
+    double factor;        /* of the history that a parameter "history" names, at the present time; else 1 */
+    int32_t shared_count; /* length of shared */
+    const double *shared; /* numbers of drape_term_share; NULL: none */
 } drape_elements;
 
 /* The fault that a check found, for the message of a rejected step. */

@@ -29,7 +29,8 @@ typedef struct drape_point {
     const double *history;  /* (measure_count) [q/s]; NULL: q' = grad q . v, as in continuous time */
     const double *stress;   /* (measure_count) the f before ddq in a Jacobian; NULL: the forces here */
     double t;               /* [s] time of the colliders' poses, and of terms that depend on it */
-    bool done;              /* energies that depend on time are taken at progress 1 */
+    bool done;              /* energies that depend on time are taken at progress 1, loads at their largest */
+    bool full;              /* loads from outside are taken at progress 1 and without their histories */
     double progressed;      /* added to their progress, for differences */
     double span[2]; /* [s] over which the velocities of colliders are taken; equal: they are at rest */
     bool instant;   /* those that turn have their velocities of time t instead, as the pins of methods that
@@ -65,11 +66,10 @@ drape_motion *drape_system_steer(drape_system *system);
 void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
 
-/* Whether a term depends on time, and the work that this does in a step from nodes x at t0 to y at t1 [J].
- * internal: of the state at t0. */
+/* Whether a term depends on time, and the work that this does in a step from one state to another [J], by the
+ * internal variables of the former. */
 bool drape_system_is_timed(const drape_system *system);
-double drape_system_timed_work(drape_system *system, const double *internal, const double *x, double t0,
-                               const double *y, double t1);
+double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after);
 
 /* From now on the medium moves with this field, if the model has a term that feels it; NULL: it is at
  * rest. */

@@ -282,9 +282,11 @@ static json_t *term(const cli_info *info, int32_t i)
     object = drape_json_with(object, "jacobian_s", drape_json_number(cost->jacobian_seconds));
     object = drape_json_with(
         object, "share", drape_json_number(cli_share(info, cost->residual_seconds + cost->jacobian_seconds)));
-    return drape_json_with(
-        object, "parameters",
-        params_of(from->ops->entry.params, from->ops->entry.param_count, from->params, NULL));
+    json_t *parameters = params_of(from->ops->entry.params, from->ops->entry.param_count, from->params, NULL);
+    if (from->history && *from->history->name)
+        json_object_set_new(json_object_get(parameters, "history"), "value",
+                            drape_json_text(from->history->name));
+    return drape_json_with(object, "parameters", parameters);
 }
 
 /* ---- Costs ---- */
@@ -363,6 +365,7 @@ json_t *cli_info_json(const cli_info *info)
     object = with_contact(object, info);
     object = with_events(object, info);
     object = with_seams(object, model);
+    object = with_list(object, "histories", cli_histories_json(info));
     cli_chosen_entries(info->sim, entries);
     for (int i = 0; i < CLI_CHOSEN; i++)
         object = drape_json_with(object, entries[i].title, chosen(&entries[i], &info->sim->chosen));

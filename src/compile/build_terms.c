@@ -246,6 +246,7 @@ static drape_status begin_term(drape_model *model, int32_t c, int32_t seam, cons
     term->cloth = c;
     term->seam = seam;
     term->elements.user = ops->user;
+    term->elements.factor = 1;
     term->first_internal = term->first_measure = term->first_slider = -1;
     model->term_count++;
     model->has_dissipation = model->has_dissipation || term->ops->dissipative || term->ops->dissipation;
@@ -286,7 +287,8 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
         cloth->laws[cloth->law_count++] = term;
         return DRAPE_OK;
     }
-    return build_elements(model, term, pointer);
+    status = build_elements(model, term, pointer);
+    return status ? status : drape_compile_history_of(model, pointer, def, term);
 }
 
 drape_status drape_compile_weight(drape_model *model)
@@ -331,8 +333,19 @@ static drape_status build_named(drape_model *model, int32_t c, const char *point
     return build_term(model, c, pointer, ops, def);
 }
 
+/* Builds a term that the scene's gravity adds. */
+static drape_status build_implied(drape_model *model, int32_t c, const drape_term_ops *ops,
+                                  const char *history)
+{
+    const drape_setting setting = {.name = DRAPE_HISTORY_PARAM, .text = history};
+    const drape_entry_def def = {
+        .type = ops->entry.name, .settings = &setting, .setting_count = history != NULL};
+    return build_term(model, c, "/gravity", ops, &def);
+}
+
 /* Builds the terms that the scene names, then those that its gravity adds if it is not zero. */
-static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth_def *def)
+static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth_def *def,
+                                const char *gravity_history)
 {
     const double *g = model->gravity;
     const bool has_gravity = g[0] != 0 || g[1] != 0 || g[2] != 0;
@@ -349,7 +362,7 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
     }
     for (int i = 0; !status && has_gravity && (ops = term_at(model->ctx, i)) != NULL; i++)
         if (ops->from_scene_gravity)
-            status = build_term(model, c, "/gravity", ops, &(drape_entry_def){.type = ops->entry.name});
+            status = build_implied(model, c, ops, gravity_history);
     return status;
 }
 
@@ -454,7 +467,7 @@ drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def)
     if (!model->terms)
         return DRAPE_E_MEMORY;
     for (int32_t c = 0; !status && c < model->cloth_count; c++) {
-        status = build_cloth(model, c, &def->cloths[c]);
+        status = build_cloth(model, c, &def->cloths[c], def->gravity_history);
         if (!status)
             status = connect_laws(model, c);
     }

@@ -126,6 +126,11 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
     return status;
 }
 
+void drape_contact_watch(drape_contact *c, const atomic_bool *const *cancel)
+{
+    c->cancel = cancel;
+}
+
 double drape_contact_seconds(const drape_contact *c)
 {
     return c ? c->seconds : 0;

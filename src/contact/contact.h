@@ -13,6 +13,8 @@
 #include "base/archive.h"
 #include "model/motion.h"
 
+#include <stdatomic.h>
+
 typedef struct drape_contact drape_contact;
 
 /* The point at which contact is evaluated. Colliders have their poses at time t; they move with their mean
@@ -27,6 +29,10 @@ typedef struct drape_contact_at {
 /* *out is NULL for a model without colliders and without self-contact. Contact takes all its memory from
  * the arena, later as well, and is freed with it. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion, drape_contact **out);
+/* The address of a flag that any thread may raise (see drape_system_watch); both must live as long as the
+ * contact. While it is up, drape_contact_step_fraction ends early. */
+void drape_contact_watch(drape_contact *contact, const atomic_bool *const *cancel);
+
 double drape_contact_seconds(const drape_contact *contact);        /* spent in all functions of this header */
 double drape_contact_search_seconds(const drape_contact *contact); /* part of it: in the broad phase */
 
@@ -149,7 +155,7 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
  * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered
  * at each node to the smallest fraction of its pairs; where a displacement is longer than a few edges, to
  * such a length without a look at pairs. One that throws nodes farther than the scene is large is
- * shortened to about an edge. */
+ * shortened to about an edge. If the watched flag is raised meanwhile: 0, also at each node. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
                                    double *of_node);
 

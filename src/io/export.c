@@ -6,7 +6,19 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "model/model.h"
+
 #define FRAME_WORD "frame_"
+
+void drape_export_body_vertex(const drape_frame *frame, const drape_export_body *body, int32_t number,
+                              int32_t vertex, double x[3])
+{
+    for (size_t k = 0; k < 3; k++)
+        x[k] = body->deforms ? frame->points[3 * (size_t)(body->first_point + vertex) + k]
+                             : (double)body->vertex[6 * (size_t)vertex + k];
+    if (!body->deforms)
+        drape_pose_point(&frame->poses[number], x, x);
+}
 
 /* ---- One file ---- */
 
@@ -123,6 +135,29 @@ void drape_frame_files_close(drape_frame_files *frames)
 
 /* ---- OBJ ---- */
 
+void drape_obj_put_name(drape_file *file, const char *statement, const char *name)
+{
+    drape_file_put_text(file, statement);
+    drape_file_put_text(file, " ");
+    for (; *name; name++)
+        drape_file_put(file, (unsigned char)*name < ' ' ? "_" : name, 1);
+    drape_file_put_text(file, "\n");
+}
+
+void drape_obj_put_material_files(drape_file *file, const drape_model *model)
+{
+    for (int32_t c = 0; c < model->cloth_count; c++) {
+        const char *own = model->cloths[c].mesh.faces.material_file;
+        bool named = !own;
+        for (int32_t b = 0; b < c && !named; b++) {
+            const char *other = model->cloths[b].mesh.faces.material_file;
+            named = other && strcmp(own, other) == 0;
+        }
+        if (!named)
+            drape_obj_put_name(file, "mtllib", own);
+    }
+}
+
 void drape_obj_put_nodes(drape_file *file, const double *x, int32_t count)
 {
     for (int32_t i = 0; i < count; i++, x += 3)
@@ -134,4 +169,40 @@ void drape_obj_put_triangles(drape_file *file, const int32_t *triangle, int32_t 
     for (int32_t i = 0; i < count; i++, triangle += 3)
         drape_file_print(file, "f %" PRId32 " %" PRId32 " %" PRId32 "\n", triangle[0] + 1, triangle[1] + 1,
                          triangle[2] + 1);
+}
+
+/* A material stays in force, also for other objects, until another is named. */
+static void use_material(drape_obj *obj, const char *material)
+{
+    if (!material && obj->material)
+        material = DRAPE_NO_MATERIAL;
+    if (!material || (obj->material && strcmp(material, obj->material) == 0))
+        return;
+    drape_obj_put_name(obj->file, "usemtl", material);
+    obj->material = material;
+}
+
+void drape_obj_put_faces(drape_obj *obj, const drape_model *model, int32_t cloth)
+{
+    const drape_cloth *from = &model->cloths[cloth];
+    const drape_faces *faces = &from->mesh.faces;
+    drape_file *file = obj->file;
+    for (int32_t i = 0; i < faces->uv_count; i++)
+        drape_file_print(file, "vt %.17g %.17g\n", faces->uv[2 * (size_t)i], faces->uv[2 * (size_t)i + 1]);
+    if (faces->count == 0) {
+        use_material(obj, NULL);
+        drape_obj_put_triangles(file, model->triangle + 3 * (size_t)from->first_triangle,
+                                from->mesh.triangle_count);
+    }
+    for (int32_t f = 0; f < faces->count; f++) {
+        use_material(obj, faces->material[f] < 0 ? NULL : faces->name[faces->material[f]]);
+        drape_file_put_text(file, "f");
+        for (int32_t c = faces->first[f]; c < faces->first[f + 1]; c++) {
+            drape_file_print(file, " %" PRId32, from->first_node + faces->node[c] + 1);
+            if (faces->uv_of[c] >= 0)
+                drape_file_print(file, "/%" PRId64, (int64_t)obj->uvs + faces->uv_of[c] + 1);
+        }
+        drape_file_put_text(file, "\n");
+    }
+    obj->uvs += faces->uv_count;
 }

@@ -5,6 +5,7 @@
 #include "base/archive.h"
 #include "base/arena.h"
 #include "base/registry.h"
+#include "io/bodies.h"
 #include "io/file.h"
 
 /* The target of the frames, known before the first one. It is valid until close. */
@@ -15,6 +16,8 @@ typedef struct drape_export_def {
     double frame_rate;   /* [1/s] */
     int64_t most_frames; /* frames that a run of the scene's duration writes, including the one at its end */
     bool durable;        /* a checkpoint may claim that each frame is on the disk */
+    const drape_export_body *bodies; /* (body_count) of formats that want them: the colliders */
+    int32_t body_count;
 } drape_export_def;
 
 /* A frame. Its vectors are rotated if the format has another vertical axis than the scene. */
@@ -26,6 +29,9 @@ typedef struct drape_frame {
     const double *velocities;     /* (node_count x 3) [m/s] */
     const double *strain;         /* (triangle_count x 2) as drape_model_strain */
     const double *energy_density; /* (node_count) [J/m2], of the state at or after the frame */
+    /* For formats that want bodies; otherwise NULL: */
+    const drape_collider_pose *poses; /* (body_count) */
+    const double *points;             /* of all bodies that deform, in space [m] */
 } drape_frame;
 
 /*
@@ -36,7 +42,7 @@ typedef struct drape_frame {
 typedef struct drape_exporter_ops {
     drape_entry entry; /* summary: which files it writes; reference: definition of the format */
     size_t state_size;
-    bool wants_fields;
+    bool wants_fields, wants_bodies;
     bool y_up; /* the format has y up: its frames are never rotated */
 
     /* Optional: refuses, with an error at pointer, a run that the format cannot hold, before anything is
@@ -67,6 +73,10 @@ typedef struct drape_exporter_ops {
 } drape_exporter_ops;
 extern const drape_exporter_ops *const drape_exporters[]; /* NULL-ended */
 extern const drape_registry drape_exporter_registry;
+
+/* Where a vertex of a body is in space [m]; number: that of its collider. */
+void drape_export_body_vertex(const drape_frame *frame, const drape_export_body *body, int32_t number,
+                              int32_t vertex, double x[3]);
 
 /* ---- For formats with one file, folder/NAME ---- */
 
@@ -118,8 +128,25 @@ void drape_frame_files_close(drape_frame_files *frames);
 
 /* ---- Pieces of OBJ ---- */
 
+/* The name of the material of faces that have none, in files in which others have one. */
+#define DRAPE_NO_MATERIAL "cloth"
+
+/* What has been written to an OBJ file. */
+typedef struct drape_obj {
+    drape_file *file;
+    int32_t uvs;          /* number of texture coordinates */
+    const char *material; /* of the next face; NULL: none was named */
+} drape_obj;
+
+/* A statement with a name. Control characters, such as line breaks, are replaced: names contain any. */
+void drape_obj_put_name(drape_file *file, const char *statement, const char *name);
+/* `mtllib file` of all cloths, each file once. */
+void drape_obj_put_material_files(drape_file *file, const drape_model *model);
 /* `v x y z` of nodes, with 17 digits; `f a b c` of triangles, whose array counts nodes from 0. */
 void drape_obj_put_nodes(drape_file *file, const double *x, int32_t count);
 void drape_obj_put_triangles(drape_file *file, const int32_t *triangle, int32_t count);
+/* The faces of a cloth as its file had them, with `vt u v` and `usemtl name`; its triangles if it has no
+ * such faces. Nodes are counted from 1 over all cloths. */
+void drape_obj_put_faces(drape_obj *obj, const drape_model *model, int32_t cloth);
 
 #endif

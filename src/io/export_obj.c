@@ -1,7 +1,8 @@
 /*
  * export_obj.c: folder/frame_000000.obj, ...: one Wavefront OBJ file for each frame. For each cloth `o
- * name`, `v x y z` [m], `f a b c` with nodes counted from 1 over the whole file. Numbers have 17 digits, so
- * that a reader gets the same doubles. Format: Wavefront Advanced Visualizer manual, appendix B1.
+ * name`, `v x y z` [m], `f a b c` with nodes counted from 1 over the whole file; of a cloth from a file its
+ * polygons, with `vt`, `usemtl` and `mtllib`. Numbers have 17 digits, so that a reader gets the same doubles.
+ * Format: Wavefront Advanced Visualizer manual, appendix B1.
  */
 #include <inttypes.h>
 
@@ -17,24 +18,6 @@ static drape_status obj_open(drape_context *ctx, const drape_export_def *def, vo
     return drape_frame_files_open(ctx, def, "obj", state);
 }
 
-/* A name may contain any character; control characters, such as line breaks, are replaced. */
-static void put_object(drape_file *file, const char *name)
-{
-    drape_file_put_text(file, "o ");
-    for (; *name; name++)
-        drape_file_put(file, (unsigned char)*name < ' ' ? "_" : name, 1);
-    drape_file_put_text(file, "\n");
-}
-
-static void put_cloth(drape_file *file, const drape_model *model, const drape_cloth_range *cloth,
-                      const double *positions)
-{
-    put_object(file, cloth->name);
-    drape_obj_put_nodes(file, positions + 3 * (size_t)cloth->first_node, cloth->node_count);
-    drape_obj_put_triangles(file, drape_model_triangles(model) + 3 * (size_t)cloth->first_triangle,
-                            cloth->triangle_count);
-}
-
 static drape_status obj_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
     drape_frame_files *frames = state;
@@ -43,9 +26,13 @@ static drape_status obj_write(drape_context *ctx, void *state, const drape_frame
     if (status)
         return status;
     drape_file_print(&frames->file, "# Drape frame %" PRId64 ", t = %.17g s\n", frame->index, frame->time);
+    drape_obj_put_material_files(&frames->file, frames->model);
+    drape_obj obj = {.file = &frames->file};
     for (int32_t i = 0; i < drape_model_cloth_count(frames->model); i++) {
-        drape_cloth_range cloth = drape_model_cloth(frames->model, i);
-        put_cloth(&frames->file, frames->model, &cloth, frame->positions);
+        const drape_cloth_range cloth = drape_model_cloth(frames->model, i);
+        drape_obj_put_name(&frames->file, "o", cloth.name);
+        drape_obj_put_nodes(&frames->file, frame->positions + 3 * (size_t)cloth.first_node, cloth.node_count);
+        drape_obj_put_faces(&obj, frames->model, i);
     }
     return drape_frame_files_end(frames);
 }
@@ -68,7 +55,8 @@ const drape_exporter_ops drape_exporter_obj = {
     .entry =
         {.name = "obj",
          .summary =
-             "frame_000000.obj ...: a Wavefront OBJ file for each frame, an object for each cloth, 17 digits",
+             "frame_000000.obj ...: a Wavefront OBJ file for each frame, an object for each cloth, with its "
+             "polygons, texture coordinates and materials, 17 digits",
          .reference = "Wavefront Advanced Visualizer manual, appendix B1"},
     .state_size = sizeof(drape_frame_files),
     .open = obj_open,

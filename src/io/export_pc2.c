@@ -54,9 +54,13 @@ static drape_status pc2_open(drape_context *ctx, const drape_export_def *def, vo
 static drape_status write_mesh(pc2_state *pc2, const drape_frame *frame)
 {
     const drape_model *model = pc2->def->model;
-    drape_file_put_text(&pc2->mesh, "# the mesh that " FILE_NAME " moves\no cloth\n");
+    drape_obj obj = {.file = &pc2->mesh};
+    drape_file_put_text(&pc2->mesh, "# the mesh that " FILE_NAME " moves\n");
+    drape_obj_put_material_files(&pc2->mesh, model);
+    drape_file_put_text(&pc2->mesh, "o cloth\n");
     drape_obj_put_nodes(&pc2->mesh, frame->positions, drape_model_node_count(model));
-    drape_obj_put_triangles(&pc2->mesh, drape_model_triangles(model), drape_model_triangle_count(model));
+    for (int32_t c = 0; c < drape_model_cloth_count(model); c++)
+        drape_obj_put_faces(&obj, model, c);
     return drape_file_finish(&pc2->mesh);
 }
 

@@ -2,20 +2,26 @@
  * export_vtp.c: folder/frame_000000.vtp, ...: one VTK XML file of PolyData for each frame, and
  * folder/frames.pvd, a collection that gives each frame its time. Positions are float64, fields float32,
  * appended raw, little endian. All cloths are in one mesh; an array of the cells says which cloth they
- * belong to. Formats: VTK XML file formats (VTK User's Guide, 11th ed., section 19.3), ParaView's
- * collections of them.
+ * belong to. Each collider is a part of its own in the collection: its surface is in folder/collider_0.vtp
+ * if it stays where it is, otherwise in folder/collider_0_000000.vtp, ... for each frame. Formats: VTK XML
+ * file formats (VTK User's Guide, 11th ed., section 19.3), ParaView's collections of them.
  *
- * The collection always ends with the same line: a frame's entry is written over it, followed by that line
- * again, in one write.
+ * The collection always ends with the same line: a frame's entries are written over it, followed by that
+ * line again, in one write.
  */
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "io/export.h"
 
 #define PVD_NAME "frames.pvd"
 #define PVD_ROOM 256 /* for an entry and the last line */
+
+/* A collider that stays, and one that does not, in a frame. */
+#define BODY_NAME       "collider_%" PRId32 ".vtp"
+#define BODY_FRAME_NAME "collider_%" PRId32 "_%06" PRId64 ".vtp"
 
 static const char pvd_begin[] = "<?xml version=\"1.0\"?>\n"
                                 "<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
@@ -26,6 +32,8 @@ typedef struct vtp_state {
     drape_frame_files frames;
     drape_file pvd;
     off_t entries_end; /* position in the collection */
+    const drape_export_def *def;
+    char *entries; /* (PVD_ROOM (1 + body_count)) of one frame */
 } vtp_state;
 
 /* ---- The collection ---- */
@@ -41,18 +49,37 @@ static drape_status pvd_open(drape_context *ctx, drape_folder *folder, vtp_state
     return drape_file_publish(&vtp->pvd);
 }
 
+static bool changes(const drape_export_body *body)
+{
+    return body->moves || body->deforms;
+}
+
+static size_t put_entry(vtp_state *vtp, size_t at, double time, int32_t part, const char *name)
+{
+    return at + (size_t)snprintf(vtp->entries + at, PVD_ROOM,
+                                 "<DataSet timestep=\"%.17g\" part=\"%" PRId32 "\" file=\"%s\"/>\n", time,
+                                 part, name);
+}
+
 /* On a full disk the last line is restored where it was: the file already has that room. */
 static drape_status pvd_add(vtp_state *vtp, const drape_frame *frame)
 {
-    char text[PVD_ROOM];
-    int entry = snprintf(text, sizeof text,
-                         "<DataSet timestep=\"%.17g\" part=\"0\" file=\"" DRAPE_FRAME_NAME "\"/>\n",
-                         frame->time, frame->index, "vtp");
-    memcpy(text + entry, pvd_end, sizeof pvd_end);
-    size_t size = (size_t)entry + sizeof pvd_end - 1;
-    drape_status status = drape_file_overwrite(&vtp->pvd, vtp->entries_end, text, size);
+    char name[64];
+    snprintf(name, sizeof name, DRAPE_FRAME_NAME, frame->index, "vtp");
+    size_t size = put_entry(vtp, 0, frame->time, 0, name);
+    for (int32_t b = 0; b < vtp->def->body_count; b++) {
+        if (changes(&vtp->def->bodies[b]))
+            snprintf(name, sizeof name, BODY_FRAME_NAME, b, frame->index);
+        else
+            snprintf(name, sizeof name, BODY_NAME, b);
+        size = put_entry(vtp, size, frame->time, b + 1, name);
+    }
+    const size_t end = size;
+    memcpy(vtp->entries + size, pvd_end, sizeof pvd_end);
+    size += sizeof pvd_end - 1;
+    drape_status status = drape_file_overwrite(&vtp->pvd, vtp->entries_end, vtp->entries, size);
     if (!status) {
-        vtp->entries_end += entry;
+        vtp->entries_end += (off_t)end;
         return DRAPE_OK;
     }
     drape_file_restore(&vtp->pvd, vtp->entries_end, pvd_end, sizeof pvd_end - 1);
@@ -181,7 +208,7 @@ static void put_declarations(drape_file *file, const array *list, int first, int
     }
 }
 
-static void put_xml(drape_file *file, const drape_model *model, const drape_frame *frame, const array *list)
+static void put_time(drape_file *file, const drape_frame *frame)
 {
     drape_file_print(
         file,
@@ -190,10 +217,20 @@ static void put_xml(drape_file *file, const drape_model *model, const drape_fram
         "<DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">%.17g"
         "</DataArray>\n</FieldData>\n",
         frame->time);
+}
+
+static void put_piece(drape_file *file, int32_t points, int32_t polygons)
+{
     drape_file_print(file,
                      "<Piece NumberOfPoints=\"%" PRId32 "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" "
                      "NumberOfStrips=\"0\" NumberOfPolys=\"%" PRId32 "\">\n<Points>\n",
-                     drape_model_node_count(model), drape_model_triangle_count(model));
+                     points, polygons);
+}
+
+static void put_xml(drape_file *file, const drape_model *model, const drape_frame *frame, const array *list)
+{
+    put_time(file, frame);
+    put_piece(file, drape_model_node_count(model), drape_model_triangle_count(model));
     put_declarations(file, list, POINTS, POINTS + 1);
     drape_file_put_text(file, "</Points>\n<PointData Vectors=\"velocity\" Scalars=\"energy_density\">\n");
     put_declarations(file, list, POINTS + 1, CELL_FIELDS);
@@ -204,26 +241,120 @@ static void put_xml(drape_file *file, const drape_model *model, const drape_fram
     drape_file_put_text(file, "</Polys>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_");
 }
 
+static void put_size(drape_file *file, uint64_t size)
+{
+    drape_file_put_word(file, (uint32_t)size);
+    drape_file_put_word(file, (uint32_t)(size >> 32));
+}
+
 static void put_data(drape_file *file, const drape_model *model, const drape_frame *frame, const array *list)
 {
     for (int i = 0; i < ARRAY_COUNT; i++) {
-        uint64_t size = list[i].count * list[i].size;
-        drape_file_put_word(file, (uint32_t)size);
-        drape_file_put_word(file, (uint32_t)(size >> 32));
+        put_size(file, list[i].count * list[i].size);
         list[i].put(file, model, frame);
     }
     drape_file_put_text(file, "\n</AppendedData>\n</VTKFile>\n");
 }
 
+/* ---- Colliders ---- */
+
+/* Points in space, and triangles; the cells know the number of their collider. */
+static void put_body(drape_file *file, const drape_frame *frame, const drape_export_body *body,
+                     int32_t number)
+{
+    const array list[] = {{"Float64", "Points", 3, 3 * (size_t)body->vertex_count, 8, NULL},
+                          {"Int32", "collider", 1, (size_t)body->triangle_count, 4, NULL},
+                          {"Int32", "connectivity", 1, 3 * (size_t)body->triangle_count, 4, NULL},
+                          {"Int32", "offsets", 1, (size_t)body->triangle_count, 4, NULL}};
+    put_time(file, frame);
+    put_piece(file, body->vertex_count, body->triangle_count);
+    put_declarations(file, list, 0, 1);
+    drape_file_put_text(file, "</Points>\n<CellData Scalars=\"collider\">\n");
+    put_declarations(file, list, 1, 2);
+    drape_file_put_text(file, "</CellData>\n<Polys>\n");
+    put_declarations(file, list, 2, 4);
+    drape_file_put_text(file, "</Polys>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_");
+
+    put_size(file, list[0].count * list[0].size);
+    for (int32_t i = 0; i < body->vertex_count; i++) {
+        double x[3];
+        drape_export_body_vertex(frame, body, number, i, x);
+        drape_file_put_doubles(file, x, 3);
+    }
+    put_size(file, list[1].count * list[1].size);
+    for (int32_t i = 0; i < body->triangle_count; i++)
+        drape_file_put_word(file, (uint32_t)number);
+    put_size(file, list[2].count * list[2].size);
+    for (size_t i = 0; i < list[2].count; i++)
+        drape_file_put_word(file, (uint32_t)body->triangle[i]);
+    put_size(file, list[3].count * list[3].size);
+    for (int32_t i = 1; i <= body->triangle_count; i++)
+        drape_file_put_word(file, 3 * (uint32_t)i);
+    drape_file_put_text(file, "\n</AppendedData>\n</VTKFile>\n");
+}
+
+static drape_status write_bodies(vtp_state *vtp, const drape_frame *frame)
+{
+    drape_file *file = &vtp->frames.file;
+    drape_status status = DRAPE_OK;
+    for (int32_t b = 0; b < vtp->def->body_count && !status; b++) {
+        const drape_export_body *body = &vtp->def->bodies[b];
+        if (!changes(body) && frame->index > 0)
+            continue;
+        if (changes(body))
+            drape_file_name(file, BODY_FRAME_NAME, b, frame->index);
+        else
+            drape_file_name(file, BODY_NAME, b);
+        status = drape_file_begin(file);
+        if (status)
+            return status;
+        put_body(file, frame, body, b);
+        status = drape_file_finish(file);
+    }
+    return status;
+}
+
+/* Whether a file is one of a collider. *frame: that it is of; 0 if the collider stays. */
+static bool body_names(const char *name, int64_t *frame)
+{
+    static const char word[] = "collider_";
+    if (strncmp(name, word, sizeof word - 1) != 0)
+        return false;
+    const char *number = name + sizeof word - 1, *rest = number + strspn(number, "0123456789");
+    *frame = 0;
+    if (rest == number || *rest != '_')
+        return rest > number && strcmp(rest, ".vtp") == 0;
+    const size_t digits = strspn(rest + 1, "0123456789");
+    *frame = (int64_t)strtoll(rest + 1, NULL, 10);
+    return digits >= DRAPE_FRAME_DIGITS && strcmp(rest + 1 + digits, ".vtp") == 0;
+}
+
+static bool is_late_body(const void *user, const char *name)
+{
+    int64_t frame;
+    return body_names(name, &frame) && frame >= *(const int64_t *)user;
+}
+
 static bool vtp_names(const char *name)
 {
-    return strcmp(name, PVD_NAME) == 0 || drape_frame_files_name(name, DRAPE_FRAME_DIGITS, "vtp", NULL);
+    int64_t frame;
+    return strcmp(name, PVD_NAME) == 0 || body_names(name, &frame) ||
+           drape_frame_files_name(name, DRAPE_FRAME_DIGITS, "vtp", NULL);
+}
+
+static drape_status allocate(const drape_export_def *def, vtp_state *vtp)
+{
+    vtp->def = def;
+    vtp->entries = drape_arena_take(def->arena, 1 + (size_t)def->body_count, PVD_ROOM);
+    return vtp->entries ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 static drape_status vtp_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
     vtp_state *vtp = state;
-    drape_status status = drape_frame_files_open(ctx, def, "vtp", &vtp->frames);
+    drape_status status = allocate(def, vtp);
+    if (!status)
+        status = drape_frame_files_open(ctx, def, "vtp", &vtp->frames);
     return status ? status : pvd_open(ctx, def->folder, vtp);
 }
 
@@ -234,7 +365,9 @@ static drape_status vtp_write(drape_context *ctx, void *state, const drape_frame
     array list[ARRAY_COUNT];
     (void)ctx;
     list_arrays(model, list);
-    drape_status status = drape_frame_files_begin(&vtp->frames, frame->index);
+    drape_status status = write_bodies(vtp, frame);
+    if (!status)
+        status = drape_frame_files_begin(&vtp->frames, frame->index);
     if (status)
         return status;
     put_xml(&vtp->frames.file, model, frame, list);
@@ -257,8 +390,9 @@ static drape_status vtp_resume(drape_context *ctx, const drape_export_def *def, 
 {
     vtp_state *vtp = state;
     vtp_archive(vtp, a);
-    drape_status status =
-        a->status ? a->status : drape_frame_files_resume(ctx, def, "vtp", frames, &vtp->frames);
+    drape_status status = a->status ? a->status : allocate(def, vtp);
+    if (!status)
+        status = drape_frame_files_resume(ctx, def, "vtp", frames, &vtp->frames);
     return status ? status : drape_export_reopen(ctx, def->folder, PVD_NAME, &vtp->pvd);
 }
 
@@ -270,6 +404,8 @@ static drape_status vtp_cut(drape_context *ctx, void *state, int64_t frames)
     drape_status status = drape_file_overwrite(&vtp->pvd, vtp->entries_end, pvd_end, sizeof pvd_end - 1);
     if (!status)
         status = drape_file_trim(&vtp->pvd);
+    if (!status)
+        status = drape_folder_remove(vtp->frames.folder, is_late_body, &frames);
     return status ? status : drape_frame_files_cut(ctx, &vtp->frames, frames);
 }
 
@@ -291,10 +427,11 @@ static drape_status vtp_close(drape_context *ctx, void *state)
 const drape_exporter_ops drape_exporter_vtp = {
     .entry = {.name = "vtp",
               .summary = "frame_000000.vtp ... and frames.pvd: VTK PolyData for each frame, float64, with "
-                         "velocity, energy density and strain, and the times of the frames",
+                         "velocity, energy density and strain, the times of the frames, and colliders",
               .reference = "VTK User's Guide, 11th edition, section 19.3, XML file formats"},
     .state_size = sizeof(vtp_state),
     .wants_fields = true,
+    .wants_bodies = true,
     .open = vtp_open,
     .names = vtp_names,
     .write = vtp_write,

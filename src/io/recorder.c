@@ -14,7 +14,8 @@
 #include "io/summary.h"
 #include "sim/sim.h"
 
-/* Times closer than this are the same up to rounding: k / frame_rate and a sum of steps. Steps are longer. */
+/* Times closer than this are the same up to rounding: k / frame_rate and a sum of steps. Steps are longer.
+ * */
 #define SAME_TIME 1e-12
 
 #define MAX_FRAMES INT64_C(1000000000000000)
@@ -35,8 +36,12 @@ struct drape_recorder {
     drape_export_def def; /* for the formats */
     output *outputs;
     size_t output_count;
-    double *fields;  /* of one frame; NULL if no format wants any */
-    double *rotated; /* positions and velocities with z up; NULL if no format wants them */
+    double *fields;             /* of one frame; NULL if no format wants any */
+    double *rotated;            /* positions and velocities with z up; NULL if no format wants them */
+    drape_export_body *bodies;  /* (body_count) the colliders; NULL if no format wants them */
+    drape_collider_pose *poses; /* (2 x body_count) of a frame, and these with z up */
+    double *points;             /* (2 x point_count x 3) of those that deform, likewise */
+    size_t body_count, point_count;
     drape_file steps, energies;
     drape_file checkpoint; /* the file of the checkpoints; without a path none are written */
     int64_t every;         /* frames between checkpoints; 0: only drape_recorder_checkpoint writes them */
@@ -112,6 +117,38 @@ static void add_fields(drape_recorder *r, const double *velocities, drape_frame 
     frame->energy_density = density;
 }
 
+/* Where the colliders are at the time of the frame, if a format wants them. */
+static void add_bodies(drape_recorder *r, drape_frame *frame)
+{
+    const drape_motion *motion = drape_system_motion(r->sim->system);
+    for (size_t i = 0; i < r->body_count; i++) {
+        const drape_export_body *body = &r->bodies[i];
+        double *x = r->points + 3 * (size_t)body->first_point;
+        drape_motion_pose(motion, (int32_t)i, frame->time, frame->time, &r->poses[i]);
+        if (body->deforms)
+            drape_motion_points(motion, (int32_t)i, frame->time, x);
+        for (int32_t p = 0; body->deforms && p < body->vertex_count; p++, x += 3)
+            drape_pose_point(&r->poses[i], x, x);
+    }
+    frame->poses = r->poses;
+    frame->points = r->points;
+}
+
+static void rotate_pose(const drape_collider_pose *from, drape_collider_pose *to)
+{
+    double turn[9];
+    memcpy(turn, from->turn, sizeof turn);
+    for (int i = 0; !from->turned && i < 9; i++)
+        turn[i] = i % 4 == 0;
+    for (int k = 0; k < 3; k++) {
+        to->turn[k] = turn[k];
+        to->turn[3 + k] = -turn[6 + k];
+        to->turn[6 + k] = turn[3 + k];
+    }
+    to->turned = true;
+    rotate(from->displacement, 1, to->displacement);
+}
+
 static drape_frame rotated_frame(const drape_recorder *r, const drape_frame *frame)
 {
     size_t nodes = (size_t)drape_model_node_count(drape_sim_model(r->sim));
@@ -119,6 +156,12 @@ static drape_frame rotated_frame(const drape_recorder *r, const drape_frame *fra
     rotated.positions = rotate(frame->positions, nodes, r->rotated);
     if (frame->velocities)
         rotated.velocities = rotate(frame->velocities, nodes, r->rotated + 3 * nodes);
+    for (size_t i = 0; i < r->body_count; i++)
+        rotate_pose(&r->poses[i], &r->poses[r->body_count + i]);
+    if (r->body_count > 0) {
+        rotated.poses = r->poses + r->body_count;
+        rotated.points = rotate(r->points, r->point_count, r->points + 3 * r->point_count);
+    }
     return rotated;
 }
 
@@ -135,6 +178,8 @@ static void write_frame(drape_recorder *r, double time, const double *positions,
 {
     drape_frame frame = {.index = r->frames, .time = time, .positions = positions};
     add_fields(r, velocities, &frame);
+    if (r->body_count > 0)
+        add_bodies(r, &frame);
     write_outputs(r, &frame);
     const drape_energy_row row = {
         .frame = r->frames, .t = time, .t_state = drape_sim_time(r->sim), .energy = drape_sim_energy(r->sim)};
@@ -334,6 +379,24 @@ static drape_status allocate_arrays(drape_recorder *r)
     return drape_arena_status(&r->arena);
 }
 
+static drape_status make_bodies(drape_recorder *r)
+{
+    const drape_model *model = r->sim->model;
+    bool wanted = false;
+    for (size_t i = 0; i < r->output_count; i++)
+        wanted = wanted || r->outputs[i].ops->wants_bodies;
+    if (!wanted || model->collider_count == 0)
+        return DRAPE_OK;
+    r->body_count = (size_t)model->collider_count;
+    r->point_count = drape_export_points(model);
+    r->poses = drape_arena_take(&r->arena, 2 * r->body_count, sizeof *r->poses);
+    r->points = drape_arena_take(&r->arena, 2 * r->point_count, 3 * sizeof *r->points);
+    const drape_status status = drape_export_bodies_create(&r->arena, model, &r->bodies);
+    for (size_t i = 0; i < r->body_count && !status; i++)
+        r->bodies[i].moves = drape_motion_moves_collider(drape_system_motion(r->sim->system), (int32_t)i);
+    return status ? status : drape_arena_status(&r->arena);
+}
+
 /* ---- Files ---- */
 
 static bool is_also(const drape_recorder *r, const char *name)
@@ -408,6 +471,8 @@ static drape_status prepare_checkpoints(drape_recorder *r, const drape_recorder_
     r->def.arena = &r->arena;
     r->def.folder = r->folder;
     r->def.durable = def->checkpoints;
+    r->def.bodies = r->bodies;
+    r->def.body_count = (int32_t)r->body_count;
     if (!def->checkpoints)
         return DRAPE_OK;
     drape_status status = drape_file_create_in(r->ctx, r->folder, &r->checkpoint);
@@ -510,6 +575,8 @@ static drape_status set_up(drape_recorder *r, const drape_recorder_def *def, dra
     drape_status status = choose_outputs(r, def);
     if (!status)
         status = allocate_arrays(r);
+    if (!status)
+        status = make_bodies(r);
     if (!status)
         status = open_folder(r, def, a != NULL);
     if (!status)

@@ -2,10 +2,11 @@
  * import_ply.c: the Stanford polygon format (Turk 1994, "The PLY Polygon File Format"), ascii and binary. A
  * header lists elements (vertex, face, others) with their properties; the items of each element follow in
  * that order, all as text or all as bytes. The reader uses x, y, z of vertex and the list vertex_indices (or
- * vertex_index) of face and ignores everything else.
+ * vertex_index) of face. Texture coordinates are kept for output: s, t of vertex (or u, v, or texture_u,
+ * texture_v), or the list texcoord of face, u and v of each corner. Everything else is ignored.
  *
- * The data are read twice: the first pass only counts triangles, because a face may have any number of
- * corners.
+ * The data are read twice: the first pass only counts faces and corners, because a face may have any number
+ * of these.
  */
 #include <math.h>
 #include <stdarg.h>
@@ -35,8 +36,8 @@ static const struct {
     [FLOAT64] = {"double", "float64", 8},
 };
 
-typedef enum ply_role { X, Y, Z, CORNERS, PASSED_OVER } ply_role;
-#define ROLE_COUNT PASSED_OVER
+typedef enum ply_role { X, Y, Z, CORNERS, U, V, CORNER_UVS, PASSED_OVER } ply_role;
+#define NEEDED_ROLES U
 
 typedef struct ply_property {
     ply_type count_type; /* type of a list's count; NO_TYPE: not a list */
@@ -62,12 +63,15 @@ typedef struct ply_reader {
     ply_element elements[MAX_ELEMENTS];
     ply_property properties[MAX_PROPERTIES];
     int element_count, property_count;
-    bool has_role[ROLE_COUNT];
+    bool has_role[PASSED_OVER];
     /* while the data are read: */
     const ply_element *element;
     int64_t item;
-    bool counting;    /* the first pass: nothing is written */
-    size_t triangles; /* so far */
+    bool counting;         /* the first pass: nothing is written */
+    size_t faces, corners; /* so far */
+    int64_t list_count;    /* of the texture coordinates of this face's corners, which begin at `list` */
+    ply_type list_type;
+    drape_text list;
 } ply_reader;
 
 /* Reports a fault at the present place: a line or, in binary data, an item. */
@@ -169,13 +173,27 @@ static bool is_integer(ply_type type)
 
 static ply_role role_of(drape_word element, drape_word name, bool list)
 {
-    static const char *const axes[] = {"x", "y", "z"};
-    if (!list && drape_word_is(element, "vertex"))
-        for (int axis = 0; axis < 3; axis++)
-            if (drape_word_is(name, axes[axis]))
-                return (ply_role)axis;
-    const bool corners = drape_word_is(name, "vertex_indices") || drape_word_is(name, "vertex_index");
-    return list && corners && drape_word_is(element, "face") ? CORNERS : PASSED_OVER;
+    static const struct {
+        const char *element, *name;
+        bool list;
+        ply_role role;
+    } known[] = {{"vertex", "x", false, X},
+                 {"vertex", "y", false, Y},
+                 {"vertex", "z", false, Z},
+                 {"vertex", "s", false, U},
+                 {"vertex", "u", false, U},
+                 {"vertex", "texture_u", false, U},
+                 {"vertex", "t", false, V},
+                 {"vertex", "v", false, V},
+                 {"vertex", "texture_v", false, V},
+                 {"face", "vertex_indices", true, CORNERS},
+                 {"face", "vertex_index", true, CORNERS},
+                 {"face", "texcoord", true, CORNER_UVS}};
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        if (drape_word_is(element, known[i].element) && drape_word_is(name, known[i].name) &&
+            list == known[i].list)
+            return known[i].role;
+    return PASSED_OVER;
 }
 
 static drape_status add_property(ply_reader *reader, ply_property property, drape_word name)
@@ -189,6 +207,8 @@ static drape_status add_property(ply_reader *reader, ply_property property, drap
     if (property.role == CORNERS && !is_integer(property.type))
         return fail(reader, "%.*s are %s; they must be of an integer type", drape_word_shown(name),
                     name.start, types[property.type].name);
+    if (property.role >= NEEDED_ROLES && property.role != PASSED_OVER && reader->has_role[property.role])
+        property.role = PASSED_OVER; /* a second set of texture coordinates */
     if (property.role != PASSED_OVER && reader->has_role[property.role])
         return fail(reader, "property %.*s is defined twice", drape_word_shown(name), name.start);
     if (reader->property_count == MAX_PROPERTIES)
@@ -236,13 +256,13 @@ static drape_status read_header_line(ply_reader *reader, drape_word keyword)
 
 static drape_status check_contents(const ply_reader *reader)
 {
-    static const char *const names[ROLE_COUNT] = {"x", "y", "z", "vertex_indices"};
+    static const char *const names[NEEDED_ROLES] = {"x", "y", "z", "vertex_indices"};
     if (reader->format == NO_FORMAT)
         return fail(reader, "the header has no format");
     if (!find_element(reader, "vertex") || !find_element(reader, "face"))
         return fail(reader, "the header has no element %s",
                     find_element(reader, "vertex") ? "face" : "vertex");
-    for (int role = 0; role < ROLE_COUNT; role++)
+    for (int role = 0; role < NEEDED_ROLES; role++)
         if (!reader->has_role[role])
             return fail(reader, "element %s has no %s %s", role == CORNERS ? "face" : "vertex",
                         role == CORNERS ? "list" : "property", names[role]);
@@ -361,24 +381,53 @@ static drape_status read_corner(ply_reader *reader, ply_type type, int32_t *node
     return DRAPE_OK;
 }
 
+/* Those of corners come before those of vertices. */
+static bool has_vertex_uvs(const ply_reader *reader)
+{
+    return reader->has_role[U] && reader->has_role[V] && !reader->has_role[CORNER_UVS];
+}
+
 static drape_status read_polygon(ply_reader *reader, ply_type type, int64_t corners)
 {
-    int32_t first = 0, last = 0, node = 0;
+    drape_faces *faces = &reader->mesh->faces;
     for (int64_t corner = 0; corner < corners; corner++) {
-        const drape_status status = read_corner(reader, type, &node);
+        int32_t *node = &faces->node[reader->corners];
+        const drape_status status = read_corner(reader, type, node);
         if (status)
             return status;
-        if (corner == 0)
-            first = node;
-        if (corner >= 2) {
-            int32_t *triangle = reader->mesh->triangle + 3 * reader->triangles++;
-            triangle[0] = first;
-            triangle[1] = last;
-            triangle[2] = node;
-        }
-        last = node;
+        if (has_vertex_uvs(reader))
+            faces->uv_of[reader->corners] = *node;
+        reader->corners++;
     }
+    faces->first[++reader->faces] = (int32_t)reader->corners;
     return DRAPE_OK;
+}
+
+/* Numbers of the file, not all of which need to be read: texture coordinates that are no numbers do not
+ * matter to the simulation. */
+static void read_uv(ply_reader *reader, ply_type type, double *uv)
+{
+    drape_word word;
+    if (reader->format != ASCII)
+        read_value(reader, type, uv);
+    else if (!drape_text_next_word(&reader->text, &word) || !drape_word_number(word, uv))
+        *uv = NAN;
+}
+
+/* Texture coordinates of the corners of the last face. They may come before its corners, so that they are
+ * read after both: returns to the list. */
+static void read_corner_uvs(ply_reader *reader)
+{
+    drape_faces *faces = &reader->mesh->faces;
+    const size_t first = (size_t)faces->first[reader->faces - 1], last = reader->corners;
+    const drape_text after = reader->text;
+    reader->text = reader->list;
+    for (size_t c = first; c < last && reader->list_count == 2 * (int64_t)(last - first); c++) {
+        faces->uv_of[c] = (int32_t)c;
+        for (size_t k = 0; k < 2; k++)
+            read_uv(reader, reader->list_type, &faces->uv[2 * c + k]);
+    }
+    reader->text = after;
 }
 
 static drape_status skip_values(ply_reader *reader, ply_type type, int64_t count)
@@ -402,9 +451,16 @@ static drape_status read_list(ply_reader *reader, const ply_property *property)
         return fail(reader, "a face with %d corners; it needs at least 3", (int)count);
     if (property->role == CORNERS && !reader->counting)
         return read_polygon(reader, property->type, count);
+    if (property->role == CORNER_UVS) {
+        reader->list = reader->text;
+        reader->list_type = property->type;
+        reader->list_count = count;
+    }
     status = skip_values(reader, property->type, count);
-    if (!status && property->role == CORNERS)
-        reader->triangles += (size_t)count - 2;
+    if (!status && property->role == CORNERS) {
+        reader->faces++;
+        reader->corners += (size_t)count;
+    }
     return status;
 }
 
@@ -412,9 +468,19 @@ static drape_status read_property_value(ply_reader *reader, const ply_property *
 {
     if (property->count_type)
         return read_list(reader, property);
-    const bool taken = property->role != PASSED_OVER && !reader->counting;
-    double *x = taken ? &reader->mesh->x[3 * (size_t)reader->item + (size_t)property->role] : NULL;
-    return read_value(reader, property->type, x);
+    const size_t item = (size_t)reader->item, role = (size_t)property->role;
+    if (reader->counting || property->role == PASSED_OVER)
+        return read_value(reader, property->type, NULL);
+    if (role <= Z)
+        return read_value(reader, property->type, &reader->mesh->x[3 * item + role]);
+    const drape_text before = reader->text;
+    const drape_status status = read_value(reader, property->type, NULL);
+    const drape_text after = reader->text;
+    reader->text = before;
+    if (has_vertex_uvs(reader))
+        read_uv(reader, property->type, &reader->mesh->faces.uv[2 * item + (role - U)]);
+    reader->text = after;
+    return status;
 }
 
 /* In ascii data an item is a line; empty lines are skipped. */
@@ -448,6 +514,9 @@ static drape_status read_item(ply_reader *reader)
     drape_status status = reader->format == ASCII ? find_item_line(reader) : DRAPE_OK;
     for (int i = 0; i < reader->element->property_count && !status; i++)
         status = read_property_value(reader, &property[i]);
+    if (!status && !reader->counting && reader->has_role[CORNER_UVS] &&
+        drape_word_is(reader->element->name, "face"))
+        read_corner_uvs(reader);
     if (!status && reader->format == ASCII)
         status = end_item_line(reader);
     return status;
@@ -458,7 +527,7 @@ static drape_status read_items(ply_reader *reader, bool counting)
 {
     drape_status status = DRAPE_OK;
     reader->counting = counting;
-    reader->triangles = 0;
+    reader->faces = reader->corners = 0;
     for (int i = 0; i < reader->element_count && !status; i++) {
         reader->element = &reader->elements[i];
         if (reader->element->property_count == 0) /* items without properties take no byte and no line */
@@ -481,17 +550,21 @@ static drape_status read_ply(drape_context *ctx, const drape_mesh_source *source
     const drape_text items = reader.text;
     if (!status)
         status = read_items(&reader, true);
-    if (!status)
-        status = drape_mesh_allocate(ctx, source, (size_t)find_element(&reader, "vertex")->count,
-                                     reader.triangles, mesh);
+    if (status)
+        return status;
+    const size_t nodes = (size_t)find_element(&reader, "vertex")->count;
+    const size_t uvs = reader.has_role[CORNER_UVS] ? reader.corners : has_vertex_uvs(&reader) ? nodes : 0;
+    status = drape_faces_allocate(ctx, source, nodes, reader.faces, reader.corners, uvs, mesh);
     reader.text = items;
-    return status ? status : read_items(&reader, false);
+    if (!status)
+        status = read_items(&reader, false);
+    return status ? status : drape_faces_complete(ctx, mesh);
 }
 
 const drape_import_ops drape_import_ply = {
     .entry = {.name = "ply",
-              .summary =
-                  "Stanford PLY, ascii or binary of either byte order; polygons become fans of triangles"},
+              .summary = "Stanford PLY, ascii or binary of either byte order; faces of any number of "
+                         "corners; their texture coordinates are for output"},
     .ending = ".ply",
     .read = read_ply,
 };

@@ -5,6 +5,7 @@
 
 #include "base/arena.h"
 #include "base/registry.h"
+#include "mesh/faces.h"
 
 /* One mesh. All numbers are 0-based and local to the mesh. */
 typedef struct drape_mesh {
@@ -24,6 +25,7 @@ typedef struct drape_mesh {
     double *triangle_area;  /* (triangle_count) [m2] */
     double *edge_length;    /* (edge_count) [m] */
     double *node_area;      /* (node_count) a third of the area of each triangle around it [m2] */
+    drape_faces faces;      /* of the file; all zeros: the triangles are all there is */
 } drape_mesh;
 
 /* These limits keep every count and every corner number (3 per triangle) within int32_t. Offsets into arrays
@@ -57,8 +59,8 @@ extern const drape_registry drape_grid_registry;
 typedef struct drape_import_ops {
     drape_entry entry;
     const char *ending; /* extension with its dot: ".obj", in any case */
-    /* Parses size bytes of data (followed by a 0 byte) into x, triangle and their counts, and checks indices.
-     * Polygons become fans. The caller has switched to the C locale. */
+    /* Parses size bytes of data (followed by a 0 byte) into x, triangle, their counts and faces, and checks
+     * indices. The caller has switched to the C locale. */
     drape_status (*read)(drape_context *ctx, const drape_mesh_source *source, const char *data, size_t size,
                          drape_mesh *mesh);
 } drape_import_ops;

@@ -119,9 +119,7 @@ static drape_status check_same(const drape_sequence_source *source, const char *
     if (mesh->node_count != first->node_count)
         return drape_mesh_fail(source->ctx, &file, 0, "frame %d: %d nodes; the first frame has %d",
                                (int)frame, (int)mesh->node_count, (int)first->node_count);
-    if (mesh->triangle_count != first->triangle_count ||
-        memcmp(mesh->triangle, first->triangle, 3 * (size_t)first->triangle_count * sizeof *mesh->triangle) !=
-            0)
+    if (!drape_faces_same(mesh, first))
         return drape_mesh_fail(source->ctx, &file, 0,
                                "frame %d: its faces differ from those of the first frame", (int)frame);
     return DRAPE_OK;

@@ -9,7 +9,7 @@
 
 #include "model/scene.h"
 
-#define MAX_KEYS  16  /* of one object, for the lists in messages */
+#define MAX_KEYS  24  /* of one object, for the lists in messages */
 #define MAX_TAKES 600 /* bytes of the description of what a key accepts */
 
 typedef struct reader {
@@ -301,7 +301,9 @@ static drape_status take_array(reader *r, const drape_scene_key *key, json_t *va
 /* Each element is stored like a key of its own. */
 static drape_status read_list(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
-    const size_t size = key->param.kind == DRAPE_PARAM_INTEGER ? sizeof(int32_t) : sizeof(const char *);
+    const size_t size = key->param.kind == DRAPE_PARAM_INTEGER  ? sizeof(int32_t)
+                        : key->param.kind == DRAPE_PARAM_NUMBER ? sizeof(double)
+                                                                : sizeof(const char *);
     const size_t mark = r->at.length;
     drape_scene_key element = {.param = key->param};
     element.param.name = "an element";

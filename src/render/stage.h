@@ -3,8 +3,8 @@
 #ifndef DRAPE_RENDER_STAGE_H
 #define DRAPE_RENDER_STAGE_H
 
+#include "colliders/body.h"
 #include "colliders/deformed.h"
-#include "render/body.h"
 #include "render/camera.h"
 #include "render/gl.h"
 #include "render/skin.h"

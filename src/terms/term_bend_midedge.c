@@ -31,6 +31,8 @@
 #include <math.h>
 #include <string.h>
 
+#define LEAST_STIFFNESS 1e-100 /* [N m] */
+
 enum {
     PARAM_REST = DRAPE_ORTHOTROPIC_COUNT,
     PARAM_CURVATURE,
@@ -177,7 +179,7 @@ static int32_t hinge_at(const drape_cloth_view *cloth, int32_t edge)
  * first. Returns the sign of its angle in the patch, which depends on the orientation of the triangle. */
 static int part_nodes(const drape_cloth_view *cloth, const drape_midedge *patch, int h, int32_t node[4])
 {
-    const int *local = drape_midedge_hinge[h];
+    const int *local = drape_patch_hinge[h];
     if (h < 3 && patch->clamped[h]) {
         for (int a = 0; a < 4; a++)
             node[a] = patch->node[local[a % 3]];
@@ -301,6 +303,18 @@ static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch,
     }
 }
 
+/* The squares of a patch are found from products of stiffnesses, which must not underflow. */
+static drape_status check_law(const double law[9], drape_term_builder *builder)
+{
+    for (int i = 0; i < 3; i++)
+        if (!(law[4 * i] >= LEAST_STIFFNESS))
+            return drape_term_refuse(builder,
+                                     "a bending stiffness of %g N m is too small to be computed with; it is "
+                                     "at least %g N m",
+                                     law[4 * i], LEAST_STIFFNESS);
+    return DRAPE_OK;
+}
+
 /* The sliders of a square for each unit of its stiffness, and the share of that which is elastic. */
 typedef struct hysteresis {
     int count;
@@ -344,7 +358,9 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
                           m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio), m->poisson_ratio,
                           law);
     hysteresis slides;
-    drape_status status = hysteresis_of(values, law, builder, &slides);
+    drape_status status = check_law(law, builder);
+    if (!status)
+        status = hysteresis_of(values, law, builder, &slides);
     if (!status)
         status = reserve(cloth, values, law, builder);
     if (!status && slides.count > 0)

@@ -68,6 +68,26 @@ def test_interrupted():
     same("whole", "out")
 
 
+def test_bodies():
+    """the same for frames with colliders that move, deform and stay, and with a mesh of quadrilaterals, texture coordinates and materials"""
+    scenes = SOURCES + "/examples/scenes/"
+    with open("strip.obj", "w", encoding="utf-8") as file:
+        print("mtllib a.mtl", *(f"v {i / 5} {j / 5} 0" for j in (0, 1) for i in range(6)), *(f"vt {i / 5} {j}" for j in (0, 1) for i in range(6)),
+              *(f"usemtl m{i % 2}\nf {i}/{i} {i + 1}/{i + 1} {i + 7}/{i + 7} {i + 6}/{i % 2 * 6 + i}" for i in range(1, 6)), sep="\n", file=file)
+    write_scene(duration=2, frame_rate=25, integrator={"dt": 0.002}, cloth=[{
+        "mesh": {"file": "strip.obj"}, "pins": [{"nodes": [0, 1]}], "terms": ["stretch.edge"],
+        "material": {"young_modulus": 1e4, "thickness": 1e-3, "density": 200}}], colliders=[
+            {"type": "sphere", "center": [9, 0, 0], "radius": 0.1, "track": [[0, [0, 0, 0]], [2, [0, 1, 0]]]},
+            {"type": "box", "center": [9, 3, 0], "size": [1, 1, 1], "turns": [{"time": 0, "rotate": [0, 1, 0, 0]}, {"time": 2, "rotate": [0, 1, 0, 720]}]},
+            {"type": "plane", "point": [0, -9, 0], "normal": [0, 1, 0]},
+            {"type": "animated_mesh", "file": scenes + "limb.npy", "mesh": scenes + "limb.obj", "frame_rate": 8, "track": [[0, [9, -5, 0]]]}])
+    good("run", "scene.json", "--out", "whole", "--format", ALL)
+    equal(stopped(signal.SIGINT, "--out", "out", "--format", ALL), 130)
+    assert read_json("out/summary.json")["time"] < 2
+    good("run", "scene.json", "--out", "out", "--format", ALL, "--resume")
+    same("whole", "out")
+
+
 def test_no_checkpoint_and_finished():
     """--resume without a checkpoint starts a run, and leaves a finished run as it is"""
     write_scene(colliders=[{"type": "plane", "point": [0, -0.02, 0], "normal": [0, 1, 0]}])

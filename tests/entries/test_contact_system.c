@@ -436,6 +436,30 @@ START_TEST(a_thrown_node_is_stopped)
 }
 END_TEST
 
+/* Whoever cancels need not wait until all pairs have been looked at: nothing moves, which is always safe. */
+START_TEST(a_cancelled_search_moves_nothing)
+{
+    probe t = open_flat(3e-3);
+    const size_t nodes = (size_t)t.s.model->node_count;
+    atomic_bool cancel = false;
+    double *fraction = calloc(nodes, sizeof *fraction);
+    ck_assert_ptr_nonnull(fraction);
+    for (size_t i = 0; i < 3 * nodes; i++)
+        t.x[i] = t.at.x[i] - (i % 3 == 1 ? 1e-3 : 0);
+    drape_system_watch(t.system, &cancel);
+    ck_assert_double_gt(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, fraction), 0);
+    atomic_store(&cancel, true);
+    ck_assert_double_eq(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, NULL), 0);
+    ck_assert_double_eq(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, fraction), 0);
+    for (size_t i = 0; i < nodes; i++)
+        ck_assert_double_eq(fraction[i], 0);
+    atomic_store(&cancel, false);
+    ck_assert_double_gt(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, NULL), 0);
+    free(fraction);
+    close_probe(&t);
+}
+END_TEST
+
 /* A state with NaN has no effect on later ones: the next evaluation is as before it. */
 START_TEST(nan_is_forgotten)
 {
@@ -692,6 +716,6 @@ END_TEST
 
 SUITE("contact_system", every_collider, colliders_without_terms, cloth_on_cloth, near_the_least_gap,
       a_correction_arrives_from_beyond_the_distance, a_thrown_node_is_stopped,
-      the_jacobian_has_the_predicted_forces, landing_takes_few_iterations, nan_is_forgotten,
-      only_scenes_with_contact_have_it_checked, scenes_without_contact_pay_nothing, all_bytes_are_counted,
-      active_contacts_are_all_pairs, queries_change_nothing)
+      a_cancelled_search_moves_nothing, the_jacobian_has_the_predicted_forces, landing_takes_few_iterations,
+      nan_is_forgotten, only_scenes_with_contact_have_it_checked, scenes_without_contact_pay_nothing,
+      all_bytes_are_counted, active_contacts_are_all_pairs, queries_change_nothing)

@@ -23,6 +23,8 @@ static const char base[] =
     " 'seams': [{'type': 'stitch', 'a': {'cloth': 'sewn', 'nodes': [0, 1]},"
     "            'b': {'cloth': 'sewn', 'nodes': [2, 3]}}],"
     " 'colliders': [{'name': 'ball', 'type': 'sphere', 'center': [0,0,-1], 'radius': 0.1}],"
+    " 'gravity_history': 'up', 'histories': [{'name': 'up', 'times': [0, 1, 2], 'values': [1, 2, 3]},"
+    " {'name': 'down', 'times': [0, 1], 'values': [2, 1]}],"
     " 'self_contact': {'thickness': 0.001}, 'untangle': {}, 'duration': 1}";
 
 typedef enum outcome {
@@ -111,6 +113,10 @@ static const struct test_case {
     {"/cloth/0/ignore", REFUSED, NULL, "['ball']"},
     {"/colliders/0/enabled", REFUSED, NULL, "false"},
     {"/events/0/pins", REFUSED, NULL, "'other'"},
+    {"/histories/0/name", SKIPPED, NULL, NULL}, /* names what the loads have */
+    {"/histories/0/times", REFUSED, NULL, "[0, 1, 3]"},
+    {"/histories/0/values", REFUSED, NULL, "[1, 2, 4]"},
+    {"/gravity_history", REFUSED, NULL, "'down'"},
     {"/seams/0/type", SKIPPED, NULL, NULL}, /* there is only one */
     {"/seams/0/a/cloth", SKIPPED, NULL, NULL},
     {"/seams/0/b/cloth", SKIPPED, NULL, NULL},

@@ -867,8 +867,9 @@ static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
     static double field[NODES * 3];
     static double strain[TRIANGLES * 2];
     drape_folder *folder = open_folder(w, w->out);
+    drape_arena arena = drape_arena_of(w->ctx);
     const drape_export_def def = {
-        .model = w->model, .folder = folder, .frame_rate = RATE, .most_frames = 1000};
+        .arena = &arena, .model = w->model, .folder = folder, .frame_rate = RATE, .most_frames = 1000};
     struct rlimit old;
     drape_status status = DRAPE_OK;
     int frames = 0;
@@ -890,6 +891,7 @@ static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
     snprintf(message, sizeof message, "%s", drape_context_message(w->ctx));
     ops->close(w->ctx, state);
     drape_folder_close(&folder);
+    drape_arena_free(&arena);
     free_disk(&old);
     drape_context_set_message(w->ctx, "%s", message);
     ck_assert_int_eq(status, DRAPE_E_FILE);

@@ -1,5 +1,5 @@
 /* test_render.c: all that is computed before drawing: surfaces, colours, letters, the camera, frames. */
-#include "render/body.h"
+#include "colliders/body.h"
 #include "render/camera.h"
 #include "render/font.h"
 #include "render/images.h"

@@ -1240,7 +1240,7 @@ END_TEST
 static void check_form(const drape_scene_object *object)
 {
     ck_assert_ptr_nonnull(object->name);
-    ck_assert_uint_le(object->key_count, 16);
+    ck_assert_uint_le(object->key_count, 24);
     for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
         ck_assert_msg(key->param.help && *key->param.help, "%s has no help", key->param.name);
@@ -1269,6 +1269,7 @@ static const char whole[] =
     "1}]}], 'colliders': [{'type': 'c', 'turns': "
     "[{'time': 0, 'rotate': [0, 0, 1]}]}],"
     "'events': [{'type': 'e'}], 'integrator': {}, 'controller': {}, 'output': {},"
+    "'histories': [{'name': 'h', 'times': [0], 'values': [1]}],"
     "'seams': [{'type': 's', 'a': {'cloth': 'c', 'nodes': [0]}, 'b': {'cloth': 'c', 'nodes': [1]}}]}";
 
 /* The key that a pointer leads to, and the def it belongs to. */

@@ -4,8 +4,8 @@
  * gets the point that fits the tangent planes of the surface there best (dual contouring: Ju, Losasso,
  * Schaefer & Warren 2002). On edges and corners of the collider that point lies on them.
  */
-#ifndef DRAPE_RENDER_BODY_H
-#define DRAPE_RENDER_BODY_H
+#ifndef DRAPE_COLLIDERS_BODY_H
+#define DRAPE_COLLIDERS_BODY_H
 
 #include "base/arena.h"
 #include "colliders/colliders.h"

@@ -1,5 +1,5 @@
 /* body.c: see body.h. */
-#include "render/body.h"
+#include "colliders/body.h"
 
 #include "base/vec3.h"
 

@@ -1,0 +1,482 @@
+/* test_faces.c: polygons, texture coordinates and materials of a mesh file: how they are divided into
+ * triangles, and that frames have them again. */
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/vec3.h"
+#include "io/recorder.h"
+#include "mesh/mesh.h"
+#include "support/failing_allocator.h"
+#include "support/frames.h"
+#include "support/scene.h"
+
+extern const drape_import_ops drape_import_obj, drape_import_ply;
+
+static void parse(drape_context *ctx, const drape_import_ops *import, const char *text, drape_mesh *mesh)
+{
+    const drape_mesh_source source = {"/m/file", "a.obj", NULL};
+    *mesh = (drape_mesh){0};
+    const drape_status status = import->read(ctx, &source, text, strlen(text), mesh);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+}
+
+static drape_context *new_context(void)
+{
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    return ctx;
+}
+
+static void divides_into(const char *text, int triangles, const int *expected)
+{
+    drape_context *ctx = new_context();
+    drape_mesh mesh;
+    parse(ctx, &drape_import_obj, text, &mesh);
+    ck_assert_int_eq(mesh.triangle_count, triangles);
+    for (int i = 0; i < 3 * triangles; i++)
+        ck_assert_msg(mesh.triangle[i] == expected[i], "%s: number %d is %d, not %d", text, i,
+                      mesh.triangle[i], expected[i]);
+    drape_mesh_free(&mesh);
+    drape_context_destroy(&ctx);
+}
+
+START_TEST(a_quadrilateral_gets_its_shorter_diagonal)
+{
+    static const int first[] = {0, 1, 2, 0, 2, 3}, second[] = {0, 1, 3, 1, 2, 3};
+    divides_into("v 0 0 0\nv 1 0 0\nv 2 1 0\nv 1 1 0\nf 1 2 3 4\n", 2, second);
+    divides_into("v 0 0 0\nv 1 0 0\nv 0 1 0\nv -1 1 0\nf 1 2 3 4\n", 2, first);
+    /* alike to a thousandth, whatever the rounding of the coordinates: from the first corner */
+    divides_into("v 0 0 0\nv 1 0 0\nv 1.0004 1 0\nv 0 1 0\nf 1 2 3 4\n", 2, first);
+    divides_into("v 0 0 0\nv 1 0 0\nv 0.9996 1 0\nv 0 1 0\nf 1 2 3 4\n", 2, first);
+    /* Concave at the second corner, at the first: the shorter diagonal, between the others, is outside. */
+    divides_into("v 0 0 0\nv .4 .4 0\nv 1 0 0\nv .4 3 0\nf 1 2 3 4\n", 2, second);
+    divides_into("v .4 .4 0\nv 1 0 0\nv .4 3 0\nv 0 0 0\nf 1 2 3 4\n", 2, first);
+}
+END_TEST
+
+/* The area of the triangles of a polygon in the plane, and the largest of the areas that are turned over. */
+static double area_of(const drape_mesh *mesh, double *least)
+{
+    double sum = 0;
+    *least = INFINITY;
+    for (int32_t t = 0; t < mesh->triangle_count; t++) {
+        const double *p[3];
+        double ab[3], ac[3], n[3];
+        for (int k = 0; k < 3; k++)
+            p[k] = mesh->x + 3 * (size_t)mesh->triangle[3 * (size_t)t + (size_t)k];
+        vec3_sub(p[1], p[0], ab);
+        vec3_sub(p[2], p[0], ac);
+        vec3_cross(ab, ac, n);
+        sum += n[2] / 2;
+        *least = fmin(*least, n[2] / 2);
+    }
+    return sum;
+}
+
+/* A star of n points with radii 1 and r: its area is n r sin(pi / n), and it is concave at every second
+ * corner. Sums of n products have rounding errors below n^2 2^-53 < 1e-11. */
+START_TEST(a_polygon_loses_ears)
+{
+    drape_context *ctx = new_context();
+    for (int n = 3; n <= 128; n += n < 8 ? 1 : 40) {
+        char text[65536];
+        size_t used = 0;
+        const double r = .4, step = acos(-1) / n;
+        for (int i = 0; i < 2 * n; i++)
+            used += (size_t)snprintf(text + used, sizeof text - used, "v %.17g %.17g 0\n",
+                                     (i % 2 ? r : 1) * cos(i * step), (i % 2 ? r : 1) * sin(i * step));
+        used += (size_t)snprintf(text + used, sizeof text - used, "f");
+        for (int i = 0; i < 2 * n; i++)
+            used += (size_t)snprintf(text + used, sizeof text - used, " %d", i + 1);
+        drape_mesh mesh;
+        double least;
+        parse(ctx, &drape_import_obj, text, &mesh);
+        ck_assert_int_eq(mesh.triangle_count, 2 * n - 2);
+        ck_assert_double_eq_tol(area_of(&mesh, &least), n * r * sin(step), 1e-11);
+        ck_assert(least > 0);
+        ck_assert_int_eq(mesh.faces.count, 1);
+        drape_mesh_free(&mesh);
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* No such polygon can be divided well, but each becomes as many triangles as it must, and ends. */
+START_TEST(polygons_of_any_kind_are_divided)
+{
+    static const char *const texts[] = {
+        "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nv .5 2 0\nf 1 2 3 4 5\n",                 /* crosses itself */
+        "v 0 0 0\nv 0 0 0\nv 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3 4 5\n",                  /* one place */
+        "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nv 4 0 0\nf 1 2 3 4 5\n",                  /* a line */
+        "v 1e300 0 0\nv -1e300 0 0\nv 0 1e300 0\nv 0 0 1e300\nv 1 1 1\nf 1 2 3 4 5\n", /* overflows */
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3 1 2\n"};                                   /* nodes repeat */
+    drape_context *ctx = new_context();
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        drape_mesh mesh;
+        parse(ctx, &drape_import_obj, texts[i], &mesh);
+        ck_assert_int_eq(mesh.triangle_count, 3);
+        drape_mesh_free(&mesh);
+    }
+    char text[16384] = "f";
+    for (int i = 0; i < 1000; i++)
+        snprintf(text + strlen(text), sizeof text - strlen(text), " %d", i % 3 + 1);
+    drape_mesh mesh;
+    strcat(text, "\nv 0 0 0\nv 1 0 0\nv 0 1 0\n");
+    parse(ctx, &drape_import_obj, text, &mesh);
+    ck_assert_int_eq(mesh.triangle_count, 998);
+    drape_mesh_free(&mesh);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(what_a_simulation_does_not_need_is_not_refused)
+{
+    drape_context *ctx = new_context();
+    drape_mesh mesh;
+    /* coordinates that are not defined, are no numbers, or are missing at a corner */
+    parse(ctx, &drape_import_obj,
+          "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt x 1\nvt\nvt .5\n"
+          "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\nf 1/1 3/3 4/9\nf 1/1 3 4/2\nf 1/1 2/5 3/2\nf 1/6 2/-5 3/2\n",
+          &mesh);
+    static const int has[] = {1, 0, 0, 0, 0, 1};
+    ck_assert_int_eq(mesh.faces.count, 6);
+    for (int f = 0; f < 6; f++)
+        for (int k = 0; k < 3; k++)
+            ck_assert_int_eq(mesh.faces.uv_of[3 * f + k] >= 0, has[f]);
+    ck_assert_double_eq(mesh.faces.uv[2 * mesh.faces.uv_of[15]], .5);
+    ck_assert_double_eq(mesh.faces.uv[2 * mesh.faces.uv_of[15] + 1], 0);
+    drape_mesh_free(&mesh);
+    /* nothing of all that: the mesh has triangles only */
+    parse(ctx, &drape_import_obj, "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nusemtl\nf 1/2 2/1 3\n",
+          &mesh);
+    ck_assert_int_eq(mesh.faces.count, 0);
+    ck_assert_ptr_null(mesh.faces.first);
+    drape_mesh_free(&mesh);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* In OBJ coordinates are often repeated for each corner; a vertex is split only where they differ. */
+START_TEST(equal_coordinates_are_one)
+{
+    drape_context *ctx = new_context();
+    drape_mesh mesh;
+    drape_vertices vertices;
+    parse(ctx, &drape_import_obj,
+          "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt .3 0\nvt 1 0\nvt 1 1\nvt -0 0\nvt 1 1\nvt 0 1\nvt .3 0\n"
+          "f 1/4 2/2 3/3\nf 1/7 3/5 4/6\n",
+          &mesh);
+    ck_assert_int_eq(mesh.faces.uv_count, 5);
+    drape_arena arena = drape_arena_of(ctx);
+    ck_assert_int_eq(drape_faces_vertices(&arena, &mesh, &vertices), DRAPE_OK);
+    static const int node[] = {0, 0, 1, 2, 3}, at[] = {0, 2, 3, 1, 3, 4};
+    ck_assert_int_eq(vertices.count, 5); /* node 0 is on the seam */
+    for (int i = 0; i < 5; i++)
+        ck_assert_int_eq(vertices.node[i], node[i]);
+    for (int i = 0; i < 6; i++)
+        ck_assert_int_eq(vertices.at[i], at[i]);
+    drape_arena_free(&arena);
+    drape_mesh_free(&mesh);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+static void check_uvs(const drape_mesh *mesh, const double *expected)
+{
+    ck_assert_int_eq(mesh->faces.corner_count, 4);
+    for (int c = 0; c < 4; c++)
+        for (int k = 0; k < 2; k++)
+            ck_assert_double_eq(mesh->faces.uv[2 * mesh->faces.uv_of[c] + k], expected[2 * c + k]);
+}
+
+START_TEST(ply_has_them_at_vertices_or_corners)
+{
+    static const double uvs[] = {0, .25, 1, 0, 1, 1, 0, 1};
+    drape_context *ctx = new_context();
+    drape_mesh mesh;
+    static const char *const names[][2] = {{"s", "t"}, {"u", "v"}, {"texture_u", "texture_v"}};
+    for (int i = 0; i < 3; i++) {
+        char text[512];
+        snprintf(
+            text, sizeof text,
+            "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float %s\nproperty float y\n"
+            "property float z\nproperty float %s\nelement face 1\nproperty list uchar int vertex_indices\n"
+            "end_header\n0 0 0 0 .25\n1 1 0 0 0\n1 1 1 0 1\n0 0 1 0 1\n4 0 1 2 3\n",
+            names[i][0], names[i][1]);
+        parse(ctx, &drape_import_ply, text, &mesh);
+        check_uvs(&mesh, uvs);
+        drape_mesh_free(&mesh);
+    }
+    static const char *const orders[] = {"8 0 .25 1 0 1 1 0 1 4 0 1 2 3\n",
+                                         "4 0 1 2 3 8 0 .25 1 0 1 1 0 1\n"};
+    for (int i = 0; i < 2; i++) {
+        char text[512];
+        const char *lists[] = {"property list uchar float texcoord\n",
+                               "property list uchar int vertex_indices\n"};
+        snprintf(
+            text, sizeof text,
+            "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+            "property float s\nproperty float t\nelement face 1\n%s%send_header\n"
+            "0 0 0 9 9\n1 0 0 9 9\n1 1 0 9 9\n0 1 0 9 9\n%s",
+            lists[i], lists[1 - i], orders[i]);
+        parse(ctx, &drape_import_ply, text, &mesh);
+        check_uvs(&mesh, uvs);
+        drape_mesh_free(&mesh);
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* ---- Round trips ---- */
+
+/* A tube of 4 x 3 quadrilaterals and a lid of 4 corners: its seam has the coordinates 0 and 1 on one line of
+ * nodes, its materials alternate, and one name has a blank. */
+#define SIDES 4
+#define RINGS 4
+#define NODES (SIDES * RINGS)
+#define QUADS (SIDES * (RINGS - 1))
+#define UVS   ((SIDES + 1) * RINGS)
+
+static void write_tube(const frames_folder *f, const char *name)
+{
+    FILE *file = frames_file(f, name);
+    fprintf(file, "mtllib tube of\tcloth.mtl\n");
+    for (int r = 0; r < RINGS; r++)
+        for (int s = 0; s < SIDES; s++)
+            fprintf(file, "v %.6f %.6f %.6f\n", .1 * cos(s * 1.5707963), .1 * r, .1 * sin(s * 1.5707963));
+    for (int r = 0; r < RINGS; r++)
+        for (int s = 0; s <= SIDES; s++)
+            fprintf(file, "vt %g %g\n", (double)s / SIDES, (double)r / RINGS);
+    for (int r = 0; r + 1 < RINGS; r++) {
+        fprintf(file, "usemtl %s\n", r % 2 ? "lining" : "light denim");
+        for (int s = 0; s < SIDES; s++) {
+            const int a = r * SIDES + s + 1, b = r * SIDES + (s + 1) % SIDES + 1;
+            const int u = r * (SIDES + 1) + s + 1;
+            fprintf(file, "f %d/%d %d/%d %d/%d %d/%d\n", b, u + 1, a, u, a + SIDES, u + SIDES + 1, b + SIDES,
+                    u + SIDES + 2);
+        }
+    }
+    fprintf(file, "f 16 13 14 15\n"); /* without coordinates, of the last material */
+    fclose(file);
+}
+
+static scene tube_scene(const frames_folder *f)
+{
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'name': 'tube', 'mesh': {'file': '%s/tube.obj'}, 'material': "
+        "{'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge'], "
+        "'pins': [{'nodes': [0, 1]}]}, {'name': 'grid', 'mesh': {'grid': 'square', 'columns': 3, "
+        "'rows': 3, 'width': 0.2, 'height': 0.2}, 'material': {'young_modulus': 1e4, 'thickness': "
+        "1e-3, 'density': 200}, 'terms': ['stretch.edge'], 'pins': [{'corner': 'top-left'}]}], "
+        "'integrator': {'dt': 0.01}, 'duration': 0.05, 'frame_rate': 40}",
+        f->path);
+}
+
+static void record(scene *s, const frames_folder *f, const char *format)
+{
+    char out[100];
+    snprintf(out, sizeof out, "%s/out", f->path);
+    const drape_recorder_def def = {.folder = out, .formats = &format, .format_count = 1};
+    drape_recorder *recorder = NULL;
+    drape_status status = drape_recorder_create(s->ctx, s->sim, &def, &recorder);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    ck_assert_int_eq(drape_sim_advance(s->sim, 0.05), DRAPE_OK);
+    ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
+    drape_recorder_destroy(&recorder);
+}
+
+static char *slurp(const frames_folder *f, const char *name, size_t *size)
+{
+    char path[200];
+    snprintf(path, sizeof path, "%s/%s", f->path, name);
+    FILE *file = fopen(path, "rb");
+    ck_assert_msg(file != NULL, "%s is not there", path);
+    char *data = malloc(1 << 20);
+    *size = fread(data, 1, (1 << 20) - 1, file);
+    data[*size] = 0;
+    fclose(file);
+    return data;
+}
+
+/* Frames have the faces that the mesh had: the frame read again, the grid apart, is the mesh but for
+ * positions. */
+START_TEST(obj_frames_have_the_faces_of_the_mesh)
+{
+    frames_folder f = frames_folder_make();
+    write_tube(&f, "tube.obj");
+    scene s = tube_scene(&f);
+    ck_assert_int_eq(s.model->cloths[0].mesh.triangle_count, 2 * QUADS + 2);
+    record(&s, &f, "obj");
+    static const char *const frames[] = {"out/frame_000000.obj", "out/frame_000002.obj"};
+    for (int i = 0; i < 2; i++) {
+        drape_mesh mesh = {0};
+        const drape_faces *from = &s.model->cloths[0].mesh.faces, *to = &mesh.faces;
+        ck_assert_int_eq(drape_mesh_read(s.ctx, "/m", f.path, frames[i], &mesh), DRAPE_OK);
+        ck_assert_int_eq(mesh.node_count, NODES + 9);
+        ck_assert_int_eq(to->count, QUADS + 1 + 8); /* the triangles of the grid, in no material */
+        ck_assert_int_eq(to->corner_count, 4 * QUADS + 4 + 24);
+        ck_assert_int_eq(memcmp(to->node, from->node, (size_t)from->corner_count * sizeof *to->node), 0);
+        ck_assert_int_eq(to->uv_count, UVS);
+        for (int32_t c = 0; c < from->corner_count; c++) {
+            ck_assert_int_eq(to->uv_of[c] >= 0, from->uv_of[c] >= 0);
+            for (int k = 0; k < 2 && from->uv_of[c] >= 0; k++)
+                ck_assert_double_eq(to->uv[2 * to->uv_of[c] + k], from->uv[2 * from->uv_of[c] + k]);
+        }
+        for (int32_t face = 0; face < QUADS + 1; face++)
+            ck_assert_str_eq(to->name[to->material[face]], face / SIDES == 1 ? "lining" : "light denim");
+        ck_assert_str_eq(to->name[to->material[QUADS + 1]], "cloth");
+        ck_assert_str_eq(to->material_file, "tube of_cloth.mtl"); /* without the control character */
+        drape_mesh_free(&mesh);
+    }
+    scene_close(&s);
+    frames_folder_remove(&f);
+}
+END_TEST
+
+static uint32_t word_at(const char *data, size_t at)
+{
+    const unsigned char *b = (const unsigned char *)data + at;
+    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+}
+
+static float float_at(const char *data, size_t at)
+{
+    float value;
+    memcpy(&value, data + at, sizeof value); /* tests run on little endian machines */
+    return value;
+}
+
+typedef struct glb {
+    char *data;
+    size_t size, binary; /* where the binary chunk begins */
+    json_t *json;
+} glb;
+
+static glb glb_load(const frames_folder *f)
+{
+    glb g = {.data = slurp(f, "out/positions.glb", &g.size)};
+    const uint32_t text = word_at(g.data, 12);
+    json_error_t error;
+    g.binary = 28 + (size_t)text;
+    g.json = json_loadb(g.data + 20, text, JSON_REJECT_DUPLICATES, &error);
+    ck_assert_msg(g.json != NULL, "%s", error.text);
+    return g;
+}
+
+static void glb_free(glb *g)
+{
+    json_decref(g->json);
+    free(g->data);
+}
+
+static json_t *item(const json_t *object, const char *list, json_int_t index)
+{
+    json_t *found = json_array_get(json_object_get(object, list), (size_t)index);
+    ck_assert_msg(found != NULL, "%s has no item %d", list, (int)index);
+    return found;
+}
+
+static json_int_t number(const json_t *object, const char *key)
+{
+    return json_integer_value(json_object_get(object, key)); /* 0 if it is missing, as in glTF */
+}
+
+/* Where an accessor's data begin; they must be within the file. */
+static size_t place(const glb *g, json_int_t accessor, size_t width, json_int_t *count)
+{
+    const json_t *a = item(g->json, "accessors", accessor),
+                 *v = item(g->json, "bufferViews", number(a, "bufferView"));
+    const size_t at = g->binary + (size_t)number(v, "byteOffset") + (size_t)number(a, "byteOffset");
+    *count = number(a, "count");
+    ck_assert_uint_le((size_t)number(a, "byteOffset") + width * (size_t)*count,
+                      (size_t)number(v, "byteLength"));
+    ck_assert_uint_le(at + width * (size_t)*count, g->size);
+    return at;
+}
+
+/* One primitive a material with its name, all corners with the positions and coordinates of the mesh, v
+ * downwards; the nodes of the seam have two vertices, and those of the lid one more. */
+START_TEST(glb_has_texture_coordinates_and_materials)
+{
+    frames_folder f = frames_folder_make();
+    write_tube(&f, "tube.obj");
+    scene s = tube_scene(&f);
+    record(&s, &f, "glb");
+    glb g = glb_load(&f);
+    static const char *const names[] = {"cloth", "light denim", "lining"};
+    static const int triangles[] = {8, 4 * SIDES + 2, 2 * SIDES};
+    const drape_mesh *mesh = &s.model->cloths[0].mesh;
+    const json_t *drawn = item(g.json, "meshes", 0);
+    ck_assert_uint_eq(json_array_size(json_object_get(drawn, "primitives")), 3);
+    size_t seen = 0;
+    for (json_int_t p = 0; p < 3; p++) {
+        const json_t *primitive = item(drawn, "primitives", p),
+                     *attributes = json_object_get(primitive, "attributes");
+        const json_t *material = item(g.json, "materials", number(primitive, "material"));
+        ck_assert_str_eq(json_string_value(json_object_get(material, "name")), names[p]);
+        ck_assert_uint_eq(json_array_size(json_object_get(primitive, "targets")), 2);
+        json_int_t corners, vertices, same;
+        const size_t index = place(&g, number(primitive, "indices"), 4, &corners);
+        const size_t position = place(&g, number(attributes, "POSITION"), 12, &vertices);
+        const size_t uv = place(&g, number(attributes, "TEXCOORD_0"), 8, &same);
+        ck_assert_int_eq(corners, 3 * triangles[p]);
+        ck_assert_int_eq(vertices, NODES + RINGS + SIDES + 9);
+        ck_assert_int_eq(same, vertices);
+        for (json_int_t c = 0; c < corners; c++) {
+            const uint32_t vertex = word_at(g.data, index + 4 * (size_t)c);
+            ck_assert_uint_lt(vertex, (uint32_t)vertices);
+            bool found = p == 0; /* the grid has no coordinates */
+            for (int32_t i = 0; i < 3 * mesh->triangle_count && !found; i++) {
+                const int32_t own = mesh->faces.uv_of[mesh->faces.corner[i]];
+                found = own >= 0 || p == 1;
+                for (size_t k = 0; k < 3; k++)
+                    found = found && float_at(g.data, position + 12 * vertex + 4 * k) ==
+                                         (float)mesh->x[3 * mesh->triangle[i] + (int)k];
+                const double u = own < 0 ? 0 : mesh->faces.uv[2 * own],
+                             v = own < 0 ? 0 : 1 - mesh->faces.uv[2 * own + 1];
+                found = found && float_at(g.data, uv + 8 * vertex) == (float)u &&
+                        float_at(g.data, uv + 8 * vertex + 4) == (float)v;
+            }
+            ck_assert_msg(found, "corner %d of primitive %d", (int)c, (int)p);
+            seen++;
+        }
+    }
+    ck_assert_uint_eq(seen, 3 * (2 * QUADS + 2 + 8));
+    glb_free(&g);
+    scene_close(&s);
+    frames_folder_remove(&f);
+}
+END_TEST
+
+/* Each failed allocation is reported, by the importer and where vertices are split, and none leaks. */
+START_TEST(each_allocation_may_fail)
+{
+    frames_folder f = frames_folder_make();
+    write_tube(&f, "tube.obj");
+    drape_status status = DRAPE_E_MEMORY;
+    for (int n = 1; status; n++) {
+        failing_allocator memory = {.fail_at = n};
+        drape_context *ctx = failing_context(&memory);
+        drape_mesh mesh = {0};
+        drape_vertices vertices;
+        ck_assert_int_lt(n, 200);
+        status = drape_mesh_read(ctx, "/m", f.path, "tube.obj", &mesh);
+        drape_arena arena = drape_arena_of(ctx);
+        if (!status)
+            status = drape_faces_vertices(&arena, &mesh, &vertices);
+        ck_assert(status == DRAPE_OK || status == DRAPE_E_MEMORY);
+        drape_arena_free(&arena);
+        drape_mesh_free(&mesh);
+        drape_context_destroy(&ctx);
+        ck_assert_int_eq(memory.live, 0);
+    }
+    frames_folder_remove(&f);
+}
+END_TEST
+
+SUITE("faces", a_quadrilateral_gets_its_shorter_diagonal, a_polygon_loses_ears,
+      polygons_of_any_kind_are_divided, what_a_simulation_does_not_need_is_not_refused,
+      equal_coordinates_are_one, ply_has_them_at_vertices_or_corners, obj_frames_have_the_faces_of_the_mesh,
+      glb_has_texture_coordinates_and_materials, each_allocation_may_fail)
