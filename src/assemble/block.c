@@ -3,6 +3,7 @@
 
 #include "base/lanes.h"
 #include "model/history.h"
+#include "model/slider.h"
 #include "sparse/project.h"
 
 #define D DRAPE_MAX_ELEMENT_DOFS
@@ -25,6 +26,22 @@ static void rates_of_history(const drape_term *term, const drape_request *want, 
         b->rate[i] = want->point->weight * b->q[i] + history[i];
 }
 
+/* Adds what the sliders of the term do. */
+static void add_sliders(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    for (int s = 0; want->conservative && s < term->sliders; s++) {
+        const size_t first = (size_t)s * (size_t)term->elements.count + (size_t)b->first;
+        const double *k = term->slider_stiffness + first, *limit = term->slider_limit + first,
+                     *slid = want->point->internal + term->first_slider + first;
+        for (int32_t i = 0; i < b->count; i++) {
+            const drape_slider_value v = drape_slider_at(k[i], limit[i], b->strain[i] - slid[i]);
+            b->force[i] += v.force;
+            b->by_strain[i] += v.slope;
+            b->energy[i] += v.energy;
+        }
+    }
+}
+
 /* Generalised forces on the measures, their derivatives and energies, from q and its rate. */
 static void sum_stresses(const drape_term *term, const drape_request *want, drape_block *b)
 {
@@ -38,6 +55,7 @@ static void sum_stresses(const drape_term *term, const drape_request *want, drap
         b->energy[i] = 0.5 * b->force[i] * b->strain[i];
         b->by_rate[i] = 0;
     }
+    add_sliders(term, want, b);
     const double *c = want->dissipative && term->damping ? term->damping + b->first : NULL;
     for (int32_t i = 0; c && i < b->count; i++) {
         b->force[i] += c[i] * b->rate[i];

@@ -70,6 +70,36 @@ double *drape_term_share(drape_term_builder *builder, int32_t count)
     return shared;
 }
 
+drape_status drape_term_reserve_sliders(drape_term_builder *builder, int count)
+{
+    drape_term *term = builder->term;
+    if (!builder->reserved || !term->ops->measure || term->sliders > 0 || count < 1 ||
+        count > DRAPE_MAX_SLIDERS)
+        return drape_term_refuse(builder,
+                                 "%s reserves %d sliders; 1 to %d, once, after the elements of a measure",
+                                 term->ops->entry.name, count, DRAPE_MAX_SLIDERS);
+    const size_t all = (size_t)count * (size_t)term->elements.count;
+    term->slider_stiffness = drape_arena_take(&builder->model->arena, all, sizeof *term->slider_stiffness);
+    term->slider_limit = drape_arena_take(&builder->model->arena, all, sizeof *term->slider_limit);
+    term->sliders = count;
+    return drape_arena_status(&builder->model->arena);
+}
+
+void drape_term_set_slider(drape_term_builder *builder, int number, int32_t element, double stiffness,
+                           double limit)
+{
+    const drape_term *term = builder->term;
+    if (!term->slider_stiffness || !term->slider_limit || number < 0 || number >= term->sliders ||
+        element < 0 || element >= term->elements.count || !(stiffness >= 0) || !(limit >= 0) ||
+        isinf(stiffness) || isinf(limit)) {
+        builder->strayed = true;
+        return;
+    }
+    const size_t at = (size_t)number * (size_t)term->elements.count + (size_t)element;
+    term->slider_stiffness[at] = stiffness;
+    term->slider_limit[at] = limit;
+}
+
 drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
 {
     char text[512];
@@ -183,8 +213,8 @@ static drape_status check_elements(drape_term_builder *builder)
                                  timed[1]);
     if (builder->strayed)
         return drape_term_refuse(builder,
-                                 "%s set an element outside of the %d that it announced, or a part or link "
-                                 "outside of those",
+                                 "%s set an element outside of the %d that it announced, or a part, link or "
+                                 "slider outside of those, or a slider of negative stiffness or limit",
                                  ops->entry.name, (int)el->count);
     for (size_t i = 0; i < (size_t)el->count; i++)
         if (el->node[i * (size_t)el->nodes] == -1)
@@ -217,7 +247,7 @@ static drape_status begin_term(drape_model *model, int32_t c, int32_t seam, cons
     term->seam = seam;
     term->elements.user = ops->user;
     term->elements.factor = 1;
-    term->first_internal = term->first_measure = -1;
+    term->first_internal = term->first_measure = term->first_slider = -1;
     model->term_count++;
     model->has_dissipation = model->has_dissipation || term->ops->dissipative || term->ops->dissipation;
     return DRAPE_OK;
@@ -393,6 +423,10 @@ static void number_elements(drape_model *model, drape_term *term)
     if (term->ops->measure) {
         term->first_measure = model->measure_count;
         model->measure_count += term->elements.count;
+    }
+    if (term->sliders > 0) {
+        term->first_slider = model->internal_count;
+        model->internal_count += drape_term_slider_count(term);
     }
 }
 

@@ -61,7 +61,7 @@ static int32_t find_runs(const drape_elements *el, run *out)
 
 static bool has_runs(const drape_term *term)
 {
-    return term->ops->distance && term->law_count == 0 && !term->damping &&
+    return term->ops->distance && term->law_count == 0 && !term->damping && term->sliders == 0 &&
            find_runs(&term->elements, NULL) <= term->elements.count / MEAN_RUN;
 }
 

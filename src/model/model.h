@@ -47,6 +47,10 @@ typedef struct drape_term {
     const struct drape_term *const *laws; /* laws of the cloth that act on this measure */
     int law_count;
     const double *damping; /* (elements.count) its measures' own dashpots [J s/q2]; NULL: none */
+    int sliders;           /* of each element (slider.h) */
+    double *slider_stiffness, *slider_limit; /* (sliders x elements.count) [J/q2], [J/q] */
+    int64_t
+        first_slider; /* index in a state of how far they have slid (sliders x elements.count); -1: none */
 } drape_term;
 
 static inline bool drape_term_is_timed(const drape_term *term)
@@ -80,6 +84,12 @@ static inline int64_t drape_term_internals(const drape_term *term)
 {
     const int64_t each = term->ops->internal_count > 0 ? term->ops->internal_count : term->ops->has_internal;
     return each * (term->elements.parts ? term->parts.count : term->elements.count);
+}
+
+/* The number of the sliders of all its elements. */
+static inline int64_t drape_term_slider_count(const drape_term *term)
+{
+    return term->sliders * (int64_t)term->elements.count;
 }
 
 /* The nodes that elements couple. */

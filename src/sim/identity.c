@@ -93,6 +93,8 @@ static uint64_t add_term(uint64_t hash, const drape_term *term)
     hash = add(hash, el->node, count * (size_t)el->nodes * sizeof *el->node);
     hash = add_doubles(hash, el->rest, count * (size_t)el->rest_count);
     hash = add_doubles(hash, el->shared, (size_t)el->shared_count);
+    hash = add_doubles(hash, term->slider_stiffness, (size_t)drape_term_slider_count(term));
+    hash = add_doubles(hash, term->slider_limit, (size_t)drape_term_slider_count(term));
     if (el->parts) {
         const drape_parts *p = el->parts;
         const int64_t counts[] = {p->count, p->nodes, p->rest_count, p->link_count};

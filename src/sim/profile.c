@@ -183,6 +183,7 @@ static size_t term_bytes(const drape_term *term)
                  (size_t)(term->patches.count + el->count) * (size_t)el->nodes * sizeof *term->patches.node;
     if (term->block)
         bytes += drape_term_places(term) * sizeof *term->block;
+    bytes += 4 * (size_t)drape_term_slider_count(term) * sizeof(double); /* in both states, too */
     if (term->first_internal >= 0)
         bytes += 2 * (size_t)drape_term_internals(term) * sizeof(double); /* in both states */
     return bytes;

@@ -10,6 +10,9 @@
  * approach to nonlinear tensile stiffness, have independent curves of Green's strains.) In compression W1 and
  * W2 go on with the stiffness at rest, W = T'(0) e^2/2.
  *
+ * Friction between yarns that turn against each other, HG of KES-FB1, is a slider (model/slider.h) on s, an
+ * element of its own without elasticity: its limit is HG A, and it slips after a turn by friction_angle.
+ *
  * Each response is an element, three per triangle: warp, weft, shear. Its measure is q(e) for which the
  * energy is k/2 q^2, k = A T'(0), so that dampings of strain measures act on it, in proportion to the
  * stiffness.
@@ -29,8 +32,8 @@
 #include <math.h>
 #include <string.h>
 
-enum { PARAM_DIRECTION, PARAM_MIN_AREA = 3 };
-enum { WARP, WEFT, SHEAR, RESPONSES };
+enum { PARAM_DIRECTION, PARAM_MIN_AREA = 3, PARAM_FRICTION, PARAM_FRICTION_ANGLE };
+enum { WARP, WEFT, SHEAR, FRICTION, RESPONSES }; /* without friction only three */
 enum {
     REST_K,
     REST_Q0,
@@ -40,6 +43,7 @@ enum {
     REST_R2,
     REST_TABLE, /* where its curve is in the shared numbers */
     REST_AREA,
+    REST_SHEAR, /* 1: of shear or its friction */
     REST_COUNT
 };
 
@@ -50,6 +54,10 @@ static const drape_param params[] = {
     DRAPE_NUMBER(
         "min_area", "1", 1e-6, 0, DRAPE_BELOW(1),
         "a step that takes the area of a triangle below this fraction of its area at rest is rejected"),
+    DRAPE_NUMBER("shear_friction", "N/m", 0, 0, 1e9,
+                 "friction between yarns in shear, a force per length: half of 2HG of a KES test; 0: none"),
+    DRAPE_NUMBER("friction_angle", "degrees", DRAPE_DERIVED("required with shear_friction"), DRAPE_ABOVE(0),
+                 89, "change of the shear angle at which yarns slip"),
 };
 
 /* ---- Building ---- */
@@ -70,8 +78,9 @@ static double *make_tables(const drape_cloth_view *cloth, drape_term_builder *bu
     const double straight[RESPONSES][2] = {
         {1, of ? of->warp : strip},
         {1, of ? of->weft : strip},
-        {90, of ? of->shear : strip / (2 * (1 + cloth->material->poisson_ratio))}};
-    drape_points curve[RESPONSES] = {cloth->warp_curve, cloth->weft_curve, cloth->shear_curve};
+        {90, of ? of->shear : strip / (2 * (1 + cloth->material->poisson_ratio))},
+        {90, 1}};
+    drape_points curve[RESPONSES] = {cloth->warp_curve, cloth->weft_curve, cloth->shear_curve, {0}};
     int32_t size = 0;
     for (int k = 0; k < RESPONSES; k++) {
         if (curve[k].count == 0)
@@ -81,19 +90,25 @@ static double *make_tables(const drape_cloth_view *cloth, drape_term_builder *bu
     }
     double *numbers = drape_term_share(builder, size);
     for (int k = 0; numbers && k < RESPONSES; k++)
-        drape_curve_make(&curve[k], k == SHEAR ? sine : NULL, numbers + at[k]);
+        drape_curve_make(&curve[k], k >= SHEAR ? sine : NULL, numbers + at[k]);
     return numbers;
 }
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     static const double woven[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}; /* any law that is not isotropic */
+    const double friction = values[PARAM_FRICTION], slips_at = sine(values[PARAM_FRICTION_ANGLE]);
+    const int responses = friction > 0 ? RESPONSES : FRICTION;
     double direction[DRAPE_ORTHOTROPIC_COUNT];
     int32_t at[RESPONSES];
-    if (cloth->triangle_count > INT32_MAX / RESPONSES)
+    if (friction > 0 && isnan(slips_at))
+        return drape_term_refuse(builder, "\"shear_friction\" = %g needs \"friction_angle\"", friction);
+    if (cloth->triangle_count > INT32_MAX / responses)
         return drape_term_refuse(builder, "the mesh has %d triangles; at most %d", (int)cloth->triangle_count,
-                                 INT32_MAX / RESPONSES);
-    drape_status status = drape_term_reserve(builder, RESPONSES * cloth->triangle_count, REST_COUNT);
+                                 INT32_MAX / responses);
+    drape_status status = drape_term_reserve(builder, responses * cloth->triangle_count, REST_COUNT);
+    if (!status && friction > 0)
+        status = drape_term_reserve_sliders(builder, 1);
     const double *table = status ? NULL : make_tables(cloth, builder, at);
     if (!status && !table)
         status = DRAPE_E_MEMORY;
@@ -109,17 +124,22 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         /* The gradients of N1 and N2: column k of F is sum B_n[k] (x_n - x0). */
         const double twice = flat[2] * flat[5] - flat[3] * flat[4];
         const double a[2] = {flat[5] / twice, -flat[3] / twice}, b[2] = {-flat[4] / twice, flat[2] / twice};
-        for (int k = 0; k < RESPONSES; k++) {
+        for (int k = 0; k < responses; k++) {
             const double *p = k == WEFT ? b : a;
-            drape_term_set(builder, RESPONSES * t + k, node,
-                           (const double[REST_COUNT]){[REST_K] = area * drape_curve_stiffness(table + at[k]),
-                                                      [REST_P1] = p[0],
-                                                      [REST_P2] = p[1],
-                                                      [REST_R1] = k == SHEAR ? b[0] : 0,
-                                                      [REST_R2] = k == SHEAR ? b[1] : 0,
-                                                      [REST_TABLE] = at[k],
-                                                      [REST_AREA] = area});
+            drape_term_set(builder, responses * t + k, node,
+                           (const double[REST_COUNT]){
+                               [REST_K] = k == FRICTION ? 0 : area * drape_curve_stiffness(table + at[k]),
+                               [REST_P1] = p[0],
+                               [REST_P2] = p[1],
+                               [REST_R1] = k >= SHEAR ? b[0] : 0,
+                               [REST_R2] = k >= SHEAR ? b[1] : 0,
+                               [REST_TABLE] = at[k],
+                               [REST_AREA] = area,
+                               [REST_SHEAR] = k >= SHEAR});
         }
+        if (friction > 0)
+            drape_term_set_slider(builder, 0, responses * t + FRICTION, area * friction / slips_at,
+                                  area * friction);
     }
     return status;
 }
@@ -175,9 +195,9 @@ static void shear_strain(double p, const double n[3], double r, const double m[3
     }
 }
 
-static bool is_shear(int32_t element)
+static bool is_shear(const drape_elements *el, int32_t element)
 {
-    return element % RESPONSES == SHEAR;
+    return drape_rest_of(el, REST_SHEAR, element) != 0;
 }
 
 /* Writes w: by how much p (w[0]) and r (w[1]) change with each of the three corners. */
@@ -192,7 +212,7 @@ static void strain_of(const drape_elements *el, int32_t element, const double *x
     }
     sides(el, element, x, d1, d2);
     const double p = column_of(w[0] + 1, d1, d2, n);
-    if (is_shear(element))
+    if (is_shear(el, element))
         shear_strain(p, n, column_of(w[1] + 1, d1, d2, m), m, s);
     else
         tension_strain(p, n, s);
@@ -204,7 +224,7 @@ static drape_curve_measure_value measure_of(const drape_elements *el, int32_t el
     const double *table = el->shared + (int32_t)drape_rest_of(el, REST_TABLE, element);
     if (e >= 0)
         return drape_curve_measure(table, e);
-    if (!is_shear(element))
+    if (!is_shear(el, element))
         return (drape_curve_measure_value){e, 1, 0};
     const drape_curve_measure_value v = drape_curve_measure(table, -e);
     return (drape_curve_measure_value){-v.q, v.dq, -v.ddq};
@@ -272,8 +292,8 @@ static void positive(const drape_elements *el, int32_t first, int32_t count, con
         strain_of(el, first + e, x, &s, w);
         const drape_curve_measure_value v = measure_of(el, first + e, s.value);
         gradient_of(&s, w, gradient);
-        hessian_of(&s, w, f > 0 || is_shear(first + e) ? v.dq : 0, out);
-        if (is_shear(first + e)) {
+        hessian_of(&s, w, f > 0 || is_shear(el, first + e) ? v.dq : 0, out);
+        if (is_shear(el, first + e)) {
             for (int i = 0; f < 0 && i < 81; i++)
                 out[i] = -out[i];
             drape_project(9, out);
@@ -302,7 +322,8 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
     *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_AREA_COLLAPSE),
                            .what = "area / rest area",
                            .limit = el->params[PARAM_MIN_AREA]};
-    return drape_check_ratios(el, x, before, RESPONSES, ratio_of, fault);
+    const int32_t every = el->params[PARAM_FRICTION] > 0 ? RESPONSES : FRICTION; /* of one triangle */
+    return drape_check_ratios(el, x, before, every, ratio_of, fault);
 }
 
 const drape_term_ops drape_term_stretch_curve = {
