@@ -7,23 +7,40 @@
 #include "base/vec3.h"
 #include "colliders/body.h"
 
-#define REACH 1.0 /* of an endless body, in diagonals of the cloth; it is cut off at twice that */
+#define REACH       1.0   /* of an endless body, in diagonals of the cloth; it is cut off at twice that */
+#define SAME_NORMAL 0.999 /* cosine of the angle between normals that become one */
+#define MAX_NORMALS 16    /* of one place that are compared with further ones */
 
 typedef struct numbered_vertex {
     float value[6];
     int32_t number;
 } numbered_vertex;
 
+/* By position. */
 static int compare_vertices(const void *left, const void *right)
 {
     const numbered_vertex *a = left, *b = right;
-    for (int k = 0; k < 6; k++)
+    for (int k = 0; k < 3; k++)
         if (a->value[k] != b->value[k])
             return a->value[k] < b->value[k] ? -1 : 1;
     return (a->number > b->number) - (a->number < b->number);
 }
 
-/* Corners with the same position and normal become one vertex. */
+/* The number of a vertex that there is at the same place with nearly this normal; -1: there is none. first,
+ * count: the vertices at the place. */
+static int32_t find_vertex(const numbered_vertex *kept, size_t first, size_t count, const float *normal)
+{
+    for (size_t i = first; i < count && i < first + MAX_NORMALS; i++) {
+        double along = 0;
+        for (int k = 0; k < 3; k++)
+            along += (double)kept[i].value[3 + k] * (double)normal[k];
+        if (along >= SAME_NORMAL)
+            return (int32_t)i;
+    }
+    return -1;
+}
+
+/* Corners at the same place with nearly the same normal become one vertex. */
 static drape_status weld(drape_arena *arena, drape_arena *scratch, const drape_body *body,
                          drape_export_body *out)
 {
@@ -37,14 +54,17 @@ static drape_status weld(drape_arena *arena, drape_arena *scratch, const drape_b
         memcpy(sorted[i].value, body->vertex + 6 * i, sizeof sorted[i].value);
     }
     qsort(sorted, corners, sizeof *sorted, compare_vertices);
-    size_t count = 0;
+    size_t count = 0, first = 0; /* vertices, which take the places of corners that were read */
     for (size_t i = 0; i < corners; i++) {
-        bool same = i > 0;
-        for (int k = 0; same && k < 6; k++)
-            same = sorted[i].value[k] == sorted[count - 1].value[k];
-        if (!same)
-            memcpy(sorted[count++].value, sorted[i].value, sizeof sorted[i].value);
-        out->triangle[sorted[i].number] = (int32_t)count - 1;
+        const numbered_vertex corner = sorted[i];
+        if (count > 0 && memcmp(corner.value, sorted[count - 1].value, 3 * sizeof *corner.value) != 0)
+            first = count;
+        int32_t vertex = find_vertex(sorted, first, count, corner.value + 3);
+        if (vertex < 0) {
+            vertex = (int32_t)count;
+            memcpy(sorted[count++].value, corner.value, sizeof corner.value);
+        }
+        out->triangle[corner.number] = vertex;
     }
     out->vertex = drape_arena_take(arena, count, 6 * sizeof *out->vertex);
     for (size_t i = 0; out->vertex && i < count; i++)

@@ -12,7 +12,7 @@ import time
 
 from program import LIMIT, PROGRAM, SOURCES, drape, equal, good, read_json, read_npy, refused, run_tests, write_scene
 
-ALL = "npy,obj,ply,vtp,pc2,glb"
+ALL = "npy,obj,ply,vtp,pc2,glb,usd"
 
 
 def contents(folder, but=("checkpoint.drape",)):

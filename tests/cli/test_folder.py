@@ -123,7 +123,7 @@ def test_links():
 def test_changed():
     """files of an earlier run are replaced; one that was changed since, or put there by somebody else, is not"""
     write_scene()
-    good(*RUN, "npy,obj,vtp,pc2,glb,ply")
+    good(*RUN, "npy,obj,vtp,pc2,glb,ply,usd")
     good(*RUN, "npy,obj")
     assert not os.path.exists("out/positions.glb") and not os.path.exists("out/frames.pvd")
     for name in "frame_000001.obj", "steps.csv", "scene.json", "positions.npy":
@@ -148,7 +148,7 @@ def test_kill():
     """after a kill at any moment the folder is known: a new run replaces everything, without temporary files"""
     write_scene(duration=30)
     for k in range(12):
-        with subprocess.Popen([PROGRAM, *RUN, "npy,obj,vtp,glb,pc2", "--checkpoint-every", "2"], stdout=subprocess.DEVNULL,
+        with subprocess.Popen([PROGRAM, *RUN, "npy,obj,vtp,glb,pc2,usd", "--checkpoint-every", "2"], stdout=subprocess.DEVNULL,
                               stderr=subprocess.PIPE) as child:
             time.sleep(0.02 + 0.02 * k)
             child.kill()
@@ -201,7 +201,7 @@ def test_summary():
 def test_resume():
     """--resume names the file that was damaged since the checkpoint, and changes nothing"""
     write_scene(duration=2)
-    command = [*RUN, "npy,obj,vtp,pc2,glb,ply", "--checkpoint-every", "1"]
+    command = [*RUN, "npy,obj,vtp,pc2,glb,ply,usd", "--checkpoint-every", "1"]
     with subprocess.Popen([PROGRAM, *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as child:
         end = time.monotonic() + LIMIT
         while not os.path.exists("out/frame_000009.obj") and time.monotonic() < end:
@@ -225,7 +225,7 @@ def test_resume():
     keeps("out", *command, "--resume", says='"out/frame_000050.obj" would be replaced')
     os.remove("out/frame_000050.obj")
     good(*command, "--resume")
-    good("run", "scene.json", "--out", "whole", "--format", "npy,obj,vtp,pc2,glb,ply")
+    good("run", "scene.json", "--out", "whole", "--format", "npy,obj,vtp,pc2,glb,ply,usd")
     resumed, whole = contents("out"), contents("whole")
     for name in "manifest.jsonl", "summary.json", "checkpoint.drape":
         resumed.pop(name)

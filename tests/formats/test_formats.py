@@ -19,7 +19,7 @@ PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAP
 HERE = os.path.dirname(os.path.abspath(__file__))
 PYTHON = "/usr/bin/python3"  # Debian's python3, for which its packages are made
 LIMIT = 300  # [s]
-FORMATS = "npy,obj,ply,vtp,pc2,glb"
+FORMATS = "npy,obj,ply,vtp,pc2,glb,usd"
 
 CLOTH = {"material": {"young_modulus": 1e4, "thickness": 1e-3, "density": 200}, "terms": ["stretch.edge", "bend.hinge"],
          "pins": [{"corner": "top-left"}], "velocity": [0.3, 0, -0.2]}

@@ -1,0 +1,694 @@
+/*
+ * export_usd.c: folder/positions.usda, and folder/positions_1.usda, ...: OpenUSD as text. The stage has a
+ * mesh for each cloth and each collider, below /run, with time samples: the positions of a cloth, or of a
+ * collider that deforms, and the transformation of a rigid one that moves.
+ *
+ * A growing text can have one list of samples, at its end. positions.usda has that of the first cloth, and
+ * all that does not change; what changes of the other objects is in files of their own, to which their prims
+ * refer.
+ *
+ *     #usda 1.0 (metadata) def Xform "run" { ... def Mesh "cloth" { ... point3f[] points.timeSamples = {
+ *     0: [(x, y, z), ...],
+ *     TAIL                     closes all braces
+ *
+ * A frame is written after the tail, as a comment, and followed by a tail of its own; then the first tail
+ * and the sign of the comment become blanks. At any moment the file is complete up to a frame. The end of
+ * the time and the extents, which bound all frames so far, are numbers of a fixed width at the beginning.
+ *
+ * Format: Pixar, OpenUSD 24, UsdGeom and UsdShade schemas, and the grammar of .usda files.
+ */
+#include <float.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "io/export.h"
+#include "model/model.h"
+
+#define FILE_NAME   "positions.usda"
+#define PART_NAME   "positions_%" PRId32 ".usda"
+#define MAX_CHANGES 256 /* objects that change: each is an open file */
+#define NAME_ROOM   64
+#define MATERIALS   "materials"
+#define PLAIN       "cloth"
+
+/* An extent, and the last time code, have this many characters whatever their values. */
+#define EXTENT      "[(%15.8e, %15.8e, %15.8e), (%15.8e, %15.8e, %15.8e)]"
+#define EXTENT_ROOM 128
+#define CODE        "%-20.12g"
+#define CODE_ROOM   32
+
+/* The tail of the object in positions.usda closes the samples, its mesh and /run; others have no /run. */
+static const char tails[2][16] = {"}\n}\n}\n", "}\n}\n"};
+
+/* A cloth or a collider. */
+typedef struct object {
+    char name[NAME_ROOM];
+    int32_t cloth, body; /* one of them is -1 */
+    bool changes;
+    drape_file file;        /* of what changes */
+    int32_t number;         /* of that file; 0: positions.usda */
+    double low[3], high[3]; /* [m] of all frames so far, if its points change */
+    int64_t extent, end;    /* where extent and last time code are in the file; 0: it has none */
+} object;
+
+typedef struct material {
+    const char *name; /* NULL: of faces that have none */
+    char prim[NAME_ROOM];
+} material;
+
+typedef struct usd_state {
+    const drape_export_def *def;
+    object *object; /* (objects) cloths, then colliders */
+    int32_t objects;
+    material *material; /* (materials) */
+    int32_t materials;
+    double code; /* time code of the last frame */
+    bool live;   /* the files can be continued */
+} usd_state;
+
+static const drape_mesh *mesh_of(const usd_state *usd, const object *o)
+{
+    return &usd->def->model->cloths[o->cloth].mesh;
+}
+
+static const drape_export_body *body_of(const usd_state *usd, const object *o)
+{
+    return o->body < 0 ? NULL : &usd->def->bodies[o->body];
+}
+
+static int32_t point_count(const usd_state *usd, const object *o)
+{
+    return o->body < 0 ? mesh_of(usd, o)->node_count : body_of(usd, o)->vertex_count;
+}
+
+/* Whether its points change, not only its place. */
+static bool deforms(const usd_state *usd, const object *o)
+{
+    return o->body < 0 || body_of(usd, o)->deforms;
+}
+
+/* ---- Names ---- */
+
+/* A name of a prim has letters, digits and underscores, and begins with none of the digits. */
+static void make_identifier(const char *name, char out[NAME_ROOM])
+{
+    size_t used = 0;
+    if (*name >= '0' && *name <= '9')
+        out[used++] = '_';
+    for (; *name && used < NAME_ROOM - 16; name++) {
+        const bool good = (*name >= 'a' && *name <= 'z') || (*name >= 'A' && *name <= 'Z') ||
+                          (*name >= '0' && *name <= '9') || *name == '_';
+        out[used++] = good ? *name : '_';
+    }
+    if (used == 0)
+        out[used++] = '_';
+    out[used] = 0;
+}
+
+static bool object_has(const usd_state *usd, const char *name)
+{
+    bool found = strcmp(name, MATERIALS) == 0;
+    for (int32_t i = 0; i < usd->objects && !found; i++)
+        found = strcmp(usd->object[i].name, name) == 0;
+    return found;
+}
+
+static bool material_has(const usd_state *usd, const char *name)
+{
+    bool found = false;
+    for (int32_t i = 0; i < usd->materials && !found; i++)
+        found = strcmp(usd->material[i].prim, name) == 0;
+    return found;
+}
+
+/* The identifier of a name, with a number if it is taken. */
+static void choose_name(const usd_state *usd, bool (*has)(const usd_state *, const char *), const char *name,
+                        char out[NAME_ROOM])
+{
+    make_identifier(name, out);
+    const size_t length = strlen(out);
+    for (int number = 1; has(usd, out); number++)
+        snprintf(out + length, NAME_ROOM - length, "_%d", number);
+}
+
+/* The number of a material; -1: there is no such material yet. */
+static int32_t find_material(const usd_state *usd, const char *name)
+{
+    for (int32_t i = 0; i < usd->materials; i++) {
+        const char *other = usd->material[i].name;
+        if (name == other || (name && other && strcmp(name, other) == 0))
+            return i;
+    }
+    return -1;
+}
+
+static void add_material(usd_state *usd, const char *name)
+{
+    material *m = &usd->material[usd->materials];
+    if (find_material(usd, name) >= 0)
+        return;
+    choose_name(usd, material_has, name ? name : PLAIN, m->prim);
+    m->name = name;
+    usd->materials++;
+}
+
+/* ---- Opening ---- */
+
+static drape_status usd_check(drape_context *ctx, const char *pointer, const drape_export_def *def)
+{
+    int32_t changes = def->model->cloth_count;
+    for (int32_t i = 0; i < def->model->collider_count; i++) {
+        const drape_collider *c = &def->model->colliders[i];
+        changes += c->frames.frame_count > 0 || c->track.key_count > 0 || c->turns.key_count > 0;
+    }
+    if (changes <= MAX_CHANGES)
+        return DRAPE_OK;
+    return drape_fail_at(
+        ctx, DRAPE_E_ARGUMENT, pointer,
+        "usd: %d cloths and colliders that move, each of which is a file; at most %d are allowed: "
+        "take another format",
+        (int)changes, MAX_CHANGES);
+}
+
+static bool usd_names(const char *name)
+{
+    static const char word[] = "positions_";
+    if (strcmp(name, FILE_NAME) == 0)
+        return true;
+    if (strncmp(name, word, sizeof word - 1) != 0)
+        return false;
+    const size_t digits = strspn(name + sizeof word - 1, "0123456789");
+    return digits > 0 && strcmp(name + sizeof word - 1 + digits, ".usda") == 0;
+}
+
+static drape_status list_objects(usd_state *usd)
+{
+    const drape_model *model = usd->def->model;
+    size_t materials = 1;
+    usd->object = drape_arena_take(usd->def->arena, (size_t)model->cloth_count + (size_t)usd->def->body_count,
+                                   sizeof *usd->object);
+    for (int32_t c = 0; c < model->cloth_count; c++)
+        materials += (size_t)model->cloths[c].mesh.faces.material_count;
+    usd->material = drape_arena_take(usd->def->arena, materials, sizeof *usd->material);
+    if (!usd->object || !usd->material)
+        return DRAPE_E_MEMORY;
+    add_material(usd, NULL);
+    int32_t files = 0;
+    for (int32_t i = 0; i < model->cloth_count + usd->def->body_count; i++) {
+        object *o = &usd->object[i];
+        o->cloth = i < model->cloth_count ? i : -1;
+        o->body = o->cloth < 0 ? i - model->cloth_count : -1;
+        const drape_export_body *body = body_of(usd, o);
+        choose_name(usd, object_has, body ? body->name : model->cloths[i].name, o->name);
+        usd->objects++;
+        o->changes = !body || body->deforms || body->moves;
+        o->number = o->changes ? files++ : -1;
+        for (int k = 0; k < 3; k++) {
+            o->low[k] = DBL_MAX;
+            o->high[k] = -DBL_MAX;
+        }
+        for (int32_t m = 0; !body && m < mesh_of(usd, o)->faces.material_count; m++)
+            add_material(usd, mesh_of(usd, o)->faces.name[m]);
+    }
+    return DRAPE_OK;
+}
+
+static void name_file(object *o)
+{
+    if (o->number == 0)
+        drape_file_name(&o->file, FILE_NAME);
+    else
+        drape_file_name(&o->file, PART_NAME, o->number);
+}
+
+/* Takes the memory for all files. */
+static drape_status usd_open(drape_context *ctx, const drape_export_def *def, void *state)
+{
+    usd_state *usd = state;
+    usd->def = def;
+    drape_status status = list_objects(usd);
+    for (int32_t i = 0; i < usd->objects && !status; i++)
+        if (usd->object[i].changes)
+            status = drape_file_create_in(ctx, def->folder, &usd->object[i].file);
+    return status;
+}
+
+/* ---- What does not change ---- */
+
+/* A name as the user gave it, in quotes. */
+static void put_text(drape_file *file, const char *text)
+{
+    drape_file_put_text(file, "\"");
+    for (; *text; text++) {
+        if (*text == '"' || *text == '\\')
+            drape_file_put_text(file, "\\");
+        drape_file_put(file, (unsigned char)*text < ' ' ? "_" : text, 1);
+    }
+    drape_file_put_text(file, "\"");
+}
+
+static void put_numbers(drape_file *file, const char *attribute, const int32_t *numbers, size_t count)
+{
+    drape_file_print(file, "%s = [", attribute);
+    for (size_t i = 0; i < count; i++)
+        drape_file_print(file, "%s%" PRId32, i ? ", " : "", numbers[i]);
+    drape_file_put_text(file, "]\n");
+}
+
+static void put_material(drape_file *file, const material *m)
+{
+    drape_file_print(file, "def Material \"%s\" (\ndoc = ", m->prim);
+    put_text(file, m->name ? m->name : PLAIN);
+    drape_file_print(file,
+                     "\n)\n{\ntoken outputs:surface.connect = </run/" MATERIALS
+                     "/%s/shader.outputs:surface>\n"
+                     "def Shader \"shader\"\n{\nuniform token info:id = \"UsdPreviewSurface\"\n"
+                     "color3f inputs:diffuseColor = %s\nfloat inputs:roughness = 0.85\n"
+                     "token outputs:surface\n}\n}\n",
+                     m->prim, m->name ? "(0.8, 0.8, 0.8)" : "(0.55, 0.16, 0.13)");
+}
+
+static void put_binding(drape_file *file, const material *m)
+{
+    drape_file_print(file, "rel material:binding = </run/" MATERIALS "/%s>\n", m->prim);
+}
+
+/* The faces that have one of the materials of the mesh. */
+static void put_subset(usd_state *usd, drape_file *file, const drape_faces *faces, int32_t number)
+{
+    const material *m = &usd->material[find_material(usd, faces->name[number])];
+    bool first = true;
+    drape_file_print(file,
+                     "def GeomSubset \"%s\" (\nprepend apiSchemas = [\"MaterialBindingAPI\"]\n)\n{\n"
+                     "uniform token elementType = \"face\"\nuniform token familyName = \"materialBind\"\n"
+                     "int[] indices = [",
+                     m->prim);
+    for (int32_t f = 0; f < faces->count; f++)
+        if (faces->material[f] == number) {
+            drape_file_print(file, "%s%" PRId32, first ? "" : ", ", f);
+            first = false;
+        }
+    drape_file_put_text(file, "]\n");
+    put_binding(file, m);
+    drape_file_put_text(file, "}\n");
+}
+
+/* A corner without texture coordinates, beside others with some, has (0, 0), which is added to them. */
+static void put_uvs(drape_file *file, const drape_faces *faces)
+{
+    if (faces->uv_count == 0)
+        return;
+    drape_file_put_text(file, "texCoord2f[] primvars:st = [");
+    for (size_t i = 0; i < (size_t)faces->uv_count; i++)
+        drape_file_print(file, "(%.9g, %.9g), ", (double)(float)faces->uv[2 * i],
+                         (double)(float)faces->uv[2 * i + 1]);
+    drape_file_put_text(file, "(0, 0)] (\ninterpolation = \"faceVarying\"\n)\nint[] primvars:st:indices = [");
+    for (int32_t c = 0; c < faces->corner_count; c++)
+        drape_file_print(file, "%s%" PRId32, c ? ", " : "",
+                         faces->uv_of[c] < 0 ? faces->uv_count : faces->uv_of[c]);
+    drape_file_put_text(file, "]\n");
+}
+
+static void put_triangles(drape_file *file, const int32_t *triangle, int32_t count)
+{
+    drape_file_put_text(file, "int[] faceVertexCounts = [");
+    for (int32_t i = 0; i < count; i++)
+        drape_file_put_text(file, i ? ", 3" : "3");
+    drape_file_put_text(file, "]\n");
+    put_numbers(file, "int[] faceVertexIndices", triangle, 3 * (size_t)count);
+}
+
+static void put_cloth(usd_state *usd, drape_file *file, const object *o)
+{
+    const drape_mesh *mesh = mesh_of(usd, o);
+    const drape_faces *faces = &mesh->faces;
+    drape_file_put_text(file, "uniform bool doubleSided = 1\n");
+    put_binding(file, &usd->material[0]);
+    if (faces->count == 0) {
+        put_triangles(file, mesh->triangle, mesh->triangle_count);
+        return;
+    }
+    drape_file_put_text(file, "int[] faceVertexCounts = [");
+    for (int32_t f = 0; f < faces->count; f++)
+        drape_file_print(file, "%s%" PRId32, f ? ", " : "", faces->first[f + 1] - faces->first[f]);
+    drape_file_put_text(file, "]\n");
+    put_numbers(file, "int[] faceVertexIndices", faces->node, (size_t)faces->corner_count);
+    put_uvs(file, faces);
+    if (faces->material_count > 0)
+        drape_file_put_text(file,
+                            "uniform token subsetFamily:materialBind:familyType = \"nonOverlapping\"\n");
+    for (int32_t m = 0; m < faces->material_count; m++)
+        put_subset(usd, file, faces, m);
+}
+
+/* Points are in the collider's own coordinates, with its normals. */
+static void put_rigid(drape_file *file, const drape_export_body *body)
+{
+    float low[3] = {FLT_MAX, FLT_MAX, FLT_MAX}, high[3] = {-FLT_MAX, -FLT_MAX, -FLT_MAX};
+    for (size_t part = 0; part < 6; part += 3) {
+        drape_file_put_text(file, part ? "normal3f[] normals = [" : "point3f[] points = [");
+        for (size_t i = 0; i < (size_t)body->vertex_count; i++) {
+            const float *p = body->vertex + 6 * i + part;
+            for (int k = 0; k < 3 && part == 0; k++) {
+                low[k] = fminf(low[k], p[k]);
+                high[k] = fmaxf(high[k], p[k]);
+            }
+            drape_file_print(file, "%s(%.9g, %.9g, %.9g)", i ? ", " : "", (double)p[0], (double)p[1],
+                             (double)p[2]);
+        }
+        drape_file_put_text(file, part ? "] (\ninterpolation = \"vertex\"\n)\n" : "]\n");
+    }
+    drape_file_print(file, "float3[] extent = [(%.9g, %.9g, %.9g), (%.9g, %.9g, %.9g)]\n", (double)low[0],
+                     (double)low[1], (double)low[2], (double)high[0], (double)high[1], (double)high[2]);
+}
+
+/* USD multiplies rows by matrices: the transposed rotation, then the translation. */
+static void put_matrix(drape_file *file, const drape_collider_pose *pose)
+{
+    static const double none[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    const double *R = pose->turned ? pose->turn : none, *d = pose->displacement;
+    drape_file_print(file,
+                     "((%.17g, %.17g, %.17g, 0), (%.17g, %.17g, %.17g, 0), (%.17g, %.17g, %.17g, 0), "
+                     "(%.17g, %.17g, %.17g, 1))",
+                     R[0], R[3], R[6], R[1], R[4], R[7], R[2], R[5], R[8], d[0], d[1], d[2]);
+}
+
+/* Beside the transformation itself, also if that is in a file of its own. */
+static void put_order(drape_file *file)
+{
+    drape_file_put_text(file, "uniform token[] xformOpOrder = [\"xformOp:transform\"]\n");
+}
+
+/* ---- What changes ---- */
+
+/* Where the next byte of a file will be. */
+static int64_t place(const drape_file *file)
+{
+    return (int64_t)file->size + (int64_t)file->used;
+}
+
+static void format_extent(const object *o, char text[EXTENT_ROOM])
+{
+    snprintf(text, EXTENT_ROOM, EXTENT, o->low[0], o->low[1], o->low[2], o->high[0], o->high[1], o->high[2]);
+}
+
+static void include(object *o, const double *x)
+{
+    for (int k = 0; k < 3; k++) {
+        o->low[k] = fmin(o->low[k], (double)(float)x[k]);
+        o->high[k] = fmax(o->high[k], (double)(float)x[k]);
+    }
+}
+
+static const double *point_at(const usd_state *usd, const object *o, const drape_frame *frame, int32_t i)
+{
+    return o->body < 0 ? frame->positions + 3 * (size_t)(usd->def->model->cloths[o->cloth].first_node + i)
+                       : frame->points + 3 * (size_t)(body_of(usd, o)->first_point + i);
+}
+
+/* The sample of a frame: in one line, which may be a comment. */
+static void put_sample(usd_state *usd, object *o, const drape_frame *frame, double code)
+{
+    drape_file *file = &o->file;
+    drape_file_print(file, "%.12g: ", code);
+    if (!deforms(usd, o)) {
+        put_matrix(file, &frame->poses[o->body]);
+    } else {
+        for (int32_t i = 0; i < point_count(usd, o); i++) {
+            const double *x = point_at(usd, o, frame, i);
+            drape_file_print(file, "%s(%.9g, %.9g, %.9g)", i ? ", " : "[", (double)(float)x[0],
+                             (double)(float)x[1], (double)(float)x[2]);
+        }
+        drape_file_put_text(file, "]");
+    }
+    drape_file_put_text(file, ",\n");
+    drape_file_put_text(file, tails[o->number > 0]);
+}
+
+/* Where the samples begin; before it the extent of what deforms. */
+static void put_samples(usd_state *usd, object *o, const drape_frame *frame)
+{
+    char text[EXTENT_ROOM];
+    if (deforms(usd, o)) {
+        for (int32_t i = 0; i < point_count(usd, o); i++)
+            include(o, point_at(usd, o, frame, i));
+        format_extent(o, text);
+        drape_file_put_text(&o->file, "float3[] extent = ");
+        o->extent = place(&o->file);
+        drape_file_print(&o->file, "%s\npoint3f[] points.timeSamples = {\n", text);
+    } else {
+        put_order(&o->file);
+        drape_file_put_text(&o->file, "matrix4d xformOp:transform.timeSamples = {\n");
+    }
+    put_sample(usd, o, frame, usd->code);
+}
+
+static void put_metadata(usd_state *usd, object *o, const char *prim)
+{
+    drape_file *file = &o->file;
+    drape_file_print(file,
+                     "#usda 1.0\n(\ndefaultPrim = \"%s\"\ndoc = \"Drape %s\"\nframesPerSecond = %.17g\n"
+                     "metersPerUnit = 1\nstartTimeCode = 0\ntimeCodesPerSecond = %.17g\nupAxis = \"%s\"\n"
+                     "endTimeCode = ",
+                     prim, drape_version(), usd->def->frame_rate, usd->def->frame_rate,
+                     usd->def->model->z_up ? "Z" : "Y");
+    o->end = place(file);
+    drape_file_print(file, CODE "\n)\n\n", usd->code);
+}
+
+static void begin_mesh(usd_state *usd, drape_file *file, const object *o)
+{
+    const drape_export_body *body = body_of(usd, o);
+    drape_file_print(file, "def Mesh \"%s\" (\ndoc = ", o->name);
+    put_text(file, body ? body->name : usd->def->model->cloths[o->cloth].name);
+    if (!body)
+        drape_file_put_text(file, "\nprepend apiSchemas = [\"MaterialBindingAPI\"]");
+    if (o->number > 0)
+        drape_file_print(file, "\nprepend references = @./" PART_NAME "@", o->number);
+    drape_file_put_text(file, "\n)\n{\nuniform token subdivisionScheme = \"none\"\n");
+    if (!body) {
+        put_cloth(usd, file, o);
+        return;
+    }
+    put_triangles(file, body->triangle, body->triangle_count);
+    if (body->deforms)
+        return;
+    put_rigid(file, body);
+}
+
+/* All of the stage but the samples of other files. */
+static void put_stage(usd_state *usd, const drape_frame *frame)
+{
+    object *first = &usd->object[0];
+    drape_file *file = &first->file;
+    put_metadata(usd, first, "run");
+    drape_file_put_text(file, "def Xform \"run\"\n{\ndef Scope \"" MATERIALS "\"\n{\n");
+    for (int32_t i = 0; i < usd->materials; i++)
+        put_material(file, &usd->material[i]);
+    drape_file_put_text(file, "}\n");
+    for (int32_t i = 1; i < usd->objects; i++) {
+        const object *o = &usd->object[i];
+        begin_mesh(usd, file, o);
+        if (!o->changes) {
+            put_order(file);
+            drape_file_put_text(file, "matrix4d xformOp:transform = ");
+            put_matrix(file, &frame->poses[o->body]);
+            drape_file_put_text(file, "\n");
+        }
+        drape_file_put_text(file, "}\n");
+    }
+    begin_mesh(usd, file, first);
+    put_samples(usd, first, frame);
+}
+
+/* positions.usda appears last: it refers to the others. */
+static drape_status write_first(usd_state *usd, const drape_frame *frame)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t i = usd->objects - 1; i >= 0 && !status; i--) {
+        object *o = &usd->object[i];
+        if (!o->changes)
+            continue;
+        name_file(o);
+        status = drape_file_begin(&o->file);
+        if (status)
+            return status;
+        if (i == 0) {
+            put_stage(usd, frame);
+        } else {
+            put_metadata(usd, o, "mesh");
+            drape_file_put_text(&o->file, "def \"mesh\"\n{\n"); /* no type: alone it is not one to be drawn */
+            put_samples(usd, o, frame);
+        }
+        status = drape_file_publish(&o->file);
+    }
+    return status;
+}
+
+/* Writes extent and last time code over those before. */
+static drape_status write_bounds(usd_state *usd, object *o)
+{
+    char text[EXTENT_ROOM];
+    drape_status status = DRAPE_OK;
+    if (o->extent > 0) {
+        format_extent(o, text);
+        status = drape_file_overwrite(&o->file, (off_t)o->extent, text, strlen(text));
+    }
+    snprintf(text, sizeof text, CODE, usd->code);
+    return status ? status : drape_file_overwrite(&o->file, (off_t)o->end, text, strlen(text));
+}
+
+/* Bounds first: they may be larger than what is there, but not smaller. */
+static drape_status write_next(usd_state *usd, object *o, const drape_frame *frame)
+{
+    static const char blanks[] = "                ";
+    const size_t tail = strlen(tails[o->number > 0]);
+    const off_t before = o->file.kept;
+    drape_file_put_text(&o->file, "#");
+    put_sample(usd, o, frame, usd->code);
+    drape_status status = drape_file_keep(&o->file);
+    if (status)
+        return status;
+    for (int32_t i = 0; deforms(usd, o) && i < point_count(usd, o); i++)
+        include(o, point_at(usd, o, frame, i));
+    status = write_bounds(usd, o);
+    if (!status)
+        status = drape_file_overwrite(&o->file, before - (off_t)tail, blanks, tail + 1);
+    if (status)
+        drape_file_cut(&o->file, before);
+    return status;
+}
+
+/* Frames between have whole numbers; that at the end of a run may not. */
+static double code_of(const usd_state *usd, const drape_frame *frame)
+{
+    const double code = frame->time * usd->def->frame_rate, whole = floor(code + .5);
+    return fabs(code - whole) < 1e-6 ? whole : code;
+}
+
+static drape_status usd_write(drape_context *ctx, void *state, const drape_frame *frame)
+{
+    usd_state *usd = state;
+    (void)ctx;
+    usd->code = code_of(usd, frame);
+    drape_status status = frame->index == 0 ? write_first(usd, frame) : DRAPE_OK;
+    for (int32_t i = usd->objects - 1; i >= 0 && frame->index > 0 && !status; i--)
+        if (usd->object[i].changes)
+            status = write_next(usd, &usd->object[i], frame);
+    usd->live = usd->live || !status;
+    return status;
+}
+
+/* ---- Checkpoints and end ---- */
+
+static void usd_archive(void *state, drape_archive *a)
+{
+    usd_state *usd = state;
+    drape_archive_same(a, "the number of objects in " FILE_NAME, usd->objects);
+    drape_archive_bool(a, &usd->live);
+    drape_archive_double(a, &usd->code);
+    for (int32_t i = 0; i < usd->objects && !a->status; i++) {
+        object *o = &usd->object[i];
+        drape_archive_same(a, "whether an object of " FILE_NAME " changes", o->changes);
+        if (!o->changes || a->status)
+            continue;
+        drape_archive_bytes(a, o->low, sizeof o->low);
+        drape_archive_bytes(a, o->high, sizeof o->high);
+        drape_archive_int64(a, &o->extent);
+        drape_archive_int64(a, &o->end);
+        drape_export_archive_file(a, &o->file);
+    }
+}
+
+/* Before the first frame there are no files. */
+static drape_status usd_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
+                               drape_archive *a)
+{
+    usd_state *usd = state;
+    (void)frames;
+    usd->def = def;
+    drape_status status = list_objects(usd);
+    if (status)
+        return status;
+    usd_archive(usd, a);
+    status = a->status;
+    for (int32_t i = 0; i < usd->objects && !status; i++) {
+        object *o = &usd->object[i];
+        char name[NAME_ROOM];
+        if (!o->changes)
+            continue;
+        snprintf(name, sizeof name, o->number == 0 ? FILE_NAME : PART_NAME, o->number);
+        status = usd->live ? drape_export_reopen(ctx, def->folder, name, &o->file)
+                           : drape_file_create_in(ctx, def->folder, &o->file);
+    }
+    return status;
+}
+
+/* The tail of the last frame to be kept, which a later one made blanks, closes the file again. */
+static drape_status usd_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    usd_state *usd = state;
+    drape_status status = DRAPE_OK;
+    (void)ctx, (void)frames;
+    for (int32_t i = 0; i < usd->objects && usd->live && !status; i++) {
+        object *o = &usd->object[i];
+        const char *tail = tails[o->number > 0];
+        if (!o->changes)
+            continue;
+        status = write_bounds(usd, o);
+        if (!status)
+            status = drape_file_overwrite(&o->file, o->file.kept - (off_t)strlen(tail), tail, strlen(tail));
+        if (!status)
+            status = drape_file_trim(&o->file);
+    }
+    return status;
+}
+
+static drape_status usd_sync(void *state)
+{
+    usd_state *usd = state;
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; i < usd->objects && usd->live && !status; i++)
+        if (usd->object[i].changes)
+            status = drape_file_sync(&usd->object[i].file);
+    return status;
+}
+
+static drape_status usd_close(drape_context *ctx, void *state)
+{
+    usd_state *usd = state;
+    drape_status status = DRAPE_OK;
+    (void)ctx;
+    for (int32_t i = 0; i < usd->objects; i++) {
+        object *o = &usd->object[i];
+        if (!o->changes)
+            continue;
+        const drape_status closing = drape_file_close(&o->file);
+        status = status ? status : closing;
+        drape_file_destroy(&o->file);
+    }
+    return status;
+}
+
+const drape_exporter_ops drape_exporter_usd = {
+    .entry = {.name = "usd",
+              .summary =
+                  "positions.usda: OpenUSD with time samples, a mesh for each cloth and collider, polygons, "
+                  "texture coordinates and materials, float32; of a second and further objects that change, "
+                  "in positions_1.usda ...",
+              .reference = "Pixar, OpenUSD 24: UsdGeom, UsdShade"},
+    .state_size = sizeof(usd_state),
+    .wants_bodies = true,
+    .check = usd_check,
+    .open = usd_open,
+    .names = usd_names,
+    .write = usd_write,
+    .archive = usd_archive,
+    .resume = usd_resume,
+    .cut = usd_cut,
+    .sync = usd_sync,
+    .close = usd_close,
+};
