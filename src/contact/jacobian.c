@@ -218,12 +218,36 @@ static void differentiate(const drape_contact *c, const request *want, const dra
         symmetrize(contact->gap.closest.points, h);
 }
 
-bool drape_contact_is_symmetric(const drape_contact *c)
+bool drape_contact_has_friction(const drape_contact *c)
 {
     bool friction = c->model->contact.self && c->model->contact.self_friction > 0;
     for (int32_t i = 0; i < c->model->collider_count; i++)
         friction = friction || c->model->colliders[i].friction > 0;
-    return !friction || c->model->contact.lagged;
+    return friction;
+}
+
+bool drape_contact_is_symmetric(const drape_contact *c)
+{
+    return !drape_contact_has_friction(c) || c->model->contact.lagged;
+}
+
+/* The derivatives of the lagged friction of one contact, h (12 x 12). */
+static void differentiate_lagged(const drape_contact *c, const request *want, const drape_lagged *lagged,
+                                 double *h)
+{
+    const drape_contact_law law = drape_contact_law_of(c, &lagged->contact);
+    double v[4][3];
+    memset(h, 0, D * D * sizeof *h);
+    drape_contact_velocities(c, &lagged->contact, v);
+    add_friction(want, &lagged->contact, &law, lagged->force, v, h);
+    if (!spins(c, &lagged->contact) || want->which == DRAPE_CONTACT_VELOCITY ||
+        want->which == DRAPE_CONTACT_GAUSS_NEWTON)
+        return;
+    double hv[D * D] = {0};
+    add_friction(&(request){1, DRAPE_CONTACT_EXACT}, &lagged->contact, &law, lagged->force, v, hv);
+    add_spin(c, &lagged->contact, NULL, hv, h);
+    if (want->which == DRAPE_CONTACT_SYMMETRIC)
+        symmetrize(lagged->contact.gap.closest.points, h);
 }
 
 void drape_contact_add_jacobian(drape_contact *c, double weight, drape_contact_derivatives which,
@@ -238,21 +262,35 @@ void drape_contact_add_jacobian(drape_contact *c, double weight, drape_contact_d
         add_blocks(c, &c->active.contacts[i], h, pattern, values);
     }
     for (int32_t i = 0; i < c->lagged_count; i++) {
-        const drape_lagged *lagged = &c->lagged[i];
-        const drape_contact_law law = drape_contact_law_of(c, &lagged->contact);
-        double v[4][3];
-        memset(h, 0, sizeof h);
-        drape_contact_velocities(c, &lagged->contact, v);
-        add_friction(&want, &lagged->contact, &law, lagged->force, v, h);
-        if (spins(c, &lagged->contact) && want.which != DRAPE_CONTACT_VELOCITY &&
-            want.which != DRAPE_CONTACT_GAUSS_NEWTON) {
-            double hv[D * D] = {0};
-            add_friction(&(request){1, DRAPE_CONTACT_EXACT}, &lagged->contact, &law, lagged->force, v, hv);
-            add_spin(c, &lagged->contact, NULL, hv, h);
-            if (want.which == DRAPE_CONTACT_SYMMETRIC)
-                symmetrize(lagged->contact.gap.closest.points, h);
-        }
-        add_blocks(c, &lagged->contact, h, pattern, values);
+        differentiate_lagged(c, &want, &c->lagged[i], h);
+        add_blocks(c, &c->lagged[i].contact, h, pattern, values);
+    }
+    c->seconds += drape_clock_seconds() - start;
+}
+
+static void add_difference(const drape_contact *c, const drape_active_contact *contact, double *h,
+                           const double *less, const drape_pattern *pattern, double *values)
+{
+    for (int k = 0; k < D * 3 * contact->gap.closest.points; k++)
+        h[k] -= less[k];
+    add_blocks(c, contact, h, pattern, values);
+}
+
+void drape_contact_add_remainder(drape_contact *c, double weight, const drape_pattern *pattern,
+                                 double *values)
+{
+    const double start = drape_clock_seconds();
+    const request exact = {weight, DRAPE_CONTACT_EXACT}, bound = {weight, DRAPE_CONTACT_GAUSS_NEWTON};
+    double h[D * D], less[D * D];
+    for (int32_t i = 0; i < c->active.count; i++) {
+        differentiate(c, &exact, &c->active.contacts[i], h);
+        differentiate(c, &bound, &c->active.contacts[i], less);
+        add_difference(c, &c->active.contacts[i], h, less, pattern, values);
+    }
+    for (int32_t i = 0; i < c->lagged_count; i++) {
+        differentiate_lagged(c, &exact, &c->lagged[i], h);
+        differentiate_lagged(c, &bound, &c->lagged[i], less);
+        add_difference(c, &c->lagged[i].contact, h, less, pattern, values);
     }
     c->seconds += drape_clock_seconds() - start;
 }
