@@ -516,6 +516,18 @@ void drape_system_symmetrize(drape_system *system, const drape_point *point, dou
     drape_system_project_matrix(system, values);
 }
 
+void drape_system_contact_remainder(drape_system *system, const drape_point *point, double *values)
+{
+    memset(values, 0, (size_t)system->pattern->nonzeros * sizeof *values);
+    if (evaluate_contact(system, point))
+        drape_contact_add_remainder(system->contact, point->weight, system->pattern, values);
+}
+
+bool drape_system_has_friction(const drape_system *system)
+{
+    return system->contact && drape_contact_has_friction(system->contact);
+}
+
 void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *point, double *h)
 {
     const drape_request want = {

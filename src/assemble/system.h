@@ -174,6 +174,13 @@ void drape_system_predict_contact(drape_system *system, const double *p, double 
 /* Whether the Jacobian of contact is symmetric in every state. */
 bool drape_system_is_symmetric(const drape_system *system);
 
+/* values (pattern.nonzeros) = what the exact Jacobian of contact has beyond its positive semidefinite
+ * approximation, as drape_contact_add_remainder. */
+void drape_system_contact_remainder(drape_system *system, const drape_point *point, double *values);
+
+/* Whether the model has a contact with friction. */
+bool drape_system_has_friction(const drape_system *system);
+
 /* Makes the values of drape_system_jacobian at a point with a share of the positive parts symmetric: takes out
  * how friction changes with the normal force and the place of contact, and of the rest, what is antisymmetric. */
 void drape_system_symmetrize(drape_system *system, const drape_point *point, double positive_share,

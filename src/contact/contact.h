@@ -125,6 +125,9 @@ void drape_contact_add_jacobian(drape_contact *contact, double weight, drape_con
  * the predictions, until a step begins. */
 void drape_contact_predict(drape_contact *contact, const double *p, double weight, double mass_weight);
 
+/* Whether there is friction, with colliders or of cloth with itself. */
+bool drape_contact_has_friction(const drape_contact *contact);
+
 /* Whether DRAPE_CONTACT_SYMMETRIC is symmetric: no friction follows the normal force within a step. */
 bool drape_contact_is_symmetric(const drape_contact *contact);
 
@@ -133,6 +136,11 @@ bool drape_contact_is_symmetric(const drape_contact *contact);
  * is symmetric, and positive semidefinite for each contact in its tangential plane. */
 void drape_contact_fix_friction(drape_contact *contact, double weight, double share,
                                 const drape_pattern *pattern, double *values);
+
+/* Adds to values what DRAPE_CONTACT_EXACT has beyond DRAPE_CONTACT_GAUSS_NEWTON: how friction changes with
+ * the normal force, and what bounds and the Gauss-Newton part leave out. */
+void drape_contact_add_remainder(drape_contact *contact, double weight, const drape_pattern *pattern,
+                                 double *values);
 
 /* Whether the pattern has the blocks of all active contacts. */
 bool drape_contact_is_in_pattern(const drape_contact *contact, const drape_pattern *pattern);

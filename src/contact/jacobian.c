@@ -219,12 +219,17 @@ static void differentiate(const drape_contact *c, const request *want, const dra
         symmetrize(contact->gap.closest.points, h);
 }
 
-bool drape_contact_is_symmetric(const drape_contact *c)
+bool drape_contact_has_friction(const drape_contact *c)
 {
     bool friction = c->model->contact.self && c->model->contact.self_friction > 0;
     for (int32_t i = 0; i < c->model->collider_count; i++)
         friction = friction || c->model->colliders[i].friction > 0;
-    return !friction || c->model->contact.lagged;
+    return friction;
+}
+
+bool drape_contact_is_symmetric(const drape_contact *c)
+{
+    return !drape_contact_has_friction(c) || c->model->contact.lagged;
 }
 
 /* Adds a share of the derivatives of all contacts. */
@@ -266,6 +271,15 @@ void drape_contact_add_jacobian(drape_contact *c, double weight, drape_contact_d
                         values);
     if (which != DRAPE_CONTACT_GAUSS_NEWTON && positive_share > 0)
         add_derivatives(c, &(request){weight, DRAPE_CONTACT_GAUSS_NEWTON}, positive_share, pattern, values);
+    c->seconds += drape_clock_seconds() - start;
+}
+
+void drape_contact_add_remainder(drape_contact *c, double weight, const drape_pattern *pattern,
+                                 double *values)
+{
+    const double start = drape_clock_seconds();
+    add_derivatives(c, &(request){weight, DRAPE_CONTACT_EXACT}, 1, pattern, values);
+    add_derivatives(c, &(request){weight, DRAPE_CONTACT_GAUSS_NEWTON}, -1, pattern, values);
     c->seconds += drape_clock_seconds() - start;
 }
 

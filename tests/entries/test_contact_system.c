@@ -189,6 +189,28 @@ static void check_shares(probe *t, const char *what, double weight, double time)
     ck_assert_msg(error <= 1e-13 * largest, "%s: %g of %g", what, error, largest);
 }
 
+/* What the Gauss-Newton matrix leaves out, added to it, makes it J, up to rounding errors. */
+static void check_remainder(probe *t, const char *what, double weight, double time)
+{
+    drape_point point = {.x = t->at.x,
+                         .v = t->at.v,
+                         .internal = t->at.internal,
+                         .weight = weight,
+                         .t = time,
+                         .span = {time - 0.01, time}};
+    const int64_t n = drape_system_pattern(t->system)->nonzeros;
+    double *exact = take(t, (size_t)n), *rest = take(t, (size_t)n), largest = 0, error = 0;
+    drape_system_jacobian(t->system, &point, 0, 0, exact);
+    point.contact = DRAPE_CONTACT_GAUSS_NEWTON;
+    drape_system_jacobian(t->system, &point, 0, 0, t->values);
+    drape_system_contact_remainder(t->system, &point, rest);
+    for (int64_t k = 0; k < n; k++) {
+        largest = fmax(largest, fabs(exact[k]));
+        error = fmax(error, fabs(t->values[k] + rest[k] - exact[k]));
+    }
+    ck_assert_msg(error <= 1e-11 * largest, "%s: %g of %g", what, error, largest);
+}
+
 static void check(probe *t, const char *what, double time)
 {
     double gap;
@@ -197,6 +219,7 @@ static void check(probe *t, const char *what, double time)
     check_symmetrized(t, what, 100, time, 0.25);
     check_symmetrized(t, what, 100, time, 1);
     check_shares(t, what, 100, time);
+    check_remainder(t, what, 100, time);
     const double still = error_of(t, 0, time);
     const drape_contact *contact = drape_system_contact(t->system);
     const int32_t active = drape_contact_active(contact, &gap);
