@@ -124,6 +124,9 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->near_element = drape_arena_take(
         arena, (size_t)(m->edge_count > m->triangle_count ? m->edge_count : m->triangle_count),
         sizeof *s->near_element);
+    s->marked_node = drape_arena_take(arena, (size_t)m->node_count + 1, sizeof *s->marked_node);
+    s->marked_face = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->marked_face);
+    s->marked_edge = drape_arena_take(arena, (size_t)m->edge_count, sizeof *s->marked_edge);
     s->point = drape_arena_take(arena, (size_t)s->points, sizeof *s->point);
     s->corner_reach = drape_arena_take(arena, (size_t)points, sizeof *s->corner_reach);
     s->segment_reach = drape_arena_take(arena, (size_t)s->segments, sizeof *s->segment_reach);
@@ -350,19 +353,67 @@ static bool is_marked(const bool *marked, const int32_t *node, int nodes)
     return !marked;
 }
 
-/* The longest edge of the cloth on the path. */
-static double longest_edge(const drape_model *m, const drape_broad_query *want)
+/* What is scanned: all of the cloth, or only its marked elements. */
+typedef struct scanned_cloth {
+    drape_path_elements faces, edges; /* with the same points */
+    double edge;                      /* [m] no edge of these is longer on the path */
+} scanned_cloth;
+
+/* The longest of some edges on the path. */
+static double longest_edge(const drape_model *m, const drape_broad_query *want,
+                           const drape_path_elements *edges)
 {
     const double *const ends[2] = {want->x, want->y};
     double largest = 0, d[3];
     for (int end = 0; end < 2 && ends[end]; end++)
-        for (int32_t e = 0; e < m->edge_count; e++) {
-            const int32_t *n = m->edge + 2 * (size_t)e;
+        for (int32_t i = 0; i < edges->elements; i++) {
+            const int32_t *n = m->edge + 2 * (size_t)edges->element[i];
             vec3_sub(ends[end] + 3 * (size_t)n[1], ends[end] + 3 * (size_t)n[0], d);
             const double square = vec3_dot(d, d);
             largest = square > largest ? square : largest;
         }
     return sqrt(largest);
+}
+
+static scanned_cloth all_cloth(const drape_broad_phase *s, const drape_broad_query *want)
+{
+    const int32_t nodes = s->model->node_count;
+    scanned_cloth all = {.faces = {s->faces.order, s->point, s->faces.count, nodes},
+                         .edges = {s->edges.order, s->point, s->edges.count, nodes}};
+    all.edge = longest_edge(s->model, want, &all.edges);
+    return all;
+}
+
+/* Lists the marked elements of a tree, and adds those of their nodes that are not listed yet. */
+static int32_t list_marked(drape_broad_phase *s, const drape_path_bvh *tree, const bool *marked,
+                           int32_t *element, int32_t *points)
+{
+    int32_t count = 0;
+    for (int32_t place = 0; place < tree->count; place++) {
+        const int32_t e = tree->order[place], *node = tree->node + (size_t)e * (size_t)tree->nodes;
+        if (!is_marked(marked, node, tree->nodes))
+            continue;
+        element[count++] = e;
+        for (int a = 0; a < tree->nodes; a++) {
+            s->marked_node[*points] = node[a];
+            *points += !s->near[node[a]];
+            s->near[node[a]] = true;
+        }
+    }
+    return count;
+}
+
+/* A face with a marked node may have one edge without, which is not longer than the other two together. */
+static scanned_cloth marked_cloth(drape_broad_phase *s, const drape_broad_query *want)
+{
+    int32_t points = 0;
+    memset(s->near, 0, (size_t)s->model->node_count * sizeof *s->near);
+    const int32_t faces = list_marked(s, &s->faces, want->marked, s->marked_face, &points),
+                  edges = list_marked(s, &s->edges, want->marked, s->marked_edge, &points);
+    scanned_cloth some = {.faces = {s->marked_face, s->marked_node, faces, points},
+                          .edges = {s->marked_edge, s->marked_node, edges, points}};
+    some.edge = 2 * longest_edge(s->model, want, &some.edges);
+    return some;
 }
 
 /* Whether a node is so far from a collider on the whole path that no element which has it can meet a feature,
@@ -382,28 +433,30 @@ static bool is_distant(const drape_broad_phase *s, const drape_broad_query *want
 
 /* Marks and lists the nodes that a collider may meet. All of them if it turns: its features move straight,
  * which is no straight path in its coordinates. Returns their number. */
-static int32_t list_near(drape_broad_phase *s, const drape_broad_query *want, int32_t collider, double edge)
+static int32_t list_near(drape_broad_phase *s, const drape_broad_query *want, int32_t collider,
+                         const scanned_cloth *of)
 {
-    const drape_model *m = s->model;
     const drape_collider_pose *pose[2] = {&want->pose[0][collider], &want->pose[want->y ? 1 : 0][collider]};
     const bool turns = (pose[0]->turned || pose[1]->turned) &&
                        memcmp(pose[0]->turn, pose[1]->turn, sizeof pose[0]->turn) != 0;
-    const double reach = s->distance[collider] + want->reach + edge;
+    const double reach = s->distance[collider] + want->reach + of->edge;
     int32_t count = 0;
-    for (int32_t i = 0; i < m->node_count; i++) {
-        s->near[i] = turns || !is_distant(s, want, collider, i, reach);
-        s->near_node[count] = i;
-        count += s->near[i];
+    for (int32_t i = 0; i < of->edges.points; i++) {
+        const int32_t node = of->edges.point[i];
+        s->near[node] = turns || !is_distant(s, want, collider, node, reach);
+        s->near_node[count] = node;
+        count += s->near[node];
     }
     return count;
 }
 
-/* Lists the elements of a tree all of whose nodes are near. */
-static drape_path_elements list_elements(drape_broad_phase *s, const drape_path_bvh *tree, int32_t points)
+/* Lists those elements of a tree all of whose nodes are near. */
+static drape_path_elements list_elements(drape_broad_phase *s, const drape_path_bvh *tree,
+                                         const drape_path_elements *of, int32_t points)
 {
     drape_path_elements among = {.element = s->near_element, .point = s->near_node, .points = points};
-    for (int32_t place = 0; points > 0 && place < tree->count; place++) {
-        const int32_t e = tree->order[place], *node = tree->node + (size_t)e * (size_t)tree->nodes;
+    for (int32_t i = 0; points > 0 && i < of->elements; i++) {
+        const int32_t e = of->element[i], *node = tree->node + (size_t)e * (size_t)tree->nodes;
         bool near = s->near[node[0]];
         for (int a = 1; a < tree->nodes; a++)
             near = near & s->near[node[a]];
@@ -432,19 +485,26 @@ static void scan_features(query *q)
 {
     drape_broad_phase *s = q->broad;
     const drape_model *m = s->model;
-    const double edge = longest_edge(m, q->want);
+    const bool *marked = q->want->marked;
+    scanned_cloth all = {.edge = -1}, some = {.edge = -1}; /* listed where they are needed first */
     int32_t segment = 0;
     set_reaches(s);
     for (int32_t k = 0; k < m->collider_count; k++) {
         const drape_collider_shape *shape = &m->colliders[k].shape;
-        const int32_t corner = s->first_point[k] - m->node_count, last = segment + shape->segment_count,
-                      points = shape->point_count > 0 ? list_near(s, q->want, k, edge) : 0;
+        const int32_t corner = s->first_point[k] - m->node_count, last = segment + shape->segment_count;
+        if (shape->point_count == 0)
+            continue;
+        const bool only_marked = marked && !marked[s->first_point[k]];
+        scanned_cloth *of = only_marked ? &some : &all;
+        if (of->edge < 0)
+            *of = only_marked ? marked_cloth(s, q->want) : all_cloth(s, q->want);
+        const int32_t points = list_near(s, q->want, k, of);
         begin_stage(q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
-        drape_path_elements among = list_elements(s, &s->faces, points);
+        drape_path_elements among = list_elements(s, &s->faces, &of->faces, points);
         for (int32_t i = corner; among.elements > 0 && i < corner + shape->point_count; i++)
             scan_tree(q, &s->corners, i, s->corner_reach, &s->faces, &among, meet_face);
         begin_stage(q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS);
-        among = list_elements(s, &s->edges, shape->segment_count > 0 ? points : 0);
+        among = list_elements(s, &s->edges, &of->edges, shape->segment_count > 0 ? points : 0);
         for (; segment < last; segment++)
             if (among.elements > 0)
                 scan_tree(q, &s->segment_tree, segment, s->segment_reach, &s->edges, &among, meet_edge);

@@ -31,7 +31,8 @@ typedef struct drape_broad_phase {
     uint8_t *side;                     /* (node_count) scratch of drape_path_bvh_scan */
     bool *near;                        /* (node_count) scratch: nodes that a collider may meet, */
     int32_t *near_node, *near_element; /* (node_count), (edges or triangles) and lists of what it may */
-    double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
+    int32_t *marked_node, *marked_face, *marked_edge; /* scratch: lists of what is marked */
+    double *node_area, *edge_area, *face_area;        /* area of the sheet that belongs to each [m2] */
     double *distance;       /* (collider_count) activation distance of cloth and each collider [m] */
     double rounding;        /* what rounding can change in a gap, set by who moves the points [m] */
     double obstacle_radius; /* largest radius around the triangles of an obstacle [m] */
