@@ -240,9 +240,9 @@ DRAPE_API void drape_path_def_init(drape_path_def *def, size_t struct_size);
  *
  * Errors: DRAPE_E_ARGUMENT (NULL, an invalid def, no free node, a scene with colliders or self-contact,
  * loads that vanish or that rounding hides), DRAPE_E_STEP_TOO_SMALL (steps fail, however short),
- * DRAPE_E_SOLVER (the first point was not found, or the branch), DRAPE_E_STOPPED (cancelled), DRAPE_E_MEMORY, those of the
- * observer. After one the sim is at the last point that was reported. Thread-safety: as the
- * sim. */
+ * DRAPE_E_SOLVER (the first point was not found, or the branch), DRAPE_E_STOPPED (cancelled),
+ * DRAPE_E_MEMORY, those of the observer. After one the sim is at the last point that was reported. Thread-
+ * safety: as the sim. */
 DRAPE_API drape_status drape_sim_path(drape_sim *sim, const drape_path_def *def);
 
 DRAPE_C_END

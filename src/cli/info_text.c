@@ -460,6 +460,8 @@ void cli_info_text(const cli_info *info)
         print_event(&info->model->events[i], &info->def.events[i]);
     for (int32_t i = 0; i < info->model->seam_count; i++)
         print_seam(info->model, i, &info->def.seams[i]);
+    if (info->def.history_count > 0)
+        puts("\nhistories");
     print_objects("history", &drape_form_history, cli_histories_json(info));
     cli_chosen_entries(info->sim, entries);
     for (int i = 0; i < CLI_CHOSEN; i++)
