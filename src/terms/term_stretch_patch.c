@@ -14,11 +14,11 @@
  * sheet, an isometric bending has x,a.x,bcd = -x,ab.x,cd, so that
  *     d.d = g(d,d) - |x,dd|^2/12,  a.a = g(a,a) - |x,aa|^2/12,
  *     d.a = g(d,a) - x,da.(x,dd + x,aa)/24 - x,do.x,ao/2
- * up to terms of fourth order, g the metric of the sheet, o from the middle of d to that of a. What is missing differs from edge to
- * edge; in general no displacement in the plane balances it, and triangles resist: membrane locking
- * (Stolarski & Belytschko 1983). Here it is added, with second derivatives that are sums of c_k x_k over the
- * six nodes of the patch, exact for quadratics in the plane of the triangle at rest (Cirak, Ortiz & Schroeder
- * 2000 take curvatures from such patches).
+ * up to terms of fourth order, g the metric of the sheet, o from the middle of d to that of a. What is
+ * missing differs from edge to edge; in general no displacement in the plane balances it, and triangles
+ * resist: membrane locking (Stolarski & Belytschko 1983). Here it is added, with second derivatives that are
+ * sums of c_k x_k over the six nodes of the patch, exact for quadratics in the plane of the triangle at rest
+ * (Cirak, Ortiz & Schroeder 2000 take curvatures from such patches).
  *
  * Uniform stretching has no second derivatives: its strain is exact, and because the F of the edges by their
  * areas sum up to those of the triangles, so are its forces: the patch test. Every term is a product of two

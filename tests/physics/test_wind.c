@@ -37,6 +37,62 @@ START_TEST(force_on_a_flat_sheet)
 }
 END_TEST
 
+/* A sheet in wind at an angle of attack a has C_N = C (4 + pi) sin a/(4 + pi sin a) along its normal
+ * (Rayleigh 1876), and friction along it; both derivatives. */
+START_TEST(plate_and_friction)
+{
+    enum { NODES = 30 };
+    static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
+    const double pi = 4 * atan(1), degrees[] = {2, 20, 60, 90, 135};
+    for (int k = 0; k < 5; k++) {
+        const double a = degrees[k] * pi / 180, speed = 3;
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 5, 'width': "
+            "0.5, 'height': 0.4}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': "
+            "200}, 'terms': ['stretch.edge', {'type': 'drag.wind', 'law': 'plate', 'coefficient': "
+            "0.88, 'friction': 0.03, 'wind': [%.17g, %.17g, 0]}]}], 'gravity': [0, 0, 0], "
+            "'integrator': {'dt': 0.01}, 'duration': 1}",
+            speed * cos(a), speed * sin(a));
+        const drape_state *state = scene_state(&s);
+        const double scale = 0.5 * DENSITY * 0.5 * 0.4 * speed * speed,
+                     normal = scale * 0.88 * (4 + pi) * sin(a) / (4 + pi * sin(a)),
+                     along = scale * 0.03 * cos(a) * fabs(cos(a));
+        double g[3 * NODES], sum[3] = {0};
+        int count = 0;
+        drape_system_dissipation(
+            s.sim->system, &(drape_point){.x = state->x, .v = state->v, .internal = state->internal}, g);
+        for (int i = 0; i < 3 * NODES; i++)
+            sum[i % 3] -= g[i];
+        /* Rounding: 40 triangles, about 50 operations each. */
+        ck_assert_double_eq_tol(sum[0], along, 2000 * DBL_EPSILON * scale);
+        ck_assert_double_eq_tol(sum[1], normal, 2000 * DBL_EPSILON * scale);
+        ck_assert_double_eq_tol(sum[2], 0, 2000 * DBL_EPSILON * scale);
+        ck_assert_int_eq(drape_check_derivatives(s.ctx, s.sim->system, 3, rows, &count), DRAPE_OK);
+        for (int i = 0; i < count; i++)
+            ck_assert_msg(rows[i].pass, "%s of %s is off by %g", rows[i].what, rows[i].term, rows[i].error);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* A sheet that falls edge-on, its friction the only force of the air, has the terminal speed sqrt(2 s g/(rho
+ * c)), s its mass per area: v = V tanh(g t/V), of which the first order of be leaves some g dt/V. */
+START_TEST(a_sheet_falls_edge_on)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.1, "
+        "'height': 0.1, 'orientation': 'vertical'}, 'material': {'young_modulus': 1e5, 'thickness': "
+        "1e-3, 'areal_density': 0.05}, 'terms': ['stretch.edge', {'type': 'drag.wind', 'law': "
+        "'plate', 'friction': 0.2}]}], 'gravity': [0, -9.81, 0], 'integrator': {'dt': 0.01, "
+        "'tolerance': 1e-12}, 'duration': 1}");
+    const double terminal = sqrt(2 * 0.05 * 9.81 / (DENSITY * 0.2));
+    ck_assert_int_eq(drape_sim_advance(s.sim, 4), DRAPE_OK);
+    for (int i = 0; i < 9; i++)
+        ck_assert_double_eq_tol(drape_sim_velocities(s.sim)[3 * i + 1], -terminal, 1e-6 * terminal);
+    scene_close(&s);
+}
+END_TEST
+
 /* Its derivatives in a wind; the tests of all terms have it in air at rest. */
 START_TEST(derivatives_in_a_wind)
 {
@@ -122,5 +178,5 @@ START_TEST(a_level_sheet_falls_and_flies)
 }
 END_TEST
 
-SUITE("wind", force_on_a_flat_sheet, derivatives_in_a_wind, derivatives_in_the_wind_of_a_host,
-      a_level_sheet_falls_and_flies)
+SUITE("wind", force_on_a_flat_sheet, plate_and_friction, a_sheet_falls_edge_on, derivatives_in_a_wind,
+      derivatives_in_the_wind_of_a_host, a_level_sheet_falls_and_flies)

@@ -329,8 +329,8 @@ START_TEST(annuli)
 }
 END_TEST
 
-/* A quarter of a hemisphere with a hole: all nodes on the sphere, evenly spaced along meridians, all triangles
- * outwards. A closed ring is slit: first and last column at the same places. */
+/* A quarter of a hemisphere with a hole: all nodes on the sphere, evenly spaced along meridians, all
+ * triangles outwards. A closed ring is slit: first and last column at the same places. */
 START_TEST(surfaces_of_revolution)
 {
     enum { ROWS = 5, COLUMNS = 4 };
