@@ -274,6 +274,24 @@ START_TEST(checkpoints_keep_sliders)
 }
 END_TEST
 
+/* Another model of the same cloth goes on with the sliders of the one before. */
+START_TEST(a_new_model_keeps_sliders)
+{
+    scene s = falling("{'method': 'be', 'dt': 0.01}"), other = falling("{'method': 'be', 'dt': 0.01}");
+    const drape_term *bending = &s.model->terms[1];
+    const size_t size = (size_t)drape_term_slider_count(bending) * sizeof(double);
+    scene_advance(&s, 0.1);
+    double *slid = malloc(size);
+    ck_assert_ptr_nonnull(slid);
+    memcpy(slid, drape_sim_state(s.sim)->internal + bending->first_slider, size);
+    other.model->gravity[1] = -1;
+    ck_assert_int_eq(drape_sim_change_model(s.sim, other.model), DRAPE_OK);
+    ck_assert_mem_eq(drape_sim_state(s.sim)->internal + other.model->terms[1].first_slider, slid, size);
+    free(slid);
+    scene_close(&s), scene_close(&other);
+}
+END_TEST
+
 /* Every derivative, at a random state in which most sliders slip. */
 START_TEST(derivatives_agree_with_differences)
 {
@@ -333,4 +351,4 @@ END_TEST
 
 SUITE("hysteresis", moments_go_around_the_loop, creases_keep_their_fold, shear_goes_around_the_loop,
       sliding_is_in_the_balance, rejected_steps_move_no_slider, checkpoints_keep_sliders,
-      derivatives_agree_with_differences, incomplete_parameters_are_refused)
+      a_new_model_keeps_sliders, derivatives_agree_with_differences, incomplete_parameters_are_refused)
