@@ -3,6 +3,7 @@
 #include "colliders/colliders.h"
 
 #include "base/vec3.h"
+#include "mesh/remedy.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -36,7 +37,7 @@ drape_status drape_shape_check_volume(drape_context *ctx, const drape_mesh_sourc
         return DRAPE_OK;
     return drape_mesh_fail(ctx, source, 0,
                            "the mesh is inside out: its volume is %g m3; triangles go counterclockwise seen "
-                           "from outside",
+                           "from outside; remedy: turn all faces over (flip normals)",
                            volume);
 }
 
@@ -44,16 +45,19 @@ static drape_status check_closed(drape_context *ctx, const drape_mesh_source *so
 {
     for (int32_t e = 0; e < mesh->edge_count; e++) {
         const int32_t *ends = mesh->edge + 2 * (size_t)e, *beside = mesh->edge_triangle + 2 * (size_t)e;
-        if (beside[1] < 0)
+        if (beside[1] < 0) {
+            char remedy[DRAPE_REMEDY_SIZE];
+            drape_remedy_open(ctx, mesh, remedy);
             return drape_mesh_fail(ctx, source, 0,
                                    "the mesh is not closed: edge %d %d has one triangle, %d; a collider is a "
-                                   "closed surface, unless it is an animated_mesh with \"open\": true",
-                                   (int)ends[0], (int)ends[1], (int)beside[0]);
+                                   "closed surface, unless it is an animated_mesh with \"open\": true%s",
+                                   (int)ends[0], (int)ends[1], (int)beside[0], remedy);
+        }
         if (runs_along(mesh, beside[0], ends[0], ends[1]) == runs_along(mesh, beside[1], ends[0], ends[1]))
             return drape_mesh_fail(
                 ctx, source, 0,
                 "triangles %d and %d are not oriented alike: both go along edge %d %d in the "
-                "same direction",
+                "same direction; remedy: let all faces look outwards (recalculate normals)",
                 (int)beside[0], (int)beside[1], (int)ends[0], (int)ends[1]);
     }
     return drape_shape_check_volume(ctx, source, mesh);

@@ -35,20 +35,27 @@ static drape_status count_edges(drape_context *ctx, const drape_mesh_source *sou
                                 const int32_t *order, drape_mesh *mesh)
 {
     const int32_t count = 3 * mesh->triangle_count;
+    int32_t wrong = 0, worst[5] = {0}; /* edges of more than two triangles; the first of them */
     mesh->edge_count = 0;
     mesh->hinge_count = 0;
     for (int32_t first = 0, length; first < count; first += length) {
         length = run_length(side, order, first, count);
         const int32_t *same = order + first, *edge = side + 2 * (size_t)same[0];
-        if (length > 2)
-            return drape_mesh_fail(ctx, source, 0,
-                                   "edge %d %d is shared by triangles %d, %d and %d; at most two "
-                                   "may share an edge",
-                                   edge[0], edge[1], same[0] / 3, same[1] / 3, same[2] / 3);
+        if (length > 2 && wrong++ == 0)
+            for (int k = 0; k < 5; k++)
+                worst[k] = k < 2 ? edge[k] : same[k - 2] / 3;
         mesh->edge_count++;
         mesh->hinge_count += length == 2;
     }
-    return DRAPE_OK;
+    if (wrong == 0)
+        return DRAPE_OK;
+    const double *a = mesh->x + 3 * (size_t)worst[0], *b = mesh->x + 3 * (size_t)worst[1];
+    return drape_mesh_fail(
+        ctx, source, 0,
+        "edge %d %d is shared by triangles %d, %d and %d; at most two may share an edge; remedy: "
+        "delete the others, or give them an edge of their own, between (%.4g, %.4g, %.4g) and "
+        "(%.4g, %.4g, %.4g) m, the first of %d such places",
+        worst[0], worst[1], worst[2], worst[3], worst[4], a[0], a[1], a[2], b[0], b[1], b[2], wrong);
 }
 
 static drape_status allocate_edges(drape_mesh *mesh)

@@ -5,6 +5,7 @@
 #include "base/vec3.h"
 #include "mesh/mesh.h"
 #include "mesh/order.h"
+#include "mesh/remedy.h"
 
 #define MAX_COORDINATE 1e9   /* [m]: beyond this, neighbouring doubles are more than 1e-7 m apart */
 #define MIN_THINNESS   1e-12 /* altitude / longest edge; the rounding of positions is 1e-16 of the edge */
@@ -57,11 +58,14 @@ drape_status drape_mesh_validate_shapes(drape_context *ctx, const drape_mesh_sou
     for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
         const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
         const double ratio = thinness(mesh, n);
-        if (!(ratio >= MIN_THINNESS))
+        if (!(ratio >= MIN_THINNESS)) {
+            char remedy[DRAPE_REMEDY_SIZE];
+            drape_remedy_degenerate(mesh, n, remedy);
             return drape_mesh_fail(ctx, source, 0,
                                    "triangle %d (nodes %d %d %d) is degenerate: altitude / longest "
-                                   "edge is %g, at least %g is needed",
-                                   triangle, n[0], n[1], n[2], ratio, MIN_THINNESS);
+                                   "edge is %g, at least %g is needed%s",
+                                   triangle, n[0], n[1], n[2], ratio, MIN_THINNESS, remedy);
+        }
     }
     return DRAPE_OK;
 }
@@ -90,8 +94,10 @@ static drape_status compare_neighbours(drape_context *ctx, const drape_mesh_sour
     for (int32_t i = 1; i < count; i++) {
         const int32_t *a = corners + 3 * (size_t)order[i - 1], *b = corners + 3 * (size_t)order[i];
         if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2])
-            return drape_mesh_fail(ctx, source, 0, "triangles %d and %d have the same nodes %d %d %d",
-                                   order[i - 1], order[i], a[0], a[1], a[2]);
+            return drape_mesh_fail(
+                ctx, source, 0,
+                "triangles %d and %d have the same nodes %d %d %d; remedy: delete one of them", order[i - 1],
+                order[i], a[0], a[1], a[2]);
     }
     return DRAPE_OK;
 }
@@ -179,14 +185,24 @@ static drape_status check_fans(drape_context *ctx, const drape_mesh_source *sour
         if (fan[node] >= 0)
             return drape_mesh_fail(ctx, source, 0,
                                    "triangles %d and %d touch only at node %d; the triangles "
-                                   "around a node must be joined by edges",
-                                   fan[node] / 3, corner / 3, node);
+                                   "around a node must be joined by edges; remedy: give one of them a "
+                                   "vertex of its own there, at (%.4g, %.4g, %.4g) m, or join them by faces",
+                                   fan[node] / 3, corner / 3, node, mesh->x[3 * (size_t)node],
+                                   mesh->x[3 * (size_t)node + 1], mesh->x[3 * (size_t)node + 2]);
         fan[node] = corner;
     }
-    for (int32_t node = 0; node < mesh->node_count; node++)
-        if (fan[node] < 0)
-            return drape_mesh_fail(ctx, source, 0, "node %d belongs to no triangle", node);
-    return DRAPE_OK;
+    int32_t loose = 0, first = -1;
+    for (int32_t node = mesh->node_count - 1; node >= 0; node--)
+        if (fan[node] < 0) {
+            first = node;
+            loose++;
+        }
+    return loose == 0
+               ? DRAPE_OK
+               : drape_mesh_fail(ctx, source, 0,
+                                 "node %d belongs to no triangle; remedy: delete loose vertices, of which "
+                                 "there %s %d",
+                                 first, loose > 1 ? "are" : "is", loose);
 }
 
 drape_status drape_mesh_validate_nodes(drape_context *ctx, const drape_mesh_source *source,

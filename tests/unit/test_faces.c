@@ -8,6 +8,7 @@
 #include "base/vec3.h"
 #include "io/recorder.h"
 #include "mesh/mesh.h"
+#include "mesh/remedy.h"
 #include "support/failing_allocator.h"
 #include "support/frames.h"
 #include "support/scene.h"
@@ -225,6 +226,77 @@ START_TEST(ply_has_them_at_vertices_or_corners)
         check_uvs(&mesh, uvs);
         drape_mesh_free(&mesh);
     }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* ---- Remedies ---- */
+
+static void open_has_remedy(drape_context *ctx, const char *text, const char *expected)
+{
+    const drape_mesh_source source = {"/m/file", "a.obj", NULL};
+    char remedy[DRAPE_REMEDY_SIZE];
+    drape_mesh mesh;
+    parse(ctx, &drape_import_obj, text, &mesh);
+    ck_assert_int_eq(drape_mesh_connect(ctx, &source, &mesh), DRAPE_OK);
+    drape_remedy_open(ctx, &mesh, remedy);
+    ck_assert_str_eq(remedy, expected);
+    drape_mesh_free(&mesh);
+}
+
+#define CORNERS "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+
+/* A tetrahedron without a face has a hole; one whose faces have vertices of their own is to be welded, by
+ * more than these are apart; and a sheet that was torn apart by more than an edge has nothing to be welded.
+ * */
+START_TEST(an_open_mesh_has_a_remedy)
+{
+    drape_context *ctx = new_context();
+    open_has_remedy(
+        ctx, CORNERS "f 1 3 2\nf 1 2 4\nf 1 4 3\n",
+        "; remedy: fill the holes, which have 3 open edges, this one from (1, 0, 0) to (0, 1, 0) m");
+    open_has_remedy(
+        ctx, CORNERS CORNERS CORNERS CORNERS "f 1 3 2\nf 5 6 8\nf 9 12 11\nf 14 15 16\n",
+        "; remedy: merge vertices by a distance of 0.001 m: the nodes of its 12 open edges lie in "
+        "pairs, at most 0 m apart");
+    open_has_remedy(
+        ctx,
+        CORNERS "v .01 0 0\nv 1.01 0 0\nv .01 0 1\nv 0 .02 0\nv 0 .02 1\nv 0 1.02 0\nv 1 0 .03\nv 0 1 "
+                ".03\nv 0 0 1.03\nf 1 3 2\nf 5 6 7\nf 8 9 10\nf 11 12 13\n",
+        "; remedy: merge vertices by a distance of 0.063 m: the nodes of its 12 open edges lie in "
+        "pairs, at most 0.032 m apart");
+    open_has_remedy(
+        ctx, CORNERS "f 1 2 3\n",
+        "; remedy: fill the holes, which have 3 open edges, this one from (0, 0, 0) to (1, 0, 0) m");
+    drape_context_destroy(&ctx);
+    failing_allocator memory = {.fail_at = 1, .stay_broken = true};
+    ctx = new_context();
+    drape_context *none = failing_context(&memory);
+    drape_mesh mesh;
+    char remedy[DRAPE_REMEDY_SIZE];
+    const drape_mesh_source source = {"/m/file", "a.obj", NULL};
+    parse(ctx, &drape_import_obj, CORNERS CORNERS "f 1 3 2\nf 5 6 8\n", &mesh);
+    ck_assert_int_eq(drape_mesh_connect(ctx, &source, &mesh), DRAPE_OK);
+    drape_remedy_open(none, &mesh, remedy);
+    ck_assert_ptr_nonnull(strstr(remedy, "fill the holes"));
+    drape_mesh_free(&mesh);
+    drape_context_destroy(&none);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(a_degenerate_triangle_has_a_remedy)
+{
+    drape_context *ctx = new_context();
+    drape_mesh mesh;
+    char remedy[DRAPE_REMEDY_SIZE];
+    parse(ctx, &drape_import_obj, "v 0 0 0\nv 1 0 0\nv 3 0 0\nv 3 0 1e-14\nf 1 2 3\nf 1 3 4\n", &mesh);
+    drape_remedy_degenerate(&mesh, mesh.triangle, remedy);
+    ck_assert_str_eq(
+        remedy, "; remedy: move node 1, at (1, 0, 0) m, off the line between the others, or dissolve it");
+    drape_remedy_degenerate(&mesh, mesh.triangle + 3, remedy);
+    ck_assert_str_eq(remedy, "; remedy: merge nodes 2 and 3, which are 1e-14 m apart");
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -478,5 +550,6 @@ END_TEST
 
 SUITE("faces", a_quadrilateral_gets_its_shorter_diagonal, a_polygon_loses_ears,
       polygons_of_any_kind_are_divided, what_a_simulation_does_not_need_is_not_refused,
-      equal_coordinates_are_one, ply_has_them_at_vertices_or_corners, obj_frames_have_the_faces_of_the_mesh,
+      equal_coordinates_are_one, ply_has_them_at_vertices_or_corners, an_open_mesh_has_a_remedy,
+      a_degenerate_triangle_has_a_remedy, obj_frames_have_the_faces_of_the_mesh,
       glb_has_texture_coordinates_and_materials, each_allocation_may_fail)

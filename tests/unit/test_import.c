@@ -670,9 +670,10 @@ START_TEST(content_faults_name_the_file)
         {"", "/m/file: bad.obj: the mesh has no nodes"},
         {SQUARE, "/m/file: bad.obj: the mesh has no triangles"},
         {SQUARE "f 1 2 3 4\nf 3 4 4\n", "/m/file: bad.obj: triangle 2 (nodes 2 3 3) uses a node twice"},
-        {SQUARE "f 1 2 3\n", "/m/file: bad.obj: node 3 belongs to no triangle"},
+        {SQUARE "f 1 2 3\n", "/m/file: bad.obj: node 3 belongs to no triangle; remedy: delete loose "
+                             "vertices, of which there is 1"},
         {SQUARE "f 1 2 3\nf 4 1 3\nf 3 1 2\n",
-         "/m/file: bad.obj: triangles 0 and 2 have the same nodes 0 1 2"},
+         "/m/file: bad.obj: triangles 0 and 2 have the same nodes 0 1 2; remedy: delete one of them"},
         {SQUARE "v 2e9 0 0\nf 1 2 5 3\n",
          "/m/file: bad.obj: node 4 is at (2e+09, 0, 0) m; coordinates must be "
          "finite and within 1e+09 m"},

@@ -574,14 +574,23 @@ START_TEST(array_faults)
     REFUSED(3, "/m: triangle 1 (nodes 2 1 1) uses a node twice", 0, 1, 2, 2, 1, 1);
     REFUSED(3, "/m: triangle 0 (nodes 2 1 2) uses a node twice", 2, 1, 2);
     REFUSED(3, "/m: triangle 0 (nodes 2 2 1) uses a node twice", 2, 2, 1);
-    REFUSED(4, "/m: triangles 0 and 2 have the same nodes 0 1 2", 0, 1, 2, 1, 2, 3, 2, 1, 0);
-    REFUSED(4, "/m: triangles 0 and 1 have the same nodes 1 2 3", 3, 1, 2, 1, 2, 3);
-    REFUSED(5, "/m: edge 0 1 is shared by triangles 0, 1 and 2; at most two may share an edge", 0, 1, 2, 3, 1,
-            0, 1, 0, 4);
-    REFUSED(5, "/m: node 3 belongs to no triangle", 0, 1, 2, 1, 2, 4);
-    REFUSED(5,
-            "/m: triangles 0 and 1 touch only at node 2; the triangles around a node must be joined by edges",
-            0, 1, 2, 2, 3, 4);
+    REFUSED(4, "/m: triangles 0 and 2 have the same nodes 0 1 2; remedy: delete one of them", 0, 1, 2, 1, 2,
+            3, 2, 1, 0);
+    REFUSED(4, "/m: triangles 0 and 1 have the same nodes 1 2 3; remedy: delete one of them", 3, 1, 2, 1, 2,
+            3);
+    REFUSED(
+        5,
+        "/m: edge 0 1 is shared by triangles 0, 1 and 2; at most two may share an edge; "
+        "remedy: delete the others, or give them an edge of their own, between (0, 0, 0) and (1, 0, 1) m, "
+        "the first of 1 such places",
+        0, 1, 2, 3, 1, 0, 1, 0, 4);
+    REFUSED(5, "/m: node 3 belongs to no triangle; remedy: delete loose vertices, of which there is 1", 0, 1,
+            2, 1, 2, 4);
+    REFUSED(
+        5,
+        "/m: triangles 0 and 1 touch only at node 2; the triangles around a node must be joined by edges; "
+        "remedy: give one of them a vertex of its own there, at (2, 0, 4) m, or join them by faces",
+        0, 1, 2, 2, 3, 4);
     drape_mesh_def def = arrays(points, 3, NULL, 1);
     assert_refused(&def, "/m: \"triangles\" is missing: a mesh needs positions and triangles");
     def = arrays(points, 0, (const int32_t[]){0, 1, 2}, 1);
@@ -590,14 +599,15 @@ START_TEST(array_faults)
     assert_refused(&def, "/m: the mesh has no triangles");
     static const double line[] = {0, 0, 0, 1, 1, 1, 2, 2, 2};
     def = arrays(line, 3, (const int32_t[]){0, 1, 2}, 1);
-    assert_refused(&def,
-                   "/m: triangle 0 (nodes 0 1 2) is degenerate: altitude / longest edge is 0, at least 1e-12 "
-                   "is needed");
+    assert_refused(
+        &def,
+        "/m: triangle 0 (nodes 0 1 2) is degenerate: altitude / longest edge is 0, at least 1e-12 "
+        "is needed; remedy: move node 1, at (1, 1, 1) m, off the line between the others, or dissolve it");
     static const double point[9] = {0};
     def = arrays(point, 3, (const int32_t[]){0, 1, 2}, 1);
     assert_refused(&def,
                    "/m: triangle 0 (nodes 0 1 2) is degenerate: altitude / longest edge is 0, at least 1e-12 "
-                   "is needed");
+                   "is needed; remedy: merge nodes 1 and 2, which are 0 m apart");
     static const double wild[] = {0, 0, 0, 1, NAN, 0, 2, 0, 1};
     def = arrays(wild, 3, (const int32_t[]){0, 1, 2}, 1);
     assert_refused(&def, "/m: node 1 is at (1, nan, 0) m; coordinates must be finite and within 1e+09 m");
@@ -613,7 +623,8 @@ START_TEST(two_closed_fans_at_one_node_are_refused)
     const drape_mesh_def def = arrays(x, 7, triangle, 6);
     assert_refused(&def,
                    "/m: triangles 0 and 3 touch only at node 0; the triangles around a node must be joined "
-                   "by edges");
+                   "by edges; remedy: give one of them a vertex of its own there, at (0, 0, 0) m, or join "
+                   "them by faces");
 }
 END_TEST
 
