@@ -181,8 +181,9 @@ void drape_system_contact_remainder(drape_system *system, const drape_point *poi
 /* Whether the model has a contact with friction. */
 bool drape_system_has_friction(const drape_system *system);
 
-/* Makes the values of drape_system_jacobian at a point with a share of the positive parts symmetric: takes out
- * how friction changes with the normal force and the place of contact, and of the rest, what is antisymmetric. */
+/* Makes the values of drape_system_jacobian at a point with a share of the positive parts symmetric: takes
+ * out how friction changes with the normal force and the place of contact, and of the rest, what is
+ * antisymmetric. */
 void drape_system_symmetrize(drape_system *system, const drape_point *point, double positive_share,
                              double *values);
 
