@@ -108,12 +108,12 @@ DRAPE_API const char *drape_context_message(const drape_context *ctx);
 
 /* One parameter, given by name. Numbers and integers go into number, with text and vector NULL; choices and
  * file names go into text; booleans go into text as "true" or "false", or into number as 0 or 1; vectors go
- * into vector. */
+ * into vector, and so do points of a curve, as x0 y0 x1 y1 ... */
 typedef struct drape_setting {
     const char *name;     /* name of the parameter */
-    double number;        /* value of a number, integer or boolean */
+    double number;        /* value of a number, integer or boolean; with vector 0, or 2 if it is of pairs */
     const char *text;     /* value of a choice, file name or boolean; NULL: none */
-    const double *vector; /* vector_count numbers: 3, or 4 for axis and angle [degrees] */
+    const double *vector; /* vector_count numbers: 3, 4 for axis and angle [degrees], or those of points */
     size_t vector_count;  /* length of vector */
 } drape_setting;
 
@@ -325,6 +325,20 @@ typedef struct drape_event_def {
     bool once;             /* only the first time counts; default false */
 } drape_event_def;
 
+/* The factor of loads over time, which loads name in their parameter "history": linear or cubic between its
+ * keys, and constant before the first and after the last one. A cubic (Fritsch & Butland 1984) goes beyond no
+ * key: its slope is 0 at both ends and where the factor turns round, and continuous. Initialise with
+ * drape_history_def_init. */
+typedef struct drape_history_def {
+    size_t struct_size;        /* set by drape_history_def_init */
+    const char *name;          /* unique; required */
+    const double *times;       /* time_count times [s] within 1e9, strictly increasing */
+    size_t time_count;         /* length of times, at least 1 */
+    const double *values;      /* value_count factors [1] within 1e9 */
+    size_t value_count;        /* length of values, that of times */
+    const char *interpolation; /* "linear" or "cubic"; NULL: "linear" */
+} drape_history_def;
+
 /* A whole scene. Initialise with drape_scene_def_init. Everything it points to need only live until
  * drape_model_create returns. */
 typedef struct drape_scene_def {
@@ -356,6 +370,9 @@ typedef struct drape_scene_def {
     const drape_setting *untangle; /* sweeps, gap, on_failure: cloth that begins through itself, other cloth
                                       or colliders is taken apart before the first step; NULL: it is not */
     size_t untangle_count;         /* length of untangle */
+    const drape_history_def *histories; /* at most 4096; NULL: none */
+    size_t history_count;               /* length of histories */
+    const char *gravity_history; /* name of the history that multiplies gravity; NULL: it is constant */
 } drape_scene_def;
 
 /* Fill a def with the defaults documented above. Pass the caller's sizeof of the def as struct_size. Nothing
@@ -365,6 +382,7 @@ DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
 DRAPE_API void drape_pin_def_init(drape_pin_def *def, size_t struct_size);
 DRAPE_API void drape_mass_def_init(drape_mass_def *def, size_t struct_size);
+DRAPE_API void drape_history_def_init(drape_history_def *def, size_t struct_size);
 DRAPE_API void drape_event_def_init(drape_event_def *def, size_t struct_size);
 DRAPE_API void drape_seam_def_init(drape_seam_def *def, size_t struct_size);
 DRAPE_API void drape_collider_def_init(drape_collider_def *def, size_t struct_size);

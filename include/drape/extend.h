@@ -39,7 +39,12 @@ typedef enum drape_param_kind {
     DRAPE_PARAM_TURN,    /* a rotation as three values: a vector along the axis whose length is the angle
                             [degrees], to which the range applies; may also be given as axis and angle, four
                             numbers */
-    DRAPE_PARAM_TEXT     /* a text, such as a file name; its numerical value is always 0 */
+    DRAPE_PARAM_TEXT,    /* a text, such as a file name; its numerical value is always 0. Of a term, one that
+                            is called "history" names a history of the scene: the library multiplies an
+                            external load by its factor, and other terms read it in el->factor */
+    DRAPE_PARAM_POINTS   /* points of an increasing curve that begins at 0, 0, which is not one of them: pairs
+                            of numbers, both increasing from point to point. The range applies to the first;
+                            the second is from 1e-9 to 1e15. The numerical value is the number of points */
 } drape_param_kind;
 
 /* One parameter. All values are stored as doubles: integers exactly, booleans as 0 or 1, choices by index. A
@@ -58,7 +63,7 @@ typedef struct drape_param {
     const char *help;           /* meaning and effect, in one line */
     bool uniform;               /* VECTOR: a single number may stand for three equal ones */
     const char *numbers;        /* VECTOR: the names of the three numbers, "[k11, k22, k12]"; NULL: [x, y,
-                                   z] */
+                                   z]. POINTS: of the two of a point, "[strain, force]"; NULL: [x, y] */
     const char *const *aliases; /* CHOICE: pairs of a former name and the choice that it stands for,
                                    NULL-terminated; NULL: none. A warning is logged where one is given */
 } drape_param;
@@ -113,6 +118,12 @@ typedef struct drape_param {
         .name = name_, .kind = DRAPE_PARAM_TEXT, .unit = "1", .default_value = DRAPE_REQUIRED,               \
         .help = __VA_ARGS__                                                                                  \
     }
+/* Points of an increasing curve; the range applies to the first number of each. They have no default. */
+#define DRAPE_POINTS(name_, unit_, default_, min_, max_, ...)                                                \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_POINTS, .unit = unit_, .default_value = default_, .min = min_,    \
+        .max = max_, .help = __VA_ARGS__                                                                     \
+    }
 /* In place of a default: the parameter must be given. */
 #define DRAPE_REQUIRED ((double)NAN)
 /* In place of a default: a description of what is used instead. */
@@ -161,6 +172,12 @@ typedef struct drape_woven {
     double poisson;    /* sqrt(nu12 nu21) [1] */
 } drape_woven;
 
+/* Measured points of a curve, from 0, 0 on; both numbers increase from point to point. */
+typedef struct drape_points {
+    int32_t count;       /* number of points; 0: not measured */
+    const double *point; /* (count x 2) */
+} drape_points;
+
 /* One cloth at rest. Node numbers are local to the cloth. All arrays are const and valid while the model is
  * compiled. */
 typedef struct drape_cloth_view {
@@ -185,6 +202,8 @@ typedef struct drape_cloth_view {
     double gravity[3];                    /* [m/s2] */
     const drape_woven *tension, *bending; /* of a measured fabric; NULL: use material */
     void *user;                           /* of the term's ops */
+    drape_points warp_curve, weft_curve;  /* strain of a strip [1] and force per width [N/m] */
+    drape_points shear_curve;             /* shear angle [degrees] and force per length [N/m] */
 } drape_cloth_view;
 
 /* A seam at rest: two sides, each a list of nodes of one cloth, which may be the same cloth. Nodes of equal
@@ -247,6 +266,26 @@ DRAPE_API void drape_term_sew(drape_term_builder *builder, int32_t a, int32_t b)
  * where the stable step of explicit integrators is estimated. */
 DRAPE_API void drape_term_timed(drape_term_builder *builder, double from, double to);
 
+/* Allocates numbers (count, zeroed) that all elements of the term need, such as the table of a law, for build
+ * to fill; the functions of the term find them in el->shared. They live as long as the model. At most once.
+ * Returns NULL if memory is out, and for a second call or count <= 0: build must then return
+ * DRAPE_E_MEMORY. */
+DRAPE_API double *drape_term_share(drape_term_builder *builder, int32_t count);
+
+/* For terms with measure, after drape_term_reserve: gives each element `count` sliders (1 to
+ * DRAPE_MAX_SLIDERS) beside its elastic energy. A slider is a spring in series with dry friction (Jenkin
+ * 1922; Iwan 1966): its force on q is stiffness times (q - q0 - p), at most limit in magnitude, and where it
+ * would be more, p follows. p is an internal variable that the library keeps: it moves only when a step is
+ * accepted, and at the start the force is 0. What sliding costs counts as dissipated. Once per term. Errors:
+ * DRAPE_E_MEMORY, DRAPE_E_ARGUMENT. */
+#define DRAPE_MAX_SLIDERS 4
+DRAPE_API drape_status drape_term_reserve_sliders(drape_term_builder *builder, int count);
+
+/* Sets slider `number` of an element: stiffness [J/q2] >= 0 and limit [J/q] >= 0. Sliders that are not set
+ * have no force. */
+DRAPE_API void drape_term_set_slider(drape_term_builder *builder, int number, int32_t element,
+                                     double stiffness, double limit);
+
 /* Rejects the cloth or the seam: the reason is reported at the place of the term in the scene. Returns
  * DRAPE_E_ARGUMENT, which build or build_seam must return. */
 DRAPE_API drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
@@ -290,6 +329,9 @@ typedef struct drape_elements {
     const drape_parts *parts; /* NULL: the term has none */
     void *user;               /* of the term's ops */
     double progress;          /* for the function energy of a term with drape_term_timed: 0 to 1; else 0 */
+    double factor;        /* of the history that a parameter "history" names, at the present time; else 1 */
+    int32_t shared_count; /* length of shared */
+    const double *shared; /* numbers of drape_term_share; NULL: none */
 } drape_elements;
 
 /* The fault that a check found, for the message of a rejected step. */

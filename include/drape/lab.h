@@ -217,7 +217,7 @@ typedef struct drape_path_def {
     bool
         load_control; /* steps of the factor instead of the arc: it cannot pass limit points; default false */
     int branch; /* at the first bifurcation, 1 or -1: follow the branch to either side along the unstable
-                           mode; 0: stay on the path; default 0 */
+                           mode; 0: stay on the path, as with load_control; default 0 */
     int64_t max_points; /* after so many points the path ends with DRAPE_OK; default 1000 */
     double tolerance;   /* of the residual, in parts of the largest force on a node; default 1e-8 */
     drape_path_observer *observer; /* NULL: none */
@@ -230,17 +230,18 @@ DRAPE_API void drape_path_def_init(drape_path_def *def, size_t struct_size);
 
 /* Follows a path of equilibria: all loads of the scene, that is its terms that act from outside, such as
  * gravity, are multiplied by one factor, which is one more unknown; pins are where they are at the time of
- * the state. Each step is a prediction along the tangent and Newton's method with the exact stiffness and a
+ * the state, and loads that vary in time have the value of that time, but at t = 0 the one that the scene
+ * gives. Each step is a prediction along the tangent and Newton's method with the exact stiffness and a
  * constraint: corrections are normal to the step so far (Ramm 1981), so that the path may turn round at limit
  * points. A step that fails (no convergence, a degenerate element, a matrix that cannot be solved with) is
  * rejected and made again with half its length. Damping, velocities and the wind have no effect. The sim's
  * state becomes each point in turn, with velocities 0; at another factor than 1 it is no equilibrium of the
  * scene itself.
  *
- * Errors: DRAPE_E_ARGUMENT (NULL, an invalid def, no free node, a stiffness that is not symmetric, a scene
- * with colliders or self-contact, loads that vanish), DRAPE_E_STEP_TOO_SMALL (steps fail, however short),
- * DRAPE_E_SOLVER (the first point was not found, or the branch), DRAPE_E_STOPPED (cancelled), DRAPE_E_MEMORY,
- * those of the observer. After one the sim is at the last point that was reported. Thread-safety: as the
+ * Errors: DRAPE_E_ARGUMENT (NULL, an invalid def, no free node, a scene with colliders or self-contact,
+ * loads that vanish or that rounding hides), DRAPE_E_STEP_TOO_SMALL (steps fail, however short),
+ * DRAPE_E_SOLVER (the first point was not found, or the branch), DRAPE_E_STOPPED (cancelled), DRAPE_E_MEMORY, those of the
+ * observer. After one the sim is at the last point that was reported. Thread-safety: as the
  * sim. */
 DRAPE_API drape_status drape_sim_path(drape_sim *sim, const drape_path_def *def);
 

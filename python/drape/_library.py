@@ -4,6 +4,7 @@ import functools
 import glob
 import json
 import math
+import operator
 import os
 import shutil
 import threading
@@ -247,18 +248,71 @@ def record(struct):
     return _reader(type(struct))(struct)
 
 
-def encode(text) -> bytes:
-    """A text or a path for the library."""
-    return os.fsencode(text) if isinstance(text, os.PathLike) else text.encode() if isinstance(text, str) else text
+def encode(text) -> Optional[bytes]:
+    """A text or a path for the library; None stays None."""
+    if text is None or isinstance(text, bytes):
+        return text
+    if isinstance(text, os.PathLike):
+        return os.fsencode(text)
+    if not isinstance(text, str):
+        raise TypeError(f"needs a text, has {type(text).__name__}: {text!r}")
+    return text.encode()
 
 
 def numbers(values, name: str, *shape, dtype=np.float64) -> np.ndarray:
-    """A contiguous array of this shape; -1 stands for any length."""
-    array = np.ascontiguousarray(values, dtype)
+    """A contiguous array of this shape; -1 stands for any length. Numbers that dtype cannot hold are refused, never wrapped or cut."""
+    try:
+        given = np.asarray(values)
+        if np.issubdtype(dtype, np.integer):
+            array = _whole_numbers(given, name, dtype)
+        elif np.iscomplexobj(given):
+            raise TypeError(f"{name}: needs real numbers, has {given.dtype}")
+        else:
+            array = np.ascontiguousarray(given, dtype)
+    except TypeError as error:
+        raise TypeError(str(error) if str(error).startswith(name) else f"{name}: {error}") from None
+    except Error:
+        raise
+    except (ValueError, OverflowError) as error:  # of numpy: texts, and lists of different lengths
+        raise ArgumentError(f"{name}: {error}") from None
     if array.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, array.shape)):
         wanted = " x ".join("n" if n == -1 else str(n) for n in shape)
         raise ArgumentError(f"{name}: has shape {array.shape}, needs {wanted}")
     return array
+
+
+def _whole_numbers(given: np.ndarray, name: str, dtype) -> np.ndarray:
+    if given.dtype == object:  # numbers beyond 64 bits
+        given = np.array([operator.index(item) for item in given.flat], object).reshape(given.shape)
+    elif given.dtype.kind not in "iu" and given.size:
+        raise ArgumentError(f"{name}: needs whole numbers, has {given.dtype}")
+    limits = np.iinfo(dtype)
+    for number in (given.min(), given.max()) if given.size else ():
+        if not limits.min <= number <= limits.max:
+            raise ArgumentError(f"{name}: {number} is not allowed; whole numbers are from {limits.min} to {limits.max}")
+    return np.ascontiguousarray(given, dtype)
+
+
+def whole(value, name: str) -> int:
+    """A whole number that the library has room for."""
+    try:
+        return int(numbers([operator.index(value)], name, 1, dtype=np.int32)[0])
+    except TypeError as error:
+        raise TypeError(f"{name}: {error}") from None
+
+
+def real(value, name: str) -> float:
+    """A number; a text is none."""
+    if isinstance(value, (str, bytes)):
+        raise TypeError(f"{name}: needs a number, has the text {value!r}")
+    return float(value)
+
+
+def function_of(value, name: str):
+    """Something that can be called."""
+    if not callable(value):
+        raise TypeError(f"{name}: needs a function, has {type(value).__name__}")
+    return value
 
 
 def indices(values, name: str) -> np.ndarray:
@@ -266,8 +320,6 @@ def indices(values, name: str) -> np.ndarray:
     array = np.atleast_1d(np.asarray(values))
     if array.dtype == bool:
         array = np.flatnonzero(array)
-    if array.size and not np.issubdtype(array.dtype, np.integer):
-        raise ArgumentError(f"{name}: needs whole numbers or a mask, has {array.dtype}")
     return numbers(array, name, -1, dtype=np.int32)
 
 

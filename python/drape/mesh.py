@@ -77,4 +77,4 @@ def _fans(blocks) -> np.ndarray:
         if isinstance(block, np.ndarray) and block.ndim == 2:
             corners = block.shape[1]
             triangles += np.stack([block[:, [0, k, k + 1]] for k in range(1, corners - 1)], 1).reshape(-1, 3).tolist()
-    return np.array(triangles, np.int32).reshape(-1, 3)
+    return np.array(triangles, dtype=None if triangles else np.int32).reshape(-1, 3)

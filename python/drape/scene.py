@@ -2,6 +2,7 @@
 import copy
 import ctypes
 import json
+import operator
 import os
 import re
 import shutil
@@ -12,7 +13,7 @@ import numpy as np
 
 from . import _binding as c
 from ._binding import CheckResult, ClothRange, ColliderMotion
-from ._library import ArgumentError, Context, Handle, encode, header, lib, numbers, record, to_json
+from ._library import ArgumentError, Context, Handle, encode, header, lib, numbers, real, record, to_json
 from .mesh import Mesh
 from .terms import Term
 
@@ -42,8 +43,10 @@ class Scene:
             lib.drape_scene_destroy(handle)
             self._loaded = _read(self.path)
             self.data = copy.deepcopy(self._loaded)
+        elif source is None or isinstance(source, Mapping):
+            self.data = _copy(dict({"drape": 1} if source is None else source))
         else:
-            self.data = _copy(dict(source or {"drape": 1}))
+            raise TypeError(f"a scene is a dictionary, the name of a file, or another scene, not {type(source).__name__}")
         self.data.update(members)
 
     # ---- A dictionary ----
@@ -247,7 +250,7 @@ class Model:
 
     def collider(self, which: Union[int, str], t: float = 0.0) -> ColliderMotion:
         """A collider by number or name, and where its track has it at time t [s]."""
-        return record(lib.drape_model_collider(self._address, self.collider_index(which), t))
+        return record(lib.drape_model_collider(self._address, self.collider_index(which), real(t, "t")))
 
     def collider_index(self, which: Union[int, str]) -> int:
         """The number of a collider that is given by number or name."""
@@ -256,9 +259,9 @@ class Model:
         names = self._colliders
         if isinstance(which, str) and which in names:
             return names.index(which)
-        if isinstance(which, str) or not 0 <= which < len(names):
+        if isinstance(which, str) or not 0 <= operator.index(which) < len(names):
             raise ArgumentError(f"no collider {which!r}: there are {', '.join(names) or 'none'}")
-        return int(which)
+        return operator.index(which)
 
     @header("drape_model_strain")
     def strain(self, positions) -> np.ndarray:
@@ -282,7 +285,7 @@ class Model:
         count = ctypes.c_int32()
         with self._context.lock:
             results = (c.drape_check_result * 256)()
-            status = lib.drape_model_check_derivatives(self._address, seed, results, 256, ctypes.addressof(count))
+            status = lib.drape_model_check_derivatives(self._address, operator.index(seed), results, 256, ctypes.addressof(count))
             self._raise_pending()
             self._context.check(status)
         return [record(result) for result in results[:min(count.value, 256)]]

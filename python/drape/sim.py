@@ -11,7 +11,8 @@ import numpy as np
 
 from . import _binding as c
 from ._binding import (Attempt, ColliderMotion, Energy, EventKind, EventRecord, Realtime, Relaxed, SeamReport, Statistics, Status, Untangling, Warning)
-from ._library import ArgumentError, Context, Error, Handle, Stopped, encode, error_of, header, indices, lib, numbers, record
+from ._library import (ArgumentError, Context, Error, Handle, Stopped, encode, error_of, function_of, header, indices, lib, numbers, real, record,
+                       whole)
 from .scene import Model, Scene
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ class Sim:
         definition.integrator, definition.controller = encode(integrator), encode(controller)
         definition.integrator_settings, definition.integrator_setting_count = _settings(integrator_settings, keep)
         definition.controller_settings, definition.controller_setting_count = _settings(controller_settings, keep)
-        definition.dt, definition.dt_min, definition.frame_rate, definition.threads = dt, dt_min, frame_rate, threads
+        definition.dt, definition.dt_min, definition.frame_rate, definition.threads = dt, dt_min, frame_rate, whole(threads, "threads")
         definition.realtime_step, definition.teleport_speed = realtime_step, teleport_speed
         handle = ctypes.c_void_p()
         self._context.check(lib.drape_sim_create(self._context.address, self.model._address, definition, handle))
@@ -127,7 +128,10 @@ class Sim:
     def _call(self, function, *arguments) -> None:
         """A function that returns a status."""
         with self._lock:
-            status = function(self._open(), *arguments)
+            try:
+                status = function(self._open(), *arguments)
+            except ctypes.ArgumentError as error:
+                raise TypeError(f"{function.__name__}: {error}") from None
             self._raise_pending()
             if status:
                 raise error_of(status, self._context.message())
@@ -149,13 +153,13 @@ class Sim:
     @header("drape_sim_advance")
     def advance(self, until: float) -> Optional[EventRecord]:
         """Makes steps up to the time `until` [s]. Returns None, or the event of the scene that stopped the run before."""
-        return self._run(lib.drape_sim_advance, float(until))
+        return self._run(lib.drape_sim_advance, real(until, "until"))
 
     @header("drape_sim_advance_realtime")
     def advance_realtime(self, frame_dt: float, budget: float) -> Realtime:
         """Advances by frame_dt [s] of simulated time within a budget [s] of wall-clock time, and reports what that took."""
         report = c.drape_realtime()
-        self._run(lib.drape_sim_advance_realtime, float(frame_dt), float(budget), report)
+        self._run(lib.drape_sim_advance_realtime, real(frame_dt, "frame_dt"), real(budget, "budget"), report)
         return record(report)
 
     def _run(self, function, *arguments) -> Optional[EventRecord]:
@@ -205,7 +209,7 @@ class Sim:
     def observe(self, observer: Observer, *kinds: EventKind) -> Observer:
         """Calls observer(event) within advances, for all events or those of these kinds. If it returns a true value, the advance ends with Stopped; an
         exception ends it and comes out of advance(). It may read the sim and save it, but not advance or change it. Also a decorator."""
-        self._observers.append((observer, kinds))
+        self._observers.append((function_of(observer, "observer"), kinds))
         return observer
 
     def unobserve(self, observer: Observer) -> None:
@@ -215,23 +219,27 @@ class Sim:
     # ---- State ----
 
     def _view(self, function) -> np.ndarray:
-        return self._handle.view(function(self._open()), self._shape, np.float64)
+        with self._lock:
+            return self._handle.view(function(self._open()), self._shape, np.float64)
 
     def _model_view(self, function, dtype) -> np.ndarray:
         """An array of the nodes of the present model: that of the scene, or one of the sim's own, after pins or masses have changed."""
-        address = function(lib.drape_sim_model(self._open()))
-        owner = self._handle if self._context.memory.lease(address) else self.model._handle
-        return owner.view(address, self._shape[:1], dtype)
+        with self._lock:
+            address = function(lib.drape_sim_model(self._open()))
+            owner = self._handle if self._context.memory.lease(address) else self.model._handle
+            return owner.view(address, self._shape[:1], dtype)
 
     @property
     def time(self) -> float:
         """[s] of the last accepted state."""
-        return lib.drape_sim_time(self._open())
+        with self._lock:
+            return lib.drape_sim_time(self._open())
 
     @property
     def hash(self) -> int:
         """64-bit hash of the last accepted state: equal hashes, equal bits."""
-        return lib.drape_sim_hash(self._open())
+        with self._lock:
+            return lib.drape_sim_hash(self._open())
 
     @property
     def positions(self) -> np.ndarray:
@@ -328,7 +336,8 @@ class Sim:
     @property
     def strain(self) -> np.ndarray:
         """Principal strains [1] of the triangles (triangles x 2), the larger first."""
-        return self.model.strain(self.positions)
+        with self._lock:
+            return self.model.strain(self.positions)
 
     @property
     def statistics(self) -> Statistics:
@@ -386,7 +395,8 @@ class Sim:
         """Lets a collider carry nodes from where they are. triangles: those of a collider that deforms; None: the nearest."""
         nodes = indices(nodes, "nodes")
         on = None if triangles is None else numbers(np.atleast_1d(triangles), "triangles", len(nodes), dtype=np.int32)
-        self._call(lib.drape_sim_attach, self._collider(collider), len(nodes), nodes.ctypes.data, None if on is None else on.ctypes.data)
+        with self._lock:
+            self._call(lib.drape_sim_attach, self._collider(collider), len(nodes), nodes.ctypes.data, None if on is None else on.ctypes.data)
 
     @header("drape_sim_attach")
     def detach(self, nodes) -> None:
@@ -395,7 +405,8 @@ class Sim:
 
     def attached(self, node: int) -> int:
         """The number of the collider that carries a node; -1: none."""
-        return lib.drape_sim_attached(self._open(), node)
+        with self._lock:
+            return lib.drape_sim_attached(self._open(), whole(node, "node"))
 
     @header("drape_sim_set_masses")
     def set_masses(self, nodes, masses) -> None:
@@ -415,7 +426,7 @@ class Sim:
     @header("drape_sim_set_drag_springs")
     def drag(self, nodes=(), targets=(), stiffness=0.0) -> None:
         """Drags nodes towards targets (count x 3 [m]) by springs of a stiffness [N/m]; without arguments: no more."""
-        nodes = indices(np.asarray(nodes, int), "nodes")
+        nodes = indices(nodes, "nodes")
         x = numbers(np.reshape(targets, (-1, 3)), "targets", len(nodes), 3)
         k = numbers(np.broadcast_to(np.asarray(stiffness, float), len(nodes)), "stiffness", len(nodes))
         self._call(lib.drape_sim_set_drag_springs, len(nodes), nodes.ctypes.data, k.ctypes.data, x.ctypes.data)
@@ -424,7 +435,8 @@ class Sim:
     def drag_force(self) -> np.ndarray:
         """[N] (3): the sum of the forces of drag springs."""
         out = np.empty(3)
-        lib.drape_sim_drag_spring_force(self._open(), out.ctypes.data)
+        with self._lock:
+            lib.drape_sim_drag_spring_force(self._open(), out.ctypes.data)
         return out
 
     @header("drape_sim_set_wind", "drape_wind_field")
@@ -432,7 +444,7 @@ class Sim:
         """Sets the velocity of the air for drag terms: wind(t, x) returns velocities (count x 3 [m/s]) at the time t [s] and the points x (count x 3 [m]), or
         these and their gradient (count x 3 x 3 [1/s], d wind_i / d x_j), with which Newton's method converges as fast as without wind. A single vector
         stands for the same wind everywhere. None: still air. An exception in it ends the advance and comes out of it."""
-        field: Any = c.drape_wind_field() if wind is None else _wind(weakref.ref(self), wind)  # type: ignore[call-overload]
+        field: Any = c.drape_wind_field() if wind is None else _wind(weakref.ref(self), function_of(wind, "wind"))  # type: ignore[call-overload]
         self._call(lib.drape_sim_set_wind, field, None)
         self._needs["wind"] = field
 
@@ -464,38 +476,45 @@ class Sim:
         if rotation is None:
             if angular_velocity is not None:
                 raise ArgumentError("angular_velocity: needs a rotation")
-            self._call(lib.drape_sim_move_collider, self._collider(which), seconds, d.ctypes.data, at)
+            with self._lock:
+                self._call(lib.drape_sim_move_collider, self._collider(which), seconds, d.ctypes.data, at)
             return
         q = numbers(rotation, "rotation", 4)
         w = None if angular_velocity is None else numbers(angular_velocity, "angular_velocity", 3)
-        self._call(lib.drape_sim_move_collider_pose, self._collider(which), seconds, d.ctypes.data, q.ctypes.data, at, None if w is None else w.ctypes.data)
+        with self._lock:
+            self._call(lib.drape_sim_move_collider_pose, self._collider(which), seconds, d.ctypes.data, q.ctypes.data, at,
+                       None if w is None else w.ctypes.data)
 
     @header("drape_sim_deform_collider")
     def deform_collider(self, which: Which, positions, seconds: float, velocities=None) -> None:
         """Sends the points of an animated_mesh to positions (points x 3 [m]) within the next seconds [s], to arrive with velocities [m/s]."""
         x = numbers(positions, "positions", -1, 3)
         v = None if velocities is None else numbers(velocities, "velocities", len(x), 3)
-        self._call(lib.drape_sim_deform_collider, self._collider(which), seconds, len(x), x.ctypes.data, None if v is None else v.ctypes.data)
+        with self._lock:
+            self._call(lib.drape_sim_deform_collider, self._collider(which), seconds, len(x), x.ctypes.data, None if v is None else v.ctypes.data)
 
     @header("drape_sim_collider_points")
     def collider_points(self, which: Which = 0) -> Tuple[np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s] (points x 3) of a collider that deforms."""
-        index = self._collider(which)
-        count = max(0, lib.drape_model_collider_points(self.model._address, index))
-        x, v = np.empty((count, 3)), np.empty((count, 3))
-        self._call(lib.drape_sim_collider_points, index, x.ctypes.data, v.ctypes.data)
+        with self._lock:
+            index = self._collider(which)
+            count = max(0, lib.drape_model_collider_points(self.model._address, index))
+            x, v = np.empty((count, 3)), np.empty((count, 3))
+            self._call(lib.drape_sim_collider_points, index, x.ctypes.data, v.ctypes.data)
         return x, v
 
     @header("drape_sim_contact_forces")
     def collider_force(self, which: Which = 0) -> np.ndarray:
         """[N] (3): the force of the cloth on a collider."""
-        return self._array(lib.drape_sim_collider_force, 3, self._collider(which))
+        with self._lock:
+            return self._array(lib.drape_sim_collider_force, 3, self._collider(which))
 
     @header("drape_sim_contact_forces")
     def collider_torque(self, which: Which = 0, about=None) -> np.ndarray:
         """[N m] (3): the torque of the cloth on a collider, about a point [m] or its pivot."""
         point = None if about is None else numbers(about, "about", 3)
-        return self._array(lib.drape_sim_collider_torque, 3, self._collider(which), None if point is None else point.ctypes.data)
+        with self._lock:
+            return self._array(lib.drape_sim_collider_torque, 3, self._collider(which), None if point is None else point.ctypes.data)
 
     # ---- Placing, changing ----
 
@@ -507,16 +526,17 @@ class Sim:
         definition = c.drape_place_def()
         lib.drape_place_def_init(definition, ctypes.sizeof(definition))
         if len(rotate):
-            definition.rotate[:] = [float(number) for number in rotate]
-        definition.center[:], definition.translate[:] = [float(n) for n in center], [float(n) for n in translate]
+            definition.rotate[:] = numbers(rotate, "rotate", 4).tolist()
+        definition.center[:], definition.translate[:] = numbers(center, "center", 3).tolist(), numbers(translate, "translate", 3).tolist()
         definition.stop = stop
         if cloths is not None:
-            pieces = indices(np.asarray(cloths, int), "cloths")
+            pieces = indices(cloths, "cloths")
             definition.cloths, definition.cloth_count = pieces.ctypes.data, len(pieces)
-        if colliders is not None:
-            bodies = np.array([self._collider(which) for which in np.atleast_1d(np.asarray(colliders, object))], np.int32)
-            definition.colliders, definition.collider_count = bodies.ctypes.data, len(bodies)
-        self._call(lib.drape_sim_place, definition)
+        with self._lock:
+            if colliders is not None:
+                bodies = np.array([self._collider(which) for which in np.atleast_1d(np.asarray(colliders, object))], np.int32)
+                definition.colliders, definition.collider_count = bodies.ctypes.data, len(bodies)
+            self._call(lib.drape_sim_place, definition)
 
     @header("drape_sim_change")
     def change(self, scene: Union[Scene, Model, Mapping]) -> None:
@@ -531,6 +551,7 @@ class Sim:
         """Takes apart cloth that passes through itself, other cloth or colliders, and reports what was found and done."""
         definition, report = c.drape_untangle_def(), c.drape_untangling()
         lib.drape_untangle_def_init(definition, ctypes.sizeof(definition))
+        sweeps = None if sweeps is None else whole(sweeps, "sweeps")
         given = {name: value for name, value in (("sweeps", sweeps), ("gap", gap), ("keep", keep)) if value is not None}
         for name, value in given.items():
             setattr(definition, name, value)
@@ -629,7 +650,7 @@ class Sim:
         lib.drape_event_def_init(definition, ctypes.sizeof(definition))
         definition.name, definition.direction, definition.action, definition.once = encode(name), encode(direction), encode(action), once
         definition.cloth, definition.pins = encode(cloth), encode(pins)
-        callback = _event_function(weakref.ref(self), function)
+        callback = _event_function(weakref.ref(self), function_of(function, "function"))
         self._call(lib.drape_sim_add_event, definition, callback, None)
         self._needs.setdefault("events", []).append(callback)
 
@@ -654,7 +675,7 @@ class Embedding:
         x = numbers(vertices, "vertices", -1, 3, dtype=np.float32)
         n = None if normals is None else numbers(normals, "normals", len(x), 3, dtype=np.float32)
         handle, context = ctypes.c_void_p(), Context()
-        context.check(lib.drape_embedding_create(context.address, model._address, cloth, len(x), x.ctypes.data, None if n is None else n.ctypes.data, handle))
+        context.check(lib.drape_embedding_create(context.address, model._address, whole(cloth, "cloth"), len(x), x.ctypes.data, None if n is None else n.ctypes.data, handle))
         self._handle = Handle(handle, lib.drape_embedding_destroy, context)
         self._nodes, self._shape, self._normals = model.node_count, x.shape, n is not None
 

@@ -2,6 +2,8 @@
 #include "assemble/block.h"
 
 #include "base/lanes.h"
+#include "model/history.h"
+#include "model/slider.h"
 #include "sparse/project.h"
 
 #define D DRAPE_MAX_ELEMENT_DOFS
@@ -24,6 +26,22 @@ static void rates_of_history(const drape_term *term, const drape_request *want, 
         b->rate[i] = want->point->weight * b->q[i] + history[i];
 }
 
+/* Adds what the sliders of the term do. */
+static void add_sliders(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    for (int s = 0; want->conservative && s < term->sliders; s++) {
+        const size_t first = (size_t)s * (size_t)term->elements.count + (size_t)b->first;
+        const double *k = term->slider_stiffness + first, *limit = term->slider_limit + first,
+                     *slid = want->point->internal + term->first_slider + first;
+        for (int32_t i = 0; i < b->count; i++) {
+            const drape_slider_value v = drape_slider_at(k[i], limit[i], b->strain[i] - slid[i]);
+            b->force[i] += v.force;
+            b->by_strain[i] += v.slope;
+            b->energy[i] += v.energy;
+        }
+    }
+}
+
 /* Generalised forces on the measures, their derivatives and energies, from q and its rate. */
 static void sum_stresses(const drape_term *term, const drape_request *want, drape_block *b)
 {
@@ -37,6 +55,7 @@ static void sum_stresses(const drape_term *term, const drape_request *want, drap
         b->energy[i] = 0.5 * b->force[i] * b->strain[i];
         b->by_rate[i] = 0;
     }
+    add_sliders(term, want, b);
     const double *c = want->dissipative && term->damping ? term->damping + b->first : NULL;
     for (int32_t i = 0; c && i < b->count; i++) {
         b->force[i] += c[i] * b->rate[i];
@@ -360,8 +379,30 @@ static void evaluate_measures(const drape_term *term, const drape_request *want,
 static drape_elements elements_at(const drape_term *term, const drape_point *point)
 {
     drape_elements el = term->elements;
-    el.progress = point->done ? 1 : drape_term_progress(term, point->t) + point->progressed;
+    const bool full = point->full && term->ops->external;
+    el.progress = full || point->done ? 1 : drape_term_progress(term, point->t) + point->progressed;
+    if (term->history)
+        el.factor = full          ? 1
+                    : point->done ? drape_history_largest(term->history)
+                                  : drape_history_factor(term->history, point->t);
     return el;
+}
+
+static void scale(double factor, double *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        values[i] *= factor;
+}
+
+/* The energy and the forces of an external load are those that the term computes times the factor of its
+ * history. */
+static void scale_load(const drape_elements *el, const drape_request *want, drape_block *b)
+{
+    const size_t count = (size_t)b->count, d = 3 * (size_t)el->nodes;
+    scale(el->factor, b->energy, count);
+    scale(el->factor, b->gradient, count * d);
+    if (want->hessian)
+        scale(el->factor, b->hessian, count * d * d);
 }
 
 static void evaluate_energies(const drape_term *term, const drape_request *want, drape_block *b)
@@ -370,6 +411,8 @@ static void evaluate_energies(const drape_term *term, const drape_request *want,
     const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
     term->ops->energy(&el, b->first, b->count, want->point->x, internal, b->energy, b->gradient,
                       want->hessian ? b->hessian : NULL);
+    if (term->history && term->ops->external)
+        scale_load(&el, want, b);
 }
 
 /* h -= dg/dv W: the wind at an element's nodes changes as they move. */
@@ -391,13 +434,15 @@ static void evaluate_dissipations(const drape_term *term, const drape_request *w
 {
     const int d = 3 * term->elements.nodes;
     const bool hessian = want->hessian, wind = want->against && term->ops->in_medium;
+    const drape_elements el = elements_at(term, want->point);
     memset(b->energy, 0, (size_t)b->count * sizeof *b->energy);
-    term->ops->dissipation(&term->elements, b->first, b->count, want->point->x,
-                           wind ? want->against : want->point->v, b->gradient, hessian ? b->hessian : NULL,
-                           hessian ? b->scratch : NULL);
+    term->ops->dissipation(&el, b->first, b->count, want->point->x, wind ? want->against : want->point->v,
+                           b->gradient, hessian ? b->hessian : NULL, hessian ? b->scratch : NULL);
     for (int32_t i = 0; wind && hessian && !want->velocity && i < b->count; i++)
         carry_wind(term, want->wind_gradient, b->scratch + (size_t)i * (size_t)(d * d), b->first + i,
                    b->hessian + (size_t)i * (size_t)(d * d));
+    if (term->history && term->ops->external)
+        scale_load(&el, want, b);
     for (int i = 0; hessian && i < b->count * d * d; i++)
         b->hessian[i] = want->velocity ? b->scratch[i] : b->hessian[i] + want->point->weight * b->scratch[i];
 }

@@ -2,8 +2,23 @@
 #include "assemble/state.h"
 
 #include "base/hash.h"
+#include "model/slider.h"
 
+#include <math.h>
 #include <string.h>
+
+/* The strains q - q0 of a range of at most DRAPE_PAIR_BLOCK elements. */
+static void strains_of(const drape_term *term, int32_t first, int32_t count, const double *x,
+                       const double *internal, double *strain)
+{
+    const drape_elements *el = &term->elements;
+    const double *q0 = el->rest + (size_t)el->count + first;
+    term->ops->measure(el, first, count, x,
+                       term->first_internal >= 0 ? internal + term->first_internal : NULL, strain, NULL,
+                       NULL);
+    for (int32_t i = 0; i < count; i++)
+        strain[i] -= q0[i];
+}
 
 drape_status drape_state_create(drape_arena *arena, const drape_model *model, drape_state *state)
 {
@@ -22,6 +37,13 @@ drape_status drape_state_create(drape_arena *arena, const drape_model *model, dr
         if (term->ops->initial)
             term->ops->initial(&term->elements, 0, drape_term_pieces(term).count, model->start,
                                state->internal + term->first_internal);
+        const int32_t elements = term->sliders > 0 ? term->elements.count : 0;
+        for (int32_t e = 0; e < elements; e += DRAPE_PAIR_BLOCK)
+            strains_of(term, e, elements - e < DRAPE_PAIR_BLOCK ? elements - e : DRAPE_PAIR_BLOCK,
+                       model->start, state->internal, state->internal + term->first_slider + e);
+        for (int s = 1; s < term->sliders; s++)
+            memcpy(state->internal + term->first_slider + (int64_t)s * elements,
+                   state->internal + term->first_slider, (size_t)elements * sizeof *state->internal);
     }
     return DRAPE_OK;
 }
@@ -35,6 +57,39 @@ void drape_state_commit(const drape_model *model, const drape_state *before, dra
                               before->internal + term->first_internal,
                               after->internal + term->first_internal);
     }
+}
+
+static double slide_term(const drape_term *term, const drape_state *before, drape_state *after)
+{
+    const int32_t elements = term->elements.count;
+    double dissipated = 0;
+    for (int32_t e = 0; e < elements; e += DRAPE_PAIR_BLOCK) {
+        const int32_t count = elements - e < DRAPE_PAIR_BLOCK ? elements - e : DRAPE_PAIR_BLOCK;
+        double strain[DRAPE_PAIR_BLOCK];
+        strains_of(term, e, count, after->x, after->internal, strain);
+        for (int s = 0; s < term->sliders; s++) {
+            const size_t first = (size_t)s * (size_t)elements + (size_t)e;
+            const double *from = before->internal + term->first_slider + first;
+            double *to = after->internal + term->first_slider + first;
+            for (int32_t i = 0; i < count; i++) {
+                const double limit = term->slider_limit[first + (size_t)i];
+                const double slip =
+                    drape_slider_slip(term->slider_stiffness[first + (size_t)i], limit, strain[i] - from[i]);
+                dissipated += limit * fabs(slip);
+                to[i] = from[i] + slip;
+            }
+        }
+    }
+    return dissipated;
+}
+
+double drape_state_slide(const drape_model *model, const drape_state *before, drape_state *after)
+{
+    double dissipated = 0;
+    for (int32_t i = 0; i < model->term_count; i++)
+        if (model->terms[i].sliders > 0)
+            dissipated += slide_term(&model->terms[i], before, after);
+    return dissipated;
 }
 
 uint64_t drape_state_hash(const drape_model *model, const drape_state *state)

@@ -4,6 +4,7 @@
 #include "assemble/sum.h"
 #include "base/clock.h"
 #include "base/finite.h"
+#include "model/history.h"
 #include "model/support.h"
 
 #include <math.h>
@@ -29,6 +30,7 @@ struct drape_system {
     drape_drag_springs drag;
     double *push; /* (node_count x 3) [N], if pushed */
     bool pushed;
+    double *load; /* (node_count x 3) scratch, if the model has histories */
     drape_wind wind;
     const atomic_bool *cancel; /* NULL: there is no flag to watch */
 };
@@ -44,6 +46,8 @@ drape_status drape_system_create(drape_arena *arena, const drape_model *model, i
     *system = (drape_system){
         .arena = arena, .model = model, .pattern = &model->pattern, .extension = drape_arena_within(arena)};
     system->push = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->push);
+    if (model->history_count > 0)
+        system->load = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->load);
     drape_status status = drape_pool_create(arena, threads, &system->pool);
     if (!status)
         status = drape_summer_create(arena, model, system->pool, &system->summer);
@@ -190,7 +194,10 @@ drape_status drape_system_status(const drape_system *system)
 
 drape_status drape_system_add_contact(drape_system *system)
 {
-    return drape_contact_create(system->arena, system->motion, &system->contact);
+    const drape_status status = drape_contact_create(system->arena, system->motion, &system->contact);
+    if (system->contact)
+        drape_contact_watch(system->contact, &system->cancel);
+    return status;
 }
 
 const drape_contact *drape_system_contact(const drape_system *system)
@@ -481,8 +488,7 @@ void drape_system_jacobian_without(drape_system *system, const drape_point *poin
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (evaluate_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight,
-                                   positive_share > 0 ? DRAPE_CONTACT_GAUSS_NEWTON : point->contact,
+        drape_contact_add_jacobian(system->contact, point->weight, point->contact, positive_share,
                                    system->pattern, values);
     drape_drag_springs_add_hessian(&system->drag, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
@@ -500,12 +506,26 @@ bool drape_system_is_symmetric(const drape_system *system)
     return !system->contact || drape_contact_is_symmetric(system->contact);
 }
 
-void drape_system_symmetrize(drape_system *system, const drape_point *point, double *values)
+void drape_system_symmetrize(drape_system *system, const drape_point *point, double positive_share,
+                             double *values)
 {
     if (evaluate_contact(system, point))
-        drape_contact_fix_friction(system->contact, point->weight, system->pattern, values);
+        drape_contact_fix_friction(system->contact, point->weight, 1 - positive_share, system->pattern,
+                                   values);
     drape_pattern_symmetrize(system->pattern, values);
     drape_system_project_matrix(system, values);
+}
+
+void drape_system_contact_remainder(drape_system *system, const drape_point *point, double *values)
+{
+    memset(values, 0, (size_t)system->pattern->nonzeros * sizeof *values);
+    if (evaluate_contact(system, point))
+        drape_contact_add_remainder(system->contact, point->weight, system->pattern, values);
+}
+
+bool drape_system_has_friction(const drape_system *system)
+{
+    return system->contact && drape_contact_has_friction(system->contact);
 }
 
 void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *point, double *h)
@@ -527,7 +547,7 @@ void drape_system_remainder(drape_system *system, const drape_point *point, doub
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (evaluate_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight, DRAPE_CONTACT_GAUSS_NEWTON,
+        drape_contact_add_jacobian(system->contact, point->weight, DRAPE_CONTACT_GAUSS_NEWTON, 1,
                                    system->pattern, values);
 }
 
@@ -549,7 +569,7 @@ void drape_system_damping(drape_system *system, const drape_point *point, double
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (evaluate_contact(system, point))
-        drape_contact_add_jacobian(system->contact, 0, DRAPE_CONTACT_VELOCITY, system->pattern, values);
+        drape_contact_add_jacobian(system->contact, 0, DRAPE_CONTACT_VELOCITY, 0, system->pattern, values);
     drape_system_project_matrix(system, values);
 }
 
@@ -577,7 +597,7 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
 bool drape_system_is_timed(const drape_system *system)
 {
     for (int32_t i = 0; i < system->model->term_count; i++)
-        if (drape_term_is_timed(&system->model->terms[i]))
+        if (drape_term_changes(&system->model->terms[i]))
             return true;
     return false;
 }
@@ -618,16 +638,54 @@ static double timed_work(drape_system *system, const drape_term *term, const dra
     return energy[1] - energy[0];
 }
 
-double drape_system_timed_work(drape_system *system, const double *internal, const double *x, double t0,
-                               const double *y, double t1)
+/* E0 of a load without its history, and its rate dE0/dx . v. */
+static void measure_load(drape_system *system, const drape_term *term, const drape_point *at, double *energy,
+                         double *rate)
 {
-    const drape_point from = {.x = x, .internal = internal, .t = t0},
-                      to = {.x = y, .internal = internal, .t = t1};
+    const size_t n = 3 * (size_t)system->model->node_count;
+    double *g = system->load;
+    drape_point point = *at;
+    point.full = true;
+    const drape_request want = {.point = &point, .energy = true, .conservative = true};
+    memset(g, 0, n * sizeof *g);
+    drape_summer_add_term(system->summer, term, &want, &(drape_sums){.g = g}, energy);
+    *rate = 0;
+    for (size_t i = 0; i < n; i++)
+        *rate += g[i] * at->v[i];
+}
+
+/* The work of a load E = f(t) E0(x) whose factor changes, int f' E0 dt = [f E0] - int f E0' dt, with E0 as
+ * the cubic through its values and rates at both ends, by Gauss's rule of three points; f counts from its
+ * value at the beginning, so that a constant one does no work. */
+static double history_work(drape_system *system, const drape_term *term, const drape_point *from,
+                           const drape_point *to)
+{
+    static const double node[] = {0.11270166537925831, 0.5, 0.88729833462074169},
+                        weight[] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+    const double h = to->t - from->t, start = drape_history_factor(term->history, from->t);
+    double energy[2] = {0, 0}, rate[2];
+    measure_load(system, term, from, &energy[0], &rate[0]);
+    measure_load(system, term, to, &energy[1], &rate[1]);
+    double work = (drape_history_factor(term->history, to->t) - start) * energy[1];
+    for (int k = 0; k < 3; k++) {
+        const double s = node[k], along = 6 * s * (1 - s) * (energy[1] - energy[0]) +
+                                          (1 - s) * (1 - 3 * s) * h * rate[0] + s * (3 * s - 2) * h * rate[1];
+        work -= weight[k] * (drape_history_factor(term->history, from->t + s * h) - start) * along;
+    }
+    return work;
+}
+
+double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after)
+{
+    const drape_point from = {.x = before->x, .v = before->v, .internal = before->internal, .t = before->t},
+                      to = {.x = after->x, .v = after->v, .internal = before->internal, .t = after->t};
     double work = 0;
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         if (drape_term_is_timed(term) && has_energy(system, term))
             work += timed_work(system, term, &from, &to);
+        if (term->history && has_energy(system, term))
+            work += history_work(system, term, &from, &to);
     }
     return work;
 }
@@ -663,7 +721,7 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
     if (g)
         drape_contact_add_forces(system->contact, true, friction, g);
     if (values)
-        drape_contact_add_jacobian(system->contact, point->weight, DRAPE_CONTACT_EXACT, system->pattern,
+        drape_contact_add_jacobian(system->contact, point->weight, DRAPE_CONTACT_EXACT, 0, system->pattern,
                                    values);
 }
 

@@ -29,7 +29,8 @@ typedef struct drape_point {
     const double *history;  /* (measure_count) [q/s]; NULL: q' = grad q . v, as in continuous time */
     const double *stress;   /* (measure_count) the f before ddq in a Jacobian; NULL: the forces here */
     double t;               /* [s] time of the colliders' poses, and of terms that depend on it */
-    bool done;              /* energies that depend on time are taken at progress 1 */
+    bool done;              /* energies that depend on time are taken at progress 1, loads at their largest */
+    bool full;              /* loads from outside are taken at progress 1 and without their histories */
     double progressed;      /* added to their progress, for differences */
     double span[2]; /* [s] over which the velocities of colliders are taken; equal: they are at rest */
     bool instant;   /* those that turn have their velocities of time t instead, as the pins of methods that
@@ -65,11 +66,10 @@ drape_motion *drape_system_steer(drape_system *system);
 void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
 
-/* Whether a term depends on time, and the work that this does in a step from nodes x at t0 to y at t1 [J].
- * internal: of the state at t0. */
+/* Whether a term depends on time, and the work that this does in a step from one state to another [J], by the
+ * internal variables of the former. */
 bool drape_system_is_timed(const drape_system *system);
-double drape_system_timed_work(drape_system *system, const double *internal, const double *x, double t0,
-                               const double *y, double t1);
+double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after);
 
 /* From now on the medium moves with this field, if the model has a term that feels it; NULL: it is at
  * rest. */
@@ -159,8 +159,8 @@ void drape_system_project_matrix(const drape_system *system, double *values);
 
 /* values (pattern.nonzeros) = mass_weight M + J over the free nodes. With positive_share from 0 to 1, each
  * element's Hessian H becomes H + positive_share (H+ - H), where H+ is its positive semidefinite part: 0 is
- * exact, 1 is positive semidefinite. Contact has no such shares: for any share above 0 its matrix is the
- * positive semidefinite approximation of drape_contact_add_jacobian. */
+ * exact, 1 is positive semidefinite. So does that of contact, whose positive semidefinite part is
+ * DRAPE_CONTACT_GAUSS_NEWTON. */
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
                            double positive_share, double *values);
 
@@ -174,9 +174,17 @@ void drape_system_predict_contact(drape_system *system, const double *p, double 
 /* Whether the Jacobian of contact is symmetric in every state. */
 bool drape_system_is_symmetric(const drape_system *system);
 
-/* Makes the values of drape_system_jacobian at a point, without positive parts, symmetric: takes out how
- * friction changes with the normal force and the place of contact, and of the rest, what is antisymmetric. */
-void drape_system_symmetrize(drape_system *system, const drape_point *point, double *values);
+/* values (pattern.nonzeros) = what the exact Jacobian of contact has beyond its positive semidefinite
+ * approximation, as drape_contact_add_remainder. */
+void drape_system_contact_remainder(drape_system *system, const drape_point *point, double *values);
+
+/* Whether the model has a contact with friction. */
+bool drape_system_has_friction(const drape_system *system);
+
+/* Makes the values of drape_system_jacobian at a point with a share of the positive parts symmetric: takes out
+ * how friction changes with the normal force and the place of contact, and of the rest, what is antisymmetric. */
+void drape_system_symmetrize(drape_system *system, const drape_point *point, double positive_share,
+                             double *values);
 
 /* The parts of an approximate Jacobian that is cheaper than J (nonlinear/approx_jacobian.h), term by term.
  *

@@ -11,6 +11,8 @@
 #define MIN_PART   3    /* letters: shorter words are near to a part of too many names */
 #define SHOWN_SIZE 24   /* bytes of a number with 10 digits */
 #define RANGE_SIZE 1024 /* bytes of a range as text: lists of choices are long */
+#define POINT_MIN  1e-9 /* of the second numbers of points */
+#define POINT_MAX  1e15
 
 int drape_param_find(const drape_param *params, int param_count, const char *name)
 {
@@ -39,7 +41,7 @@ bool drape_params_are_well_formed(const drape_param *params, int param_count)
         return false;
     for (int i = 0; i < param_count; i++)
         if (!params[i].name || !params[i].unit || params[i].kind < DRAPE_PARAM_NUMBER ||
-            params[i].kind > DRAPE_PARAM_TEXT ||
+            params[i].kind > DRAPE_PARAM_POINTS ||
             (params[i].kind == DRAPE_PARAM_CHOICE && (!params[i].choices || !params[i].choices[0])))
             return false;
     return drape_param_place(params, param_count) <= DRAPE_MAX_PARAMS;
@@ -155,8 +157,9 @@ static void choices_text(const drape_param *param, char *text, size_t size)
 void drape_param_range_text(const drape_param *param, char *text, size_t size)
 {
     const char *unit = strcmp(param->unit, "1") == 0 ? "" : param->unit;
-    const char *numbers = param->numbers ? param->numbers : "[x, y, z]";
-    char several[96] = "";
+    const bool points = param->kind == DRAPE_PARAM_POINTS;
+    const char *numbers = param->numbers ? param->numbers : points ? "[x, y]" : "[x, y, z]";
+    char several[128] = "";
     switch (param->kind) {
     case DRAPE_PARAM_BOOLEAN:
         snprintf(text, size, "true or false");
@@ -174,12 +177,15 @@ void drape_param_range_text(const drape_param *param, char *text, size_t size)
         snprintf(several, sizeof several, "[x, y, z, angle], or %s whose length is the angle, which is in ",
                  numbers);
         break;
+    case DRAPE_PARAM_POINTS:
+        snprintf(several, sizeof several, "an array of %s, both increasing from 0, the first in ", numbers);
+        break;
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
         break;
     }
     snprintf(text, size, "%s%c%s, %s%c%s%s", several, param->open_min ? '(' : '[', SHOWN(param->min),
-             SHOWN(param->max), param->open_max ? ')' : ']', *unit ? " " : "", unit);
+             SHOWN(param->max), param->open_max ? ')' : ']', *unit && !points ? " " : "", points ? "" : unit);
 }
 
 void drape_param_takes_text(const drape_param *param, char *text, size_t size)
@@ -225,6 +231,9 @@ void drape_param_value_text(const drape_param *param, const double *value, char 
         return;
     case DRAPE_PARAM_TEXT:
         snprintf(text, size, "a text");
+        return;
+    case DRAPE_PARAM_POINTS:
+        snprintf(text, size, "%d point%s", (int)*value, *value == 1 ? "" : "s");
     }
 }
 
@@ -272,6 +281,7 @@ static drape_status number_value(drape_context *ctx, const char *pointer, const 
     case DRAPE_PARAM_CHOICE:
     case DRAPE_PARAM_TURN:
     case DRAPE_PARAM_TEXT:
+    case DRAPE_PARAM_POINTS:
         break;
     }
     if (!good)
@@ -300,15 +310,56 @@ static drape_status turn_value(drape_context *ctx, const char *pointer, const dr
     return DRAPE_OK;
 }
 
+/* pointer: to the number k (0, 1) of point i. */
+static drape_status refuse_point(drape_context *ctx, const char *pointer, const drape_param *param, size_t i,
+                                 int k, double number, double before)
+{
+    char at[300], given[40], least[40];
+    snprintf(at, sizeof at, "%.250s/%zu/%d", pointer, i, k);
+    drape_number_text(number, given, sizeof given);
+    drape_number_text(before, least, sizeof least);
+    trim_exponent(given), trim_exponent(least);
+    return drape_fail_at(
+        ctx, DRAPE_E_ARGUMENT, at,
+        "%s is not allowed; the %s number of a point of %s is above that of the point before, "
+        "%s, and in [%s, %s]",
+        given, k == 0 ? "first" : "second", param->name, least, SHOWN(k == 0 ? param->min : POINT_MIN),
+        SHOWN(k == 0 ? param->max : POINT_MAX));
+}
+
+/* The bounds keep slopes, and products of two of them, far from overflow and underflow. */
+static drape_status points_value(drape_context *ctx, const char *pointer, const drape_param *param,
+                                 const drape_setting *setting, double *value)
+{
+    const size_t count = setting->vector_count;
+    const double *v = setting->vector;
+    char given[48];
+    snprintf(given, sizeof given, count ? "an array of %zu numbers" : "an empty array", count);
+    if (count == 0 || count % 2)
+        return drape_param_refuse(ctx, pointer, param, given);
+    for (size_t i = 0; i < count / 2; i++) {
+        const double x = v[2 * i], y = v[2 * i + 1], x0 = i ? v[2 * i - 2] : 0, y0 = i ? v[2 * i - 1] : 0;
+        if (!in_range(param, x) || !(x > x0))
+            return refuse_point(ctx, pointer, param, i, 0, x, x0);
+        if (!(y >= POINT_MIN) || !(y <= POINT_MAX) || !(y > y0))
+            return refuse_point(ctx, pointer, param, i, 1, y, y0);
+    }
+    *value = (double)(count / 2);
+    return DRAPE_OK;
+}
+
 static drape_status vector_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                  const drape_setting *setting, double *value)
 {
     const size_t count = setting->vector_count;
+    const bool pairs = setting->number == 2;
     char given[40];
-    if (param->kind == DRAPE_PARAM_TURN && (count == 3 || count == 4))
+    if (param->kind == DRAPE_PARAM_POINTS)
+        return points_value(ctx, pointer, param, setting, value);
+    if (param->kind == DRAPE_PARAM_TURN && !pairs && (count == 3 || count == 4))
         return turn_value(ctx, pointer, param, setting, value);
-    snprintf(given, sizeof given, count ? "an array of %zu" : "an empty array", count);
-    if (param->kind != DRAPE_PARAM_VECTOR || count != 3)
+    snprintf(given, sizeof given, count ? "an array of %zu" : "an empty array", pairs ? count / 2 : count);
+    if (param->kind != DRAPE_PARAM_VECTOR || pairs || count != 3)
         return drape_param_refuse(ctx, pointer, param, given);
     for (int k = 0; k < 3; k++) {
         if (!in_range(param, setting->vector[k]))

@@ -53,13 +53,16 @@ static param_text text_of(const drape_param *param)
     return text;
 }
 
-static param_text text_of_key(const drape_scene_key *key)
+/* Of keys of which exactly one is given, none has a default. */
+static param_text text_of_key(const cli_object *object, const drape_scene_key *key)
 {
     param_text text = text_of(&key->param);
     drape_scene_key plain = *key;
     plain.param.unit = "1";
     drape_scene_takes_text(&plain, text.takes, sizeof text.takes);
     drape_scene_default_text(key, text.value, sizeof text.value);
+    if (cli_is_one_of(object->form, key))
+        *text.value = 0;
     return text;
 }
 
@@ -89,7 +92,7 @@ static void print_param(const char *name, const char *help, const param_text *te
 static void text_key(const cli_object *object, const drape_scene_key *key)
 {
     (void)object;
-    param_text text = text_of_key(key);
+    param_text text = text_of_key(object, key);
     drape_scene_takes_text(key, text.takes, sizeof text.takes); /* the unit included */
     *text.unit = 0;
     print_param(key->param.name, key->param.help, &text,
@@ -164,7 +167,7 @@ static void markdown_cells(const char *const *of, int count, const char *name, c
 /* The help of a key that stands for others names them, as a reader may see only its row of the table. */
 static void markdown_key(const cli_object *object, const drape_scene_key *key)
 {
-    param_text text = text_of_key(key);
+    param_text text = text_of_key(object, key);
     const size_t length = strlen(text.takes);
     if (cli_is_one_of(object->form, key)) {
         snprintf(text.takes + length, sizeof text.takes - length, "; ");

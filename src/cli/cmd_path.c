@@ -96,6 +96,8 @@ static drape_status open_table(job *j)
 
 static void print_point(const job *j, const drape_path_point *point)
 {
+    if (point->number == 0)
+        puts("point          factor  displacement     energy [J]  unstable  iterations  event");
     printf("%5" PRId64 "  %14.9g  %12.6g  %13.6g  %8" PRId64 "  %10d  %s\n", point->number, point->factor,
            largest_displacement(j->in.model, drape_sim_positions(j->in.sim)),
            point->elastic + point->potential, point->unstable, point->iterations, event_name(point->event));
@@ -135,6 +137,9 @@ static int read_nodes(job *j)
             return cli_misuse("path", "--node \"%.60s\": it is a number from 0 to %d",
                               j->request->nodes.items[i], (int)j->in.model->node_count - 1);
         j->node[i] = (int32_t)number;
+        for (size_t k = 0; k < i; k++)
+            if (j->node[k] == j->node[i])
+                return cli_misuse("path", "--node %d is given twice", (int)j->node[i]);
     }
     return CLI_GO_ON;
 }
@@ -149,6 +154,9 @@ static int read_def(const path_request *request, const cli_state *state, drape_p
         return cli_misuse("path", "--from and --to are two factors of the loads");
     if (request->branch && strcmp(request->branch, "+") != 0 && strcmp(request->branch, "-") != 0)
         return cli_misuse("path", "--branch \"%.60s\": it is + or -", request->branch);
+    if (request->branch && request->load_control)
+        return cli_misuse("path",
+                          "--branch with --load-control: a branch is left and followed by arc length");
     def->branch = !request->branch ? 0 : request->branch[0] == '+' ? 1 : -1;
     def->step = request->step > 0 ? request->step : fabs(def->to - def->from) / 20;
     def->max_arc = request->max_arc;
@@ -168,10 +176,8 @@ static int follow(job *j, const cli_state *state, drape_path_def *def)
         status = cli_shapes_open(command, &j->in, &shapes, &j->recorder);
     if (!status && j->recorder)
         status = open_table(j);
-    if (!status) {
-        puts("point          factor  displacement     energy [J]  unstable  iterations  event");
+    if (!status)
         status = drape_sim_path(j->in.sim, def);
-    }
     fflush(stdout);
     char message[DRAPE_MESSAGE_SIZE];
     snprintf(message, sizeof message, "%s", drape_context_message(j->in.ctx));

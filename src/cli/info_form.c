@@ -45,13 +45,22 @@ static json_t *text_element(const void *element)
     return drape_json_text(text);
 }
 
+static json_t *number_element(const void *element)
+{
+    double number;
+    memcpy(&number, element, sizeof number);
+    return drape_json_number(number);
+}
+
 /* NULL: it has no elements. */
 static json_t *array_json(const char *def, const drape_scene_key *key)
 {
-    const bool texts = key->param.kind == DRAPE_PARAM_TEXT, track = key->shape == DRAPE_SCENE_TRACK;
+    const bool texts = key->param.kind == DRAPE_PARAM_TEXT, track = key->shape == DRAPE_SCENE_TRACK,
+               numbers = key->param.kind == DRAPE_PARAM_NUMBER;
     const size_t size = key->child ? key->child->def_size
                         : track    ? sizeof(drape_track_key)
                         : texts    ? sizeof(const char *)
+                        : numbers  ? sizeof(double)
                                    : sizeof(int32_t);
     const char *elements;
     size_t count;
@@ -63,6 +72,7 @@ static json_t *array_json(const char *def, const drape_scene_key *key)
         array = drape_json_append(array, key->child ? cli_form_json(key->child, element)
                                          : track    ? track_element(element)
                                          : texts    ? text_element(element)
+                                         : numbers  ? number_element(element)
                                                     : integer_element(element));
     }
     return array;
@@ -172,6 +182,14 @@ json_t *cli_masses_json(const cli_info *info, int32_t c)
     for (size_t i = 0; i < def->mass_count; i++)
         masses = drape_json_append(masses, cli_form_json(&drape_form_mass, &def->masses[i]));
     return masses;
+}
+
+json_t *cli_histories_json(const cli_info *info)
+{
+    json_t *histories = json_array();
+    for (size_t i = 0; i < info->def.history_count; i++)
+        histories = drape_json_append(histories, cli_form_json(&drape_form_history, &info->def.histories[i]));
+    return histories;
 }
 
 json_t *cli_start_json(const cli_info *info, int32_t c)

@@ -33,6 +33,8 @@ static json_t *value_of(const drape_param *param, const double *value, const dra
         return vector(value);
     case DRAPE_PARAM_TEXT:
         return drape_json_text(choice ? cli_text_of(choice, param->name) : "");
+    case DRAPE_PARAM_POINTS: /* their number */
+        return count((int64_t)*value);
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
         break;
@@ -280,9 +282,11 @@ static json_t *term(const cli_info *info, int32_t i)
     object = drape_json_with(object, "jacobian_s", drape_json_number(cost->jacobian_seconds));
     object = drape_json_with(
         object, "share", drape_json_number(cli_share(info, cost->residual_seconds + cost->jacobian_seconds)));
-    return drape_json_with(
-        object, "parameters",
-        params_of(from->ops->entry.params, from->ops->entry.param_count, from->params, NULL));
+    json_t *parameters = params_of(from->ops->entry.params, from->ops->entry.param_count, from->params, NULL);
+    if (from->history && *from->history->name)
+        json_object_set_new(json_object_get(parameters, "history"), "value",
+                            drape_json_text(from->history->name));
+    return drape_json_with(object, "parameters", parameters);
 }
 
 /* ---- Costs ---- */
@@ -361,6 +365,7 @@ json_t *cli_info_json(const cli_info *info)
     object = with_contact(object, info);
     object = with_events(object, info);
     object = with_seams(object, model);
+    object = with_list(object, "histories", cli_histories_json(info));
     cli_chosen_entries(info->sim, entries);
     for (int i = 0; i < CLI_CHOSEN; i++)
         object = drape_json_with(object, entries[i].title, chosen(&entries[i], &info->sim->chosen));

@@ -84,6 +84,8 @@ static bool is_default(const drape_param *param, const double *value)
 static void print_params(const char *indent, const drape_param *params, int count, const double *values)
 {
     for (int p = 0; p < count; p++) {
+        if (params[p].kind == DRAPE_PARAM_TEXT) /* has no value here */
+            continue;
         printf("%s%-16s ", indent, params[p].name);
         const double *value = values + drape_param_place(params, p);
         print_value(&params[p], value);
@@ -322,8 +324,13 @@ static void print_term(const cli_info *info, int32_t i)
         printf("%d %s elements of %d node%s", (int)term->elements.count, term->ops->element_name,
                term->elements.nodes, term->elements.nodes == 1 ? "" : "s");
     for (int p = 0; p < term->ops->entry.param_count; p++) {
-        printf("; %s ", term->ops->entry.params[p].name);
         const double *value = term->params + drape_param_place(term->ops->entry.params, p);
+        if (term->ops->entry.params[p].kind == DRAPE_PARAM_TEXT) {
+            if (term->history && *term->history->name)
+                printf("; history %s", CLI_SHOWN(term->history->name));
+            continue;
+        }
+        printf("; %s ", term->ops->entry.params[p].name);
         print_value(&term->ops->entry.params[p], value);
         fputs(is_default(&term->ops->entry.params[p], value) ? " (default)" : "", stdout);
     }
@@ -453,6 +460,7 @@ void cli_info_text(const cli_info *info)
         print_event(&info->model->events[i], &info->def.events[i]);
     for (int32_t i = 0; i < info->model->seam_count; i++)
         print_seam(info->model, i, &info->def.seams[i]);
+    print_objects("history", &drape_form_history, cli_histories_json(info));
     cli_chosen_entries(info->sim, entries);
     for (int i = 0; i < CLI_CHOSEN; i++)
         print_chosen(&entries[i], &info->sim->chosen);

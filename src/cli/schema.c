@@ -4,6 +4,7 @@
  * collider depend on each other, and all rules that depend on a mesh.
  */
 #include "cli/schema.h"
+#include "cli/keys.h"
 
 #include "colliders/colliders.h"
 #include "compile/compile.h"
@@ -124,6 +125,7 @@ static json_t *default_of(const drape_param *p, const double *values)
         return three(values);
     case DRAPE_PARAM_TEXT:
         return json_string(p->derived);
+    case DRAPE_PARAM_POINTS: /* they have no default */
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
         break;
@@ -160,6 +162,9 @@ static json_t *value_of(const drape_param *p)
         return vector_of(p);
     case DRAPE_PARAM_TURN:
         return numbers(3, 4);
+    case DRAPE_PARAM_POINTS:
+        return drape_json_with(drape_json_with(typed("array"), "items", numbers(2, 2)), "minItems",
+                               json_integer(1));
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
         break;
@@ -167,8 +172,9 @@ static json_t *value_of(const drape_param *p)
     return bounded(p->kind == DRAPE_PARAM_INTEGER ? "integer" : "number", p);
 }
 
-/* Adds the help and the default of a key to the schema of its value. */
-static json_t *described(json_t *value, const drape_scene_key *key)
+/* Adds the help of a key to the schema of its value, and the default unless another key may be given in its
+ * place. */
+static json_t *described(json_t *value, const drape_scene_key *key, bool is_one_of)
 {
     char text[512];
     double defaults[DRAPE_PARAM_WIDEST];
@@ -178,7 +184,7 @@ static json_t *described(json_t *value, const drape_scene_key *key)
              has_unit ? "]" : "");
     value = drape_json_with(value, "description", json_string(text));
     drape_param_default(p, defaults);
-    if (isnan(*defaults) && !key->literal)
+    if (is_one_of || (isnan(*defaults) && !key->literal))
         return value;
     json_t *one = default_of(p, key->vector ? key->vector : defaults);
     return drape_json_with(value, "default",
@@ -187,7 +193,7 @@ static json_t *described(json_t *value, const drape_scene_key *key)
 
 static json_t *param(const drape_param *p)
 {
-    return described(value_of(p), &(drape_scene_key){.param = *p});
+    return described(value_of(p), &(drape_scene_key){.param = *p}, false);
 }
 
 /* A value of a parameter that several entries have with different bounds must be right for each of them, as
@@ -362,7 +368,8 @@ static json_t *properties_of(const drape_scene_object *object, const char *chose
     for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
         if (!is_excluded(object, key->param.name, chosen))
-            properties = drape_json_with(properties, key->param.name, described(key_value(object, key), key));
+            properties = drape_json_with(properties, key->param.name,
+                                         described(key_value(object, key), key, cli_is_one_of(object, key)));
     }
     return properties;
 }

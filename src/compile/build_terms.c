@@ -59,6 +59,47 @@ void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t 
         builder->rest[(size_t)k * (size_t)el->count + (size_t)element] = rest[k];
 }
 
+double *drape_term_share(drape_term_builder *builder, int32_t count)
+{
+    drape_elements *el = &builder->term->elements;
+    if (el->shared || count <= 0)
+        return NULL;
+    double *shared = drape_arena_take(&builder->model->arena, (size_t)count, sizeof *shared);
+    el->shared = shared;
+    el->shared_count = shared ? count : 0;
+    return shared;
+}
+
+drape_status drape_term_reserve_sliders(drape_term_builder *builder, int count)
+{
+    drape_term *term = builder->term;
+    if (!builder->reserved || !term->ops->measure || term->sliders > 0 || count < 1 ||
+        count > DRAPE_MAX_SLIDERS)
+        return drape_term_refuse(builder,
+                                 "%s reserves %d sliders; 1 to %d, once, after the elements of a measure",
+                                 term->ops->entry.name, count, DRAPE_MAX_SLIDERS);
+    const size_t all = (size_t)count * (size_t)term->elements.count;
+    term->slider_stiffness = drape_arena_take(&builder->model->arena, all, sizeof *term->slider_stiffness);
+    term->slider_limit = drape_arena_take(&builder->model->arena, all, sizeof *term->slider_limit);
+    term->sliders = count;
+    return drape_arena_status(&builder->model->arena);
+}
+
+void drape_term_set_slider(drape_term_builder *builder, int number, int32_t element, double stiffness,
+                           double limit)
+{
+    const drape_term *term = builder->term;
+    if (!term->slider_stiffness || !term->slider_limit || number < 0 || number >= term->sliders ||
+        element < 0 || element >= term->elements.count || !(stiffness >= 0) || !(limit >= 0) ||
+        isinf(stiffness) || isinf(limit)) {
+        builder->strayed = true;
+        return;
+    }
+    const size_t at = (size_t)number * (size_t)term->elements.count + (size_t)element;
+    term->slider_stiffness[at] = stiffness;
+    term->slider_limit[at] = limit;
+}
+
 drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
 {
     char text[512];
@@ -130,7 +171,10 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .gravity = {model->gravity[0], model->gravity[1], model->gravity[2]},
                               .tension = cloth->tension.warp > 0 ? &cloth->tension : NULL,
                               .bending = cloth->bending.warp > 0 ? &cloth->bending : NULL,
-                              .user = user};
+                              .user = user,
+                              .warp_curve = cloth->curves[DRAPE_CURVE_WARP],
+                              .weft_curve = cloth->curves[DRAPE_CURVE_WEFT],
+                              .shear_curve = cloth->curves[DRAPE_CURVE_SHEAR]};
 }
 
 static bool is_owned(const drape_term_builder *builder, int32_t node)
@@ -169,8 +213,8 @@ static drape_status check_elements(drape_term_builder *builder)
                                  timed[1]);
     if (builder->strayed)
         return drape_term_refuse(builder,
-                                 "%s set an element outside of the %d that it announced, or a part or link "
-                                 "outside of those",
+                                 "%s set an element outside of the %d that it announced, or a part, link or "
+                                 "slider outside of those, or a slider of negative stiffness or limit",
                                  ops->entry.name, (int)el->count);
     for (size_t i = 0; i < (size_t)el->count; i++)
         if (el->node[i * (size_t)el->nodes] == -1)
@@ -202,7 +246,8 @@ static drape_status begin_term(drape_model *model, int32_t c, int32_t seam, cons
     term->cloth = c;
     term->seam = seam;
     term->elements.user = ops->user;
-    term->first_internal = term->first_measure = -1;
+    term->elements.factor = 1;
+    term->first_internal = term->first_measure = term->first_slider = -1;
     model->term_count++;
     model->has_dissipation = model->has_dissipation || term->ops->dissipative || term->ops->dissipation;
     return DRAPE_OK;
@@ -242,7 +287,8 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
         cloth->laws[cloth->law_count++] = term;
         return DRAPE_OK;
     }
-    return build_elements(model, term, pointer);
+    status = build_elements(model, term, pointer);
+    return status ? status : drape_compile_history_of(model, pointer, def, term);
 }
 
 drape_status drape_compile_weight(drape_model *model)
@@ -287,8 +333,19 @@ static drape_status build_named(drape_model *model, int32_t c, const char *point
     return build_term(model, c, pointer, ops, def);
 }
 
+/* Builds a term that the scene's gravity adds. */
+static drape_status build_implied(drape_model *model, int32_t c, const drape_term_ops *ops,
+                                  const char *history)
+{
+    const drape_setting setting = {.name = DRAPE_HISTORY_PARAM, .text = history};
+    const drape_entry_def def = {
+        .type = ops->entry.name, .settings = &setting, .setting_count = history != NULL};
+    return build_term(model, c, "/gravity", ops, &def);
+}
+
 /* Builds the terms that the scene names, then those that its gravity adds if it is not zero. */
-static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth_def *def)
+static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth_def *def,
+                                const char *gravity_history)
 {
     const double *g = model->gravity;
     const bool has_gravity = g[0] != 0 || g[1] != 0 || g[2] != 0;
@@ -305,7 +362,7 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
     }
     for (int i = 0; !status && has_gravity && (ops = term_at(model->ctx, i)) != NULL; i++)
         if (ops->from_scene_gravity)
-            status = build_term(model, c, "/gravity", ops, &(drape_entry_def){.type = ops->entry.name});
+            status = build_implied(model, c, ops, gravity_history);
     return status;
 }
 
@@ -367,6 +424,10 @@ static void number_elements(drape_model *model, drape_term *term)
         term->first_measure = model->measure_count;
         model->measure_count += term->elements.count;
     }
+    if (term->sliders > 0) {
+        term->first_slider = model->internal_count;
+        model->internal_count += drape_term_slider_count(term);
+    }
 }
 
 /* Connects the laws of a cloth to its measures, of which there must be one if there are laws. */
@@ -406,7 +467,7 @@ drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def)
     if (!model->terms)
         return DRAPE_E_MEMORY;
     for (int32_t c = 0; !status && c < model->cloth_count; c++) {
-        status = build_cloth(model, c, &def->cloths[c]);
+        status = build_cloth(model, c, &def->cloths[c], def->gravity_history);
         if (!status)
             status = connect_laws(model, c);
     }

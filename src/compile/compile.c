@@ -240,6 +240,7 @@ drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape
                                                                       drape_compile_ignored,
                                                                       drape_compile_contact_stiffness,
                                                                       drape_compile_seams,
+                                                                      drape_compile_histories,
                                                                       drape_compile_terms};
     *out = NULL;
     drape_model *model = drape_alloc(ctx, 1, sizeof *model);

@@ -4,9 +4,10 @@
  * Wang, O'Brien & Ramamoorthi 2011, Data-driven elastic models for cloth (ACM TOG 30, 4): areal density,
  * tension, shear and bending of ten fabrics, measured on the same specimens. The values are from their data
  * base, which is distributed with ARCSim, and are interpreted as in ARCSim, by the same group: stress C (F'F
- * - I), so that K = 2 c of Green's strain and c33 of the shear angle, at rest (the first line of a file; they
- * stiffen at 17 %), and k |e|^2/(8 (A1 + A2)) theta^2 for a hinge, that is, a rigidity k/4 in the direction
- * in which the hinge bends. Warp is the direction v, in which the jeans have no elastic yarns. Negative
+ * - I), so that K = 2 c of Green's strain and c33 of the shear angle, at rest (the first line of a file),
+ * with another c of strips stretched by 1/6 along u (the second line) and v (the last), linear in the stretch
+ * between, and k |e|^2/(8 (A1 + A2)) theta^2 for a hinge, that is, a rigidity k/4 in the direction in which
+ * the hinge bends. Warp is the direction v, in which the jeans have no elastic yarns. Negative
  * couplings are set to 0, as in ARCSim. Both stiff wovens have c = 2 000 to within one per cent, which may be
  * a bound of their fit.
  *
@@ -35,10 +36,12 @@
 #define SHEAR   34.4 /* [N/m] */
 
 /* clang-format off */
-#define ENTRY(name, what, source, density, warp, weft, coupling, shear, bend_warp, bend_weft, diagonal,      \
-              drape) \
-    {name, what, source, density, {warp, weft, coupling, shear}, {bend_warp, bend_weft, diagonal}, drape},
-const drape_fabric drape_fabrics[] = {DRAPE_FABRICS(ENTRY) {NULL, NULL, NULL, 0, {0, 0, 0, 0}, {0, 0, 0}, 0}};
+#define ENTRY(name, what, source, density, warp, weft, coupling, shear, far_warp, far_weft, bend_warp,       \
+              bend_weft, diagonal, drape) \
+    {name, what, source, density, {warp, weft, coupling, shear}, {far_warp, far_weft},                       \
+     {bend_warp, bend_weft, diagonal}, drape},
+const drape_fabric drape_fabrics[] = {
+    DRAPE_FABRICS(ENTRY) {NULL, NULL, NULL, 0, {0, 0, 0, 0}, {0, 0}, {0, 0, 0}, 0}};
 #undef ENTRY
 
 #define ENTRY(name, ...) name,
@@ -69,4 +72,28 @@ void drape_fabric_bending(const drape_fabric *fabric, drape_woven *bending)
                              ? sqrt(warp * weft) / 2
                              : 1 / (4 / fabric->bending.diagonal - 1 / warp - 1 / weft);
     *bending = (drape_woven){warp, weft, twist, 0};
+}
+
+/* A strip with the stretch l = 1 + e has the force l S, S = C(e) (l^2 - 1)/2, per width at rest, with the
+ * coupling at rest. */
+static void sample(double at_rest, double stretched, double free_sides, double *point)
+{
+    for (int i = 0; i < DRAPE_FABRIC_POINTS; i++) {
+        const double share = (i + 1.0) / DRAPE_FABRIC_POINTS, e = share / 6, l = 1 + e;
+        point[2 * i] = e;
+        point[2 * i + 1] = free_sides * (at_rest + share * (stretched - at_rest)) * l * (l * l - 1) / 2;
+    }
+}
+
+bool drape_fabric_curves(const drape_fabric *fabric, double warp[2 * DRAPE_FABRIC_POINTS],
+                         double weft[2 * DRAPE_FABRIC_POINTS])
+{
+    drape_woven tension;
+    if (isnan(fabric->stretched.warp))
+        return false;
+    drape_fabric_tension(fabric, &tension);
+    const double free_sides = 1 - tension.poisson * tension.poisson;
+    sample(fabric->tension.warp, fabric->stretched.warp, free_sides, warp);
+    sample(fabric->tension.weft, fabric->stretched.weft, free_sides, weft);
+    return true;
 }

@@ -12,6 +12,9 @@ typedef struct drape_fabric {
         double warp, weft, coupling, shear; /* C for Green's strain (E11, E22, 2 E12) [N/m] */
     } tension;
     struct {
+        double warp, weft; /* the same of strips that are stretched by 1/6 along warp and weft */
+    } stretched;
+    struct {
         double warp, weft, diagonal; /* rigidity of strips [N m] */
     } bending;
     double drape; /* drape coefficient from a drape tester [1] */
@@ -24,5 +27,11 @@ extern const char *const drape_fabric_names[];
  * coupling, and the twist of an isotropic sheet. */
 void drape_fabric_tension(const drape_fabric *fabric, drape_woven *tension);
 void drape_fabric_bending(const drape_fabric *fabric, drape_woven *bending);
+
+/* The points of the tension curve along warp and weft, strain and force per width, of a fabric of which more
+ * was measured than the stiffness at rest; returns false for others. */
+#define DRAPE_FABRIC_POINTS 16
+bool drape_fabric_curves(const drape_fabric *fabric, double warp[2 * DRAPE_FABRIC_POINTS],
+                         double weft[2 * DRAPE_FABRIC_POINTS]);
 
 #endif

@@ -18,8 +18,13 @@ enum {
     TOTAL_MASS,
     MASS,
     FABRIC,
-    PARAM_COUNT
+    FIRST_CURVE, /* DRAPE_CURVE_WARP */
+    PARAM_COUNT = FIRST_CURVE + DRAPE_CURVE_COUNT
 };
+
+/* How far a curve may go: the angle of shear stays below a right one. */
+#define MAX_STRAIN 100
+#define MAX_ANGLE  89
 
 enum { MASS_AREA, MASS_UNIFORM };
 static const char *const mass_choices[] = {"area", "uniform", NULL};
@@ -45,6 +50,19 @@ static const drape_param params[] = {
                      "a measured fabric: gives the areal density unless the scene does, the "
                      "bending of bend.midedge and, without young_modulus and thickness, the tension and "
                      "shear of stretch.cst"),
+    [FIRST_CURVE + DRAPE_CURVE_WARP] =
+        DRAPE_POINTS("warp_curve", "1", DRAPE_DERIVED("of the fabric, or a straight line"), 1e-9, MAX_STRAIN,
+                     "tension of a strip along the warp, its sides free: strain and force per width in N/m, "
+                     "for stretch.curve",
+                     .numbers = "[strain, force]"),
+    [FIRST_CURVE + DRAPE_CURVE_WEFT] =
+        DRAPE_POINTS("weft_curve", "1", DRAPE_DERIVED("of the fabric, or a straight line"), 1e-9, MAX_STRAIN,
+                     "the same along the weft", .numbers = "[strain, force]"),
+    [FIRST_CURVE + DRAPE_CURVE_SHEAR] = DRAPE_POINTS(
+        "shear_curve", "1", DRAPE_DERIVED("straight in the sine of the angle"), 1e-9, MAX_ANGLE,
+        "shear: angle in degrees and force per length in N/m, less W tan(angle) if the sheet was "
+        "held taut by a force W per length; for stretch.curve",
+        .numbers = "[angle, force]"),
 };
 
 const drape_entry drape_material_entry = {
@@ -116,21 +134,54 @@ static bool is_given(const drape_cloth_def *def, const char *name)
     return false;
 }
 
+/* Copies the points that the scene gives. */
+static drape_status take_curves(drape_model *model, const drape_cloth_def *def, drape_cloth *cloth)
+{
+    for (size_t i = 0; i < def->material_count; i++) {
+        const drape_setting *given = &def->material[i];
+        const int k = drape_param_find(params, PARAM_COUNT, given->name) - FIRST_CURVE;
+        if (k < 0)
+            continue;
+        double *point = drape_arena_take(&model->arena, given->vector_count, sizeof *point);
+        if (!point)
+            return DRAPE_E_MEMORY;
+        memcpy(point, given->vector, given->vector_count * sizeof *point);
+        cloth->curves[k] = (drape_points){(int32_t)(given->vector_count / 2), point};
+    }
+    return DRAPE_OK;
+}
+
+/* The curves of a fabric, where the scene gives none. */
+static drape_status take_fabric_curves(drape_model *model, const drape_fabric *fabric, drape_cloth *cloth)
+{
+    double *point = drape_arena_take(&model->arena, 4 * DRAPE_FABRIC_POINTS, sizeof *point);
+    if (!point)
+        return DRAPE_E_MEMORY;
+    double *const of[2] = {[DRAPE_CURVE_WARP] = point, [DRAPE_CURVE_WEFT] = point + 2 * DRAPE_FABRIC_POINTS};
+    const bool measured = drape_fabric_curves(fabric, of[DRAPE_CURVE_WARP], of[DRAPE_CURVE_WEFT]);
+    for (int k = 0; measured && k < 2; k++)
+        if (cloth->curves[k].count == 0)
+            cloth->curves[k] = (drape_points){DRAPE_FABRIC_POINTS, of[k]};
+    return DRAPE_OK;
+}
+
 /* Values that the scene gives take precedence over measured ones. */
-static void take_fabric(const drape_cloth_def *def, double *values, drape_cloth *cloth)
+static drape_status take_fabric(drape_model *model, const drape_cloth_def *def, double *values,
+                                drape_cloth *cloth)
 {
     const drape_fabric *fabric = &drape_fabrics[(int)values[FABRIC]];
     drape_woven tension, *bending = &cloth->bending;
     if (!(fabric->areal_density > 0))
-        return;
+        return DRAPE_OK;
     drape_fabric_tension(fabric, &tension);
     drape_fabric_bending(fabric, bending);
     if (is_given(def, params[POISSON_RATIO].name))
         tension.poisson = bending->poisson = values[POISSON_RATIO];
     if (!isnan(values[THICKNESS]))
-        return;
+        return DRAPE_OK;
     cloth->tension = tension;
     fill_in(&tension, bending, values);
+    return take_fabric_curves(model, fabric, cloth);
 }
 
 static drape_material resolve(const double *values, const drape_woven *bending, double mass, double area)
@@ -162,6 +213,8 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
         status = check_stiffness(model->ctx, at, values);
     if (!status)
         status = total_mass(model->ctx, at, values, area, &mass);
+    if (!status)
+        status = take_curves(model, def, cloth);
     if (status)
         return status;
     int32_t count = cloth->mesh.node_count;
@@ -169,7 +222,9 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
     cloth->node_mass = cloth->material_mass;
     if (!cloth->material_mass)
         return DRAPE_E_MEMORY;
-    take_fabric(def, values, cloth);
+    status = take_fabric(model, def, values, cloth);
+    if (status)
+        return status;
     memcpy(cloth->material_values, values, sizeof values);
     cloth->material = resolve(values, &cloth->bending, mass, area);
     for (int32_t i = 0; i < count; i++)

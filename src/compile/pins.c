@@ -141,6 +141,8 @@ static drape_status keep_track(pin_place *pin)
 {
     drape_model *model = pin->model;
     pin->track = -1;
+    if (pin->def->turn_count == 0 && !isnan(pin->def->pivot[0]))
+        return refuse(pin, "/pivot", "without turns there is nothing that turns about it");
     if (pin->def->attach && pin->def->key_count > 0)
         return refuse(pin, "/attach", "a pin is carried by a collider or moves along a track, not both");
     if (pin->def->turn_count > 0 && pin->def->attach)

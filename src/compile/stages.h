@@ -58,6 +58,15 @@ drape_status drape_compile_events(drape_model *model, const drape_scene_def *def
 /* Finds the nodes that seams join, before the terms. */
 drape_status drape_compile_seams(drape_model *model, const drape_scene_def *def);
 
+/* Checks and copies the histories, before the terms. */
+drape_status drape_compile_histories(drape_model *model, const drape_scene_def *def);
+
+/* Finds the history of a term whose elements are built, if its parameters, def, name one or a ramp. pointer:
+ * that of the term. */
+#define DRAPE_HISTORY_PARAM "history"
+drape_status drape_compile_history_of(drape_model *model, const char *pointer, const drape_entry_def *def,
+                                      drape_term *term);
+
 /* Builds the terms of all cloths and seams and assigns indices to measures and internal variables. */
 drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def);
 

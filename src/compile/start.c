@@ -224,6 +224,16 @@ static bool sets_velocities(const drape_start_def *def)
     return def->velocity_file || def->velocities || vec3_norm(def->spin) > 0;
 }
 
+/* Copies the names of the files, for the folder of a run. */
+static drape_status copy_sources(drape_model *model, const drape_start_def *def, drape_cloth *cloth)
+{
+    if (def->file)
+        cloth->start_file = drape_arena_text(&model->arena, def->file);
+    if (def->velocity_file)
+        cloth->velocity_file = drape_arena_text(&model->arena, def->velocity_file);
+    return drape_arena_status(&model->arena);
+}
+
 drape_status drape_compile_start(drape_model *model, const drape_scene_def *def)
 {
     const size_t size = 3 * (size_t)model->node_count * sizeof *model->start;
@@ -240,11 +250,12 @@ drape_status drape_compile_start(drape_model *model, const drape_scene_def *def)
     drape_status status = DRAPE_OK;
     for (size_t c = 0; !status && c < def->cloth_count; c++) {
         const drape_start_def *from = &def->cloths[c].start;
-        const drape_cloth *cloth = &model->cloths[c];
+        drape_cloth *cloth = &model->cloths[c];
         double *x = model->start + 3 * (size_t)cloth->first_node;
         char pointer[64];
         snprintf(pointer, sizeof pointer, "/cloth/%zu/start", c);
-        if (moves_nodes(from))
+        status = copy_sources(model, from, cloth);
+        if (!status && moves_nodes(from))
             status = place_nodes(model, pointer, def->folder, from, &cloth->mesh, x);
         if (!status && sets_velocities(from))
             status = add_velocities(model, pointer, def->folder, from, cloth, x,

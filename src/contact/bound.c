@@ -40,7 +40,14 @@ static double lead_along(int split, const double axis[3], double x[4][3])
     return first - second;
 }
 
-/* The difference of two points along an axis is linear on the path: it is least at an end. */
+/* The same over a path with these ends (y NULL: there is one): the difference of two points along an axis is
+ * linear on it, so it is least at an end. */
+static double least_lead(int split, const double axis[3], double at[2][4][3], const double *y)
+{
+    const double first = lead_along(split, axis, at[0]), last = y ? lead_along(split, axis, at[1]) : first;
+    return last < first ? last : first;
+}
+
 double drape_bound_by_axes(const drape_pair *pair, const double *x, const double *y)
 {
     const int split = split_of(pair), ends = y ? 2 : 1;
@@ -50,10 +57,7 @@ double drape_bound_by_axes(const drape_pair *pair, const double *x, const double
         gather(pair, x, y, at[1]);
     for (int end = 0; end < ends; end++) {
         axis_between(split, at[end], axis);
-        double least = lead_along(split, axis, at[0]);
-        const double last = y ? lead_along(split, axis, at[1]) : least;
-        least = last < least ? last : least;
-        const double length = vec3_norm(axis);
+        const double least = least_lead(split, axis, at, y), length = vec3_norm(axis);
         if (length > 0 && least / length > bound)
             bound = least / length;
     }
@@ -69,9 +73,7 @@ bool drape_bound_is_apart(const drape_pair *pair, const double *x, const double 
         gather(pair, x, y, at[1]);
     for (int end = 0; end < ends; end++) {
         axis_between(split, at[end], axis);
-        double least = lead_along(split, axis, at[0]);
-        const double last = y ? lead_along(split, axis, at[1]) : least;
-        least = last < least ? last : least;
+        const double least = least_lead(split, axis, at, y);
         if (least > 0 && least * least >= distance * distance * vec3_dot(axis, axis))
             return true;
     }

@@ -1,6 +1,8 @@
 /* broad_phase.c: see broad_phase.h. */
 #include "contact/broad_phase.h"
 
+#include "base/vec3.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -117,6 +119,11 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->triangle_collider = drape_arena_take(arena, (size_t)triangles, sizeof *s->triangle_collider);
     s->distance = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->distance);
     s->side = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->side);
+    s->near = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near);
+    s->near_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near_node);
+    s->near_element = drape_arena_take(
+        arena, (size_t)(m->edge_count > m->triangle_count ? m->edge_count : m->triangle_count),
+        sizeof *s->near_element);
     s->point = drape_arena_take(arena, (size_t)s->points, sizeof *s->point);
     s->corner_reach = drape_arena_take(arena, (size_t)points, sizeof *s->corner_reach);
     s->segment_reach = drape_arena_take(arena, (size_t)s->segments, sizeof *s->segment_reach);
@@ -124,7 +131,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->node_area = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->node_area);
     s->edge_area = drape_arena_take(arena, (size_t)m->edge_count, sizeof *s->edge_area);
     s->face_area = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->face_area);
-    if (drape_arena_status(arena))
+    if (drape_arena_status(arena) || drape_distant_create(arena, m, &s->distant))
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < m->collider_count; i++)
         s->distance[i] = drape_collider_activation(m, i);
@@ -343,32 +350,105 @@ static bool is_marked(const bool *marked, const int32_t *node, int nodes)
     return !marked;
 }
 
-static void scan_tree(query *q, const drape_path_bvh *features, const double *reach,
-                      const drape_path_bvh *tree, drape_path_bvh_meet *meet)
+/* The longest edge of the cloth on the path. */
+static double longest_edge(const drape_model *m, const drape_broad_query *want)
 {
-    const drape_broad_query *want = q->want;
-    for (int32_t i = 0; i < features->count; i++) {
-        const int32_t *node = features->node + (size_t)i * (size_t)features->nodes;
-        const drape_path_query from = {.node = node,
-                                       .nodes = features->nodes,
-                                       .x = want->x,
-                                       .y = want->y,
-                                       .reach = reach[i] + want->reach,
-                                       .only_marked = !is_marked(want->marked, node, features->nodes)};
-        drape_path_bvh_scan(tree, &from, q->broad->model->node_count, want->marked, q->broad->side, scanned,
-                            &(scan){q, i, meet});
-    }
+    const double *const ends[2] = {want->x, want->y};
+    double largest = 0, d[3];
+    for (int end = 0; end < 2 && ends[end]; end++)
+        for (int32_t e = 0; e < m->edge_count; e++) {
+            const int32_t *n = m->edge + 2 * (size_t)e;
+            vec3_sub(ends[end] + 3 * (size_t)n[1], ends[end] + 3 * (size_t)n[0], d);
+            const double square = vec3_dot(d, d);
+            largest = square > largest ? square : largest;
+        }
+    return sqrt(largest);
 }
 
-/* The features of colliders without triangles, if they are few, by looking at all of the cloth. */
+/* Whether a node is so far from a collider on the whole path that no element which has it can meet a feature,
+ * since these lie within the surface. */
+static bool is_distant(const drape_broad_phase *s, const drape_broad_query *want, int32_t collider,
+                       int32_t node, double reach)
+{
+    const double *const ends[2] = {want->x, want->y};
+    bool distant = true;
+    for (int end = 0; distant && end < 2 && ends[end]; end++) {
+        double own[3];
+        drape_pose_own(&want->pose[end][collider], ends[end] + 3 * (size_t)node, own);
+        distant = drape_distant_keeps(&s->distant, collider, node, own, reach);
+    }
+    return distant;
+}
+
+/* Marks and lists the nodes that a collider may meet. All of them if it turns: its features move straight,
+ * which is no straight path in its coordinates. Returns their number. */
+static int32_t list_near(drape_broad_phase *s, const drape_broad_query *want, int32_t collider, double edge)
+{
+    const drape_model *m = s->model;
+    const drape_collider_pose *pose[2] = {&want->pose[0][collider], &want->pose[want->y ? 1 : 0][collider]};
+    const bool turns = (pose[0]->turned || pose[1]->turned) &&
+                       memcmp(pose[0]->turn, pose[1]->turn, sizeof pose[0]->turn) != 0;
+    const double reach = s->distance[collider] + want->reach + edge;
+    int32_t count = 0;
+    for (int32_t i = 0; i < m->node_count; i++) {
+        s->near[i] = turns || !is_distant(s, want, collider, i, reach);
+        s->near_node[count] = i;
+        count += s->near[i];
+    }
+    return count;
+}
+
+/* Lists the elements of a tree all of whose nodes are near. */
+static drape_path_elements list_elements(drape_broad_phase *s, const drape_path_bvh *tree, int32_t points)
+{
+    drape_path_elements among = {.element = s->near_element, .point = s->near_node, .points = points};
+    for (int32_t place = 0; points > 0 && place < tree->count; place++) {
+        const int32_t e = tree->order[place], *node = tree->node + (size_t)e * (size_t)tree->nodes;
+        bool near = s->near[node[0]];
+        for (int a = 1; a < tree->nodes; a++)
+            near = near & s->near[node[a]];
+        s->near_element[among.elements] = e;
+        among.elements += near;
+    }
+    return among;
+}
+
+static void scan_tree(query *q, const drape_path_bvh *features, int32_t feature, const double *reach,
+                      const drape_path_bvh *tree, const drape_path_elements *among, drape_path_bvh_meet *meet)
+{
+    const drape_broad_query *want = q->want;
+    const int32_t *node = features->node + (size_t)feature * (size_t)features->nodes;
+    const drape_path_query from = {.node = node,
+                                   .nodes = features->nodes,
+                                   .x = want->x,
+                                   .y = want->y,
+                                   .reach = reach[feature] + want->reach,
+                                   .only_marked = !is_marked(want->marked, node, features->nodes)};
+    drape_path_bvh_scan(tree, &from, among, want->marked, q->broad->side, scanned, &(scan){q, feature, meet});
+}
+
+/* The features of colliders without triangles, if they are few, by a look at the cloth near each of them. */
 static void scan_features(query *q)
 {
     drape_broad_phase *s = q->broad;
+    const drape_model *m = s->model;
+    const double edge = longest_edge(m, q->want);
+    int32_t segment = 0;
     set_reaches(s);
-    begin_stage(q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
-    scan_tree(q, &s->corners, s->corner_reach, &s->faces, meet_face);
-    begin_stage(q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS);
-    scan_tree(q, &s->segment_tree, s->segment_reach, &s->edges, meet_edge);
+    for (int32_t k = 0; k < m->collider_count; k++) {
+        const drape_collider_shape *shape = &m->colliders[k].shape;
+        const int32_t corner = s->first_point[k] - m->node_count, last = segment + shape->segment_count,
+                      points = shape->point_count > 0 ? list_near(s, q->want, k, edge) : 0;
+        begin_stage(q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
+        drape_path_elements among = list_elements(s, &s->faces, points);
+        for (int32_t i = corner; among.elements > 0 && i < corner + shape->point_count; i++)
+            scan_tree(q, &s->corners, i, s->corner_reach, &s->faces, &among, meet_face);
+        begin_stage(q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS);
+        among = list_elements(s, &s->edges, shape->segment_count > 0 ? points : 0);
+        for (; segment < last; segment++)
+            if (among.elements > 0)
+                scan_tree(q, &s->segment_tree, segment, s->segment_reach, &s->edges, &among, meet_edge);
+    }
 }
 
 void drape_broad_phase_pairs(drape_broad_phase *s, const drape_broad_query *want,

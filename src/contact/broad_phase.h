@@ -6,6 +6,7 @@
 #ifndef DRAPE_CONTACT_BROAD_PHASE_H
 #define DRAPE_CONTACT_BROAD_PHASE_H
 
+#include "contact/distant.h"
 #include "contact/pair.h"
 #include "geometry/path_bvh.h"
 
@@ -26,7 +27,10 @@ typedef struct drape_broad_phase {
     int32_t segments;
     int32_t *triangle; /* (obstacles.count x 3) of colliders */
     int32_t *triangle_collider;
-    uint8_t *side;                             /* (node_count) scratch of drape_path_bvh_scan */
+    drape_distant distant;             /* nodes far from smooth colliders */
+    uint8_t *side;                     /* (node_count) scratch of drape_path_bvh_scan */
+    bool *near;                        /* (node_count) scratch: nodes that a collider may meet, */
+    int32_t *near_node, *near_element; /* (node_count), (edges or triangles) and lists of what it may */
     double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
     double *distance;       /* (collider_count) activation distance of cloth and each collider [m] */
     double rounding;        /* what rounding can change in a gap, set by who moves the points [m] */
@@ -38,7 +42,8 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *mod
 /* Which pairs are searched: those whose pieces may be within their activation distance plus reach, at x or
  * anywhere on the straight path from x to y. */
 typedef struct drape_broad_query {
-    const double *x, *y; /* (points x 3); y NULL: only at x */
+    const double *x, *y;                /* (points x 3); y NULL: only at x */
+    const drape_collider_pose *pose[2]; /* (collider_count) at x, and at y */
     double reach;
     const bool *marked; /* (points) only pairs with a marked point; NULL: all */
 } drape_broad_query;

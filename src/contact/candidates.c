@@ -13,6 +13,8 @@
 
 static void take_set(drape_arena *arena, const drape_broad_phase *broad, drape_candidate_set *set)
 {
+    set->away =
+        drape_arena_take(arena, (size_t)(broad->points + broad->model->collider_count), sizeof *set->away);
     for (int end = 0; end < 2; end++) {
         set->x[end] = drape_arena_take(arena, 3 * (size_t)broad->points, sizeof *set->x[end]);
         set->pose[end] =
@@ -45,6 +47,20 @@ typedef struct search {
     drape_broad_phase_visit *visit;
     void *user;
 } search;
+
+/* Whether a node stays beyond the reach of a surface on the whole path. */
+static bool stays_beyond(const drape_broad_phase *broad, const search *s, const drape_pair *pair)
+{
+    const int32_t node = pair->node[0], collider = pair->collider;
+    bool beyond = true;
+    for (int end = 0; beyond && end < (s->moves ? 2 : 1); end++) {
+        const drape_configuration *at = &s->path->end[end];
+        double own[3];
+        drape_pose_own(&at->pose[collider], at->x + 3 * (size_t)node, own);
+        beyond = drape_distant_keeps(&broad->distant, collider, node, own, pair->distance + s->reach);
+    }
+    return beyond;
+}
 
 /* How far a node moves relative to a surface, straight in the coordinates of that. */
 static double move_to_surface(const drape_straight_path *path, const drape_pair *pair)
@@ -117,12 +133,16 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
         for (int32_t i = 0; i < m->free_count; i++) {
             const drape_pair pair = drape_broad_phase_surface(broad, m->node_of_free[i], k);
             if (!drape_model_ignores(m, k, pair.node[0]) &&
-                (!marked || marked[broad->points + k] || marked[pair.node[0]]))
+                (!marked || marked[broad->points + k] || marked[pair.node[0]]) &&
+                !stays_beyond(broad, &s, &pair))
                 consider(&s, &pair);
         }
     }
-    const drape_broad_query want = {
-        .x = path->end[0].x, .y = s.moves ? path->end[1].x : NULL, .reach = s.reach, .marked = marked};
+    const drape_broad_query want = {.x = path->end[0].x,
+                                    .y = s.moves ? path->end[1].x : NULL,
+                                    .pose = {path->end[0].pose, path->end[1].pose},
+                                    .reach = s.reach,
+                                    .marked = marked};
     drape_broad_phase_pairs(broad, &want, consider, &s);
 }
 
@@ -245,8 +265,8 @@ static double square_of_point(const drape_candidate_set *from, const double *x, 
 }
 
 /* The largest distance from the path of a set, of the points and colliders that were not marked for a later
- * one. INFINITY if it is above the margin. */
-static double distance_from(const drape_candidates *c, int set, const drape_configuration *at)
+ * one. INFINITY if it is above the margin. Notes those of each, if `last` the larger one of both ends. */
+static double distance_from(const drape_candidates *c, int set, const drape_configuration *at, bool last)
 {
     const drape_candidate_set *from = &c->set[set];
     const int32_t points = c->broad->points;
@@ -259,17 +279,19 @@ static double distance_from(const drape_candidates *c, int set, const drape_conf
             i < points ? square_of_point(from, at->x, i, t) : square_of_collider(c, set, at, i - points, t);
         if (!(square <= limit))
             return INFINITY;
-        largest = square > largest ? square : largest;
+        const double away = sqrt(square);
+        largest = away > largest ? away : largest;
+        from->away[i] = last && from->away[i] > away ? from->away[i] : away;
     }
-    return sqrt(largest);
+    return largest;
 }
 
 static double measure(const drape_candidates *c, int set, const drape_straight_path *path)
 {
-    const double first = distance_from(c, set, &path->end[0]);
+    const double first = distance_from(c, set, &path->end[0], false);
     if (isinf(first) || (path->end[1].x == path->end[0].x && path->end[1].pose == path->end[0].pose))
         return first;
-    return fmax(first, distance_from(c, set, &path->end[1]));
+    return fmax(first, distance_from(c, set, &path->end[1], true));
 }
 
 static bool has_stale(const drape_candidates *c)
@@ -296,6 +318,7 @@ double drape_candidates_farthest(const drape_candidates *c, const drape_distance
     double largest = away->set[0];
     for (int i = 1; i < c->sets; i++)
         largest = fmax(largest, away->set[i]);
+    largest += away->stray;
     return largest <= c->margin ? largest : INFINITY;
 }
 
@@ -385,11 +408,27 @@ void drape_candidates_forget_collider(drape_candidates *c, int32_t collider)
 
 /* ---- The list ---- */
 
-/* Each piece of the pair is at most `away` from where it was found. */
-static bool may_become_active(const drape_candidates *c, const drape_pair *pair, double away, double beyond)
+/* Whether the gap can be below the activation distance: each piece is at most as far from where it was found
+ * as the farthest of its points. */
+static bool may_become_active(const drape_candidates *c, int set, const drape_pair *pair,
+                              const drape_distances *away)
 {
-    const double reach = pair->distance + beyond + ROUNDING * c->broad->model->length;
-    return pair->gap_at_search - 2 * away < reach;
+    const double slack =
+        pair->gap_at_search - pair->distance - away->beyond - ROUNDING * c->broad->model->length;
+    if (!(slack >= 0) || !(away->set[set] <= c->margin))
+        return true;
+    const double *of = c->set[set].away;
+    const int32_t *n = pair->node;
+    double first = of[n[0]], second;
+    if (pair->kind == DRAPE_PAIR_SURFACE)
+        second = of[c->broad->points + pair->collider];
+    else {
+        const bool edge = pair->kind == DRAPE_PAIR_SEGMENTS;
+        second = of[n[2]] > of[n[3]] ? of[n[2]] : of[n[3]];
+        double *piece = edge ? &first : &second;
+        *piece = of[n[1]] > *piece ? of[n[1]] : *piece;
+    }
+    return slack < first + second + 2 * away->stray;
 }
 
 /* Whether the pair is of the last set for which one of its pieces was marked. */
@@ -410,8 +449,8 @@ const drape_pair *drape_candidates_next(const drape_candidates *c, const drape_d
     for (int i = 0; i < c->sets; i++) {
         const drape_candidate_set *set = &c->set[i];
         int32_t at = cursor->at[i];
-        while (at < set->count && (!may_become_active(c, &set->pairs[at], away->set[i], away->beyond) ||
-                                   (c->sets > 1 && !is_of(c, &set->pairs[at], i))))
+        while (at < set->count && ((c->sets > 1 && !is_of(c, &set->pairs[at], i)) ||
+                                   !may_become_active(c, i, &set->pairs[at], away)))
             at++;
         cursor->at[i] = at;
         if (at < set->count && (!next || drape_pair_is_before(&set->pairs[at], next))) {

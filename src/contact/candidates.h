@@ -25,7 +25,8 @@ typedef struct drape_candidate_set {
     bool known;                   /* there was memory for everything that the search found */
     double *x[2];                 /* (points x 3) the ends of its path */
     drape_collider_pose *pose[2]; /* (collider_count) */
-    drape_pair *pairs;            /* (count of room) including those with surfaces, by increasing rank */
+    double *away; /* (points + collider_count) how far from its path each is, on the path measured last [m] */
+    drape_pair *pairs; /* (count of room) including those with surfaces, by increasing rank */
     int32_t count, room;
 } drape_candidate_set;
 
@@ -70,12 +71,14 @@ void drape_candidates_forget_collider(drape_candidates *candidates, int32_t coll
 
 /* How far a straight path is from those of each search. */
 typedef struct drape_distances {
-    double set[DRAPE_CANDIDATE_SETS]; /* [m] at most */
+    double set[DRAPE_CANDIDATE_SETS]; /* [m] the largest of all points; of each: drape_candidate_set.away */
+    double stray;                     /* [m] by which points may be farther, set by who knows of it */
     double beyond;                    /* [m] of the activation distance: so far off may pairs stay, too */
 } drape_distances;
 
-/* The distances of a path: as far as its ends are, at most. INFINITY if there was no search, or if a position
- * is not finite or beyond the margin; those after such a one are not measured. */
+/* The distances of a path: as far as its ends are, at most. Those of each point are kept until the
+ * next call. INFINITY if there was no search, or if a position is not finite or beyond the margin;
+ * those after such a one are not measured. */
 drape_distances drape_candidates_distances(const drape_candidates *candidates,
                                            const drape_straight_path *path);
 

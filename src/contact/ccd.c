@@ -33,6 +33,8 @@ typedef struct path {
     int32_t nodes;
     const drape_relaxed_set *relaxed; /* their pairs limit nothing */
     const drape_contact *surfaces;    /* its surfaces limit nodes, too; NULL: they do not */
+    const atomic_bool *cancel;        /* NULL: nothing ends the search early */
+    bool cancelled;                   /* pairs have been left out */
 } path;
 
 /* The fraction of a pair that limits the displacement, for each of its nodes. */
@@ -80,6 +82,9 @@ static void follow(void *user, const drape_pair *pair)
 {
     path *p = user;
     const drape_configuration from = {.x = p->x};
+    p->cancelled = p->cancelled || (p->cancel && atomic_load(p->cancel));
+    if (p->cancelled)
+        return;
     if (drape_pair_points(pair) == 1) {
         if (p->surfaces && lists_limits(p->surfaces, pair->collider))
             follow_surface(p->surfaces, pair->collider, pair->node[0], p);
@@ -114,8 +119,7 @@ static double longest_move(const drape_contact *c, const path *p)
 static const drape_candidates *with_stray(const drape_candidates *candidates, double stray,
                                           drape_distances *away)
 {
-    for (int i = 0; candidates && stray > 0 && i < DRAPE_CANDIDATE_SETS; i++)
-        away->set[i] += stray;
+    away->stray = stray;
     return candidates && drape_candidates_farthest(candidates, away) <= candidates->margin ? candidates
                                                                                            : NULL;
 }
@@ -139,7 +143,7 @@ double drape_contact_stray(const drape_collider *collider, double angle)
 
 double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *straight,
                                    const drape_swing *swing, const drape_keep *keep, double *of_node,
-                                   double *of_surfaces, drape_pair *limiting)
+                                   double *of_surfaces, const atomic_bool *cancel, drape_pair *limiting)
 {
     const drape_swings swings = {.of = swing, .nodes = c->model->node_count};
     double stray = 0;
@@ -156,6 +160,7 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
               .nodes = c->model->node_count,
               .surface_fraction = 1,
               .surfaces = of_surfaces ? c : NULL,
+              .cancel = cancel,
               .relaxed = &c->relaxed};
     drape_distances away;
     drape_candidate_cursor cursor = {0};
@@ -174,7 +179,7 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
     if (of_surfaces)
         *of_surfaces = p.surface_fraction;
     *limiting = p.limiting;
-    return p.fraction;
+    return p.cancelled ? -1 : p.fraction;
 }
 
 double drape_contact_least_gap(const drape_contact *c)
@@ -315,8 +320,13 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
         c->to[i] = x[i] + whole * (y[i] - x[i]);
     const drape_straight_path straight = {{{.model = c->model, .x = c->from, .pose = c->path_pose},
                                            {.model = c->model, .x = c->to, .pose = c->path_pose}}};
-    const double of_features =
-        drape_contact_free_fraction(c, &straight, NULL, &keep, of_node, &of_surfaces, &limiting);
+    const double of_features = drape_contact_free_fraction(c, &straight, NULL, &keep, of_node, &of_surfaces,
+                                                           c->cancel ? *c->cancel : NULL, &limiting);
     c->seconds += drape_clock_seconds() - start;
+    if (of_features < 0) {
+        for (int32_t i = 0; of_node && i < c->model->node_count; i++)
+            of_node[i] = 0;
+        return 0;
+    }
     return whole * fmin(of_features, of_surfaces);
 }

@@ -126,6 +126,11 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
     return status;
 }
 
+void drape_contact_watch(drape_contact *c, const atomic_bool *const *cancel)
+{
+    c->cancel = cancel;
+}
+
 double drape_contact_seconds(const drape_contact *c)
 {
     return c ? c->seconds : 0;
@@ -694,6 +699,7 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     c->ahead_t = NAN;
     c->refused = false;
     drape_contact_set_rounding(c, c->x);
+    drape_distant_update(&c->broad.distant, c->x, c->pose, c->broad.rounding);
     const bool retry = is_retry(c);
     if (!status)
         status = adapt_distances(c, t, retry);

@@ -13,6 +13,8 @@
 #include "base/archive.h"
 #include "model/motion.h"
 
+#include <stdatomic.h>
+
 typedef struct drape_contact drape_contact;
 
 /* The point at which contact is evaluated. Colliders have their poses at time t; they move with their mean
@@ -27,6 +29,10 @@ typedef struct drape_contact_at {
 /* *out is NULL for a model without colliders and without self-contact. Contact takes all its memory from
  * the arena, later as well, and is freed with it. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion, drape_contact **out);
+/* The address of a flag that any thread may raise (see drape_system_watch); both must live as long as the
+ * contact. While it is up, drape_contact_step_fraction ends early. */
+void drape_contact_watch(drape_contact *contact, const atomic_bool *const *cancel);
+
 double drape_contact_seconds(const drape_contact *contact);        /* spent in all functions of this header */
 double drape_contact_search_seconds(const drape_contact *contact); /* part of it: in the broad phase */
 
@@ -109,23 +115,32 @@ typedef enum drape_contact_derivatives {
                                   contact/friction.h) */
 } drape_contact_derivatives;
 
-/* Adds them to values in the pattern, which must have their blocks. */
+/* Adds them to values in the pattern, which must have their blocks: with the share `positive_share`, from 0 to
+ * 1, of the difference between them and DRAPE_CONTACT_GAUSS_NEWTON. */
 void drape_contact_add_jacobian(drape_contact *contact, double weight, drape_contact_derivatives which,
-                                const drape_pattern *pattern, double *values);
+                                double positive_share, const drape_pattern *pattern, double *values);
 
 /* Predicts the normal forces (contact/predict.h) at the end of a correction p (node_count x 3) from the last
  * point, where the Jacobian had these weights; p NULL: forgets what was predicted. The next Jacobians use
  * the predictions, until a step begins. */
 void drape_contact_predict(drape_contact *contact, const double *p, double weight, double mass_weight);
 
+/* Whether there is friction, with colliders or of cloth with itself. */
+bool drape_contact_has_friction(const drape_contact *contact);
+
 /* Whether DRAPE_CONTACT_SYMMETRIC is symmetric: no friction follows the normal force within a step. */
 bool drape_contact_is_symmetric(const drape_contact *contact);
 
-/* Takes out of values, to which drape_contact_add_jacobian added DRAPE_CONTACT_SYMMETRIC with the same
- * weight, how friction changes with the normal force and with the place of contact: what remains of friction
+/* Takes out of values, to which drape_contact_add_jacobian added a share of DRAPE_CONTACT_SYMMETRIC with the
+ * same weight, how friction changes with the normal force and with the place of contact: what remains of friction
  * is symmetric, and positive semidefinite for each contact in its tangential plane. */
-void drape_contact_fix_friction(drape_contact *contact, double weight, const drape_pattern *pattern,
-                                double *values);
+void drape_contact_fix_friction(drape_contact *contact, double weight, double share,
+                                const drape_pattern *pattern, double *values);
+
+/* Adds to values what DRAPE_CONTACT_EXACT has beyond DRAPE_CONTACT_GAUSS_NEWTON: how friction changes with
+ * the normal force, and what bounds and the Gauss-Newton part leave out. */
+void drape_contact_add_remainder(drape_contact *contact, double weight, const drape_pattern *pattern,
+                                 double *values);
 
 /* Whether the pattern has the blocks of all active contacts. */
 bool drape_contact_is_in_pattern(const drape_contact *contact, const drape_pattern *pattern);
@@ -149,7 +164,7 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
  * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered
  * at each node to the smallest fraction of its pairs; where a displacement is longer than a few edges, to
  * such a length without a look at pairs. One that throws nodes farther than the scene is large is
- * shortened to about an edge. */
+ * shortened to about an edge. If the watched flag is raised meanwhile: 0, also at each node. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
                                    double *of_node);
 

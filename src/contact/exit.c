@@ -5,6 +5,7 @@
 #include "contact/barrier.h"
 #include "contact/parts.h"
 #include "geometry/intersect.h"
+#include "geometry/nearest.h"
 
 #include <string.h>
 
@@ -175,14 +176,7 @@ static void join(const drape_contact *c, const uint8_t *take, int32_t *parent)
 
 static double normal_of(const drape_contact *c, int32_t face, double normal[3])
 {
-    const int32_t *n = c->model->triangle + 3 * (size_t)face;
-    double a[3], b[3];
-    vec3_sub(c->x + 3 * (size_t)n[1], c->x + 3 * (size_t)n[0], a);
-    vec3_sub(c->x + 3 * (size_t)n[2], c->x + 3 * (size_t)n[0], b);
-    vec3_cross(a, b, normal);
-    const double twice = vec3_norm(normal);
-    for (int k = 0; k < 3; k++)
-        normal[k] = twice > 0 ? normal[k] / twice : 0;
+    drape_triangle_normal(c->model->triangle + 3 * (size_t)face, c->x, normal);
     return c->broad.face_area[face];
 }
 

@@ -19,8 +19,9 @@ static int32_t free_of(const drape_model *m, int32_t point)
     return point >= 0 && point < m->node_count ? m->free_of_node[point] : -1;
 }
 
-static void add_blocks(const drape_contact *c, const drape_active_contact *contact, const double *h,
-                       const drape_pattern *pattern, double *values)
+/* Adds share h. */
+static void add_blocks(const drape_contact *c, const drape_active_contact *contact, double share,
+                       const double *h, const drape_pattern *pattern, double *values)
 {
     const int points = contact->gap.closest.points;
     for (int s = 0; s < points; s++)
@@ -34,7 +35,7 @@ static void add_blocks(const drape_contact *c, const drape_active_contact *conta
                 drape_pattern_at(pattern, values, column, drape_pattern_find(pattern, row, column), &stride);
             for (int k = 0; k < 3; k++)
                 for (int i = 0; i < 3; i++)
-                    to[k * stride + i] += h[D * (3 * r + i) + 3 * s + k];
+                    to[k * stride + i] += share * h[D * (3 * r + i) + 3 * s + k];
         }
 }
 
@@ -218,24 +219,27 @@ static void differentiate(const drape_contact *c, const request *want, const dra
         symmetrize(contact->gap.closest.points, h);
 }
 
-bool drape_contact_is_symmetric(const drape_contact *c)
+bool drape_contact_has_friction(const drape_contact *c)
 {
     bool friction = c->model->contact.self && c->model->contact.self_friction > 0;
     for (int32_t i = 0; i < c->model->collider_count; i++)
         friction = friction || c->model->colliders[i].friction > 0;
-    return !friction || c->model->contact.lagged;
+    return friction;
 }
 
-void drape_contact_add_jacobian(drape_contact *c, double weight, drape_contact_derivatives which,
-                                const drape_pattern *pattern, double *values)
+bool drape_contact_is_symmetric(const drape_contact *c)
 {
-    const double start = drape_clock_seconds();
-    const bool exact = which == DRAPE_CONTACT_SYMMETRIC && !drape_contact_is_symmetric(c);
-    const request want = {which == DRAPE_CONTACT_VELOCITY ? 1 : weight, exact ? DRAPE_CONTACT_EXACT : which};
+    return !drape_contact_has_friction(c) || c->model->contact.lagged;
+}
+
+/* Adds a share of the derivatives of all contacts. */
+static void add_derivatives(const drape_contact *c, const request *want, double share,
+                            const drape_pattern *pattern, double *values)
+{
     double h[D * D];
     for (int32_t i = 0; i < c->active.count; i++) {
-        differentiate(c, &want, &c->active.contacts[i], h);
-        add_blocks(c, &c->active.contacts[i], h, pattern, values);
+        differentiate(c, want, &c->active.contacts[i], h);
+        add_blocks(c, &c->active.contacts[i], share, h, pattern, values);
     }
     for (int32_t i = 0; i < c->lagged_count; i++) {
         const drape_lagged *lagged = &c->lagged[i];
@@ -243,21 +247,44 @@ void drape_contact_add_jacobian(drape_contact *c, double weight, drape_contact_d
         double v[4][3];
         memset(h, 0, sizeof h);
         drape_contact_velocities(c, &lagged->contact, v);
-        add_friction(&want, &lagged->contact, &law, lagged->force, v, h);
-        if (spins(c, &lagged->contact) && want.which != DRAPE_CONTACT_VELOCITY &&
-            want.which != DRAPE_CONTACT_GAUSS_NEWTON) {
+        add_friction(want, &lagged->contact, &law, lagged->force, v, h);
+        if (spins(c, &lagged->contact) && want->which != DRAPE_CONTACT_VELOCITY &&
+            want->which != DRAPE_CONTACT_GAUSS_NEWTON) {
             double hv[D * D] = {0};
             add_friction(&(request){1, DRAPE_CONTACT_EXACT}, &lagged->contact, &law, lagged->force, v, hv);
             add_spin(c, &lagged->contact, NULL, hv, h);
-            if (want.which == DRAPE_CONTACT_SYMMETRIC)
+            if (want->which == DRAPE_CONTACT_SYMMETRIC)
                 symmetrize(lagged->contact.gap.closest.points, h);
         }
-        add_blocks(c, &lagged->contact, h, pattern, values);
+        add_blocks(c, &lagged->contact, share, h, pattern, values);
     }
+}
+
+void drape_contact_add_jacobian(drape_contact *c, double weight, drape_contact_derivatives which,
+                                double positive_share, const drape_pattern *pattern, double *values)
+{
+    const double start = drape_clock_seconds();
+    const bool exact = which == DRAPE_CONTACT_SYMMETRIC && !drape_contact_is_symmetric(c);
+    const request want = {which == DRAPE_CONTACT_VELOCITY ? 1 : weight, exact ? DRAPE_CONTACT_EXACT : which};
+    if (which == DRAPE_CONTACT_GAUSS_NEWTON || positive_share < 1)
+        add_derivatives(c, &want, which == DRAPE_CONTACT_GAUSS_NEWTON ? 1 : 1 - positive_share, pattern,
+                        values);
+    if (which != DRAPE_CONTACT_GAUSS_NEWTON && positive_share > 0)
+        add_derivatives(c, &(request){weight, DRAPE_CONTACT_GAUSS_NEWTON}, positive_share, pattern, values);
     c->seconds += drape_clock_seconds() - start;
 }
 
-void drape_contact_fix_friction(drape_contact *c, double weight, const drape_pattern *pattern, double *values)
+void drape_contact_add_remainder(drape_contact *c, double weight, const drape_pattern *pattern,
+                                 double *values)
+{
+    const double start = drape_clock_seconds();
+    add_derivatives(c, &(request){weight, DRAPE_CONTACT_EXACT}, 1, pattern, values);
+    add_derivatives(c, &(request){weight, DRAPE_CONTACT_GAUSS_NEWTON}, -1, pattern, values);
+    c->seconds += drape_clock_seconds() - start;
+}
+
+void drape_contact_fix_friction(drape_contact *c, double weight, double share, const drape_pattern *pattern,
+                                double *values)
 {
     const double start = drape_clock_seconds();
     const drape_configuration now = drape_contact_configuration(c);
@@ -280,9 +307,7 @@ void drape_contact_fix_friction(drape_contact *c, double weight, const drape_pat
             differentiate_by_v(c, contact, hv);
             add_spin(c, contact, &derivatives, hv, h);
         }
-        for (int k = 0; k < D * D; k++)
-            h[k] = -h[k];
-        add_blocks(c, contact, h, pattern, values);
+        add_blocks(c, contact, -share, h, pattern, values);
     }
     c->seconds += drape_clock_seconds() - start;
 }

@@ -145,8 +145,11 @@ double drape_pair_activation_distance(const drape_pair *pair, const drape_config
 static bool surface_gap(const drape_pair *pair, const drape_configuration *at, drape_gap *gap)
 {
     gap->closest = (drape_closest){.points = 1, .c = {1}};
-    gap->value = surface(pair, at, gap->closest.normal, gap->curvature);
-    return gap->value < pair->distance;
+    gap->value = surface(pair, at, NULL, NULL);
+    if (!(gap->value < pair->distance))
+        return false;
+    surface(pair, at, gap->closest.normal, gap->curvature);
+    return true;
 }
 
 bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const double *rest, drape_gap *gap)

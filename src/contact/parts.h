@@ -31,6 +31,7 @@ typedef struct drape_press {
 
 struct drape_contact {
     drape_arena *arena;
+    const atomic_bool *const *cancel; /* NULL: nothing is watched */
     const drape_model *model;
     const drape_motion *motion; /* of its colliders */
     double mean_edge;           /* [m] */
@@ -158,10 +159,11 @@ void drape_contact_velocities(const drape_contact *c, const drape_active_contact
  * colliders, except those that turn by their swing (collider_count; NULL: none turns). of_node
  * (node_count), unless NULL, is lowered at each node to the smallest fraction of its pairs. of_surfaces,
  * unless NULL, is set to the smallest fraction of nodes and smooth surfaces, which must rest at
- * c->path_pose; of_node then counts these, too. */
+ * c->path_pose; of_node then counts these, too. cancel, unless NULL, ends the search when it is raised: then
+ * the result is negative. */
 double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *straight,
                                    const drape_swing *swing, const drape_keep *keep, double *of_node,
-                                   double *of_surfaces, drape_pair *limiting);
+                                   double *of_surfaces, const atomic_bool *cancel, drape_pair *limiting);
 
 /* The same for the path of a node from x to y, and the smooth surface of a collider, which goes from one pose
  * to another, by its swing unless that is NULL. */

@@ -62,6 +62,7 @@ static bool sweep(drape_contact *c, int32_t collider, double *y)
 {
     const drape_collider *k = &c->model->colliders[collider];
     const drape_collider_pose *from = &c->start_pose[collider], *to = &c->path_pose[collider];
+    const double reach = c->broad.distance[collider];
     bool moved = false;
     if (c->deformed[collider])
         return false;
@@ -73,7 +74,10 @@ static bool sweep(drape_contact *c, int32_t collider, double *y)
             continue;
         drape_pose_own(from, c->start + at, a);
         drape_pose_own(to, y + at, b);
-        if (!slide(k, c->broad.distance[collider], c->broad.rounding, a, b))
+        if (drape_distant_keeps(&c->broad.distant, collider, node, a, reach) &&
+            drape_distant_keeps(&c->broad.distant, collider, node, b, reach))
+            continue;
+        if (!slide(k, reach, c->broad.rounding, a, b))
             continue;
         drape_pose_point(to, b, y + at);
         moved = true;

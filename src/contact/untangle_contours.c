@@ -277,18 +277,6 @@ static bool colour_near(drape_untangler *u, const curve *k, int trace, double pr
 
 /* ---- A part on the wrong side ---- */
 
-static void normal_of(const drape_untangler *u, int32_t triangle, double n[3])
-{
-    const int32_t *t = u->sheets.triangle + 3 * (size_t)triangle;
-    double v[3], w[3];
-    vec3_sub(u->x + 3 * (size_t)t[1], u->x + 3 * (size_t)t[0], v);
-    vec3_sub(u->x + 3 * (size_t)t[2], u->x + 3 * (size_t)t[0], w);
-    vec3_cross(v, w, n);
-    const double length = vec3_norm(n);
-    for (int k = 0; k < 3; k++)
-        n[k] = length > 0 ? n[k] / length : 0;
-}
-
 static double area_of(const double *a, const double *b, const double *c, const double n[3])
 {
     double v[3], w[3], cross[3];
@@ -328,7 +316,7 @@ static int pass(drape_untangler *u, int32_t triangle, int32_t other, int8_t wron
                   *corner = u->sheets.triangle + 3 * (size_t)other;
     double n[3], weight[3], height[3], sum[2] = {0};
     int number[2] = {0};
-    normal_of(u, other, n);
+    drape_triangle_normal(u->sheets.triangle + 3 * (size_t)other, u->x, n);
     weights_of(u, other, n, at, weight);
     for (int a = 0; a < 3; a++) {
         double from[3];
@@ -472,7 +460,7 @@ static void gradient_of(const drape_untangler *u, const drape_crossing *c, doubl
     const drape_sheets *s = &u->sheets;
     const int32_t *ends = s->edge + 2 * (size_t)c->edge;
     double n[3], e[3];
-    normal_of(u, c->triangle, n);
+    drape_triangle_normal(u->sheets.triangle + 3 * (size_t)c->triangle, u->x, n);
     vec3_sub(u->x + 3 * (size_t)ends[1], u->x + 3 * (size_t)ends[0], e);
     const double length = vec3_norm(e);
     double sine = vec3_dot(e, n) / length;
@@ -485,7 +473,7 @@ static void gradient_of(const drape_untangler *u, const drape_crossing *c, doubl
         if (face < 0)
             continue;
         const int32_t *t = s->triangle + 3 * (size_t)face;
-        normal_of(u, face, own);
+        drape_triangle_normal(u->sheets.triangle + 3 * (size_t)face, u->x, own);
         vec3_cross(own, n, r);
         const double size = vec3_norm(r);
         for (int a = 0; a < 3; a++)
@@ -514,7 +502,7 @@ static void shorten(drape_untangler *u, const curve *k)
         const double size = vec3_norm(g);
         if (!(size > 0))
             continue;
-        normal_of(u, c->triangle, n);
+        drape_triangle_normal(u->sheets.triangle + 3 * (size_t)c->triangle, u->x, n);
         weights_of(u, c->triangle, n, c->x, weight);
         vec3_sub(u->x + 3 * (size_t)ends[1], u->x + 3 * (size_t)ends[0], e);
         const double stride = STRIDE * vec3_norm(e) * size / sqrt(1 + size * size);

@@ -217,11 +217,12 @@ void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *fro
 /* ---- Without a tree ---- */
 
 /* On which sides of the query a point is at both ends: bit 2 k is above along axis k, 2 k + 1 below. */
-static void find_sides(const drape_path_query *from, int32_t points, uint8_t *side)
+static void find_sides(const drape_path_query *from, const drape_path_elements *among, uint8_t *side)
 {
     const double *const x = from->x, *const y = from->y ? from->y : from->x;
     const drape_box first = box_of(from->node, from->nodes, x), last = box_of(from->node, from->nodes, y);
-    for (size_t i = 0; i < (size_t)points; i++) {
+    for (int32_t p = 0; p < among->points; p++) {
+        const size_t i = (size_t)among->point[p];
         unsigned int sides = 0;
         for (size_t k = 0; k < 3; k++) {
             const unsigned int above = (unsigned int)(x[3 * i + k] > first.high[k] + from->reach) &
@@ -235,12 +236,13 @@ static void find_sides(const drape_path_query *from, int32_t points, uint8_t *si
 }
 
 /* An axis separates an element if all of its points are on the same side. */
-void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *from, int32_t points,
-                         const bool *marked, uint8_t *side, drape_bvh_visit *visit, void *user)
+void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *from,
+                         const drape_path_elements *among, const bool *marked, uint8_t *side,
+                         drape_bvh_visit *visit, void *user)
 {
-    find_sides(from, points, side);
-    for (int32_t place = 0; place < bvh->count; place++) {
-        const int32_t e = bvh->order[place], *node = bvh->node + (size_t)e * (size_t)bvh->nodes;
+    find_sides(from, among, side);
+    for (int32_t i = 0; i < among->elements; i++) {
+        const int32_t e = among->element[i], *node = bvh->node + (size_t)e * (size_t)bvh->nodes;
         unsigned int common = side[node[0]];
         for (int a = 1; a < bvh->nodes; a++)
             common &= side[node[a]];

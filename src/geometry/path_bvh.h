@@ -53,11 +53,17 @@ typedef struct drape_path_query {
 void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *query, drape_bvh_visit *visit,
                           void *user);
 
-/* The same for a tree that is not fitted, by a look at each of the points 0 .. points - 1 that its elements
- * have: for a few queries that is less than to fit it. marked as in drape_path_bvh_fit; side: (points)
- * scratch. */
-void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *query, int32_t points,
-                         const bool *marked, uint8_t *side, drape_bvh_visit *visit, void *user);
+/* Elements of a tree by increasing place, and the points that they have. */
+typedef struct drape_path_elements {
+    const int32_t *element, *point;
+    int32_t elements, points;
+} drape_path_elements;
+
+/* The same for some elements of a tree that is not fitted, by a look at each of their points: for a few
+ * queries that is less than to fit it. marked as in drape_path_bvh_fit; side: (largest point + 1) scratch. */
+void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *query,
+                         const drape_path_elements *among, const bool *marked, uint8_t *side,
+                         drape_bvh_visit *visit, void *user);
 
 /* Calls visit for every pair of elements, one of each tree, of which one is marked and that no axis separates
  * by more than reach at both ends; both trees were fitted to the same ends. Branches that are apart are met

@@ -7,7 +7,8 @@
  * that the last steps are Newton steps. A step that fails, or ends in a degenerate element, is discarded
  * and retried with a larger m. Damping and velocities have no effect.
  *
- * The signs of D in K = L D L' show whether the equilibrium is stable: it is if none is negative.
+ * The signs of D in K = L D L' show whether the equilibrium is stable: it is if none is negative. Of a load
+ * without a potential K is not symmetric, and that is not known.
  */
 #include "base/reason.h"
 #include "integrators/implicit.h"
@@ -21,7 +22,10 @@
 /* the same, used also while the residual does not fall: then the flow is far from its end */
 #define MAX_FACTOR  0.5
 #define FAIL_FACTOR 10.0 /* of m after a failure */
-#define STALLED     0.5  /* of the residual before: one that falls by less may be rounding */
+/* of the stiffness, in parts of its largest entry: more than rounding; the signs of its pivots then say
+ * nothing */
+#define MAX_ASYMMETRY 1e-10
+#define STALLED       0.5 /* of the residual before: one that falls by less may be rounding */
 
 enum { PARAM_MAX_STEPS = DRAPE_NEWTON_PARAM_COUNT, PARAM_COUNT };
 
@@ -186,6 +190,10 @@ static drape_status judge_stability(static_state *s, const drape_state *out)
     if (e->dofs == 0)
         return DRAPE_OK;
     drape_status status = drape_newton_matrix(s->common.newton, &point, 0, &pattern, &values);
+    s->stability_known = false;
+    if (!status && drape_system_is_symmetric(e->system) &&
+        drape_pattern_asymmetry(pattern, values) > MAX_ASYMMETRY)
+        return DRAPE_OK;
     return status ? status
                   : drape_inertia(s->arena->ctx, pattern, values, drape_system_cancel_flag(e->system),
                                   &s->unstable_modes, &s->stability_known);

@@ -61,7 +61,7 @@ static int32_t find_runs(const drape_elements *el, run *out)
 
 static bool has_runs(const drape_term *term)
 {
-    return term->ops->distance && term->law_count == 0 && !term->damping &&
+    return term->ops->distance && term->law_count == 0 && !term->damping && term->sliders == 0 &&
            find_runs(&term->elements, NULL) <= term->elements.count / MEAN_RUN;
 }
 
@@ -98,7 +98,7 @@ static drape_status sum_linear(drape_context *ctx, drape_verlet_force *f)
     bool *others = drape_arena_take(&arena, (size_t)m->term_count, sizeof *others);
     const drape_status status = drape_arena_status(&arena);
     for (int32_t i = 0; !status && i < m->term_count; i++) {
-        others[i] = !m->terms[i].ops->linear || drape_term_is_timed(&m->terms[i]);
+        others[i] = !m->terms[i].ops->linear || drape_term_changes(&m->terms[i]);
         f->summed[i] = f->summed[i] || !others[i];
         f->has_rest = f->has_rest || (has_forces(&m->terms[i]) && !f->summed[i]);
     }

@@ -1,5 +1,5 @@
-/* scene_copy.c: see scene_copy.h. A scene names files as sources of the meshes of cloths, and in the text
- * parameters of colliders. */
+/* scene_copy.c: see scene_copy.h. A scene names files as sources of the meshes of cloths and of their
+ * starts, and in the text parameters of colliders. */
 #include "io/scene_copy.h"
 
 #include <errno.h>
@@ -14,7 +14,7 @@
 #include "model/scene_text.h"
 
 #define MESH_NAME   "scene_mesh_%d%.15s"
-#define MESH_ROOM   48 /* for the name of a copied mesh */
+#define MESH_ROOM   48 /* for the name of a copied file */
 #define COPIED_ONCE 16384
 
 typedef struct copier {
@@ -80,23 +80,36 @@ static drape_status visit_collider(const visitor *v, const drape_collider *colli
     return status;
 }
 
+static drape_status visit_cloth(const visitor *v, const drape_cloth *cloth, int index)
+{
+    const struct {
+        const char *file, *key;
+    } named[] = {{cloth->file, "mesh/file"},
+                 {cloth->start_file, "start/file"},
+                 {cloth->velocity_file, "start/velocities"}};
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < sizeof named / sizeof *named; i++) {
+        char pointer[DRAPE_POINTER_SIZE];
+        snprintf(pointer, sizeof pointer, "/cloth/%d/%s", index, named[i].key);
+        if (named[i].file)
+            status = visit_file(v, named[i].file, pointer);
+    }
+    return status;
+}
+
 drape_status drape_scene_files(drape_context *ctx, const drape_model *model, const char *scene,
                                drape_file_visit *visit, void *user)
 {
     const visitor v = {ctx, scene, visit, user};
     drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < model->cloth_count; i++) {
-        char pointer[DRAPE_POINTER_SIZE];
-        snprintf(pointer, sizeof pointer, "/cloth/%d/mesh/file", (int)i);
-        if (model->cloths[i].file)
-            status = visit_file(&v, model->cloths[i].file, pointer);
-    }
+    for (int32_t i = 0; !status && i < model->cloth_count; i++)
+        status = visit_cloth(&v, &model->cloths[i], (int)i);
     for (int32_t i = 0; !status && i < model->collider_count; i++)
         status = visit_collider(&v, &model->colliders[i], (int)i);
     return status;
 }
 
-/* ---- Meshes ---- */
+/* ---- Copies ---- */
 
 static drape_status copy_bytes(copier *c, int from, const char *source)
 {
@@ -107,7 +120,7 @@ static drape_status copy_bytes(copier *c, int from, const char *source)
         return status;
     while ((count = read(from, bytes, sizeof bytes)) != 0) {
         if (count < 0 && errno != EINTR)
-            return drape_file_fail(c->ctx, "read the mesh", source, errno);
+            return drape_file_fail(c->ctx, "read the file", source, errno);
         if (count > 0)
             drape_file_put(&c->out, bytes, (size_t)count);
     }
@@ -144,7 +157,7 @@ static drape_status copy_file(void *user, const char *source, const char *pointe
         return DRAPE_OK;
     int from = open(source, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     if (from < 0)
-        return drape_file_fail(c->ctx, "read the mesh", source, errno);
+        return drape_file_fail(c->ctx, "read the file", source, errno);
     snprintf(name, sizeof name, MESH_NAME, c->files++, ending ? ending : "");
     drape_file_name(&c->out, "%s", name);
     drape_status status = copy_bytes(c, from, source);

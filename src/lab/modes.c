@@ -35,6 +35,7 @@
 #define SHIFT_STEP 8.0 /* while it is not below all eigenvalues */
 #define MAX_SHIFTS 16
 #define SPARE      4    /* modes beyond those asked for, to find a gap behind them */
+#define RIGID      6    /* motions of a rigid body, which have no stiffness */
 #define MAX_SEARCH 8    /* searches for what is missing */
 #define LEAST_GAP  1e-7 /* relative; a narrower one may be rounding between repeated eigenvalues */
 #define MAX_ERROR  1e-6 /* relative, of a mode that counts as converged */
@@ -283,7 +284,8 @@ static drape_status search_all(problem *p, int32_t wanted, int64_t *below)
     drape_status status = DRAPE_OK;
     for (int i = 0; !status && i < MAX_SEARCH && missing != 0; i++) {
         const int32_t before = p->count;
-        status = search(p, (int32_t)(missing > 0 ? missing : 0) + SPARE);
+        const int64_t sought = i == 0 && missing <= RIGID - SPARE ? RIGID + 1 - SPARE : missing;
+        status = search(p, (int32_t)(sought > 0 ? sought : 0) + SPARE);
         if (!status)
             status = find_missing(p, wanted, &missing, below);
         if (p->buckling && p->count == before && p->count < wanted)
@@ -414,6 +416,28 @@ static drape_status fill_mode(problem *p, const eigenpair *pair, double *shape, 
     return DRAPE_OK;
 }
 
+/* If more motions than those of a rigid body have no stiffness within rounding, and there are others beside
+ * the modes, the modes are some of a space in which any others would do as well. */
+static drape_status refuse_part_of_slack(problem *p, int32_t count, const drape_modes *found, double *scratch)
+{
+    drape_mode next = {.kind = DRAPE_MODE_ZERO};
+    drape_status status = DRAPE_OK;
+    int32_t k = count;
+    if (p->buckling || found->modes[count - 1].kind != DRAPE_MODE_ZERO)
+        return DRAPE_OK;
+    for (; !status && next.kind == DRAPE_MODE_ZERO && k < p->count; k++)
+        status = fill_mode(p, &p->pairs[k], scratch, &next);
+    if (status == DRAPE_E_SOLVER) /* one that did not converge was not asked for either */
+        status = DRAPE_OK;
+    if (status || k == count || k - (next.kind != DRAPE_MODE_ZERO) <= (count > RIGID ? count : RIGID))
+        return status;
+    return drape_fail(p->ctx, DRAPE_E_SOLVER,
+                      "more than %d motions have no stiffness within rounding, as of slack cloth without "
+                      "bending: of these, modes cannot be separated; ask for more, or give the cloth tension "
+                      "or bending",
+                      (int)count);
+}
+
 static drape_status fill(problem *p, int32_t count, int64_t below, drape_modes *out)
 {
     const size_t nodes = 3 * (size_t)p->tangent.sim->model->node_count;
@@ -422,10 +446,12 @@ static drape_status fill(problem *p, int32_t count, int64_t below, drape_modes *
     if (!own)
         return DRAPE_E_MEMORY;
     out->modes = drape_arena_take(own, (size_t)count, sizeof *out->modes);
-    double *shapes = drape_arena_take(own, (size_t)count * nodes, sizeof *shapes);
+    double *shapes = drape_arena_take(own, (size_t)(count + 1) * nodes, sizeof *shapes);
     drape_status status = drape_arena_status(own);
     for (int32_t k = 0; !status && k < count; k++)
         status = fill_mode(p, &p->pairs[k], shapes + (size_t)k * nodes, &out->modes[k]);
+    if (!status)
+        status = refuse_part_of_slack(p, count, out, shapes + (size_t)count * nodes);
     out->count = count;
     out->below = below;
     out->force = p->tangent.force;
@@ -448,7 +474,8 @@ static void measure_stiffness(problem *p)
 static drape_status compute(problem *p, drape_sim *sim, const drape_modes_def *def, drape_modes *out)
 {
     int64_t below = 0;
-    drape_status status = lab_tangent_open(&p->arena, sim, def->buckling ? def->load_factor : 1, &p->tangent);
+    drape_status status =
+        lab_tangent_open(&p->arena, sim, def->buckling ? def->load_factor : 1, true, &p->tangent);
     if (status)
         return status;
     p->n = p->tangent.pattern->n;

@@ -167,7 +167,9 @@ static drape_status count_unstable(follower *p, double factor, int64_t *unstable
     lab_tangent *t = &p->tangent;
     bool known;
     lab_tangent_evaluate(t, p->x, factor, NULL, NULL, t->values);
-    drape_pattern_symmetrize(t->pattern, t->values); /* rounding only: the path is of a potential */
+    *unstable = -1; /* of a load without a potential the signs of pivots say nothing */
+    if (!lab_tangent_is_symmetric(t, t->values))
+        return DRAPE_OK;
     *unstable = 0;
     drape_status status = lab_tangent_factor_definite(t, p->solver, p->factors, t->values, &known);
     if (status || known)
@@ -216,7 +218,8 @@ static drape_status accept(follower *p, drape_path_point point, bool *ended)
     if (status)
         return status;
     const drape_state *now = drape_sim_state(p->sim);
-    const drape_point at = {.x = now->x, .v = p->still, .internal = now->internal, .t = now->t};
+    const drape_point at = {
+        .x = now->x, .v = p->still, .internal = now->internal, .t = now->t, .full = p->tangent.full};
     drape_system_energy(p->tangent.system, &at, &point.elastic, &point.potential);
     point.potential *= point.factor;
     memcpy(p->before, p->step, p->n * sizeof *p->step);
@@ -298,6 +301,21 @@ static drape_status end_at(follower *p, drape_path_point *point)
     p->change = p->def->to - p->point.factor;
     drape_status status = correct(p, CONTROL_LOAD, limit, point);
     return status ? status : examine(p, point);
+}
+
+/* Loads so small that rounding of the cloth's own forces hides them have no path. Those that are 0 are found
+ * by what they do. */
+static drape_status check_loads(follower *p)
+{
+    const drape_state *now = drape_sim_state(p->sim);
+    lab_tangent_evaluate(&p->tangent, now->x, 0, NULL, p->load, NULL);
+    const double most = fmax(fabs(p->def->from), fabs(p->def->to)) * largest(p->load, p->n);
+    return !(most > 0 && most < p->rounding)
+               ? DRAPE_OK
+               : drape_fail(p->ctx, DRAPE_E_ARGUMENT,
+                            "the loads are at most %.3g N on a node, less than rounding leaves of the "
+                            "cloth's own forces, %.3g N: a path needs larger loads",
+                            most, p->rounding);
 }
 
 static drape_status too_small(const follower *p, drape_status why)
@@ -473,7 +491,7 @@ static drape_status open(follower *p)
         return drape_fail(p->ctx, DRAPE_E_ARGUMENT,
                           "a path of equilibria is followed without contact: leave out colliders and "
                           "self_contact");
-    drape_status status = lab_tangent_open(&p->arena, p->sim, p->def->from, &p->tangent);
+    drape_status status = lab_tangent_open(&p->arena, p->sim, p->def->from, false, &p->tangent);
     if (status)
         return status;
     p->n = (size_t)p->tangent.pattern->n;
@@ -489,7 +507,8 @@ static drape_status open(follower *p)
     for (size_t i = 0; i < p->n; i++)
         p->mass += p->tangent.mass[i] / 3;
     p->rounding = ROUNDINGS * DBL_EPSILON * stiffest_row(&p->tangent) * m->length;
-    return p->solver->create(&p->factor_arena, p->tangent.pattern, &p->factors);
+    status = check_loads(p);
+    return status ? status : p->solver->create(&p->factor_arena, p->tangent.pattern, &p->factors);
 }
 
 void drape_path_def_init(drape_path_def *def, size_t struct_size)
@@ -504,7 +523,8 @@ static bool is_valid(const drape_path_def *def)
 {
     return isfinite(def->from) && isfinite(def->to) && def->from != def->to && def->step > 0 &&
            isfinite(def->step) && def->max_arc >= 0 && isfinite(def->max_arc) && def->max_points >= 1 &&
-           def->tolerance > 0 && def->tolerance < 1 && def->branch >= -1 && def->branch <= 1;
+           def->tolerance > 0 && def->tolerance < 1 && def->branch >= -1 && def->branch <= 1 &&
+           !(def->branch && def->load_control);
 }
 
 drape_status drape_sim_path(drape_sim *sim, const drape_path_def *given)
@@ -517,9 +537,10 @@ drape_status drape_sim_path(drape_sim *sim, const drape_path_def *given)
     if (given)
         memcpy(&def, given, given->struct_size < sizeof def ? given->struct_size : sizeof def);
     if (!is_valid(&def))
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "drape_sim_path: from and to are finite and differ, step > 0, max_arc >= 0, "
-                          "max_points >= 1, 0 < tolerance < 1, branch is -1, 0 or 1");
+        return drape_fail(
+            sim->ctx, DRAPE_E_ARGUMENT,
+            "drape_sim_path: from and to are finite and differ, step > 0, max_arc >= 0, "
+            "max_points >= 1, 0 < tolerance < 1, branch is -1, 0 or 1, and 0 with load_control");
     follower p = {.ctx = sim->ctx, .sim = sim, .def = &def};
     p.arena = drape_arena_of(sim->ctx);
     p.factor_arena = drape_arena_of(sim->ctx);

@@ -16,8 +16,12 @@
 static drape_point point_at(const lab_tangent *t, const double *x)
 {
     const drape_state *now = drape_sim_state(t->sim);
-    return (drape_point){
-        .x = x, .v = t->zero, .internal = now->internal, .t = now->t, .span = {now->t, now->t}};
+    return (drape_point){.x = x,
+                         .v = t->zero,
+                         .internal = now->internal,
+                         .t = now->t,
+                         .full = t->full,
+                         .span = {now->t, now->t}};
 }
 
 /* values = K at nodes x and a factor of the loads: K without the loads, and the factor times the difference
@@ -40,33 +44,33 @@ static void take_free(const drape_model *m, const double *nodes, double *free)
         memcpy(free + 3 * (size_t)f, nodes + 3 * (size_t)m->node_of_free[f], 3 * sizeof *free);
 }
 
-/* A friction that does not slip has no stiffness, and one that slips none that is symmetric: both are left
- * out. Anything else that is not symmetric has no modes of the kind that are sought. */
-static drape_status make_symmetric(const lab_tangent *t, const drape_point *point)
+/* Refuses loads without a potential, by the stiffness of these alone: as the cloth is held it may be
+ * symmetric after all, as under the pressure on cloth that is pinned all round. */
+static drape_status check_potential(const lab_tangent *t, const drape_point *point)
 {
-    const drape_pattern *p = t->pattern;
-    const size_t count = (size_t)p->nonzeros;
-    double largest = 0, difference = 0;
-    memcpy(t->scratch, t->values, count * sizeof *t->scratch);
-    if (drape_system_is_symmetric(t->system))
-        drape_pattern_symmetrize(p, t->values);
-    else
-        drape_system_symmetrize(t->system, point, t->values);
-    if (!drape_system_is_symmetric(t->system))
+    if (!t->follows)
         return DRAPE_OK;
-    for (size_t i = 0; i < count; i++) {
-        largest = fmax(largest, fabs(t->values[i]));
-        difference = fmax(difference, fabs(t->values[i] - t->scratch[i]));
-    }
-    return difference <= MAX_ASYMMETRY * largest
-               ? DRAPE_OK
-               : drape_fail(t->ctx, DRAPE_E_ARGUMENT,
-                            "the stiffness of this state is not symmetric, by %.2g of its largest entry: a "
-                            "load follows the cloth, and modes are only computed of loads with a potential",
-                            difference / largest);
+    drape_system_jacobian_without(t->system, point, 0, 0, t->potential, t->scratch);
+    const double asymmetry = drape_pattern_asymmetry(t->pattern, t->scratch);
+    return asymmetry > MAX_ASYMMETRY
+               ? drape_fail(t->ctx, DRAPE_E_ARGUMENT,
+                            "the stiffness of a load that follows the cloth is not symmetric, by %.2g of its "
+                            "largest entry: modes are only computed of loads with a potential",
+                            asymmetry)
+               : DRAPE_OK;
 }
 
-static drape_status read_state(lab_tangent *t, drape_arena *arena)
+/* A friction that does not slip has no stiffness, and one that slips none that is symmetric: both are left
+ * out. What else is not symmetric, as drag.wind in its own wind, is no part of K. */
+static void make_symmetric(const lab_tangent *t, const drape_point *point)
+{
+    if (drape_system_is_symmetric(t->system))
+        lab_tangent_is_symmetric(t, t->values);
+    else
+        drape_system_symmetrize(t->system, point, 0, t->values);
+}
+
+static drape_status read_state(lab_tangent *t, drape_arena *arena, bool needs_potential)
 {
     const drape_model *m = t->sim->model;
     const drape_state *now = drape_sim_state(t->sim);
@@ -91,10 +95,12 @@ static drape_status read_state(lab_tangent *t, drape_arena *arena)
     lab_tangent_evaluate(t, now->x, t->factor, force, NULL, NULL);
     for (int64_t i = 0; i < t->pattern->n; i++)
         t->force = fmax(t->force, fabs(force[i]));
-    return make_symmetric(t, &point);
+    make_symmetric(t, &point);
+    return needs_potential ? check_potential(t, &point) : DRAPE_OK;
 }
 
-drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor, lab_tangent *t)
+drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor, bool needs_potential,
+                              lab_tangent *t)
 {
     const drape_model *m = sim->model;
     *t = (lab_tangent){.ctx = sim->ctx, .sim = sim, .factor = factor, .arena = arena};
@@ -105,16 +111,20 @@ drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor,
     t->mass = drape_arena_take(arena, 3 * (size_t)m->free_count, sizeof *t->mass);
     t->dissipative = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->dissipative);
     t->without = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->without);
+    t->potential = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->potential);
     drape_status status = drape_arena_status(arena);
     if (status)
         return status;
     for (int32_t c = 0; c < m->collider_count; c++)
         same[c] = c;
+    t->full = drape_sim_state(sim)->t == 0;
     t->linear = true;
     for (int32_t i = 0; i < m->term_count; i++) {
         const drape_term_ops *ops = m->terms[i].ops;
-        t->dissipative[i] = ops->dissipation;
+        t->dissipative[i] = ops->dissipation && !ops->external;
         t->without[i] = ops->dissipation || ops->external;
+        t->potential[i] = !(ops->dissipation && ops->external);
+        t->follows = t->follows || !t->potential[i];
         t->linear = t->linear && (!ops->external || ops->linear);
     }
     for (int32_t i = 0; i < 3 * m->free_count; i++)
@@ -126,12 +136,20 @@ drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor,
         status = drape_system_continue(t->system, sim->system, same, drape_sim_state(sim)->t);
     if (!status)
         drape_system_copy_wind(t->system, sim->system);
-    return status ? status : read_state(t, arena);
+    return status ? status : read_state(t, arena, needs_potential);
 }
 
 void lab_tangent_close(lab_tangent *t)
 {
     drape_system_destroy(&t->system);
+}
+
+bool lab_tangent_is_symmetric(const lab_tangent *t, double *values)
+{
+    const bool symmetric = !(drape_pattern_asymmetry(t->pattern, values) > MAX_ASYMMETRY);
+    if (symmetric)
+        drape_pattern_symmetrize(t->pattern, values);
+    return symmetric;
 }
 
 drape_status lab_tangent_factor_definite(const lab_tangent *t, const drape_linear_ops *solver, void *factors,

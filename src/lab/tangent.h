@@ -1,7 +1,9 @@
 /*
  * tangent.h: the exact stiffness of a sim's present state, about which modes are computed: K = d2E/dx2 over
  * the free nodes, with the nodes at rest, so that only stiffness is in it; and how K changes with the loads.
- * The loads are the scene's external terms (drape_term_ops.external), all multiplied by the same factor.
+ * The loads are the scene's external terms (drape_term_ops.external), all multiplied by the same factor. At
+ * the time 0 of a sim they have the values that the scene gives, even if they rise from 0 in time; later on
+ * those of the time.
  */
 #ifndef DRAPE_LAB_TANGENT_H
 #define DRAPE_LAB_TANGENT_H
@@ -23,14 +25,19 @@ typedef struct lab_tangent {
     bool *dissipative; /* (term_count) terms such as drag in the wind: they have no part in an equilibrium or
                           in K */
     bool *without;     /* (term_count) these, and the loads */
+    bool *potential;   /* (term_count) all but loads without a potential */
+    bool follows;      /* there are such loads */
     bool linear;       /* no load has a part in K */
     double factor;     /* of the loads */
+    bool full;         /* loads have the values that the scene gives, whatever they are at this time */
     drape_arena *arena;
 } lab_tangent;
 
-/* Evaluates K. Close it in any case. Errors: DRAPE_E_MEMORY; DRAPE_E_ARGUMENT (no free node, or K is not
- * symmetric); DRAPE_E_SOLVER (K is not finite). */
-drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor, lab_tangent *tangent);
+/* Evaluates K. Close it in any case. needs_potential: refuses a K that is not symmetric; else that is what it
+ * may be. Errors: DRAPE_E_MEMORY; DRAPE_E_ARGUMENT (no free node, or such a K); DRAPE_E_SOLVER (K is not
+ * finite). */
+drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor, bool needs_potential,
+                              lab_tangent *tangent);
 void lab_tangent_close(lab_tangent *tangent);
 
 /* At nodes x (nodes x 3), with the internal variables of the sim's present state, and a factor of the loads:
@@ -39,6 +46,10 @@ void lab_tangent_close(lab_tangent *tangent);
  * without the loads [N]. All may be not finite. */
 double lab_tangent_evaluate(const lab_tangent *tangent, const double *x, double factor, double *force,
                             double *load, double *values);
+
+/* Whether a K is symmetric within rounding, as that of loads with a potential is: then it becomes so to the
+ * bit. */
+bool lab_tangent_is_symmetric(const lab_tangent *tangent, double *values);
 
 /* Factors a symmetric matrix of the pattern if it is positive definite; *definite: it is. A Cholesky
  * factorisation finds that of matrices whose inertia is too inexact to be counted. Errors: DRAPE_E_MEMORY,

@@ -19,6 +19,15 @@ typedef struct drape_patches {
                          of one of them */
 } drape_patches;
 
+/* The factor of loads over time (model/history.h). */
+typedef struct drape_history {
+    char *name;           /* "" of a ramp */
+    size_t key_count;     /* at least 1 */
+    double *time, *value; /* (key_count) [s], ascending; [1] */
+    double *slope;        /* (key_count) [1/s] of a cubic; NULL: linear */
+    bool used;            /* a term has it */
+} drape_history;
+
 /* One term on one cloth or one seam. */
 typedef struct drape_term {
     const drape_term_ops *ops;
@@ -31,17 +40,28 @@ typedef struct drape_term {
     int32_t *block;  /* (drape_term_places) block of each node pair in the pattern, -1: pinned; NULL: no
                        sparsity */
     double timed[2]; /* [s] from when to when its energy changes with time; equal: it does not */
-    bool anchored;   /* its elements are attached to fixed directions in space */
+    const drape_history *history;         /* the factor of a load over time; NULL: it is constant */
+    bool anchored;                        /* its elements are attached to fixed directions in space */
     int64_t first_internal;               /* index of its internal variables in a state; -1: none */
     int64_t first_measure;                /* index of its measures in the list of all measures; -1: none */
     const struct drape_term *const *laws; /* laws of the cloth that act on this measure */
     int law_count;
     const double *damping; /* (elements.count) its measures' own dashpots [J s/q2]; NULL: none */
+    int sliders;           /* of each element (slider.h) */
+    double *slider_stiffness, *slider_limit; /* (sliders x elements.count) [J/q2], [J/q] */
+    int64_t
+        first_slider; /* index in a state of how far they have slid (sliders x elements.count); -1: none */
 } drape_term;
 
 static inline bool drape_term_is_timed(const drape_term *term)
 {
     return term->timed[0] < term->timed[1];
+}
+
+/* Whether its forces depend on time. */
+static inline bool drape_term_changes(const drape_term *term)
+{
+    return drape_term_is_timed(term) || term->history;
 }
 
 /* From 0 at the beginning of this time to 1 at its end, with rate 0 at both. */
@@ -64,6 +84,12 @@ static inline int64_t drape_term_internals(const drape_term *term)
 {
     const int64_t each = term->ops->internal_count > 0 ? term->ops->internal_count : term->ops->has_internal;
     return each * (term->elements.parts ? term->parts.count : term->elements.count);
+}
+
+/* The number of the sliders of all its elements. */
+static inline int64_t drape_term_slider_count(const drape_term *term)
+{
+    return term->sliders * (int64_t)term->elements.count;
 }
 
 /* The nodes that elements couple. */
@@ -117,17 +143,22 @@ typedef struct drape_choice {
     size_t setting_count;
 } drape_choice;
 
+/* The measured curves of a material. */
+enum { DRAPE_CURVE_WARP, DRAPE_CURVE_WEFT, DRAPE_CURVE_SHEAR, DRAPE_CURVE_COUNT };
+
 /* One cloth: its mesh at rest and the data of the scene. */
 typedef struct drape_cloth {
     char *name;
     drape_mesh mesh;
-    drape_choice grid; /* its type is "" if the mesh is not a grid */
-    char *file;        /* NULL if the mesh is not from a file */
+    drape_choice grid;                /* its type is "" if the mesh is not a grid */
+    char *file;                       /* NULL if the mesh is not from a file */
+    char *start_file, *velocity_file; /* of the start; NULL: none */
     double scale[3], rotate[4], translate[3];
     double material_values[DRAPE_MAX_PARAMS]; /* in the order of the parameters of drape_material_entry */
     drape_material material;
-    drape_woven tension, bending; /* of a measured fabric; warp 0: not a measured fabric */
-    double *material_mass;        /* (mesh.node_count) [kg] of the material alone */
+    drape_woven tension, bending;           /* of a measured fabric; warp 0: not a measured fabric */
+    drape_points curves[DRAPE_CURVE_COUNT]; /* measured: see drape_cloth_view */
+    double *material_mass;                  /* (mesh.node_count) [kg] of the material alone */
     double *node_mass;     /* (mesh.node_count) [kg] with the "masses" of the scene; material_mass itself
                                      if there are none */
     uint8_t *edge_clamped; /* (mesh.edge_count) 1: both nodes are held by pins that clamp */
@@ -285,6 +316,8 @@ struct drape_model {
     drape_context *ctx;
     int32_t cloth_count, term_count, node_count, triangle_count, edge_count;
     drape_cloth *cloths;
+    drape_history *histories; /* (history_count) those of the scene, then one of each ramp */
+    int32_t history_count;
     drape_term *terms;     /* (term_count) in scene order, gravity last in each cloth; then those of seams */
     double *rest;          /* (node_count x 3) [m] */
     double *start;         /* (node_count x 3) [m] at t = 0; rest itself if all cloths start there */

@@ -4,6 +4,7 @@
 #include "base/finite.h"
 #include "base/rotation.h"
 #include "base/vec3.h"
+#include "model/history.h"
 #include "model/ride.h"
 #include "model/track.h"
 
@@ -987,6 +988,9 @@ double drape_motion_next_kink(const drape_motion *motion, double t, double end)
         end = next_kink_of(&c, t, end);
         end = drape_deformation_next_kink(&motion->deformation[i], t, end);
     }
+    for (int32_t i = 0; i < motion->model->history_count; i++)
+        if (motion->model->histories[i].used)
+            end = drape_history_next_kink(&motion->model->histories[i], t, end);
     return end;
 }
 

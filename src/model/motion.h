@@ -109,7 +109,9 @@ void drape_motion_deform(drape_motion *motion, int32_t collider, double t, doubl
 /* Whether the points of a collider ever move in its own coordinates. */
 bool drape_motion_deforms(const drape_motion *motion, int32_t collider);
 
-/* Returns the next time after t and before end at which some velocity jumps; otherwise end. */
+/* Returns the next time after t and before end at which some velocity or the course of a load jumps;
+ * otherwise end. drape_motion_at_kink: whether a velocity does, after which a method that follows the
+ * solution starts anew; loads are continuous. */
 double drape_motion_next_kink(const drape_motion *motion, double t, double end);
 bool drape_motion_at_kink(const drape_motion *motion, double t);
 

@@ -38,7 +38,7 @@ void drape_scene_print(drape_scene *scene, drape_text_sink *sink, void *user);
 /* The JSON form of a key's value. */
 typedef enum drape_scene_shape {
     DRAPE_SCENE_VALUE,      /* a value of the parameter */
-    DRAPE_SCENE_LIST,       /* an array of such values, integers or texts */
+    DRAPE_SCENE_LIST,       /* an array of such values, numbers, integers or texts */
     DRAPE_SCENE_VERSION,    /* the number DRAPE_SCENE_FORM; not stored in the def */
     DRAPE_SCENE_REMARK,     /* a string for people; not stored in the def */
     DRAPE_SCENE_BOX,        /* two corners of a box, and at count_offset whether it is given */
@@ -74,6 +74,7 @@ typedef struct drape_scene_key {
 #define DRAPE_MAX_COLLIDERS 4096
 #define DRAPE_MAX_EVENTS    256
 #define DRAPE_MAX_SEAMS     4096
+#define DRAPE_MAX_HISTORIES 4096
 
 typedef struct drape_scene_object {
     const char *name;
@@ -92,7 +93,7 @@ typedef struct drape_scene_object {
 /* The top-level object and some of its descendants. */
 extern const drape_scene_object drape_form_scene, drape_form_output, drape_form_cloth, drape_form_mesh,
     drape_form_transform, drape_form_pin, drape_form_mass, drape_form_turn, drape_form_collider,
-    drape_form_event, drape_form_seam, drape_form_seam_side;
+    drape_form_event, drape_form_seam, drape_form_seam_side, drape_form_history;
 
 /* Returns the key of an object by its name; NULL if there is none. */
 const drape_scene_key *drape_scene_key_of(const drape_scene_object *object, const char *name);
@@ -103,7 +104,7 @@ const drape_scene_key *drape_scene_key_at(const char *pointer);
 /* Reads the value of a key as a setting, which points into the def. Returns false if none is given. */
 bool drape_scene_value(const drape_scene_key *key, const void *def, drape_setting *out);
 
-/* Reads the texts of a LIST. Returns their number. */
+/* Reads the texts of a LIST. Returns their number; 0 if it has numbers. */
 size_t drape_scene_texts(const drape_scene_key *key, const void *def, const char *const **texts);
 
 /* Stores a value that has been checked against the parameter in the def: given as a setting, and as the

@@ -67,6 +67,9 @@ bool drape_scene_value(const drape_scene_key *key, const void *def, drape_settin
     case DRAPE_PARAM_CHOICE:
     case DRAPE_PARAM_TEXT:
         memcpy(&out->text, at, sizeof out->text);
+        break;
+    case DRAPE_PARAM_POINTS: /* only settings are points */
+        break;
     }
     return out->text;
 }
@@ -76,7 +79,7 @@ size_t drape_scene_texts(const drape_scene_key *key, const void *def, const char
     size_t count;
     memcpy(texts, (const char *)def + key->offset, sizeof *texts);
     memcpy(&count, (const char *)def + key->count_offset, sizeof count);
-    return count;
+    return key->param.kind == DRAPE_PARAM_TEXT ? count : 0;
 }
 
 void drape_scene_store(const drape_scene_key *key, const drape_setting *setting, const double *values,
@@ -112,6 +115,9 @@ void drape_scene_store(const drape_scene_key *key, const drape_setting *setting,
         break;
     case DRAPE_PARAM_TEXT:
         word = setting->text;
+        break;
+    case DRAPE_PARAM_POINTS:
+        return;
     }
     memcpy(at, &word, sizeof word);
 }
@@ -204,6 +210,14 @@ void drape_pin_def_init(drape_pin_def *def, size_t struct_size)
 {
     drape_pin_def defaults = {.struct_size = 0};
     drape_scene_set_defaults(&drape_form_pin, &defaults);
+    defaults.struct_size = struct_size;
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
+}
+
+void drape_history_def_init(drape_history_def *def, size_t struct_size)
+{
+    drape_history_def defaults = {.struct_size = 0};
+    drape_scene_set_defaults(&drape_form_history, &defaults);
     defaults.struct_size = struct_size;
     drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }

@@ -9,7 +9,7 @@
 
 #include "model/scene.h"
 
-#define MAX_KEYS  16  /* of one object, for the lists in messages */
+#define MAX_KEYS  24  /* of one object, for the lists in messages */
 #define MAX_TAKES 600 /* bytes of the description of what a key accepts */
 
 typedef struct reader {
@@ -163,6 +163,22 @@ static drape_status read_three(reader *r, json_t *value, const char *what, doubl
                                        : refuse_as(r, value, what, "three numbers, [x, y, z]");
 }
 
+/* Reads an array of arrays of two numbers, as many as out has room for. */
+static drape_status read_pairs(reader *r, json_t *array, double *out)
+{
+    const size_t mark = r->at.length;
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < json_array_size(array); i++) {
+        json_t *one = json_array_get(array, i);
+        drape_pointer_push_index(&r->at, i);
+        status = json_array_size(one) == 2 ? read_numbers(r, one, out + 2 * i)
+                                           : refuse_as(r, one, "an element", "an array of two numbers");
+        if (!status)
+            drape_pointer_cut(&r->at, mark);
+    }
+    return status;
+}
+
 /* Booleans become texts, so that no parameter mistakes them for numbers. */
 static drape_status read_setting(reader *r, const char *name, json_t *value, drape_setting *out)
 {
@@ -175,10 +191,14 @@ static drape_status read_setting(reader *r, const char *name, json_t *value, dra
         out->text = json_string_value(value);
     if (!json_is_array(value))
         return DRAPE_OK;
-    double *numbers = drape_arena_take(r->arena, json_array_size(value), sizeof *numbers);
+    const bool pairs = json_is_array(json_array_get(value, 0));
+    double *numbers = drape_arena_take(r->arena, (pairs ? 2 : 1) * json_array_size(value), sizeof *numbers);
+    out->number = pairs ? 2 : 0;
     out->vector = numbers;
-    out->vector_count = json_array_size(value);
-    return numbers ? read_numbers(r, value, numbers) : DRAPE_E_MEMORY;
+    out->vector_count = (pairs ? 2 : 1) * json_array_size(value);
+    if (!numbers)
+        return DRAPE_E_MEMORY;
+    return pairs ? read_pairs(r, value, numbers) : read_numbers(r, value, numbers);
 }
 
 /* Whether a parameter of this kind may be written as a JSON value of this type; drape_param_value checks the
@@ -186,7 +206,7 @@ static drape_status read_setting(reader *r, const char *name, json_t *value, dra
 static bool is_writable(const drape_param *param, json_t *value)
 {
     if (json_is_array(value))
-        return drape_param_width(param) > 1;
+        return drape_param_width(param) > 1 || param->kind == DRAPE_PARAM_POINTS;
     if (json_is_boolean(value))
         return param->kind == DRAPE_PARAM_BOOLEAN;
     if (json_is_string(value))
@@ -281,7 +301,9 @@ static drape_status take_array(reader *r, const drape_scene_key *key, json_t *va
 /* Each element is stored like a key of its own. */
 static drape_status read_list(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
-    const size_t size = key->param.kind == DRAPE_PARAM_INTEGER ? sizeof(int32_t) : sizeof(const char *);
+    const size_t size = key->param.kind == DRAPE_PARAM_INTEGER  ? sizeof(int32_t)
+                        : key->param.kind == DRAPE_PARAM_NUMBER ? sizeof(double)
+                                                                : sizeof(const char *);
     const size_t mark = r->at.length;
     drape_scene_key element = {.param = key->param};
     element.param.name = "an element";
@@ -335,10 +357,11 @@ static drape_status read_member(reader *r, const char *name, json_t *value, drap
 {
     size_t mark = r->at.length;
     drape_pointer_push(&r->at, name);
-    drape_status status =
-        json_is_object(value) || json_is_null(value)
-            ? refuse_as(r, value, "a setting", "a number, true, false, a string or an array of numbers")
-            : read_setting(r, name, value, out);
+    drape_status status = json_is_object(value) || json_is_null(value)
+                              ? refuse_as(r, value, "a setting",
+                                          "a number, true, false, a string or an array of numbers or "
+                                          "pairs")
+                              : read_setting(r, name, value, out);
     if (!status)
         drape_pointer_cut(&r->at, mark);
     return status;

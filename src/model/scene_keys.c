@@ -68,8 +68,8 @@ static const drape_scene_key pin_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECTS, "turns", DRAPE_DERIVED("none: they do not turn"),
             "rotation of the nodes as one body about the pivot, steady between the times"),
      ARRAY(drape_pin_def, turns, turn_count), .at_least = 1, .child = &drape_form_turn},
-    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the mean of the nodes"), LOWEST, HIGHEST,
-                  "the point about which they turn, at the start; the track displaces it"),
+    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the mean of the nodes"), -1e9, 1e9,
+                  "the point about which they turn, at the start; the track displaces it; with `turns`"),
      IN(drape_pin_def, pivot)},
 };
 static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
@@ -195,7 +195,7 @@ static const drape_scene_key start_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECT, "transform", NONE, "scale, rotation, translation after the folds"),
      .child = &start_transform},
     {DRAPE_VECTOR("spin", "rad/s", 0, -1e9, 1e9, "angular velocity"), IN(drape_start_def, spin)},
-    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the centre of mass at the start"), LOWEST, HIGHEST,
+    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the centre of mass at the start"), -1e9, 1e9,
                   "the point that the spin does not move"),
      IN(drape_start_def, pivot)},
     {DRAPE_TEXT("velocities", "an NPY file, nodes x 3, of velocities in m/s; relative to the scene",
@@ -265,8 +265,8 @@ static const drape_scene_key collider_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECTS, "turns", DRAPE_DERIVED("none: it does not turn"),
             "rotation about the pivot, steady between the times"),
      ARRAY(drape_collider_def, turns, turn_count), .at_least = 1, .child = &drape_form_turn},
-    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the middle of its shape; of a plane, the origin"), LOWEST,
-                  HIGHEST, "the point about which it turns, where its parameters define it"),
+    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the middle of its shape; of a plane, the origin"), -1e9, 1e9,
+                  "the point about which it turns, where its parameters define it"),
      IN(drape_collider_def, pivot)},
     {DRAPE_BOOLEAN("enabled", true, "cloth touches it"), IN(drape_collider_def, enabled)},
 };
@@ -358,6 +358,27 @@ const drape_scene_object drape_form_seam = {
     .least_size = sizeof(drape_seam_def),
 };
 
+/* ---- Histories ---- */
+
+static const char *const interpolations[] = {"linear", "cubic", NULL};
+
+static const drape_scene_key history_keys[] = {
+    {DRAPE_TEXT("name", "unique name, which loads give as their history"), IN(drape_history_def, name)},
+    {DRAPE_NUMBER("times", "s", DRAPE_REQUIRED, -1e9, 1e9, "increasing"), .shape = DRAPE_SCENE_LIST,
+     ARRAY(drape_history_def, times, time_count), .at_least = 1},
+    {DRAPE_NUMBER("values", "1", DRAPE_REQUIRED, -1e9, 1e9,
+                  "the factors of a load at these times; before the first and after the last it is constant"),
+     .shape = DRAPE_SCENE_LIST, ARRAY(drape_history_def, values, value_count), .at_least = 1},
+    {DRAPE_CHOICE("interpolation", 0, interpolations,
+                  "between them; cubic: with a continuous slope, 0 at the ends, and beyond no value"),
+     IN(drape_history_def, interpolation)},
+};
+
+const drape_scene_object drape_form_history = {.name = "history",
+                                               KEYS(history_keys),
+                                               .def_size = sizeof(drape_history_def),
+                                               .least_size = sizeof(drape_history_def)};
+
 /* ---- Scene ---- */
 
 static const drape_scene_key output_keys[] = {
@@ -404,6 +425,12 @@ static const drape_scene_key scene_keys[] = {
      ARRAY(drape_scene_def, events, event_count), .at_most = DRAPE_MAX_EVENTS, .child = &drape_form_event},
     {SHAPED(DRAPE_SCENE_OBJECTS, "seams", NONE, "nodes that are sewn together, of two cloths or one"),
      ARRAY(drape_scene_def, seams, seam_count), .at_most = DRAPE_MAX_SEAMS, .child = &drape_form_seam},
+    {SHAPED(DRAPE_SCENE_OBJECTS, "histories", NONE, "factors over time, by which loads are multiplied"),
+     ARRAY(drape_scene_def, histories, history_count), .at_most = DRAPE_MAX_HISTORIES,
+     .child = &drape_form_history},
+    {DRAPE_TEXT("gravity_history", "name of the history by which gravity is multiplied",
+                .derived = "none: gravity is constant"),
+     IN(drape_scene_def, gravity_history)},
 };
 
 const drape_scene_object drape_form_scene = {.name = "scene",

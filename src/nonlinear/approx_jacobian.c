@@ -5,6 +5,13 @@
 
 #include <string.h>
 
+/* Conjugate gradients in each iteration with friction. A sheet of 30 x 30 nodes on a ball with friction 0.3 is
+ * 30 mm of 1 m from the converged run after 0.8 s with 0, 2, 3 or up to 60 iterations, for 1.7, 2.5, 2.8 and
+ * 4.7 times the CPU of symmetric matrices, with which it is 52 mm off; one of 20 x 20 nodes that is thrown on a
+ * slope, 378, 0, 0 and 1 mm, and 567 mm. */
+#define INNER_ITERATIONS 2
+#define INNER_TOLERANCE  0.3
+
 /* ---- Symmetric 3 x 3 blocks: xx xy xz yy yz zz ---- */
 
 static void multiply_block(const double *a, const double *x, double *y)
@@ -174,7 +181,7 @@ static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_poi
         return status;
     drape_system_remainder(s->system, point, s->remainder.values);
     list_remainder(s);
-    return DRAPE_OK;
+    return drape_friction_matrix_update(&s->friction, point);
 }
 
 static void add_upper(drape_approx_jacobian *s, int32_t node, const double upper[6])
@@ -303,9 +310,18 @@ drape_status drape_approx_jacobian_update(drape_approx_jacobian *s, const drape_
     return status;
 }
 
-int drape_approx_jacobian_solve(drape_approx_jacobian *s, const double *b, double *x, double tolerance,
-                                int max_iterations)
+static void solve_symmetric(void *owner, const double *b, double *x)
 {
+    drape_approx_jacobian *s = owner;
+    drape_pcg_solve(&s->pcg, b, x, INNER_TOLERANCE, INNER_ITERATIONS);
+}
+
+int drape_approx_jacobian_solve(drape_approx_jacobian *s, const double *b, double *x, bool friction,
+                                double tolerance, int max_iterations)
+{
+    int iterations = 1;
+    if (friction && drape_friction_matrix_solve(&s->friction, b, x, &iterations))
+        return iterations;
     drape_pcg_solve(&s->pcg, b, x, tolerance, max_iterations);
     return s->pcg.iterations;
 }
@@ -326,7 +342,10 @@ drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *syst
     const size_t n = 3 * (size_t)s->nodes;
     s->inverse = drape_arena_take(arena, 2 * n, sizeof *s->inverse);
     s->pcg = drape_pcg_of(arena, (int64_t)n, s, multiply, precondition);
-    drape_status status = drape_approx_jacobian_build(s, spacing);
+    drape_status status =
+        drape_friction_matrix_init(arena, system, s, multiply, solve_symmetric, &s->friction);
+    if (!status)
+        status = drape_approx_jacobian_build(s, spacing);
     return status ? status : drape_arena_status(arena);
 }
 
@@ -337,6 +356,7 @@ void drape_approx_jacobian_destroy(drape_approx_jacobian **out)
         return;
     drape_linear_destroy(s->coarse.linear, &s->coarse.solver);
     drape_arena_free(&s->remainder.arena);
+    drape_friction_matrix_free(&s->friction);
     *out = NULL;
 }
 

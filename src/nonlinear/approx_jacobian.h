@@ -10,7 +10,7 @@
  *        would resist motion across the sheet, too, with thousands of times the sheet's inertia, which ten
  *        iterations do not correct.
  *     R  the remainder: energies and dissipation without a strain measure, and contact, without
- *        approximation.
+ *        approximation except for friction, for which friction_matrix.h corrects solutions.
  *
  * A x = b is solved by conjugate gradients with an additive preconditioner: the inverse of the diagonal
  * blocks plus the inverse of the matrix on a coarse space (solvers/prolong.h), which represents the motion
@@ -36,9 +36,10 @@ drape_status drape_approx_jacobian_update(drape_approx_jacobian *jacobian, const
                                           double mass_weight, drape_work *work);
 
 /* x = A^-1 b (free DOFs), until the residual falls to `tolerance` times its initial value, in the norm of
- * the preconditioner. Returns the number of iterations. */
-int drape_approx_jacobian_solve(drape_approx_jacobian *jacobian, const double *b, double *x, double tolerance,
-                                int max_iterations);
+ * the preconditioner; with `friction`, where some acts, corrected by friction_matrix.h. Returns the number of
+ * iterations. */
+int drape_approx_jacobian_solve(drape_approx_jacobian *jacobian, const double *b, double *x, bool friction,
+                                double tolerance, int max_iterations);
 
 /* y = A x, for tests. */
 void drape_approx_jacobian_multiply(const drape_approx_jacobian *jacobian, const double *x, double *y);

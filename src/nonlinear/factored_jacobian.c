@@ -3,6 +3,7 @@
 
 #include "base/finite.h"
 #include "base/vec3.h"
+#include "nonlinear/friction_matrix.h"
 #include "nonlinear/scalar_stiffness.h"
 #include "solvers/pcg.h"
 #include "solvers/sun_linear.h"
@@ -30,6 +31,7 @@ struct drape_factored_jacobian {
     int32_t *block;  /* (entries of C) in the pattern; -1: lumped */
     int64_t version; /* of the pattern */
     drape_pcg pcg;
+    drape_friction_matrix friction;
     SUNContext sun;
     drape_sun_linear *linear;
 };
@@ -158,7 +160,7 @@ static drape_status assemble(drape_factored_jacobian *s, const drape_point *at, 
     if (!s->nonsymmetric)
         drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
     drape_system_project_matrix(s->system, s->linear->values);
-    return DRAPE_OK;
+    return drape_friction_matrix_update(&s->friction, &point);
 }
 
 drape_status drape_factored_jacobian_update(drape_factored_jacobian *s, const drape_point *point,
@@ -219,11 +221,38 @@ static void precondition(const void *owner, const double *r, double *z)
         memset(z, 0, (size_t)s->pcg.n * sizeof *z);
 }
 
+/* For a matrix whose drag makes it nonsymmetric, too. */
+static void multiply_any(const void *owner, const double *x, double *y)
+{
+    const drape_factored_jacobian *s = owner;
+    const drape_pattern *p = drape_system_pattern(s->system);
+    if (!s->nonsymmetric) {
+        multiply(s, x, y);
+        return;
+    }
+    memset(y, 0, (size_t)s->pcg.n * sizeof *y);
+    for (int32_t j = 0; j < p->block_count; j++)
+        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
+            int64_t stride;
+            const double *a = drape_pattern_at(p, s->linear->values, j, k, &stride);
+            for (int c = 0; c < 3; c++)
+                vec3_add_scaled(x[3 * (size_t)j + (size_t)c], a + c * stride,
+                                y + 3 * (size_t)p->block_row[k]);
+        }
+}
+
+static void solve_factored(void *factors, const double *b, double *x)
+{
+    precondition(factors, b, x);
+}
+
 drape_status drape_factored_jacobian_solve(drape_factored_jacobian *s, const double *b, double tolerance,
                                            double *x, int *iterations, bool *definite)
 {
     *iterations = 1;
     *definite = true;
+    if (drape_friction_matrix_solve(&s->friction, b, x, iterations))
+        return DRAPE_OK;
     if (!s->lumps)
         return drape_sun_linear_solve(s->linear, b, x);
     drape_pcg_solve(&s->pcg, b, x, tolerance, MAX_ITERATIONS);
@@ -295,7 +324,9 @@ drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *sy
         return status;
     s->block = drape_arena_take(arena, (size_t)s->scalar.start[s->scalar.n], sizeof *s->block);
     s->pcg = drape_pcg_of(arena, 3 * (int64_t)m->free_count, s, multiply, precondition);
-    status = drape_arena_status(arena);
+    status = drape_friction_matrix_init(arena, system, s, multiply_any, solve_factored, &s->friction);
+    if (!status)
+        status = drape_arena_status(arena);
     if (!status)
         status = choose_pattern(s, dt);
     if (status)
@@ -313,6 +344,7 @@ void drape_factored_jacobian_destroy(drape_factored_jacobian **jacobian)
     if (!s)
         return;
     drape_sun_linear_destroy(&s->linear);
+    drape_friction_matrix_free(&s->friction);
     if (s->sun)
         SUNContext_Free(&s->sun);
     *jacobian = NULL;

@@ -9,7 +9,8 @@
  *     J+  all other terms and contact, with the positive semidefinite parts of their elements or a share
  *         of them: 1 is positive semidefinite, and converges slowly where cloth is compressed; 0 is exact,
  *         except for contact, but may be indefinite
- * It is symmetric, of friction it has the symmetric part, except for drag, which is exact.
+ * It is symmetric, except for drag, which is exact; where there is friction, solutions are corrected by the
+ * exact matrix of contact (friction_matrix.h).
  *
  * C couples nodes two and three edges apart, which makes factors of A several times as expensive as those
  * of J+: for a measured fabric of 10 000 nodes nine times. So, where there is no drag, a matrix N without

@@ -90,6 +90,7 @@ struct drape_inexact_newton {
     drape_approx_jacobian *approximate;
     drape_factored_jacobian *factors;
     drape_factored_jacobian *factored; /* the factors in solves that use them, NULL in others */
+    bool cheap;                        /* of the settings */
     drape_stress_predictor predictor;  /* with factors */
     double share;                      /* of the positive parts in the next matrix; with factors */
     double used_share, repair_share;   /* in the last matrix; in the last one that was indefinite without */
@@ -163,6 +164,7 @@ static void begin(drape_inexact_newton *s, bool follows, bool cheap)
 {
     drape_step_equation *e = s->equation;
     s->factored = cheap && s->approximate ? NULL : s->factors;
+    s->cheap = cheap;
     drape_step_equation_begin(e);
     s->share = 1;
     if (!follows || s->first.mass_weight != e->mass_weight)
@@ -194,7 +196,8 @@ static drape_status solve(drape_inexact_newton *s, double tolerance, int max_ite
         status = drape_factored_jacobian_solve(s->factored, s->minus_f, LUMPED_TOLERANCE * tolerance, s->p,
                                                &iterations, &definite);
     else
-        iterations = drape_approx_jacobian_solve(s->approximate, s->minus_f, s->p, tolerance, max_iterations);
+        iterations = drape_approx_jacobian_solve(s->approximate, s->minus_f, s->p, !s->cheap, tolerance,
+                                                 max_iterations);
     s->unstable |= !definite;
     e->work.linear_iterations += iterations;
     e->work.solve_seconds += drape_clock_seconds() - start;

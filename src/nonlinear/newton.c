@@ -28,8 +28,10 @@
  * With contact, J can be unsymmetric: friction changes with the normal force. Then the matrix that is
  * factored is symmetric, J with the normal forces held fixed, and p solves J p = -F to 1e-2 of F by a few
  * iterations of GMRES with these factors (solvers/refine.h). A factorisation of J would cost four times as
- * much, and could not tell whether J is indefinite. Where the matrix is repaired, p is that of the repaired
- * matrix: it is not Newton's direction in any case.
+ * much, and could not tell whether J is indefinite. Where the matrix is repaired by a share of the positive
+ * parts, the rest of the coupling of friction with normal forces is in J, and not in what is factored. With
+ * all of them there is none: corrections that are short because it is missing would be made by such matrices
+ * for ever, so that after a short one the exact matrix is tried again.
  *
  * A sheet that buckles crosses many states with an indefinite J. Once J was indefinite, the next matrices of
  * the solve are repaired without trying J, until a correction is short.
@@ -239,9 +241,9 @@ static drape_status assemble(drape_newton *s, const double *d, double positive_s
         return status;
     drape_step_equation_jacobian(e, drape_stress_predictor_stress(&s->predictor), share, s->linear->values);
     drape_sun_linear_forget_exact(s->linear);
-    if (s->linear->near && share == 0) {
+    if (s->linear->near && share < 1) {
         drape_sun_linear_keep_exact(s->linear);
-        drape_step_equation_symmetrize(e, s->linear->values);
+        drape_step_equation_symmetrize(e, share, s->linear->values);
     }
     e->work.jacobian_seconds += jacobian_clock(s) - start;
     return DRAPE_OK;
@@ -468,6 +470,13 @@ static drape_status add_chords(drape_newton *s, const double *d, double *p, cons
     return DRAPE_OK;
 }
 
+/* The share of the positive parts in the next matrix, after a step of length a. */
+static double next_share(const drape_newton *s, double a)
+{
+    const bool lacks_coupling = s->linear->near && s->positive_share == 1;
+    return a < SHORT_STEP && !lacks_coupling ? 1 : 0;
+}
+
 /* Turns p into the step that is taken from the present iterate d. A p that is not finite is left to KINSOL,
  * whose evaluation then fails. */
 static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
@@ -488,7 +497,7 @@ static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
         return DRAPE_OK;
     predict_stress(s, p);
     double a = search_along(s, d, p, start);
-    s->positive_share = a < SHORT_STEP ? 1 : 0; /* of the next matrix */
+    s->positive_share = next_share(s, a);
     if (a == 1)
         return s->predictor.active && s->trial_evaluated ? add_chords(s, d, p, minus_f) : DRAPE_OK;
     for (size_t i = 0; i < e->dofs; i++)

@@ -20,7 +20,7 @@ typedef struct start {
 static void add_terms(drape_system *system, const drape_state *at, double *g)
 {
     const drape_model *m = drape_system_model(system);
-    const drape_point point = {.x = at->x, .v = at->v, .internal = at->internal};
+    const drape_point point = {.x = at->x, .v = at->v, .internal = at->internal, .full = true};
     memset(g, 0, 3 * (size_t)m->node_count * sizeof *g);
     for (int32_t i = 0; i < m->term_count; i++)
         drape_system_term(system, i, &point, NULL, g, NULL);

@@ -84,9 +84,9 @@ void drape_step_equation_jacobian(drape_step_equation *s, const double *stress, 
     s->work.jacobians++;
 }
 
-void drape_step_equation_symmetrize(drape_step_equation *s, double *values)
+void drape_step_equation_symmetrize(drape_step_equation *s, double positive_share, double *values)
 {
-    drape_system_symmetrize(s->system, &s->point, values);
+    drape_system_symmetrize(s->system, &s->point, positive_share, values);
 }
 
 double drape_step_equation_make_feasible(drape_step_equation *s, double *p)

@@ -79,8 +79,8 @@ bool drape_step_equation_try(drape_step_equation *equation, const double *d, dou
 void drape_step_equation_jacobian(drape_step_equation *equation, const double *stress, double positive_share,
                                   double *values);
 
-/* Makes J at the last point, without positive parts, symmetric: drape_system_symmetrize. */
-void drape_step_equation_symmetrize(drape_step_equation *equation, double *values);
+/* Makes J at the last point with that share of the positive parts symmetric: drape_system_symmetrize. */
+void drape_step_equation_symmetrize(drape_step_equation *equation, double positive_share, double *values);
 
 /* Shortens a step p from the last point to its largest feasible fraction, which it returns. */
 double drape_step_equation_make_feasible(drape_step_equation *equation, double *p);

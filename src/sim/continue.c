@@ -13,8 +13,8 @@
 
 /* ---- State ---- */
 
-/* The same term on the same cloth, if it has as many internal variables: the first one of that name that no
- * earlier term of the new model stands for. */
+/* The same term on the same cloth: the first one of that name that no earlier term of the new model stands
+ * for; NULL: there is none. */
 static const drape_term *term_like(const drape_model *from, const drape_model *to, const drape_term *term)
 {
     int32_t skip = 0;
@@ -23,18 +23,22 @@ static const drape_term *term_like(const drape_model *from, const drape_model *t
     for (int32_t i = 0; i < from->term_count; i++) {
         const drape_term *t = &from->terms[i];
         if (t->ops == term->ops && t->cloth == term->cloth && skip-- == 0)
-            return drape_term_internals(t) == drape_term_internals(term) ? t : NULL;
+            return t;
     }
     return NULL;
 }
 
+/* Internal variables go on if there are as many, and so do sliders; others are as if the cloth had come from
+ * its start in one step. */
 static void copy_internal(const drape_model *to, const drape_model *from, const double *before, double *after)
 {
     for (int32_t i = 0; i < to->term_count; i++) {
-        const drape_term *term = &to->terms[i], *same = NULL;
-        if (drape_term_internals(term) > 0 && (same = term_like(from, to, term)))
-            memcpy(after + term->first_internal, before + same->first_internal,
-                   (size_t)drape_term_internals(term) * sizeof *after);
+        const drape_term *term = &to->terms[i], *same = term_like(from, to, term);
+        const int64_t own = drape_term_internals(term), sliders = drape_term_slider_count(term);
+        if (same && own > 0 && own == drape_term_internals(same))
+            memcpy(after + term->first_internal, before + same->first_internal, (size_t)own * sizeof *after);
+        if (same && sliders > 0 && sliders == drape_term_slider_count(same))
+            memcpy(after + term->first_slider, before + same->first_slider, (size_t)sliders * sizeof *after);
     }
 }
 

@@ -73,6 +73,15 @@ static uint64_t add_track(uint64_t hash, const drape_track *track)
     return hash;
 }
 
+static uint64_t add_history(uint64_t hash, const drape_history *history)
+{
+    const size_t count = history->key_count;
+    hash = add_integer(hash, (int64_t)count);
+    hash = add_doubles(hash, history->time, count);
+    hash = add_doubles(hash, history->value, count);
+    return add_doubles(hash, history->slope, history->slope ? count : 0);
+}
+
 static uint64_t add_term(uint64_t hash, const drape_term *term)
 {
     const drape_elements *el = &term->elements;
@@ -83,6 +92,9 @@ static uint64_t add_term(uint64_t hash, const drape_term *term)
     hash = add_doubles(hash, term->params, DRAPE_MAX_PARAMS);
     hash = add(hash, el->node, count * (size_t)el->nodes * sizeof *el->node);
     hash = add_doubles(hash, el->rest, count * (size_t)el->rest_count);
+    hash = add_doubles(hash, el->shared, (size_t)el->shared_count);
+    hash = add_doubles(hash, term->slider_stiffness, (size_t)drape_term_slider_count(term));
+    hash = add_doubles(hash, term->slider_limit, (size_t)drape_term_slider_count(term));
     if (el->parts) {
         const drape_parts *p = el->parts;
         const int64_t counts[] = {p->count, p->nodes, p->rest_count, p->link_count};
@@ -94,6 +106,8 @@ static uint64_t add_term(uint64_t hash, const drape_term *term)
         hash = add(hash, p->part, links * sizeof *p->part);
         hash = add_doubles(hash, p->weight, links);
     }
+    if (term->history)
+        hash = add_history(hash, term->history);
     return add_doubles(hash, term->damping, term->damping ? count : 0);
 }
 

@@ -174,7 +174,8 @@ static size_t term_bytes(const drape_term *term)
     const drape_elements *el = &term->elements;
     const drape_parts *p = el->parts;
     size_t bytes = (size_t)el->count *
-                   ((size_t)el->nodes * sizeof *el->node + (size_t)el->rest_count * sizeof *el->rest);
+                       ((size_t)el->nodes * sizeof *el->node + (size_t)el->rest_count * sizeof *el->rest) +
+                   (size_t)el->shared_count * sizeof *el->shared;
     if (p)
         bytes += (size_t)p->count *
                      ((size_t)p->nodes * sizeof *p->node + (size_t)p->rest_count * sizeof *p->rest) +
@@ -182,6 +183,7 @@ static size_t term_bytes(const drape_term *term)
                  (size_t)(term->patches.count + el->count) * (size_t)el->nodes * sizeof *term->patches.node;
     if (term->block)
         bytes += drape_term_places(term) * sizeof *term->block;
+    bytes += 4 * (size_t)drape_term_slider_count(term) * sizeof(double); /* in both states, too */
     if (term->first_internal >= 0)
         bytes += 2 * (size_t)drape_term_internals(term) * sizeof(double); /* in both states */
     return bytes;

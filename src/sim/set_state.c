@@ -88,6 +88,32 @@ static drape_status check_pinned(const drape_sim *sim, const double *given, doub
     return DRAPE_OK;
 }
 
+/* Nodes that pins hold in some directions stay where they are along these. scratch (node_count x 3) */
+static drape_status check_supported(const drape_sim *sim, const double *given, double *scratch)
+{
+    const drape_model *m = sim->model;
+    const double *now = drape_sim_state(sim)->x;
+    for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
+        scratch[i] = given[i] - now[i];
+    drape_system_project(sim->system, scratch);
+    for (int32_t i = 0; i < m->support_count; i++) {
+        const int32_t node = m->supports[i].node;
+        const double *x = given + 3 * (size_t)node, *at = now + 3 * (size_t)node;
+        const double *within = scratch + 3 * (size_t)node;
+        double off[3];
+        for (int k = 0; k < 3; k++)
+            off[k] = x[k] - at[k] - within[k];
+        const double distance = drape_hypot(drape_hypot(off[0], off[1]), off[2]);
+        const drape_cloth *cloth = &m->cloths[drape_model_cloth_of(m, node)];
+        if (m->free_of_node[node] >= 0 && !(distance <= PIN_SLIP * m->length))
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                              "drape_sim_set_state: node %d of %s is at (%g %g %g), which is %g m off the "
+                              "plane or line on which a pin holds it",
+                              (int)(node - cloth->first_node), cloth->name, x[0], x[1], x[2], distance);
+    }
+    return DRAPE_OK;
+}
+
 /* The index of the first frame at or after the present time. */
 static int64_t first_frame(const drape_sim *sim)
 {
@@ -122,6 +148,9 @@ drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, cons
     const drape_model *m = sim->model;
     const size_t size = 3 * (size_t)m->node_count * sizeof *x;
     double *placed = sim->query_scratch;
+    status = check_supported(sim, x, placed);
+    if (status)
+        return status;
     memcpy(placed, x, size);
     place_pinned(sim, x, t, placed);
     status = check_pinned(sim, x, t, placed);
@@ -134,6 +163,7 @@ drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, cons
     stop_fixed(sim, v, next);
     drape_motion_hold_pins(drape_system_steer(sim->system), next->x);
     drape_state_commit(m, now, next);
+    drape_state_slide(m, now, next); /* the account of energy starts anew */
     sim->next = sim->now;
     sim->now = (int)(next - sim->states);
     start_anew(sim, now->t);

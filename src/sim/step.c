@@ -68,7 +68,7 @@ static bool may_relax(const drape_sim *sim)
 static double outer_work(const drape_sim *sim, const drape_state *from, const drape_state *to)
 {
     return drape_system_push_work(sim->system, from->x, to->x) +
-           drape_system_timed_work(sim->system, from->internal, from->x, from->t, to->x, to->t);
+           drape_system_timed_work(sim->system, from, to);
 }
 
 static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step_info *info)
@@ -196,6 +196,8 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     }
     if (!info->committed)
         drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
+    /* what slides leaves the elastic energy, and so stays in the balance */
+    sim->audit.dissipated += drape_state_slide(sim->model, drape_sim_state(sim), next_state(sim));
     rotate_states(sim);
     drape_sim_add_work(sim, info);
     measure_strain(sim, drape_sim_state(sim)->x);

@@ -13,8 +13,15 @@
 
 drape_status drape_refine_create(drape_arena *arena, const drape_pattern *pattern, drape_refine *w)
 {
-    const size_t n = (size_t)pattern->n;
-    *w = (drape_refine){.pattern = pattern};
+    drape_status status = drape_refine_init(arena, pattern->n, w);
+    w->pattern = pattern;
+    return status;
+}
+
+drape_status drape_refine_init(drape_arena *arena, int64_t unknowns, drape_refine *w)
+{
+    const size_t n = (size_t)unknowns;
+    *w = (drape_refine){.n = unknowns};
     w->residual = drape_arena_take(arena, n, sizeof *w->residual);
     w->basis = drape_arena_take(arena, n, (VECTORS + 1) * sizeof *w->basis);
     w->correction = drape_arena_take(arena, n, VECTORS * sizeof *w->correction);
@@ -46,10 +53,17 @@ static double dot(int64_t n, const double *x, const double *y)
     return sum;
 }
 
-/* y += factor A x */
-static void add_product(const drape_pattern *p, const double *values, double factor, const double *x,
-                        double *y)
+/* A matrix by the values of a pattern. */
+typedef struct entries {
+    const drape_pattern *pattern;
+    const double *values;
+} entries;
+
+static void add_product(const void *owner, double factor, const double *x, double *y)
 {
+    const entries *a_entries = owner;
+    const drape_pattern *p = a_entries->pattern;
+    const double *values = a_entries->values;
     for (int32_t j = 0; j < p->block_count; j++) {
         const double x0 = factor * x[3 * j], x1 = factor * x[3 * j + 1], x2 = factor * x[3 * j + 2];
         for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
@@ -62,12 +76,13 @@ static void add_product(const drape_pattern *p, const double *values, double fac
     }
 }
 
-static void find_residual(drape_refine *w, const double *values, const double *b, const double *x)
+static void find_residual(drape_refine *w, drape_add_product *product, const void *owner, const double *b,
+                          const double *x)
 {
-    const int64_t n = w->pattern->n;
+    const int64_t n = w->n;
     for (int64_t i = 0; i < n; i++)
         w->residual[i] = b[i];
-    add_product(w->pattern, values, -1, x, w->residual);
+    product(owner, -1, x, w->residual);
     w->error = largest(n, w->residual) / (largest(n, x) + largest(n, b));
     if (largest(n, b) == 0 && largest(n, w->residual) == 0)
         w->error = 0;
@@ -77,7 +92,7 @@ static void find_residual(drape_refine *w, const double *values, const double *b
  * its column of the Hessenberg matrix. */
 static void orthogonalise(const drape_refine *w, int j, double *h)
 {
-    const int64_t n = w->pattern->n;
+    const int64_t n = w->n;
     double *v = w->basis + (j + 1) * n;
     for (int i = 0; i <= j; i++) {
         const double *u = w->basis + i * n;
@@ -110,7 +125,7 @@ static void rotate(int j, double *h, double *c, double *s, double *g)
 /* Adds to x the combination of the corrections with the least residual. */
 static void combine(const drape_refine *w, int count, double (*h)[VECTORS + 1], double *g, double *x)
 {
-    const int64_t n = w->pattern->n;
+    const int64_t n = w->n;
     for (int j = count - 1; j >= 0; j--) {
         for (int i = j + 1; i < count; i++)
             g[j] -= h[i][j] * g[i];
@@ -121,10 +136,10 @@ static void combine(const drape_refine *w, int count, double (*h)[VECTORS + 1], 
 }
 
 /* One cycle of GMRES: corrects x until the residual is expected to be below `target`. */
-static void correct(drape_refine *w, drape_preconditioner *apply, void *factors, const double *values,
-                    double target, double *x)
+static void correct(drape_refine *w, drape_preconditioner *apply, void *factors, drape_add_product *product,
+                    const void *owner, double target, double *x)
 {
-    const int64_t n = w->pattern->n;
+    const int64_t n = w->n;
     double h[VECTORS][VECTORS + 1] = {{0}}, c[VECTORS], s[VECTORS], g[VECTORS + 1] = {0};
     int j = 0;
     g[0] = norm(n, w->residual);
@@ -135,7 +150,7 @@ static void correct(drape_refine *w, drape_preconditioner *apply, void *factors,
         apply(factors, w->basis + j * n, z);
         for (int64_t k = 0; k < n; k++)
             v[k] = 0;
-        add_product(w->pattern, values, 1, z, v);
+        product(owner, 1, z, v);
         orthogonalise(w, j, h[j]);
         rotate(j, h[j], c, s, g);
         j++;
@@ -147,27 +162,35 @@ static void correct(drape_refine *w, drape_preconditioner *apply, void *factors,
 drape_status drape_refine_solve(drape_refine *w, drape_preconditioner *apply, void *factors,
                                 const double *values, const double *b, double *x)
 {
-    const int64_t n = w->pattern->n;
+    const int64_t n = w->n;
+    const entries a = {w->pattern, values};
     double before = INFINITY;
     apply(factors, b, x);
-    find_residual(w, values, b, x);
+    find_residual(w, add_product, &a, b, x);
     w->first_error = w->error;
     for (int cycle = 0; cycle < CYCLES && w->error > TARGET && w->error < before / 2; cycle++) {
         const double size = largest(n, x) + largest(n, b);
         before = w->error;
-        correct(w, apply, factors, values, 0.1 * TARGET * size * sqrt((double)n), x);
-        find_residual(w, values, b, x);
+        correct(w, apply, factors, add_product, &a, 0.1 * TARGET * size * sqrt((double)n), x);
+        find_residual(w, add_product, &a, b, x);
     }
     return w->error <= BOUND ? DRAPE_OK : DRAPE_RETRY_LINEAR;
+}
+
+void drape_refine_reduce_product(drape_refine *w, drape_preconditioner *apply, void *factors,
+                                 drape_add_product *product, const void *owner, const double *b,
+                                 double tolerance, double *x)
+{
+    const double target = tolerance * norm(w->n, b);
+    apply(factors, b, x);
+    find_residual(w, product, owner, b, x);
+    if (norm(w->n, w->residual) > target)
+        correct(w, apply, factors, product, owner, target, x);
 }
 
 void drape_refine_reduce(drape_refine *w, drape_preconditioner *apply, void *factors, const double *values,
                          const double *b, double tolerance, double *x)
 {
-    const int64_t n = w->pattern->n;
-    const double target = tolerance * norm(n, b);
-    apply(factors, b, x);
-    find_residual(w, values, b, x);
-    if (norm(n, w->residual) > target)
-        correct(w, apply, factors, values, target, x);
+    const entries a = {w->pattern, values};
+    drape_refine_reduce_product(w, apply, factors, add_product, &a, b, tolerance, x);
 }

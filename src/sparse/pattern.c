@@ -3,6 +3,7 @@
 #include "sparse/pattern.h"
 
 #include <assert.h>
+#include <math.h>
 #include <string.h>
 
 /* Lists of neighbours, with repeats: entries start[j] ... start[j+1] - 1 of row. */
@@ -212,4 +213,24 @@ void drape_pattern_symmetrize(const drape_pattern *p, double *values)
             double *mirror = drape_pattern_at(p, values, i, drape_pattern_find(p, j, i), &mirror_stride);
             symmetrize_block(block, stride, mirror, mirror_stride);
         }
+}
+
+double drape_pattern_asymmetry(const drape_pattern *p, const double *values)
+{
+    double largest = 0, difference = 0;
+    for (int32_t j = 0; j < p->block_count; j++)
+        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
+            int64_t stride, mirror_stride;
+            const int32_t i = p->block_row[k];
+            double *const from = (double *)(uintptr_t)values; /* only read */
+            const double *block = drape_pattern_at(p, from, j, k, &stride),
+                         *mirror = drape_pattern_at(p, from, i, drape_pattern_find(p, j, i), &mirror_stride);
+            for (int c = 0; c < 3; c++)
+                for (int r = 0; r < 3; r++) {
+                    const double one = block[c * stride + r], other = mirror[r * mirror_stride + c];
+                    largest = fmax(largest, fmax(fabs(one), fabs(other)));
+                    difference = fmax(difference, fabs(one - other));
+                }
+        }
+    return largest > 0 ? difference / largest : 0;
 }

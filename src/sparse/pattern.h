@@ -46,6 +46,9 @@ void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_n
 /* Replaces A by (A + A')/2; a symmetric matrix keeps its bits. */
 void drape_pattern_symmetrize(const drape_pattern *pattern, double *values);
 
+/* The largest difference of two mirrored entries, in parts of the largest entry. */
+double drape_pattern_asymmetry(const drape_pattern *pattern, const double *values);
+
 /* Returns the first value of a block and the distance to its next column. */
 static inline double *drape_pattern_at(const drape_pattern *pattern, double *values, int32_t column,
                                        int32_t block, int64_t *stride)

@@ -27,6 +27,14 @@ bool drape_load_takes(const drape_cloth_view *cloth, const double *values, int32
 /* Whether a point lies in a box, boundary and rounding included. */
 bool drape_load_in_box(const double *x, const double *low, const double *high);
 
+/* How the load varies in time; the library multiplies by it. One value each, after all others. */
+#define DRAPE_LOAD_HISTORY                                                                                   \
+    DRAPE_TEXT("history", "name of a history of the scene, by which the load is multiplied",                 \
+               .derived = "none: it is constant")
+#define DRAPE_LOAD_RAMP                                                                                      \
+    DRAPE_NUMBER("ramp", "s", 0, 0, 1e9,                                                                     \
+                 "in place of a history: the time in which the load rises smoothly from 0; 0: it does not")
+
 #define DRAPE_LOAD_PARAMS                                                                                    \
     [DRAPE_LOAD_LIST_EDGE] =                                                                                 \
         DRAPE_CHOICE("edge", 0, drape_load_edges, "a side of a grid, or all of the boundary"),               \

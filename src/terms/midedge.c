@@ -28,80 +28,32 @@
 #include <math.h>
 #include <string.h>
 
-#define MIN_EIGENVALUE 1e-4 /* over the largest; phi ignores curvatures below */
-#define MIN_C          1e-9 /* smaller coefficients c are rounding errors */
-
-const int drape_midedge_hinge[MIDEDGE_HINGES][4] = {{0, 1, 2, 3}, {1, 2, 0, 4},  {2, 0, 1, 5},
-                                                    {0, 3, 1, 6}, {3, 1, 0, 7},  {1, 4, 2, 8},
-                                                    {4, 2, 1, 9}, {2, 5, 0, 10}, {5, 0, 2, 11}};
+#define MIN_C 1e-9 /* smaller coefficients c are rounding errors */
 
 /* A patch during construction. */
 typedef struct patch {
     const drape_cloth_view *cloth;
     drape_midedge *out;
-    int32_t triangle, beyond[3];    /* the triangles beside it, -1: none */
-    bool open[MIDEDGE_HINGES];      /* the hinge exists and is not clamped */
-    double flat[2 * MIDEDGE_NODES]; /* the nodes unfolded into the plane of the triangle */
-    double c[3][MIDEDGE_HINGES];    /* phi_i = sum c theta */
+    int32_t triangle;
+    drape_patch around;
+    bool open[MIDEDGE_HINGES];   /* the hinge exists and is not clamped */
+    double c[3][MIDEDGE_HINGES]; /* phi_i = sum c theta */
 } patch;
 
 /* ---- Neighbours ---- */
 
-static int corner_of(const int32_t *nodes, int32_t node)
+static void find_neighbours(patch *p, const double flat[6])
 {
-    return nodes[0] == node ? 0 : nodes[1] == node ? 1 : 2;
-}
-
-/* The triangle beyond the edge of `triangle` between nodes a and b, that edge, and the apex; -1: none. */
-static int32_t beyond(const drape_cloth_view *cloth, int32_t triangle, int32_t a, int32_t b, int32_t *edge,
-                      int32_t *apex)
-{
-    const int32_t *own = cloth->triangle + 3 * (size_t)triangle;
-    const int i = corner_of(own, a), j = corner_of(own, b), side = (i + 1) % 3 == j ? i : j;
-    *edge = cloth->triangle_edge[3 * (size_t)triangle + (size_t)side];
-    const int32_t *beside = cloth->edge_triangle + 2 * (size_t)*edge;
-    const int32_t other = beside[0] == triangle ? beside[1] : beside[0];
-    *apex = -1;
-    for (int k = 0; other >= 0 && k < 3; k++) {
-        const int32_t node = cloth->triangle[3 * (size_t)other + (size_t)k];
-        if (node != a && node != b)
-            *apex = node;
-    }
-    return other;
-}
-
-/* Adds the apex beyond hinge h: its node, its place in the plane, and whether the hinge is open. */
-static int32_t add_beyond(patch *p, int32_t triangle, int h)
-{
-    const int *local = drape_midedge_hinge[h];
-    int32_t *node = p->out->node, *edge = &p->out->edge[h];
-    const int32_t other = beyond(p->cloth, triangle, node[local[0]], node[local[1]], edge, &node[local[3]]);
-    p->open[h] = other >= 0 && !p->cloth->edge_clamped[*edge];
-    p->out->turned[h] = p->cloth->edge_triangle[2 * (size_t)*edge] != triangle;
-    if (other < 0)
-        return other;
-    const double *a = p->cloth->rest + 3 * (size_t)node[local[0]],
-                 *b = p->cloth->rest + 3 * (size_t)node[local[1]];
-    const double *from = p->flat + 2 * local[0], *to = p->flat + 2 * local[1];
-    double along[3], d[3], normal[3];
-    vec3_sub(b, a, along);
-    vec3_sub(p->cloth->rest + 3 * (size_t)node[local[3]], a, d);
-    vec3_cross(along, d, normal);
-    const double length2 = vec3_dot(along, along), s = vec3_dot(d, along) / length2;
-    const double rise = vec3_norm(normal) / length2; /* altitude over length */
-    p->flat[2 * local[3]] = from[0] + s * (to[0] - from[0]) + rise * (to[1] - from[1]);
-    p->flat[2 * local[3] + 1] = from[1] + s * (to[1] - from[1]) - rise * (to[0] - from[0]);
-    return other;
-}
-
-static void find_neighbours(patch *p)
-{
+    drape_midedge *out = p->out;
+    drape_patch_around(p->cloth, p->triangle, flat, &p->around);
+    memcpy(out->node, p->around.node, sizeof out->node);
+    memcpy(out->edge, p->around.edge, sizeof out->edge);
+    memcpy(out->turned, p->around.turned, sizeof out->turned);
+    for (int h = 0; h < MIDEDGE_HINGES; h++)
+        p->open[h] = p->around.beyond[h] >= 0 && !p->cloth->edge_clamped[out->edge[h]];
     for (int i = 0; i < 3; i++) {
-        p->beyond[i] = add_beyond(p, p->triangle, i);
-        p->out->clamped[i] = p->cloth->edge_clamped[p->out->edge[i]];
-        p->out->free[i] = p->beyond[i] < 0 && !p->out->clamped[i];
-        for (int k = 3 + 2 * i; k < 5 + 2 * i && p->beyond[i] >= 0; k++)
-            add_beyond(p, p->beyond[i], k);
+        out->clamped[i] = p->cloth->edge_clamped[out->edge[i]];
+        out->free[i] = p->around.beyond[i] < 0 && !out->clamped[i];
     }
 }
 
@@ -110,7 +62,8 @@ static void find_neighbours(patch *p)
 /* Outward normal of hinge h (2) and its length, in the plane. */
 static double outward(const patch *p, int h, double nu[2])
 {
-    const double *a = p->flat + 2 * drape_midedge_hinge[h][0], *b = p->flat + 2 * drape_midedge_hinge[h][1];
+    const double *a = p->around.flat + 2 * drape_patch_hinge[h][0],
+                 *b = p->around.flat + 2 * drape_patch_hinge[h][1];
     const double x = b[0] - a[0], y = b[1] - a[1], length = drape_hypot(x, y);
     nu[0] = y / length;
     nu[1] = -x / length;
@@ -120,7 +73,8 @@ static double outward(const patch *p, int h, double nu[2])
 /* Slope along nu of the linear deflection that is w at three corners. */
 static double slope(const patch *p, const int corner[3], const double w[3], const double nu[2])
 {
-    const double *a = p->flat + 2 * corner[0], *b = p->flat + 2 * corner[1], *c = p->flat + 2 * corner[2];
+    const double *a = p->around.flat + 2 * corner[0], *b = p->around.flat + 2 * corner[1],
+                 *c = p->around.flat + 2 * corner[2];
     const double u[2] = {b[0] - a[0], b[1] - a[1]}, v[2] = {c[0] - a[0], c[1] - a[1]};
     const double area2 = u[0] * v[1] - u[1] * v[0], wu = w[1] - w[0], wv = w[2] - w[0];
     return ((wu * v[1] - wv * u[1]) * nu[0] + (wv * u[0] - wu * v[0]) * nu[1]) / area2;
@@ -129,7 +83,8 @@ static double slope(const patch *p, const int corner[3], const double w[3], cons
 /* x^2/2, y^2/2 or xy (kind 0, 1, 2) at a node, about a point and in units of a length. */
 static double quadratic(const patch *p, int kind, int node, const double about[2], double unit)
 {
-    const double x = (p->flat[2 * node] - about[0]) / unit, y = (p->flat[2 * node + 1] - about[1]) / unit;
+    const double x = (p->around.flat[2 * node] - about[0]) / unit,
+                 y = (p->around.flat[2 * node + 1] - about[1]) / unit;
     return kind == 0 ? x * x / 2 : kind == 1 ? y * y / 2 : x * y;
 }
 
@@ -137,7 +92,7 @@ static double quadratic(const patch *p, int kind, int node, const double about[2
 static void slopes(const patch *p, int h, int kind, const double about[2], double unit, const double nu[2],
                    double *inside, double *outside)
 {
-    const int *n = drape_midedge_hinge[h];
+    const int *n = drape_patch_hinge[h];
     const int in[3] = {n[0], n[1], n[2]}, out[3] = {n[1], n[0], n[3]};
     double w[4];
     for (int i = 0; i < 4; i++)
@@ -148,57 +103,13 @@ static void slopes(const patch *p, int h, int kind, const double about[2], doubl
 
 /* ---- phi ---- */
 
-/* Cyclic Jacobi rotations: leaves the eigenvalues on the diagonal of a (3 x 3), eigenvectors in the columns
- * of v. */
-static void diagonalize(double a[9], double v[9])
-{
-    for (int i = 0; i < 9; i++)
-        v[i] = i % 4 == 0;
-    for (int turn = 0; turn < 30; turn++) { /* ten sweeps: convergence is quadratic */
-        const int p = turn % 3 == 2 ? 1 : 0, q = turn % 3 == 0 ? 1 : 2;
-        if (a[3 * p + q] == 0)
-            continue;
-        const double tau = (a[4 * q] - a[4 * p]) / (2 * a[3 * p + q]);
-        const double t = (tau >= 0 ? 1 : -1) / (fabs(tau) + drape_hypot(1, tau)), c = 1 / drape_hypot(1, t),
-                     s = t * c;
-        for (int i = 0; i < 3; i++) {
-            const double ap = a[3 * i + p], aq = a[3 * i + q], vp = v[3 * i + p], vq = v[3 * i + q];
-            a[3 * i + p] = c * ap - s * aq, a[3 * i + q] = s * ap + c * aq;
-            v[3 * i + p] = c * vp - s * vq, v[3 * i + q] = s * vp + c * vq;
-        }
-        for (int i = 0; i < 3; i++) {
-            const double ap = a[3 * p + i], aq = a[3 * q + i];
-            a[3 * p + i] = c * ap - s * aq, a[3 * q + i] = s * ap + c * aq;
-        }
-    }
-}
-
-/* The smallest c (n) with sum_j c_j m_j = target, for m (3 x n), by the eigenvalues of m m'. */
-static void least_solution(const double *m, int n, const double target[3], double *c)
-{
-    double a[9] = {0}, v[9], y[3] = {0};
-    for (int i = 0; i < 9; i++)
-        for (int j = 0; j < n; j++)
-            a[i] += m[n * (i / 3) + j] * m[n * (i % 3) + j];
-    diagonalize(a, v);
-    const double largest = fmax(a[0], fmax(a[4], a[8]));
-    for (int k = 0; k < 3; k++) {
-        if (!(a[4 * k] > MIN_EIGENVALUE * largest))
-            continue;
-        const double along = v[k] * target[0] + v[3 + k] * target[1] + v[6 + k] * target[2];
-        for (int i = 0; i < 3; i++)
-            y[i] += v[3 * i + k] * along / a[4 * k];
-    }
-    for (int j = 0; j < n; j++)
-        c[j] = m[j] * y[0] + m[n + j] * y[1] + m[2 * n + j] * y[2];
-}
-
 /* phi of own edge i from the open hinges of its two triangles. It is exact for quadratic deflections about
  * the middle of the edge, whose slope there is 0. */
 static void find_phi(patch *p, int i)
 {
     const int near[5] = {i, (i + 1) % 3, (i + 2) % 3, 3 + 2 * i, 4 + 2 * i};
-    const double *a = p->flat + 2 * drape_midedge_hinge[i][0], *b = p->flat + 2 * drape_midedge_hinge[i][1];
+    const double *a = p->around.flat + 2 * drape_patch_hinge[i][0],
+                 *b = p->around.flat + 2 * drape_patch_hinge[i][1];
     const double middle[2] = {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2};
     double nu[2], m[15], target[3], c[5], in, out;
     int hinge[5], n = 0;
@@ -216,7 +127,7 @@ static void find_phi(patch *p, int i)
             m[n * kind + j] = out - in;
         }
     }
-    least_solution(m, n, target, c);
+    drape_least_solution(m, n, target, c);
     for (int j = 0; j < n; j++)
         p->c[i][hinge[j]] = fabs(c[j]) > MIN_C ? c[j] : 0;
 }
@@ -271,17 +182,13 @@ bool drape_midedge_of(const drape_cloth_view *cloth, int32_t triangle, const dou
 {
     patch p = {.cloth = cloth, .out = out, .triangle = triangle};
     const double *corner[3];
-    double axes[6];
+    double axes[6], flat[6];
     memset(out, 0, sizeof *out);
-    for (int k = 0; k < MIDEDGE_NODES; k++)
-        out->node[k] = k < 3 ? cloth->triangle[3 * (size_t)triangle + (size_t)k] : -1;
-    for (int h = 0; h < MIDEDGE_HINGES; h++)
-        out->edge[h] = -1;
     for (int k = 0; k < 3; k++)
-        corner[k] = cloth->rest + 3 * (size_t)out->node[k];
-    if (!drape_orthotropic_frame(values, corner, law, axes, p.flat))
+        corner[k] = cloth->rest + 3 * (size_t)cloth->triangle[3 * (size_t)triangle + (size_t)k];
+    if (!drape_orthotropic_frame(values, corner, law, axes, flat))
         return false;
-    find_neighbours(&p);
+    find_neighbours(&p, flat);
     for (int i = 0; i < 3; i++)
         if (p.open[i])
             find_phi(&p, i);

@@ -1,19 +1,14 @@
 /*
- * midedge.h: the shape operator of a triangle from the angles of the hinges around it.
- *
- * Local nodes: 0 1 2 of the triangle; 3 + i the apex beyond its edge i, which goes from node i to node i + 1;
- * 6 + 2 i and 7 + 2 i the apices beyond the two other edges of that neighbour. Hinges: 0 1 2 at its own
- * edges; 3 + 2 i and 4 + 2 i at those of neighbour i.
+ * midedge.h: the shape operator of a triangle from the angles of the hinges around it, with the local nodes
+ * and hinges of patch.h.
  */
 #ifndef DRAPE_TERMS_MIDEDGE_H
 #define DRAPE_TERMS_MIDEDGE_H
 
 #include "drape/extend.h"
+#include "terms/patch.h"
 
-enum { MIDEDGE_NODES = 12, MIDEDGE_HINGES = 9 };
-
-/* Local nodes of each hinge: x0 x1 the edge, x2 the inner apex, x3 the outer one. */
-extern const int drape_midedge_hinge[MIDEDGE_HINGES][4];
+enum { MIDEDGE_NODES = DRAPE_PATCH_NODES, MIDEDGE_HINGES = DRAPE_PATCH_HINGES };
 
 typedef struct drape_midedge {
     int32_t node[MIDEDGE_NODES];  /* local to the cloth; -1: there is none */

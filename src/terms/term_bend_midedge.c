@@ -10,6 +10,13 @@
  * A clamped edge has a direction in space instead of a second triangle: x3 = (x0 + x1)/2 + r with r as at
  * rest. Such a hinge belongs to one triangle, and its fourth node is a copy of the first.
  *
+ * Hysteresis and creases are sliders (model/slider.h) on the squares. Friction between yarns, of KES-FB2's
+ * moment HB = B friction per width: a slider of the limit HB that slips after a change of curvature by
+ * friction_curvature, so that the loop of moment over curvature is 2 HB high. A crease: of the rigidity B the
+ * share `hardening` stays elastic, and the rest yields at yield_curvature, so that a fold of the curvature K
+ * springs back to (1 - hardening) (K - yield_curvature). Each square slides by itself, which is the moment
+ * along warp and weft if they are not coupled.
+ *
  * The internal variable of a part is its angle in the last accepted state: each angle is taken on the branch
  * nearest to it.
  */
@@ -24,17 +31,27 @@
 #include <math.h>
 #include <string.h>
 
+#define LEAST_STIFFNESS 1e-100 /* [N m] */
+
 enum {
     PARAM_REST = DRAPE_ORTHOTROPIC_COUNT,
     PARAM_CURVATURE,
     PARAM_MIN_ALTITUDE = PARAM_CURVATURE + 3,
-    PARAM_MAX_TURN
+    PARAM_MAX_TURN,
+    PARAM_FRICTION,
+    PARAM_FRICTION_CURVATURE,
+    PARAM_YIELD_CURVATURE,
+    PARAM_HARDENING
 };
 enum {
     LIST_REST = DRAPE_ORTHOTROPIC_DIRECTION + 1,
     LIST_CURVATURE,
     LIST_MIN_ALTITUDE,
     LIST_MAX_TURN,
+    LIST_FRICTION,
+    LIST_FRICTION_CURVATURE,
+    LIST_YIELD_CURVATURE,
+    LIST_HARDENING,
     LIST_COUNT
 };
 enum { REST_MESH, REST_FLAT };
@@ -63,6 +80,19 @@ static const drape_param params[LIST_COUNT] = {
     [LIST_MAX_TURN] =
         DRAPE_NUMBER("max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
                      "a step that turns a hinge by more is rejected: near pi its angle is ambiguous"),
+    [LIST_FRICTION] =
+        DRAPE_NUMBER("friction", "1/m", 0, 0, 1e9,
+                     "friction between yarns: the curvature whose elastic moment it is as large "
+                     "as, HB/B of a KES test; 0: none"),
+    [LIST_FRICTION_CURVATURE] =
+        DRAPE_NUMBER("friction_curvature", "1/m", DRAPE_DERIVED("required with friction"), DRAPE_ABOVE(0),
+                     1e9, "change of curvature at which yarns slip"),
+    [LIST_YIELD_CURVATURE] =
+        DRAPE_NUMBER("yield_curvature", "1/m", DRAPE_DERIVED("none: no creases"), DRAPE_ABOVE(0), 1e9,
+                     "curvature beyond which bending leaves a crease"),
+    [LIST_HARDENING] =
+        DRAPE_NUMBER("hardening", "1", DRAPE_DERIVED("required with yield_curvature"), DRAPE_ABOVE(0),
+                     DRAPE_BELOW(1), "rigidity beyond yield_curvature over that below"),
 };
 
 /* x3 of the parts that are clamped. Returns the lanes in which they are, as bits. */
@@ -149,7 +179,7 @@ static int32_t hinge_at(const drape_cloth_view *cloth, int32_t edge)
  * first. Returns the sign of its angle in the patch, which depends on the orientation of the triangle. */
 static int part_nodes(const drape_cloth_view *cloth, const drape_midedge *patch, int h, int32_t node[4])
 {
-    const int *local = drape_midedge_hinge[h];
+    const int *local = drape_patch_hinge[h];
     if (h < 3 && patch->clamped[h]) {
         for (int a = 0; a < 4; a++)
             node[a] = patch->node[local[a % 3]];
@@ -273,6 +303,52 @@ static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch,
     }
 }
 
+/* The squares of a patch are found from products of stiffnesses, which must not underflow. */
+static drape_status check_law(const double law[9], drape_term_builder *builder)
+{
+    for (int i = 0; i < 3; i++)
+        if (!(law[4 * i] >= LEAST_STIFFNESS))
+            return drape_term_refuse(builder,
+                                     "a bending stiffness of %g N m is too small to be computed with; it is "
+                                     "at least %g N m",
+                                     law[4 * i], LEAST_STIFFNESS);
+    return DRAPE_OK;
+}
+
+/* The sliders of a square for each unit of its stiffness, and the share of that which is elastic. */
+typedef struct hysteresis {
+    int count;
+    double stiffness[2], limit[2], elastic;
+} hysteresis;
+
+static drape_status hysteresis_of(const double *values, const double law[9], drape_term_builder *builder,
+                                  hysteresis *out)
+{
+    const double friction = values[PARAM_FRICTION], begins = values[PARAM_FRICTION_CURVATURE],
+                 yield = values[PARAM_YIELD_CURVATURE], hardening = values[PARAM_HARDENING];
+    *out = (hysteresis){.elastic = 1};
+    if (friction > 0 && isnan(begins))
+        return drape_term_refuse(builder, "\"friction\" = %g needs \"friction_curvature\"", friction);
+    if (isnan(yield) != isnan(hardening))
+        return drape_term_refuse(builder, "\"%s\" is given without \"%s\"",
+                                 isnan(yield) ? "hardening" : "yield_curvature",
+                                 isnan(yield) ? "yield_curvature" : "hardening");
+    if ((friction > 0 || !isnan(yield)) && law[1] != 0)
+        return drape_term_refuse(
+            builder, "\"%s\" needs \"poisson\" 0: warp and weft slide independently of each other",
+            friction > 0 ? "friction" : "yield_curvature");
+    if (friction > 0) {
+        out->stiffness[out->count] = friction / begins;
+        out->limit[out->count++] = friction;
+    }
+    if (!isnan(yield)) {
+        out->elastic = hardening;
+        out->stiffness[out->count] = 1 - hardening;
+        out->limit[out->count++] = (1 - hardening) * yield;
+    }
+    return DRAPE_OK;
+}
+
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     const double *bend = values + PARAM_CURVATURE;
@@ -281,7 +357,14 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     drape_orthotropic_law(values, cloth->bending,
                           m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio), m->poisson_ratio,
                           law);
-    drape_status status = reserve(cloth, values, law, builder);
+    hysteresis slides;
+    drape_status status = check_law(law, builder);
+    if (!status)
+        status = hysteresis_of(values, law, builder, &slides);
+    if (!status)
+        status = reserve(cloth, values, law, builder);
+    if (!status && slides.count > 0)
+        status = drape_term_reserve_sliders(builder, slides.count);
     int32_t element = 0, clamps = cloth->hinge_count;
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
         drape_midedge patch;
@@ -294,7 +377,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
             node[a] = node[0];
         for (int r = 0; r < patch.rank; r++, element++) {
             const double *l = patch.l + 3 * r;
-            double rest[REST_COUNT] = {[REST_K] = patch.k[r]};
+            double rest[REST_COUNT] = {[REST_K] = slides.elastic * patch.k[r]};
             rest[REST_ALTITUDE] =
                 min_altitude(cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
                              cloth->rest + 3 * (size_t)node[2]);
@@ -308,6 +391,9 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
             }
             rest[REST_Q0] += l[0] * bend[0] + l[1] * bend[1] + 2 * l[2] * bend[2];
             drape_term_set(builder, element, node, rest);
+            for (int s = 0; s < slides.count; s++)
+                drape_term_set_slider(builder, s, element, slides.stiffness[s] * patch.k[r],
+                                      slides.limit[s] * patch.k[r]);
         }
     }
     return status;

@@ -1,5 +1,5 @@
 /*
- * drag.wind: the pressure of a steady wind on every triangle. With m = (x1 - x0) x (x2 - x0), twice the
+ * drag.wind: the pressure of a wind on every triangle. With m = (x1 - x0) x (x2 - x0), twice the
  * area times the normal n, and u = w - (v0 + v1 + v2)/3, the wind relative to the triangle,
  *     F = 1/2 rho C A |u.n| (u.n) n = rho C/4 |q| q m / |m|^2,   q = u . m,
  * a third of it on each node. So the wind acts along the normal only (Provot 1995, section 3.2, there linear
@@ -17,7 +17,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { PARAM_DENSITY, PARAM_COEFFICIENT, PARAM_WIND, PARAM_COUNT };
+enum { PARAM_DENSITY, PARAM_COEFFICIENT, PARAM_WIND, LIST_HISTORY, LIST_RAMP, PARAM_COUNT };
 enum { REST_FACTOR, REST_WIND, REST_COUNT = REST_WIND + 3 };
 enum { D = 9 };
 
@@ -27,6 +27,11 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_COEFFICIENT] = DRAPE_NUMBER("coefficient", "1", 1.17, 0, 1e6,
                                        "drag coefficient across the sheet: 1.17 is a square plate"),
     [PARAM_WIND] = DRAPE_VECTOR("wind", "m/s", 0, -1e6, 1e6, "velocity of the medium"),
+    [LIST_HISTORY] = DRAPE_TEXT("history", "name of a history of the scene, by which the wind is multiplied",
+                                .derived = "none: it is constant"),
+    [LIST_RAMP] = DRAPE_NUMBER("ramp", "s", 0, 0, 1e9,
+                               "in place of a history: the time in which the wind rises smoothly from 0; 0: "
+                               "it does not"),
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
@@ -59,7 +64,7 @@ static flow flow_of(const drape_elements *el, int32_t element, const double *x, 
     vec3_cross(f.a, f.b, f.m);
     f.area2 = vec3_dot(f.m, f.m);
     for (int k = 0; k < 3; k++)
-        f.u[k] = el->rest[(size_t)(REST_WIND + k) * (size_t)el->count + (size_t)element] -
+        f.u[k] = el->factor * el->rest[(size_t)(REST_WIND + k) * (size_t)el->count + (size_t)element] -
                  (moves[0][k] + moves[1][k] + moves[2][k]) / 3;
     f.q = vec3_dot(f.u, f.m);
     return f;

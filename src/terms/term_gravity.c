@@ -1,6 +1,9 @@
 /* gravity: E = -m g . x of every node, with its lumped mass m. Linear: it has no Hessian. It is modelled if
  * the gravity of the scene is not zero. */
+#include "terms/load.h"
 #include "terms/terms.h"
+
+static const drape_param params[] = {DRAPE_LOAD_HISTORY};
 
 enum { REST_FORCE_X, REST_FORCE_Y, REST_FORCE_Z, REST_COUNT };
 
@@ -37,7 +40,8 @@ const drape_term_ops drape_term_gravity = {
     .struct_size = sizeof(drape_term_ops),
     .entry = {.name = "gravity",
               .summary = "weight of every node: E = -m g . x; acts whenever the scene's gravity is not zero",
-              .reference = "lumped masses: a third of each triangle to each of its nodes"},
+              .reference = "lumped masses: a third of each triangle to each of its nodes",
+              DRAPE_PARAMS(params)},
     .element_name = "node",
     .nodes = 1,
     .linear = true,

@@ -3,7 +3,7 @@
 #include "terms/load.h"
 #include "terms/terms.h"
 
-enum { LIST_FORCE = DRAPE_LOAD_LIST_COUNT, LIST_COUNT };
+enum { LIST_FORCE = DRAPE_LOAD_LIST_COUNT, LIST_HISTORY, LIST_RAMP, LIST_COUNT };
 enum { PARAM_FORCE = DRAPE_LOAD_COUNT };
 enum { REST_HALF_X, REST_HALF_Y, REST_HALF_Z, REST_COUNT }; /* half the force on an edge [N] */
 
@@ -11,6 +11,8 @@ static const drape_param params[LIST_COUNT] = {
     DRAPE_LOAD_PARAMS,
     [LIST_FORCE] = DRAPE_VECTOR("force", "N/m", 0, -1e12, 1e12,
                                 "force per length of the edge at rest; it keeps its direction"),
+    [LIST_HISTORY] = DRAPE_LOAD_HISTORY,
+    [LIST_RAMP] = DRAPE_LOAD_RAMP,
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

@@ -23,7 +23,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { LIST_MOMENT = DRAPE_LOAD_LIST_COUNT, LIST_COUNT };
+enum { LIST_MOMENT = DRAPE_LOAD_LIST_COUNT, LIST_HISTORY, LIST_RAMP, LIST_COUNT };
 enum { PARAM_MOMENT = DRAPE_LOAD_COUNT };
 enum { REST_MOMENT, REST_TANGENT, REST_NORMAL = 4, REST_COUNT = 7 }; /* M L [N m], t0, n0 */
 
@@ -32,6 +32,8 @@ static const drape_param params[LIST_COUNT] = {
     [LIST_MOMENT] = DRAPE_NUMBER("moment", "N", DRAPE_REQUIRED, -1e12, 1e12,
                                  "moment per length of the edge [N m/m]; positive: it bends towards the side "
                                  "from which triangles turn counterclockwise"),
+    [LIST_HISTORY] = DRAPE_LOAD_HISTORY,
+    [LIST_RAMP] = DRAPE_LOAD_RAMP,
 };
 
 /* The edge in the orientation of its triangle, then the apex. */

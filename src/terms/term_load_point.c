@@ -2,14 +2,8 @@
 #include "terms/load.h"
 #include "terms/terms.h"
 
-enum { LIST_NODE, LIST_BOX_MIN, LIST_BOX_MAX, LIST_FORCE, LIST_RAMP, LIST_COUNT };
-enum {
-    PARAM_NODE,
-    PARAM_BOX_MIN,
-    PARAM_BOX_MAX = PARAM_BOX_MIN + 3,
-    PARAM_FORCE = PARAM_BOX_MAX + 3,
-    PARAM_RAMP = PARAM_FORCE + 3
-};
+enum { LIST_NODE, LIST_BOX_MIN, LIST_BOX_MAX, LIST_FORCE, LIST_HISTORY, LIST_RAMP, LIST_COUNT };
+enum { PARAM_NODE, PARAM_BOX_MIN, PARAM_BOX_MAX = PARAM_BOX_MIN + 3, PARAM_FORCE = PARAM_BOX_MAX + 3 };
 
 static const drape_param params[LIST_COUNT] = {
     [LIST_NODE] = DRAPE_INTEGER("node", "1", DRAPE_DERIVED("all nodes in the box"), 0, 2147483647,
@@ -19,9 +13,8 @@ static const drape_param params[LIST_COUNT] = {
                                   "at rest, are loaded"),
     [LIST_BOX_MAX] = DRAPE_VECTOR("box_max", "m", 1e9, -1e9, 1e9, "opposite corner of the box"),
     [LIST_FORCE] = DRAPE_VECTOR("force", "N", 0, -1e12, 1e12, "on each of the nodes; it keeps its direction"),
-    [LIST_RAMP] = DRAPE_NUMBER("ramp", "s", 0, 0, 1e9,
-                               "time in which it rises smoothly from 0; 0: it "
-                               "acts from the start"),
+    [LIST_HISTORY] = DRAPE_LOAD_HISTORY,
+    [LIST_RAMP] = DRAPE_LOAD_RAMP,
 };
 
 static bool takes(const drape_cloth_view *cloth, const double *values, int32_t i)
@@ -43,8 +36,6 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     if (count == 0)
         return drape_term_refuse(builder, "no such node of the mesh lies in the box");
     drape_status status = drape_term_reserve(builder, count, 0);
-    if (!status && values[PARAM_RAMP] > 0)
-        drape_term_timed(builder, 0, values[PARAM_RAMP]);
     for (int32_t i = 0; !status && i < cloth->node_count; i++)
         if (takes(cloth, values, i))
             drape_term_set(builder, next++, &i, NULL);
@@ -54,16 +45,16 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
                    const double *internal, double *e, double *g, double *hess)
 {
-    const double share = el->params[PARAM_RAMP] > 0 ? el->progress : 1, *force = el->params + PARAM_FORCE;
+    const double *force = el->params + PARAM_FORCE;
     (void)internal;
     (void)hess;
     for (int32_t i = 0; i < count; i++) {
         const double *at = x + 3 * (size_t)el->node[first + i];
         double work = 0;
         for (int k = 0; k < 3; k++) {
-            work += share * force[k] * at[k];
+            work += force[k] * at[k];
             if (g)
-                g[3 * (size_t)i + (size_t)k] = -share * force[k];
+                g[3 * (size_t)i + (size_t)k] = -force[k];
         }
         if (e)
             e[i] = -work;

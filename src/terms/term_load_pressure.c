@@ -9,12 +9,13 @@
  * those on the cloth closed by that cone.
  */
 #include "base/vec3.h"
+#include "terms/load.h"
 #include "terms/terms.h"
 
 #include <string.h>
 
-enum { LIST_PRESSURE, LIST_POINT, LIST_RAMP, LIST_COUNT };
-enum { PARAM_PRESSURE, PARAM_POINT, PARAM_RAMP = PARAM_POINT + 3 };
+enum { LIST_PRESSURE, LIST_POINT, LIST_HISTORY, LIST_RAMP, LIST_COUNT };
+enum { PARAM_PRESSURE, PARAM_POINT };
 
 static const drape_param params[LIST_COUNT] = {
     [LIST_PRESSURE] = DRAPE_NUMBER("pressure", "Pa", DRAPE_REQUIRED, -1e12, 1e12,
@@ -22,16 +23,14 @@ static const drape_param params[LIST_COUNT] = {
     [LIST_POINT] = DRAPE_VECTOR("point", "m", 0, -1e9, 1e9,
                                 "apex of the cone that closes the volume over the boundary: in the "
                                 "planes of symmetry"),
-    [LIST_RAMP] = DRAPE_NUMBER("ramp", "s", 0, 0, 1e9,
-                               "time in which it rises smoothly from 0; 0: it "
-                               "acts from the start"),
+    [LIST_HISTORY] = DRAPE_LOAD_HISTORY,
+    [LIST_RAMP] = DRAPE_LOAD_RAMP,
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     drape_status status = drape_term_reserve(builder, cloth->triangle_count, 0);
-    if (!status && values[PARAM_RAMP] > 0)
-        drape_term_timed(builder, 0, values[PARAM_RAMP]);
+    (void)values;
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++)
         drape_term_set(builder, t, cloth->triangle + 3 * (size_t)t, NULL);
     return status;
@@ -55,7 +54,7 @@ static void add_hessian(double s, double x[3][3], double *h)
 static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
                    const double *internal, double *e, double *g, double *hess)
 {
-    const double s = el->params[PARAM_PRESSURE] / 6 * (el->params[PARAM_RAMP] > 0 ? el->progress : 1);
+    const double s = el->params[PARAM_PRESSURE] / 6;
     (void)internal;
     for (int32_t i = 0; i < count; i++) {
         const int32_t *node = el->node + 3 * (size_t)(first + i);

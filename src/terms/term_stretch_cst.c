@@ -15,44 +15,23 @@
  */
 #include "base/elementary.h"
 #include "base/lanes.h"
-#include "base/reason.h"
 #include "base/vec3.h"
-#include "terms/orthotropic.h"
-#include "terms/terms.h"
+#include "terms/strain.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { PARAM_MIN_AREA = DRAPE_ORTHOTROPIC_COUNT };
-enum { LIST_MIN_AREA = DRAPE_ORTHOTROPIC_DIRECTION + 1, LIST_COUNT };
 enum {
-    REST_K,
-    REST_Q0,
-    REST_W11,
+    REST_W11 = DRAPE_STRAIN_COUNT,
     REST_W12,
     REST_W22,
     REST_TENSION11, /* W of L+ */
     REST_TENSION12,
     REST_TENSION22,
-    REST_AREA,
     REST_COUNT
 };
 
-/* As a list the direction is one entry; among the values it takes three. */
-static const drape_param params[LIST_COUNT] = {
-    DRAPE_ORTHOTROPIC_PARAMS("N/m", "of the material: its fabric, or E h", "shear",
-                             "shear stiffness, a force per length"),
-    [LIST_MIN_AREA] = DRAPE_NUMBER(
-        "min_area", "1", 1e-6, 0, DRAPE_BELOW(1),
-        "a step that takes the area of a triangle below this fraction of its area at rest is rejected"),
-};
-
-static void sides(const drape_elements *el, int32_t element, const double *x, double d1[3], double d2[3])
-{
-    const int32_t *node = el->node + 3 * (size_t)element;
-    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], d1);
-    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], d2);
-}
+static const drape_param params[DRAPE_STRAIN_LIST] = {DRAPE_STRAIN_PARAMS};
 
 static double measure_of(const double w[3], const double d1[3], const double d2[3])
 {
@@ -143,65 +122,34 @@ static void tension_part(const double l[3], double plus[3])
     plus[2] = share * l[2];
 }
 
-/* W of one square from l and the gradients of N1 and N2 in the plane of the rest triangle. */
-static void weights(const double l[3], const double flat[6], double w[3])
-{
-    const double twice = flat[2] * flat[5] - flat[3] * flat[4];
-    const double b1[2] = {flat[5] / twice, -flat[4] / twice}, b2[2] = {-flat[3] / twice, flat[2] / twice};
-    w[0] = l[0] * b1[0] * b1[0] + l[1] * b1[1] * b1[1] + 2 * l[2] * b1[0] * b1[1];
-    w[1] = l[0] * b1[0] * b2[0] + l[1] * b1[1] * b2[1] + l[2] * (b1[0] * b2[1] + b1[1] * b2[0]);
-    w[2] = l[0] * b2[0] * b2[0] + l[1] * b2[1] * b2[1] + 2 * l[2] * b2[0] * b2[1];
-}
-
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
-    double law[9], k[3], l[9];
+    double c[9], k[3], l[9];
     if (cloth->triangle_count > INT32_MAX / 3)
         return drape_term_refuse(builder, "the mesh has %d triangles; at most %d", (int)cloth->triangle_count,
                                  INT32_MAX / 3);
-    drape_orthotropic_law(values, cloth->tension, cloth->material->membrane_stiffness,
-                          cloth->material->poisson_ratio, law);
-    drape_orthotropic_squares(law, 3, k, l);
+    drape_strain_law(cloth, values, c, k, l);
     drape_status status = drape_term_reserve(builder, 3 * cloth->triangle_count, REST_COUNT);
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
         const int32_t *node = cloth->triangle + 3 * (size_t)t;
         const double *const corner[3] = {cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
                                          cloth->rest + 3 * (size_t)node[2]};
         double axes[6], flat[6], w[3], plus[3], tension[3], d1[3], d2[3];
-        if (!drape_orthotropic_frame(values, corner, law, axes, flat))
+        if (!drape_orthotropic_frame(values, corner, c, axes, flat))
             return drape_orthotropic_refuse(builder, t);
         vec3_sub(corner[1], corner[0], d1);
         vec3_sub(corner[2], corner[0], d2);
         for (int r = 0; r < 3; r++) {
             const double area = cloth->triangle_area[t];
-            weights(l + 3 * r, flat, w);
+            drape_strain_weights(l + 3 * r, flat, w);
             tension_part(l + 3 * r, plus);
-            weights(plus, flat, tension);
+            drape_strain_weights(plus, flat, tension);
             drape_term_set(builder, 3 * t + r, node,
-                           (const double[REST_COUNT]){k[r] * area, measure_of(w, d1, d2), w[0], w[1], w[2],
-                                                      tension[0], tension[1], tension[2], area});
+                           (const double[REST_COUNT]){k[r] * area, measure_of(w, d1, d2), area, w[0], w[1],
+                                                      w[2], tension[0], tension[1], tension[2]});
         }
     }
     return status;
-}
-
-/* Area over rest area. */
-static double ratio_of(const drape_elements *el, int32_t element, const double *x)
-{
-    double d1[3], d2[3], normal[3];
-    sides(el, element, x, d1, d2);
-    vec3_cross(d1, d2, normal);
-    return vec3_norm(normal) / 2 / drape_rest_of(el, REST_AREA, element);
-}
-
-static drape_status check(const drape_elements *el, const double *x, const double *before,
-                          const double *internal, drape_fault *fault)
-{
-    (void)internal;
-    *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_AREA_COLLAPSE),
-                           .what = "area / rest area",
-                           .limit = el->params[PARAM_MIN_AREA]};
-    return drape_check_ratios(el, x, before, 3, ratio_of, fault);
 }
 
 const drape_term_ops drape_term_stretch_cst = {
@@ -218,5 +166,5 @@ const drape_term_ops drape_term_stretch_cst = {
     .measure = measure,
     .lanes = measure_lanes,
     .positive = positive,
-    .check = check,
+    .check = drape_strain_check,
 };

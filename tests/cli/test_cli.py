@@ -302,6 +302,32 @@ def test_scene_copy():
     equal(read_json("ours/summary.json")["hash"], read_json("cs184/summary.json")["hash"])
 
 
+def test_start_copy():
+    """the folder of a run that starts from files has copies of them: it is drawn, checked, resumed and run again where it was moved"""
+    os.mkdir("scenes")
+    nodes = 16
+    write_scene(duration=0.05)
+    good("run", "scene.json", "--out", "first", "--format", "obj,npy")
+    shutil.copy(sorted(glob.glob("first/*.obj"))[-1], "scenes/bent.obj")
+    values = struct.pack(f"<{3 * nodes}d", *(0.1 * (i % 5) for i in range(3 * nodes)))
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({nodes}, 3), }}".ljust(117) + "\n"
+    with open("scenes/speed.npy", "wb") as file:
+        file.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode() + values)
+    whole = scene()
+    whole["cloth"][0]["start"] = {"file": "bent.obj", "velocities": "speed.npy"}
+    with open("scenes/one.json", "w", encoding="utf-8") as file:
+        json.dump(whole, file)
+    good("run", "scenes/one.json", "--out", "a", "--checkpoint-every", "1")
+    kept = read_json("a/scene.json")["cloth"][0]["start"]
+    equal(kept, {"file": "scene_mesh_0.obj", "velocities": "scene_mesh_1.npy"})
+    shutil.rmtree("scenes")
+    os.rename("a", "moved")
+    good("check", "moved/scene.json")
+    good("run", "moved/scene.json", "--out", "again")
+    equal(read_json("again/summary.json")["hash"], read_json("moved/summary.json")["hash"])
+    good("run", "moved/scene.json", "--out", "moved", "--resume", "--checkpoint-every", "1")
+
+
 def test_scene_in_the_folder():
     """a scene that is itself the scene.json of the output folder is never overwritten"""
     write_scene()

@@ -672,6 +672,9 @@ def test_modes():
         file.write(PLATE.replace('"bend.midedge", ', ""))
     result = drape("modes", "slack.json", "--state", "start", "--out", "n")
     equal((result.returncode, os.path.exists("n")), (1, False), "modes without stiffness")
+    # Of 3 x 3 nodes, 25 of whose motions have no stiffness: any six of them would be arbitrary.
+    result = drape("modes", "slack.json", "--state", "start", "--set", "/cloth/0/mesh/columns=3", "--set", "/cloth/0/mesh/rows=3")
+    equal((result.returncode, result.stdout, "cannot be separated" in result.stderr), (1, "", True), result.stderr)
 
 
 def test_path():
@@ -694,8 +697,16 @@ def test_path():
     assert "bifurcation" in straight, straight
     hung = good("path", "column.json", "--state", "static", "--to", "1.5")
     equal([hung.splitlines()[i].split()[1] for i in (1, -1)], ["1", "1.5"], "factors from an equilibrium")
-    for wrong in (["--from", "1"], ["--to", "x"], ["--branch", "2"], ["--node", "51"], ["--state", "middle"]):
+    for wrong in (["--from", "1"], ["--to", "x"], ["--branch", "2"], ["--node", "51"], ["--state", "middle"],
+                  ["--branch", "+", "--load-control"], ["--node", "3", "--node", "3"], ["--set", "/cloth/0/terms/2/force=[-1e-30, 0, 0]"]):
         refused("path", "column.json", *wrong)
+    # A load that rises in time has its full value, whatever it is when the scene begins.
+    point = ["--set", '/cloth/0/terms/2={"type": "load.point", "node": 33, "force": [0, 0, -1e-4]}', "--points", "3"]
+    now, later = (good("path", "column.json", *point, *ramp) for ramp in ([], ["--set", "/cloth/0/terms/2/ramp=3"]))
+    equal(later, now, "a load with a ramp")
+    now, later = (good("modes", "column.json", *point[:2], "--set", "/cloth/0/terms/2/force=[-1e-3, 0, 0]", "--state", "start", "--buckling",
+                       "--count", "1", *ramp) for ramp in ([], ["--set", "/cloth/0/terms/2/ramp=3"]))
+    equal(later, now, "buckling under a load with a ramp")
 
 
 def test_no_reference():

@@ -86,16 +86,21 @@ typedef struct model_def {
     double thickness;     /* [m]; 0: 1e-3 */
 } model_def;
 
-/* All else is fixed: E = 1e5 Pa, nu = 0.3, 0.2 kg/m2. */
+/* All else is fixed: E = 1e5 Pa, nu = 0.3, 0.2 kg/m2, and curves that stiffen, soften and do both. */
 static inline drape_status try_model(drape_context *ctx, const model_def *def, drape_model **out)
 {
     static const int32_t pinned_nodes[] = {0, 3};
+    static const double warp[] = {0.03, 2, 0.08, 11, 0.15, 70}, weft[] = {0.03, 9, 0.08, 11, 0.15, 12},
+                        shear[] = {2, 1, 5, 1.6, 12, 6};
     double x[3 * IRREGULAR_NODES];
     int32_t triangle[3 * IRREGULAR_TRIANGLES];
     const drape_setting material[] = {{"young_modulus", 1e5, NULL},
                                       {"poisson_ratio", 0.3, NULL},
                                       {"thickness", def->thickness > 0 ? def->thickness : 1e-3, NULL},
-                                      {"areal_density", 0.2, NULL}};
+                                      {"areal_density", 0.2, NULL},
+                                      {"warp_curve", 0, NULL, warp, 6},
+                                      {"weft_curve", 0, NULL, weft, 6},
+                                      {"shear_curve", 0, NULL, shear, 6}};
     const drape_setting equilateral[] = {{"edges", 3, NULL}, {"edge_length", 0.1, NULL}};
     const drape_setting square[] = {
         {"columns", 4, NULL}, {"rows", 5, NULL}, {"width", 0.3, NULL}, {"height", 0.5, NULL}};
@@ -117,7 +122,7 @@ static inline drape_status try_model(drape_context *ctx, const model_def *def, d
         cloth.mesh.triangle_count = IRREGULAR_TRIANGLES;
     }
     cloth.material = material;
-    cloth.material_count = 4;
+    cloth.material_count = sizeof material / sizeof *material;
     cloth.terms = def->terms;
     cloth.term_count = def->term_count;
     pin.nodes = pinned_nodes;

@@ -135,9 +135,10 @@ static double value_at(const drape_pattern *p, const double *values, int64_t i, 
     return 0;
 }
 
-/* The matrix that Newton factors in place of J: exactly symmetric; J itself, up to rounding errors, where
- * contact is declared symmetric, and another one where it is not, for cloth that slides. */
-static void check_symmetrized(probe *t, const char *what, double weight, double time)
+/* The matrix that Newton factors in place of J, here with a share of the positive parts: exactly symmetric; J
+ * itself, up to rounding errors, where contact is declared symmetric or has all of the positive parts, and
+ * another one where it is not, for cloth that slides. */
+static void check_symmetrized(probe *t, const char *what, double weight, double time, double share)
 {
     const drape_point point = {.x = t->at.x,
                                .v = t->at.v,
@@ -148,26 +149,77 @@ static void check_symmetrized(probe *t, const char *what, double weight, double 
                                .contact = DRAPE_CONTACT_SYMMETRIC};
     const drape_pattern *p = drape_system_pattern(t->system);
     double *exact = take(t, (size_t)p->nonzeros), largest = 0, change = 0;
-    drape_system_jacobian(t->system, &point, 0, 0, exact);
+    drape_system_jacobian(t->system, &point, 0, share, exact);
     memcpy(t->values, exact, (size_t)p->nonzeros * sizeof *exact);
-    drape_system_symmetrize(t->system, &point, t->values);
+    drape_system_symmetrize(t->system, &point, share, t->values);
     for (int64_t j = 0; j < p->n; j++)
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++) {
             ck_assert_msg(t->values[k] == value_at(p, t->values, j, p->row[k]), "%s", what);
             largest = fmax(largest, fabs(exact[k]));
             change = fmax(change, fabs(t->values[k] - exact[k]));
         }
-    if (drape_system_is_symmetric(t->system))
+    if (drape_system_is_symmetric(t->system) || share == 1)
         ck_assert_msg(change <= 1e-12 * largest, "%s: %g of %g", what, change, largest);
     else
         ck_assert_msg(change > 1e-9 * largest, "%s: %g of %g", what, change, largest);
+}
+
+/* A matrix with a share of the positive parts lies between those without and with all of them, contact
+ * included: with rounding errors of sums of at most some hundred terms in each value. */
+static void check_shares(probe *t, const char *what, double weight, double time)
+{
+    const double shares[] = {0, 1, 0.25};
+    const drape_point point = {.x = t->at.x,
+                               .v = t->at.v,
+                               .internal = t->at.internal,
+                               .weight = weight,
+                               .t = time,
+                               .span = {time - 0.01, time},
+                               .contact = DRAPE_CONTACT_SYMMETRIC};
+    const size_t nonzeros = (size_t)drape_system_pattern(t->system)->nonzeros;
+    double *values[3], largest = 0, error = 0;
+    for (int i = 0; i < 3; i++) {
+        values[i] = take(t, nonzeros);
+        drape_system_jacobian(t->system, &point, 0, shares[i], values[i]);
+    }
+    for (size_t k = 0; k < nonzeros; k++) {
+        largest = fmax(largest, fmax(fabs(values[0][k]), fabs(values[1][k])));
+        error = fmax(error, fabs(values[2][k] - (0.75 * values[0][k] + 0.25 * values[1][k])));
+    }
+    ck_assert_msg(error <= 1e-13 * largest, "%s: %g of %g", what, error, largest);
+}
+
+/* What the Gauss-Newton matrix leaves out, added to it, makes it J, up to rounding errors. */
+static void check_remainder(probe *t, const char *what, double weight, double time)
+{
+    drape_point point = {.x = t->at.x,
+                         .v = t->at.v,
+                         .internal = t->at.internal,
+                         .weight = weight,
+                         .t = time,
+                         .span = {time - 0.01, time}};
+    const int64_t n = drape_system_pattern(t->system)->nonzeros;
+    double *exact = take(t, (size_t)n), *rest = take(t, (size_t)n), largest = 0, error = 0;
+    drape_system_jacobian(t->system, &point, 0, 0, exact);
+    point.contact = DRAPE_CONTACT_GAUSS_NEWTON;
+    drape_system_jacobian(t->system, &point, 0, 0, t->values);
+    drape_system_contact_remainder(t->system, &point, rest);
+    for (int64_t k = 0; k < n; k++) {
+        largest = fmax(largest, fabs(exact[k]));
+        error = fmax(error, fabs(t->values[k] + rest[k] - exact[k]));
+    }
+    ck_assert_msg(error <= 1e-11 * largest, "%s: %g of %g", what, error, largest);
 }
 
 static void check(probe *t, const char *what, double time)
 {
     double gap;
     const double steps = error_of(t, 100, time);
-    check_symmetrized(t, what, 100, time);
+    check_symmetrized(t, what, 100, time, 0);
+    check_symmetrized(t, what, 100, time, 0.25);
+    check_symmetrized(t, what, 100, time, 1);
+    check_shares(t, what, 100, time);
+    check_remainder(t, what, 100, time);
     const double still = error_of(t, 0, time);
     const drape_contact *contact = drape_system_contact(t->system);
     const int32_t active = drape_contact_active(contact, &gap);
@@ -436,6 +488,30 @@ START_TEST(a_thrown_node_is_stopped)
 }
 END_TEST
 
+/* Whoever cancels need not wait until all pairs have been looked at: nothing moves, which is always safe. */
+START_TEST(a_cancelled_search_moves_nothing)
+{
+    probe t = open_flat(3e-3);
+    const size_t nodes = (size_t)t.s.model->node_count;
+    atomic_bool cancel = false;
+    double *fraction = calloc(nodes, sizeof *fraction);
+    ck_assert_ptr_nonnull(fraction);
+    for (size_t i = 0; i < 3 * nodes; i++)
+        t.x[i] = t.at.x[i] - (i % 3 == 1 ? 1e-3 : 0);
+    drape_system_watch(t.system, &cancel);
+    ck_assert_double_gt(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, fraction), 0);
+    atomic_store(&cancel, true);
+    ck_assert_double_eq(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, NULL), 0);
+    ck_assert_double_eq(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, fraction), 0);
+    for (size_t i = 0; i < nodes; i++)
+        ck_assert_double_eq(fraction[i], 0);
+    atomic_store(&cancel, false);
+    ck_assert_double_gt(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, NULL), 0);
+    free(fraction);
+    close_probe(&t);
+}
+END_TEST
+
 /* A state with NaN has no effect on later ones: the next evaluation is as before it. */
 START_TEST(nan_is_forgotten)
 {
@@ -692,6 +768,6 @@ END_TEST
 
 SUITE("contact_system", every_collider, colliders_without_terms, cloth_on_cloth, near_the_least_gap,
       a_correction_arrives_from_beyond_the_distance, a_thrown_node_is_stopped,
-      the_jacobian_has_the_predicted_forces, landing_takes_few_iterations, nan_is_forgotten,
-      only_scenes_with_contact_have_it_checked, scenes_without_contact_pay_nothing, all_bytes_are_counted,
-      active_contacts_are_all_pairs, queries_change_nothing)
+      a_cancelled_search_moves_nothing, the_jacobian_has_the_predicted_forces, landing_takes_few_iterations,
+      nan_is_forgotten, only_scenes_with_contact_have_it_checked, scenes_without_contact_pay_nothing,
+      all_bytes_are_counted, active_contacts_are_all_pairs, queries_change_nothing)

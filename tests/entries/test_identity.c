@@ -13,7 +13,7 @@ static const char base[] =
     "{'drape': 1, 'cloth': [{'name': 'sheet',"
     " 'mesh': {'grid': 'square', 'columns': 4, 'rows': 5, 'width': 0.3, 'height': 0.4},"
     " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
-    " 'terms': ['stretch.cst', 'bend.midedge'],"
+    " 'terms': ['stretch.cst', 'bend.midedge', 'stretch.curve'],"
     " 'pins': [{'nodes': [5, 6], 'track': [[0, [0,0,0]], [1, [0,0.1,0]]]},"
     "          {'name': 'other', 'nodes': [0]}]},"
     "  {'name': 'sewn', 'mesh': {'grid': 'square', 'columns': 4, 'rows': 2, 'width': 0.3, 'height': 0.1,"
@@ -23,6 +23,8 @@ static const char base[] =
     " 'seams': [{'type': 'stitch', 'a': {'cloth': 'sewn', 'nodes': [0, 1]},"
     "            'b': {'cloth': 'sewn', 'nodes': [2, 3]}}],"
     " 'colliders': [{'name': 'ball', 'type': 'sphere', 'center': [0,0,-1], 'radius': 0.1}],"
+    " 'gravity_history': 'up', 'histories': [{'name': 'up', 'times': [0, 1, 2], 'values': [1, 2, 3]},"
+    " {'name': 'down', 'times': [0, 1], 'values': [2, 1]}],"
     " 'self_contact': {'thickness': 0.001}, 'untangle': {}, 'duration': 1}";
 
 typedef enum outcome {
@@ -63,7 +65,7 @@ static const struct test_case {
     {"/cloth/0/material/total_mass", REFUSED, "/cloth/0/material",
      "{'young_modulus': 1e5, 'thickness': 1e-3, 'total_mass': 0.3}"},
     {"/cloth/0/terms", REFUSED, NULL,
-     "['stretch.cst', 'bend.midedge', {'type': 'drag.viscous', 'coefficient': 1}]"},
+     "['stretch.cst', 'bend.midedge', 'stretch.curve', {'type': 'drag.viscous', 'coefficient': 1}]"},
     {"/cloth/0/terms/0/type", REFUSED, "/cloth/0/terms/0", "'stretch.edge'"},
     {"/cloth/0/pins/0/nodes", REFUSED, NULL, "[5, 7]"},
     {"/cloth/0/pins/0/corner", REFUSED, "/cloth/0/pins/0", "{'corner': 'top-right'}"},
@@ -111,6 +113,10 @@ static const struct test_case {
     {"/cloth/0/ignore", REFUSED, NULL, "['ball']"},
     {"/colliders/0/enabled", REFUSED, NULL, "false"},
     {"/events/0/pins", REFUSED, NULL, "'other'"},
+    {"/histories/0/name", SKIPPED, NULL, NULL}, /* names what the loads have */
+    {"/histories/0/times", REFUSED, NULL, "[0, 1, 3]"},
+    {"/histories/0/values", REFUSED, NULL, "[1, 2, 4]"},
+    {"/gravity_history", REFUSED, NULL, "'down'"},
     {"/seams/0/type", SKIPPED, NULL, NULL}, /* there is only one */
     {"/seams/0/a/cloth", SKIPPED, NULL, NULL},
     {"/seams/0/b/cloth", SKIPPED, NULL, NULL},
@@ -186,6 +192,9 @@ static void another_value(const drape_param *p, char *text, size_t size)
         return;
     case DRAPE_PARAM_TEXT:
         ck_abort_msg("%s is a text: give it a value in `cases`", p->name);
+    case DRAPE_PARAM_POINTS:
+        snprintf(text, size, "[[0.25, 0.5], [0.75, 1]]");
+        return;
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
         break;

@@ -19,11 +19,7 @@
 /* [s] of CPU. Between two checks for cancellation are some passes over elements and contacts and a
  * factorization: milliseconds for the few nodes of a target, ten times as much under sanitizers on a busy
  * machine. */
-#if defined(__SANITIZE_ADDRESS__)
-#define SOON 20 /* which makes all ten times slower */
-#else
 #define SOON 5
-#endif
 
 void fuzz_die(const char *file, int line, const char *promise, const char *format, ...)
 {

@@ -23,6 +23,8 @@
 #define MAX_PINS      3
 #define MAX_TERMS     8
 #define MAX_COLLIDERS 3
+#define HISTORY       "history" /* the name of the scene's only one */
+#define MAX_KEYS      3
 #define MAX_ROWS      32 /* parts with settings in a scene */
 #define ATTEMPTS      6
 #define STEPS         3
@@ -34,7 +36,7 @@
 
 typedef struct drawn {
     drape_setting setting[DRAPE_MAX_PARAMS];
-    double vector[DRAPE_MAX_PARAMS][3];
+    double vector[DRAPE_MAX_PARAMS][4];
     size_t count;
 } drawn;
 
@@ -67,8 +69,13 @@ static void draw_value(fuzz_bytes *in, const drape_param *p, int span, drape_set
     else if (p->kind == DRAPE_PARAM_NUMBER)
         s->number = draw_number(in, p);
     else if (p->kind == DRAPE_PARAM_TEXT)
-        s->text = "missing.obj";
-    else {
+        s->text = strcmp(p->name, "history") == 0 ? HISTORY : "missing.obj";
+    else if (p->kind == DRAPE_PARAM_POINTS) { /* one point, or a second one that may lie lower */
+        vector[0] = draw_number(in, p), vector[1] = fuzz_magnitude(in, 1e-9, 1e15);
+        vector[2] = draw_number(in, p), vector[3] = fuzz_magnitude(in, 1e-9, 1e15);
+        s->vector = vector;
+        s->vector_count = fuzz_below(in, 2) ? 4 : 2;
+    } else {
         for (int k = 0; k < 3; k++)
             vector[k] = fuzz_between(in, fmax(p->min + (p->open_min ? 1e-3 : 0), -1), fmin(p->max, 1));
         s->vector = vector;
@@ -120,6 +127,8 @@ typedef struct scene {
     cloth parts[MAX_CLOTHS];
     drawn integrators[MAX_ROWS];
     int row_count;
+    drape_history_def history;
+    double times[MAX_KEYS], factors[MAX_KEYS];
 } scene;
 
 static drape_entry_def row(scene *s, fuzz_bytes *in, const char *name, const drape_param *params, int count)
@@ -285,6 +294,24 @@ static void draw_contact(scene *s, fuzz_bytes *in)
     }
 }
 
+static void draw_history(scene *s, fuzz_bytes *in)
+{
+    const unsigned count = 1 + fuzz_below(in, MAX_KEYS);
+    drape_history_def_init(&s->history, sizeof s->history);
+    s->history.name = HISTORY;
+    s->history.times = s->times;
+    s->history.values = s->factors;
+    s->history.time_count = s->history.value_count = count;
+    s->history.interpolation = fuzz_below(in, 2) ? "cubic" : NULL;
+    for (unsigned k = 0; k < count; k++) {
+        s->times[k] = (k ? s->times[k - 1] : 0) + fuzz_magnitude(in, 1e-6, 1);
+        s->factors[k] = fuzz_between(in, -2, 2);
+    }
+    s->def.histories = &s->history;
+    s->def.history_count = 1;
+    s->def.gravity_history = fuzz_below(in, 4) == 3 ? HISTORY : NULL;
+}
+
 static void draw_scene(scene *s, fuzz_bytes *in)
 {
     memset(s, 0, sizeof *s);
@@ -294,6 +321,7 @@ static void draw_scene(scene *s, fuzz_bytes *in)
     draw_contact(s, in);
     if (fuzz_below(in, 3) == 2)
         s->def.gravity[1] = fuzz_between(in, -1e4, 1e4);
+    draw_history(s, in);
 }
 
 /* ---- Removing what was refused ---- */

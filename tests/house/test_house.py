@@ -15,7 +15,7 @@ def files_of(root):
     """{path: text} of the project's files: these folders and the pages and build files at the top; no binary files."""
     kept = {}
     names = [os.path.join(root, name) for name in os.listdir(root) if re.search(r"\.md$|^meson|^LICENSE$|^\.clang-format$|^\.gitignore$", name)]
-    for top in (".ci", "bench", "docs", "examples", "include", "src", "tests", "tools"):
+    for top in (".ci", "bench", "docs", "examples", "include", "src", "tests", "tools", "blender"):
         for folder, folders, inside in os.walk(os.path.join(root, top)):
             folders[:] = [name for name in folders if name != "__pycache__"]
             names += [os.path.join(folder, name) for name in inside]

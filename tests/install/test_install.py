@@ -78,7 +78,7 @@ def symbols(path, *options):
 
 
 def what_is_installed(tree):
-    for name in ("include/drape/drape.h", "include/drape/extend.h", "include/drape/export.h", "bin/drape"):
+    for name in ("include/drape/drape.h", "include/drape/extend.h", "include/drape/export.h", "bin/drape", "share/drape/blender/drape_cloth.zip"):
         assert os.path.isfile(os.path.join(tree.prefix, name)), name
     for name in ("pkgconfig/drape.pc", "cmake/drape/drape-config.cmake", "cmake/drape/drape-config-version.cmake"):
         assert os.path.isfile(os.path.join(tree.lib, name)), name

@@ -368,6 +368,68 @@ START_TEST(memory_that_fails_is_reported)
 }
 END_TEST
 
-SUITE("path", a_truss_snaps_through, load_control_stops_at_a_limit, a_column_follows_the_elastica,
-      a_bifurcation_is_noted, a_path_does_not_jump_to_another, wrong_requests_are_refused,
-      memory_that_fails_is_reported)
+/* ---- Loads that vary in time, and a load without a potential ---- */
+
+#define STRIP                                                                                                \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 3, 'width': 1, 'height': "     \
+    "0.3}, 'material': {'young_modulus': 1e6, 'poisson_ratio': 0, 'thickness': 1e-3, 'areal_density': "      \
+    "0.2}, 'terms': ['stretch.cst', 'bend.midedge', {%s}], 'pins': [{'edge': 'left'}, {'edge': 'right'}]}]," \
+    "'gravity': [0, 0, 0], 'integrator': {'method': 'static'}, 'duration': 1}"
+#define STRIP_NODES 21
+
+static drape_status keep_last(void *user, drape_sim *sim, const drape_path_point *point)
+{
+    if (point->number > 0)
+        memcpy(user, drape_sim_positions(sim), 3 * STRIP_NODES * sizeof(double));
+    return DRAPE_OK;
+}
+
+static void follow_strip(const char *load, double *x)
+{
+    scene s = scene_open(STRIP, load);
+    drape_path_def def;
+    drape_path_def_init(&def, sizeof def);
+    def.observer = keep_last;
+    def.user = x;
+    ck_assert_msg(drape_sim_path(s.sim, &def) == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    scene_close(&s);
+}
+
+/* From the start, whatever a history is there, a path has the load of the scene: the bits of one without. */
+START_TEST(a_path_has_the_full_load)
+{
+    double x[2][3 * STRIP_NODES];
+    follow_strip("'type': 'load.line', 'edge': 'top', 'force': [0, 1, 0]", x[0]);
+    follow_strip("'type': 'load.line', 'edge': 'top', 'force': [0, 1, 0], 'ramp': 3", x[1]);
+    ck_assert_mem_eq(x[0], x[1], sizeof *x);
+}
+END_TEST
+
+/* Of a follower pressure on a strip with open sides the stiffness is not symmetric: the path ends at the
+ * equilibrium that `static` finds, both to 1e-8 of the forces, 1e-7 of the size; modes are refused. */
+START_TEST(a_follower_pressure_has_a_path_and_no_modes)
+{
+    static const char load[] = "'type': 'load.follower', 'pressure': 50";
+    double x[3 * STRIP_NODES];
+    drape_modes modes;
+    follow_strip(load, x);
+    scene s = scene_open(STRIP, load);
+    scene_advance(&s, 1);
+    for (int i = 0; i < 3 * STRIP_NODES; i++)
+        ck_assert_double_eq_tol(x[i], scene_state(&s)->x[i], 1e-7);
+    ck_assert_int_eq(drape_sim_modes(s.sim, NULL, &modes), DRAPE_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "a load that follows the cloth"));
+    scene_close(&s);
+    drape_modes_def def;
+    drape_modes_def_init(&def, sizeof def);
+    def.buckling = true;
+    def.load_factor = 0;
+    s = scene_open(STRIP, load);
+    ck_assert_int_eq(drape_sim_modes(s.sim, &def, &modes), DRAPE_E_ARGUMENT);
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("path", a_path_has_the_full_load, a_follower_pressure_has_a_path_and_no_modes, a_truss_snaps_through,
+      load_control_stops_at_a_limit, a_column_follows_the_elastica, a_bifurcation_is_noted,
+      a_path_does_not_jump_to_another, wrong_requests_are_refused, memory_that_fails_is_reported)

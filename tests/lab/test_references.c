@@ -83,6 +83,10 @@ START_TEST(quick_references_pass)
     check("friction_slide", 1, DRAPE_OUTCOME_PASS);
     check("friction_slope", 0, DRAPE_OUTCOME_PASS);
     check("cusick_stiff", 0, DRAPE_OUTCOME_PASS);
+    for (int i = 0; i < find("curve_tension")->case_count; i++)
+        check("curve_tension", i, DRAPE_OUTCOME_PASS);
+    for (int i = 0; i < find("curve_shear")->case_count; i++)
+        check("curve_shear", i, DRAPE_OUTCOME_PASS);
 }
 END_TEST
 
@@ -133,6 +137,16 @@ START_TEST(a_fabric_has_what_was_published)
     ck_assert_double_eq_tol(bending.warp, 64.196457e-6 / 4, 1e-15);
     ck_assert_double_eq_tol(4 / jeans->bending.diagonal,
                             1 / bending.warp + 1 / bending.weft + 1 / bending.shear, 1e-6);
+    /* At 1/6 the stiffness of the last line of the file: c = 1051.55712 along v, a stress of c (l^2 - 1). */
+    double warp[2 * DRAPE_FABRIC_POINTS], weft[2 * DRAPE_FABRIC_POINTS];
+    ck_assert(drape_fabric_curves(jeans, warp, weft));
+    const double l = 7. / 6, free_sides = 1 - 10.234077 * 10.234077 / (205.352005 * 1013.88629);
+    ck_assert_double_eq_tol(warp[2 * DRAPE_FABRIC_POINTS - 2], l - 1, 1e-15);
+    ck_assert_double_eq_tol(warp[2 * DRAPE_FABRIC_POINTS - 1], free_sides * 1051.55712 * l * (l * l - 1),
+                            1e-9);
+    ck_assert_double_eq_tol(weft[2 * DRAPE_FABRIC_POINTS - 1], free_sides * 232.027634 * l * (l * l - 1),
+                            1e-9);
+    ck_assert(!drape_fabric_curves(feng, warp, weft));
     drape_fabric_tension(feng, &tension);
     ck_assert_double_eq(tension.warp, 1e4);
     ck_assert_double_eq(tension.shear, 34.4);

@@ -232,9 +232,15 @@ static scene everything(const char *method)
         "'start': {'folds': [{'point': [0.15, 0, 0], 'axis': [0, 0, 1], 'side': [1, 0, 0], 'angle': 60,"
         "'radius': 0.02}], 'spin': [0, 1, 0]}, 'terms': ['stretch.cst', 'bend.midedge',"
         "{'type': 'load.pressure', 'pressure': 2, 'ramp': 0.1},"
-        "{'type': 'load.point', 'node': 10, 'force': [0, 0.01, 0], 'ramp': 0.2}],"
+        "{'type': 'load.point', 'node': 10, 'force': [0, 0.01, 0], 'ramp': 0.2},"
+        "{'type': 'load.line', 'edge': 'right', 'force': [0, 0.05, 0], 'history': 'up'},"
+        "{'type': 'load.moment', 'edge': 'right', 'moment': 1e-4, 'history': 'gust'},"
+        "{'type': 'load.follower', 'pressure': 0.5, 'history': 'gust'},"
+        "{'type': 'drag.wind', 'wind': [0, 1, 0], 'history': 'gust'}],"
         "'pins': [{'edge': 'left', 'normal': [1, 1, 0]}, {'corner': 'bottom-right', 'pivot': [0, 0, 0],"
         "'turns': [{'time': 0, 'rotate': [0, 1, 0, 0]}, {'time': 0.3, 'rotate': [0, 1, 0, 90]}]}]}],"
+        "'histories': [{'name': 'up', 'times': [0, 0.06], 'values': [0.5, 1]}, {'name': 'gust', 'times': [0, "
+        "0.03, 0.1], 'values': [0, 1, 0.2], 'interpolation': 'cubic'}], 'gravity_history': 'up',"
         "'integrator': {'method': '%s', 'dt': 0.01}, 'controller': {'type': '%s'}, 'duration': 1}",
         method, strcmp(method, "verlet") == 0 ? "stable" : "halving");
 }

@@ -341,8 +341,37 @@ START_TEST(a_sheet_follows_its_turned_edge)
 }
 END_TEST
 
-SUITE("support", a_rail_leaves_its_direction_free, half_with_a_plane_of_symmetry_moves_as_the_whole,
-      nodes_stay_in_an_inclined_plane, supports_combine_and_carry_the_weight,
-      the_jacobian_is_that_of_the_projected_forces, states_and_placements_of_a_host,
-      a_clamped_edge_turns_in_its_plane, pins_turn_as_one_body_about_their_pivot,
-      a_sheet_follows_its_turned_edge)
+/* A state set by the host keeps nodes in their planes and on their lines: within 1e-9 of the scene. */
+START_TEST(a_state_off_a_plane_is_refused)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.2, 'height': "
+        "0.2}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2}, 'terms': "
+        "['stretch.cst'], 'pins': [{'edge': 'left', 'normal': [1, 1, 0]}, {'edge': 'right', 'axis': [0, 0, "
+        "1]}]}], 'duration': 1}");
+    double x[27], v[27] = {0}, from[27];
+    memcpy(from, scene_state(&s)->x, sizeof from);
+    for (int node = 0; node < 9; node++) {
+        /* along (1, -1, 0): in the plane of the left edge, off the line of the right one */
+        memcpy(x, from, sizeof x);
+        x[3 * node] += 0.01;
+        x[3 * node + 1] -= 0.01;
+        ck_assert_int_eq(drape_sim_set_state(s.sim, 0, x, v), node % 3 == 2 ? DRAPE_E_ARGUMENT : DRAPE_OK);
+        /* along (1, 1, 0): off both */
+        memcpy(x, from, sizeof x);
+        x[3 * node] += 0.01;
+        x[3 * node + 1] += 0.01;
+        const bool held = node % 3 != 1;
+        ck_assert_int_eq(drape_sim_set_state(s.sim, 0, x, v), held ? DRAPE_E_ARGUMENT : DRAPE_OK);
+        if (held)
+            ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "off the plane or line"));
+    }
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("support", a_state_off_a_plane_is_refused, a_rail_leaves_its_direction_free,
+      half_with_a_plane_of_symmetry_moves_as_the_whole, nodes_stay_in_an_inclined_plane,
+      supports_combine_and_carry_the_weight, the_jacobian_is_that_of_the_projected_forces,
+      states_and_placements_of_a_host, a_clamped_edge_turns_in_its_plane,
+      pins_turn_as_one_body_about_their_pivot, a_sheet_follows_its_turned_edge)

@@ -294,6 +294,64 @@ def test_threads():
     equal(outcome, [drape.Status.E_STOPPED])
 
 
+def test_reads_wait():
+    """what reads a sim waits for another thread's advance, too; only cancel() does not"""
+    sim, held, go_on = drape.Sim(sheet()), threading.Event(), threading.Event()
+
+    def hold(_):
+        held.set()
+        go_on.wait()
+
+    sim.observe(hold, KIND.FRAME)
+    reads = {name: lambda name=name: getattr(sim, name) for name in ("time", "hash", "positions", "velocities", "masses", "pinned", "strain", "drag_force")}
+    reads.update(attached=lambda: sim.attached(0), collider_points=lambda: sim.collider("ball"), force=lambda: sim.collider_force("ball"), repr=lambda: repr(sim))
+    advancing = threading.Thread(target=sim.advance, args=(0.03,))
+    advancing.start()
+    held.wait()
+    found = {}
+
+    def read(name, function):
+        found[name] = function()
+
+    threads = [threading.Thread(target=read, args=item) for item in reads.items()]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(0.02)  # none returns meanwhile, however long one waits
+    during = list(found)
+    go_on.set()
+    for thread in [advancing, *threads]:
+        thread.join()
+    equal((during, set(found)), ([], set(reads)))
+    equal(found["time"], 0.03)
+
+
+def test_misuse():
+    """numbers of nodes do not wrap, and no number is cut; wrong types are Python's TypeError, everything else is a drape.Error"""
+    sim = drape.Sim(sheet(pins=[]))
+    for nodes in ([2**32], [2**32 + 5], np.array([2**63 + 3], np.uint64), [10**30], [-2**31 - 1], [1.5], ["a"]):
+        raises(drape.ArgumentError, sim.pin, nodes, says="nodes: ")
+        raises(drape.ArgumentError, sim.drag, nodes, [[0, 0, 0]], 1.0, says="nodes: ")
+    assert not sim.pinned.any()
+    for call in (lambda: sim.attached(2**32), lambda: sim.place(cloths=[2**40]), lambda: sim.attach("ball", [3], triangles=[0.5]),
+                 lambda: sim.untangle(sweeps=2**32 + 3), lambda: drape.Sim(sheet(), threads=2**32 + 1), lambda: drape.Embedding(sim.model, [[0, 0, 0]], cloth=2**32),
+                 lambda: drape.Mesh(np.eye(3), [[0, 1, 2**32 + 2]]), lambda: drape.Mesh(np.eye(3), [[0, 1, 1.5]]), lambda: sim.move_collider(2**32, [0, 0, 0], 1),
+                 lambda: drape.Mesh.of({"vertices": np.eye(3), "faces": np.array([[0, 1, 2**32 + 2]])}), lambda: sim.push("a"), lambda: sim.push([[1, 2], [3]]),
+                 lambda: sim.place(rotate=[1, 2]), lambda: sim.place(center=["a", 0, 0]), lambda: sim.set_masses([1], [10**400])):
+        raises(drape.ArgumentError, call)
+    for call in (lambda: sim.advance("1"), lambda: sim.advance(None), lambda: sim.advance_realtime("1", 1), lambda: sim.set_state("a", sim.positions, sim.velocities),
+                 lambda: sim.push(sim.positions * 1j), lambda: sim.restore(3), lambda: sim.restore_checkpoint("text"), lambda: sim.move_collider(0.5, [0, 0, 0], 1),
+                 lambda: sim.move_collider(0, [0, 0, 0], "1"), lambda: sim.closest([[0, 0, 0]], within="far"), lambda: sim.set_wind("north"), lambda: sim.observe(3),
+                 lambda: sim.add_event("name", 3), lambda: drape.Sim(3), lambda: drape.Sim([1]), lambda: drape.Sim(sheet(), integrator=3),
+                 lambda: drape.Sim(sheet(), threads=1.5), lambda: drape.Sim(sheet(), dt="a"), lambda: sim.model.collider("ball", "now"),
+                 lambda: sim.model.check_derivatives(seed="a"), lambda: sim.untangle(sweeps="many")):
+        raises(TypeError, call)
+    for call in (lambda: drape.Mesh(np.eye(3), [[0, 1, 2]]).write("none/x.ply"), lambda: drape.Scene(sheet()).write("none/x.json"), lambda: sim.save("none/x")):
+        raises(OSError, call)
+    equal(sim.time, 0)
+    sim.advance(0.02)
+
+
 def test_callbacks_in_threads():
     """a wind and a term in Python are called from the threads of a sim, with the same result"""
     hashes = set()

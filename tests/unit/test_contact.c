@@ -492,7 +492,11 @@ static void check_tree(drape_arena *arena, int32_t count)
         drape_path_bvh_query(&tree, &query, note, &f);
         uint8_t side[100];
         found scanned = {.count = 0};
-        drape_path_bvh_scan(&tree, &query, 100, marks, side, note, &scanned);
+        int32_t point[100];
+        for (int32_t i = 0; i < 100; i++)
+            point[i] = i;
+        const drape_path_elements all = {tree.order, point, count, 100};
+        drape_path_bvh_scan(&tree, &query, &all, marks, side, note, &scanned);
         ck_assert_int_eq(scanned.count, f.count);
         ck_assert_int_eq(memcmp(scanned.elements, f.elements, (size_t)f.count * sizeof *f.elements), 0);
         for (int i = 1; i < f.count; i++)

@@ -329,6 +329,55 @@ START_TEST(annuli)
 }
 END_TEST
 
+/* A quarter of a hemisphere with a hole: all nodes on the sphere, evenly spaced along meridians, all triangles
+ * outwards. A closed ring is slit: first and last column at the same places. */
+START_TEST(surfaces_of_revolution)
+{
+    enum { ROWS = 5, COLUMNS = 4 };
+    const double pi = acos(-1.0), top = pi / 10;
+    drape_context *ctx = new_context();
+    drape_setting settings[] = {
+        {"rows", ROWS, NULL},       {"columns", COLUMNS, NULL},     {"top_radius", 2 * sin(top), NULL},
+        {"bottom_radius", 2, NULL}, {"height", 2 * cos(top), NULL}, {"arc_radius", 2, NULL},
+        {"angle", 90, NULL}};
+    drape_mesh_def def;
+    drape_mesh_def_init(&def, sizeof def);
+    def.grid = (drape_entry_def){"revolution", settings, 7};
+    drape_mesh mesh = make(ctx, &def);
+    ck_assert_int_eq(mesh.rows, ROWS);
+    ck_assert_int_eq(mesh.columns, COLUMNS);
+    for (int32_t i = 0; i < mesh.node_count; i++) {
+        const double polar = top + (pi / 2 - top) * (i / COLUMNS) / (ROWS - 1),
+                     angle = pi / 2 * (i % COLUMNS) / (COLUMNS - 1), *x = mesh.x + 3 * i;
+        ck_assert_double_eq_tol(x[0], 2 * sin(polar) * cos(angle), 1e-14);
+        ck_assert_double_eq_tol(x[1], 2 * cos(polar) - 2 * cos(top), 1e-14);
+        ck_assert_double_eq_tol(x[2], -2 * sin(polar) * sin(angle), 1e-14);
+    }
+    for (int32_t t = 0; t < mesh.triangle_count; t++)
+        ck_assert_double_gt(twice_area(&mesh, t), 0); /* outwards is upwards here */
+    drape_mesh_free(&mesh);
+    def.grid.setting_count = 4;
+    settings[2].number = 1;
+    mesh = make(ctx, &def);
+    for (int32_t r = 0; r < ROWS; r++)
+        for (int k = 0; k < 3; k++)
+            ck_assert_double_eq_tol(mesh.x[3 * r * COLUMNS + k], mesh.x[3 * (r * COLUMNS + COLUMNS - 1) + k],
+                                    1e-14);
+    ck_assert_double_eq_tol(mesh.x[3 * COLUMNS], 1.25, 1e-15);
+    for (int32_t t = 0; t < mesh.triangle_count; t++)
+        ck_assert_double_gt(twice_area(&mesh, t), 0);
+    drape_mesh_free(&mesh);
+    settings[2].number = 2;
+    assert_refused(&def, "/m/height: 0 m, and both circles have the radius 2 m");
+    settings[2].number = 1;
+    def.grid.setting_count = 6;
+    settings[4].number = 0;
+    settings[5].number = 0.4;
+    assert_refused(&def, "/m/arc_radius: 0.4 m; it is at least half the distance of the circles, 0.5 m");
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 START_TEST(grid_faults)
 {
     drape_setting s[6];
@@ -668,7 +717,7 @@ START_TEST(every_failed_allocation_is_reported_and_none_leaks)
 END_TEST
 
 SUITE("mesh", equilateral_counts_and_positions, equilateral_triangles_are_equilateral, square_grids,
-      square_defaults, equilateral_strips, annuli, grid_faults,
+      square_defaults, equilateral_strips, annuli, surfaces_of_revolution, grid_faults,
       too_many_nodes_are_refused_before_memory_is_taken, transform_scales_then_rotates_then_translates,
       rotation_is_exact_at_right_angles_and_right_between, identity_transform_changes_no_bit,
       transform_faults, exactly_one_source, array_faults, two_closed_fans_at_one_node_are_refused,

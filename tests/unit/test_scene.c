@@ -502,7 +502,7 @@ static const struct {
      "s.json:2:23: /integrator/dt/0: null is not allowed; an element is a number"},
     {ROOT("'controller': {'dt_min': null}"),
      "s.json:2:16: /controller/dt_min: null is not allowed; a setting is a number, true, false, a string or "
-     "an array of numbers"},
+     "an array of numbers or pairs"},
     {ROOT("'controller': []"),
      "s.json:2:1: /controller: an empty array is not allowed; controller is an object"},
     {"{'drape': 1, 'duration': 0, 'cloth': [{'mesh': {'grid': 'g'}}]}",
@@ -536,9 +536,15 @@ static const struct {
      "s.json:2:1: /cloth/0/material: an empty array is not allowed; material is an object"},
     {CLOTH("'material': {'density': {}}"),
      "s.json:2:14: /cloth/0/material/density: an object is not "
-     "allowed; a setting is a number, true, false, a string or an array of numbers"},
+     "allowed; a setting is a number, true, false, a string or an array of numbers or pairs"},
     {CLOTH("'material': {'a/b': [true]}"),
      "s.json:2:22: /cloth/0/material/a~1b/0: true is not allowed; an element is a number"},
+    {CLOTH("'material': {'warp_curve': [[1, 2], [3]]}"),
+     "s.json:2:37: /cloth/0/material/warp_curve/1: an array of 1 is not allowed; an element is an array of "
+     "two "
+     "numbers"},
+    {CLOTH("'material': {'warp_curve': [[1, 2], 3]}"),
+     "s.json:2:37: /cloth/0/material/warp_curve/1: 3 is not allowed; an element is an array of two numbers"},
     {CLOTH("'terms': 'stretch.edge'"), "s.json:2:1: /cloth/0/terms: \"stretch.edge\" is not allowed; terms "
                                        "is an array of names, or objects with a \"type\""},
     {CLOTH("'terms': ['']"), "s.json:2:11: /cloth/0/terms/0: \"\" is not allowed; an element is a name, or "
@@ -549,7 +555,7 @@ static const struct {
      "s.json:2:27: /cloth/0/terms/1/type: \"type\" is missing: name of a term; a non-empty string"},
     {CLOTH("'terms': [{'type': 'bend.hinge', 'stiffness': null}]"),
      "s.json:2:34: /cloth/0/terms/0/stiffness: null is not allowed; a setting is a number, true, false, a "
-     "string or an array of numbers"},
+     "string or an array of numbers or pairs"},
     {CLOTH("'velocity': [1, 2, 3, 4]"), "s.json:2:1: /cloth/0/velocity: an array of 4 is not allowed; "
                                         "velocity is [x, y, z], each in [-1e9, 1e9] m/s"},
     {CLOTH("'velocity': [null, 2, 3]"),
@@ -1234,7 +1240,7 @@ END_TEST
 static void check_form(const drape_scene_object *object)
 {
     ck_assert_ptr_nonnull(object->name);
-    ck_assert_uint_le(object->key_count, 16);
+    ck_assert_uint_le(object->key_count, 24);
     for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
         ck_assert_msg(key->param.help && *key->param.help, "%s has no help", key->param.name);
@@ -1263,6 +1269,7 @@ static const char whole[] =
     "1}]}], 'colliders': [{'type': 'c', 'turns': "
     "[{'time': 0, 'rotate': [0, 0, 1]}]}],"
     "'events': [{'type': 'e'}], 'integrator': {}, 'controller': {}, 'output': {},"
+    "'histories': [{'name': 'h', 'times': [0], 'values': [1]}],"
     "'seams': [{'type': 's', 'a': {'cloth': 'c', 'nodes': [0]}, 'b': {'cloth': 'c', 'nodes': [1]}}]}";
 
 /* The key that a pointer leads to, and the def it belongs to. */
@@ -1312,6 +1319,9 @@ static void write_value(const drape_param *param, char *text, size_t size)
         return;
     case DRAPE_PARAM_TEXT:
         snprintf(text, size, "\"other\"");
+        return;
+    case DRAPE_PARAM_POINTS:
+        snprintf(text, size, "[[0.25, 0.5], [0.75, 1]]");
     }
 }
 

@@ -1,0 +1,155 @@
+/* histories.c: the histories of a scene, and which of them a term has: by its parameter "history", or by
+ * "ramp", which stands for a cubic from 0 at t = 0 to 1. */
+#include "compile/stages.h"
+#include "model/history.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define MAX_FACTOR 1e9
+#define MAX_SLOPE  1e30 /* [1/s] between two keys, so that no number of a cubic overflows */
+
+static drape_status refuse(drape_model *model, const char *pointer, const char *key, size_t index,
+                           const char *text)
+{
+    char at[128];
+    snprintf(at, sizeof at, "%s/%s/%zu", pointer, key, index);
+    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
+}
+
+static drape_status check(drape_model *model, const char *pointer, const drape_history_def *def)
+{
+    if (def->time_count == 0 || def->time_count != def->value_count)
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
+                             "%zu times and %zu values; there is one value for each time, and at least one",
+                             def->time_count, def->value_count);
+    for (size_t k = 0; k < def->time_count; k++) {
+        if (!(fabs(def->times[k]) <= MAX_FACTOR))
+            return refuse(model, pointer, "times", k, "a time is finite and within 1e9 s");
+        if (!(fabs(def->values[k]) <= MAX_FACTOR))
+            return refuse(model, pointer, "values", k, "a factor is finite and within 1e9");
+        if (k > 0 && !(def->times[k] > def->times[k - 1]))
+            return refuse(model, pointer, "times", k, "times must increase from key to key");
+        if (k > 0 &&
+            !(fabs(def->values[k] - def->values[k - 1]) <= MAX_SLOPE * (def->times[k] - def->times[k - 1])))
+            return refuse(model, pointer, "times", k, "the factor changes by more than 1e30 per second");
+    }
+    return DRAPE_OK;
+}
+
+static drape_status check_name(drape_model *model, const char *pointer, const drape_scene_def *def, size_t i)
+{
+    char at[96];
+    snprintf(at, sizeof at, "%s/name", pointer);
+    for (size_t k = 0; k < i; k++)
+        if (strcmp(def->histories[k].name, def->histories[i].name) == 0)
+            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "two histories have the name \"%.60s\"",
+                                 def->histories[i].name);
+    return DRAPE_OK;
+}
+
+/* Adds a history of so many keys to the model, which has room for it. */
+static drape_status add(drape_model *model, const char *name, size_t count, const double *times,
+                        const double *values, bool cubic)
+{
+    drape_arena *arena = &model->arena;
+    drape_history *to = &model->histories[model->history_count];
+    to->name = drape_arena_text(arena, name);
+    to->key_count = count;
+    to->time = drape_arena_take(arena, count, sizeof *to->time);
+    to->value = drape_arena_take(arena, count, sizeof *to->value);
+    to->slope = cubic ? drape_arena_take(arena, count, sizeof *to->slope) : NULL;
+    if (drape_arena_status(arena))
+        return DRAPE_E_MEMORY;
+    memcpy(to->time, times, count * sizeof *times);
+    memcpy(to->value, values, count * sizeof *values);
+    if (cubic)
+        drape_history_slopes(count, times, values, to->slope);
+    model->history_count++;
+    return DRAPE_OK;
+}
+
+drape_status drape_compile_histories(drape_model *model, const drape_scene_def *def)
+{
+    size_t room = def->history_count;
+    for (size_t c = 0; c < def->cloth_count; c++)
+        room += def->cloths[c].term_count;
+    model->histories = drape_arena_take(&model->arena, room, sizeof *model->histories);
+    drape_status status = model->histories ? DRAPE_OK : DRAPE_E_MEMORY;
+    for (size_t i = 0; !status && i < def->history_count; i++) {
+        const drape_history_def *from = &def->histories[i];
+        char pointer[64];
+        snprintf(pointer, sizeof pointer, "/histories/%zu", i);
+        status = check(model, pointer, from);
+        if (!status)
+            status = check_name(model, pointer, def, i);
+        if (!status)
+            status = add(model, from->name, from->time_count, from->times, from->values,
+                         from->interpolation && strcmp(from->interpolation, "cubic") == 0);
+    }
+    return status;
+}
+
+/* ---- Of a term ---- */
+
+static const char *text_of(const drape_entry_def *def, const char *name)
+{
+    const char *text = NULL;
+    for (size_t i = 0; i < def->setting_count; i++)
+        if (strcmp(def->settings[i].name, name) == 0)
+            text = def->settings[i].text;
+    return text;
+}
+
+static drape_status find_named(drape_model *model, const char *pointer, const char *name, drape_term *term)
+{
+    const char *names[16];
+    size_t known = 0;
+    for (int32_t i = 0; i < model->history_count && !term->history; i++) {
+        drape_history *history = &model->histories[i];
+        if (*history->name && strcmp(history->name, name) == 0) {
+            history->used = true;
+            term->history = history;
+        } else if (*history->name && known < sizeof names / sizeof *names)
+            names[known++] = history->name;
+    }
+    if (term->history)
+        return DRAPE_OK;
+    const char *meant = drape_did_you_mean(name, names, known);
+    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "there is no history \"%.60s\"%s%.60s%s",
+                         name, meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+}
+
+drape_status drape_compile_history_of(drape_model *model, const char *pointer, const drape_entry_def *def,
+                                      drape_term *term)
+{
+    const drape_entry *entry = &term->ops->entry;
+    const int given = drape_param_find(entry->params, entry->param_count, DRAPE_HISTORY_PARAM),
+              ramp = drape_param_find(entry->params, entry->param_count, "ramp");
+    if (given < 0 || entry->params[given].kind != DRAPE_PARAM_TEXT)
+        return DRAPE_OK;
+    const char *name = text_of(def, DRAPE_HISTORY_PARAM);
+    const double rise = ramp < 0 ? 0 : term->params[drape_param_place(entry->params, ramp)];
+    char at[160];
+    if (term->ops->from_scene_gravity)
+        snprintf(at, sizeof at, "/gravity_history");
+    else
+        snprintf(at, sizeof at, "%s/%s", pointer, DRAPE_HISTORY_PARAM);
+    if (term->timed[0] < term->timed[1])
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
+                             "%s has a course in time of its own, and no history", entry->name);
+    if (name && rise > 0)
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "a load has a history or a ramp, not both");
+    if (name)
+        return find_named(model, at, name, term);
+    if (!(rise > 0))
+        return DRAPE_OK;
+    const double times[] = {0, rise}, values[] = {0, 1};
+    drape_status status = add(model, "", 2, times, values, true);
+    if (!status) {
+        term->history = &model->histories[model->history_count - 1];
+        model->histories[model->history_count - 1].used = true;
+    }
+    return status;
+}

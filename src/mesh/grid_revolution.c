@@ -1,0 +1,117 @@
+/*
+ * grid_revolution.c: part of a surface of revolution about the y axis, between two circles: a sector of a
+ * ring, a cylinder, a cone, or of a sphere or a torus. Row 0 is the top circle at y = 0, the last row the
+ * bottom circle at y = -height; columns are meridians, c angle/(columns - 1) from x towards -z, the first and
+ * the last one not joined, at 360 degrees neither: a slit. Between the circles, a meridian is straight, or an
+ * arc of arc_radius that bulges away from the axis; nodes divide it evenly. A sphere has arc_radius R,
+ * top_radius R sin t, bottom_radius R sin b and height R (cos t - cos b), t and b the angles from the axis.
+ *
+ * Triangles are counterclockwise as seen from outside or, if the bottom circle is the larger one, from above.
+ */
+#include <math.h>
+#include <stdio.h>
+
+#include "base/elementary.h"
+#include "mesh/grid.h"
+
+enum { COLUMNS, ROWS, TOP, BOTTOM, HEIGHT, ARC, ANGLE, DIAGONALS, PARAM_COUNT };
+enum { ALTERNATING, PARALLEL };
+
+static const char *const diagonals[] = {[ALTERNATING] = "alternating", [PARALLEL] = "parallel", NULL};
+
+static const drape_param params[PARAM_COUNT] = {
+    [COLUMNS] = GRID_NODES("columns", 2, 2, "nodes on each circle; columns x rows is at most 2^28"),
+    [ROWS] = GRID_NODES("rows", 2, 2, "circles of nodes, the top one first"),
+    [TOP] = GRID_LENGTH("top_radius", "radius of the top circle, at y = 0"),
+    [BOTTOM] = GRID_LENGTH("bottom_radius", "radius of the bottom circle"),
+    [HEIGHT] = DRAPE_NUMBER("height", "m", 0, 0, 1e9, "of the top circle above the bottom one; 0: a ring"),
+    [ARC] = DRAPE_NUMBER("arc_radius", "m", 0, 0, 1e9,
+                         "radius of the arc between the circles, at least half their distance; 0: straight"),
+    [ANGLE] = DRAPE_NUMBER("angle", "degrees", 360, DRAPE_ABOVE(0), 360,
+                           "about the axis; first and last column are not joined, at 360 neither"),
+    [DIAGONALS] = DRAPE_CHOICE("diagonals", ALTERNATING, diagonals, "how the cells are split into triangles"),
+};
+
+/* A meridian: its points are middle + sine of an angle times along + (cosine - least) times out, as radius
+ * and y, at angles from -half to half; a straight one has half = 0. */
+typedef struct meridian {
+    double middle[2], along[2], out[2], half, least;
+} meridian;
+
+static meridian meridian_of(const double *values)
+{
+    const double run = values[BOTTOM] - values[TOP], drop = values[HEIGHT], chord = drape_hypot(run, drop),
+                 radius = values[ARC];
+    meridian m = {.middle = {(values[TOP] + values[BOTTOM]) / 2, -drop / 2}, .along = {run, -drop}};
+    if (radius > 0 && chord > 0) {
+        const double depth = sqrt(fmax(0, radius * radius - chord * chord / 4));
+        m.half = drape_atan2(chord / 2, depth);
+        m.least = depth / radius;
+        m.out[0] = drop / chord * radius, m.out[1] = run / chord * radius;
+        m.along[0] *= radius / chord, m.along[1] *= radius / chord;
+    }
+    return m;
+}
+
+static void place_nodes(const double *values, drape_mesh *mesh)
+{
+    const double radian = 3.14159265358979323846 / 180;
+    const meridian m = meridian_of(values);
+    double *x = mesh->x;
+    for (int32_t r = 0; r < mesh->rows; r++) {
+        const double at = (double)r / (mesh->rows - 1) - 0.5;
+        double sine = at, cosine = 0;
+        if (m.half > 0)
+            drape_sin_cos(2 * m.half * at, &sine, &cosine);
+        const double radius = m.middle[0] + sine * m.along[0] + (cosine - m.least) * m.out[0];
+        const double y = m.middle[1] + sine * m.along[1] + (cosine - m.least) * m.out[1];
+        for (int32_t c = 0; c < mesh->columns; c++, x += 3) {
+            drape_sin_cos(radian * values[ANGLE] * c / (mesh->columns - 1), &sine, &cosine);
+            x[0] = radius * cosine;
+            x[1] = y;
+            x[2] = -radius * sine;
+        }
+    }
+}
+
+static drape_status check_meridian(drape_context *ctx, const char *pointer, const double *values)
+{
+    char place[sizeof ctx->pointer];
+    const double chord = drape_hypot(values[BOTTOM] - values[TOP], values[HEIGHT]);
+    if (!(chord > 0)) {
+        snprintf(place, sizeof place, "%s/height", pointer);
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "0 m, and both circles have the radius %g m",
+                             values[TOP]);
+    }
+    if (values[ARC] == 0 || values[ARC] >= chord / 2 * (1 - 1e-12))
+        return DRAPE_OK;
+    snprintf(place, sizeof place, "%s/arc_radius", pointer);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
+                         "%g m; it is at least half the distance of the circles, %g m", values[ARC],
+                         chord / 2);
+}
+
+static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
+{
+    static const bool falling[][2][2] = {
+        [ALTERNATING] = {{true, false}, {false, true}}, [PARALLEL] = {{true, true}, {true, true}}};
+    const int32_t columns = (int32_t)values[COLUMNS], rows = (int32_t)values[ROWS];
+    drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
+    if (!status)
+        status = check_meridian(ctx, pointer, values);
+    if (!status)
+        status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
+    if (status)
+        return status;
+    place_nodes(values, mesh);
+    drape_grid_triangulate(mesh, falling[(int)values[DIAGONALS]], true);
+    return DRAPE_OK;
+}
+
+const drape_grid_ops drape_grid_revolution = {
+    .entry = {.name = "revolution",
+              .summary = "part of a surface of revolution between two circles: of a ring, cylinder, cone, "
+                         "sphere or torus",
+              DRAPE_PARAMS(params)},
+    .generate = generate,
+};

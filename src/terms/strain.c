@@ -1,0 +1,43 @@
+/* strain.c: see strain.h. */
+#include "terms/strain.h"
+
+#include "base/reason.h"
+#include "base/vec3.h"
+
+void drape_strain_law(const drape_cloth_view *cloth, const double *values, double c[9], double k[3],
+                      double l[9])
+{
+    drape_orthotropic_law(values, cloth->tension, cloth->material->membrane_stiffness,
+                          cloth->material->poisson_ratio, c);
+    drape_orthotropic_squares(c, 3, k, l);
+}
+
+void drape_strain_weights(const double l[3], const double flat[6], double w[3])
+{
+    const double twice = flat[2] * flat[5] - flat[3] * flat[4];
+    const double b1[2] = {flat[5] / twice, -flat[4] / twice}, b2[2] = {-flat[3] / twice, flat[2] / twice};
+    w[0] = l[0] * b1[0] * b1[0] + l[1] * b1[1] * b1[1] + 2 * l[2] * b1[0] * b1[1];
+    w[1] = l[0] * b1[0] * b2[0] + l[1] * b1[1] * b2[1] + l[2] * (b1[0] * b2[1] + b1[1] * b2[0]);
+    w[2] = l[0] * b2[0] * b2[0] + l[1] * b2[1] * b2[1] + 2 * l[2] * b2[0] * b2[1];
+}
+
+/* Area over rest area. */
+static double ratio_of(const drape_elements *el, int32_t element, const double *x)
+{
+    const int32_t *node = el->node + (size_t)element * (size_t)el->nodes;
+    double d1[3], d2[3], normal[3];
+    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], d1);
+    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], d2);
+    vec3_cross(d1, d2, normal);
+    return vec3_norm(normal) / 2 / drape_rest_of(el, DRAPE_STRAIN_AREA, element);
+}
+
+drape_status drape_strain_check(const drape_elements *el, const double *x, const double *before,
+                                const double *internal, drape_fault *fault)
+{
+    (void)internal;
+    *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_AREA_COLLAPSE),
+                           .what = "area / rest area",
+                           .limit = el->params[DRAPE_STRAIN_MIN_AREA]};
+    return drape_check_ratios(el, x, before, 3, ratio_of, fault);
+}
