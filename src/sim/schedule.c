@@ -8,6 +8,7 @@
 #define JOIN       1e-9 /* of dt: a shorter remainder is joined to the interval before it */
 /* of the time: a shorter remainder is rounding error in the host's own sum */
 #define ROUNDING (1e3 * DBL_EPSILON)
+#define LEAST    1e-30 /* of dt: in a shorter remainder nothing happens, and 1/h^2 would overflow */
 
 void drape_schedule_init(drape_schedule *s, drape_stepping stepping, double dt, double start)
 {
@@ -39,6 +40,12 @@ static double rounding(double t)
     return 4 * DBL_EPSILON * fabs(t);
 }
 
+/* Remainders up to this are left out. */
+static double least_remainder(const drape_schedule *s)
+{
+    return fmax(ROUNDING * fabs(s->end), LEAST * s->dt);
+}
+
 /* Remainders up to this are joined to the interval before; it exceeds the rounding error that a frame can
  * add. */
 static double min_remainder(const drape_schedule *s)
@@ -68,7 +75,7 @@ static bool next_free(const drape_schedule *s, double *t1, double *h)
 {
     *t1 = s->cut ? s->cut_end : s->end;
     *h = fmin(*t1 - s->now, s->limit);
-    return s->end - s->now > ROUNDING * fabs(s->end);
+    return s->end - s->now > least_remainder(s);
 }
 
 /* The rest of the advance is covered by one step if one suffices, or by two halves if two do, so that no
@@ -79,7 +86,7 @@ static bool next_proposed(const drape_schedule *s, double *t1, double *h)
     double left = end - s->now;
     *h = s->limit >= (1 - JOIN) * left ? left : 2 * s->limit > left ? left / 2 : s->limit;
     *t1 = *h == left ? end : s->now + *h;
-    return s->end - s->now > ROUNDING * fabs(s->end);
+    return s->end - s->now > least_remainder(s);
 }
 
 static bool next_counted(drape_schedule *s, double *t1, double *h)
@@ -88,7 +95,7 @@ static bool next_counted(drape_schedule *s, double *t1, double *h)
         double left = s->end - interval_time(s, s->count);
         double least =
             /* before the first step there is none to join */
-            s->stepped ? min_remainder(s) : ROUNDING * fabs(s->end);
+            s->stepped ? min_remainder(s) : least_remainder(s);
         if (!(left > least))
             return false;
         open_interval(s);

@@ -57,6 +57,23 @@ START_TEST(asking_changes_nothing)
 }
 END_TEST
 
+/* Nothing happens in a step so short that 1/h^2 overflows, also before the first one. */
+START_TEST(a_step_is_not_too_short_to_be_computed)
+{
+    const drape_stepping all[] = {DRAPE_STEPS_COUNTED, DRAPE_STEPS_PROPOSED, DRAPE_STEPS_FREE};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+        drape_schedule s;
+        double t1, h;
+        drape_schedule_init(&s, all[i], 0.01, 0);
+        drape_schedule_aim(&s, 1e-300);
+        ck_assert(!drape_schedule_next(&s, &t1, &h));
+        drape_schedule_aim(&s, 1e-30);
+        ck_assert(drape_schedule_next(&s, &t1, &h));
+        ck_assert_double_eq(t1, 1e-30);
+    }
+}
+END_TEST
+
 /* Rejected once, then twice: halves and quarters of the same interval; then the size grows again. */
 START_TEST(halves_fill_the_interval)
 {
