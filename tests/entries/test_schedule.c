@@ -368,7 +368,7 @@ START_TEST(other_steps_lead_to_the_cut)
 END_TEST
 
 SUITE("schedule", a_cut_step_ends_at_its_end, other_steps_lead_to_the_cut, times_are_counted,
-      asking_changes_nothing, halves_fill_the_interval, the_end_cuts_and_tiny_remainders_join,
-      advances_do_not_shift_the_count, a_host_may_add_up_its_frames, an_interval_left_half_done_is_given_up,
-      any_sequence_fills_the_time, many_halvings_stay_small, proposed_steps_reach_the_end,
-      no_step_is_tried_again_at_its_size)
+      asking_changes_nothing, a_step_is_not_too_short_to_be_computed, halves_fill_the_interval,
+      the_end_cuts_and_tiny_remainders_join, advances_do_not_shift_the_count, a_host_may_add_up_its_frames,
+      an_interval_left_half_done_is_given_up, any_sequence_fills_the_time, many_halvings_stay_small,
+      proposed_steps_reach_the_end, no_step_is_tried_again_at_its_size)
