@@ -174,8 +174,9 @@ void drape_system_predict_contact(drape_system *system, const double *p, double 
 /* Whether the Jacobian of contact is symmetric in every state. */
 bool drape_system_is_symmetric(const drape_system *system);
 
-/* Makes the values of drape_system_jacobian at a point with a share of the positive parts symmetric: takes out
- * how friction changes with the normal force and the place of contact, and of the rest, what is antisymmetric. */
+/* Makes the values of drape_system_jacobian at a point with a share of the positive parts symmetric: takes
+ * out how friction changes with the normal force and the place of contact, and of the rest, what is
+ * antisymmetric. */
 void drape_system_symmetrize(drape_system *system, const drape_point *point, double positive_share,
                              double *values);
 
