@@ -109,8 +109,8 @@ typedef enum drape_contact_derivatives {
                                   contact/friction.h) */
 } drape_contact_derivatives;
 
-/* Adds them to values in the pattern, which must have their blocks: with the share `positive_share`, from 0 to
- * 1, of the difference between them and DRAPE_CONTACT_GAUSS_NEWTON. */
+/* Adds them to values in the pattern, which must have their blocks: with the share `positive_share`, from 0
+ * to 1, of the difference between them and DRAPE_CONTACT_GAUSS_NEWTON. */
 void drape_contact_add_jacobian(drape_contact *contact, double weight, drape_contact_derivatives which,
                                 double positive_share, const drape_pattern *pattern, double *values);
 
@@ -123,8 +123,8 @@ void drape_contact_predict(drape_contact *contact, const double *p, double weigh
 bool drape_contact_is_symmetric(const drape_contact *contact);
 
 /* Takes out of values, to which drape_contact_add_jacobian added a share of DRAPE_CONTACT_SYMMETRIC with the
- * same weight, how friction changes with the normal force and with the place of contact: what remains of friction
- * is symmetric, and positive semidefinite for each contact in its tangential plane. */
+ * same weight, how friction changes with the normal force and with the place of contact: what remains of
+ * friction is symmetric, and positive semidefinite for each contact in its tangential plane. */
 void drape_contact_fix_friction(drape_contact *contact, double weight, double share,
                                 const drape_pattern *pattern, double *values);
 
