@@ -7,14 +7,15 @@
  * The guess extrapolates the motion, with a share s of the last change of velocity,
  *     d = h v0 + s h^2 (v0 - v-1)/h0
  * s = 1/2 halves the error of one iteration on a swinging sheet; s = 1 amplifies its own noise and
- * diverges. A change that is not like the one before it does not go on: after pins have turned, a guess with
- * half of it is so far off that it may lead to another solution. So s is at most the correlation of the two,
+ * diverges. A change that is not like the one before it does not go on: after pins have turned, a guess
+ * with half of it is so far off that it may lead to another solution. So s is at most the correlation of
+ * the two,
  *     (a0, a1)_M / max(|a0|_M^2, |a1|_M^2)
- * and 0 where there is none, or the last step ended in contact: 36 scenes in contact drawn at random took 27
- * % fewer iterations than with s = 1/2, and 14 % fewer with the correlation alone, and were as far off or
- * nearer. So does h/h0 > 1 diverge: where a step was halved and the next is not, what the short step left as
- * noise would count twice, the longer step would be refused for the energy of it, and so on. h/h0 is 1 at
- * most.
+ * and 0 where there is none, or the last step ended in contact: 36 scenes in contact drawn at random took
+ * 27 % fewer iterations than with s = 1/2, and 14 % fewer with the correlation alone, and were as far off
+ * or nearer. h/h0 > 1 diverges, too: where a step was halved and the next is not, what the short step
+ * left as noise would count twice, the longer step would be refused for the energy of it, and so on. h/h0
+ * is 1 at most.
  */
 #include "integrators/implicit.h"
 #include "nonlinear/inexact_newton.h"

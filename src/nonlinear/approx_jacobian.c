@@ -5,10 +5,10 @@
 
 #include <string.h>
 
-/* Conjugate gradients in each iteration with friction. A sheet of 30 x 30 nodes on a ball with friction 0.3
- * is 30 mm of 1 m from the converged run after 0.8 s with 0, 2, 3 or up to 60 iterations, for 1.7, 2.5, 2.8
- * and 4.7 times the CPU of symmetric matrices, with which it is 52 mm off; one of 20 x 20 nodes that is
- * thrown on a slope, 378, 0, 0 and 1 mm, and 567 mm. */
+/* Conjugate gradients in each iteration with friction. A sheet of 30 x 30 nodes on a ball with friction
+ * 0.3 is 30 mm of 1 m from the converged run after 0.8 s with 0, 2, 3 or up to 60 iterations, for 1.7,
+ * 2.5, 2.8 and 4.7 times the CPU of symmetric matrices, with which it is 52 mm off; one of 20 x 20 nodes
+ * that is thrown on a slope, 378, 0, 0 and 1 mm, and 567 mm. */
 #define INNER_ITERATIONS 2
 #define INNER_TOLERANCE  0.3
 

@@ -7,9 +7,10 @@
 
 #include <string.h>
 
-/* Residual left by a solution, of |b|, most of which are normal forces. A sheet of 1 m, E h 300 to 1e5 N/m,
- * that is thrown on a slope with friction 0.4 is 0 to 17 mm from the converged run after 0.4 s with 1e-4, 2
- * to 41 mm with 1e-3, and 0.07 to 0.6 m, where it sticks, with A alone, for two thirds more iterations. */
+/* Residual left by a solution, of |b|, most of which are normal forces. A sheet of 1 m, E h 300 to 1e5
+ * N/m, that is thrown on a slope with friction 0.4 is 0 to 17 mm from the converged run after 0.4 s with
+ * 1e-4, 2 to 41 mm with 1e-3, and 0.07 to 0.6 m, where it sticks, with A alone, for two thirds more
+ * iterations. */
 #define TOLERANCE 1e-4
 
 drape_status drape_friction_matrix_init(drape_arena *arena, drape_system *system, void *owner,

@@ -179,6 +179,7 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
     drape_archive_mark(a, "realtime");
     drape_archive_bool(a, &m->active);
     drape_archive_bool(a, &m->stretched);
+    drape_archive_bool(a, &m->touches);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         drape_archive_double(a, numbers[i]);
     drape_archive_doubles(a, m->cost, DRAPE_MAX_EFFORTS);

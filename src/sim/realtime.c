@@ -93,12 +93,16 @@ static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *
 
 /* The longest step to keep up with. Not above dt in contact: in a longer step a body moves farther, which
  * costs more iterations and rejected steps than it saves (docs/realtime.md, "A budget"). */
-static double longest_step(const drape_sim *sim)
+static double longest_step(const drape_realtime_memory *m)
 {
-    const drape_realtime_memory *m = &sim->realtime;
+    return m->touches ? m->dt : m->longest;
+}
+
+static bool is_in_contact(const drape_sim *sim)
+{
     const drape_contact *contact = drape_system_contact(sim->system);
     double gap;
-    return contact && drape_contact_active(contact, &gap) > 0 ? m->dt : m->longest;
+    return contact && drape_contact_active(contact, &gap) > 0;
 }
 
 /* Steps at the lowest level of effort, longer than dt: as many as fit into the budget. If not even one
@@ -107,7 +111,7 @@ static double longest_step(const drape_sim *sim)
 static plan plan_stretched(const drape_sim *sim, double owed, double frame, double budget)
 {
     int effort = effort_count(sim) - 1;
-    double longest = fmin(longest_step(sim), sim->realtime.cap);
+    double longest = fmin(longest_step(&sim->realtime), sim->realtime.cap);
     double fit = KEEP * budget / expected(sim, effort);
     int64_t most = steps_of(owed, sim->realtime.dt);
     if (fit < 1 && owed < (1 - SAME) * fmin(longest, ceil(1 / fit) * frame))
@@ -166,6 +170,7 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
         set_deadline(sim, p, report, begun + KEEP * budget);
         status = drape_sim_step(sim, t1, h, &attempt);
         learn(sim, drape_clock_seconds() - start - sim->further_seconds);
+        sim->realtime.touches = is_in_contact(sim);
         report->attempts++;
         report->rejected += !attempt.accepted;
         report->held += attempt.accepted && attempt.reason == drape_reason_name(DRAPE_REASON_HELD);
@@ -193,7 +198,7 @@ static void settle(drape_sim *sim, double goal, drape_realtime *report)
 {
     drape_realtime_memory *m = &sim->realtime;
     double left = goal - drape_sim_state(sim)->t;
-    const double most = longest_step(sim);
+    const double most = longest_step(&sim->realtime);
     m->debt = left > SAME * m->dt ? fmin(left, most) : 0;
     report->dropped = left > most ? left - most : 0;
     m->dropped += report->dropped;
