@@ -272,13 +272,15 @@ DRAPE_API void drape_term_timed(drape_term_builder *builder, double from, double
  * DRAPE_E_MEMORY. */
 DRAPE_API double *drape_term_share(drape_term_builder *builder, int32_t count);
 
+/* The maximum number of sliders of an element. */
+#define DRAPE_MAX_SLIDERS 4
+
 /* For terms with measure, after drape_term_reserve: gives each element `count` sliders (1 to
  * DRAPE_MAX_SLIDERS) beside its elastic energy. A slider is a spring in series with dry friction (Jenkin
  * 1922; Iwan 1966): its force on q is stiffness times (q - q0 - p), at most limit in magnitude, and where it
  * would be more, p follows. p is an internal variable that the library keeps: it moves only when a step is
  * accepted, and at the start the force is 0. What sliding costs counts as dissipated. Once per term. Errors:
  * DRAPE_E_MEMORY, DRAPE_E_ARGUMENT. */
-#define DRAPE_MAX_SLIDERS 4
 DRAPE_API drape_status drape_term_reserve_sliders(drape_term_builder *builder, int count);
 
 /* Sets slider `number` of an element: stiffness [J/q2] >= 0 and limit [J/q] >= 0. Sliders that are not set
