@@ -531,8 +531,8 @@ static bool comes_free(const struct pinch *p)
 }
 
 /* Which pinched cloth stays caught is a matter of small differences: one in forty of such pinches does
- * (docs/realtime.md), another one whenever the rounding changes. Of cloth that goes to the nearest surface, that
- * of all four does. */
+ * (docs/realtime.md), another one whenever the rounding changes. Of cloth that goes to the nearest surface,
+ * that of all four does. */
 START_TEST(test_entangled)
 {
     int freed = 0;
