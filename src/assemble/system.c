@@ -658,15 +658,17 @@ static void measure_load(drape_system *system, const drape_term *term, const dra
  * the cubic through its values and rates at both ends, by Gauss's rule of three points; f counts from its
  * value at the beginning, so that a constant one does no work. */
 static double history_work(drape_system *system, const drape_term *term, const drape_point *from,
-                           const drape_point *to)
+                           const drape_point *to, double *open)
 {
     static const double node[] = {0.11270166537925831, 0.5, 0.88729833462074169},
                         weight[] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
-    const double h = to->t - from->t, start = drape_history_factor(term->history, from->t);
+    const double h = to->t - from->t, start = drape_history_factor(term->history, from->t),
+                 change = drape_history_factor(term->history, to->t) - start;
     double energy[2] = {0, 0}, rate[2];
     measure_load(system, term, from, &energy[0], &rate[0]);
     measure_load(system, term, to, &energy[1], &rate[1]);
-    double work = (drape_history_factor(term->history, to->t) - start) * energy[1];
+    double work = change * energy[1];
+    *open += fabs(change) * fmax(fabs(energy[1] - energy[0]), h * fabs(rate[1]));
     for (int k = 0; k < 3; k++) {
         const double s = node[k], along = 6 * s * (1 - s) * (energy[1] - energy[0]) +
                                           (1 - s) * (1 - 3 * s) * h * rate[0] + s * (3 * s - 2) * h * rate[1];
@@ -675,7 +677,8 @@ static double history_work(drape_system *system, const drape_term *term, const d
     return work;
 }
 
-double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after)
+double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
+                               double *open)
 {
     const drape_point from = {.x = before->x, .v = before->v, .internal = before->internal, .t = before->t},
                       to = {.x = after->x, .v = after->v, .internal = before->internal, .t = after->t};
@@ -685,7 +688,7 @@ double drape_system_timed_work(drape_system *system, const drape_state *before, 
         if (drape_term_is_timed(term) && has_energy(system, term))
             work += timed_work(system, term, &from, &to);
         if (term->history && has_energy(system, term))
-            work += history_work(system, term, &from, &to);
+            work += history_work(system, term, &from, &to, open);
     }
     return work;
 }

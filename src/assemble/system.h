@@ -67,9 +67,11 @@ void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
 
 /* Whether a term depends on time, and the work that this does in a step from one state to another [J], by the
- * internal variables of the former. */
+ * internal variables of the former. *open grows by how much that may be off if histories change at another
+ * time of the step than an integrator sees: at its end, for some. */
 bool drape_system_is_timed(const drape_system *system);
-double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after);
+double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
+                               double *open);
 
 /* From now on the medium moves with this field, if the model has a term that feels it; NULL: it is at
  * rest. */

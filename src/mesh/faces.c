@@ -1,6 +1,7 @@
 /* faces.c: see faces.h. */
 #include "mesh/faces.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -212,6 +213,12 @@ static void divide(drape_mesh *mesh)
 
 /* ---- Texture coordinates ---- */
 
+/* Whether they are numbers, also as floats, which most formats have. */
+static bool are_numbers(const double uv[2])
+{
+    return fabs(uv[0]) <= FLT_MAX && fabs(uv[1]) <= FLT_MAX;
+}
+
 /* A face has texture coordinates at all corners or at none. Returns whether any has. */
 static bool complete_uvs(drape_faces *f)
 {
@@ -220,7 +227,7 @@ static bool complete_uvs(drape_faces *f)
         bool all = true;
         for (int32_t c = f->first[i]; c < f->first[i + 1]; c++) {
             const double *uv = f->uv_of[c] < 0 ? NULL : f->uv + 2 * (size_t)f->uv_of[c];
-            all = all && uv && isfinite(uv[0]) && isfinite(uv[1]);
+            all = all && uv && are_numbers(uv);
         }
         for (int32_t c = f->first[i]; c < f->first[i + 1] && !all; c++)
             f->uv_of[c] = -1;
@@ -257,7 +264,7 @@ static drape_status merge_uvs(drape_context *ctx, drape_faces *f)
         return DRAPE_E_MEMORY;
     }
     for (size_t i = 0; i < count; i++)
-        if (isfinite(f->uv[2 * i]) && isfinite(f->uv[2 * i + 1]))
+        if (are_numbers(f->uv + 2 * i))
             sorted[usable++] = (numbered_uv){{f->uv[2 * i], f->uv[2 * i + 1]}, (int32_t)i};
     qsort(sorted, usable, sizeof *sorted, compare_uvs);
     for (size_t i = 0; i < usable; i++) {

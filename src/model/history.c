@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#define LEAST 1e-6 /* of the largest factor */
+
 /* Returns the number of keys at or before t. */
 static size_t keys_until(const drape_history *h, double t)
 {
@@ -40,6 +42,16 @@ double drape_history_largest(const drape_history *h)
     for (size_t k = 1; h && k < h->key_count; k++)
         largest = fabs(h->value[k]) > fabs(largest) ? h->value[k] : largest;
     return largest;
+}
+
+double drape_history_least(const drape_history *h)
+{
+    const double largest = fabs(drape_history_largest(h));
+    double least = largest;
+    for (size_t k = 0; h && k < h->key_count; k++)
+        if (h->value[k] != 0)
+            least = fmin(least, fabs(h->value[k]));
+    return fmax(least, LEAST * largest);
 }
 
 /* The first and second derivatives at both ends of the piece that begins at a key; of the constant before the

@@ -2,6 +2,7 @@
 #include "nonlinear/residual_bound.h"
 
 #include "base/vec3.h"
+#include "model/history.h"
 
 #include <math.h>
 #include <string.h>
@@ -67,9 +68,19 @@ static double least_bending(const drape_model *m)
     return least;
 }
 
+/* The gravity that is felt; where it has a history, the least of it that is not 0. */
+static double least_gravity(const drape_model *m)
+{
+    double factor = 1;
+    for (int32_t i = 0; i < m->term_count; i++)
+        if (m->terms[i].ops->from_scene_gravity && m->terms[i].history)
+            factor = drape_history_least(m->terms[i].history);
+    return factor * vec3_norm(m->gravity);
+}
+
 static double acceleration_of(const drape_model *m, const start *at, double mass)
 {
-    const double gravity = vec3_norm(m->gravity);
+    const double gravity = least_gravity(m);
     if (gravity > 0)
         return gravity;
     double a = fmin(m->length, least_bending(m)); /* over (1 s)^2 */
@@ -121,7 +132,7 @@ drape_status drape_residual_bound_set(drape_step_equation *e, drape_norm norm, d
         e->weight[f] = mean / bound_of(load, component, at.rounding);
         limit = fmin(limit, e->weight[f] * DRAPE_MAX_LOAD_SHARE * load);
     }
-    if (vec3_norm(m->gravity) > 0) /* else the load is a guess, which the forces may exceed by far */
+    if (least_gravity(m) > 0) /* else the load is a guess, which the forces may exceed by far */
         e->max_residual = in_norm(limit, norm, (double)e->dofs);
     if (mean != component)
         *tolerance = in_norm(mean, norm, (double)e->dofs);

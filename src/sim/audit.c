@@ -181,10 +181,12 @@ static drape_diagnostic gain_at(const drape_model *m, const double *v, const cha
 
 /* Whether kinetic energy exploded in one step; e is the energy at its beginning. What contact has stored in
  * the step is not kinetic: where a collider meets cloth at rest, integrators that take its work at the
- * middle of the step, before contact begins, see no source of it. */
-static bool exploded(const drape_energy *e, const drape_energy *attempted, double gain, double quiet)
+ * middle of the step, before contact begins, see no source of it. Nor do those that take the forces at the end
+ * of a step see when in it a load has changed: open_work is what that leaves open. */
+static bool exploded(const drape_energy *e, const drape_energy *attempted, double gain, double open_work,
+                     double quiet)
 {
-    const double stored = fmax(attempted->contact - e->contact, 0);
+    const double stored = fmax(attempted->contact - e->contact, 0) + open_work;
     if (!(attempted->kinetic > JUMP * e->kinetic && gain - stored > SHARE * (attempted->kinetic + stored)))
         return false;
     double size = attempted->kinetic + fabs(attempted->elastic) + fabs(attempted->gravity) +
@@ -221,7 +223,7 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
     if (m->free_count == 0) /* all motion is prescribed: a gain is only an error in the sum of the pins'
                                work */
         return false;
-    if (exploded(&e, &attempted, gain, quiet))
+    if (exploded(&e, &attempted, gain, info->open_work, quiet))
         info->diagnostic =
             gain_at(m, out->v, "energy gained / kinetic energy", gain / attempted.kinetic, SHARE);
     else if (gain - info->residual_work > STEP_GAIN * scale)

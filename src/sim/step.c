@@ -64,11 +64,11 @@ static bool may_relax(const drape_sim *sim)
 }
 
 /* The work from one state to another of what no integrator counts: the forces of the host, and terms that
- * depend on time. */
-static double outer_work(const drape_sim *sim, const drape_state *from, const drape_state *to)
+ * depend on time, of which *open may be wrong. */
+static double outer_work(const drape_sim *sim, const drape_state *from, const drape_state *to, double *open)
 {
     return drape_system_push_work(sim->system, from->x, to->x) +
-           drape_system_timed_work(sim->system, from, to);
+           drape_system_timed_work(sim->system, from, to, open);
 }
 
 static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step_info *info)
@@ -90,7 +90,8 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
         info->reason = drape_reason_name(DRAPE_REASON_CANCELLED);
     if (status && !info->usable)
         return status;
-    info->pin_work += outer_work(sim, drape_sim_state(sim), next);
+    info->open_work = 0;
+    info->pin_work += outer_work(sim, drape_sim_state(sim), next, &info->open_work);
     drape_status refused = check(sim, info);
     if (refused)
         info->usable = false;
@@ -244,7 +245,9 @@ static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
     const drape_state *now = drape_sim_state(sim);
     drape_state *next = next_state(sim);
     const double t = sim->schedule.cut_end, share = (t - now->t) / (next->t - now->t);
-    const double outer = outer_work(sim, now, next);
+    double open = 0;
+    const double outer = outer_work(sim, now, next, &open);
+    info->open_work = 0;
     if (!sim->chosen.integrator->interpolate_velocities)
         return false;
     drape_sim_dense_positions(sim, now, next, t, sim->frame);
@@ -254,7 +257,7 @@ static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
     next->t = t;
     info->h = t - now->t;
     info->dissipated *= share;
-    info->pin_work = share * (info->pin_work - outer) + outer_work(sim, now, next);
+    info->pin_work = share * (info->pin_work - outer) + outer_work(sim, now, next, &info->open_work);
     return !check(sim, info);
 }
 

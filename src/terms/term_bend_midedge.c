@@ -85,11 +85,10 @@ static const drape_param params[LIST_COUNT] = {
                      "friction between yarns: the curvature whose elastic moment it is as large "
                      "as, HB/B of a KES test; 0: none"),
     [LIST_FRICTION_CURVATURE] =
-        DRAPE_NUMBER("friction_curvature", "1/m", DRAPE_DERIVED("required with friction"), DRAPE_ABOVE(0),
-                     1e9, "change of curvature at which yarns slip"),
-    [LIST_YIELD_CURVATURE] =
-        DRAPE_NUMBER("yield_curvature", "1/m", DRAPE_DERIVED("none: no creases"), DRAPE_ABOVE(0), 1e9,
-                     "curvature beyond which bending leaves a crease"),
+        DRAPE_NUMBER("friction_curvature", "1/m", DRAPE_DERIVED("required with friction"), 1e-9, 1e9,
+                     "change of curvature at which yarns slip"),
+    [LIST_YIELD_CURVATURE] = DRAPE_NUMBER("yield_curvature", "1/m", DRAPE_DERIVED("none: no creases"), 1e-9,
+                                          1e9, "curvature beyond which bending leaves a crease"),
     [LIST_HARDENING] =
         DRAPE_NUMBER("hardening", "1", DRAPE_DERIVED("required with yield_curvature"), DRAPE_ABOVE(0),
                      DRAPE_BELOW(1), "rigidity beyond yield_curvature over that below"),
@@ -349,6 +348,17 @@ static drape_status hysteresis_of(const double *values, const double law[9], dra
     return DRAPE_OK;
 }
 
+/* Whether warp and weft are known on a triangle: yarns slide along them, even if the law has no direction. */
+static bool has_warp(const drape_cloth_view *cloth, const double *values, int32_t triangle)
+{
+    static const double woven[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}; /* any law that is not isotropic */
+    const double *corner[3];
+    double axes[6], flat[6];
+    for (int a = 0; a < 3; a++)
+        corner[a] = cloth->rest + 3 * (size_t)cloth->triangle[3 * (size_t)triangle + (size_t)a];
+    return drape_orthotropic_frame(values, corner, woven, axes, flat);
+}
+
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     const double *bend = values + PARAM_CURVATURE;
@@ -371,6 +381,8 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         int32_t part[MIDEDGE_HINGES], node[MIDEDGE_NODES];
         int sign[MIDEDGE_HINGES];
         double theta[MIDEDGE_HINGES];
+        if (slides.count > 0 && !has_warp(cloth, values, t))
+            return drape_orthotropic_refuse(builder, t);
         drape_midedge_of(cloth, t, values, law, &patch);
         set_parts(cloth, &patch, &clamps, builder, part, sign, theta);
         for (int a = gather_nodes(cloth, &patch, node); a < MIDEDGE_NODES; a++)

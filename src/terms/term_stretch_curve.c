@@ -56,8 +56,8 @@ static const drape_param params[] = {
         "a step that takes the area of a triangle below this fraction of its area at rest is rejected"),
     DRAPE_NUMBER("shear_friction", "N/m", 0, 0, 1e9,
                  "friction between yarns in shear, a force per length: half of 2HG of a KES test; 0: none"),
-    DRAPE_NUMBER("friction_angle", "degrees", DRAPE_DERIVED("required with shear_friction"), DRAPE_ABOVE(0),
-                 89, "change of the shear angle at which yarns slip"),
+    DRAPE_NUMBER("friction_angle", "degrees", DRAPE_DERIVED("required with shear_friction"), 1e-9, 89,
+                 "change of the shear angle at which yarns slip"),
 };
 
 /* ---- Building ---- */
