@@ -11,8 +11,8 @@ double drape_history_factor(const drape_history *history, double t);
 /* The factor that is largest in magnitude, with its sign; 1 if the history is NULL. */
 double drape_history_largest(const drape_history *history);
 
-/* The least magnitude of a key that is not 0, or a millionth of the largest one if that is more: less is not
- * told from 0. 0 if all are 0, 1 if the history is NULL. */
+/* The least magnitude of a key that is not 0, but at least a millionth of the largest one, below which a
+ * factor counts as 0. 0 if all are 0, 1 if the history is NULL. */
 double drape_history_least(const drape_history *history);
 
 /* Returns the time of the next key after t and before end at which the first or second derivative of the

@@ -180,9 +180,9 @@ static drape_diagnostic gain_at(const drape_model *m, const double *v, const cha
 }
 
 /* Whether kinetic energy exploded in one step; e is the energy at its beginning. What contact has stored in
- * the step is not kinetic: where a collider meets cloth at rest, integrators that take its work at the
- * middle of the step, before contact begins, see no source of it. Nor do those that take the forces at the end
- * of a step see when in it a load has changed: open_work is what that leaves open. */
+ * the step is not kinetic: where a collider meets cloth at rest, integrators that take its work at the middle
+ * of the step, before contact begins, see no source of it. Nor do those that take the forces at the end of a
+ * step see when in it a load has changed: open_work is what that leaves open. */
 static bool exploded(const drape_energy *e, const drape_energy *attempted, double gain, double open_work,
                      double quiet)
 {
