@@ -83,6 +83,8 @@ START_TEST(quick_references_pass)
     check("friction_slide", 1, DRAPE_OUTCOME_PASS);
     check("friction_slope", 0, DRAPE_OUTCOME_PASS);
     check("cusick_stiff", 0, DRAPE_OUTCOME_PASS);
+    check("hinged_roof", 4, DRAPE_OUTCOME_PASS);
+    check("hinged_roof_limit", 1, DRAPE_OUTCOME_PASS);
     for (int i = 0; i < find("curve_tension")->case_count; i++)
         check("curve_tension", i, DRAPE_OUTCOME_PASS);
     for (int i = 0; i < find("curve_shear")->case_count; i++)
