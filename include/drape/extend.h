@@ -288,6 +288,18 @@ DRAPE_API drape_status drape_term_reserve_sliders(drape_term_builder *builder, i
 DRAPE_API void drape_term_set_slider(drape_term_builder *builder, int number, int32_t element,
                                      double stiffness, double limit);
 
+/* The maximum number of Maxwell branches of a cloth. */
+#define DRAPE_MAX_BRANCHES 8
+
+/* In build of a law: gives every strain measure of the cloth a Maxwell branch beside its elastic energy, a
+ * spring of the stiffness fraction k, k that of the measure [J/q2], in series with a dashpot, whose force
+ * falls to 1/e in `time` [s] at constant strain. Fractions are > 0, and at most 1 in sum over all laws of the
+ * cloth; times are > 0. The extension of the spring is an internal variable that the library keeps: it moves
+ * when a step is accepted, and at the start it is 0. What the dashpot takes counts as dissipated. Static
+ * equilibria have no force in branches; integrators that choose their own steps refuse them. Errors:
+ * DRAPE_E_ARGUMENT. */
+DRAPE_API drape_status drape_term_add_branch(drape_term_builder *builder, double fraction, double time);
+
 /* Rejects the cloth or the seam: the reason is reported at the place of the term in the scene. Returns
  * DRAPE_E_ARGUMENT, which build or build_seam must return. */
 DRAPE_API drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
@@ -376,7 +388,7 @@ typedef struct drape_term_ops {
     bool distance;   /* measure: q is the distance between the two nodes, for all elements */
 
     /* Adds the elements of one cloth. Called once per cloth. Returns DRAPE_OK or the error that a builder
-     * function returned. */
+     * function returned. Optional for a law, which has no elements. */
     drape_status (*build)(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder);
 
     /* Writes q [q] (count), dq (count x d) and ddq (count x d x d, symmetric). */

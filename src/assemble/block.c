@@ -42,6 +42,27 @@ static void add_sliders(const drape_term *term, const drape_request *want, drape
     }
 }
 
+/* Adds what the Maxwell branches of the term do, at the time of the point after that of the last accepted
+ * state. */
+static void add_branches(const drape_term *term, const drape_request *want, const double *k, drape_block *b)
+{
+    const drape_point *point = want->point;
+    for (int n = 0; want->conservative && n < term->branch_count; n++) {
+        const drape_branch *branch = &term->branches[n];
+        const double *kept = point->internal + term->first_branch, *before = kept + 1 + b->first,
+                     *extension = before + (n + 1) * (int64_t)term->elements.count;
+        const drape_decay decay =
+            drape_decay_over(branch->time, point->relaxed ? INFINITY : point->t - kept[0]);
+        for (int32_t i = 0; i < b->count; i++) {
+            const double stiffness = branch->fraction * k[i], d = b->strain[i] - before[i], e0 = extension[i];
+            b->force[i] += stiffness * drape_decay_extension(&decay, e0, d);
+            b->by_strain[i] += stiffness * decay.follows;
+            b->energy[i] += stiffness * (0.5 * decay.follows * d * d + decay.keeps * e0 * d +
+                                         0.5 * decay.constant * e0 * e0);
+        }
+    }
+}
+
 /* Generalised forces on the measures, their derivatives and energies, from q and its rate. */
 static void sum_stresses(const drape_term *term, const drape_request *want, drape_block *b)
 {
@@ -56,6 +77,7 @@ static void sum_stresses(const drape_term *term, const drape_request *want, drap
         b->by_rate[i] = 0;
     }
     add_sliders(term, want, b);
+    add_branches(term, want, k, b);
     const double *c = want->dissipative && term->damping ? term->damping + b->first : NULL;
     for (int32_t i = 0; c && i < b->count; i++) {
         b->force[i] += c[i] * b->rate[i];

@@ -101,6 +101,19 @@ static void rotate(const double a[3], double out[3])
         out[i] = cosine * a[i] + sine * cross[i] + (1 - cosine) * along * k[i];
 }
 
+/* Maxwell branches are extended as strains are, and were so a part of their time ago. */
+static void extend_branches(checker *c)
+{
+    for (int32_t t = 0; t < c->model->term_count; t++) {
+        const drape_term *term = &c->model->terms[t];
+        double *kept = c->internal + term->first_branch;
+        for (int64_t i = 1 + term->elements.count; i < drape_term_branch_numbers(term); i++)
+            kept[i] = DEFORMATION * uniform(c);
+        if (term->branch_count > 0)
+            kept[0] = -0.7 * term->branches[0].time;
+    }
+}
+
 static void make_state(checker *c, const drape_state *rest)
 {
     const drape_model *m = c->model;
@@ -113,6 +126,7 @@ static void make_state(checker *c, const drape_state *rest)
         rotate(deformed, c->x + 3 * i);
     }
     memcpy(c->internal, rest->internal, (size_t)m->internal_count * sizeof *c->internal);
+    extend_branches(c);
     for (int64_t i = 0; i < m->measure_count; i++)
         c->history[i] = uniform(c);
 }

@@ -20,6 +20,14 @@ static void strains_of(const drape_term *term, int32_t first, int32_t count, con
         strain[i] -= q0[i];
 }
 
+static void all_strains_of(const drape_term *term, const double *x, const double *internal, double *strain)
+{
+    const int32_t elements = term->elements.count;
+    for (int32_t e = 0; e < elements; e += DRAPE_PAIR_BLOCK)
+        strains_of(term, e, elements - e < DRAPE_PAIR_BLOCK ? elements - e : DRAPE_PAIR_BLOCK, x, internal,
+                   strain + e);
+}
+
 drape_status drape_state_create(drape_arena *arena, const drape_model *model, drape_state *state)
 {
     size_t n = 3 * (size_t)model->node_count;
@@ -37,13 +45,11 @@ drape_status drape_state_create(drape_arena *arena, const drape_model *model, dr
         if (term->ops->initial)
             term->ops->initial(&term->elements, 0, drape_term_pieces(term).count, model->start,
                                state->internal + term->first_internal);
-        const int32_t elements = term->sliders > 0 ? term->elements.count : 0;
-        for (int32_t e = 0; e < elements; e += DRAPE_PAIR_BLOCK)
-            strains_of(term, e, elements - e < DRAPE_PAIR_BLOCK ? elements - e : DRAPE_PAIR_BLOCK,
-                       model->start, state->internal, state->internal + term->first_slider + e);
-        for (int s = 1; s < term->sliders; s++)
-            memcpy(state->internal + term->first_slider + (int64_t)s * elements,
-                   state->internal + term->first_slider, (size_t)elements * sizeof *state->internal);
+        for (int s = 0; s < term->sliders; s++)
+            all_strains_of(term, model->start, state->internal,
+                           state->internal + term->first_slider + s * (int64_t)term->elements.count);
+        if (term->branch_count > 0) /* at the time 0, and without extensions */
+            all_strains_of(term, model->start, state->internal, state->internal + term->first_branch + 1);
     }
     return DRAPE_OK;
 }
@@ -83,12 +89,36 @@ static double slide_term(const drape_term *term, const drape_state *before, drap
     return dissipated;
 }
 
-double drape_state_slide(const drape_model *model, const drape_state *before, drape_state *after)
+static double relax_term(const drape_term *term, const drape_state *before, bool relaxed, drape_state *after)
+{
+    const int32_t elements = term->elements.count;
+    const double *k = term->elements.rest, *from = before->internal + term->first_branch;
+    double dissipated = 0, *to = after->internal + term->first_branch;
+    to[0] = after->t;
+    all_strains_of(term, after->x, after->internal, to + 1);
+    for (int n = 0; n < term->branch_count; n++) {
+        const drape_branch *branch = &term->branches[n];
+        const drape_decay decay = drape_decay_over(branch->time, relaxed ? INFINITY : after->t - from[0]);
+        const int64_t first = 1 + (n + 1) * (int64_t)elements;
+        for (int32_t e = 0; e < elements; e++) {
+            const double d = to[1 + e] - from[1 + e], e0 = from[first + e];
+            dissipated += branch->fraction * k[e] * drape_decay_loss(&decay, e0, d);
+            to[first + e] = drape_decay_extension(&decay, e0, d);
+        }
+    }
+    return dissipated;
+}
+
+double drape_state_relax(const drape_model *model, const drape_state *before, bool relaxed,
+                         drape_state *after)
 {
     double dissipated = 0;
-    for (int32_t i = 0; i < model->term_count; i++)
+    for (int32_t i = 0; i < model->term_count; i++) {
         if (model->terms[i].sliders > 0)
             dissipated += slide_term(&model->terms[i], before, after);
+        if (model->terms[i].branch_count > 0)
+            dissipated += relax_term(&model->terms[i], before, relaxed, after);
+    }
     return dissipated;
 }
 

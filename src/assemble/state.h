@@ -18,11 +18,13 @@ drape_status drape_state_create(drape_arena *arena, const drape_model *model, dr
  * step. */
 void drape_state_commit(const drape_model *model, const drape_state *before, drape_state *after);
 
-/* Moves the sliders of the terms from where they are in `before` to where the positions of `after`, whose
- * other internal variables are committed, take them. Returns what that dissipates [J]. Separate from
- * drape_state_commit, which an iteration for an equilibrium calls for each of its steps: there the sliders
+/* Moves the sliders and the Maxwell branches of the terms from where they are in `before` to where the time
+ * and the positions of `after`, whose other internal variables are committed, take them; relaxed: branches go
+ * to their limit after an infinite time. Returns what that dissipates [J]. Separate from
+ * drape_state_commit, which an iteration for an equilibrium calls for each of its steps: there they
  * stay until the equilibrium is found, so that it does not depend on the path of the iteration. */
-double drape_state_slide(const drape_model *model, const drape_state *before, drape_state *after);
+double drape_state_relax(const drape_model *model, const drape_state *before, bool relaxed,
+                         drape_state *after);
 
 uint64_t drape_state_hash(const drape_model *model, const drape_state *state);
 

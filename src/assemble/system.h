@@ -30,10 +30,11 @@ typedef struct drape_point {
     const double *stress;   /* (measure_count) the f before ddq in a Jacobian; NULL: the forces here */
     double t;               /* [s] time of the colliders' poses, and of terms that depend on it */
     bool done;              /* energies that depend on time are taken at progress 1, loads at their largest */
-    bool full;              /* loads from outside are taken at progress 1 and without their histories */
-    double progressed;      /* added to their progress, for differences */
-    double span[2]; /* [s] over which the velocities of colliders are taken; equal: they are at rest */
-    bool instant;   /* those that turn have their velocities of time t instead, as the pins of methods that
+    bool relaxed;      /* an infinite time after the internal variables: Maxwell branches have no force */
+    bool full;         /* loads from outside are taken at progress 1 and without their histories */
+    double progressed; /* added to their progress, for differences */
+    double span[2];    /* [s] over which the velocities of colliders are taken; equal: they are at rest */
+    bool instant;      /* those that turn have their velocities of time t instead, as the pins of methods that
                        follow the solution between the kinks of the motion, at the ends of span */
     drape_contact_derivatives contact; /* of contact in a Jacobian without positive parts */
 } drape_point;

@@ -9,6 +9,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#define FRACTION_ROUNDING 1e-12 /* of a sum of decimal fractions */
+
 drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count)
 {
     return drape_term_reserve_nodes(builder, element_count, builder->term->ops->nodes, rest_count);
@@ -98,6 +100,27 @@ void drape_term_set_slider(drape_term_builder *builder, int number, int32_t elem
     const size_t at = (size_t)number * (size_t)term->elements.count + (size_t)element;
     term->slider_stiffness[at] = stiffness;
     term->slider_limit[at] = limit;
+}
+
+drape_status drape_term_add_branch(drape_term_builder *builder, double fraction, double time)
+{
+    drape_cloth *cloth = &builder->model->cloths[builder->term->cloth];
+    const char *name = builder->term->ops->entry.name;
+    double sum = fraction;
+    if (!builder->term->ops->law || !(fraction > 0) || !(time > 0) || isinf(time) ||
+        cloth->branch_count == DRAPE_MAX_BRANCHES)
+        return drape_term_refuse(builder,
+                                 "%s adds a branch of the fraction %g with the time %g s; both are above 0, "
+                                 "and the laws of a cloth have at most %d branches",
+                                 name, fraction, time, DRAPE_MAX_BRANCHES);
+    for (int i = 0; i < cloth->branch_count; i++)
+        sum += cloth->branches[i].fraction;
+    if (sum > 1 + FRACTION_ROUNDING)
+        return drape_term_refuse(
+            builder, "the fractions of the stiffness that relax have the sum %.12g; it is at most 1", sum);
+    cloth->branches[cloth->branch_count++] = (drape_branch){fraction, time};
+    builder->model->has_branches = true;
+    return DRAPE_OK;
 }
 
 drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
@@ -247,7 +270,7 @@ static drape_status begin_term(drape_model *model, int32_t c, int32_t seam, cons
     term->seam = seam;
     term->elements.user = ops->user;
     term->elements.factor = 1;
-    term->first_internal = term->first_measure = term->first_slider = -1;
+    term->first_internal = term->first_measure = term->first_slider = term->first_branch = -1;
     model->term_count++;
     model->has_dissipation = model->has_dissipation || term->ops->dissipative || term->ops->dissipation;
     return DRAPE_OK;
@@ -268,7 +291,7 @@ static drape_status build_elements(drape_model *model, drape_term *term, const c
     drape_status status = term->ops->build(&view, term->params, &builder);
     status = drape_fail_unsaid(model->ctx, status, pointer, "build() of \"%s\" returned %s",
                                term->ops->entry.name, drape_status_name(status));
-    return status ? status : check_elements(&builder);
+    return status || term->ops->law ? status : check_elements(&builder);
 }
 
 static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_term_ops *ops,
@@ -285,7 +308,7 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
         return status;
     if (term->ops->law) {
         cloth->laws[cloth->law_count++] = term;
-        return DRAPE_OK;
+        return ops->build ? build_elements(model, term, pointer) : DRAPE_OK;
     }
     status = build_elements(model, term, pointer);
     return status ? status : drape_compile_history_of(model, pointer, def, term);
@@ -428,6 +451,10 @@ static void number_elements(drape_model *model, drape_term *term)
         term->first_slider = model->internal_count;
         model->internal_count += drape_term_slider_count(term);
     }
+    if (term->branch_count > 0) {
+        term->first_branch = model->internal_count;
+        model->internal_count += drape_term_branch_numbers(term);
+    }
 }
 
 /* Connects the laws of a cloth to its measures, of which there must be one if there are laws. */
@@ -443,6 +470,8 @@ static drape_status connect_laws(drape_model *model, int32_t c)
         measured = true;
         term->laws = cloth->laws;
         term->law_count = cloth->law_count;
+        term->branches = cloth->branches;
+        term->branch_count = cloth->branch_count;
         term->damping = own_damping(term);
         model->has_laws = model->has_laws || term->damping;
         model->has_dissipation = model->has_dissipation || term->damping;

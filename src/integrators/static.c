@@ -73,6 +73,7 @@ static void set_equation(static_state *s, const double *x, double mass_weight)
     drape_step_equation *e = &s->common.equation;
     e->point.internal = s->internal;
     e->point.weight = 0;
+    e->point.relaxed = true;
     e->point.span[0] = e->point.t;
     e->mass_weight = mass_weight;
     e->x_start = NULL; /* corrections are too large for forces to first order in them */
@@ -129,7 +130,8 @@ static void end_at_best(static_state *s, drape_state *out, double tolerance, dra
         memcpy(out->x, s->best_x, e->nodes * sizeof *out->x);
         memcpy(s->internal, s->best_internal, (size_t)e->model->internal_count * sizeof *s->internal);
     }
-    const drape_point point = {.x = out->x, .v = e->v_base, .internal = s->internal, .t = e->point.t};
+    const drape_point point = {
+        .x = out->x, .v = e->v_base, .internal = s->internal, .relaxed = true, .t = e->point.t};
     drape_system_force(e->system, &point, e->g);
     info->residual = static_residual(s);
     info->diagnostic = drape_step_equation_diagnose(e, tolerance);
@@ -184,7 +186,8 @@ static drape_status follow(static_state *s, double mass_weight, drape_state *out
 static drape_status judge_stability(static_state *s, const drape_state *out)
 {
     const drape_step_equation *e = &s->common.equation;
-    const drape_point point = {.x = out->x, .v = e->v_base, .internal = s->internal, .t = e->point.t};
+    const drape_point point = {
+        .x = out->x, .v = e->v_base, .internal = s->internal, .relaxed = true, .t = e->point.t};
     const drape_pattern *pattern;
     const double *values;
     if (e->dofs == 0)

@@ -7,6 +7,7 @@
 #include "mesh/mesh.h"
 #include "mesh/sequence.h"
 #include "model/pose.h"
+#include "model/relaxation.h"
 #include "sparse/pattern.h"
 
 /* The patches of a term with parts: runs of consecutive elements with the same nodes. */
@@ -51,6 +52,11 @@ typedef struct drape_term {
     double *slider_stiffness, *slider_limit; /* (sliders x elements.count) [J/q2], [J/q] */
     int64_t
         first_slider; /* index in a state of how far they have slid (sliders x elements.count); -1: none */
+    const drape_branch *branches; /* (branch_count) of each measure (relaxation.h) */
+    int branch_count;
+    int64_t first_branch; /* index in a state of (drape_term_branch_numbers): the time at which they were
+                             computed, then the strains (elements.count) and the extensions (branch_count x
+                             elements.count); -1: none */
 } drape_term;
 
 static inline bool drape_term_is_timed(const drape_term *term)
@@ -90,6 +96,12 @@ static inline int64_t drape_term_internals(const drape_term *term)
 static inline int64_t drape_term_slider_count(const drape_term *term)
 {
     return term->sliders * (int64_t)term->elements.count;
+}
+
+/* The internal variables of the branches of all its elements. */
+static inline int64_t drape_term_branch_numbers(const drape_term *term)
+{
+    return term->branch_count > 0 ? 1 + (1 + term->branch_count) * (int64_t)term->elements.count : 0;
 }
 
 /* The nodes that elements couple. */
@@ -166,6 +178,8 @@ typedef struct drape_cloth {
     int32_t first_node, first_triangle;
     const struct drape_term **laws; /* (law_count) */
     int law_count;
+    drape_branch branches[DRAPE_MAX_BRANCHES]; /* (branch_count) of every strain measure */
+    int branch_count;
 } drape_cloth;
 
 /* A key of a rotation: from here to the next key it turns steadily, about one axis. */
@@ -351,6 +365,7 @@ struct drape_model {
     int64_t internal_count, measure_count;
     bool has_laws;        /* some term needs the rates of measures */
     bool has_dissipation; /* some term dissipates energy */
+    bool has_branches;    /* some measure has Maxwell branches */
     drape_pattern pattern;
     size_t pattern_bytes; /* bytes of the pattern in the arena */
     double length;        /* diagonal of the rest bounding box [m], > 0 */

@@ -125,6 +125,12 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
                              "\"%s\" chooses the step size, but so does the integrator \"%s\"; choose the "
                              "controller \"halving\"",
                              chosen->controller->entry.name, chosen->integrator->entry.name);
+    if (model->has_branches && chosen->integrator->own_steps && !chosen->integrator->steady_state)
+        return drape_fail_at(
+            ctx, DRAPE_E_ARGUMENT, "/integrator/method",
+            "\"%s\" chooses its own steps, over which Maxwell branches (\"relax.maxwell\") "
+            "are not integrated to its tolerance; choose a method of fixed steps, or \"static\"",
+            chosen->integrator->entry.name);
     return DRAPE_OK;
 }
 

@@ -28,17 +28,20 @@ static const drape_term *term_like(const drape_model *from, const drape_model *t
     return NULL;
 }
 
-/* Internal variables go on if there are as many, and so do sliders; others are as if the cloth had come from
- * its start in one step. */
+/* Internal variables go on if there are as many, and so do sliders and Maxwell branches; others are as if the
+ * cloth had come from its start in one step. */
 static void copy_internal(const drape_model *to, const drape_model *from, const double *before, double *after)
 {
     for (int32_t i = 0; i < to->term_count; i++) {
         const drape_term *term = &to->terms[i], *same = term_like(from, to, term);
-        const int64_t own = drape_term_internals(term), sliders = drape_term_slider_count(term);
+        const int64_t own = drape_term_internals(term), sliders = drape_term_slider_count(term),
+                      branches = drape_term_branch_numbers(term);
         if (same && own > 0 && own == drape_term_internals(same))
             memcpy(after + term->first_internal, before + same->first_internal, (size_t)own * sizeof *after);
         if (same && sliders > 0 && sliders == drape_term_slider_count(same))
             memcpy(after + term->first_slider, before + same->first_slider, (size_t)sliders * sizeof *after);
+        if (same && branches > 0 && branches == drape_term_branch_numbers(same))
+            memcpy(after + term->first_branch, before + same->first_branch, (size_t)branches * sizeof *after);
     }
 }
 

@@ -95,6 +95,8 @@ static uint64_t add_term(uint64_t hash, const drape_term *term)
     hash = add_doubles(hash, el->shared, (size_t)el->shared_count);
     hash = add_doubles(hash, term->slider_stiffness, (size_t)drape_term_slider_count(term));
     hash = add_doubles(hash, term->slider_limit, (size_t)drape_term_slider_count(term));
+    for (int i = 0; i < term->branch_count; i++)
+        hash = add_doubles(add_doubles(hash, &term->branches[i].fraction, 1), &term->branches[i].time, 1);
     if (el->parts) {
         const drape_parts *p = el->parts;
         const int64_t counts[] = {p->count, p->nodes, p->rest_count, p->link_count};

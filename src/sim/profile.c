@@ -184,6 +184,7 @@ static size_t term_bytes(const drape_term *term)
     if (term->block)
         bytes += drape_term_places(term) * sizeof *term->block;
     bytes += 4 * (size_t)drape_term_slider_count(term) * sizeof(double); /* in both states, too */
+    bytes += 2 * (size_t)drape_term_branch_numbers(term) * sizeof(double);
     if (term->first_internal >= 0)
         bytes += 2 * (size_t)drape_term_internals(term) * sizeof(double); /* in both states */
     return bytes;

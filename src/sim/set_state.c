@@ -163,7 +163,7 @@ drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, cons
     stop_fixed(sim, v, next);
     drape_motion_hold_pins(drape_system_steer(sim->system), next->x);
     drape_state_commit(m, now, next);
-    drape_state_slide(m, now, next); /* the account of energy starts anew */
+    drape_state_relax(m, now, false, next); /* the account of energy starts anew */
     sim->next = sim->now;
     sim->now = (int)(next - sim->states);
     start_anew(sim, now->t);

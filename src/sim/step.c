@@ -197,8 +197,9 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     }
     if (!info->committed)
         drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
-    /* what slides leaves the elastic energy, and so stays in the balance */
-    sim->audit.dissipated += drape_state_slide(sim->model, drape_sim_state(sim), next_state(sim));
+    /* what slides or flows leaves the elastic energy, and so stays in the balance */
+    sim->audit.dissipated += drape_state_relax(sim->model, drape_sim_state(sim),
+                                               sim->chosen.integrator->steady_state, next_state(sim));
     rotate_states(sim);
     drape_sim_add_work(sim, info);
     measure_strain(sim, drape_sim_state(sim)->x);

@@ -178,7 +178,7 @@ static void commit(drape_sim *sim)
     next->t = now->t;
     memcpy(next->v, now->v, 3 * (size_t)m->node_count * sizeof *next->v);
     drape_state_commit(m, now, next);
-    drape_state_slide(m, now, next); /* the energy is shifted below */
+    drape_state_relax(m, now, false, next); /* the energy is shifted below */
     sim->next = sim->now;
     sim->now = (int)(next - sim->states);
     drape_sim_forget_past(sim);

@@ -89,6 +89,10 @@ START_TEST(quick_references_pass)
         check("curve_tension", i, DRAPE_OUTCOME_PASS);
     for (int i = 0; i < find("curve_shear")->case_count; i++)
         check("curve_shear", i, DRAPE_OUTCOME_PASS);
+    for (int i = 0; i < find("stress_relaxation")->case_count; i++)
+        check("stress_relaxation", i, DRAPE_OUTCOME_PASS);
+    for (int i = 0; i < find("creep")->case_count; i++)
+        check("creep", i, DRAPE_OUTCOME_PASS);
 }
 END_TEST
 

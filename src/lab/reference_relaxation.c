@@ -1,0 +1,130 @@
+/* reference_relaxation.c: stress relaxation and creep of relax.maxwell, in a strip without lateral
+ * contraction that is strained alike everywhere. */
+#include "lab/strip.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#define SIDE      0.1    /* [m] */
+#define STIFFNESS 1000.0 /* E h [N/m] */
+
+/* The strip along x; material, relaxation, pins and terms follow. */
+#define STRIP                                                                                                \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 5, 'rows': 5, 'width': 0.1, "          \
+    "'height': 0.1},\n 'material': {'young_modulus': 1e6, 'poisson_ratio': 0, 'thickness': 1e-3, "           \
+    "'areal_density': 0.1},\n "
+
+/* A state at the time 0 in which the strip was stretched at once. */
+static drape_status stretch(drape_reference_run *run, double strain)
+{
+    const size_t n = 3 * (size_t)drape_model_node_count(run->model);
+    const double *rest = drape_model_rest_positions(run->model);
+    double *x = drape_arena_take(&run->arena, n, sizeof *x), *v = drape_arena_take(&run->arena, n, sizeof *v);
+    for (size_t i = 0; x && i < n; i++)
+        x[i] = rest[i] * (i % 3 == 0 ? 1 + strain : 1);
+    return x && v ? drape_sim_set_state(run->sim, 0, x, v) : DRAPE_E_MEMORY;
+}
+
+/* ---- Relaxation at constant strain ---- */
+
+static const double fractions[] = {0.3, 0.2, 0.1}, times[] = {0.1, 1, 10}; /* [1], [s] */
+enum { BRANCHES = sizeof times / sizeof *times };
+
+static double prony(double t)
+{
+    double f = 1;
+    for (int i = 0; i < BRANCHES; i++)
+        f -= fractions[i] * (1 - exp(-t / times[i]));
+    return f;
+}
+
+#define HELD 0.02
+
+/* Forty steps: the recurrence is exact in any. */
+static int held(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return snprintf(text, DRAPE_LAB_TEXT,
+                    STRIP "'terms': ['stretch.cst', {'type': 'relax.maxwell', 'fraction_1': %g, 'time_1': "
+                          "%g,\n 'fraction_2': %g, 'time_2': %g, 'fraction_3': %g, 'time_3': %g}],\n "
+                          "'pins': [{'edge': 'left'}, {'edge': 'right', 'track': [[0, [%.17g, 0, 0]]]}]}],\n "
+                          "'gravity': [0, 0, 0], "
+                          "'integrator': {'method': 'be', 'dt': %.17g}, 'duration': %.17g}",
+                    fractions[0], times[0], fractions[1], times[1], fractions[2], times[2], HELD * SIDE,
+                    c->parameter / 40, c->parameter);
+}
+
+/* The force along x of the pins on the right edge [N]. */
+static drape_status pull_of(drape_reference_run *run, double *reactions, double *force)
+{
+    const size_t nodes = (size_t)drape_model_node_count(run->model);
+    const double *rest = drape_model_rest_positions(run->model);
+    const drape_status status = drape_sim_reactions(run->sim, reactions);
+    *force = 0;
+    for (size_t i = 0; !status && i < nodes; i++)
+        *force += fabs(rest[3 * i] - SIDE) < 1e-9 ? reactions[3 * i] : 0;
+    return status;
+}
+
+static drape_status measure_relaxation(drape_reference_run *run, double *value)
+{
+    const size_t nodes = (size_t)drape_model_node_count(run->model);
+    double *reactions = drape_arena_take(&run->arena, 3 * nodes, sizeof *reactions), before = 0, after = 0;
+    drape_status status = reactions ? stretch(run, HELD) : DRAPE_E_MEMORY;
+    if (!status)
+        status = pull_of(run, reactions, &before);
+    if (!status)
+        status = lab_advance(run);
+    if (!status)
+        status = pull_of(run, reactions, &after);
+    *value = after / before;
+    return status;
+}
+
+DRAPE_REFERENCE(stress_relaxation, .entry.summary = "force of a strip held stretched, over that at once",
+                .unit = "1",
+                .entry.reference = "Prony series of a generalised Maxwell solid; Simo & Hughes 1998, 10.3",
+                .parameter = "s", DRAPE_CASES(0.05, 0.2, 1, 5, 50),
+                .model = "stretch.cst, relax.maxwell; irregular; be", .tolerance = 1e-3, .expected = prony,
+                .scene = held, .measure = measure_relaxation);
+
+/* ---- Creep under a constant load ---- */
+
+#define RELAXING 0.4
+#define TIME     0.5  /* [s] */
+#define STRAIN   1e-5 /* at the start: strains are those of Green, which are linear to this */
+
+/* The standard linear solid at constant stress, with the stiffness 1 at once. */
+static double compliance(double t)
+{
+    const double lasting = 1 - RELAXING;
+    return (1 - RELAXING * exp(-lasting * t / TIME)) / lasting;
+}
+
+/* Steps of TIME/50 take the strain as straight between their ends, which is off by less than 1e-4. */
+static int loaded(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return snprintf(text, DRAPE_LAB_TEXT,
+                    STRIP
+                    "'terms': ['stretch.cst', {'type': 'relax.maxwell', 'fraction_1': %g, 'time_1': %g},\n "
+                    "{'type': 'load.line', 'edge': 'right', 'force': [%.17g, 0, 0]}],\n "
+                    "'pins': [{'edge': 'left'}]}],\n 'gravity': [0, 0, 0], "
+                    "'integrator': {'method': 'be', 'dt': %.17g, 'tolerance': 1e-12}, 'duration': %.17g}",
+                    RELAXING, TIME, STIFFNESS * STRAIN, TIME / 50, c->parameter);
+}
+
+static drape_status measure_creep(drape_reference_run *run, double *value)
+{
+    double tip[3] = {0};
+    drape_status status = stretch(run, STRAIN);
+    if (!status)
+        status = lab_tip(run, tip);
+    *value = (tip[0] - SIDE) / (STRAIN * SIDE);
+    return status;
+}
+
+DRAPE_REFERENCE(creep, .entry.summary = "lengthening of a strip under a constant load, over that at once",
+                .unit = "1",
+                .entry.reference = "standard linear solid at constant stress; Simo & Hughes 1998, 10.3",
+                .parameter = "s", DRAPE_CASES(0.1, 0.5, 2, 10),
+                .model = "stretch.cst, relax.maxwell; irregular; be", .tolerance = 1e-3,
+                .expected = compliance, .scene = loaded, .measure = measure_creep);

@@ -1,0 +1,302 @@
+/*
+ * test_relaxation.c: relax.maxwell: relaxation at constant strain under every method of fixed steps, what it
+ * dissipates, the relaxed limit, damped vibration, and that checkpoints and new models carry the branches.
+ */
+#include "model/relaxation.h"
+#include "support/bytes.h"
+#include "support/scene.h"
+
+#define SIDE    0.1
+#define NODES   16
+#define STRAIN  0.02
+#define MAXWELL "{'type': 'relax.maxwell', 'fraction_1': 0.3, 'time_1': 0.1, 'fraction_2': 0.2, 'time_2': 2}"
+
+/* A sheet of 3 x 3 cells without lateral contraction; pins and members of the scene follow. */
+static scene sheet(const char *terms, const char *pins, const char *members)
+{
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, 'width': %g, "
+        "'height': %g}, 'material': {'young_modulus': 1e6, 'poisson_ratio': 0, 'thickness': 5e-4, "
+        "'areal_density': 0.15}, 'terms': ['stretch.cst', 'bend.midedge', %s], 'pins': [%s]}], %s}",
+        SIDE, SIDE, terms, pins, members);
+}
+
+static scene held(const char *integrator)
+{
+    char members[256];
+    snprintf(members, sizeof members, "'gravity': [0, 0, 0], 'integrator': %s, 'duration': 100", integrator);
+    return sheet(MAXWELL, "{'edge': 'left'}, {'edge': 'right', 'track': [[0, [0.002, 0, 0]]]}", members);
+}
+
+/* Strains the sheet along x, in no time. */
+static void stretch(scene *s, double strain)
+{
+    static const double still[3 * NODES];
+    double x[3 * NODES];
+    for (size_t i = 0; i < 3 * NODES; i++)
+        x[i] = s->model->rest[i] * (i % 3 == 0 ? 1 + strain : 1);
+    const drape_status status = drape_sim_set_state(s->sim, drape_sim_time(s->sim), x, still);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+}
+
+static double pull_of(const scene *s)
+{
+    double reactions[3 * NODES], sum = 0;
+    ck_assert_int_eq(drape_sim_reactions(s->sim, reactions), DRAPE_OK);
+    for (size_t i = 0; i < NODES; i++)
+        sum += s->model->rest[3 * i] > 0.99 * SIDE ? reactions[3 * i] : 0;
+    return sum;
+}
+
+/* The coefficients of a step agree with the functions of the C library, on both sides of where the series
+ * ends, and at both ends. The error of those is a rounding over z or z^2. */
+START_TEST(coefficients_of_a_step)
+{
+    static const double z[] = {1e-3, 0.1, 0.499999, 0.5, 2, 30};
+    for (size_t i = 0; i < sizeof z / sizeof *z; i++) {
+        const drape_decay d = drape_decay_over(2, 2 * z[i]);
+        const double follows = -expm1(-z[i]) / z[i];
+        assert_below(fabs(d.keeps - exp(-z[i])), 1e-14 * exp(-z[i]));
+        assert_below(fabs(d.follows - follows), 1e-15);
+        assert_below(fabs(d.mean - (1 - follows) / z[i]), 1e-15 + 2 * DBL_EPSILON / z[i]);
+        /* two halves of a step at a steady rate are the whole one */
+        const drape_decay half = drape_decay_over(2, z[i]);
+        assert_below(fabs(drape_decay_extension(&half, drape_decay_extension(&half, 0.7, 0.15), 0.15) -
+                          drape_decay_extension(&d, 0.7, 0.3)),
+                     4e-16);
+        assert_below(fabs(drape_decay_loss(&half, 0.7, 0.15) +
+                          drape_decay_loss(&half, drape_decay_extension(&half, 0.7, 0.15), 0.15) -
+                          drape_decay_loss(&d, 0.7, 0.3)),
+                     4e-16);
+    }
+    const drape_decay instant = drape_decay_over(2, 0), back = drape_decay_over(2, -1),
+                      relaxed = drape_decay_over(2, INFINITY);
+    ck_assert(instant.keeps == 1 && instant.follows == 1 && instant.constant == 1 && back.keeps == 1);
+    ck_assert(relaxed.keeps == 0 && relaxed.follows == 0 && relaxed.constant == 0 && relaxed.mean == 0);
+    ck_assert_double_eq(drape_decay_loss(&instant, 0.7, 0.3), 0);
+    ck_assert_double_eq(drape_decay_loss(&relaxed, 0.7, 0.3), 0.5 * 0.7 * 0.7);
+}
+END_TEST
+
+/* The recurrence is exact at constant strain, in steps of any size; what is lost is that of the springs: of
+ * the energy U at once, sum g (1 - exp(-2 t/time)). */
+START_TEST(stress_relaxes_by_the_prony_series)
+{
+    static const char *const methods[] = {"{'method': 'be', 'dt': 0.05}",
+                                          "{'method': 'bdf2', 'dt': 0.05}",
+                                          "{'method': 'trbdf2', 'dt': 0.05}",
+                                          "{'method': 'midpoint', 'dt': 0.05}",
+                                          "{'method': 'generalized_alpha', 'dt': 0.05}",
+                                          "{'method': 'newton_k', 'dt': 0.05}",
+                                          "{'method': 'verlet', 'dt': 0.05}"};
+    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
+        scene s = held(methods[i]);
+        stretch(&s, STRAIN);
+        const double at_once = pull_of(&s), energy = drape_sim_energy(s.sim).elastic;
+        for (int k = 1; k <= 3; k++) {
+            const double t = 0.3 * k;
+            scene_advance(&s, t);
+            const drape_energy e = drape_sim_energy(s.sim);
+            const double force = 0.5 + 0.3 * exp(-t / 0.1) + 0.2 * exp(-t / 2),
+                         lost = -0.3 * expm1(-2 * t / 0.1) - 0.2 * expm1(-2 * t / 2);
+            ck_assert_msg(fabs(pull_of(&s) / at_once - force) < 1e-9, "%s: %.12g, not %.12g", methods[i],
+                          pull_of(&s) / at_once, force);
+            assert_below(fabs(e.dissipated / energy - lost), 1e-9);
+            assert_below(fabs(e.numerical), 1e-9 * energy);
+        }
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* "static" finds the equilibrium after an infinite time, and leaves the branches without force. */
+START_TEST(equilibria_are_relaxed)
+{
+    scene s = held("{'method': 'static', 'tolerance': 1e-10}");
+    stretch(&s, STRAIN);
+    const double at_once = pull_of(&s), energy = drape_sim_energy(s.sim).elastic;
+    scene_advance(&s, 1);
+    assert_below(fabs(pull_of(&s) / at_once - 0.5), 1e-9);
+    assert_below(fabs(drape_sim_energy(s.sim).dissipated / energy - 0.5), 1e-9);
+    scene_close(&s);
+}
+END_TEST
+
+#define FALLING "'gravity': [0, -9.81, 0], 'integrator': %s, 'duration': 10"
+
+static scene falling(const char *integrator)
+{
+    char members[256];
+    snprintf(members, sizeof members, FALLING, integrator);
+    return sheet("{'type': 'relax.maxwell', 'fraction_1': 0.4, 'time_1': 0.02}",
+                 "{'edge': 'left', 'clamp': true}", members);
+}
+
+/* A flap that swings: methods of the second order agree on what dashpots take, and their balance closes, both
+ * the better the smaller their steps. The midpoint rule, which conserves energy else, is the reference. */
+START_TEST(losses_are_in_the_balance)
+{
+    static const char *const methods[] = {"{'method': 'midpoint', 'dt': 5e-4}",
+                                          "{'method': 'trbdf2', 'dt': 1e-3}",
+                                          "{'method': 'verlet', 'dt': 1e-3}"};
+    double first = 0;
+    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
+        scene s = falling(methods[i]);
+        scene_advance(&s, 0.15);
+        const drape_energy e = drape_sim_energy(s.sim);
+        first = i == 0 ? e.dissipated : first;
+        ck_assert_double_gt(e.dissipated, 0.005 * e.kinetic);
+        ck_assert_msg(fabs(e.numerical) < 0.02 * e.dissipated && fabs(e.dissipated - first) < 0.01 * first,
+                      "%s: %g J lost, not %g J; %g J unexplained", methods[i], e.dissipated, first,
+                      e.numerical);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* A run that goes on from a checkpoint has the bits of one that was not interrupted. */
+START_TEST(checkpoints_keep_branches)
+{
+    static const char *const methods[] = {
+        "{'method': 'be', 'dt': 0.01}",     "{'method': 'bdf2', 'dt': 0.01}",
+        "{'method': 'trbdf2', 'dt': 0.01}", "{'method': 'newton_k', 'dt': 0.01}",
+        "{'method': 'verlet', 'dt': 0.01}", "{'method': 'static'}"};
+    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
+        scene straight = falling(methods[i]), again = falling(methods[i]);
+        scene_advance(&straight, 0.06);
+        bytes saved = bytes_save(straight.sim);
+        scene_advance(&straight, 0.1);
+        ck_assert_int_eq(drape_sim_restore_from(again.sim, saved.data, saved.size), DRAPE_OK);
+        scene_advance(&again, 0.1);
+        ck_assert_msg(drape_state_hash(straight.model, drape_sim_state(straight.sim)) ==
+                          drape_state_hash(again.model, drape_sim_state(again.sim)),
+                      "%s", methods[i]);
+        ck_assert_double_eq(drape_sim_energy(straight.sim).dissipated,
+                            drape_sim_energy(again.sim).dissipated);
+        free(saved.data);
+        scene_close(&straight), scene_close(&again);
+    }
+}
+END_TEST
+
+/* Another model of the same cloth goes on with the branches of the one before. */
+START_TEST(a_new_model_keeps_branches)
+{
+    scene s = falling("{'method': 'be', 'dt': 0.01}"), other = falling("{'method': 'be', 'dt': 0.01}");
+    const drape_term *bending = &s.model->terms[1];
+    const size_t size = (size_t)drape_term_branch_numbers(bending) * sizeof(double);
+    scene_advance(&s, 0.1);
+    double *kept = malloc(size);
+    ck_assert_ptr_nonnull(kept);
+    memcpy(kept, drape_sim_state(s.sim)->internal + bending->first_branch, size);
+    ck_assert_double_eq(kept[0], drape_sim_time(s.sim));
+    other.model->gravity[1] = -1;
+    ck_assert_int_eq(drape_sim_change_model(s.sim, other.model), DRAPE_OK);
+    ck_assert_mem_eq(drape_sim_state(s.sim)->internal + other.model->terms[1].first_branch, kept, size);
+    free(kept);
+    scene_close(&s), scene_close(&other);
+}
+END_TEST
+
+/* Threads add in a fixed order: the same bits. */
+START_TEST(threads_change_no_bit)
+{
+    uint64_t hash[2];
+    for (int32_t k = 0; k < 2; k++) {
+        scene s = falling("{'method': 'be', 'dt': 0.01}");
+        drape_sim_def def;
+        drape_sim_def_init(&def, sizeof def);
+        def.threads = 1 + k;
+        drape_sim_destroy(&s.sim);
+        scene_start(&s, &def);
+        scene_advance(&s, 0.1);
+        hash[k] = drape_state_hash(s.model, drape_sim_state(s.sim));
+        scene_close(&s);
+    }
+    ck_assert(hash[0] == hash[1]);
+}
+END_TEST
+
+/* Every derivative, at a random state a part of a time after the last one. */
+START_TEST(derivatives_agree_with_differences)
+{
+    drape_check_result results[64];
+    int32_t count = 0;
+    scene s = scene_model(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 5, 'rows': 5, 'width': 0.2, "
+        "'height': 0.2}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 0.2}, "
+        "'terms': ['stretch.curve', 'stretch.edge', 'bend.midedge', "
+        "'bend.hinge', " MAXWELL "]}], 'duration': 1}");
+    for (unsigned seed = 1; seed <= 3; seed++) {
+        ck_assert_int_eq(drape_model_check_derivatives(s.model, seed, results, 64, &count), DRAPE_OK);
+        for (int32_t i = 0; i < count; i++)
+            ck_assert_msg(results[i].pass, "%s of %s is off by %g", results[i].what, results[i].term,
+                          results[i].error);
+    }
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Refused ---- */
+
+/* One line with place and reason: `wrong` of a scene with these parameters and this integrator. */
+static void refused(const char *parameters, const char *method, const char *expected)
+{
+    char text[1024];
+    drape_context *ctx = NULL;
+    drape_scene *parsed = NULL;
+    drape_model *model = NULL;
+    drape_sim *sim = NULL;
+    snprintf(
+        text, sizeof text,
+        "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, "
+        "'width': 1, 'height': 1}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': "
+        "200},\n 'terms': ['stretch.cst', {'type': 'relax.maxwell', %s}]}], 'integrator': {'method': '%s'}}",
+        parameters, method);
+    for (char *c = text; *c; c++)
+        *c = *c == '\'' ? '"' : *c;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    drape_status status = drape_scene_parse(ctx, text, "s.json", &parsed);
+    if (!status)
+        status = drape_scene_compile(parsed, &model);
+    if (!status)
+        status = drape_sim_create(ctx, model, NULL, &sim);
+    const char *message = drape_context_message(ctx);
+    ck_assert_msg(status < 0 && strstr(message, expected) && !strchr(message, '\n'), "%s", message);
+    drape_sim_destroy(&sim), drape_model_destroy(&model);
+    drape_scene_destroy(&parsed), drape_context_destroy(&ctx);
+}
+
+START_TEST(wrong_series_are_refused)
+{
+    static const char *const wrong[][2] = {
+        {"'fraction_1': 0.3, 'time_1': 0",
+         "s.json:2:72: /cloth/0/terms/1/time_1: 0 is not allowed; time_1 is a"},
+        {"'fraction_1': 0.3, 'time_1': -1", "/cloth/0/terms/1/time_1: -1 is not allowed"},
+        {"'fraction_1': 0, 'time_1': 1", "/cloth/0/terms/1/fraction_1: 0 is not allowed"},
+        {"'fraction_1': 1.01, 'time_1': 1", "/cloth/0/terms/1/fraction_1: 1.01 is not allowed"},
+        {"'fraction_1': NaN, 'time_1': 1", "s.json:2:"},
+        {"'time_1': 1", "\"fraction_1\" is missing"},
+        {"'fraction_1': 0.3, 'time_1': 1, 'time_3': 2", "\"time_3\" is given without \"fraction_3\""},
+        {"'fraction_1': 0.3, 'time_1': 1, 'fraction_2': 0.2", "\"fraction_2\" is given without \"time_2\""},
+        {"'fraction_1': 0.7, 'time_1': 1, 'fraction_4': 0.5, 'time_4': 2",
+         "s.json:2:27: /cloth/0/terms/1: the "
+         "fractions of the stiffness that relax have the sum 1.2; it is at most 1"}};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
+        refused(wrong[i][0], "be", wrong[i][1]);
+}
+END_TEST
+
+START_TEST(integrators_with_steps_of_their_own_refuse_it)
+{
+    static const char *const methods[] = {"ida", "cvode", "radau", "dirk", "rosenbrock"};
+    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++)
+        refused("'fraction_1': 0.3, 'time_1': 1", methods[i],
+                "chooses its own steps, over which Maxwell branches");
+}
+END_TEST
+
+SUITE("relaxation", coefficients_of_a_step, stress_relaxes_by_the_prony_series, equilibria_are_relaxed,
+      losses_are_in_the_balance, checkpoints_keep_branches, a_new_model_keeps_branches, threads_change_no_bit,
+      derivatives_agree_with_differences, wrong_series_are_refused,
+      integrators_with_steps_of_their_own_refuse_it)
