@@ -83,9 +83,9 @@ static void project_boson(const pose *p, const double *y0, double phi, const dou
         vec3_add_scaled(-phi, n, x);
 }
 
-/* A node that is moved from `before` to x in a substep of h gets the impulse m (x - before)/h. The work of the
- * collider is that impulse times its mean velocity where the node is: friction and impacts, which only take
- * energy as seen from a collider that moves, are not a part of it. */
+/* A node that is moved from `before` to x in a substep of h gets the impulse m (x - before)/h. The work of
+ * the collider is that impulse times its mean velocity where the node is: friction and impacts, which only
+ * take energy as seen from a collider that moves, are not a part of it. */
 static double push_work(double mass, double h, const double *before, const double *x, const double *x0,
                         const double *y0)
 {
