@@ -111,6 +111,7 @@ void drape_implicit_report(const drape_solve_report *report, drape_step_info *in
 {
     info->reason = report->reason;
     info->iterations += report->iterations;
+    info->laborious |= report->laborious;
     info->residual = report->residual;
     info->tolerance = report->tolerance;
     info->error = report->error;

@@ -16,6 +16,7 @@ typedef struct drape_step_info {
     double h;           /* [s] the step taken; set by integrators that choose their own steps */
     double retry;       /* [s] after a failed error test: the size of the next attempt; 0: half of h */
     int iterations;
+    bool laborious;             /* see drape_solve_report */
     double residual, tolerance; /* [N] */
     double error;               /* [m] estimated RMS distance of the nodes of `out` to the solution of the
                                    step's equation; NaN: the integrator estimates none */

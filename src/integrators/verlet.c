@@ -205,14 +205,15 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
 
 /* ---- Forces ---- */
 
-static void evaluate(verlet_state *s, const substep *sub, double t, const double *v, double *g)
+/* The work of friction with colliders that move is added over a share of the substep. */
+static void evaluate(verlet_state *s, const substep *sub, double share, double t, const double *v, double *g)
 {
     double start = drape_clock_seconds();
     drape_verlet_force_sum(
         s->force, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal, .t = t, .span = {t, t}}, g);
     s->work.residual_seconds += drape_clock_seconds() - start;
     s->work.residuals++;
-    drape_verlet_friction(&s->contact, t, sub->x, v, g);
+    sub->info->pin_work += share * sub->h * drape_verlet_friction(&s->contact, t, sub->x, v, g);
 }
 
 /* Adds the work of the dissipative forces at x, v and t over a share of the substep. */
@@ -309,7 +310,7 @@ static void project(verlet_state *s, const substep *sub)
     double start = drape_clock_seconds();
     if (m->contact.self)
         drape_verlet_self_push(&s->self, sub->share, sub->x);
-    drape_verlet_project(&s->contact, sub->t0, sub->t, s->x0, sub->x);
+    sub->info->pin_work += drape_verlet_project(&s->contact, sub->t0, sub->t, sub->h, s->x0, sub->x);
     if (s->limit.count > 0)
         drape_verlet_limit_lengths(&s->limit, sub->x);
     take_velocities(3 * (size_t)m->node_count, sub->h, s->inverse, sub->x, s->x0, sub->v);
@@ -319,7 +320,7 @@ static void project(verlet_state *s, const substep *sub)
 static void substep_position(verlet_state *s, const substep *sub)
 {
     start_pins(s, sub);
-    evaluate(s, sub, sub->t0, sub->v, s->g);
+    evaluate(s, sub, 1, sub->t0, sub->v, s->g);
     audit_dissipation(s, sub, 1, sub->t0, sub->v);
     audit_pins(s, sub, s->g, 1);
     damp(s, sub);
@@ -347,7 +348,7 @@ static void substep_velocity(verlet_state *s, const substep *sub, bool first)
     start_pins(s, sub);
     damp(s, sub);
     if (first || s->v_ahead || s->contact.rule == DRAPE_VERLET_BOSON) {
-        evaluate(s, sub, sub->t0, sub->v, s->g);
+        evaluate(s, sub, 0.5, sub->t0, sub->v, s->g);
     } else {
         double *swap = s->g;
         s->g = s->g1;
@@ -358,7 +359,7 @@ static void substep_velocity(verlet_state *s, const substep *sub, bool first)
     move(s, sub, 0.5 * sub->h);
     project(s, sub);
     const double *ahead = velocity_ahead(s, sub);
-    evaluate(s, sub, sub->t, ahead, s->g1);
+    evaluate(s, sub, 0.5, sub->t, ahead, s->g1);
     audit_dissipation(s, sub, 0.5, sub->t, ahead);
     audit_pins(s, sub, s->g1, 0.5);
     for (int32_t f = 0; f < m->free_count; f++)

@@ -49,13 +49,15 @@ typedef struct drape_verlet_contact {
     double friction_drag;  /* [N s/m] Boson: drag of a node under friction */
 } drape_verlet_contact;
 
-/* Moves the nodes that are inside of a collider at time t; the substep began at t0. */
-void drape_verlet_project(const drape_verlet_contact *contact, double t0, double t, const double *x0,
-                          double *x);
+/* Moves the nodes that are inside of a collider at time t; the substep of h seconds began at t0. Returns the
+ * work [J] of colliders that move. */
+double drape_verlet_project(const drape_verlet_contact *contact, double t0, double t, double h,
+                            const double *x0, double *x);
 
-/* Boson: changes g, the negative force, of nodes under friction at time t. CS184: does nothing. */
-void drape_verlet_friction(const drape_verlet_contact *contact, double t, const double *x, const double *v,
-                           double *g);
+/* Boson: changes g, the negative force, of nodes under friction at time t, and returns the power [W] of
+ * colliders that move in doing so. CS184: does nothing, 0. */
+double drape_verlet_friction(const drape_verlet_contact *contact, double t, const double *x, const double *v,
+                             double *g);
 
 /* ---- Cloth against cloth: verlet_rules.c ---- */
 

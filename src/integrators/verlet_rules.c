@@ -83,54 +83,80 @@ static void project_boson(const pose *p, const double *y0, double phi, const dou
         vec3_add_scaled(-phi, n, x);
 }
 
-static void project_on(const drape_verlet_contact *contact, const pose *p, const double *x0, double *x)
+/* A node that is moved from `before` to x in a substep of h gets the impulse m (x - before)/h. The work of
+ * the collider is that impulse times its mean velocity where the node is: friction and impacts, which only
+ * take energy as seen from a collider that moves, are not a part of it. */
+static double push_work(double mass, double h, const double *before, const double *x, const double *x0,
+                        const double *y0)
+{
+    double moved[3], carried[3];
+    vec3_sub(x, before, moved);
+    vec3_sub(y0, x0, carried);
+    return mass / (h * h) * vec3_dot(moved, carried);
+}
+
+/* Returns the work of the collider. */
+static double project_on(const drape_verlet_contact *contact, const pose *p, double h, const double *x0,
+                         double *x)
 {
     const drape_model *m = contact->model;
+    double work = 0;
     for (int32_t f = 0; f < m->free_count; f++) {
         size_t i = 3 * (size_t)m->node_of_free[f];
         double n[3], y0[3], phi = drape_collider_distance(p->collider, &p->at, x + i, n, NULL);
         if (!(phi <= 0) || drape_model_ignores(m, p->collider->index, m->node_of_free[f]))
             continue;
         carry(p, x0 + i, y0);
+        const double before[3] = {x[i], x[i + 1], x[i + 2]};
         if (contact->rule == DRAPE_VERLET_CS184)
             project_cs184(contact, p, y0, phi, n, x + i);
         else
             project_boson(p, y0, phi, n, x + i);
+        work += push_work(m->mass[i / 3], h, before, x + i, x0 + i, y0);
     }
+    return work;
 }
 
-void drape_verlet_project(const drape_verlet_contact *contact, double t0, double t, const double *x0,
-                          double *x)
+double drape_verlet_project(const drape_verlet_contact *contact, double t0, double t, double h,
+                            const double *x0, double *x)
 {
+    double work = 0;
     for (int32_t c = 0; c < contact->model->collider_count; c++) {
         pose p = {.collider = &contact->model->colliders[c]};
         drape_motion_pose(contact->motion, c, t0, t0, &p.before);
         drape_motion_pose(contact->motion, c, t, t, &p.at);
-        project_on(contact, &p, x0, x);
+        work += project_on(contact, &p, h, x0, x);
     }
+    return work;
 }
 
-/* Boson's friction on one node, whose negative force is g. */
-static void apply_friction(const drape_verlet_contact *contact, const drape_collider *c,
-                           const double velocity[3], const double *n, const double *v, double *g)
+/* Boson's friction on one node, whose negative force is g. Returns the power of the collider: the force that
+ * friction adds, times the velocity of the collider there. */
+static double apply_friction(const drape_verlet_contact *contact, const drape_collider *c,
+                             const double velocity[3], const double *n, const double *v, double *g)
 {
-    double press = vec3_dot(g, n), tangential[3], slip[3];
+    double press = vec3_dot(g, n), tangential[3], slip[3], power = 0;
     if (!(press > 0))
-        return;
+        return 0;
     for (int k = 0; k < 3; k++)
         tangential[k] = -g[k] + press * n[k];
     double force = vec3_norm(tangential), left = fmax(force - c->friction * press, 0);
     vec3_sub(v, velocity, slip);
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 3; k++) {
+        const double before = g[k];
         g[k] = contact->friction_drag * slip[k] - (force > 0 ? left / force * tangential[k] : 0);
+        power += (before - g[k]) * velocity[k];
+    }
+    return power;
 }
 
-void drape_verlet_friction(const drape_verlet_contact *contact, double t, const double *x, const double *v,
-                           double *g)
+double drape_verlet_friction(const drape_verlet_contact *contact, double t, const double *x, const double *v,
+                             double *g)
 {
     const drape_model *m = contact->model;
+    double power = 0;
     if (contact->rule != DRAPE_VERLET_BOSON)
-        return;
+        return 0;
     for (int32_t k = 0; k < m->collider_count; k++) {
         drape_collider_pose at;
         drape_motion_pose(contact->motion, k, t, t, &at);
@@ -141,9 +167,10 @@ void drape_verlet_friction(const drape_verlet_contact *contact, double t, const 
                 drape_model_ignores(m, k, m->node_of_free[f]))
                 continue;
             drape_pose_velocity(&at, x + i, velocity);
-            apply_friction(contact, &m->colliders[k], velocity, n, v + i, g + i);
+            power += apply_friction(contact, &m->colliders[k], velocity, n, v + i, g + i);
         }
     }
+    return power;
 }
 
 /* ---- Cloth against cloth ---- */

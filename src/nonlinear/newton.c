@@ -80,6 +80,9 @@
 /* The same with contact, whose evaluation takes most of an iteration: one must be enough to end the solve */
 #define MAX_CHORDS_IN_CONTACT 1
 #define STALLED               0.5 /* of the residual before: if no more is gained, it may be rounding */
+/* A solve is laborious after more iterations than the larger of these: a number, and a share of the most. */
+#define EASY       10
+#define EASY_SHARE 0.4
 /* Times the last estimate in a solve: a larger residual is not compared with a new one */
 #define FAR_FROM_ROUNDING 1e3
 
@@ -595,6 +598,7 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     drape_status status = status_of(code, &report->reason);
     KINGetNumNonlinSolvIters(s->kin, &iterations); /* of this solve: KINSol resets its counters */
     report->iterations = (int)iterations;
+    report->laborious = (double)iterations > fmax(EASY, EASY_SHARE * s->values[DRAPE_NEWTON_MAX_ITERATIONS]);
     e->work.newton_iterations += iterations;
     if (drape_system_status(e->system))
         return drape_system_status(e->system);

@@ -10,7 +10,8 @@ typedef struct drape_solve_report {
     const char *reason; /* "converged", or why not; static text */
     int iterations;
     double residual, tolerance; /* [N] */
-    double error;           /* [m] estimated RMS distance of the nodes to the solution; NaN: no estimate */
+    bool laborious; /* near the largest number of iterations: a larger step of the same motion might fail */
+    double error;   /* [m] estimated RMS distance of the nodes to the solution; NaN: no estimate */
     double further_seconds; /* [s] spent on iterations that only reduced this error */
     /* lenient: the settings have on_failure accept, so states are only checked for numbers that are not
      * finite and for passing through something. usable: the status is > 0, and the settings ask to continue

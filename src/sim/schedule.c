@@ -140,11 +140,11 @@ static void close_interval(drape_schedule *s)
 }
 
 /* The level is lowered as soon as the finished parts make up whole parts of the lower level. */
-static void accept_part(drape_schedule *s)
+static void accept_part(drape_schedule *s, bool grow)
 {
     s->part++;
     bool whole = s->part == (int64_t)1 << s->level;
-    if (s->level > 0 && s->part % 2 == 0) {
+    if (grow && s->level > 0 && s->part % 2 == 0) {
         s->level--;
         s->part /= 2;
     }
@@ -152,7 +152,7 @@ static void accept_part(drape_schedule *s)
         close_interval(s);
 }
 
-void drape_schedule_accept(drape_schedule *s, double t1, double h_next)
+void drape_schedule_accept(drape_schedule *s, double t1, double h_next, bool grow)
 {
     s->now = t1;
     s->tries++;
@@ -163,7 +163,7 @@ void drape_schedule_accept(drape_schedule *s, double t1, double h_next)
     s->stepped = true;
     s->limit = s->stepping == DRAPE_STEPS_PROPOSED ? h_next : INFINITY;
     if (s->stepping == DRAPE_STEPS_COUNTED)
-        accept_part(s);
+        accept_part(s, grow);
     else if (t1 >= s->cut_end)
         s->cut = false;
 }

@@ -50,8 +50,9 @@ void drape_schedule_aim(drape_schedule *schedule, double end);
 /* The next step: its end and its size. False if the end is reached. */
 bool drape_schedule_next(drape_schedule *schedule, double *t1, double *h);
 
-/* A step to t1 was accepted. h_next is used only if steps are proposed. */
-void drape_schedule_accept(drape_schedule *schedule, double t1, double h_next);
+/* A step to t1 was accepted. h_next is used only if steps are proposed, and grow, which lets the parts of an
+ * interval become larger again, only if they are counted. */
+void drape_schedule_accept(drape_schedule *schedule, double t1, double h_next, bool grow);
 
 /* A step was rejected; the next one has the size h_next or, if steps are counted, half of the rejected one.
  * Returns false if no step is left to try: an interval cannot be split further (2^60 parts), or h_next is

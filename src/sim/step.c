@@ -208,7 +208,7 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     s->steps_accepted++;
     s->steps_unconverged += info->usable;
     count_error(sim, info->error);
-    drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t, h_next);
+    drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t, h_next, !info->laborious);
 }
 
 static void count_reason(drape_sim *sim, const char *reason)

@@ -15,7 +15,7 @@ static void begin(drape_schedule *s, double dt, double start)
 
 static void accept(drape_schedule *s, double t1)
 {
-    drape_schedule_accept(s, t1, NAN);
+    drape_schedule_accept(s, t1, NAN, true);
 }
 
 static void halve(drape_schedule *s, double h)
@@ -95,6 +95,33 @@ START_TEST(halves_fill_the_interval)
         ck_assert_double_eq(t1, steps[i].t1);
         ck_assert_double_eq(h, steps[i].h);
         accept(&s, t1);
+    }
+}
+END_TEST
+
+/* Halved twice, parts stay as small as they are after steps that shall not grow, also in the next interval,
+ * and grow after the first others that end where larger ones would. */
+START_TEST(parts_grow_only_where_they_may)
+{
+    static const struct {
+        double t1, h;
+        bool grow;
+    } steps[] = {{0.25, 0.25, false}, {0.5, 0.25, false}, {0.75, 0.25, true}, {1, 0.25, false},
+                 {1.25, 0.25, false}, {1.5, 0.25, true},  {2, 0.5, false},    {2.5, 0.5, true},
+                 {3, 0.5, true},      {4, 1, false}};
+    drape_schedule s;
+    double t1, h;
+    begin(&s, 1, 0);
+    drape_schedule_aim(&s, 10);
+    ck_assert(drape_schedule_next(&s, &t1, &h));
+    halve(&s, h);
+    ck_assert(drape_schedule_next(&s, &t1, &h));
+    halve(&s, h);
+    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
+        ck_assert(drape_schedule_next(&s, &t1, &h));
+        ck_assert_double_eq(t1, steps[i].t1);
+        ck_assert_double_eq(h, steps[i].h);
+        drape_schedule_accept(&s, t1, NAN, steps[i].grow);
     }
 }
 END_TEST
@@ -291,7 +318,7 @@ START_TEST(proposed_steps_reach_the_end)
             }
             sum += h;
             now = t1;
-            drape_schedule_accept(&s, t1, limit);
+            drape_schedule_accept(&s, t1, limit, true);
         }
         ck_assert_double_eq(now, end);
         ck_assert_double_eq_tol(sum, end, 1e-12);
@@ -359,9 +386,9 @@ START_TEST(other_steps_lead_to_the_cut)
         ck_assert(drape_schedule_next(&s, &t1, &h));
         drape_schedule_cut(&s, 0.25);
         ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == 0.25 && h == 0.25);
-        drape_schedule_accept(&s, 0.125, 0.125); /* an integrator may stop short of it */
+        drape_schedule_accept(&s, 0.125, 0.125, true); /* an integrator may stop short of it */
         ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == 0.25 && h == 0.125);
-        drape_schedule_accept(&s, t1, 1);
+        drape_schedule_accept(&s, t1, 1, true);
         ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == (k ? 10 : 1.25));
     }
 }
@@ -369,6 +396,6 @@ END_TEST
 
 SUITE("schedule", a_cut_step_ends_at_its_end, other_steps_lead_to_the_cut, times_are_counted,
       asking_changes_nothing, a_step_is_not_too_short_to_be_computed, halves_fill_the_interval,
-      the_end_cuts_and_tiny_remainders_join, advances_do_not_shift_the_count, a_host_may_add_up_its_frames,
-      an_interval_left_half_done_is_given_up, any_sequence_fills_the_time, many_halvings_stay_small,
-      proposed_steps_reach_the_end, no_step_is_tried_again_at_its_size)
+      parts_grow_only_where_they_may, the_end_cuts_and_tiny_remainders_join, advances_do_not_shift_the_count,
+      a_host_may_add_up_its_frames, an_interval_left_half_done_is_given_up, any_sequence_fills_the_time,
+      many_halvings_stay_small, proposed_steps_reach_the_end, no_step_is_tried_again_at_its_size)
