@@ -18,7 +18,8 @@ def write(folder: str) -> int:
     The format is PC2, version 1, with float32 and little-endian numbers (Autodesk 3ds Max SDK, Point Cache). The run has positions in the world; the
     modifier needs those in the object's own axes, whatever its transform in that frame."""
     try:
-        x = np.load(os.path.join(folder, RUN, "positions.npy"), mmap_mode="r")
+        shown = os.path.join(folder, RUN, "render_positions.npy")  # of a mesh that follows the simulated one
+        x = np.load(shown if os.path.exists(shown) else os.path.join(folder, RUN, "positions.npy"), mmap_mode="r")
         to_local = np.load(os.path.join(folder, MATRICES))
     except (OSError, ValueError) as error:
         raise Problem(f"there are no frames in {folder}: {error}") from error

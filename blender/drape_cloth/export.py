@@ -23,7 +23,7 @@ KEEP_NODES = {"ARMATURE", "CAST", "CORRECTIVE_SMOOTH", "CURVE", "DATA_TRANSFER",
               "VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX", "VERTEX_WEIGHT_PROXIMITY", "WARP", "WAVE", "WEIGHTED_NORMAL"}
 """modifiers that leave the vertices of a mesh their numbers"""
 
-EXPORTED = re.compile(r"scene\.json|cloth\.obj|start\.obj|to_local\.npy|collider_\d+\.(obj|npy)")
+EXPORTED = re.compile(r"scene\.json|cloth\.obj|render\.obj|start\.obj|to_local\.npy|collider_\d+\.(obj|npy)")
 """names of the files that an export writes"""
 
 
@@ -64,6 +64,16 @@ def colliders_of(context, thing) -> List[Any]:
     within = thing.drape.colliders
     return sorted((other for other in (within.all_objects if within else context.scene.objects) if other.drape.role == "COLLIDER" and other != thing
                    and other.name in context.view_layer.objects and not other.hide_viewport), key=lambda other: other.name)
+
+
+def simulated_of(context, thing):
+    """The object that is simulated in place of a cloth."""
+    other = thing.drape.simulated
+    if other.name not in context.view_layer.objects or other.hide_viewport:
+        raise Problem(f"{other.name}: is disabled in viewports or not in this view layer, so it cannot be simulated for {thing.name}: hide it by the eye")
+    if other in colliders_of(context, thing):
+        raise Problem(f"{other.name}: is simulated for {thing.name}, so it cannot be one of its colliders")
+    return other
 
 
 class Surface:
@@ -137,7 +147,8 @@ class Samples:
         unit = scene.unit_settings.scale_length
         # Blender has z up, Drape y up: (x, y, z) becomes (x, z, -y), in metres.
         self.axes = unit * np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1 / unit]])
-        self.cloth = Surface(thing)
+        self.shown = Surface(thing)
+        self.cloth = Surface(simulated_of(context, thing)) if thing.drape.simulated else self.shown
         self.colliders = [Surface(other) for other in colliders_of(context, thing)]
         winds = [other for other in scene.objects if other.field and other.field.type == "WIND" and other.name in context.view_layer.objects
                  and not other.hide_viewport] if thing.drape.air else []
@@ -145,7 +156,7 @@ class Samples:
         self.rate, self.times = rate, np.arange(scene.frame_end - scene.frame_start + 1) / rate
         wind: List[np.ndarray] = []
         gravity: List[np.ndarray] = []
-        hidden = [modifier for modifier in list(thing.modifiers)[before_cloth(thing):] if modifier.show_viewport]
+        hidden = [modifier for other in {thing, self.cloth.thing} for modifier in list(other.modifiers)[before_cloth(other):] if modifier.show_viewport]
         now = scene.frame_current, scene.frame_subframe
         try:
             for modifier in hidden:
@@ -153,7 +164,7 @@ class Samples:
             for frame in range(scene.frame_start, scene.frame_end + 1):
                 scene.frame_set(frame)
                 depsgraph = context.evaluated_depsgraph_get()
-                for surface in [self.cloth, *self.colliders]:
+                for surface in {self.shown, self.cloth, *self.colliders}:
                     surface.sample(depsgraph, self.axes)
                 gravity.append(self.axes[:3, :3] @ np.array(scene.gravity) * scene.use_gravity)
                 wind.append(sum((self._wind(other.evaluated_get(depsgraph)) for other in winds), np.zeros(3)))
@@ -189,9 +200,8 @@ def _pins(cloth: Surface, nodes: np.ndarray, times: np.ndarray) -> List[Dict[str
     return [{"nodes": group, **({"track": _track(times, path)} if path.any() else {})} for group, path in motions.values()]
 
 
-def pinned_nodes(thing) -> np.ndarray:
+def pinned_nodes(thing, settings) -> np.ndarray:
     """Vertices whose weight in the group of pins is not below the threshold."""
-    settings = thing.drape
     if not settings.pin_group:
         return np.empty(0, int)
     group = thing.vertex_groups.get(settings.pin_group)
@@ -204,21 +214,35 @@ def pinned_nodes(thing) -> np.ndarray:
     return np.array(nodes)
 
 
+def _at_rest(surface: Surface) -> Tuple[np.ndarray, np.ndarray]:
+    """The vertices of an object without its modifiers: in its own axes, and in those of the scene where it is in the first frame [m]."""
+    data, matrix = surface.thing.data, surface.matrices[0]
+    x = np.empty(3 * len(data.vertices), np.float32)
+    data.vertices.foreach_get("co", x)
+    local = x.reshape(-1, 3)
+    if not data.polygons:
+        raise Problem(f"{surface.name}: has no faces")
+    if surface.shape[0] != len(local):
+        raise Problem(f"{surface.name}: its mesh has {len(local)} vertices, and {surface.shape[0]} after the modifiers before the cloth")
+    if min(np.linalg.svd(matrix[:3, :3], compute_uv=False)) < 1e-9:
+        raise Problem(f"{surface.name}: is scaled to nothing along an axis")
+    return local, mesh.transformed(matrix, local.astype(float))
+
+
+def _render_mesh(samples: Samples, folder: str) -> Dict[str, Any]:
+    """The mesh of the cloth that follows the simulated one, whose vertices keep their numbers."""
+    distance = samples.shown.thing.drape.simulated_distance
+    mesh.write_obj(os.path.join(folder, "render.obj"), _at_rest(samples.shown)[1], fans_of(samples.shown.thing.data)[0])
+    return {"file": "render.obj", **({"max_distance": distance} if distance > 0 else {})}
+
+
 def _cloth(thing, samples: Samples, folder: str) -> Dict[str, Any]:
     settings, cloth = thing.drape, samples.cloth
-    x = np.empty(3 * len(thing.data.vertices), np.float32)
-    thing.data.vertices.foreach_get("co", x)
-    local, matrix = x.reshape(-1, 3), cloth.matrices[0]
-    if not thing.data.polygons:
-        raise Problem(f"{thing.name}: has no faces")
-    if cloth.shape[0] != len(local):
-        raise Problem(f"{thing.name}: its mesh has {len(local)} vertices, and {cloth.shape[0]} after the modifiers before the cloth")
-    if min(np.linalg.svd(matrix[:3, :3], compute_uv=False)) < 1e-9:
-        raise Problem(f"{thing.name}: is scaled to nothing along an axis")
-    rest = mesh.transformed(matrix, local.astype(float))
-    triangles = mesh.split([tuple(polygon.vertices) for polygon in thing.data.polygons], *fans_of(thing.data), rest)
+    local, rest = _at_rest(cloth)
+    data = cloth.thing.data
+    triangles = mesh.split([tuple(polygon.vertices) for polygon in data.polygons], *fans_of(data), rest)
     mesh.write_obj(os.path.join(folder, "cloth.obj"), rest, triangles)
-    warp = matrix[:3, "XYZ".index(settings.warp)]
+    warp = samples.shown.matrices[0][:3, "XYZ".index(settings.warp)]
     warp = (warp / np.linalg.norm(warp)).tolist()
     material: Dict[str, Any] = {}
     if settings.fabric:
@@ -234,10 +258,12 @@ def _cloth(thing, samples: Samples, folder: str) -> Dict[str, Any]:
         terms.append({"type": "drag.wind", "wind": samples.wind.vector.tolist(), "density": settings.air_density})
         if samples.wind.history:
             terms[-1]["history"] = samples.wind.history["name"]
-    made = {"name": thing.name, "mesh": {"file": "cloth.obj"}, "material": material, "terms": terms, "pins": _pins(cloth, pinned_nodes(thing), samples.times)}
+    made = {"name": thing.name, "mesh": {"file": "cloth.obj"}, "material": material, "terms": terms, "pins": _pins(cloth, pinned_nodes(cloth.thing, settings), samples.times)}
     if not np.array_equal(cloth.local[0], local):
         mesh.write_obj(os.path.join(folder, "start.obj"), cloth.points(0), triangles)
         made["start"] = {"file": "start.obj"}
+    if cloth is not samples.shown:
+        made["render_mesh"] = _render_mesh(samples, folder)
     return made
 
 
@@ -346,6 +372,6 @@ def _write(thing, samples: Samples, folder: str) -> None:
         made["self_contact"] = {"thickness": settings.layer_distance / 2, "friction": settings.layer_friction}
     if settings.untangle:
         made["untangle"] = {}
-    np.save(os.path.join(folder, cache.MATRICES), np.linalg.inv(np.array(samples.cloth.matrices)))
+    np.save(os.path.join(folder, cache.MATRICES), np.linalg.inv(np.array(samples.shown.matrices)))
     with open(os.path.join(folder, SCENE), "w", encoding="utf-8") as file:
         file.write("{" + ",\n ".join(f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in made.items()) + "}\n")

@@ -57,6 +57,7 @@ class Baking:
         """Starts the program; raises a Problem."""
         thing = context.object
         self.cloth, self.folder = thing.name, folder_of(thing)
+        self.simulated = thing.drape.simulated.name if thing.drape.simulated else None
         preferences = addon_preferences()
         path = find_program()
         for other in bpy.data.objects:
@@ -73,7 +74,7 @@ class Baking:
         thing = context.scene.objects.get(self.cloth)
         done, failed = self.bake.done(), None
         try:
-            names = program.Names.of(program.read_scene(self.folder))
+            names = program.Names.of(program.read_scene(self.folder), self.simulated)
             failed = self.bake.result(names)
             for text in self.bake.warnings(names):
                 self.report({"WARNING"}, text)

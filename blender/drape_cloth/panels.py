@@ -50,6 +50,9 @@ class DRAPE_PT_drape(Panel, bpy.types.Panel):
             layout.label(text=f"Frame {bake.done()} of {bake.frames}", icon="TIME")
             layout.operator("drape.cancel", icon="X")
             return
+        layout.prop(thing.drape, "simulated")
+        if thing.drape.simulated:
+            layout.prop(thing.drape, "simulated_distance")
         layout.prop(thing.drape, "quality")
         if thing.drape.quality == "CUSTOM":
             layout.prop(thing.drape, "method")
@@ -90,7 +93,7 @@ class DRAPE_PT_contact(Panel, bpy.types.Panel):
     def draw(self, context):
         thing, layout = context.object, self.columns()
         settings = thing.drape
-        layout.prop_search(settings, "pin_group", thing, "vertex_groups")
+        layout.prop_search(settings, "pin_group", settings.simulated or thing, "vertex_groups")
         if settings.pin_group:
             layout.prop(settings, "pin_threshold", slider=True)
         layout.prop(settings, "colliders")

@@ -134,18 +134,19 @@ class Bake:
 
 
 class Names:
-    """The objects of Blender that the parts of a scene were made from, for messages: cloth, and those of the colliders by number."""
+    """The objects of Blender that the parts of a scene were made from, for messages: cloth, what is simulated for it, and those of the colliders by number."""
 
-    def __init__(self, cloth: str, colliders: List[str], files: Dict[str, str]):
-        self.cloth, self.colliders, self.files = cloth, colliders, files
+    def __init__(self, cloth: str, simulated: str, colliders: List[str], files: Dict[str, str]):
+        self.cloth, self.simulated, self.colliders, self.files = cloth, simulated, colliders, files
 
     @staticmethod
-    def of(scene: dict) -> "Names":
-        """From the names that the scene gives them, and the files that it reads."""
+    def of(scene: dict, simulated: Optional[str] = None) -> "Names":
+        """From the names that the scene gives them, and the files that it reads. simulated: the object that is simulated in place of the cloth."""
         colliders = [item["name"] for item in scene["colliders"]]
         files = {item[key]: item["name"] for item in scene["colliders"] for key in ("file", "mesh") if key in item}
         cloth = scene["cloth"][0]["name"]
-        return Names(cloth, colliders, {scene["cloth"][0]["mesh"]["file"]: cloth, **files})
+        simulated = simulated if simulated and "render_mesh" in scene["cloth"][0] else cloth
+        return Names(cloth, simulated, colliders, {scene["cloth"][0]["mesh"]["file"]: simulated, **files})
 
     def explain(self, message: str) -> str:
         """The message of the library, with the name of the object that it is about in place of line and column of the scene file."""
@@ -154,7 +155,8 @@ class Names:
         about = None
         if place:
             number = int(place.group(2))
-            about = self.cloth if place.group(1) == "cloth" else self.colliders[number] if number < len(self.colliders) else None
+            of_mesh = re.match(r"/(mesh|pins|start)\b", message[place.end():])
+            about = (self.simulated if of_mesh else self.cloth) if place.group(1) == "cloth" else self.colliders[number] if number < len(self.colliders) else None
         else:
             about = next((name for file, name in self.files.items() if re.search(rf"(?<![\w.]){re.escape(file)}(?![\w.])", message)), None)
         return f"{about or self.cloth}: {message}"

@@ -77,6 +77,13 @@ class DRAPE_object(bpy.types.PropertyGroup):
     air: BoolProperty(name="Air", default=True, description="Drag of the air, and the wind of the force fields of the type Wind: their strength is a speed [m/s] along their z axis")
     air_density: FloatProperty(name="Density", default=1.225, min=0, max=1e4, precision=3, description="Density of the air [kg/m3]")
 
+    # What is simulated in place of the mesh of a cloth
+    simulated: PointerProperty(type=bpy.types.Object, name="Simulated Mesh", poll=lambda self, other: other.type == "MESH" and other != self.id_data,
+                               description="A coarser mesh at the same place that is simulated; this one follows it. Empty: this mesh itself. Pins are vertices of the "
+                               "simulated mesh")
+    simulated_distance: FloatProperty(name="Max Distance", default=0, min=0, soft_max=0.1, max=1e6, precision=4, step=0.1,
+                                      description="Largest distance of a vertex from the simulated mesh [m]; 0: the mean length of its edges")
+
     # Pins and contact of a cloth
     pin_group: StringProperty(name="Pins", description="Vertices of this group are held, or move with the object, its armature and its shape keys")
     pin_threshold: FloatProperty(name="From Weight", default=0.5, min=0, max=1, description="Vertices with at least this weight in the group are pins")

@@ -243,6 +243,17 @@ typedef struct drape_start_def {
     void *reserved[4];         /* must be NULL */
 } drape_start_def;
 
+/* A mesh that frames show in place of the one that is simulated, such as an artist's with polygons, texture
+ * coordinates and materials. At rest each vertex is bound to the nearest triangle of the simulated mesh, by
+ * the weights of its corners and the height along their interpolated normals, and follows it. It changes no
+ * result. It is embedded in drape_cloth_def, so it can grow only into its reserved members. */
+typedef struct drape_render_mesh_def {
+    drape_mesh_def mesh; /* without a source: none. Its edges and nodes may be any */
+    double max_distance; /* [m] of a vertex from the simulated mesh at rest, > 0; default NaN: the mean length
+                            of an edge of the latter */
+    void *reserved[4];   /* must be NULL */
+} drape_render_mesh_def;
+
 /* One piece of cloth. */
 typedef struct drape_cloth_def {
     size_t struct_size;  /* set by drape_cloth_def_init */
@@ -263,6 +274,7 @@ typedef struct drape_cloth_def {
         *masses;           /* applied in this order to the masses that the material gives; NULL: none */
     size_t mass_count;     /* length of masses */
     drape_start_def start; /* in which shape and with which velocities it starts; default: at rest */
+    drape_render_mesh_def render_mesh; /* the mesh that frames show; default: the simulated one */
 } drape_cloth_def;
 
 /* One side of a seam: nodes of one cloth, in the order in which they are joined. They are selected as
@@ -453,6 +465,25 @@ typedef struct drape_cloth_range {
 /* The number of pieces of cloth, and one of them. An index out of range gives an empty range. */
 DRAPE_API int32_t drape_model_cloth_count(const drape_model *model);
 DRAPE_API drape_cloth_range drape_model_cloth(const drape_model *model, int32_t index);
+
+/* The mesh that frames show. */
+typedef struct drape_render_mesh {
+    int32_t vertex_count, triangle_count; /* 0: no such cloth */
+    const int32_t *triangles;             /* (triangle_count x 3) 0-based vertices of this mesh */
+    const double *rest;                   /* (vertex_count x 3) [m] */
+} drape_render_mesh;
+
+/* That of one cloth or, if cloth is -1, of all in their order: the render_mesh of the scene, or the simulated
+ * mesh of a cloth without one. Valid until the model is destroyed. Thread-safety: any number of threads at
+ * once. */
+DRAPE_API drape_render_mesh drape_model_render_mesh(const drape_model *model, int32_t cloth);
+
+/* Writes the positions (vertex_count x 3 [m]) of that mesh for nodes of the model at x with their normals
+ * (node_count x 3 each), as drape_sim_positions and drape_sim_normals, or drape_model_normals, return them.
+ * Nothing if an argument is NULL or there is no such cloth; nothing is allocated. Thread-safety: any number
+ * of threads at once. */
+DRAPE_API void drape_model_render_positions(const drape_model *model, int32_t cloth, const double *x,
+                                            const double *normals, double *positions);
 
 /* An obstacle and its position at a time t [s]. Obstacles are numbered in scene order. */
 typedef struct drape_collider_motion {

@@ -86,6 +86,19 @@ class Run:
             raise FileError(f"{self}: has no positions.npy")
         return self.model.mesh(cloth, np.array(self.positions[frame]))
 
+    def render_positions(self, frame: int = -1) -> np.ndarray:
+        """Positions of the vertices of render_mesh in a frame [m]: of `render_positions.npy` or, if the run has none, computed from the positions."""
+        path = os.path.join(self.folder, "render_positions.npy") if self.folder else ""
+        if os.path.exists(path):
+            return np.array(np.load(path, mmap_mode="r")[frame])
+        if self.positions is None:
+            raise FileError(f"{self}: has no positions.npy")
+        return self.model.render_positions(np.array(self.positions[frame]))
+
+    def render_mesh(self, frame: int = -1) -> Mesh:
+        """What frames show: the render meshes of the scene in a frame, of all cloths."""
+        return Mesh(self.render_positions(frame), self.model.render_mesh().triangles)
+
     def save(self, folder) -> "Run":
         """Writes a run that was recorded in memory into a new folder, from which drape.load and the program read it."""
         os.makedirs(folder)

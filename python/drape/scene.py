@@ -299,6 +299,28 @@ class Model:
         triangles = self.triangles[piece.first_triangle:piece.first_triangle + piece.triangle_count] - piece.first_node
         return Mesh(x[piece.first_node:piece.first_node + piece.node_count], triangles)
 
+    @header("drape_model_render_mesh")
+    def render_mesh(self, cloth: Optional[int] = None, positions=None) -> Mesh:
+        """The mesh that frames show of one cloth, or of all of them: the render_mesh of the scene, or the simulated mesh of a cloth without one. At rest, or for
+        nodes at positions (nodes x 3 [m]). Polygons are divided into triangles."""
+        which = -1 if cloth is None else operator.index(cloth)
+        mesh = lib.drape_model_render_mesh(self._address, which)
+        if not mesh.vertex_count:
+            raise ArgumentError(f"no cloth {cloth}: there are {len(self.cloths)}")
+        triangles = self._handle.view(mesh.triangles, (mesh.triangle_count, 3), np.int32)
+        if positions is None:
+            return Mesh(self._handle.view(mesh.rest, (mesh.vertex_count, 3), np.float64), triangles)
+        return Mesh(self.render_positions(positions, cloth), triangles)
+
+    @header("drape_model_render_positions")
+    def render_positions(self, positions, cloth: Optional[int] = None) -> np.ndarray:
+        """Positions (vertices x 3 [m]) of render_mesh for nodes at positions (nodes x 3 [m]), as frames have them."""
+        which = -1 if cloth is None else operator.index(cloth)
+        x = numbers(positions, "positions", self.node_count, 3)
+        out = np.empty((lib.drape_model_render_mesh(self._address, which).vertex_count, 3))
+        lib.drape_model_render_positions(self._address, which, x.ctypes.data, self.normals(x).ctypes.data, out.ctypes.data)
+        return out
+
     def __repr__(self) -> str:
         return f"Model({self.node_count} nodes, {self.triangle_count} triangles)"
 

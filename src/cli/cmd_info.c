@@ -212,15 +212,15 @@ static const cli_option options[] = {
 };
 
 /* The settings were valid when the model was compiled, so they are valid now. */
-const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values)
+const drape_grid_ops *cli_grid_of(const drape_entry_def *def, double *values)
 {
-    const int i = drape_registry_find(&drape_grid_registry, NULL, cloth->grid.type);
+    const int i = drape_registry_find(&drape_grid_registry, NULL, def->type ? def->type : "");
     drape_context *ctx = NULL;
     if (i < 0 || drape_context_create(NULL, &ctx))
         return NULL;
     const drape_grid_ops *grid = drape_grids[i];
     drape_status status = drape_params_resolve(ctx, "", grid->entry.params, grid->entry.param_count,
-                                               cloth->grid.settings, cloth->grid.setting_count, values);
+                                               def->settings, def->setting_count, values);
     drape_context_destroy(&ctx);
     return status ? NULL : grid;
 }

@@ -84,11 +84,12 @@ json_t *cli_form_json(const drape_scene_object *form, const void *def);
 json_t *cli_pins_json(const cli_info *info, int32_t c);
 json_t *cli_masses_json(const cli_info *info, int32_t c);
 json_t *cli_start_json(const cli_info *info, int32_t c);
+json_t *cli_render_mesh_json(const cli_info *info, int32_t c); /* NULL: none */
 
 /* The histories of the scene. */
 json_t *cli_histories_json(const cli_info *info);
 
 /* The grid of a cloth, with its values; NULL if its mesh is not a grid. */
-const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values);
+const drape_grid_ops *cli_grid_of(const drape_entry_def *def, double *values);
 
 #endif

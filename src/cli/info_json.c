@@ -201,13 +201,32 @@ static json_t *values_of(const drape_param *params, int param_count, const doubl
 static json_t *mesh(const drape_cloth *cloth, const drape_mesh_def *def)
 {
     double values[DRAPE_MAX_PARAMS];
-    const drape_grid_ops *grid = cli_grid_of(cloth, values);
+    const drape_grid_ops *grid = cli_grid_of(&def->grid, values);
     json_t *object = grid ? values_of(grid->entry.params, grid->entry.param_count, values) : json_object();
     if (grid)
         object = drape_json_with(object, "grid", drape_json_text(grid->entry.name));
     if (cloth->file)
         object = drape_json_with(object, "file", drape_json_text(cloth->file));
     return drape_json_with(object, "transform", with_keys(json_object(), &drape_form_transform, def));
+}
+
+json_t *cli_render_mesh_json(const cli_info *info, int32_t c)
+{
+    double values[DRAPE_MAX_PARAMS];
+    const drape_cloth *cloth = &info->model->cloths[c];
+    const drape_render_mesh_def *def = &info->def.cloths[c].render_mesh;
+    const drape_grid_ops *grid = cli_grid_of(&def->mesh.grid, values);
+    if (!cloth->bound)
+        return NULL;
+    json_t *object = grid ? values_of(grid->entry.params, grid->entry.param_count, values) : json_object();
+    json_t *keys = cli_form_json(drape_scene_key_of(&drape_form_cloth, "render_mesh")->child, def);
+    const char *name;
+    json_t *value;
+    json_object_foreach(keys, name, value) object = drape_json_with(object, name, json_incref(value));
+    json_decref(keys);
+    object = drape_json_with(object, "max_distance", drape_json_number(cloth->max_distance));
+    object = drape_json_with(object, "vertices", count(cloth->render_mesh.node_count));
+    return drape_json_with(object, "triangles", count(cloth->render_mesh.triangle_count));
 }
 
 /* A stiffness of a measured fabric. */
@@ -260,6 +279,9 @@ static json_t *cloth(const cli_info *info, int32_t c)
     json_t *start = cli_start_json(info, c);
     if (start)
         object = drape_json_with(object, "start", start);
+    json_t *shown = cli_render_mesh_json(info, c);
+    if (shown)
+        object = drape_json_with(object, "render_mesh", shown);
     object = drape_json_with(object, "mesh", mesh(from, &info->def.cloths[c].mesh));
     return drape_json_with(object, "material", material(from));
 }

@@ -98,7 +98,7 @@ static void print_source(const drape_cloth *cloth, const drape_mesh_def *def)
     double values[DRAPE_MAX_PARAMS];
     drape_mesh_def defaults = {.file = NULL};
     drape_scene_set_defaults(&drape_form_mesh, &defaults);
-    const drape_grid_ops *grid = cli_grid_of(cloth, values);
+    const drape_grid_ops *grid = cli_grid_of(&def->grid, values);
     if (cloth->file)
         printf("  file      %s\n", CLI_SHOWN(cloth->file));
     if (grid) {
@@ -181,13 +181,14 @@ static void print_objects(const char *what, const drape_scene_object *form, json
     json_decref(list);
 }
 
-static void print_start(json_t *start)
+/* An object of a cloth; NULL: nothing. */
+static void print_part(const char *key, json_t *part)
 {
-    if (start) {
-        puts("  start");
-        print_object("    ", drape_scene_key_of(&drape_form_cloth, "start")->child, start);
+    if (part) {
+        printf("  %s\n", key);
+        print_object("    ", drape_scene_key_of(&drape_form_cloth, key)->child, part);
     }
-    json_decref(start);
+    json_decref(part);
 }
 
 static void print_cloth(const cli_info *info, int32_t c)
@@ -208,7 +209,8 @@ static void print_cloth(const cli_info *info, int32_t c)
     print_pins(info->model, cloth, &info->cloths[c]);
     print_objects("pin", &drape_form_pin, cli_pins_json(info, c));
     print_objects("masses", &drape_form_mass, cli_masses_json(info, c));
-    print_start(cli_start_json(info, c));
+    print_part("start", cli_start_json(info, c));
+    print_part("render_mesh", cli_render_mesh_json(info, c));
     print_material(cloth);
 }
 

@@ -269,6 +269,7 @@ static const struct opening {
 } openings[] = {
     {"term", "type", ENTRY_PARAMS, &drape_term_registry, NULL, NULL, NULL},
     {"mesh", "grid", ENTRY_PARAMS, &drape_grid_registry, NULL, NULL, NULL},
+    {"render_mesh", "grid", ENTRY_PARAMS, &drape_grid_registry, NULL, NULL, NULL},
     {"collider", "type", ENTRY_PARAMS, &drape_collider_registry, NULL, NULL, NULL},
     {"seam", "type", ENTRY_PARAMS, &drape_seam_registry, NULL, NULL, NULL},
     {"event", "type", ENTRY_PARAMS, &drape_event_registry, NULL, NULL, NULL},

@@ -231,6 +231,7 @@ drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape
     static drape_status (*const stages[])(drape_model *,
                                           const drape_scene_def *) = {copy_scene,
                                                                       compile_cloths,
+                                                                      drape_compile_render_meshes,
                                                                       drape_compile_start,
                                                                       drape_compile_pins,
                                                                       drape_compile_events,

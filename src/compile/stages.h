@@ -17,6 +17,9 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
 drape_status drape_compile_masses(drape_model *model, const char *pointer, const drape_cloth_def *def,
                                   drape_cloth *cloth);
 
+/* Reads the render meshes and binds them to the meshes at rest, after these. */
+drape_status drape_compile_render_meshes(drape_model *model, const drape_scene_def *def);
+
 /* Computes where all cloths start and their initial velocities, after the meshes and masses. */
 drape_status drape_compile_start(drape_model *model, const drape_scene_def *def);
 

@@ -72,7 +72,7 @@ bool drape_frame_files_name(const char *name, size_t digits, const char *ending,
 drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
                                     drape_frame_files *frames)
 {
-    frames->model = def->model;
+    frames->surface = &def->model->surface;
     frames->folder = def->folder;
     frames->ending = ending;
     drape_status status = drape_file_create_in(ctx, def->folder, &frames->file);
@@ -144,13 +144,13 @@ void drape_obj_put_name(drape_file *file, const char *statement, const char *nam
     drape_file_put_text(file, "\n");
 }
 
-void drape_obj_put_material_files(drape_file *file, const drape_model *model)
+void drape_obj_put_material_files(drape_file *file, const drape_render_surface *surface)
 {
-    for (int32_t c = 0; c < model->cloth_count; c++) {
-        const char *own = model->cloths[c].mesh.faces.material_file;
+    for (int32_t c = 0; c < surface->cloth_count; c++) {
+        const char *own = surface->cloths[c].mesh->faces.material_file;
         bool named = !own;
         for (int32_t b = 0; b < c && !named; b++) {
-            const char *other = model->cloths[b].mesh.faces.material_file;
+            const char *other = surface->cloths[b].mesh->faces.material_file;
             named = other && strcmp(own, other) == 0;
         }
         if (!named)
@@ -182,17 +182,17 @@ static void use_material(drape_obj *obj, const char *material)
     obj->material = material;
 }
 
-void drape_obj_put_faces(drape_obj *obj, const drape_model *model, int32_t cloth)
+void drape_obj_put_faces(drape_obj *obj, const drape_render_surface *surface, int32_t cloth)
 {
-    const drape_cloth *from = &model->cloths[cloth];
-    const drape_faces *faces = &from->mesh.faces;
+    const drape_render_cloth *from = &surface->cloths[cloth];
+    const drape_faces *faces = &from->mesh->faces;
     drape_file *file = obj->file;
     for (int32_t i = 0; i < faces->uv_count; i++)
         drape_file_print(file, "vt %.17g %.17g\n", faces->uv[2 * (size_t)i], faces->uv[2 * (size_t)i + 1]);
     if (faces->count == 0) {
         use_material(obj, NULL);
-        drape_obj_put_triangles(file, model->triangle + 3 * (size_t)from->first_triangle,
-                                from->mesh.triangle_count);
+        drape_obj_put_triangles(file, surface->triangle + 3 * (size_t)from->first_triangle,
+                                from->mesh->triangle_count);
     }
     for (int32_t f = 0; f < faces->count; f++) {
         use_material(obj, faces->material[f] < 0 ? NULL : faces->name[faces->material[f]]);

@@ -20,15 +20,18 @@ typedef struct drape_export_def {
     int32_t body_count;
 } drape_export_def;
 
-/* A frame. Its vectors are rotated if the format has another vertical axis than the scene. */
+/* A frame of the model's surface. Its vectors are rotated if the format has another vertical axis than the
+ * scene. */
 typedef struct drape_frame {
     int64_t index;           /* counts from 0 without gaps */
     double time;             /* [s] */
-    const double *positions; /* (node_count x 3) [m] */
+    const double *positions; /* of the nodes of the surface (node_count x 3) [m] */
+    const double *nodes;     /* of the nodes of the model (node_count x 3) [m], never rotated */
     /* For formats that want fields; otherwise NULL: */
     const double *velocities;     /* (node_count x 3) [m/s] */
     const double *strain;         /* (triangle_count x 2) as drape_model_strain */
     const double *energy_density; /* (node_count) [J/m2], of the state at or after the frame */
+    const uint8_t *pinned;        /* (node_count) */
     /* For formats that want bodies; otherwise NULL: */
     const drape_collider_pose *poses; /* (body_count) */
     const double *points;             /* of all bodies that deform, in space [m] */
@@ -97,7 +100,7 @@ drape_status drape_export_reopen(drape_context *ctx, drape_folder *folder, const
 #define DRAPE_FRAME_NAME "frame_%06" PRId64 ".%s"
 
 typedef struct drape_frame_files {
-    const drape_model *model;
+    const drape_render_surface *surface;
     drape_folder *folder;
     const char *ending; /* "obj" */
     drape_file file;
@@ -141,12 +144,12 @@ typedef struct drape_obj {
 /* A statement with a name. Control characters, such as line breaks, are replaced: names contain any. */
 void drape_obj_put_name(drape_file *file, const char *statement, const char *name);
 /* `mtllib file` of all cloths, each file once. */
-void drape_obj_put_material_files(drape_file *file, const drape_model *model);
+void drape_obj_put_material_files(drape_file *file, const drape_render_surface *surface);
 /* `v x y z` of nodes, with 17 digits; `f a b c` of triangles, whose array counts nodes from 0. */
 void drape_obj_put_nodes(drape_file *file, const double *x, int32_t count);
 void drape_obj_put_triangles(drape_file *file, const int32_t *triangle, int32_t count);
 /* The faces of a cloth as its file had them, with `vt u v` and `usemtl name`; its triangles if it has no
  * such faces. Nodes are counted from 1 over all cloths. */
-void drape_obj_put_faces(drape_obj *obj, const drape_model *model, int32_t cloth);
+void drape_obj_put_faces(drape_obj *obj, const drape_render_surface *surface, int32_t cloth);
 
 #endif

@@ -197,20 +197,21 @@ static int compare_places(const void *left, const void *right)
 
 /* Lists the materials of all cloths, those that triangles lack first; first (cloth_count) receives where
  * those of each cloth begin. */
-static material *list_materials(drape_arena *scratch, const drape_model *model, size_t *first, size_t *count)
+static material *list_materials(drape_arena *scratch, const drape_render_surface *surface, size_t *first,
+                                size_t *count)
 {
     *count = 0;
-    for (int32_t c = 0; c < model->cloth_count; c++)
-        *count += (size_t)model->cloths[c].mesh.faces.material_count + 1;
+    for (int32_t c = 0; c < surface->cloth_count; c++)
+        *count += (size_t)surface->cloths[c].mesh->faces.material_count + 1;
     material *list = drape_arena_take(scratch, *count, sizeof *list);
     size_t at = 0;
-    for (int32_t c = 0; list && c < model->cloth_count; c++) {
-        const drape_faces *faces = &model->cloths[c].mesh.faces;
+    for (int32_t c = 0; list && c < surface->cloth_count; c++) {
+        const drape_faces *faces = &surface->cloths[c].mesh->faces;
         first[c] = at;
         for (int32_t m = -1; m < faces->material_count; m++)
             list[at++] = (material){.name = m < 0 ? "" : faces->name[m], .cloth = c, .number = m};
         if (faces->count == 0)
-            list[first[c]].triangles = (uint32_t)model->cloths[c].mesh.triangle_count;
+            list[first[c]].triangles = (uint32_t)surface->cloths[c].mesh->triangle_count;
         for (int32_t f = 0; f < faces->count; f++)
             list[first[c] + (size_t)(faces->material[f] + 1)].triangles +=
                 (uint32_t)(faces->first[f + 1] - faces->first[f] - 2);
@@ -261,12 +262,12 @@ static drape_status make_primitives(glb_state *glb, material *list, size_t count
 
 /* Puts the triangles of one cloth where their primitives have them; next (primitives): the place of the next
  * triangle of each. */
-static void put_corners(glb_state *glb, const drape_cloth *cloth, const material *own,
+static void put_corners(glb_state *glb, const drape_render_cloth *cloth, const material *own,
                         const drape_vertices *vertices, uint32_t *next)
 {
-    const drape_faces *faces = &cloth->mesh.faces;
+    const drape_faces *faces = &cloth->mesh->faces;
     const int32_t *at = vertices->at;
-    const int32_t count = faces->count > 0 ? faces->count : cloth->mesh.triangle_count;
+    const int32_t count = faces->count > 0 ? faces->count : cloth->mesh->triangle_count;
     for (int32_t f = 0; f < count; f++) {
         const int32_t triangles = faces->count > 0 ? faces->first[f + 1] - faces->first[f] - 2 : 1;
         const int32_t number = faces->count > 0 ? faces->material[f] : -1;
@@ -277,16 +278,17 @@ static void put_corners(glb_state *glb, const drape_cloth *cloth, const material
     }
 }
 
-static drape_status add_cloth(glb_state *glb, const drape_cloth *cloth, const material *own, uint32_t *next)
+static drape_status add_cloth(glb_state *glb, const drape_render_cloth *cloth, const material *own,
+                              uint32_t *next)
 {
     drape_arena scratch = drape_arena_of(glb->def->arena->ctx);
     drape_vertices vertices;
-    const drape_status status = drape_faces_vertices(&scratch, &cloth->mesh, &vertices);
+    const drape_status status = drape_faces_vertices(&scratch, cloth->mesh, &vertices);
     for (int32_t i = 0; !status && i < vertices.count; i++) {
         const size_t to = (size_t)glb->vertices + (size_t)i;
         glb->node[to] = cloth->first_node + vertices.node[i];
         if (glb->uv)
-            glb->uv[to] = vertices.uv[i] < 0 ? NULL : cloth->mesh.faces.uv + 2 * (size_t)vertices.uv[i];
+            glb->uv[to] = vertices.uv[i] < 0 ? NULL : cloth->mesh->faces.uv + 2 * (size_t)vertices.uv[i];
     }
     if (!status) {
         put_corners(glb, cloth, own, &vertices, next);
@@ -298,21 +300,21 @@ static drape_status add_cloth(glb_state *glb, const drape_cloth *cloth, const ma
 
 static drape_status add_cloths(glb_state *glb, drape_arena *scratch)
 {
-    const drape_model *model = glb->def->model;
+    const drape_render_surface *surface = &glb->def->model->surface;
     size_t count, room = 0;
     bool has_uvs = false;
-    size_t *first = drape_arena_take(scratch, (size_t)model->cloth_count, sizeof *first);
-    material *list = first ? list_materials(scratch, model, first, &count) : NULL;
+    size_t *first = drape_arena_take(scratch, (size_t)surface->cloth_count, sizeof *first);
+    material *list = first ? list_materials(scratch, surface, first, &count) : NULL;
     drape_status status = list ? make_primitives(glb, list, count) : DRAPE_E_MEMORY;
     if (status)
         return status;
-    for (int32_t c = 0; c < model->cloth_count; c++) {
-        const drape_mesh *mesh = &model->cloths[c].mesh;
+    for (int32_t c = 0; c < surface->cloth_count; c++) {
+        const drape_mesh *mesh = surface->cloths[c].mesh;
         has_uvs = has_uvs || mesh->faces.uv_count > 0;
         room += (size_t)(mesh->faces.uv_count > 0 ? 3 * mesh->triangle_count : mesh->node_count);
     }
     uint32_t *next = drape_arena_take(scratch, glb->primitives, sizeof *next);
-    size_t triangles = (size_t)model->triangle_count;
+    size_t triangles = (size_t)surface->triangle_count;
     const size_t own = room;
     for (int32_t b = 0; b < glb->def->body_count; b++) {
         triangles += (size_t)glb->def->bodies[b].triangle_count;
@@ -326,8 +328,8 @@ static drape_status add_cloths(glb_state *glb, drape_arena *scratch)
         return DRAPE_E_MEMORY;
     for (uint32_t p = 0; p < glb->primitives; p++)
         next[p] = glb->primitive[p].first;
-    for (int32_t c = 0; c < model->cloth_count && !status; c++)
-        status = add_cloth(glb, &model->cloths[c], list + first[c], next);
+    for (int32_t c = 0; c < surface->cloth_count && !status; c++)
+        status = add_cloth(glb, &surface->cloths[c], list + first[c], next);
     return status;
 }
 
@@ -390,7 +392,7 @@ static drape_status make_vertices(glb_state *glb)
     drape_arena_free(&scratch);
     if (status)
         return status;
-    glb->points = (uint32_t)drape_model_node_count(glb->def->model);
+    glb->points = (uint32_t)glb->def->model->surface.node_count;
     glb->objects = 1;
     glb->object[0] =
         (object){.vertices = glb->vertices, .points = glb->points, .primitives = glb->primitives};
@@ -598,16 +600,17 @@ static double frame_room(double objects, double primitives)
 
 static drape_status glb_check(drape_context *ctx, const char *pointer, const drape_export_def *def)
 {
+    const drape_render_surface *surface = &def->model->surface;
     double frames = (double)def->most_frames, vertices = (double)drape_export_points(def->model);
     double primitives = 1 + def->model->collider_count;
-    for (int32_t c = 0; c < def->model->cloth_count; c++) {
-        const drape_mesh *mesh = &def->model->cloths[c].mesh;
+    for (int32_t c = 0; c < surface->cloth_count; c++) {
+        const drape_mesh *mesh = surface->cloths[c].mesh;
         /* a seam of the texture coordinates splits a node for each further pair that is used */
         vertices += mesh->faces.uv_count > mesh->node_count ? mesh->faces.uv_count : mesh->node_count;
         primitives += mesh->faces.material_count;
     }
-    double bytes = 12.0 * drape_model_triangle_count(def->model) + 24 * vertices * frames +
-                   4 * frames * frames + frames * frame_room(1 + def->model->collider_count, primitives);
+    double bytes = 12.0 * surface->triangle_count + 24 * vertices * frames + 4 * frames * frames +
+                   frames * frame_room(1 + def->model->collider_count, primitives);
     for (int32_t i = 0; i < def->model->collider_count; i++)
         bytes += SURFACE_BYTES + 84.0 * def->model->colliders[i].shape.triangle_count + 28 * frames;
     if (frames <= MAX_FRAMES && bytes <= MAX_BYTES)
@@ -664,7 +667,7 @@ static drape_status glb_open(drape_context *ctx, const drape_export_def *def, vo
 /* Positions of the points of all objects. */
 static const double *positions_of(glb_state *glb, const drape_frame *frame)
 {
-    const size_t nodes = 3 * (size_t)drape_model_node_count(glb->def->model);
+    const size_t nodes = 3 * (size_t)glb->def->model->surface.node_count;
     if (!glb->x)
         return frame->positions;
     memcpy(glb->x, frame->positions, nodes * sizeof *glb->x);
@@ -691,9 +694,9 @@ static void add_normals(glb_state *glb, const double *x, const int32_t *node, si
 /* The mean of the normals of the triangles around each point, weighted by area; upwards if they cancel. */
 static void find_normals(glb_state *glb, const double *x)
 {
-    const drape_model *model = glb->def->model;
+    const drape_render_surface *surface = &glb->def->model->surface;
     memset(glb->normal, 0, 3 * (size_t)glb->points * sizeof *glb->normal);
-    add_normals(glb, x, drape_model_triangles(model), (size_t)drape_model_triangle_count(model), 0);
+    add_normals(glb, x, surface->triangle, (size_t)surface->triangle_count, 0);
     for (uint32_t i = 1; i < glb->objects; i++)
         add_normals(glb, x, glb->object[i].body->triangle, (size_t)glb->object[i].body->triangle_count,
                     glb->object[i].first_point);

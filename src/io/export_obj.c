@@ -7,6 +7,7 @@
 #include <inttypes.h>
 
 #include "io/export.h"
+#include "model/model.h"
 
 static bool obj_names(const char *name)
 {
@@ -26,13 +27,14 @@ static drape_status obj_write(drape_context *ctx, void *state, const drape_frame
     if (status)
         return status;
     drape_file_print(&frames->file, "# Drape frame %" PRId64 ", t = %.17g s\n", frame->index, frame->time);
-    drape_obj_put_material_files(&frames->file, frames->model);
+    drape_obj_put_material_files(&frames->file, frames->surface);
     drape_obj obj = {.file = &frames->file};
-    for (int32_t i = 0; i < drape_model_cloth_count(frames->model); i++) {
-        const drape_cloth_range cloth = drape_model_cloth(frames->model, i);
-        drape_obj_put_name(&frames->file, "o", cloth.name);
-        drape_obj_put_nodes(&frames->file, frame->positions + 3 * (size_t)cloth.first_node, cloth.node_count);
-        drape_obj_put_faces(&obj, frames->model, i);
+    for (int32_t i = 0; i < frames->surface->cloth_count; i++) {
+        const drape_render_cloth *cloth = &frames->surface->cloths[i];
+        drape_obj_put_name(&frames->file, "o", cloth->name);
+        drape_obj_put_nodes(&frames->file, frame->positions + 3 * (size_t)cloth->first_node,
+                            cloth->mesh->node_count);
+        drape_obj_put_faces(&obj, frames->surface, i);
     }
     return drape_frame_files_end(frames);
 }

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "io/export.h"
+#include "model/model.h"
 
 #define FILE_NAME    "positions.pc2"
 #define MESH_NAME    "positions.obj"
@@ -30,7 +31,7 @@ static void put_header(pc2_state *pc2)
 {
     drape_file_put(&pc2->file, "POINTCACHE2", 12); /* with its terminating 0 */
     drape_file_put_word(&pc2->file, 1);
-    drape_file_put_word(&pc2->file, (uint32_t)drape_model_node_count(pc2->def->model));
+    drape_file_put_word(&pc2->file, (uint32_t)pc2->def->model->surface.node_count);
     drape_file_put_float(&pc2->file, 0);
     drape_file_put_float(&pc2->file, 1);
     drape_file_put_word(&pc2->file, 0);
@@ -53,14 +54,14 @@ static drape_status pc2_open(drape_context *ctx, const drape_export_def *def, vo
 
 static drape_status write_mesh(pc2_state *pc2, const drape_frame *frame)
 {
-    const drape_model *model = pc2->def->model;
+    const drape_render_surface *surface = &pc2->def->model->surface;
     drape_obj obj = {.file = &pc2->mesh};
     drape_file_put_text(&pc2->mesh, "# the mesh that " FILE_NAME " moves\n");
-    drape_obj_put_material_files(&pc2->mesh, model);
+    drape_obj_put_material_files(&pc2->mesh, surface);
     drape_file_put_text(&pc2->mesh, "o cloth\n");
-    drape_obj_put_nodes(&pc2->mesh, frame->positions, drape_model_node_count(model));
-    for (int32_t c = 0; c < drape_model_cloth_count(model); c++)
-        drape_obj_put_faces(&obj, model, c);
+    drape_obj_put_nodes(&pc2->mesh, frame->positions, surface->node_count);
+    for (int32_t c = 0; c < surface->cloth_count; c++)
+        drape_obj_put_faces(&obj, surface, c);
     return drape_file_finish(&pc2->mesh);
 }
 
@@ -76,7 +77,7 @@ static drape_status pc2_write(drape_context *ctx, void *state, const drape_frame
 {
     pc2_state *pc2 = state;
     off_t before = pc2->file.kept;
-    size_t count = 3 * (size_t)drape_model_node_count(pc2->def->model);
+    size_t count = 3 * (size_t)pc2->def->model->surface.node_count;
     (void)ctx;
     drape_status status = frame->index == 0 ? write_mesh(pc2, frame) : DRAPE_OK;
     for (size_t i = 0; !status && i < count; i++)

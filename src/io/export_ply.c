@@ -6,6 +6,7 @@
 #include <inttypes.h>
 
 #include "io/export.h"
+#include "model/model.h"
 
 #define FACE_SIZE 13 /* the count 3 in one byte, three nodes in four bytes each */
 
@@ -19,16 +20,16 @@ static drape_status ply_open(drape_context *ctx, const drape_export_def *def, vo
     return drape_frame_files_open(ctx, def, "ply", state);
 }
 
-static void put_header(drape_file *file, const drape_model *model, const drape_frame *frame)
+static void put_header(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
 {
     drape_file_print(file,
                      "ply\nformat binary_little_endian 1.0\ncomment Drape frame %" PRId64 ", t = %.17g s\n",
                      frame->index, frame->time);
     drape_file_print(file,
                      "element vertex %" PRId32 "\nproperty double x\nproperty double y\nproperty double z\n",
-                     drape_model_node_count(model));
+                     surface->node_count);
     drape_file_print(file, "element face %" PRId32 "\nproperty list uchar int vertex_indices\nend_header\n",
-                     drape_model_triangle_count(model));
+                     surface->triangle_count);
 }
 
 static void put_face(drape_file *file, const int32_t *node)
@@ -43,15 +44,15 @@ static void put_face(drape_file *file, const int32_t *node)
 static drape_status ply_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
     drape_frame_files *frames = state;
-    const drape_model *model = frames->model;
-    const int32_t *node = drape_model_triangles(model);
+    const drape_render_surface *surface = frames->surface;
+    const int32_t *node = surface->triangle;
     (void)ctx;
     drape_status status = drape_frame_files_begin(frames, frame->index);
     if (status)
         return status;
-    put_header(&frames->file, model, frame);
-    drape_file_put_doubles(&frames->file, frame->positions, 3 * (size_t)drape_model_node_count(model));
-    for (int32_t i = 0; i < drape_model_triangle_count(model); i++, node += 3)
+    put_header(&frames->file, surface, frame);
+    drape_file_put_doubles(&frames->file, frame->positions, 3 * (size_t)surface->node_count);
+    for (int32_t i = 0; i < surface->triangle_count; i++, node += 3)
         put_face(&frames->file, node);
     return drape_frame_files_end(frames);
 }

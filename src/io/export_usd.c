@@ -71,7 +71,7 @@ typedef struct usd_state {
 
 static const drape_mesh *mesh_of(const usd_state *usd, const object *o)
 {
-    return &usd->def->model->cloths[o->cloth].mesh;
+    return usd->def->model->surface.cloths[o->cloth].mesh;
 }
 
 static const drape_export_body *body_of(const usd_state *usd, const object *o)
@@ -186,23 +186,23 @@ static bool usd_names(const char *name)
 
 static drape_status list_objects(usd_state *usd)
 {
-    const drape_model *model = usd->def->model;
+    const drape_render_surface *surface = &usd->def->model->surface;
     size_t materials = 1;
-    usd->object = drape_arena_take(usd->def->arena, (size_t)model->cloth_count + (size_t)usd->def->body_count,
-                                   sizeof *usd->object);
-    for (int32_t c = 0; c < model->cloth_count; c++)
-        materials += (size_t)model->cloths[c].mesh.faces.material_count;
+    usd->object = drape_arena_take(
+        usd->def->arena, (size_t)surface->cloth_count + (size_t)usd->def->body_count, sizeof *usd->object);
+    for (int32_t c = 0; c < surface->cloth_count; c++)
+        materials += (size_t)surface->cloths[c].mesh->faces.material_count;
     usd->material = drape_arena_take(usd->def->arena, materials, sizeof *usd->material);
     if (!usd->object || !usd->material)
         return DRAPE_E_MEMORY;
     add_material(usd, NULL);
     int32_t files = 0;
-    for (int32_t i = 0; i < model->cloth_count + usd->def->body_count; i++) {
+    for (int32_t i = 0; i < surface->cloth_count + usd->def->body_count; i++) {
         object *o = &usd->object[i];
-        o->cloth = i < model->cloth_count ? i : -1;
-        o->body = o->cloth < 0 ? i - model->cloth_count : -1;
+        o->cloth = i < surface->cloth_count ? i : -1;
+        o->body = o->cloth < 0 ? i - surface->cloth_count : -1;
         const drape_export_body *body = body_of(usd, o);
-        choose_name(usd, object_has, body ? body->name : model->cloths[i].name, o->name);
+        choose_name(usd, object_has, body ? body->name : surface->cloths[i].name, o->name);
         usd->objects++;
         o->changes = !body || body->deforms || body->moves;
         o->number = o->changes ? files++ : -1;
@@ -405,8 +405,9 @@ static void include(object *o, const double *x)
 
 static const double *point_at(const usd_state *usd, const object *o, const drape_frame *frame, int32_t i)
 {
-    return o->body < 0 ? frame->positions + 3 * (size_t)(usd->def->model->cloths[o->cloth].first_node + i)
-                       : frame->points + 3 * (size_t)(body_of(usd, o)->first_point + i);
+    return o->body < 0
+               ? frame->positions + 3 * (size_t)(usd->def->model->surface.cloths[o->cloth].first_node + i)
+               : frame->points + 3 * (size_t)(body_of(usd, o)->first_point + i);
 }
 
 /* The sample of a frame: in one line, which may be a comment. */

@@ -93,12 +93,12 @@ typedef struct array {
     const char *type, *name;
     int components;
     size_t count, size; /* number of components of all tuples; bytes of a component */
-    void (*put)(drape_file *file, const drape_model *model, const drape_frame *frame);
+    void (*put)(drape_file *file, const drape_render_surface *surface, const drape_frame *frame);
 } array;
 
-static void put_positions(drape_file *file, const drape_model *model, const drape_frame *frame)
+static void put_positions(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
 {
-    drape_file_put_doubles(file, frame->positions, 3 * (size_t)drape_model_node_count(model));
+    drape_file_put_doubles(file, frame->positions, 3 * (size_t)surface->node_count);
 }
 
 static void put_floats(drape_file *file, const double *values, size_t count)
@@ -107,34 +107,33 @@ static void put_floats(drape_file *file, const double *values, size_t count)
         drape_file_put_float(file, (float)values[i]);
 }
 
-static void put_velocities(drape_file *file, const drape_model *model, const drape_frame *frame)
+static void put_velocities(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
 {
-    put_floats(file, frame->velocities, 3 * (size_t)drape_model_node_count(model));
+    put_floats(file, frame->velocities, 3 * (size_t)surface->node_count);
 }
 
-static void put_densities(drape_file *file, const drape_model *model, const drape_frame *frame)
+static void put_densities(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
 {
-    put_floats(file, frame->energy_density, (size_t)drape_model_node_count(model));
+    put_floats(file, frame->energy_density, (size_t)surface->node_count);
 }
 
-static void put_pinned(drape_file *file, const drape_model *model, const drape_frame *frame)
+static void put_pinned(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
 {
+    drape_file_put(file, frame->pinned, (size_t)surface->node_count);
+}
+
+static void put_triangles(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
+{
+    const int32_t *node = surface->triangle;
     (void)frame;
-    drape_file_put(file, drape_model_pinned(model), (size_t)drape_model_node_count(model));
-}
-
-static void put_triangles(drape_file *file, const drape_model *model, const drape_frame *frame)
-{
-    const int32_t *node = drape_model_triangles(model);
-    (void)frame;
-    for (size_t i = 0; i < 3 * (size_t)drape_model_triangle_count(model); i++)
+    for (size_t i = 0; i < 3 * (size_t)surface->triangle_count; i++)
         drape_file_put_word(file, (uint32_t)node[i]);
 }
 
-static void put_offsets(drape_file *file, const drape_model *model, const drape_frame *frame)
+static void put_offsets(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
 {
     (void)frame;
-    for (int32_t i = 1; i <= drape_model_triangle_count(model); i++)
+    for (int32_t i = 1; i <= surface->triangle_count; i++)
         drape_file_put_word(file, 3 * (uint32_t)i);
 }
 
@@ -144,39 +143,41 @@ static void put_strains(drape_file *file, const drape_frame *frame, int which, i
         drape_file_put_float(file, (float)frame->strain[2 * (size_t)i + (size_t)which]);
 }
 
-static void put_largest_strains(drape_file *file, const drape_model *model, const drape_frame *frame)
+static void put_largest_strains(drape_file *file, const drape_render_surface *surface,
+                                const drape_frame *frame)
 {
-    put_strains(file, frame, 0, drape_model_triangle_count(model));
+    put_strains(file, frame, 0, surface->triangle_count);
 }
 
-static void put_least_strains(drape_file *file, const drape_model *model, const drape_frame *frame)
+static void put_least_strains(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
 {
-    put_strains(file, frame, 1, drape_model_triangle_count(model));
+    put_strains(file, frame, 1, surface->triangle_count);
 }
 
 /* The mean over a triangle's nodes. */
-static void put_cell_densities(drape_file *file, const drape_model *model, const drape_frame *frame)
+static void put_cell_densities(drape_file *file, const drape_render_surface *surface,
+                               const drape_frame *frame)
 {
-    const int32_t *node = drape_model_triangles(model);
+    const int32_t *node = surface->triangle;
     const double *density = frame->energy_density;
-    for (int32_t i = 0; i < drape_model_triangle_count(model); i++, node += 3)
+    for (int32_t i = 0; i < surface->triangle_count; i++, node += 3)
         drape_file_put_float(file, (float)((density[node[0]] + density[node[1]] + density[node[2]]) / 3));
 }
 
-static void put_cloths(drape_file *file, const drape_model *model, const drape_frame *frame)
+static void put_cloths(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
 {
     (void)frame;
-    for (int32_t c = 0; c < drape_model_cloth_count(model); c++)
-        for (int32_t i = 0; i < drape_model_cloth(model, c).triangle_count; i++)
+    for (int32_t c = 0; c < surface->cloth_count; c++)
+        for (int32_t i = 0; i < surface->cloths[c].mesh->triangle_count; i++)
             drape_file_put_word(file, (uint32_t)c);
 }
 
 enum { POINTS, CELL_FIELDS = 4, CORNERS = 8, ARRAY_COUNT = 10 };
 
 /* The arrays in the order of the appended data: points, point data, cell data, corners of the cells. */
-static void list_arrays(const drape_model *model, array list[ARRAY_COUNT])
+static void list_arrays(const drape_render_surface *surface, array list[ARRAY_COUNT])
 {
-    size_t nodes = (size_t)drape_model_node_count(model), cells = (size_t)drape_model_triangle_count(model);
+    size_t nodes = (size_t)surface->node_count, cells = (size_t)surface->triangle_count;
     const array all[ARRAY_COUNT] = {
         {"Float64", "Points", 3, 3 * nodes, 8, put_positions},
         {"Float32", "velocity", 3, 3 * nodes, 4, put_velocities},
@@ -227,10 +228,11 @@ static void put_piece(drape_file *file, int32_t points, int32_t polygons)
                      points, polygons);
 }
 
-static void put_xml(drape_file *file, const drape_model *model, const drape_frame *frame, const array *list)
+static void put_xml(drape_file *file, const drape_render_surface *surface, const drape_frame *frame,
+                    const array *list)
 {
     put_time(file, frame);
-    put_piece(file, drape_model_node_count(model), drape_model_triangle_count(model));
+    put_piece(file, surface->node_count, surface->triangle_count);
     put_declarations(file, list, POINTS, POINTS + 1);
     drape_file_put_text(file, "</Points>\n<PointData Vectors=\"velocity\" Scalars=\"energy_density\">\n");
     put_declarations(file, list, POINTS + 1, CELL_FIELDS);
@@ -247,11 +249,12 @@ static void put_size(drape_file *file, uint64_t size)
     drape_file_put_word(file, (uint32_t)(size >> 32));
 }
 
-static void put_data(drape_file *file, const drape_model *model, const drape_frame *frame, const array *list)
+static void put_data(drape_file *file, const drape_render_surface *surface, const drape_frame *frame,
+                     const array *list)
 {
     for (int i = 0; i < ARRAY_COUNT; i++) {
         put_size(file, list[i].count * list[i].size);
-        list[i].put(file, model, frame);
+        list[i].put(file, surface, frame);
     }
     drape_file_put_text(file, "\n</AppendedData>\n</VTKFile>\n");
 }
@@ -361,17 +364,17 @@ static drape_status vtp_open(drape_context *ctx, const drape_export_def *def, vo
 static drape_status vtp_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
     vtp_state *vtp = state;
-    const drape_model *model = vtp->frames.model;
+    const drape_render_surface *surface = vtp->frames.surface;
     array list[ARRAY_COUNT];
     (void)ctx;
-    list_arrays(model, list);
+    list_arrays(surface, list);
     drape_status status = write_bodies(vtp, frame);
     if (!status)
         status = drape_frame_files_begin(&vtp->frames, frame->index);
     if (status)
         return status;
-    put_xml(&vtp->frames.file, model, frame, list);
-    put_data(&vtp->frames.file, model, frame, list);
+    put_xml(&vtp->frames.file, surface, frame, list);
+    put_data(&vtp->frames.file, surface, frame, list);
     status = drape_frame_files_end(&vtp->frames);
     return status ? status : pvd_add(vtp, frame);
 }

@@ -37,6 +37,10 @@ struct drape_recorder {
     output *outputs;
     size_t output_count;
     double *fields;             /* of one frame; NULL if no format wants any */
+    double *normals, *surface;  /* of the nodes at a frame; positions of the surface; NULL: no render mesh */
+    double *shown;              /* fields of the surface; NULL: those of the nodes and triangles */
+    int32_t *shown_triangle;    /* of the simulation, by each one of the surface; NULL likewise */
+    uint8_t *pinned;            /* by each node of the surface; NULL likewise */
     double *rotated;            /* positions and velocities with z up; NULL if no format wants them */
     drape_export_body *bodies;  /* (body_count) the colliders; NULL if no format wants them */
     drape_collider_pose *poses; /* (2 x body_count) of a frame, and these with z up */
@@ -103,6 +107,22 @@ static const double *rotate(const double *from, size_t count, double *to)
     return to;
 }
 
+/* The fields at the nodes and triangles of the surface. */
+static void show_fields(drape_recorder *r, drape_frame *frame)
+{
+    const drape_model *model = drape_sim_model(r->sim);
+    const size_t nodes = (size_t)model->surface.node_count, triangles = (size_t)model->surface.triangle_count;
+    double *velocities = r->shown, *density = velocities + 3 * nodes, *strain = density + nodes;
+    drape_render_values(model, frame->velocities, 3, velocities);
+    drape_render_values(model, frame->energy_density, 1, density);
+    for (size_t t = 0; t < triangles; t++)
+        memcpy(strain + 2 * t, frame->strain + 2 * (size_t)r->shown_triangle[t], 2 * sizeof *strain);
+    frame->velocities = velocities;
+    frame->strain = strain;
+    frame->energy_density = density;
+    frame->pinned = r->pinned;
+}
+
 /* Adds the fields to the frame, if a format wants any. */
 static void add_fields(drape_recorder *r, const double *velocities, drape_frame *frame)
 {
@@ -110,11 +130,26 @@ static void add_fields(drape_recorder *r, const double *velocities, drape_frame 
     if (!r->fields)
         return;
     double *density = r->fields, *strain = density + drape_model_node_count(model);
-    drape_model_strain(model, frame->positions, strain);
+    drape_model_strain(model, frame->nodes, strain);
     drape_sim_energy_density(r->sim, density);
     frame->velocities = velocities;
     frame->strain = strain;
     frame->energy_density = density;
+    frame->pinned = model->pinned;
+    if (r->shown)
+        show_fields(r, frame);
+}
+
+/* Puts the vertices of render meshes where the nodes carry them. */
+static void show_positions(drape_recorder *r, drape_frame *frame)
+{
+    const drape_model *model = drape_sim_model(r->sim);
+    frame->positions = frame->nodes;
+    if (!model->surface.bound)
+        return;
+    drape_model_normals(model, frame->nodes, r->normals);
+    drape_render_positions(model, -1, frame->nodes, r->normals, r->surface);
+    frame->positions = r->surface;
 }
 
 /* Where the colliders are at the time of the frame, if a format wants them. */
@@ -151,7 +186,7 @@ static void rotate_pose(const drape_collider_pose *from, drape_collider_pose *to
 
 static drape_frame rotated_frame(const drape_recorder *r, const drape_frame *frame)
 {
-    size_t nodes = (size_t)drape_model_node_count(drape_sim_model(r->sim));
+    size_t nodes = (size_t)drape_sim_model(r->sim)->surface.node_count;
     drape_frame rotated = *frame;
     rotated.positions = rotate(frame->positions, nodes, r->rotated);
     if (frame->velocities)
@@ -176,7 +211,8 @@ static void write_outputs(drape_recorder *r, const drape_frame *frame)
 
 static void write_frame(drape_recorder *r, double time, const double *positions, const double *velocities)
 {
-    drape_frame frame = {.index = r->frames, .time = time, .positions = positions};
+    drape_frame frame = {.index = r->frames, .time = time, .nodes = positions};
+    show_positions(r, &frame);
     add_fields(r, velocities, &frame);
     if (r->body_count > 0)
         add_bodies(r, &frame);
@@ -225,6 +261,7 @@ static void archive_progress(drape_recorder *r, drape_archive *a)
     archive_formats(r, a);
     archive_duration(r, a);
     drape_archive_same(a, "whether frames have z up", r->sim->model->z_up);
+    drape_archive_same(a, "the number of vertices in frames", r->sim->model->surface.node_count);
     drape_archive_bool(a, &r->finished);
     drape_archive_int64(a, &r->frames);
     drape_archive_double(a, &r->last_time);
@@ -363,6 +400,26 @@ static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *
     return DRAPE_OK;
 }
 
+/* What shows render meshes. */
+static drape_status allocate_surface(drape_recorder *r)
+{
+    const drape_model *model = r->sim->model;
+    const drape_render_surface *s = &model->surface;
+    const size_t nodes = (size_t)s->node_count, triangles = (size_t)s->triangle_count;
+    r->normals = drape_arena_take(&r->arena, (size_t)model->node_count, 3 * sizeof *r->normals);
+    r->surface = drape_arena_take(&r->arena, nodes, 3 * sizeof *r->surface);
+    if (r->fields) {
+        r->shown = drape_arena_take(&r->arena, 4 * nodes + 2 * triangles, sizeof *r->shown);
+        r->shown_triangle = drape_arena_take(&r->arena, triangles, sizeof *r->shown_triangle);
+        r->pinned = drape_arena_take(&r->arena, nodes, sizeof *r->pinned);
+    }
+    if (drape_arena_status(&r->arena) || !r->fields)
+        return drape_arena_status(&r->arena);
+    drape_render_triangles(model, r->shown_triangle);
+    drape_render_pinned(model, r->pinned);
+    return DRAPE_OK;
+}
+
 static drape_status allocate_arrays(drape_recorder *r)
 {
     const drape_model *model = r->sim->model;
@@ -375,8 +432,8 @@ static drape_status allocate_arrays(drape_recorder *r)
     if (fields)
         r->fields = drape_arena_take(&r->arena, nodes + 2 * triangles, sizeof *r->fields);
     if (rotates)
-        r->rotated = drape_arena_take(&r->arena, 6 * nodes, sizeof *r->rotated);
-    return drape_arena_status(&r->arena);
+        r->rotated = drape_arena_take(&r->arena, 6 * (size_t)model->surface.node_count, sizeof *r->rotated);
+    return model->surface.bound ? allocate_surface(r) : drape_arena_status(&r->arena);
 }
 
 static drape_status make_bodies(drape_recorder *r)

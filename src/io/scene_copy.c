@@ -86,7 +86,8 @@ static drape_status visit_cloth(const visitor *v, const drape_cloth *cloth, int 
         const char *file, *key;
     } named[] = {{cloth->file, "mesh/file"},
                  {cloth->start_file, "start/file"},
-                 {cloth->velocity_file, "start/velocities"}};
+                 {cloth->velocity_file, "start/velocities"},
+                 {cloth->render_file, "render_mesh/file"}};
     drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < sizeof named / sizeof *named; i++) {
         char pointer[DRAPE_POINTER_SIZE];

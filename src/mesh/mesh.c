@@ -112,12 +112,18 @@ static drape_status complete(drape_context *ctx, const drape_mesh_source *source
     return status;
 }
 
-drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
-                             const char *folder, drape_mesh *mesh)
+/* The place of its faults, in a buffer of that size, and the file. */
+static drape_mesh_source source_of(const char *pointer, const drape_mesh_def *def, char *place, size_t size)
+{
+    snprintf(place, size, "%s%s", pointer, def->file ? "/file" : "");
+    return (drape_mesh_source){.pointer = place, .file = def->file};
+}
+
+drape_status drape_mesh_place(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
+                              const char *folder, drape_mesh *mesh)
 {
     char place[sizeof ctx->pointer];
-    snprintf(place, sizeof place, "%s%s", pointer, def->file ? "/file" : "");
-    const drape_mesh_source source = {.pointer = place, .file = def->file};
+    const drape_mesh_source source = source_of(pointer, def, place, sizeof place);
 
     *mesh = (drape_mesh){0};
     drape_status status = check_one_source(ctx, pointer, def);
@@ -129,6 +135,17 @@ drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drap
         status = drape_check_cancel(ctx);
     if (!status)
         status = place_nodes(ctx, pointer, &source, def, mesh);
+    if (status)
+        drape_mesh_free(mesh);
+    return status;
+}
+
+drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
+                             const char *folder, drape_mesh *mesh)
+{
+    char place[sizeof ctx->pointer];
+    const drape_mesh_source source = source_of(pointer, def, place, sizeof place);
+    drape_status status = drape_mesh_place(ctx, pointer, def, folder, mesh);
     if (!status)
         status = complete(ctx, &source, mesh);
     if (status)

@@ -99,6 +99,10 @@ void drape_mesh_transform(drape_mesh *mesh, const double scale[3], const double 
 drape_status drape_mesh_validate_positions(drape_context *ctx, const drape_mesh_source *source,
                                            const drape_mesh *mesh);
 
+/* Checks that there are nodes and triangles, and that the indices of these are in range. */
+drape_status drape_mesh_validate_indices(drape_context *ctx, const drape_mesh_source *source,
+                                         const drape_mesh *mesh);
+
 /* To be called before drape_mesh_connect, on valid positions. Checks that there are nodes and triangles, that
  * indices are in range, that no triangle has a node twice or an altitude below 1e-12 of its longest edge, and
  * that no two triangles have the same nodes. */
@@ -120,6 +124,11 @@ drape_status drape_mesh_validate_nodes(drape_context *ctx, const drape_mesh_sour
 
 /* Computes areas, lengths and lumped node areas. */
 drape_status drape_mesh_measure(drape_mesh *mesh);
+
+/* Source and transform alone, for a mesh that is not simulated: it may have any edges, and nodes without
+ * triangles, but has a node and a triangle, and its positions are valid. pointer, folder, *mesh: as below. */
+drape_status drape_mesh_place(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
+                              const char *folder, drape_mesh *mesh);
 
 /* Runs all stages: source, transform, validate, connect, measure. pointer names the mesh: "/cloth/0/mesh".
  * folder is the one that a relative file name refers to, NULL for the working directory. *mesh is

@@ -23,8 +23,12 @@ drape_status drape_mesh_validate_positions(drape_context *ctx, const drape_mesh_
     return DRAPE_OK;
 }
 
-static drape_status check_indices(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh)
+drape_status drape_mesh_validate_indices(drape_context *ctx, const drape_mesh_source *source,
+                                         const drape_mesh *mesh)
 {
+    if (mesh->node_count == 0 || mesh->triangle_count == 0)
+        return drape_mesh_fail(ctx, source, 0, "the mesh has no %s",
+                               mesh->node_count == 0 ? "nodes" : "triangles");
     for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
         const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
         for (int k = 0; k < 3; k++)
@@ -32,6 +36,14 @@ static drape_status check_indices(drape_context *ctx, const drape_mesh_source *s
                 return drape_mesh_fail(ctx, source, 0,
                                        "triangle %d (nodes %d %d %d): there is no node %d, range is 0 to %d",
                                        triangle, n[0], n[1], n[2], n[k], mesh->node_count - 1);
+    }
+    return DRAPE_OK;
+}
+
+static drape_status check_corners(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh)
+{
+    for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
+        const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
         if (n[0] == n[1] || n[1] == n[2] || n[2] == n[0])
             return drape_mesh_fail(ctx, source, 0, "triangle %d (nodes %d %d %d) uses a node twice", triangle,
                                    n[0], n[1], n[2]);
@@ -119,10 +131,9 @@ static drape_status check_duplicates(drape_context *ctx, const drape_mesh_source
 drape_status drape_mesh_validate_triangles(drape_context *ctx, const drape_mesh_source *source,
                                            const drape_mesh *mesh)
 {
-    if (mesh->node_count == 0 || mesh->triangle_count == 0)
-        return drape_mesh_fail(ctx, source, 0, "the mesh has no %s",
-                               mesh->node_count == 0 ? "nodes" : "triangles");
-    drape_status status = check_indices(ctx, source, mesh);
+    drape_status status = drape_mesh_validate_indices(ctx, source, mesh);
+    if (!status)
+        status = check_corners(ctx, source, mesh);
     if (!status)
         status = drape_mesh_validate_shapes(ctx, source, mesh);
     if (!status)

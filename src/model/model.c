@@ -11,8 +11,10 @@ void drape_model_destroy(drape_model **model)
         return;
     drape_model *m = *model;
     drape_context *ctx = m->ctx;
-    for (int32_t c = 0; c < m->cloth_count && !m->base; c++)
+    for (int32_t c = 0; c < m->cloth_count && !m->base; c++) {
         drape_mesh_free(&m->cloths[c].mesh);
+        drape_mesh_free(&m->cloths[c].render_mesh);
+    }
     drape_arena_free(&m->arena);
     drape_free(ctx, m);
     *model = NULL;

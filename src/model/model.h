@@ -8,6 +8,7 @@
 #include "mesh/sequence.h"
 #include "model/pose.h"
 #include "model/relaxation.h"
+#include "model/render_mesh.h"
 #include "sparse/pattern.h"
 
 /* The patches of a term with parts: runs of consecutive elements with the same nodes. */
@@ -165,6 +166,10 @@ typedef struct drape_cloth {
     drape_choice grid;                /* its type is "" if the mesh is not a grid */
     char *file;                       /* NULL if the mesh is not from a file */
     char *start_file, *velocity_file; /* of the start; NULL: none */
+    char *render_file;                /* of the render mesh; NULL: none */
+    drape_mesh render_mesh;           /* that frames show, not connected; empty: none */
+    double max_distance;              /* [m] of its vertices from the mesh */
+    drape_embedded *bound;            /* (render_mesh.node_count); NULL: no render mesh */
     double scale[3], rotate[4], translate[3];
     double material_values[DRAPE_MAX_PARAMS]; /* in the order of the parameters of drape_material_entry */
     drape_material material;
@@ -332,17 +337,18 @@ struct drape_model {
     drape_cloth *cloths;
     drape_history *histories; /* (history_count) those of the scene, then one of each ramp */
     int32_t history_count;
-    drape_term *terms;     /* (term_count) in scene order, gravity last in each cloth; then those of seams */
-    double *rest;          /* (node_count x 3) [m] */
-    double *start;         /* (node_count x 3) [m] at t = 0; rest itself if all cloths start there */
-    double *velocity;      /* (node_count x 3) [m/s] at t = 0 */
-    double *mass;          /* (node_count) [kg] */
-    int32_t *triangle;     /* (triangle_count x 3) */
-    int32_t *edge;         /* (edge_count x 2) */
-    double *edge_length;   /* (edge_count) [m] */
-    uint8_t *pinned;       /* (node_count) */
-    int32_t *free_of_node; /* (node_count) number among the free nodes, -1: pinned */
-    int32_t *node_of_free; /* (free_count) */
+    drape_term *terms; /* (term_count) in scene order, gravity last in each cloth; then those of seams */
+    double *rest;      /* (node_count x 3) [m] */
+    double *start;     /* (node_count x 3) [m] at t = 0; rest itself if all cloths start there */
+    double *velocity;  /* (node_count x 3) [m/s] at t = 0 */
+    double *mass;      /* (node_count) [kg] */
+    drape_render_surface surface; /* what frames show */
+    int32_t *triangle;            /* (triangle_count x 3) */
+    int32_t *edge;                /* (edge_count x 2) */
+    double *edge_length;          /* (edge_count) [m] */
+    uint8_t *pinned;              /* (node_count) */
+    int32_t *free_of_node;        /* (node_count) number among the free nodes, -1: pinned */
+    int32_t *node_of_free;        /* (free_count) */
     int32_t free_count;
     int32_t *moved_node;  /* (moved_count) pinned nodes with a track or a ride */
     int32_t *moved_track; /* (moved_count) */

@@ -149,14 +149,18 @@ static const drape_scene_object material = {.name = "material",
 static const drape_scene_key transform_keys[] = {TRANSFORM_KEYS(drape_mesh_def)};
 const drape_scene_object drape_form_transform = {.name = "transform", KEYS(transform_keys)};
 
-static const drape_scene_key mesh_keys[] = {
-    {DRAPE_TEXT("grid", "name of a grid; its parameters are keys beside it", .derived = ""),
-     IN(drape_mesh_def, grid.type)},
-    {DRAPE_TEXT("file", "an OBJ or PLY file, relative to the scene", .derived = ""),
-     IN(drape_mesh_def, file)},
-    {SHAPED(DRAPE_SCENE_OBJECT, "transform", NONE, "scale, rotation, translation"),
-     .child = &drape_form_transform},
-};
+/* Of a mesh at some offset in a def. */
+#define MESH_KEYS(at)                                                                                        \
+    {DRAPE_TEXT("grid", "name of a grid; its parameters are keys beside it", .derived = ""),                 \
+     .offset = (at) + offsetof(drape_mesh_def, grid.type)},                                                  \
+        {DRAPE_TEXT("file", "an OBJ or PLY file, relative to the scene", .derived = ""),                     \
+         .offset = (at) + offsetof(drape_mesh_def, file)},                                                   \
+    {                                                                                                        \
+        SHAPED(DRAPE_SCENE_OBJECT, "transform", NONE, "scale, rotation, translation"),                       \
+            .offset = (at), .child = &drape_form_transform                                                   \
+    }
+
+static const drape_scene_key mesh_keys[] = {MESH_KEYS(0)};
 static const char *const mesh_sources[] = {"grid", "file", NULL};
 const drape_scene_object drape_form_mesh = {.name = "mesh",
                                             KEYS(mesh_keys),
@@ -164,6 +168,20 @@ const drape_scene_object drape_form_mesh = {.name = "mesh",
                                             SETTINGS(drape_mesh_def, grid.settings, grid.setting_count),
                                             .open_with = "grid",
                                             .def_size = sizeof(drape_mesh_def)};
+
+static const drape_scene_key render_mesh_keys[] = {
+    MESH_KEYS(offsetof(drape_render_mesh_def, mesh)),
+    {DRAPE_NUMBER("max_distance", "m", DRAPE_DERIVED("the mean edge length of the simulated mesh"),
+                  DRAPE_ABOVE(0), 1e9, "of a vertex from the simulated mesh at rest"),
+     IN(drape_render_mesh_def, max_distance)},
+};
+static const drape_scene_object render_mesh = {
+    .name = "render_mesh",
+    KEYS(render_mesh_keys),
+    .one_of = mesh_sources,
+    SETTINGS(drape_render_mesh_def, mesh.grid.settings, mesh.grid.setting_count),
+    .open_with = "grid",
+    .def_size = sizeof(drape_render_mesh_def)};
 
 /* ---- Start ---- */
 
@@ -227,6 +245,9 @@ static const drape_scene_key cloth_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECTS, "masses", DRAPE_DERIVED("none: those of the material"),
             "nodes with masses of their own, applied in this order"),
      ARRAY(drape_cloth_def, masses, mass_count), .child = &drape_form_mass},
+    {SHAPED(DRAPE_SCENE_OBJECT, "render_mesh", DRAPE_DERIVED("none: frames show the simulated mesh"),
+            "another mesh that frames show in its place, whose vertices follow it"),
+     .optional = true, IN(drape_cloth_def, render_mesh), .child = &render_mesh},
 };
 
 const drape_scene_object drape_form_cloth = {.name = "cloth",

@@ -1,17 +1,14 @@
-/* embedding.c: a mesh for rendering that the cloth carries. A vertex is  sum w_i x_i + h n  with the weights
- * w of the corners of its triangle, which need not be within it, its normal n and the height h above it: in
- * the frame of the triangle it does not move. */
+/* embedding.c: a mesh for rendering that the cloth carries (geometry/embed.h): in the frame of its triangle a
+ * vertex does not move. */
 #include "base/vec3.h"
-#include "geometry/nearest.h"
+#include "geometry/embed.h"
 #include "model/model.h"
 
 #include <math.h>
-#include <string.h>
 
 typedef struct fixture {
-    int32_t node[3];
-    double weights[3], height; /* [1], [m] */
-    double normal[3];          /* its products with the sides of the triangle at its first corner, and n */
+    drape_embedded vertex; /* flat */
+    double normal[3];      /* its products with the sides of the triangle at its first corner, and n */
 } fixture;
 
 struct drape_embedding {
@@ -61,20 +58,14 @@ static void to_double(const float *from, double to[3])
 static void fix(const drape_bvh *tree, const double *rest, const float *vertex, const float *normal,
                 fixture *to)
 {
-    double point[3], d[3], by[3];
+    double point[3], direction[3];
     to_double(vertex, point);
-    const drape_on_triangle at = drape_nearest_on(tree, rest, point, INFINITY);
-    memcpy(to->node, tree->node + 3 * (size_t)at.triangle, sizeof to->node);
-    const frame f = frame_of(to->node, rest);
-    vec3_sub(point, rest + 3 * (size_t)to->node[0], d);
-    products(&f, d, by);
-    resolve(&f, by, &to->weights[1], &to->weights[2]);
-    to->height = by[2];
-    to->weights[0] = 1 - to->weights[1] - to->weights[2];
+    drape_embed(tree, rest, NULL, point, &to->vertex);
     if (!normal)
         return;
-    to_double(normal, d);
-    products(&f, d, to->normal);
+    const frame f = frame_of(to->vertex.node, rest);
+    to_double(normal, direction);
+    products(&f, direction, to->normal);
 }
 
 static drape_status check(drape_context *ctx, const drape_model *model, int32_t cloth, int32_t count,
@@ -152,15 +143,14 @@ void drape_embedding_carry(const drape_embedding *e, const double *x, float *ver
 {
     for (int32_t i = 0; e && x && i < e->count; i++) {
         const fixture *at = &e->fixtures[i];
-        const frame f = frame_of(at->node, x);
-        double point[3] = {0};
-        for (int a = 0; a < 3; a++)
-            vec3_add_scaled(at->weights[a], x + 3 * (size_t)at->node[a], point);
-        vec3_add_scaled(at->height, f.n, point);
+        double point[3];
+        drape_embedded_point(&at->vertex, x, NULL, point);
         for (size_t k = 0; vertices && k < 3; k++)
             vertices[3 * (size_t)i + k] = (float)point[k];
-        if (normals && e->has_normals)
+        if (normals && e->has_normals) {
+            const frame f = frame_of(at->vertex.node, x);
             carry_normal(at, &f, normals + 3 * (size_t)i);
+        }
     }
 }
 

@@ -178,6 +178,50 @@ def test_transform_and_unit():
     assert x[-1].mean(0)[2] < x[0].mean(0)[2] - 10  # [cm] in 0.29 s
 
 
+def test_simulated_mesh():
+    """a coarse mesh is simulated in place of the artist's, which follows it, keeps its faces, and may move and be scaled; messages name the one that is wrong"""
+    new_file()
+    collider(bpy.data.objects["Cube"])
+    cage = sheet("Cage", side=7)
+    cage.drape.role = "NONE"
+    cage.vertex_groups.new(name="corner").add([0], 1, "REPLACE")
+    cage.modifiers.new("Smoother", "SUBSURF")
+    cage.hide_render = True
+    cloth = sheet("Napkin", side=20, size=1, quality="REALTIME", pin_group="corner")
+    cloth.drape.simulated, cloth.scale = cage, (2.9, 2.9, 1)
+    cloth.location.z += 0.01
+    cloth.data.materials.append(bpy.data.materials.new("Linen"))
+    before = identity(cloth)
+    folder = bake(cloth)
+    coarse, fine = positions(folder), np.load(folder + "/run/render_positions.npy")
+    assert coarse.shape == (FRAMES, 49, 3) and fine.shape == (FRAMES, 400, 3) and identity(cloth) == before
+    assert scene_of(folder)["cloth"][0]["pins"][0]["nodes"] == [0] and (coarse[:, 0] == coarse[0, 0]).all()
+    for k, x in enumerate(z_up(fine)):
+        assert np.abs(world(cloth, 1 + k) - x).max() < 1e-5, k
+    assert [modifier.name for modifier in cage.modifiers] == ["Smoother"] and cage.modifiers[0].show_viewport
+    again = run_again(folder)
+    for name in "positions.npy", "render_positions.npy":
+        same_bytes(f"{folder}/run/{name}", f"{again}/{name}")
+    cloth.drape.simulated_distance = 0.005
+    assert "Napkin: /cloth/0/render_mesh/file: render.obj: vertex 0, at (" in refused(cloth)
+    cloth.drape.simulated_distance = 0.02
+    cage.drape.role = "COLLIDER"
+    assert "Cage: is simulated for Napkin" in refused(cloth)
+    cage.drape.role = "NONE"
+    cage.hide_viewport = True
+    assert "Cage: is disabled in viewports" in refused(cloth)
+    cage.hide_viewport = False
+    cage.hide_set(True)
+    assert (positions(bake(cloth)) == coarse).all()
+    cage.hide_set(False)
+    cage.data.vertices.add(1)
+    assert "Cage: /cloth/0/mesh/file: cloth.obj: node 49" in refused(cloth)
+    cloth.drape.simulated, cloth.drape.pin_group = None, ""
+    folder = bake(cloth)
+    assert positions(folder).shape == (FRAMES, 400, 3) and not os.path.exists(folder + "/run/render_positions.npy")
+    plays(cloth, folder)
+
+
 def test_pins():
     """vertices of a group are held from the threshold on, and move with the object; deforming modifiers before the cloth move them, too"""
     def held(cloth):

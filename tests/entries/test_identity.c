@@ -33,6 +33,7 @@ typedef enum outcome {
     SKIPPED  /* it has only one value, or the case of another key covers it */
 } outcome;
 
+#define RENDER_MESH(rest) "{'grid': 'square', 'columns': 7, 'rows': 9, 'width': 0.3, 'height': 0.4" rest "}"
 #define FOLD(point, axis, angle)                                                                             \
     "[{'point': " point ", 'axis': " axis ", 'side': [1,0,0], 'angle': " angle "}]"
 
@@ -49,6 +50,16 @@ static const struct test_case {
     {"/output/formats", RESUMES, NULL, "['obj']"},
     {"/output/up", RESUMES, NULL, "'z'"},
     {"/cloth/0/name", RESUMES, NULL, "'another'"},
+    {"/cloth/0/render_mesh/grid", RESUMES, "/cloth/0/render_mesh", RENDER_MESH("")},
+    {"/cloth/0/render_mesh/transform/translate", RESUMES, "/cloth/0/render_mesh",
+     RENDER_MESH(", 'transform': {'translate': [0, 0.01, 0]}")},
+    {"/cloth/0/render_mesh/transform/rotate", RESUMES, "/cloth/0/render_mesh",
+     RENDER_MESH(", 'transform': {'rotate': [0, 1, 0, 1]}")},
+    {"/cloth/0/render_mesh/transform/scale", RESUMES, "/cloth/0/render_mesh",
+     RENDER_MESH(", 'transform': {'scale': 0.9}")},
+    {"/cloth/0/render_mesh/max_distance", RESUMES, "/cloth/0/render_mesh",
+     RENDER_MESH(", 'max_distance': 0.5")},
+    {"/cloth/0/render_mesh/file", SKIPPED, NULL, NULL}, /* needs a file; its mesh is that of a grid */
     {"/colliders/0/name", RESUMES, NULL, "'another'"},
     {"/cloth/0/pins/0/name", RESUMES, NULL, "'another'"},
     {"/events/0/name", RESUMES, NULL, "'another'"},

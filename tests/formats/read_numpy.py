@@ -1,9 +1,11 @@
-"""read_numpy.py FOLDER [y|z [killed]]: compares all formats of a run with its positions.npy. Exit 77: no numpy.
+"""read_numpy.py FOLDER [y|z [killed]]: compares all formats of a run with its positions.npy or,
+if there are render meshes, render_positions.npy. Exit 77: no numpy.
 
 z: frames have z up. killed: formats may be one frame apart, as they are written one after another.
 """
 import glob
 import json
+import os
 import struct
 import sys
 
@@ -16,6 +18,10 @@ folder = sys.argv[1]
 z_up = sys.argv[2:3] == ["z"]
 killed = sys.argv[3:4] == ["killed"]
 x = np.load(folder + "/positions.npy")
+if os.path.exists(folder + "/render_positions.npy"):  # what the other formats have
+    nodes = x
+    x = np.load(folder + "/render_positions.npy")
+    assert len(x) == len(nodes) and x.shape != nodes.shape
 assert x.dtype == np.float64 and x.ndim == 3 and x.shape[2] == 3 and np.isfinite(x).all() and len(x) > 2, x.shape
 turned = np.stack([x[..., 0], -x[..., 2], x[..., 1]], axis=-1) if z_up else x
 

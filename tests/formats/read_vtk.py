@@ -51,7 +51,8 @@ assert names == [os.path.basename(path) for path in files[:len(names)]] and len(
 assert len(names) > 2 and all(a < b for a, b in zip(times, times[1:])), times
 with open(folder + "/energy.csv", encoding="ascii", newline="") as file:
     energies = list(csv.DictReader(file))
-x = None if how == "alone" else np.load(folder + "/positions.npy")
+shown = "/render_positions.npy" if os.path.exists(folder + "/render_positions.npy") else "/positions.npy"
+x = None if how == "alone" else np.load(folder + shown)
 
 first = None
 for k, name in enumerate(names):

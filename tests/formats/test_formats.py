@@ -136,6 +136,48 @@ def test_faces():
         raise last
 
 
+def faces_of_obj(path):
+    """The statements of materials, and the faces with node and texture coordinates of each corner."""
+    with open(path, encoding="ascii") as file:
+        lines = [line.split() for line in file]
+    uvs = [(float(line[1]), float(line[2])) for line in lines if line[:1] == ["vt"]]
+    corners = [[corner.split("/") for corner in line[1:]] for line in lines]
+    return [line if line[0] == "usemtl" else [(node, uvs[int(uv) - 1]) for node, uv in corner]
+            for line, corner in zip(lines, corners) if line[:1] in (["usemtl"], ["f"])]
+
+
+def test_render_mesh():
+    """a render mesh is in frames of every format in place of the simulated mesh, which stays in positions.npy, and keeps its quadrilaterals"""
+    fine = {"grid": "square", "columns": 20, "rows": 12, "width": 0.6, "height": 0.4, "transform": {"translate": [0, 0.01, 0]}}
+    shown = {**SCENE, "cloth": [{**SCENE["cloth"][0], "render_mesh": fine}, SCENE["cloth"][1]]}
+    run("plain")
+    run("out", scene=shown)
+    for name in ("positions.npy", "energy.csv"):
+        with open("plain/" + name, "rb") as a, open("out/" + name, "rb") as b:
+            assert a.read() == b.read(), name
+    with open("plain/summary.json", encoding="utf-8") as a, open("out/summary.json", encoding="utf-8") as b:
+        assert json.load(a)["hash"] == json.load(b)["hash"]
+    assert not os.path.exists("plain/render_positions.npy")
+    read_numpy("out")
+    read_numpy(run("turned", "--set", "/output/up=z", scene=shown), "z")
+    for name in ("napkin.json", "napkin.obj"):
+        shutil.copy(os.path.join(HERE, "../../examples/scenes", name), name)
+    subprocess.run([PROGRAM, "run", "napkin.json", "--out", "napkin", "--format", "obj,usd,glb,npy", "--duration", "0.04"], check=True, capture_output=True)
+    own, frame = faces_of_obj("napkin.obj"), faces_of_obj("napkin/frame_000002.obj")
+    assert len(own) == 16 * 16 + 2 and own == frame
+    with open("napkin/positions.usda", encoding="utf-8") as file:
+        text = file.read()
+    assert text.count("def GeomSubset") == 2 and "primvars:st" in text
+    try:
+        validate_gltf("napkin")
+    except Skip:
+        pass
+    try:
+        read_vtk("out")
+    except Skip:
+        pass
+
+
 def test_z_up():
     """with z up frames are rotated, except those of npy and of glTF, which has y up by definition"""
     read_numpy(run("out", "--set", "/output/up=z"), "z")

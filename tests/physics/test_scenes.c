@@ -50,6 +50,7 @@ static const beginning beginnings[] = {
     {"hung_sheet", 0.5, {{"/cloth/0/mesh/edges", "8"}}},
     {"limb", 1, {{COLUMNS, "8"}, {ROWS, "7"}}, .touches = true},
     {"incline", 0.3, {{COLUMNS, "7"}, {ROWS, "7"}}, .touches = true},
+    {"napkin", 0.2, {{COLUMNS, "7"}, {ROWS, "7"}}, .touches = true},
     {"rotating_sphere", 1.2, {{COLUMNS, "9"}, {ROWS, "9"}}, .touches = true},
     {"sphere_drape", 0.4, {{COLUMNS, "11"}, {ROWS, "11"}}, .touches = true},
     {"tangled",

@@ -64,6 +64,28 @@ def test_changes():
     equal(drape.load("run").model.node_count, 36)
 
 
+def test_render_mesh():
+    """frames of a cloth with a render mesh: at rest where it was given, in a run as the program writes them, in a saved run as computed"""
+    fine = drape.Model(sheet()).mesh(0)
+    scene = drape.Scene(sheet())
+    scene["/cloth/0/render_mesh"] = drape.Mesh(fine.positions + [0, 0.01, 0], fine.triangles, max_distance=0.02)
+    model = drape.Model(scene)
+    assert np.allclose(model.render_mesh(0).positions, fine.positions + [0, 0.01, 0], rtol=0, atol=1e-15)
+    assert np.array_equal(model.render_mesh().triangles, fine.triangles)
+    run = drape.run(scene, {"/duration": 0.05}, out="run")
+    plain = drape.run(sheet(), {"/duration": 0.05}, out="plain")
+    equal(run.summary["hash"], plain.summary["hash"])
+    shown = run.render_mesh(2)
+    assert np.array_equal(shown.positions, model.render_positions(run.positions[2])) and np.array_equal(shown.triangles, fine.triangles)
+    assert np.array_equal(shown.positions, model.render_mesh(0, run.positions[2]).positions)
+    assert 0.009 < np.linalg.norm(shown.positions - run.positions[2], axis=1).min() < 0.0101
+    assert np.array_equal(plain.render_positions(2), plain.positions[2]) and not os.path.exists("plain/render_positions.npy")
+    assert np.array_equal(drape.Sim(scene).record(0.05).render_positions(1), run.render_positions(1))
+    raises(drape.ArgumentError, model.render_mesh, 1, says="no cloth 1")
+    scene["/cloth/0/render_mesh/max_distance"] = 0.005
+    raises(drape.Error, drape.Model, scene, says="vertex 0, at (")
+
+
 def test_report():
     """the report of a run is a page that notebooks show"""
     page = drape.Sim(sheet()).view(0.1)

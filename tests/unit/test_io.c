@@ -885,7 +885,8 @@ static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
             .positions = drape_model_rest_positions(w->model),
             .velocities = field,
             .strain = strain,
-            .energy_density = field};
+            .energy_density = field,
+            .pinned = drape_model_pinned(w->model)};
         status = ops->write(w->ctx, state, &frame);
     }
     snprintf(message, sizeof message, "%s", drape_context_message(w->ctx));

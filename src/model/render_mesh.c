@@ -1,0 +1,125 @@
+/* render_mesh.c: see render_mesh.h. The displacement along interpolated normals is that of surfaces of
+ * several resolutions, as in Kobbelt et al. 1998, doi:10.1145/280814.280831, section 4. */
+#include "model/render_mesh.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/vec3.h"
+#include "model/model.h"
+
+static void flat_normal(const int32_t *node, const double *x, double n[3])
+{
+    double u[3], v[3];
+    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], u);
+    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], v);
+    vec3_cross(u, v, n);
+    const double length = vec3_norm(n);
+    for (int k = 0; k < 3; k++)
+        n[k] = length > 0 ? n[k] / length : 0;
+}
+
+void drape_embedded_point(const drape_embedded *e, const double *x, const double *normals, double point[3])
+{
+    double n[3] = {0};
+    memset(point, 0, 3 * sizeof *point);
+    for (int a = 0; a < 3; a++)
+        vec3_add_scaled(e->weights[a], x + 3 * (size_t)e->node[a], point);
+    if (e->flat)
+        flat_normal(e->node, x, n);
+    for (int a = 0; !e->flat && a < 3; a++)
+        vec3_add_scaled(e->weights[a], normals + 3 * (size_t)e->node[a], n);
+    vec3_add_scaled(e->height, n, point);
+}
+
+void drape_render_positions(const drape_model *model, int32_t cloth, const double *x, const double *normals,
+                            double *positions)
+{
+    const drape_render_surface *s = &model->surface;
+    for (int32_t c = cloth < 0 ? 0 : cloth; c < (cloth < 0 ? s->cloth_count : cloth + 1); c++) {
+        const drape_render_cloth *from = &s->cloths[c];
+        const size_t count = (size_t)from->mesh->node_count;
+        if (!from->bound)
+            memcpy(positions, x + 3 * (size_t)model->cloths[c].first_node, 3 * count * sizeof *x);
+        for (size_t i = 0; from->bound && i < count; i++)
+            drape_embedded_point(&from->bound[i], x, normals, positions + 3 * i);
+        positions += 3 * count;
+    }
+}
+
+/* Weights of a place within the triangle: extrapolation would give a speed or an energy that is nowhere. */
+static void weights_within(const drape_embedded *e, double weights[3])
+{
+    double sum = 0;
+    for (int a = 0; a < 3; a++)
+        sum += weights[a] = fmax(e->weights[a], 0);
+    for (int a = 0; a < 3; a++)
+        weights[a] /= sum;
+}
+
+void drape_render_values(const drape_model *model, const double *values, int width, double *out)
+{
+    const size_t w = (size_t)width;
+    for (int32_t c = 0; c < model->surface.cloth_count; c++) {
+        const drape_render_cloth *to = &model->surface.cloths[c];
+        const size_t count = (size_t)to->mesh->node_count;
+        if (!to->bound)
+            memcpy(out, values + w * (size_t)model->cloths[c].first_node, w * count * sizeof *out);
+        for (size_t i = 0; to->bound && i < count; i++) {
+            double weights[3];
+            weights_within(&to->bound[i], weights);
+            for (size_t k = 0; k < w; k++) {
+                out[w * i + k] = 0;
+                for (int a = 0; a < 3; a++)
+                    out[w * i + k] += weights[a] * values[w * (size_t)to->bound[i].node[a] + k];
+            }
+        }
+        out += w * count;
+    }
+}
+
+void drape_render_triangles(const drape_model *model, int32_t *out)
+{
+    for (int32_t c = 0; c < model->surface.cloth_count; c++) {
+        const drape_render_cloth *cloth = &model->surface.cloths[c];
+        for (int32_t t = 0; t < cloth->mesh->triangle_count; t++)
+            *out++ = cloth->bound ? cloth->bound[cloth->mesh->triangle[3 * (size_t)t]].triangle
+                                  : model->cloths[c].first_triangle + t;
+    }
+}
+
+void drape_render_pinned(const drape_model *model, uint8_t *out)
+{
+    for (int32_t c = 0; c < model->surface.cloth_count; c++) {
+        const drape_render_cloth *cloth = &model->surface.cloths[c];
+        for (int32_t i = 0; i < cloth->mesh->node_count; i++, out++) {
+            *out = cloth->bound ? 1 : model->pinned[model->cloths[c].first_node + i];
+            for (int a = 0; cloth->bound && a < 3; a++)
+                *out = *out && (cloth->bound[i].weights[a] <= 0 || model->pinned[cloth->bound[i].node[a]]);
+        }
+    }
+}
+
+drape_render_mesh drape_model_render_mesh(const drape_model *model, int32_t cloth)
+{
+    if (!model || cloth < -1 || cloth >= model->surface.cloth_count)
+        return (drape_render_mesh){.triangles = NULL};
+    const drape_render_surface *s = &model->surface;
+    if (cloth < 0)
+        return (drape_render_mesh){.vertex_count = s->node_count,
+                                   .triangle_count = s->triangle_count,
+                                   .triangles = s->triangle,
+                                   .rest = s->rest};
+    const drape_mesh *mesh = s->cloths[cloth].mesh;
+    return (drape_render_mesh){.vertex_count = mesh->node_count,
+                               .triangle_count = mesh->triangle_count,
+                               .triangles = mesh->triangle,
+                               .rest = mesh->x};
+}
+
+void drape_model_render_positions(const drape_model *model, int32_t cloth, const double *x,
+                                  const double *normals, double *positions)
+{
+    if (model && cloth >= -1 && cloth < model->surface.cloth_count && x && normals && positions)
+        drape_render_positions(model, cloth, x, normals, positions);
+}
