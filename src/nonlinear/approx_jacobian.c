@@ -169,9 +169,10 @@ static void list_remainder(drape_approx_jacobian *s)
         }
 }
 
-static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_point *point)
+static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_point *point, bool friction)
 {
     bool changed;
+    s->friction.acts = false;
     if (!s->remainder.values)
         return DRAPE_OK;
     drape_status status = drape_system_extend_pattern(s->system, point, &changed);
@@ -181,7 +182,7 @@ static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_poi
         return status;
     drape_system_remainder(s->system, point, s->remainder.values);
     list_remainder(s);
-    return drape_friction_matrix_update(&s->friction, point);
+    return friction ? drape_friction_matrix_update(&s->friction, point) : DRAPE_OK;
 }
 
 static void add_upper(drape_approx_jacobian *s, int32_t node, const double upper[6])
@@ -283,28 +284,34 @@ static drape_status factor_coarse(drape_approx_jacobian *s, drape_work *work)
     expand_coarse(s);
     add_coarse_remainder(s);
     drape_status status = s->coarse.linear->factor(s->coarse.solver, s->coarse.values);
+    s->coarse_due = status != DRAPE_OK;
     work->factorizations++;
     work->factor_seconds += drape_clock_seconds() - start;
     return status;
 }
 
 static drape_status update(drape_approx_jacobian *s, const drape_point *point, double mass_weight,
-                           drape_work *work)
+                           bool friction, drape_work *work)
 {
-    drape_status status = evaluate_remainder(s, point);
+    drape_status status = evaluate_remainder(s, point, friction);
     if (status)
         return status;
     drape_scalar_stiffness_weigh(&s->scalar, point->weight, mass_weight);
     evaluate_pairs(s, point);
     invert_diagonal(s);
-    return factor_coarse(s, work);
+    return s->coarse_due ? factor_coarse(s, work) : DRAPE_OK;
+}
+
+void drape_approx_jacobian_begin(drape_approx_jacobian *s)
+{
+    s->coarse_due = true;
 }
 
 drape_status drape_approx_jacobian_update(drape_approx_jacobian *s, const drape_point *point,
-                                          double mass_weight, drape_work *work)
+                                          double mass_weight, bool friction, drape_work *work)
 {
     double start = drape_system_clock(s->system) - work->factor_seconds;
-    drape_status status = update(s, point, mass_weight, work);
+    drape_status status = update(s, point, mass_weight, friction, work);
     work->jacobians++;
     work->jacobian_seconds += drape_system_clock(s->system) - work->factor_seconds - start;
     return status;
@@ -316,11 +323,11 @@ static void solve_symmetric(void *owner, const double *b, double *x)
     drape_pcg_solve(&s->pcg, b, x, INNER_TOLERANCE, INNER_ITERATIONS);
 }
 
-int drape_approx_jacobian_solve(drape_approx_jacobian *s, const double *b, double *x, bool friction,
-                                double tolerance, int max_iterations)
+int drape_approx_jacobian_solve(drape_approx_jacobian *s, const double *b, double *x, double tolerance,
+                                int max_iterations)
 {
     int iterations = 1;
-    if (friction && drape_friction_matrix_solve(&s->friction, b, x, &iterations))
+    if (drape_friction_matrix_solve(&s->friction, b, x, &iterations))
         return iterations;
     drape_pcg_solve(&s->pcg, b, x, tolerance, max_iterations);
     return s->pcg.iterations;
@@ -339,6 +346,7 @@ drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *syst
     s->system = system;
     s->model = drape_system_model(system);
     s->nodes = s->model->free_count;
+    s->coarse_due = true;
     const size_t n = 3 * (size_t)s->nodes;
     s->inverse = drape_arena_take(arena, 2 * n, sizeof *s->inverse);
     s->pcg = drape_pcg_of(arena, (int64_t)n, s, multiply, precondition);

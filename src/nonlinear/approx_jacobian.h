@@ -30,16 +30,21 @@ drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *syst
                                           drape_approx_jacobian **out);
 void drape_approx_jacobian_destroy(drape_approx_jacobian **jacobian);
 
-/* Computes the matrix at a point and counts the work. Returns a status > 0 if it has no factors on the
- * coarse space. Errors: DRAPE_E_MEMORY, if contact couples new nodes. */
+/* A step begins: the next update factors the matrix on the coarse space again. Further updates keep these
+ * factors, which only precondition. */
+void drape_approx_jacobian_begin(drape_approx_jacobian *jacobian);
+
+/* Computes the matrix at a point and counts the work; with `friction`, where some acts, also what corrects
+ * its solutions, by friction_matrix.h. Returns a status > 0 if it has no factors on the coarse space. Errors:
+ * DRAPE_E_MEMORY, if contact couples new nodes. */
 drape_status drape_approx_jacobian_update(drape_approx_jacobian *jacobian, const drape_point *point,
-                                          double mass_weight, drape_work *work);
+                                          double mass_weight, bool friction, drape_work *work);
 
 /* x = A^-1 b (free DOFs), until the residual falls to `tolerance` times its initial value, in the norm of
- * the preconditioner; with `friction`, where some acts, corrected by friction_matrix.h. Returns the number of
+ * the preconditioner; corrected for friction if the last update was asked for that. Returns the number of
  * iterations. */
-int drape_approx_jacobian_solve(drape_approx_jacobian *jacobian, const double *b, double *x, bool friction,
-                                double tolerance, int max_iterations);
+int drape_approx_jacobian_solve(drape_approx_jacobian *jacobian, const double *b, double *x, double tolerance,
+                                int max_iterations);
 
 /* y = A x, for tests. */
 void drape_approx_jacobian_multiply(const drape_approx_jacobian *jacobian, const double *x, double *y);

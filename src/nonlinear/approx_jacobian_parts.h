@@ -45,6 +45,7 @@ struct drape_approx_jacobian {
     double *h;            /* (6 x pairs) */
     drape_scalar_stiffness scalar;
     coarse_matrix coarse;
+    bool coarse_due; /* its factors are not of this step */
     remainder_matrix remainder;
     double *inverse; /* (6 x nodes) of the diagonal blocks */
     drape_pcg pcg;

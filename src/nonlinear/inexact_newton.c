@@ -63,6 +63,8 @@
  * iterations, and 66 stiff or swung sheets were a sixth further off. */
 #define MAX_CONTRACTION 0.9
 #define STEPS_KEPT      4
+/* Times the last estimate in a solve: a larger residual is not compared with a new one */
+#define FAR_FROM_ROUNDING 1e3
 /* Power of the error if nothing but inertia resisted it, and with contact, whose matrix is stiffer. */
 #define INERTIAL         0.08
 #define INERTIAL_CONTACT 0.2
@@ -99,6 +101,7 @@ struct drape_inexact_newton {
     bool unstable;                     /* the last matrix of this solve was, as far as it was tried */
     bool shortened;                    /* a correction of this solve was, by the line search */
     double length;                     /* that the line search gave the last correction */
+    double rounding;                   /* [N] error of forces as estimated last in this solve; INFINITY */
     double edge;                       /* [m] mean length of an edge */
     contraction first;                 /* of the first correction */
     bool nonlinear;                    /* forces are, along the correction of the last estimate */
@@ -166,6 +169,9 @@ static void begin(drape_inexact_newton *s, bool follows, bool cheap)
     s->factored = cheap && s->approximate ? NULL : s->factors;
     s->cheap = cheap;
     drape_step_equation_begin(e);
+    if (s->approximate)
+        drape_approx_jacobian_begin(s->approximate);
+    s->rounding = INFINITY;
     s->share = 1;
     if (!follows || s->first.mass_weight != e->mass_weight)
         s->first = (contraction){0};
@@ -196,8 +202,7 @@ static drape_status solve(drape_inexact_newton *s, double tolerance, int max_ite
         status = drape_factored_jacobian_solve(s->factored, s->minus_f, LUMPED_TOLERANCE * tolerance, s->p,
                                                &iterations, &definite);
     else
-        iterations = drape_approx_jacobian_solve(s->approximate, s->minus_f, s->p, !s->cheap, tolerance,
-                                                 max_iterations);
+        iterations = drape_approx_jacobian_solve(s->approximate, s->minus_f, s->p, tolerance, max_iterations);
     s->unstable |= !definite;
     e->work.linear_iterations += iterations;
     e->work.solve_seconds += drape_clock_seconds() - start;
@@ -239,9 +244,9 @@ static drape_status update_definite(drape_inexact_newton *s)
 static drape_status correct(drape_inexact_newton *s, const drape_inexact_settings *settings)
 {
     drape_step_equation *e = s->equation;
-    drape_status status =
-        s->factored ? update_definite(s)
-                    : drape_approx_jacobian_update(s->approximate, &e->point, e->mass_weight, &e->work);
+    drape_status status = s->factored ? update_definite(s)
+                                      : drape_approx_jacobian_update(s->approximate, &e->point,
+                                                                     e->mass_weight, !s->cheap, &e->work);
     return status ? status : solve(s, settings->linear_tolerance, settings->max_linear_iterations);
 }
 
@@ -454,10 +459,14 @@ static double estimate_error(drape_inexact_newton *s, double *d, bool corrected)
 /* ---- Iterate ---- */
 
 /* A residual that does not fall may be the rounding error of its forces. */
-static bool is_rounding(drape_step_equation *e, const double *d, drape_solve_report *report)
+static bool is_rounding(drape_inexact_newton *s, const double *d, drape_solve_report *report)
 {
+    drape_step_equation *e = s->equation;
     const double residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
-    if (!(residual <= drape_step_equation_rounding(e, d, DRAPE_NORM_MAX)))
+    if (residual > FAR_FROM_ROUNDING * s->rounding)
+        return false;
+    s->rounding = drape_step_equation_rounding(e, d, DRAPE_NORM_MAX);
+    if (!(residual <= s->rounding))
         return false;
     report->reason = drape_reason_name(DRAPE_REASON_ROUNDING);
     return true;
@@ -585,7 +594,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         report->iterations = p.iteration;
         bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;
         report->reason = drape_reason_name(converged ? DRAPE_REASON_CONVERGED : DRAPE_REASON_ITERATIONS);
-        converged |= least && left >= p.bound && is_rounding(e, d, report);
+        converged |= least && left >= p.bound && is_rounding(s, d, report);
         const bool fell = converged || has_fallen(s, settings, &p, left);
         const double expected = expected_error(s, &p);
         if (fell && expected <= MAX_EXPECTED * settings->error && is_quiet(s, expected)) {

@@ -183,6 +183,7 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         drape_archive_double(a, numbers[i]);
     drape_archive_doubles(a, m->cost, DRAPE_MAX_EFFORTS);
+    drape_archive_double(a, &m->ending);
     drape_archive_int64(a, &m->inaccurate);
     drape_archive_int(a, &m->effort);
     if (drape_archive_good(a) && !is_place(m->effort, 0, efforts))

@@ -138,13 +138,21 @@ static void aim(drape_sim *sim, const plan *p, double end)
     drape_schedule_aim(s, end);
 }
 
-/* Further iterations in a step leave enough of the budget for the least work of the steps after it. */
+/* The checks at the end of an attempt, the energies and what observers do. Their time rises at once, because
+ * a frame that is late is worse than one with an iteration less. */
+static void learn_ending(drape_realtime_memory *m, double seconds)
+{
+    m->ending = fmax(seconds, (1 - LEARN) * m->ending + LEARN * seconds);
+}
+
+/* Further iterations in a step leave enough of the budget for its end, and for the least work of the steps
+ * after it. */
 static void set_deadline(drape_sim *sim, const plan *p, const drape_realtime *report, double until)
 {
     const double after = fmax(0, (double)(p->steps - 1 - report->attempts));
     if (sim->chosen.integrator->set_deadline)
-        sim->chosen.integrator->set_deadline(sim->integrator,
-                                             until - after * expected(sim, sim->realtime.effort));
+        sim->chosen.integrator->set_deadline(
+            sim->integrator, until - sim->realtime.ending - after * expected(sim, sim->realtime.effort));
 }
 
 static drape_status take_steps(drape_sim *sim, const plan *p, double begun, double budget,
@@ -169,7 +177,9 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
             break;
         set_deadline(sim, p, report, begun + KEEP * budget);
         status = drape_sim_step(sim, t1, h, &attempt);
-        learn(sim, drape_clock_seconds() - start - sim->further_seconds);
+        const double end = drape_clock_seconds();
+        learn(sim, end - start - sim->further_seconds);
+        learn_ending(&sim->realtime, end - sim->solved_at);
         sim->realtime.touches = is_in_contact(sim);
         report->attempts++;
         report->rejected += !attempt.accepted;

@@ -46,6 +46,7 @@ typedef struct drape_realtime_memory {
     double longest_asked;           /* [s] the longest step set by the def; 0: not set */
     double debt, dropped;           /* [s] time left over for the next call; total time dropped */
     double cost[DRAPE_MAX_EFFORTS]; /* [s] expected for an attempt, by level of effort; 0: unknown */
+    double ending;                  /* [s] expected from the end of the integrator's work in an attempt on */
     int effort;                     /* the integrator's level of effort; 0 is the best */
     bool stretched;                 /* steps were longer than dt, or time was left over */
     bool touches;                   /* the last attempt of a call ended in contact */
@@ -89,6 +90,8 @@ struct drape_sim {
     int64_t held_up;        /* attempts that failed since held_up_from */
     double held_up_from;    /* [s] from there on no whole dt was made */
     bool relaxed_again;     /* after the last attempt cloth was relaxed; not archived: it is read at once */
+    double solved_at;       /* [s of drape_clock_seconds] the integrator's work in the last attempt ended; not
+                               archived: it is read at once */
     double further_seconds; /* [s] of the last attempt, see drape_step_info; not archived: it is read at
                                     once */
     drape_statistics statistics; /* counted by the driver; the integrator has the others */

@@ -85,6 +85,7 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
         drape_sim_energy(sim); /* for the check, while contact is where the step begins */
     if (!status)
         status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
+    sim->solved_at = drape_clock_seconds();
     drape_supports_hold(drape_system_motion(sim->system), drape_sim_state(sim)->x, next->x, next->v);
     if (status == DRAPE_E_STOPPED)
         info->reason = drape_reason_name(DRAPE_REASON_CANCELLED);

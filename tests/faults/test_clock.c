@@ -102,10 +102,19 @@ typedef struct timed {
     double longest; /* [s] of a call */
 } timed;
 
-static timed run_in(double budget)
+static drape_status spend(void *user, const drape_event *event)
+{
+    const int64_t *milliseconds = user;
+    reads += event->kind == DRAPE_EVENT_ATTEMPT ? (long)*milliseconds : 0;
+    return DRAPE_OK;
+}
+
+/* ending: milliseconds that an observer takes after each attempt. */
+static timed run_in(double budget, int64_t ending)
 {
     scene s = scene_open(hung, "newton_k', 'error': 1e-15, 'tolerance': 1e-15, 'corrections': 'factors");
     timed out = {0};
+    ck_assert_int_eq(drape_sim_observe(s.sim, spend, &ending), DRAPE_OK);
     tick = 1e-3;
     reads = 0;
     for (int k = 0; k < 20; k++) {
@@ -124,7 +133,20 @@ static timed run_in(double budget)
  * least, one a frame; what an iteration takes is known after the first frames, which alone may be late. */
 START_TEST(further_iterations_end_in_time)
 {
-    const timed all = run_in(3600), some = run_in(0.75 * all.longest);
+    const timed all = run_in(3600, 0), some = run_in(0.75 * all.longest, 0);
+    printf("# %d iterations in %g s a frame at most; %d in %g s, %d late\n", (int)all.iterations, all.longest,
+           (int)some.iterations, 0.75 * all.longest, (int)some.late);
+    ck_assert(some.iterations < all.iterations && some.iterations > 20);
+    ck_assert_int_le(some.late, 2);
+}
+END_TEST
+
+/* An observer that takes 50 ms of the time leaves less for further iterations, and frames are not late for
+ * it. */
+START_TEST(the_end_of_a_step_has_its_time)
+{
+    const int64_t ending = 50;
+    const timed all = run_in(3600, ending), some = run_in(0.75 * all.longest, ending);
     printf("# %d iterations in %g s a frame at most; %d in %g s, %d late\n", (int)all.iterations, all.longest,
            (int)some.iterations, 0.75 * all.longest, (int)some.late);
     ck_assert(some.iterations < all.iterations && some.iterations > 20);
@@ -133,4 +155,4 @@ START_TEST(further_iterations_end_in_time)
 END_TEST
 
 SUITE("clock", steps_do_not_depend_on_the_clock, a_budget_on_a_jumping_clock_ends,
-      further_iterations_end_in_time)
+      further_iterations_end_in_time, the_end_of_a_step_has_its_time)
