@@ -87,6 +87,7 @@ START_TEST(quick_references_pass)
     check("hinged_roof", 4, DRAPE_OUTCOME_PASS);
     check("hinged_roof_limit", 1, DRAPE_OUTCOME_PASS);
     check("airbag_square", 0, DRAPE_OUTCOME_PASS);
+    check("terminal_velocity", 1, DRAPE_OUTCOME_PASS);
     check("inflated_sphere", 1, DRAPE_OUTCOME_PASS);
     check("mylar_balloon", 1, DRAPE_OUTCOME_PASS);
     for (int i = 0; i < find("curve_tension")->case_count; i++)
