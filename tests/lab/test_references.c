@@ -49,7 +49,8 @@ START_TEST(expected_values_are_those_of_other_sources)
                  {"self_buckling", 0, 7.83735, 5e-6},    {"end_load", 0, 0.30172077, 1e-8},
                  {"end_load", 2, 0.66996418, 1e-8},      {"plate_supported", 0, 0.00406235, 5e-9},
                  {"catenary", 0, 0.29234380, 1e-8},      {"pendulum", 2, 1.7622037, 1e-7},
-                 {"chain", 0, 3.766067, 1e-6},           {"oscillator_bdf2", 1, 0.990401, 5e-7}};
+                 {"chain", 0, 3.766067, 1e-6},           {"oscillator_bdf2", 1, 0.990401, 5e-7},
+                 {"mylar_balloon", 0, 0.7627, 6e-5},     {"mylar_balloon", 1, 0.599, 1e-4}};
     for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
         const drape_reference *r = find(known[i].name);
         ck_assert_double_eq_tol(r->expected(r->parameters[known[i].index]), known[i].value, known[i].digits);
@@ -85,6 +86,10 @@ START_TEST(quick_references_pass)
     check("cusick_stiff", 0, DRAPE_OUTCOME_PASS);
     check("hinged_roof", 4, DRAPE_OUTCOME_PASS);
     check("hinged_roof_limit", 1, DRAPE_OUTCOME_PASS);
+    check("airbag_square", 0, DRAPE_OUTCOME_PASS);
+    check("terminal_velocity", 1, DRAPE_OUTCOME_PASS);
+    check("inflated_sphere", 1, DRAPE_OUTCOME_PASS);
+    check("mylar_balloon", 1, DRAPE_OUTCOME_PASS);
     for (int i = 0; i < find("curve_tension")->case_count; i++)
         check("curve_tension", i, DRAPE_OUTCOME_PASS);
     for (int i = 0; i < find("curve_shear")->case_count; i++)

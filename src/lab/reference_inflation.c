@@ -1,0 +1,146 @@
+/*
+ * reference_inflation.c: membranes that are blown up. They bear no compression: all have stretch.tension. The
+ * rims lie in planes of symmetry, in which nodes may move.
+ */
+#include "lab/strip.h"
+
+#include <gsl/gsl_sf_ellint.h>
+#include <math.h>
+#include <stdio.h>
+
+/* Of a mesh, a material and a load; its left, right and bottom edges lie in planes of symmetry. */
+static int inflated_scene(const char *mesh, const char *material, const char *load, const char *pins,
+                          double tolerance, char text[DRAPE_LAB_TEXT])
+{
+    return snprintf(text, DRAPE_LAB_TEXT,
+                    "{'drape': 1, 'cloth': [{'mesh': {%s},\n 'material': {%s, 'areal_density': 1},\n "
+                    "'terms': ['stretch.tension', %s],\n 'pins': [%s]}],\n 'gravity': [0, 0, 0], "
+                    "'integrator': {'method': 'static', 'tolerance': %g, 'max_iterations': 2000}, "
+                    "'duration': 1}",
+                    mesh, material, load, pins, tolerance);
+}
+
+/* ---- A square airbag ----
+ *
+ * Two flat squares with a diagonal of 1.2 m, joined along their edges: a quarter of one of them, E = 588 MPa,
+ * nu = 0.4, 0.6 mm thick, under 5 kPa. The middle rises by 0.217 m (Contri & Schrefler), 0.216 m (Kang &
+ * Im 1997) and to 0.218 m in other papers with a law for wrinkles. */
+
+static double airbag_expected(double unused)
+{
+    (void)unused;
+    return 0.217;
+}
+
+static int airbag_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    (void)c;
+    return inflated_scene("'grid': 'square', 'rows': 25, 'columns': 25, 'width': 0.42426406871192851, "
+                          "'height': 0.42426406871192851",
+                          "'young_modulus': 588e6, 'poisson_ratio': 0.4, 'thickness': 6e-4",
+                          "{'type': 'load.pressure', 'pressure': 5000, 'point': [0, 0, 0]}",
+                          "{'edge': 'left', 'normal': [1, 0, 0]}, {'edge': 'top', 'normal': [0, 0, 1]}, "
+                          "{'edge': 'right', 'normal': [0, 1, 0]}, {'edge': 'bottom', 'normal': [0, 1, 0]}",
+                          1e-4, text);
+}
+
+static drape_status measure_rise(drape_reference_run *run, double *value)
+{
+    const drape_status status = lab_advance(run);
+    *value = drape_sim_positions(run->sim)[1];
+    return status;
+}
+
+DRAPE_REFERENCE(airbag_square, .entry.summary = "rise of the middle of a square airbag", .unit = "m",
+                DRAPE_CASES(0), .model = "stretch.tension, load.pressure; square, 24 x 24 cells",
+                .entry.reference =
+                    "Contri & Schrefler 1988, A geometrically nonlinear finite element analysis of wrinkled "
+                    "membrane surfaces by a no-compression material model",
+                .tolerance = 0.01, .expected = airbag_expected, .scene = airbag_scene,
+                .measure = measure_rise);
+
+/* ---- Round ones ----
+ *
+ * A quarter of the upper half. The grid has a hole at the pole, whose radius of 1/50 changes the results by
+ * its square. */
+
+#define HOLE     "'top_radius': 0.02, 'bottom_radius': 1, 'angle': 90"
+#define MATERIAL "'young_modulus': 1e6, 'poisson_ratio': 0.3, 'thickness': 0.001" /* E h = 1000 N/m */
+#define PLANES                                                                                               \
+    "{'edge': 'left', 'normal': [0, 0, 1]}, {'edge': 'right', 'normal': [1, 0, 0]}, {'edge': 'bottom', "     \
+    "'normal': [0, 1, 0]}"
+
+static int round_scene(const char *mesh, double pressure, char text[DRAPE_LAB_TEXT])
+{
+    char load[100];
+    snprintf(load, sizeof load, "{'type': 'load.follower', 'pressure': %.17g}", pressure);
+    return inflated_scene(mesh, MATERIAL, load, PLANES, 1e-6, text);
+}
+
+/* Distance of the last node, on the rim, from the axis. */
+static double radius_of(const drape_reference_run *run)
+{
+    const double *x = drape_sim_positions(run->sim) + 3 * ((size_t)drape_model_node_count(run->model) - 1);
+    return hypot(x[0], x[2]);
+}
+
+/* W = E h/(1 - nu) e^2 of the strain e = (l^2 - 1)/2 in all directions; d(4 pi R^2 W - p 4/3 pi R^3 l^3)/dl =
+ * 0. */
+static double sphere_expected(double pressure)
+{
+    const double p = 0.7 * pressure;
+    return (p + sqrt(p * p + 4)) / 2;
+}
+
+static int sphere_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return round_scene("'grid': 'revolution', 'rows': 25, 'columns': 25, 'height': 0.999799979995999, "
+                       "'arc_radius': 1, " HOLE,
+                       1000 * c->parameter, text);
+}
+
+static drape_status measure_radius(drape_reference_run *run, double *value)
+{
+    const drape_status status = lab_advance(run);
+    *value = radius_of(run);
+    return status;
+}
+
+DRAPE_REFERENCE(inflated_sphere, .entry.summary = "radius of a sphere under pressure over that at rest",
+                .unit = "1", .parameter = "p R/(E h)", DRAPE_CASES(0.1, 0.3, 1),
+                .model = "stretch.tension, load.follower; revolution, 24 x 24 cells",
+                .entry.reference = "p R (1 - nu)/(E h) = l - 1/l, law of Saint Venant and Kirchhoff",
+                .tolerance = 0.005, .expected = sphere_expected, .scene = sphere_scene,
+                .measure = measure_radius);
+
+/* Two discs that do not stretch, joined along their edges. With the modulus k = 1/sqrt 2, the radius is
+ * sqrt 2/K(k) of theirs, and the thickness sqrt 2 (E(k) - K(k)/2) of the diameter, 0.599. */
+static double mylar_expected(double thickness)
+{
+    const double k = sqrt(0.5), first = gsl_sf_ellint_Kcomp(k, GSL_PREC_DOUBLE),
+                 second = gsl_sf_ellint_Ecomp(k, GSL_PREC_DOUBLE);
+    return sqrt(2) * (thickness > 0 ? second - first / 2 : 1 / first);
+}
+
+/* Strains are some p r/(2 E h) = 5e-5. */
+static int mylar_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    (void)c;
+    return round_scene("'grid': 'revolution', 'rows': 17, 'columns': 17, " HOLE, 0.1, text);
+}
+
+static drape_status measure_mylar(drape_reference_run *run, double *value)
+{
+    const drape_status status = lab_advance(run);
+    const double radius = radius_of(run);
+    *value = run->parameter > 0 ? drape_sim_positions(run->sim)[1] / radius : radius;
+    return status;
+}
+
+DRAPE_REFERENCE(mylar_balloon, .entry.summary = "shape of two discs that were joined and blown up",
+                .unit = "1", .parameter = "0 radius over that of the discs, 1 thickness over diameter",
+                DRAPE_CASES(0, 1), .model = "stretch.tension, load.follower; revolution, 16 x 16 cells",
+                .entry.reference = "Paulsen 1994, What is the shape of a Mylar balloon?; Mladenov & Oprea "
+                                   "2003, The Mylar balloon revisited",
+                .tolerance = 0.005, .expected = mylar_expected, .scene = mylar_scene,
+                .measure = measure_mylar);
