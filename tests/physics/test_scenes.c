@@ -27,6 +27,7 @@ typedef struct beginning {
 } beginning;
 
 static const beginning beginnings[] = {
+    {"airbag", 0.3, {{COLUMNS, "9"}, {ROWS, "9"}}},
     {"ball", 0.25, {{COLUMNS, "13"}, {ROWS, "13"}}, .touches = true},
     {"box_edge", 0.4, {{COLUMNS, "11"}, {ROWS, "11"}}, .touches = true},
     {"capstan", 0.3, {{COLUMNS, "31"}, {ROWS, "3"}}, .touches = true},
