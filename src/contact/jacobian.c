@@ -56,13 +56,12 @@ static double excess_stiffness(const drape_contact *c, const drape_active_contac
                                const drape_contact_law *law, double weight, bool bound)
 {
     const drape_gap *gap = &contact->gap;
-    const double force = drape_predictions_find(&c->predicted, contact);
     double v[4][3];
-    if (isnan(force))
+    if (c->predicted.count == 0)
         return 0;
     drape_contact_velocities(c, contact, v);
-    const double tangent = tangent_stiffness(gap, law, weight, v, bound);
-    return drape_predicted_stiffness(gap, law, weight, v, force, tangent) - tangent;
+    const double secant = drape_predictions_stiffness(&c->predicted, contact, law, weight, v);
+    return isnan(secant) ? 0 : secant - tangent_stiffness(gap, law, weight, v, bound);
 }
 
 typedef struct request {

@@ -46,18 +46,38 @@ bool drape_predictions_add(drape_predictions *p, const drape_active_contact *con
     memcpy(to->node, contact->pair.node, sizeof to->node);
     to->collider = contact->pair.collider;
     to->force = force;
+    to->weight = NAN;
     to->next = p->first[to->node[0]];
     p->first[to->node[0]] = p->count++;
     return true;
 }
 
-double drape_predictions_find(const drape_predictions *p, const drape_active_contact *contact)
+/* NULL: none. */
+static drape_predicted *find(const drape_predictions *p, const drape_active_contact *contact)
 {
     for (int32_t i = p->count > 0 ? p->first[contact->pair.node[0]] : -1; i >= 0; i = p->list[i].next)
         if (p->list[i].collider == contact->pair.collider &&
             memcmp(p->list[i].node, contact->pair.node, sizeof p->list[i].node) == 0)
-            return p->list[i].force;
-    return NAN;
+            return &p->list[i];
+    return NULL;
+}
+
+double drape_predictions_stiffness(const drape_predictions *p, const drape_active_contact *contact,
+                                   const drape_contact_law *law, double weight, double v[4][3])
+{
+    drape_predicted *of = find(p, contact);
+    const size_t points = (size_t)contact->gap.closest.points;
+    if (!of || isnan(of->force))
+        return NAN;
+    if (of->gap == contact->gap.value && of->m == contact->gap.m && of->weight == weight &&
+        memcmp(of->v, v, points * sizeof *v) == 0)
+        return of->secant;
+    of->secant = drape_predicted_stiffness(&contact->gap, law, weight, v, of->force);
+    of->gap = contact->gap.value;
+    of->m = contact->gap.m;
+    of->weight = weight;
+    memcpy(of->v, v, points * sizeof *v);
+    return of->secant;
 }
 
 /* The normal force if only the gap changes, and its rate with it. */
@@ -80,12 +100,12 @@ static double force_at(const drape_gap *gap, const drape_contact_law *law, doubl
 
 /* The force falls with the gap. The bounded barrier of relaxed cloth is near enough to linear. */
 double drape_predicted_stiffness(const drape_gap *gap, const drape_contact_law *law, double weight,
-                                 double v[4][3], double force, double tangent)
+                                 double v[4][3], double force)
 {
     const double now = force_at(gap, law, weight, v, gap->value);
     double low = law->low * law->distance, high = law->distance;
     if (!(fabs(force - now) > NEAR * fmax(force, now)) || !(law->low > 0) || !(gap->value > low))
-        return tangent;
+        return NAN;
     if (force > now)
         high = gap->value;
     else

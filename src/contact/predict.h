@@ -23,6 +23,9 @@ typedef struct drape_predicted {
     int32_t node[4], collider; /* of an active contact */
     int32_t next;              /* of the same first point; -1: none */
     double force;              /* [N] */
+    /* The secant stiffness found last, and for which gap, weight and velocities: the parts of a Jacobian and
+     * the next prediction ask for the same one. weight NAN: none was. */
+    double secant, gap, m, weight, v[4][3];
 } drape_predicted;
 
 typedef struct drape_predictions {
@@ -42,13 +45,15 @@ drape_status drape_predictions_reserve(drape_predictions *predictions, int32_t r
 /* False: there is no room. */
 bool drape_predictions_add(drape_predictions *predictions, const drape_active_contact *contact, double force);
 
-/* NAN: none. */
-double drape_predictions_find(const drape_predictions *predictions, const drape_active_contact *contact);
+/* The secant stiffness [N/m] by drape_predicted_stiffness at the force that is predicted for a contact; NAN:
+ * none is, or it is near the present one. Not thread-safe. */
+double drape_predictions_stiffness(const drape_predictions *predictions, const drape_active_contact *contact,
+                                   const drape_contact_law *law, double weight, double v[4][3]);
 
 /* The secant stiffness [N/m] of the normal force of a contact, whose gap changes with the velocities v of its
- * points at the given weight (drape_point), from its gap to that at which the force is `force`; `tangent`
- * where that is near the present force, or NAN. */
+ * points at the given weight (drape_point), from its gap to that at which the force is `force`; NAN where
+ * that is near the present force. */
 double drape_predicted_stiffness(const drape_gap *gap, const drape_contact_law *law, double weight,
-                                 double v[4][3], double force, double tangent);
+                                 double v[4][3], double force);
 
 #endif

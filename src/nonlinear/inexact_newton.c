@@ -40,6 +40,10 @@
 #define FEW_ITERATIONS 4
 /* Iterations where cloth touches something, however little time there is. */
 #define MIN_IN_CONTACT 3
+/* Of the residual of the guess: one iteration less is enough where less is left and the last one would not
+ * end in time. Three capes of 900 nodes on a body that walks, 4 s each of three runs, had 349 late frames of
+ * 1923 and 9 rejected attempts with it, 558 and 14 without. */
+#define ENOUGH 0.6
 /* In edges: by how much pins may be ahead before the step begins with the linearized equation. */
 #define MAX_AHEAD 0.1
 /* Without contact, in sizes of the scene: how far nodes would move in a step with the energy that is left,
@@ -478,15 +482,18 @@ static bool has_time(const drape_inexact_settings *settings, double seconds)
     return settings->deadline == INFINITY || drape_clock_seconds() + seconds <= settings->deadline;
 }
 
+static bool is_in_contact(const drape_inexact_newton *s)
+{
+    double gap;
+    return s->fraction && drape_contact_active(drape_system_contact(s->equation->system), &gap) > 0;
+}
+
 /* Where cloth touches something, so many iterations are made whatever the time, unless fewer meet the bound:
  * what one leaves throws the cloth about, so that later steps need more (docs/realtime.md, "What is saved
  * first"). */
 static int least_iterations(const drape_inexact_newton *s)
 {
-    double gap;
-    return s->fraction && drape_contact_active(drape_system_contact(s->equation->system), &gap) > 0
-               ? MIN_IN_CONTACT
-               : 0;
+    return is_in_contact(s) ? MIN_IN_CONTACT : 0;
 }
 
 /* Of one solve. */
@@ -500,6 +507,14 @@ typedef struct progress {
     double seconds;          /* of the last iteration and the last estimate */
     double estimating;       /* [s] of the last estimate */
 } progress;
+
+/* Whether the last iteration that a step in contact makes whatever the time is left out. */
+static bool is_enough(const drape_inexact_newton *s, const drape_inexact_settings *settings,
+                      const progress *p, double left)
+{
+    return p->iteration >= MIN_IN_CONTACT - 1 && left < ENOUGH * ENOUGH * p->start &&
+           !has_time(settings, p->seconds) && is_in_contact(s);
+}
 
 /* Without contact, factors leave so little that the error alone tells whether to go on. */
 static bool goes_by_error(const drape_inexact_newton *s)
@@ -587,10 +602,11 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
     progress p = {.start = drape_step_equation_dot(e, e->f, e->f)};
     p.bound = fall * fall * p.start;
     for (;; p.iteration++) {
+        const double left = drape_step_equation_dot(e, e->f, e->f);
         const bool least = p.iteration >= settings->iterations,
                    most = p.iteration >= settings->iterations + settings->rescue_iterations ||
-                          (least && p.iteration >= least_iterations(s) && !has_time(settings, 0));
-        const double left = drape_step_equation_dot(e, e->f, e->f);
+                          (least && p.iteration >= least_iterations(s) && !has_time(settings, 0)) ||
+                          (least && is_enough(s, settings, &p, left));
         report->iterations = p.iteration;
         bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;
         report->reason = drape_reason_name(converged ? DRAPE_REASON_CONVERGED : DRAPE_REASON_ITERATIONS);

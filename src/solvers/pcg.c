@@ -67,6 +67,8 @@ void drape_pcg_solve(drape_pcg *s, const double *b, double *x, double tolerance,
             return;
         }
         advance(s, size / curvature, x);
+        if (s->iterations == max_iterations)
+            return;
         s->precondition(s->owner, s->r, s->z);
         double before = size;
         size = dot(s->r, s->z, s->n);

@@ -18,7 +18,7 @@ typedef struct drape_pcg {
     double *r, *z, *p, *q;       /* (n) workspace */
     int iterations;              /* of the last solve */
     bool definite;               /* no direction without positive curvature was met */
-    bool converged;              /* the tolerance was reached */
+    bool converged;              /* the tolerance was reached; not tested after the last of max_iterations */
 } drape_pcg;
 
 /* Takes the workspace, which lives as long as the arena: drape_arena_status says whether there was memory. */
