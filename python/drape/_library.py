@@ -259,8 +259,19 @@ def encode(text) -> Optional[bytes]:
     return text.encode()
 
 
-def numbers(values, name: str, *shape, dtype=np.float64) -> np.ndarray:
-    """A contiguous array of this shape; -1 stands for any length. Numbers that dtype cannot hold are refused, never wrapped or cut."""
+def check_finite(array: np.ndarray, name: str, given=None) -> None:
+    """Refuses an array with a NaN or an infinity, and says where. given: the array as the caller had it, in which the number may be too large for this one."""
+    if array.dtype.kind != "f" or np.isfinite(array).all():
+        return
+    at = tuple(np.argwhere(~np.isfinite(array))[0].tolist())
+    place = f"[{', '.join(map(str, at))}]" if at else ""
+    value = array[at] if given is None or given.shape != array.shape else given[at]
+    raise ArgumentError(f"{name}{place}: {value:.9g} is not allowed; it must be finite" + (" and fit into single precision" if array.dtype.itemsize == 4 else ""))
+
+
+def numbers(values, name: str, *shape, dtype=np.float64, finite: bool = True) -> np.ndarray:
+    """A contiguous array of this shape; -1 stands for any length. Numbers that dtype cannot hold are refused, never wrapped or cut, and so are, if `finite`,
+    NaN and infinities."""
     try:
         given = np.asarray(values)
         if np.issubdtype(dtype, np.integer):
@@ -268,7 +279,8 @@ def numbers(values, name: str, *shape, dtype=np.float64) -> np.ndarray:
         elif np.iscomplexobj(given):
             raise TypeError(f"{name}: needs real numbers, has {given.dtype}")
         else:
-            array = np.ascontiguousarray(given, dtype)
+            with np.errstate(over="ignore"):
+                array = np.ascontiguousarray(given, dtype)
     except TypeError as error:
         raise TypeError(str(error) if str(error).startswith(name) else f"{name}: {error}") from None
     except Error:
@@ -278,6 +290,8 @@ def numbers(values, name: str, *shape, dtype=np.float64) -> np.ndarray:
     if array.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, array.shape)):
         wanted = " x ".join("n" if n == -1 else str(n) for n in shape)
         raise ArgumentError(f"{name}: has shape {array.shape}, needs {wanted}")
+    if finite:
+        check_finite(array, name, given)
     return array
 
 

@@ -4,7 +4,7 @@ from typing import Any, Mapping
 
 import numpy as np
 
-from ._library import ArgumentError, numbers
+from ._library import ArgumentError, check_finite, numbers
 
 
 class Mesh:
@@ -52,6 +52,7 @@ class Mesh:
 
     def write(self, path) -> None:
         """Writes a PLY file (binary, double precision), or an OBJ file if the name ends in .obj, with all digits."""
+        check_finite(self.positions, "positions")
         if os.fspath(path).endswith(".obj"):
             with open(path, "w", encoding="ascii") as file:
                 file.writelines("v %r %r %r\n" % tuple(x) for x in self.positions.tolist())

@@ -13,7 +13,7 @@ import numpy as np
 
 from . import _binding as c
 from ._binding import CheckResult, ClothRange, ColliderMotion
-from ._library import ArgumentError, Context, Handle, encode, header, lib, numbers, real, record, to_json
+from ._library import ArgumentError, Context, Handle, check_finite, encode, header, lib, numbers, real, record, to_json
 from .mesh import Mesh
 from .terms import Term
 
@@ -350,20 +350,28 @@ def _index(place: list, key: str, pointer: str) -> int:
     return int(key)
 
 
+def _escaped(name) -> str:
+    """A key in a JSON pointer."""
+    return str(name).replace("~", "~0").replace("/", "~1")
+
+
 def _plain(value, mesh_name, folder: Optional[str] = None):
     """A scene without Mesh objects, which are written to files of these names. folder: relative names of files are made absolute against it."""
     written: List[str] = []
 
-    def plain(item, key=None):
+    def plain(item, at="", key=None):
         if isinstance(item, Mesh):
             path = mesh_name(len(written))
+            check_finite(item.positions, f"{at}: positions")
             item.write(path)
             written.append(path)
-            return {**plain(item.settings), "file": path}
+            return {**plain(item.settings, at), "file": path}
         if isinstance(item, Mapping):
-            return {name: plain(part, name) for name, part in item.items()}
+            return {name: plain(part, f"{at}/{_escaped(name)}", name) for name, part in item.items()}
         if isinstance(item, (list, tuple)):
-            return [plain(part) for part in item]
+            return [plain(part, f"{at}/{k}") for k, part in enumerate(item)]
+        if isinstance(item, (float, np.floating, np.ndarray)):
+            check_finite(np.asarray(item), at)  # JSON has no NaN and no infinity
         if folder and key in _FILES and isinstance(item, str) and not os.path.isabs(item):
             return os.path.join(folder, item)
         return item
@@ -375,7 +383,7 @@ def _changes(old, new, pointer):
     """What leads from one value to another: pointers and values, so that lines of messages about the rest stay those of the file."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in sorted(old.keys() | new.keys()):
-            place = f"{pointer}/{key.replace('~', '~0').replace('/', '~1')}"
+            place = f"{pointer}/{_escaped(key)}"
             if key not in new:
                 yield place, _ABSENT
             elif key not in old:

@@ -742,10 +742,10 @@ def _wind(sim_of, wind: Wind):
         try:
             result = wind(t, _copy(x, (count, 3)))
             values, slope = result if isinstance(result, tuple) else (result, None)
-            values = numbers(np.broadcast_to(values, (count, 3)), "the wind", count, 3)
+            values = numbers(np.broadcast_to(values, (count, 3)), "the wind", count, 3, finite=False)  # the attempt is rejected
             ctypes.memmove(out, values.ctypes.data, values.nbytes)
             if gradient and slope is not None:
-                slope = numbers(np.broadcast_to(slope, (count, 3, 3)), "the gradient of the wind", count, 3, 3)
+                slope = numbers(np.broadcast_to(slope, (count, 3, 3)), "the gradient of the wind", count, 3, 3, finite=False)
                 ctypes.memmove(gradient, slope.ctypes.data, slope.nbytes)
         except BaseException as error:
             sim._pending = sim._pending or error

@@ -1,5 +1,6 @@
 /* drag_spring.c: springs by which a host drags nodes. Setting them changes the energy of the present state;
  * the account counts this as work of the host, like a pin's. */
+#include "base/finite.h"
 #include "sim/sim.h"
 
 #include <math.h>
@@ -18,9 +19,12 @@ static drape_status check(const drape_sim *sim, const char *function, int32_t no
     if (!(stiffness >= 0 && isfinite(stiffness)))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: stiffness = %g N/m; it is finite, 0 or more",
                           function, stiffness);
-    for (int k = 0; k < 3; k++)
-        if (stiffness > 0 && (!target || !isfinite(target[k])))
-            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: the target must be finite", function);
+    if (stiffness > 0 && !target)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: node %d has no target", function, (int)node);
+    if (stiffness > 0 && !drape_all_finite(target, 3))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "%s: the target of node %d is (%g, %g, %g) m; it must be finite", function,
+                          (int)node, target[0], target[1], target[2]);
     return DRAPE_OK;
 }
 

@@ -307,8 +307,13 @@ drape_status drape_sim_push(drape_sim *sim, const double *forces)
     drape_status guarded = drape_sim_guard(sim, "drape_sim_push");
     if (guarded)
         return guarded;
-    if (forces && !drape_all_finite(forces, 3 * (size_t)sim->model->node_count))
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_push: a force is not finite");
+    for (size_t i = 0; forces && i < (size_t)sim->model->node_count; i++) {
+        const double *f = forces + 3 * i;
+        if (!drape_all_finite(f, 3))
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                              "drape_sim_push: the force on node %zu is (%g, %g, %g) N; it must be finite", i,
+                              f[0], f[1], f[2]);
+    }
     drape_system_set_push(sim->system, forces);
     announce_new_forces(sim);
     return DRAPE_OK;

@@ -181,9 +181,15 @@ static drape_status check(drape_sim *sim, const char *function, int what, int32_
     if (what < DRAPE_QUERY_CLOTH || what > (DRAPE_QUERY_CLOTH | DRAPE_QUERY_COLLIDERS))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "%s: what = %d; it is 1 for cloth, 2 for colliders, 3 for both", function, what);
-    if (!(reach > 0) || !drape_all_finite(points, 3 * (size_t)count))
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "%s: points must be finite, and the distance above 0: %g m", function, reach);
+    if (!(reach > 0))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: the distance is %g m; it must be above 0",
+                          function, reach);
+    for (int32_t i = 0; i < count; i++) {
+        const double *x = points + 3 * (size_t)i;
+        if (!drape_all_finite(x, 3))
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: point %d is (%g, %g, %g) m; it must be finite",
+                              function, (int)i, x[0], x[1], x[2]);
+    }
     return DRAPE_OK;
 }
 

@@ -905,7 +905,7 @@ START_TEST(wrong_arguments_are_refused)
     says(&h, drape_sim_move_collider(h.sim, 0, -1, zero, NULL), e, "seconds = -1");
     says(&h, drape_sim_move_collider(h.sim, 0, 1, none, NULL), e, "displacement");
     says(&h, drape_sim_move_collider(h.sim, 0, 1, NULL, NULL), e, "displacement");
-    says(&h, drape_sim_push(h.sim, bad), e, "not finite");
+    says(&h, drape_sim_push(h.sim, bad), e, "the force on node");
     says(&h, drape_sim_set_wind(h.sim, blow, NULL), e, "no term that feels the wind");
     says(&h, drape_sim_reactions(h.sim, NULL), e, "the array is NULL");
     says(&h, drape_sim_contact_forces(h.sim, NULL), e, "the array is NULL");

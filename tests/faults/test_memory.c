@@ -28,6 +28,8 @@ static const char scene_text[] =
     "\"track\": [[0, [0,0,0]], [1, "
     "[0,0.1,0]]]}]},\n"
     "    {\"mesh\": {\"file\": \"mesh.obj\", \"transform\": {\"scale\": 0.2, \"rotate\": [0, 1, 0, 30]}},\n"
+    "     \"render_mesh\": {\"file\": \"mesh.obj\", \"transform\": {\"scale\": 0.2, "
+    "\"rotate\": [0, 1, 0, 30]}},\n"
     "     \"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"total_mass\": 0.1},\n"
     "     \"terms\": [\"stretch.edge\"], \"pins\": [{\"box\": [[-1,-1,-1],[0.1,1,0.1]]}]}],\n"
     "  \"colliders\": [{\"type\": \"plane\", \"point\": [0, -9, 0], \"normal\": [0, 1, 0]},\n"

@@ -86,6 +86,36 @@ def test_errors():
     raises(drape.ArgumentError, sim.push, np.zeros((3, 3)), says="36 x 3")
 
 
+def test_not_finite():
+    """a NaN or an infinity in an array, a mesh or a scene is refused with its place and value"""
+    x, triangles = np.array([[0, 0, 0], [0.2, 0, 0], [0.2, 0, 0.2], [0, 0, 0.2]]), [[0, 2, 1], [0, 3, 2]]
+    mesh = drape.Mesh(x, triangles)
+    sim = drape.Sim(sheet(mesh=drape.Mesh(x, triangles), pins=[{"nodes": [0]}]))
+    for value in float("nan"), float("inf"), float("-inf"):
+        bad = x.copy()
+        bad[2, 1] = value
+        says = f"[2, 1]: {value} is not allowed"
+        for call, argument, *given in ((drape.Mesh, "positions", bad, triangles), (sim.push, "forces", bad), (sim.closest, "points", bad), (sim.cast, "origins", bad, [0, 1, 0]),
+                                        (sim.set_state, "positions", 0.0, bad, x), (sim.model.normals, "positions", bad),
+                                       (drape.Embedding, "vertices", sim.model, bad)):
+            raises(drape.ArgumentError, call, *given, says=argument + says)
+        raises(drape.ArgumentError, sim.set_masses, [1, 2], [1, value], says=f"masses[1]: {value} is not allowed")
+        scene = drape.Scene(sheet(mesh=mesh, pins=[{"nodes": [0]}]))
+        scene["/cloth/0/velocity"] = [0, value, 0]
+        raises(drape.ArgumentError, drape.Model, scene, says=f"/cloth/0/velocity/1: {value} is not allowed")
+        scene["/cloth/0/velocity"] = np.array([0, value, 0])
+        raises(drape.ArgumentError, drape.Model, scene, says=f"/cloth/0/velocity[1]: {value} is not allowed")
+        del scene["/cloth/0/velocity"]
+        mesh.positions[2, 1] = value
+        raises(drape.ArgumentError, drape.Model, scene, says="/cloth/0/mesh: positions" + says)
+        mesh.positions[2, 1] = 0
+        scene["/cloth/0/render_mesh"] = drape.Mesh(x + [0, 0.01, 0], triangles)
+        scene["/cloth/0/render_mesh"].positions[2, 1] = value
+        raises(drape.ArgumentError, drape.Model, scene, says="/cloth/0/render_mesh: positions" + says)
+    raises(drape.ArgumentError, drape.Embedding, sim.model, x * 1e50, says="vertices[1, 0]: 2e+49 is not allowed; it must be finite and fit into single precision")
+    sim.advance(0.02)
+
+
 def test_meshes():
     """meshes come from arrays and from dictionaries of trimesh and meshio, and go there"""
     x, quads = [[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], [[0, 1, 2, 3]]
