@@ -8,11 +8,12 @@
  * that of the least of these runs.
  *
  *     cusick [--csv FILE] [--fabric NAME] [--membrane soft|fabric] [--rows N] [--columns N]
- *            [--onset K]
+ *            [--from N] [--to N] [--onset K]
  *         --fabric    run only this one
  *         --membrane  soft (default): stretch.cst with 100 N/m, as `drape validate cusick_measured`; fabric:
  *                     stretch.patch with the stiffnesses of the fabric, three times as expensive
  *         --rows, --columns  circles and nodes of each (default 13, 112)
+ *         --from, --to  numbers of waves at the start (default 4 to 11)
  *         --onset     friction_curvature [1/m] (default 10)
  */
 #include "bench.h"
@@ -26,10 +27,10 @@
 #define RAMP      1.0   /* [s] in which the weight grows */
 #define STEP      0.02  /* [s] */
 #define LONGEST   4.0   /* [s] */
-#define REST      3e-4  /* [m/s] the fastest node of a sheet at rest */
+#define REST      1e-4  /* [m/s] the fastest node of a sheet at rest, for a while: it may turn round */
+#define WHILE     3     /* tenths of a second */
 #define PROMINENT 0.1   /* of the range of heights of the rim: smaller waves are no folds */
-#define FIRST     4     /* waves at the start */
-#define LAST      11
+#define MOST      32    /* waves at the start */
 
 /* Moment of friction over bending rigidity, HB/B [1/m], of the source of the drape coefficients. */
 static const struct {
@@ -43,7 +44,7 @@ static const struct {
 typedef struct options {
     const char *fabric;
     bool soft;
-    int rows, columns;
+    int rows, columns, from, to;
     double onset;
 } options;
 
@@ -149,10 +150,11 @@ static result drape(const options *o, const char *fabric, double friction, int w
     const double start = drape_clock_cpu_seconds();
     result r = {.seeded = waves, .speed = INFINITY};
     seed(ctx, model, sim, waves);
-    for (int k = 1; r.speed > REST && k * 0.1 <= LONGEST; k++) {
+    for (int k = 1, quiet = 0; quiet < WHILE && k * 0.1 <= LONGEST; k++) {
         if (drape_sim_advance(sim, k * 0.1))
             bench_fail(ctx, "%s, %d waves", fabric, waves);
-        r.speed = k * 0.1 > RAMP ? fastest(model, sim) : INFINITY;
+        r.speed = fastest(model, sim);
+        quiet = k * 0.1 > RAMP && r.speed < REST ? quiet + 1 : 0;
     }
     const drape_energy e = drape_sim_energy(sim);
     const double *rim = drape_sim_positions(sim) + 3 * (size_t)(drape_model_node_count(model) - o->columns);
@@ -176,11 +178,12 @@ static int by_energy(const void *a, const void *b)
 static void test(const options *o, const drape_fabric *f, double friction, FILE *csv)
 {
     const char *sheet = friction > 0 ? "friction" : "elastic";
-    result of[LAST - FIRST + 1];
-    for (int n = FIRST; n <= LAST; n++)
-        of[n - FIRST] = drape(o, f->name, friction, n);
-    qsort(of, LAST - FIRST + 1, sizeof *of, by_energy);
-    for (int i = 0; i <= LAST - FIRST; i++) {
+    const int count = o->to - o->from + 1;
+    result of[MOST];
+    for (int i = 0; i < count; i++)
+        of[i] = drape(o, f->name, friction, o->from + i);
+    qsort(of, (size_t)count, sizeof *of, by_energy);
+    for (int i = 0; i < count; i++) {
         const result *r = &of[i];
         printf("%-24s %-8s %6d %5d %12.6f %8.4f %9.3f %7.1f%% %8.1e %5.1f %6.1f\n", f->name, sheet, r->seeded,
                r->found, 1e3 * r->energy, r->coefficient, f->drape, 100 * (r->coefficient / f->drape - 1),
@@ -198,11 +201,12 @@ static void test(const options *o, const drape_fabric *f, double friction, FILE 
 }
 
 #define USAGE                                                                                                \
-    "cusick [--csv FILE] [--fabric NAME] [--membrane soft|fabric] [--rows N] [--columns N] [--onset K]\n"
+    "cusick [--csv FILE] [--fabric NAME] [--membrane soft|fabric] [--rows N] [--columns N]\n"                \
+    "       [--from N] [--to N] [--onset K]\n"
 
 int main(int argc, char **argv)
 {
-    options o = {.soft = true, .rows = 13, .columns = 112, .onset = 10};
+    options o = {.soft = true, .rows = 13, .columns = 112, .from = 4, .to = 11, .onset = 10};
     const char *name = NULL;
     for (int i = 1; i < argc; i++) {
         const char *value = i + 1 < argc ? argv[i + 1] : "";
@@ -217,12 +221,18 @@ int main(int argc, char **argv)
             o.rows = atoi(value);
         else if (strcmp(argv[i], "--columns") == 0 && atoi(value) > 2)
             o.columns = atoi(value);
+        else if (strcmp(argv[i], "--from") == 0 && atoi(value) > 0)
+            o.from = atoi(value);
+        else if (strcmp(argv[i], "--to") == 0 && atoi(value) > 0)
+            o.to = atoi(value);
         else if (strcmp(argv[i], "--onset") == 0 && atof(value) > 0)
             o.onset = atof(value);
         else
             return bench_usage(argv[i], USAGE);
         i++;
     }
+    if (o.to < o.from || o.to - o.from >= MOST)
+        return bench_usage("", USAGE);
     FILE *csv = bench_csv(name, "fabric,sheet,membrane,rows,columns,onset,seeded,folds,energy_mj,coefficient,"
                                 "published,speed,time_s,cpu_s");
     printf("%-24s %-8s %6s %5s %12s %8s %9s %8s %8s %5s %6s\n", "fabric", "sheet", "seeded", "folds",
