@@ -181,8 +181,8 @@ typedef struct drape_pin_def {
     int32_t triangle;   /* of a collider that deforms: the triangle that carries them, in the order of its
                            file, from 0; -1: for each node the nearest one at t = 0 */
     double normal[3];   /* the nodes are held along this direction only: each stays in the plane across it
-                           through its start, as on rollers or in a symmetry plane; not with a track or
-                           attach. Default NaN: none */
+                           through its start, as on rollers or in a symmetry plane; a track moves the
+                           plane; not with turns or attach. Default NaN: none */
     double axis[3]; /* the nodes are held across this direction: each stays on a line along it, as on a rail;
                            not with a normal. Default NaN: none */
     const drape_turn_key *turns; /* the nodes turn about the pivot as one rigid body, and the track displaces

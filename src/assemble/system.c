@@ -30,7 +30,12 @@ struct drape_system {
     drape_drag_springs drag;
     double *push; /* (node_count x 3) [N], if pushed */
     bool pushed;
-    double *load; /* (node_count x 3) scratch, if the model has histories */
+    double *load;        /* (node_count x 3) scratch, if the model has histories */
+    double *held;        /* (node_count x 3) [N] the last forces on supports; NULL: none of them moves */
+    bool in_frame;       /* positions are in the frame of the supports, and the next of these are scratch: */
+    double frame_t;      /* [s] of the last evaluation there */
+    drape_state started; /* of a step, in the frame */
+    double *space[3];    /* (node_count x 3) what was given, in space: x, v, and further positions */
     drape_wind wind;
     const atomic_bool *cancel; /* NULL: there is no flag to watch */
 };
@@ -48,7 +53,13 @@ drape_status drape_system_create(drape_arena *arena, const drape_model *model, i
     system->push = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->push);
     if (model->history_count > 0)
         system->load = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->load);
-    drape_status status = drape_pool_create(arena, threads, &system->pool);
+    double **const moved[] = {&system->held,     &system->started.x, &system->started.v,
+                              &system->space[0], &system->space[1],  &system->space[2]};
+    for (size_t i = 0; model->supports_move && i < sizeof moved / sizeof *moved; i++)
+        *moved[i] = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof(double));
+    drape_status status = drape_arena_status(arena);
+    if (!status)
+        status = drape_pool_create(arena, threads, &system->pool);
     if (!status)
         status = drape_summer_create(arena, model, system->pool, &system->summer);
     if (!status)
@@ -145,6 +156,71 @@ void drape_system_add_loads(const drape_system *system, const double *x, double 
         g[i] -= system->push[i];
 }
 
+/* ---- The frame of the supports ---- */
+
+const drape_state *drape_system_to_frame(drape_system *system, const drape_state *in)
+{
+    const size_t bytes = 3 * (size_t)system->model->node_count * sizeof(double);
+    if (!system->model->supports_move)
+        return in;
+    system->in_frame = true;
+    system->frame_t = in->t;
+    system->started.t = in->t;
+    system->started.internal = in->internal;
+    memcpy(system->started.x, in->x, bytes);
+    memcpy(system->started.v, in->v, bytes);
+    drape_supports_displace(system->motion, in->t, -1, system->started.x);
+    drape_supports_project(system->motion, system->started.v);
+    return &system->started;
+}
+
+void drape_system_from_frame(drape_system *system, drape_state *out)
+{
+    if (system->in_frame && out)
+        drape_supports_displace(system->motion, out->t, 1, out->x);
+    system->in_frame = false;
+}
+
+/* Positions at time t in space, in one of the scratch arrays. */
+static const double *in_space(const drape_system *system, double t, const double *x, int scratch)
+{
+    if (!system->in_frame || !x)
+        return x;
+    memcpy(system->space[scratch], x, 3 * (size_t)system->model->node_count * sizeof *x);
+    drape_supports_displace(system->motion, t, 1, system->space[scratch]);
+    return system->space[scratch];
+}
+
+static drape_point point_in_space(const drape_system *system, const drape_point *given)
+{
+    drape_point point = *given;
+    if (!system->in_frame)
+        return point;
+    point.x = in_space(system, point.t, given->x, 0);
+    if (given->v) {
+        point.v = system->space[1];
+        memcpy(system->space[1], given->v, 3 * (size_t)system->model->node_count * sizeof *given->v);
+        drape_supports_add_velocity(system->motion, point.span, point.instant, system->space[1]);
+    }
+    return point;
+}
+
+double drape_system_support_work(const drape_system *system, const double *g, double t0, double t1)
+{
+    return drape_supports_work(system->motion, g ? g : system->held, t0, t1);
+}
+
+double drape_system_support_power(const drape_system *system, const double *g, double t)
+{
+    return drape_supports_power(system->motion, g ? g : system->held, t);
+}
+
+bool drape_system_is_driven(const drape_system *system)
+{
+    return system->motion->moved_count > 0 || system->model->collider_count > 0 ||
+           system->model->supports_move;
+}
+
 /* ---- Steps ---- */
 
 void drape_system_watch(drape_system *system, const atomic_bool *cancel)
@@ -168,7 +244,8 @@ bool drape_system_cancelled(drape_system *system)
 drape_status drape_system_begin(drape_system *system, const drape_state *in)
 {
     system->status = DRAPE_OK;
-    return system->contact ? drape_contact_begin(system->contact, in->x, in->v, in->t) : DRAPE_OK;
+    const double *x = in_space(system, in->t, in->x, 0);
+    return system->contact ? drape_contact_begin(system->contact, x, in->v, in->t) : DRAPE_OK;
 }
 
 drape_status drape_system_begin_reading(drape_system *system, const drape_state *at)
@@ -237,7 +314,9 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
 {
     for (int32_t i = 0; of_node && i < system->model->node_count; i++)
         of_node[i] = 1;
-    return system->contact ? drape_contact_step_fraction(system->contact, x, y, t, of_node) : 1;
+    return system->contact ? drape_contact_step_fraction(system->contact, in_space(system, t, x, 0),
+                                                         in_space(system, t, y, 2), t, of_node)
+                           : 1;
 }
 
 void drape_system_set_contact_step(drape_system *system, double dt)
@@ -255,7 +334,8 @@ void drape_system_sweep(drape_system *system, double t, double *y)
 bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,
                           drape_diagnostic *diagnostic)
 {
-    return system->contact && drape_contact_crosses(system->contact, x, t, reason, diagnostic);
+    return system->contact &&
+           drape_contact_crosses(system->contact, in_space(system, t, x, 0), t, reason, diagnostic);
 }
 
 void drape_system_expect(drape_system *system, double t1, bool may_relax)
@@ -294,7 +374,9 @@ double drape_system_take_contact_work(drape_system *system)
 drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,
                                         drape_diagnostic *diagnostic)
 {
-    return system->contact ? drape_contact_check(system->contact, x, t, reason, diagnostic) : DRAPE_OK;
+    return system->contact
+               ? drape_contact_check(system->contact, in_space(system, t, x, 0), t, reason, diagnostic)
+               : DRAPE_OK;
 }
 
 /* ---- The pattern ---- */
@@ -369,10 +451,11 @@ drape_status drape_system_leave_out(drape_system *system, const bool *terms)
     return DRAPE_OK;
 }
 
-drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed)
+drape_status drape_system_extend_pattern(drape_system *system, const drape_point *given, bool *changed)
 {
+    const drape_point point = point_in_space(system, given);
     *changed = false;
-    if (!evaluate_contact(system, point))
+    if (!evaluate_contact(system, &point))
         return system->status;
     if (drape_contact_is_in_pattern(system->contact, system->pattern))
         return DRAPE_OK;
@@ -396,34 +479,42 @@ static void evaluate_wind(drape_system *system, drape_request *want)
     want->wind_gradient = system->wind.gradient;
 }
 
+void drape_system_sum_forces(drape_system *system, const drape_point *given, const bool *without, double *g)
+{
+    const drape_point point = point_in_space(system, given);
+    drape_request want = {.point = &point, .conservative = true, .dissipative = true, .without = without};
+    system->frame_t = point.t;
+    drape_system_cancelled(system);
+    evaluate_wind(system, &want);
+    drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
+    drape_system_add_loads(system, point.x, g);
+    if (evaluate_contact(system, &point))
+        drape_contact_add_forces(system->contact, true, true, g);
+}
+
 void drape_system_force(drape_system *system, const drape_point *point, double *g)
 {
     drape_system_force_without(system, point, NULL, g);
 }
 
-/* The forces, also along the directions in which supports hold nodes. */
-static void add_up(drape_system *system, const drape_point *point, const bool *without, double *g)
-{
-    drape_request want = {.point = point, .conservative = true, .dissipative = true, .without = without};
-    drape_system_cancelled(system);
-    evaluate_wind(system, &want);
-    drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
-    drape_system_add_loads(system, point->x, g);
-    if (evaluate_contact(system, point))
-        drape_contact_add_forces(system->contact, true, true, g);
-}
-
 void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
                                 double *g)
 {
-    add_up(system, point, without, g);
-    drape_supports_project(system->motion, g);
+    drape_system_sum_forces(system, point, without, g);
+    drape_system_project_forces(system, g);
 }
 
 void drape_system_reactions(drape_system *system, const drape_point *point, double *g)
 {
-    add_up(system, point, NULL, g);
+    drape_system_sum_forces(system, point, NULL, g);
     drape_supports_keep_reactions(system->motion, g);
+}
+
+void drape_system_project_forces(drape_system *system, double *g)
+{
+    if (system->held)
+        memcpy(system->held, g, 3 * (size_t)system->model->node_count * sizeof *g);
+    drape_supports_project(system->motion, g);
 }
 
 void drape_system_project(const drape_system *system, double *nodes)
@@ -441,12 +532,13 @@ void drape_system_project_matrix(const drape_system *system, double *values)
     drape_supports_project_matrix(system->motion, system->pattern, values);
 }
 
-void drape_system_dissipation(drape_system *system, const drape_point *point, double *g)
+void drape_system_dissipation(drape_system *system, const drape_point *given, double *g)
 {
-    drape_request want = {.point = point, .dissipative = true};
+    const drape_point point = point_in_space(system, given);
+    drape_request want = {.point = &point, .dissipative = true};
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
-    if (evaluate_contact(system, point))
+    if (evaluate_contact(system, &point))
         drape_contact_add_forces(system->contact, false, true, g);
 }
 
@@ -475,10 +567,11 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     drape_system_jacobian_without(system, point, mass_weight, positive_share, NULL, values);
 }
 
-void drape_system_jacobian_without(drape_system *system, const drape_point *point, double mass_weight,
+void drape_system_jacobian_without(drape_system *system, const drape_point *given, double mass_weight,
                                    double positive_share, const bool *without, double *values)
 {
-    drape_request want = {.point = point,
+    const drape_point point = point_in_space(system, given);
+    drape_request want = {.point = &point,
                           .hessian = true,
                           .conservative = true,
                           .dissipative = true,
@@ -487,8 +580,8 @@ void drape_system_jacobian_without(drape_system *system, const drape_point *poin
     const drape_sums to = into_values(system, values);
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
-    if (evaluate_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight, point->contact, positive_share,
+    if (evaluate_contact(system, &point))
+        drape_contact_add_jacobian(system->contact, point.weight, point.contact, positive_share,
                                    system->pattern, values);
     drape_drag_springs_add_hessian(&system->drag, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
@@ -506,21 +599,23 @@ bool drape_system_is_symmetric(const drape_system *system)
     return !system->contact || drape_contact_is_symmetric(system->contact);
 }
 
-void drape_system_symmetrize(drape_system *system, const drape_point *point, double positive_share,
+void drape_system_symmetrize(drape_system *system, const drape_point *given, double positive_share,
                              double *values)
 {
-    if (evaluate_contact(system, point))
-        drape_contact_fix_friction(system->contact, point->weight, 1 - positive_share, system->pattern,
+    const drape_point point = point_in_space(system, given);
+    if (evaluate_contact(system, &point))
+        drape_contact_fix_friction(system->contact, point.weight, 1 - positive_share, system->pattern,
                                    values);
     drape_pattern_symmetrize(system->pattern, values);
     drape_system_project_matrix(system, values);
 }
 
-void drape_system_contact_remainder(drape_system *system, const drape_point *point, double *values)
+void drape_system_contact_remainder(drape_system *system, const drape_point *given, double *values)
 {
+    const drape_point point = point_in_space(system, given);
     memset(values, 0, (size_t)system->pattern->nonzeros * sizeof *values);
-    if (evaluate_contact(system, point))
-        drape_contact_add_remainder(system->contact, point->weight, system->pattern, values);
+    if (evaluate_contact(system, &point))
+        drape_contact_add_remainder(system->contact, point.weight, system->pattern, values);
 }
 
 bool drape_system_has_friction(const drape_system *system)
@@ -528,16 +623,18 @@ bool drape_system_has_friction(const drape_system *system)
     return system->contact && drape_contact_has_friction(system->contact);
 }
 
-void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *point, double *h)
+void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *given, double *h)
 {
+    const drape_point point = point_in_space(system, given);
     const drape_request want = {
-        .point = point, .hessian = true, .conservative = true, .dissipative = true, .positive_share = 1};
+        .point = &point, .hessian = true, .conservative = true, .dissipative = true, .positive_share = 1};
     drape_summer_pairs(system->summer, &system->model->terms[term], &want, h);
 }
 
-void drape_system_remainder(drape_system *system, const drape_point *point, double *values)
+void drape_system_remainder(drape_system *system, const drape_point *given, double *values)
 {
-    drape_request want = {.point = point,
+    const drape_point point = point_in_space(system, given);
+    drape_request want = {.point = &point,
                           .hessian = true,
                           .conservative = true,
                           .dissipative = true,
@@ -546,8 +643,8 @@ void drape_system_remainder(drape_system *system, const drape_point *point, doub
     const drape_sums to = into_values(system, values);
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
-    if (evaluate_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight, DRAPE_CONTACT_GAUSS_NEWTON, 1,
+    if (evaluate_contact(system, &point))
+        drape_contact_add_jacobian(system->contact, point.weight, DRAPE_CONTACT_GAUSS_NEWTON, 1,
                                    system->pattern, values);
 }
 
@@ -562,13 +659,14 @@ bool drape_system_has_remainder(const drape_system *system)
     return found;
 }
 
-void drape_system_damping(drape_system *system, const drape_point *point, double *values)
+void drape_system_damping(drape_system *system, const drape_point *given, double *values)
 {
-    drape_request want = {.point = point, .hessian = true, .velocity = true, .dissipative = true};
+    const drape_point point = point_in_space(system, given);
+    drape_request want = {.point = &point, .hessian = true, .velocity = true, .dissipative = true};
     const drape_sums to = into_values(system, values);
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
-    if (evaluate_contact(system, point))
+    if (evaluate_contact(system, &point))
         drape_contact_add_jacobian(system->contact, 0, DRAPE_CONTACT_VELOCITY, 0, system->pattern, values);
     drape_system_project_matrix(system, values);
 }
@@ -743,19 +841,21 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
         drape_summer_add_term(system->summer, t, &want, &to, energy);
 }
 
-void drape_system_measures(drape_system *system, const drape_point *point, double *q)
+void drape_system_measures(drape_system *system, const drape_point *given, double *q)
 {
+    const drape_point point = point_in_space(system, given);
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         if (term->ops->measure)
-            drape_summer_measure(system->summer, term, point, q + term->first_measure);
+            drape_summer_measure(system->summer, term, &point, q + term->first_measure);
     }
 }
 
-void drape_system_stress(drape_system *system, const drape_point *point, const double *along, double *stress)
+void drape_system_stress(drape_system *system, const drape_point *given, const double *along, double *stress)
 {
+    const drape_point point = point_in_space(system, given);
     const drape_request want = {
-        .point = point, .conservative = true, .dissipative = along, .along = along, .stress = stress};
+        .point = &point, .conservative = true, .dissipative = along, .along = along, .stress = stress};
     drape_summer_stress(system->summer, &want);
 }
 
@@ -776,9 +876,11 @@ static drape_diagnostic diagnose_element(const drape_term *term, const drape_fau
     return diagnostic;
 }
 
-drape_status drape_system_check(const drape_system *system, const double *x, const double *before,
+drape_status drape_system_check(const drape_system *system, const double *given, const double *given_before,
                                 const double *internal, const char **reason, drape_diagnostic *diagnostic)
 {
+    const double *x = in_space(system, system->frame_t, given, 0),
+                 *before = in_space(system, system->frame_t, given_before, 2);
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         drape_fault fault;
@@ -795,9 +897,11 @@ drape_status drape_system_check(const drape_system *system, const double *x, con
     return DRAPE_OK;
 }
 
-bool drape_system_breaks_limit(const drape_system *system, const double *x, const double *before,
+bool drape_system_breaks_limit(const drape_system *system, const double *given, const double *given_before,
                                const double *internal)
 {
+    const double *x = in_space(system, system->frame_t, given, 0),
+                 *before = in_space(system, system->frame_t, given_before, 2);
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         drape_fault fault;

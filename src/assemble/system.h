@@ -58,6 +58,22 @@ drape_pool *drape_system_pool(const drape_system *system);
 void drape_system_set_drag_springs(drape_system *system, const drape_drag_springs *springs);
 const drape_drag_springs *drape_system_drag_springs(const drape_system *system);
 
+/* Integrators step in the frame that moves with the supports of nodes (model/support.h), in which these rest:
+ * x - u(t) in place of x, v - u' in place of v. drape_system_to_frame enters it with the state from which a
+ * step begins: from then on functions of the system take positions and velocities in that frame, until
+ * drape_system_from_frame, which brings the positions that the step led to back to space, unless out is
+ * NULL. Velocities there are left without u'. If no support moves it returns `in`. */
+const drape_state *drape_system_to_frame(drape_system *system, const drape_state *in);
+void drape_system_from_frame(drape_system *system, drape_state *out);
+
+/* The work of supports that move from t0 to t1 [J], and their power at time t [W], against forces g
+ * (node_count x 3); NULL: against those of the last evaluation of forces. */
+double drape_system_support_work(const drape_system *system, const double *g, double t0, double t1);
+double drape_system_support_power(const drape_system *system, const double *g, double t);
+
+/* Whether some of the forces of pins, supports and colliders do work. */
+bool drape_system_is_driven(const drape_system *system);
+
 /* Where pins and colliders are: on the tracks of the model, or on paths set by the host. */
 const drape_motion *drape_system_motion(const drape_system *system);
 drape_motion *drape_system_steer(drape_system *system);
@@ -148,15 +164,19 @@ drape_status drape_system_status(const drape_system *system);
  * supports hold nodes (model/support.h). */
 void drape_system_force(drape_system *system, const drape_point *point, double *g);
 
-/* The same without the terms marked in `without` (term_count), for callers that sum those themselves. */
+/* The same without the terms marked in `without` (term_count; NULL: none), for callers that sum those
+ * themselves; drape_system_sum_forces: also along these directions. */
 void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
                                 double *g);
+void drape_system_sum_forces(drape_system *system, const drape_point *point, const bool *without, double *g);
 
 /* The forces of pins and supports (node_count x 3), with the sign of g; 0 at nodes that are free. */
 void drape_system_reactions(drape_system *system, const drape_point *point, double *g);
 
 /* The projections of model/support.h, for callers that add forces and matrices of their own. */
 void drape_system_project(const drape_system *system, double *nodes);
+/* The same of forces, of which those on supports are kept for drape_system_support_work. */
+void drape_system_project_forces(drape_system *system, double *g);
 void drape_system_project_free(const drape_system *system, double *free_nodes);
 void drape_system_project_matrix(const drape_system *system, double *values);
 
@@ -248,8 +268,9 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
                        double *g, double *values);
 
 /* Searches all terms for an element that a step made degenerate. Returns DRAPE_OK, or
- * DRAPE_RETRY_DEGENERATE with *reason and *diagnostic filled in. x is the new state; before and internal
- * belong to the previous one. before NULL: reports elements that were degenerate already, too. */
+ * DRAPE_RETRY_DEGENERATE with *reason and *diagnostic filled in. x is the new state; before and
+ * internal belong to the previous one. In the frame of supports both are at the time of the last evaluation.
+ * before NULL: reports elements that were degenerate already, too. */
 drape_status drape_system_check(const drape_system *system, const double *x, const double *before,
                                 const double *internal, const char **reason, drape_diagnostic *diagnostic);
 

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #define MAX_FACTOR 1e9
+#define LEAST_RAMP 1e-9 /* [s] steps that follow shorter ones would be refused as too small */
 #define MAX_SLOPE  1e30 /* [1/s] between two keys, so that no number of a cubic overflows */
 
 static drape_status refuse(drape_model *model, const char *pointer, const char *key, size_t index,
@@ -145,6 +146,11 @@ drape_status drape_compile_history_of(drape_model *model, const char *pointer, c
         return find_named(model, at, name, term);
     if (!(rise > 0))
         return DRAPE_OK;
+    if (rise < LEAST_RAMP) {
+        snprintf(at, sizeof at, "%s/ramp", pointer);
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
+                             "%g s is too short; ramp is 0 or at least %g s", rise, LEAST_RAMP);
+    }
     const double times[] = {0, rise}, values[] = {0, 1};
     drape_status status = add(model, "", 2, times, values, true);
     if (!status) {

@@ -3,6 +3,7 @@
 #include "base/vec3.h"
 #include "compile/select.h"
 #include "compile/stages.h"
+#include "model/track.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -10,6 +11,14 @@
 
 #define PARALLEL                                                                                             \
     1e-6 /* the part of a unit direction that lies along others, below which it adds nothing to them */
+
+/* How pins with directions hold a node. */
+typedef struct holding {
+    int count;              /* of directions */
+    double direction[3][3]; /* of length 1, at right angles */
+    double normal[3][3];    /* of the pins, of length 1 */
+    int32_t track[3];       /* of the pins; -1: fixed */
+} holding;
 
 /* One pin under construction: its place in the scene, and the cloth that it pins. */
 typedef struct pin_place {
@@ -23,8 +32,7 @@ typedef struct pin_place {
     uint8_t *held;          /* (node_count) 1: held by this pin */
     int count;              /* of the directions in which this pin holds its nodes; 0: in all */
     double direction[2][3];
-    int32_t *directions; /* (node_count) in which pins with directions hold a node, at most 3 */
-    double *all;         /* (node_count x 2 x 3) the first two of them */
+    holding *all; /* (node_count) by pins with directions */
 } pin_place;
 
 static drape_status refuse(const pin_place *pin, const char *key, const char *text)
@@ -35,18 +43,33 @@ static drape_status refuse(const pin_place *pin, const char *key, const char *te
 }
 
 /* What of a direction the others of a node do not hold already: planes that meet at a node leave it a line,
- * and three of them nothing. */
-static void add_direction(const double *direction, int32_t *count, double *all)
+ * and three of them nothing. False if pins that move differently hold
+ * the node along one direction. */
+static bool add_direction(const double *direction, int32_t track, holding *all)
 {
     double n[3] = {direction[0], direction[1], direction[2]};
-    for (int32_t i = 0; i < *count && i < 2; i++)
-        vec3_add_scaled(-vec3_dot(all + 3 * i, n), all + 3 * i, n);
+    bool same = true;
+    for (int i = 0; i < all->count; i++) {
+        /* with the others at right angles only those along it matter */
+        same = same && (all->track[i] == track || fabs(vec3_dot(all->normal[i], direction)) <= PARALLEL);
+        vec3_add_scaled(-vec3_dot(all->direction[i], n), all->direction[i], n);
+    }
     const double length = vec3_norm(n);
-    if (*count == 3 || !(length > PARALLEL))
-        return;
-    for (int k = 0; k < 3 && *count < 2; k++)
-        all[3 * *count + k] = n[k] / length;
-    ++*count;
+    if (all->count == 3 || !(length > PARALLEL))
+        return same;
+    for (int k = 0; k < 3; k++)
+        all->direction[all->count][k] = n[k] / length;
+    memcpy(all->normal[all->count], direction, 3 * sizeof *direction);
+    all->track[all->count++] = track;
+    return true;
+}
+
+static drape_status refuse_motions(const pin_place *pin, const char *key, int32_t local)
+{
+    char text[128];
+    snprintf(text, sizeof text, "node %d is held along one direction by pins that move differently",
+             (int)local);
+    return refuse(pin, key, text);
 }
 
 static drape_status take_node(void *user, const char *key, int32_t local)
@@ -55,7 +78,8 @@ static drape_status take_node(void *user, const char *key, int32_t local)
     int32_t node = pin->cloth->first_node + local;
     if (pin->count > 0) {
         for (int i = 0; i < pin->count && !pin->held[node]; i++)
-            add_direction(pin->direction[i], &pin->directions[node], pin->all + 6 * (size_t)node);
+            if (!add_direction(pin->direction[i], pin->track, &pin->all[node]))
+                return refuse_motions(pin, key, local);
         pin->clamped[node] |= pin->def->clamp;
         pin->held[node] = 1;
         return DRAPE_OK;
@@ -118,10 +142,10 @@ static drape_status find_directions(pin_place *pin)
     pin->count = normal ? 1 : line ? 2 : 0;
     if (normal && line)
         return refuse(pin, "/axis", "a pin has a normal or an axis, not both");
-    if (pin->count > 0 && (def->key_count > 0 || def->turn_count > 0 || def->attach))
+    if (pin->count > 0 && (def->turn_count > 0 || def->attach))
         return refuse(pin, normal ? "/normal" : "/axis",
-                      "a pin that holds its nodes in some directions only does not move: it has no "
-                      "track, turns or attach");
+                      "a pin that holds its nodes in some directions only may have a track, but no "
+                      "turns and no attach");
     if ((normal && vec3_norm(n) == 0) || (line && vec3_norm(axis) == 0))
         return refuse(pin, normal ? "/normal" : "/axis", "0 0 0 has no direction");
     if (!line)
@@ -243,21 +267,118 @@ static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, p
     return status;
 }
 
-/* Nodes that are held in three directions are pinned. The others that have directions are free nodes with
- * supports, unless another pin holds them altogether. */
+/* Duals of the normals: dual[i] . normal[j] = 1 if i = j, else 0, spanning the same. Normals at right angles
+ * are their own. */
+static void find_duals(const holding *all, double dual[3][3])
+{
+    memcpy(dual, all->normal, sizeof all->normal);
+    if (all->count == 1)
+        return;
+    for (int i = 0; i < all->count; i++) {
+        const double *b = all->normal[(i + 1) % all->count];
+        double own[3] = {all->normal[i][0], all->normal[i][1], all->normal[i][2]};
+        if (all->count == 2)
+            vec3_add_scaled(-vec3_dot(b, own), b, own);
+        else
+            vec3_cross(b, all->normal[(i + 2) % 3], own);
+        const double scale = vec3_dot(own, all->normal[i]);
+        for (int k = 0; k < 3; k++)
+            dual[i][k] = own[k] / scale;
+    }
+}
+
+static bool moves(const holding *all)
+{
+    bool found = false;
+    for (int i = 0; i < all->count; i++)
+        found = found || all->track[i] >= 0;
+    return found;
+}
+
+/* The displacement of a node that is held in three directions, at a time; and the first key of these after
+ * it: INFINITY if there is none. */
+static double displace(const drape_model *model, const holding *all, double t, double d[3])
+{
+    double next = INFINITY, dual[3][3];
+    find_duals(all, dual);
+    memset(d, 0, 3 * sizeof *d);
+    for (int i = 0; i < 3; i++) {
+        if (all->track[i] < 0)
+            continue;
+        const drape_track *track = &model->tracks[all->track[i]];
+        double by[3];
+        drape_track_displacement(track->keys, track->key_count, t, by);
+        vec3_add_scaled(vec3_dot(all->normal[i], by), dual[i], d);
+        for (size_t k = track->key_count; k-- > 0 && track->keys[k].time > t;)
+            next = fmin(next, track->keys[k].time);
+    }
+    return next;
+}
+
+/* The track of such a node: piecewise linear between the keys of all its tracks. */
+static drape_status join_tracks(drape_model *model, const holding *all, drape_track *track)
+{
+    double d[3];
+    for (double t = displace(model, all, -INFINITY, d); t < INFINITY; t = displace(model, all, t, d))
+        track->key_count++;
+    track->keys = drape_arena_take(&model->arena, track->key_count, sizeof *track->keys);
+    if (!track->keys)
+        return DRAPE_E_MEMORY;
+    double t = displace(model, all, -INFINITY, d);
+    for (size_t k = 0; k < track->key_count; k++) {
+        track->keys[k].time = t;
+        t = displace(model, all, t, track->keys[k].displacement);
+    }
+    return DRAPE_OK;
+}
+
+/* Nodes that are held in three directions are pinned: with a track, if one of them moves. */
+static drape_status pin_held(drape_model *model, const pin_place *pin)
+{
+    int32_t count = 0;
+    for (int32_t i = 0; i < model->node_count; i++) {
+        count += pin->all[i].count == 3 && !model->pinned[i] && moves(&pin->all[i]);
+        if (pin->all[i].count == 3 && !moves(&pin->all[i]))
+            model->pinned[i] = 1;
+    }
+    if (count == 0)
+        return DRAPE_OK;
+    const drape_track *before = model->tracks;
+    model->tracks =
+        drape_arena_take(&model->arena, (size_t)(model->track_count + count), sizeof *model->tracks);
+    if (!model->tracks)
+        return DRAPE_E_MEMORY;
+    memcpy(model->tracks, before, (size_t)model->track_count * sizeof *before);
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; !status && i < model->node_count; i++)
+        if (pin->all[i].count == 3 && !model->pinned[i]) {
+            model->pinned[i] = 1;
+            pin->track_of_node[i] = model->track_count++;
+            status = join_tracks(model, &pin->all[i], &model->tracks[pin->track_of_node[i]]);
+        }
+    return status;
+}
+
+/* The other nodes that have directions are free nodes with supports, unless another pin holds them
+ * altogether. */
 static drape_status list_supports(drape_model *model, const pin_place *pin)
 {
     for (int pass = 0; pass < 2; pass++) {
         int32_t count = 0;
         for (int32_t i = 0; i < model->node_count; i++) {
-            if (pin->directions[i] == 3)
-                model->pinned[i] = 1;
-            if (pin->directions[i] == 0 || model->pinned[i])
+            const holding *all = &pin->all[i];
+            if (all->count == 0 || model->pinned[i])
                 continue;
             if (pass == 1) {
                 drape_support *to = &model->supports[count];
-                *to = (drape_support){.node = i, .count = pin->directions[i]};
-                memcpy(to->direction, pin->all + 6 * (size_t)i, sizeof to->direction);
+                double dual[3][3];
+                *to = (drape_support){.node = i, .count = all->count};
+                memcpy(to->direction, all->direction, sizeof to->direction);
+                memcpy(to->normal, all->normal, sizeof to->normal);
+                memcpy(to->track, all->track, sizeof to->track);
+                find_duals(all, dual);
+                memcpy(to->dual, dual, sizeof to->dual);
+                model->supports_move |= moves(all);
             }
             count++;
         }
@@ -327,18 +448,15 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
     int32_t *track_of_node = drape_arena_take(&scratch, nodes, sizeof *track_of_node);
     uint8_t *clamped = drape_arena_take(&scratch, nodes, sizeof *clamped);
     uint8_t *held = drape_arena_take(&scratch, nodes, sizeof *held);
-    int32_t *directions = drape_arena_take(&scratch, nodes, sizeof *directions);
-    double *all = drape_arena_take(&scratch, nodes, 6 * sizeof *all);
+    holding *all = drape_arena_take(&scratch, nodes, sizeof *all);
     drape_status status = drape_arena_status(&model->arena) ? DRAPE_E_MEMORY : drape_arena_status(&scratch);
     if (!status) {
         memset(track_of_node, 0xff, nodes * sizeof *track_of_node); /* all -1 */
-        pin_place pin = {.model = model,
-                         .track_of_node = track_of_node,
-                         .clamped = clamped,
-                         .held = held,
-                         .directions = directions,
-                         .all = all};
+        pin_place pin = {
+            .model = model, .track_of_node = track_of_node, .clamped = clamped, .held = held, .all = all};
         status = pin_cloths(model, def, &pin);
+        if (!status)
+            status = pin_held(model, &pin);
         if (!status)
             status = list_supports(model, &pin);
         if (!status)

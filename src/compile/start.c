@@ -17,6 +17,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#define SAME_MESH                                                                                            \
+    "; remedy: move the vertices of that mesh and write it again, with vertices and faces in the same order"
+
 #define RADIANS (3.14159265358979323846 / 180)
 
 /* ---- Positions ---- */
@@ -30,17 +33,18 @@ static drape_status take_file(drape_model *model, const char *pointer, const cha
     drape_mesh read = {0};
     drape_status status = drape_mesh_read(model->ctx, place, folder, def->file, &read);
     if (!status && (read.node_count != mesh->node_count || read.triangle_count != mesh->triangle_count))
-        status = drape_mesh_fail(
-            model->ctx, &source, 0, "%d nodes and %d triangles; the mesh of the cloth has %d and %d",
-            (int)read.node_count, (int)read.triangle_count, (int)mesh->node_count, (int)mesh->triangle_count);
+        status = drape_mesh_fail(model->ctx, &source, 0,
+                                 "%d nodes and %d triangles; the mesh of the cloth has %d and %d" SAME_MESH,
+                                 (int)read.node_count, (int)read.triangle_count, (int)mesh->node_count,
+                                 (int)mesh->triangle_count);
     const bool same = !status && drape_faces_same(&read, mesh);
     for (int32_t t = 0; !status && !same && t < mesh->triangle_count; t++) {
         const int32_t *a = read.triangle + 3 * (size_t)t, *b = mesh->triangle + 3 * (size_t)t;
         if (memcmp(a, b, 3 * sizeof *a) != 0)
             status = drape_mesh_fail(
                 model->ctx, &source, 0,
-                "triangle %d has the nodes %d %d %d; in the mesh of the cloth it has %d %d %d", (int)t,
-                (int)a[0], (int)a[1], (int)a[2], (int)b[0], (int)b[1], (int)b[2]);
+                "triangle %d has the nodes %d %d %d; in the mesh of the cloth it has %d %d %d" SAME_MESH,
+                (int)t, (int)a[0], (int)a[1], (int)a[2], (int)b[0], (int)b[1], (int)b[2]);
     }
     if (!status)
         memcpy(x, read.x, 3 * (size_t)mesh->node_count * sizeof *x);

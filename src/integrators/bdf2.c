@@ -93,7 +93,7 @@ static void remember(bdf2_state *s, const drape_state *in, const drape_state *ou
     }
     if (!c->history)
         return;
-    drape_implicit_measure(c, &(drape_state){.x = out->x, .internal = in->internal}, s->made.dq);
+    drape_implicit_measure(c, &(drape_state){.t = out->t, .x = out->x, .internal = in->internal}, s->made.dq);
     for (int64_t i = 0; i < c->equation.model->measure_count; i++)
         s->made.dq[i] -= s->q0[i];
 }

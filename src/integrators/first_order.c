@@ -247,10 +247,12 @@ static void measure_powers(drape_first_order *s, double t, double powers[2])
         drape_system_dissipation(s->system, &point, s->dissipated);
         for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
             powers[0] += s->dissipated[i] * s->v[i];
+        powers[0] += drape_system_support_power(s->system, s->dissipated, (s->span[0] + s->span[1]) / 2);
         powers[0] += collider_power(s, t, drape_system_on_colliders(s->system));
     }
-    if (motion->moved_count > 0 || m->collider_count > 0)
+    if (drape_system_is_driven(s->system))
         drape_system_force(s->system, &point, s->g);
+    powers[1] += drape_system_support_power(s->system, NULL, (s->span[0] + s->span[1]) / 2);
     powers[1] += collider_power(s, t, drape_system_on_colliders(s->system));
     for (int32_t i = 0; i < motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {

@@ -87,8 +87,8 @@ void drape_implicit_backward_euler(drape_implicit *s, const drape_state *in, dou
 void drape_implicit_measure(drape_implicit *s, const drape_state *state, double *q)
 {
     if (s->history)
-        drape_system_measures(s->equation.system, &(drape_point){.x = state->x, .internal = state->internal},
-                              q);
+        drape_system_measures(s->equation.system,
+                              &(drape_point){.x = state->x, .internal = state->internal, .t = state->t}, q);
 }
 
 drape_status drape_implicit_solve(drape_implicit *s, drape_step_info *info)
@@ -138,6 +138,7 @@ void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_
             size_t at = 3 * (size_t)s->motion->moved_node[i] + k;
             pin_work += e->g[at] * (out->x[at] - in->x[at]);
         }
+    pin_work += drape_system_support_work(e->system, NULL, in->t, out->t);
     info->pin_work += pin_work + drape_implicit_collider_work(s, in->t, out->t);
     info->residual_work += fmax(drape_step_equation_dot(e, e->f, s->d), 0);
     if (!s->dissipated)
@@ -146,6 +147,7 @@ void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_
     drape_system_dissipation(e->system, &e->point, s->dissipated);
     for (size_t i = 0; i < e->nodes; i++)
         info->dissipated += s->dissipated[i] * (out->x[i] - in->x[i]);
+    info->dissipated += drape_system_support_work(e->system, s->dissipated, in->t, out->t);
     info->dissipated += drape_implicit_collider_work(s, in->t, out->t);
 }
 
@@ -169,8 +171,9 @@ void drape_implicit_audit_stage(drape_implicit *s, const double *from, const dou
 {
     drape_step_equation *e = &s->equation;
     const drape_point middle = middle_of(e, from, to, t, span);
-    if (s->motion->moved_count > 0 || e->model->collider_count > 0)
+    if (drape_system_is_driven(e->system))
         drape_system_force(e->system, &middle, g);
+    info->pin_work += drape_system_support_work(e->system, NULL, t, t + span);
     info->pin_work += drape_implicit_collider_work(s, t, t + span);
     for (int32_t i = 0; i < s->motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
@@ -190,6 +193,7 @@ void drape_implicit_audit_dissipation(drape_implicit *s, const double *from, con
     drape_system_dissipation(e->system, &middle, s->dissipated);
     for (size_t i = 0; i < e->nodes; i++)
         info->dissipated += s->dissipated[i] * (to[i] - from[i]);
+    info->dissipated += drape_system_support_work(e->system, s->dissipated, t, t + span);
     info->dissipated += drape_implicit_collider_work(s, t, t + span);
 }
 

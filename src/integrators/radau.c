@@ -519,12 +519,14 @@ static void add_work(radau_state *s, const drape_point *point, double h, drape_s
         double power = collider_power(s, point->t, drape_system_on_colliders(s->system));
         for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
             power += s->dissipated[i] * s->v[i];
+        power += drape_system_support_power(s->system, s->dissipated, (s->span[0] + s->span[1]) / 2);
         info->dissipated += h * power;
     }
-    if (motion->moved_count == 0 && m->collider_count == 0)
+    if (!drape_system_is_driven(s->system))
         return;
     drape_system_force(s->system, point, s->g);
-    double power = collider_power(s, point->t, drape_system_on_colliders(s->system));
+    double power = drape_system_support_power(s->system, NULL, (s->span[0] + s->span[1]) / 2);
+    power += collider_power(s, point->t, drape_system_on_colliders(s->system));
     for (int32_t i = 0; i < motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)motion->moved_node[i] + k;

@@ -105,7 +105,8 @@ static double power(const rosenbrock_state *s, const double *g)
 {
     const drape_step_equation *e = &s->common.equation;
     const drape_motion *m = s->common.motion;
-    double sum = collider_power(s, drape_system_on_colliders(e->system));
+    double sum = drape_system_support_power(e->system, NULL, (e->point.span[0] + e->point.span[1]) / 2);
+    sum += collider_power(s, drape_system_on_colliders(e->system));
     for (int32_t i = 0; i < m->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             const size_t at = 3 * (size_t)m->moved_node[i] + k;
@@ -354,9 +355,8 @@ static void add_dissipated(rosenbrock_state *s, const drape_state *in, const dra
 static drape_status add_moved(rosenbrock_state *s, const drape_state *in, double h, drape_step_info *info)
 {
     const drape_rosenbrock_scheme *scheme = &drape_rosenbrock_rodas;
-    const drape_motion *m = s->common.motion;
     double weights[DRAPE_ROSENBROCK_STAGES], ahead = 0;
-    if (m->moved_count == 0 && m->model->collider_count == 0)
+    if (!drape_system_is_driven(s->common.equation.system))
         return DRAPE_OK;
     for (int i = 0; i < scheme->stages; i++) {
         weights[i] = ALONG * scheme->b[i];
@@ -375,7 +375,8 @@ static drape_status add_moved(rosenbrock_state *s, const drape_state *in, double
 static bool depends_on_time(const rosenbrock_state *s)
 {
     const drape_motion *m = s->common.motion;
-    bool moved = m->moved_count > 0 || drape_system_has_wind(s->common.equation.system) ||
+    bool moved = m->moved_count > 0 || m->model->supports_move ||
+                 drape_system_has_wind(s->common.equation.system) ||
                  drape_system_is_timed(s->common.equation.system);
     for (int32_t c = 0; !moved && c < m->model->collider_count; c++)
         moved = drape_motion_moves_collider(m, c);

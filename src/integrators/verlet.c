@@ -30,6 +30,7 @@
 #include "base/reason.h"
 #include "base/vec3.h"
 #include "integrators/stability.h"
+#include "model/support.h"
 
 #include <string.h>
 
@@ -232,10 +233,18 @@ static void audit_dissipation(verlet_state *s, const substep *sub, double share,
 
 /* ---- The stages of a substep ---- */
 
+/* Along the directions that moving supports hold, nodes have the mean velocity of these over the substep. */
+static void carry(const verlet_state *s, const substep *sub)
+{
+    if (s->model->supports_move)
+        drape_supports_hold_velocity(s->motion, (const double[]){sub->t0, sub->t}, false, sub->v);
+}
+
 /* Moving pins get their mean velocity over the substep. */
 static void start_pins(verlet_state *s, const substep *sub)
 {
     const drape_motion *m = s->motion;
+    carry(s, sub);
     if (m->moved_count == 0)
         return;
     drape_motion_place_pins(m, sub->t, s->pins);
@@ -246,7 +255,7 @@ static void start_pins(verlet_state *s, const substep *sub)
         }
 }
 
-/* Adds the work of moving pins against g over a share of the substep. */
+/* Adds the work of moving pins and supports against g over a share of the substep. */
 static void audit_pins(verlet_state *s, const substep *sub, const double *g, double share)
 {
     const drape_motion *m = s->motion;
@@ -255,6 +264,7 @@ static void audit_pins(verlet_state *s, const substep *sub, const double *g, dou
             size_t at = 3 * (size_t)m->moved_node[i] + k;
             sub->info->pin_work += share * g[at] * sub->v[at] * sub->h;
         }
+    sub->info->pin_work += share * drape_system_support_work(s->system, NULL, sub->t0, sub->t);
 }
 
 static void damp(verlet_state *s, const substep *sub)
@@ -263,6 +273,8 @@ static void damp(verlet_state *s, const substep *sub)
     double taken = 0;
     if (s->keep == 1)
         return;
+    if (m->supports_move)
+        drape_system_project(s->system, sub->v); /* what supports move is not damped */
     for (int32_t f = 0; f < m->free_count; f++) {
         double *v = sub->v + 3 * (size_t)m->node_of_free[f];
         taken += m->mass[m->node_of_free[f]] * vec3_dot(v, v);
@@ -287,6 +299,7 @@ LANES_DISPATCH static void move_all(size_t n, double w, double h, const double *
 /* Moving pins go to their positions at the end of the substep. */
 static void move(const verlet_state *s, const substep *sub, double w)
 {
+    carry(s, sub);
     move_all(3 * (size_t)s->model->node_count, w, sub->h, s->inverse, s->g, sub->v, sub->x, s->x0);
     drape_motion_place_pins(s->motion, sub->t, sub->x);
 }
@@ -313,6 +326,8 @@ static void project(verlet_state *s, const substep *sub)
     sub->info->pin_work += drape_verlet_project(&s->contact, sub->t0, sub->t, sub->h, s->x0, sub->x);
     if (s->limit.count > 0)
         drape_verlet_limit_lengths(&s->limit, sub->x);
+    if (m->supports_move)
+        drape_supports_hold(s->motion, sub->t0, s->x0, sub->t, sub->x);
     take_velocities(3 * (size_t)m->node_count, sub->h, s->inverse, sub->x, s->x0, sub->v);
     s->work.contact_seconds += drape_clock_seconds() - start;
 }
@@ -508,6 +523,7 @@ const drape_integrator_ops drape_integrator_verlet = {
     .order = 2,
     .create = create,
     .projects_contact = true,
+    .in_space = true,
     .step = step,
     .restart = restart,
     .stability = stability,

@@ -103,7 +103,7 @@ static drape_status sum_linear(drape_context *ctx, drape_verlet_force *f)
         f->has_rest = f->has_rest || (has_forces(&m->terms[i]) && !f->summed[i]);
     }
     if (!status) {
-        drape_system_force_without(f->system, &(drape_point){.x = m->rest, .v = v}, others, g);
+        drape_system_sum_forces(f->system, &(drape_point){.x = m->rest, .v = v}, others, g);
         planes_from((size_t)m->node_count, g, f->constant);
     }
     drape_arena_free(&arena);
@@ -173,11 +173,11 @@ void drape_verlet_force_sum(drape_verlet_force *f, const drape_point *point, dou
         sum_runs(f->runs, f->run_count, f->x, n, f->g);
     }
     if (f->has_rest) {
-        drape_system_force_without(f->system, point, f->summed, g);
+        drape_system_sum_forces(f->system, point, f->summed, g);
         planes_add_to(n, f->g, g);
     } else {
         planes_to(n, f->g, g);
         drape_system_add_loads(f->system, point->x, g);
     }
-    drape_system_project(f->system, g);
+    drape_system_project_forces(f->system, g);
 }

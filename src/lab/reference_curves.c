@@ -1,5 +1,6 @@
-/* reference_curves.c: virtual tests of stretch.curve, whose measured curves they must give back: a strip of
- * a fabric of the table that is pulled along the warp, and a sheet that is sheared as by KES-FB1. */
+/* reference_curves.c: virtual tests of membranes: those of stretch.curve, whose measured curves they must
+ * give back, a strip of a fabric of the table that is pulled along the warp and a sheet that is sheared as
+ * by KES-FB1; and a sheet of stretch.cst that is drawn out between rollers. */
 #include "compile/fabrics.h"
 #include "lab/strip.h"
 
@@ -69,6 +70,35 @@ DRAPE_REFERENCE(curve_tension, .entry.summary = "force per width of a strip pull
                 .parameter = "strain", DRAPE_CASES(0.01, 0.03, 0.06, 0.1, 0.125, 0.15),
                 .model = "stretch.curve; irregular", .tolerance = 0.01, .expected = law, .scene = pulled,
                 .measure = measure_pull);
+
+/* ---- Tension between rollers: a plane that moves, whose nodes are free to come nearer to each other ----
+ *
+ * The strain is the same everywhere. Without a stress across, S = E (e + e^2/2) along, whatever nu is, by the
+ * Green strain; the force is S (1 + e) h per width at rest. */
+
+static double uniaxial(double strain)
+{
+    return 100 * (strain + strain * strain / 2) * (1 + strain);
+}
+
+static int drawn(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return snprintf(
+        text, DRAPE_LAB_TEXT,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 5, 'rows': 5, 'width': %g, "
+        "'height': %g},\n 'material': {'young_modulus': 1e5, 'poisson_ratio': 0.3, 'thickness': 1e-3, "
+        "'areal_density': 0.2}, 'terms': ['stretch.cst'],\n 'pins': [{'edge': 'left', 'normal': [1, 0, 0]}, "
+        "{'edge': 'right', 'normal': [1, 0, 0], 'track': [[0, [0, 0, 0]], [1, [%.17g, 0, 0]]]}, "
+        "{'corner': 'top-left', 'normal': [0, 0, 1]}, {'box': [[-1, -1, -1], [1, 1, 1]], 'normal': [0, 1, "
+        "0]}]}],\n 'gravity': [0, 0, 0], 'integrator': {'method': 'static', 'tolerance': 1e-10}, 'duration': "
+        "1}",
+        SIDE, SIDE, SIDE * c->parameter);
+}
+
+DRAPE_REFERENCE(roller_tension, .entry.summary = "force per width of a sheet drawn out between rollers",
+                .unit = "N/m", .entry.reference = "uniaxial tension, Green strain", .parameter = "strain",
+                DRAPE_CASES(0.01, 0.1, 0.3), .model = "stretch.cst; irregular", .tolerance = 1e-6,
+                .expected = uniaxial, .scene = drawn, .measure = measure_pull);
 
 /* ---- Shear, as KES-FB1 measures it: one edge moves along itself while a force W per length holds the sheet
  * taut ----

@@ -183,6 +183,19 @@ static void join_fans(const drape_mesh *mesh, int32_t *parent)
     }
 }
 
+/* Whether the triangles have different nodes at one place. */
+static bool is_doubled(const drape_mesh *mesh, int32_t a, int32_t b, int32_t twin[2])
+{
+    for (int i = 0; i < 9; i++) {
+        twin[0] = mesh->triangle[3 * (size_t)a + (size_t)(i / 3)];
+        twin[1] = mesh->triangle[3 * (size_t)b + (size_t)(i % 3)];
+        const double *p = mesh->x + 3 * (size_t)twin[0], *q = mesh->x + 3 * (size_t)twin[1];
+        if (twin[0] != twin[1] && p[0] == q[0] && p[1] == q[1] && p[2] == q[2])
+            return true;
+    }
+    return false;
+}
+
 /* fan (node_count) is workspace: the first fan found at each node, initially -1. */
 static drape_status check_fans(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh,
                                const int32_t *parent, int32_t *fan)
@@ -193,6 +206,14 @@ static drape_status check_fans(drape_context *ctx, const drape_mesh_source *sour
         const int32_t node = mesh->triangle[corner];
         if (parent[corner] != corner)
             continue;
+        int32_t twin[2];
+        if (fan[node] >= 0 && is_doubled(mesh, fan[node] / 3, corner / 3, twin))
+            return drape_mesh_fail(
+                ctx, source, 0,
+                "triangles %d and %d touch only at node %d, because nodes %d and %d are two "
+                "at one place; remedy: merge them, at (%.4g, %.4g, %.4g) m",
+                fan[node] / 3, corner / 3, node, twin[0], twin[1], mesh->x[3 * (size_t)twin[0]],
+                mesh->x[3 * (size_t)twin[0] + 1], mesh->x[3 * (size_t)twin[0] + 2]);
         if (fan[node] >= 0)
             return drape_mesh_fail(ctx, source, 0,
                                    "triangles %d and %d touch only at node %d; the triangles "

@@ -128,6 +128,18 @@ void drape_model_place_pins(const drape_model *model, double t, double *x)
         const size_t at = 3 * (size_t)model->moved_node[i];
         drape_track_point(&model->tracks[model->moved_track[i]], model->start + at, t, x + at);
     }
+    for (int32_t i = 0; model->supports_move && i < model->support_count; i++) {
+        const drape_support *support = &model->supports[i];
+        for (int d = 0; d < support->count; d++) {
+            double by[3];
+            if (support->track[d] < 0)
+                continue;
+            const drape_track *track = &model->tracks[support->track[d]];
+            drape_track_displacement(track->keys, track->key_count, t, by);
+            vec3_add_scaled(vec3_dot(support->normal[d], by), support->dual[d],
+                            x + 3 * (size_t)support->node);
+        }
+    }
 }
 
 int drape_model_couplings(const drape_model *model, const bool *without, drape_coupling *couplings)

@@ -273,6 +273,9 @@ typedef struct drape_support {
     int32_t node;
     int count;              /* 1 or 2 directions */
     double direction[2][3]; /* of length 1, at right angles */
+    int32_t track[2];       /* of the pin that holds it along normal[i]; -1: that one rests */
+    double normal[2][3];    /* of length 1: those of the pins, which span the directions */
+    double dual[2][3];      /* dual[i] . normal[j] = 1 if i = j, else 0, spanning the same */
 } drape_support;
 
 /* Where a pin is on the collider that carries it, in that collider's own coordinates. */
@@ -356,6 +359,7 @@ struct drape_model {
     drape_support
         *supports; /* (support_count) ascending nodes; those that are pinned altogether do not count */
     int32_t support_count;
+    bool supports_move;        /* some of them have a track */
     drape_track *tracks;       /* of a pin that a collider carries, without keys and turns */
     drape_ride *ride;          /* (node_count) of pins that colliders carry; NULL: no pin of the scene */
     drape_collider *colliders; /* (collider_count) */
@@ -415,8 +419,8 @@ static inline double drape_collider_activation(const drape_model *model, int32_t
     return own > 0 ? own : model->contact.distance;
 }
 
-/* Writes the positions that tracks give pinned nodes at time t; other entries of x (node_count x 3) are
- * unchanged. */
+/* Writes the positions that tracks give pinned nodes at time t, and moves those of supports from where they
+ * start; other entries of x (node_count x 3) are unchanged. */
 void drape_model_place_pins(const drape_model *model, double t, double *x);
 
 /* Lists what couples nodes of the model in every state: the terms and, if a collider has features that the

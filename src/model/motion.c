@@ -977,6 +977,14 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
 
 /* ---- All pins and colliders ---- */
 
+/* The track of a pin that holds a node along a direction only. */
+static course support_course(const drape_motion *motion, int32_t i, int direction)
+{
+    static const drape_path none;
+    const int32_t track = motion->model->supports[i].track[direction];
+    return (course){.path = &none, .track = track >= 0 ? &motion->model->tracks[track] : NULL};
+}
+
 double drape_motion_next_kink(const drape_motion *motion, double t, double end)
 {
     for (int32_t i = 0; i < motion->moved_count; i++) {
@@ -988,6 +996,11 @@ double drape_motion_next_kink(const drape_motion *motion, double t, double end)
         end = next_kink_of(&c, t, end);
         end = drape_deformation_next_kink(&motion->deformation[i], t, end);
     }
+    for (int32_t i = 0; i < motion->model->support_count; i++)
+        for (int d = 0; d < motion->model->supports[i].count; d++) {
+            const course c = support_course(motion, i, d);
+            end = next_kink_of(&c, t, end);
+        }
     for (int32_t i = 0; i < motion->model->history_count; i++)
         if (motion->model->histories[i].used)
             end = drape_history_next_kink(&motion->model->histories[i], t, end);
@@ -1004,6 +1017,10 @@ bool drape_motion_at_kink(const drape_motion *motion, double t)
     for (int32_t i = 0; !found && i < motion->model->collider_count; i++) {
         const course c = collider_course(motion, i);
         found = at_kink_of(&c, t) || drape_deformation_at_kink(&motion->deformation[i], t);
+    }
+    for (int32_t i = 0; !found && i < 2 * motion->model->support_count; i++) {
+        const course c = support_course(motion, i / 2, i % 2);
+        found = i % 2 < motion->model->supports[i / 2].count && at_kink_of(&c, t);
     }
     return found;
 }

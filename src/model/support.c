@@ -2,6 +2,7 @@
 #include "model/support.h"
 
 #include "base/vec3.h"
+#include "model/track.h"
 
 #include <math.h>
 #include <string.h>
@@ -112,17 +113,115 @@ void drape_supports_keep_reactions(const drape_motion *motion, double *g)
     }
 }
 
-void drape_supports_hold(const drape_motion *motion, const double *x0, double *x, double *v)
+/* ---- Supports that move ---- */
+
+typedef struct change {
+    double from, to; /* [s]; from -INFINITY: the whole of u(to) */
+    bool rate;       /* u' between them, not u(to) - u(from) */
+} change;
+
+/* sum dual (normal . what the track has); false if the support does not move. */
+static bool moves_by(const drape_motion *motion, const drape_support *support, const change *by, double u[3])
+{
+    const drape_model *m = motion->model;
+    bool moves = false;
+    memset(u, 0, 3 * sizeof *u);
+    for (int i = 0; i < support->count && m->free_of_node[support->node] >= 0; i++) {
+        double d[3], before[3];
+        if (support->track[i] < 0)
+            continue;
+        const drape_track *track = &m->tracks[support->track[i]];
+        if (by->rate)
+            drape_track_velocity(track->keys, track->key_count, (by->from + by->to) / 2, d);
+        else
+            drape_track_displacement(track->keys, track->key_count, by->to, d);
+        if (!by->rate && by->from > -INFINITY) {
+            drape_track_displacement(track->keys, track->key_count, by->from, before);
+            vec3_add_scaled(-1, before, d);
+        }
+        vec3_add_scaled(vec3_dot(support->normal[i], d), support->dual[i], u);
+        moves = true;
+    }
+    const drape_placement *placed = &motion->cloth_placed[drape_model_cloth_of(m, support->node)];
+    if (moves && placed->given)
+        drape_placement_turn(placed, u, u);
+    return moves;
+}
+
+/* sum of w . u over all supports that move, or y += scale u at them. */
+static double visit(const drape_motion *motion, const change *by, const double *w, double scale, double *y)
+{
+    const drape_model *m = motion->model;
+    double sum = 0, u[3];
+    for (int32_t i = 0; m->supports_move && i < m->support_count; i++) {
+        const size_t at = 3 * (size_t)m->supports[i].node;
+        if (!moves_by(motion, &m->supports[i], by, u))
+            continue;
+        if (w)
+            sum += vec3_dot(w + at, u);
+        if (y)
+            vec3_add_scaled(scale, u, y + at);
+    }
+    return sum;
+}
+
+void drape_supports_displace(const drape_motion *motion, double t, double sign, double *x)
+{
+    visit(motion, &(change){.from = -INFINITY, .to = t}, NULL, sign, x);
+}
+
+void drape_supports_add_velocity(const drape_motion *motion, const double span[2], bool instant, double *v)
+{
+    if (span[1] > span[0])
+        visit(motion, &(change){.from = span[0], .to = span[1], .rate = instant}, NULL,
+              instant ? 1 : 1 / (span[1] - span[0]), v);
+}
+
+double drape_supports_work(const drape_motion *motion, const double *g, double t0, double t1)
+{
+    return visit(motion, &(change){.from = t0, .to = t1}, g, 0, NULL);
+}
+
+double drape_supports_power(const drape_motion *motion, const double *g, double t)
+{
+    return visit(motion, &(change){.from = t, .to = t, .rate = true}, g, 0, NULL);
+}
+
+double drape_supports_kinetic(const drape_motion *motion, const double *v)
+{
+    const drape_model *m = motion->model;
+    double energy = 0;
+    for (int32_t i = 0; m->supports_move && i < m->support_count; i++) {
+        double n[2][3];
+        const int32_t node = m->supports[i].node;
+        const int count = directions(motion, &m->supports[i], n);
+        for (int d = 0; d < count; d++) {
+            const double along = vec3_dot(n[d], v + 3 * (size_t)node);
+            energy += 0.5 * m->mass[node] * along * along;
+        }
+    }
+    return energy;
+}
+
+void drape_supports_hold(const drape_motion *motion, double t0, const double *x0, double t1, double *x)
 {
     const drape_model *m = motion->model;
     for (int32_t i = 0; i < m->support_count; i++) {
         const size_t at = 3 * (size_t)m->supports[i].node;
-        double n[2][3], moved[3];
+        double n[2][3], moved[3], u[3];
         const int count = directions(motion, &m->supports[i], n);
+        const bool moves = moves_by(motion, &m->supports[i], &(change){.from = t0, .to = t1}, u);
         for (int d = 0; d < count; d++) {
             vec3_sub(x + at, x0 + at, moved);
+            if (moves)
+                vec3_add_scaled(-1, u, moved);
             vec3_add_scaled(-vec3_dot(n[d], moved), n[d], x + at);
         }
-        project(count, n, v + at);
     }
+}
+
+void drape_supports_hold_velocity(const drape_motion *motion, const double span[2], bool instant, double *v)
+{
+    drape_supports_project(motion, v);
+    drape_supports_add_velocity(motion, span, instant, v);
 }

@@ -11,6 +11,25 @@
 
 #include "model/motion.h"
 
+/* Pins with a track displace what they hold: a node by u(t) along the directions that are held, by nothing
+ * along the others. Integrators compute in the frame that moves with u (drape_system_to_frame), where
+ * supports rest. */
+
+/* x += sign u(t) (node_count x 3). */
+void drape_supports_displace(const drape_motion *motion, double t, double sign, double *x);
+
+/* v += u' (node_count x 3): the mean over the span or, if instant, that in its middle; 0 if its ends are
+ * equal. A track of the model has no kink within the span of an instant. */
+void drape_supports_add_velocity(const drape_motion *motion, const double span[2], bool instant, double *v);
+
+/* The work of forces g (node_count x 3) while supports go from u(t0) to u(t1) [J], and their power at a time
+ * t within a piece of all tracks [W]. */
+double drape_supports_work(const drape_motion *motion, const double *g, double t0, double t1);
+double drape_supports_power(const drape_motion *motion, const double *g, double t);
+
+/* The kinetic energy along the directions that moving supports hold, which only they change [J]. */
+double drape_supports_kinetic(const drape_motion *motion, const double *v);
+
 /* Takes what lies along the directions that are held out of vectors at all nodes (node_count x 3), or at
  * the free nodes (free_count x 3). Placed cloth has its directions turned with it. */
 void drape_supports_project(const drape_motion *motion, double *nodes);
@@ -23,8 +42,11 @@ void drape_supports_project_matrix(const drape_motion *motion, const drape_patte
  * pinned nodes are unchanged. */
 void drape_supports_keep_reactions(const drape_motion *motion, double *g);
 
-/* Takes the displacement from x0 to x along these directions, which rounding and methods that move nodes
- * leave, out of x, and the velocity along them out of v. */
-void drape_supports_hold(const drape_motion *motion, const double *x0, double *x, double *v);
+/* Makes the displacement from x0 to x along these directions that of the supports from t0 to t1: takes out
+ * what rounding and methods that move nodes leave. */
+void drape_supports_hold(const drape_motion *motion, double t0, const double *x0, double t1, double *x);
+
+/* Makes the velocity along them u' of the span, as above. */
+void drape_supports_hold_velocity(const drape_motion *motion, const double span[2], bool instant, double *v);
 
 #endif

@@ -9,6 +9,8 @@
  */
 #include "sim/dense.h"
 
+#include "model/support.h"
+
 #include <string.h>
 
 #define SLOPE_ORDER 3 /* methods of this order and above have the slope of the positions as velocities */
@@ -44,9 +46,13 @@ void drape_sim_dense_positions(drape_sim *sim, const drape_state *from, const dr
     if (sim->chosen.integrator->interpolate) {
         memcpy(x, to->x, n * sizeof *x);
         sim->chosen.integrator->interpolate(sim->integrator, t, x);
+        if (sim->model->supports_move)
+            drape_supports_hold(drape_system_motion(sim->system), from->t, from->x, t, x);
         return;
     }
     hermite(from, to, t, n, x);
+    if (sim->model->supports_move)
+        drape_supports_hold(drape_system_motion(sim->system), from->t, from->x, t, x);
     drape_motion_place_pins(drape_system_motion(sim->system), t, x);
 }
 
@@ -56,6 +62,10 @@ void drape_sim_dense_velocities(drape_sim *sim, const drape_state *from, const d
     const drape_integrator_ops *integrator = sim->chosen.integrator;
     const size_t n = 3 * (size_t)sim->model->node_count;
     (integrator->order >= SLOPE_ORDER ? hermite_slope : linear)(from, to, t, n, v);
-    if (integrator->interpolate_velocities)
-        integrator->interpolate_velocities(sim->integrator, t, v);
+    if (!integrator->interpolate_velocities)
+        return;
+    integrator->interpolate_velocities(sim->integrator, t, v);
+    if (sim->model->supports_move)
+        drape_supports_hold_velocity(drape_system_motion(sim->system), (const double[]){from->t, to->t}, true,
+                                     v);
 }

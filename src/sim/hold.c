@@ -3,6 +3,7 @@
 
 #include "base/finite.h"
 #include "base/reason.h"
+#include "model/support.h"
 
 #include <math.h>
 #include <string.h>
@@ -53,6 +54,9 @@ drape_status drape_sim_hold(drape_sim *sim, drape_state *next, drape_step_info *
     drape_motion_place_pins(drape_system_motion(sim->system), t1, next->x);
     for (size_t i = 0; i < n; i++)
         next->v[i] = m->pinned[i / 3] ? (next->x[i] - now->x[i]) / h : 0;
+    drape_supports_hold(drape_system_motion(sim->system), now->t, now->x, t1, next->x);
+    drape_supports_hold_velocity(drape_system_motion(sim->system), (const double[]){now->t, t1}, false,
+                                 next->v);
     drape_system_expect(sim->system, t1, true);
     drape_status status = drape_system_begin(sim->system, now);
     if (!status)

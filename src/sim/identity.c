@@ -173,6 +173,8 @@ static uint64_t add_nodes(uint64_t hash, const drape_model *m)
         const int64_t held[] = {m->supports[i].node, m->supports[i].count};
         hash = add(hash, held, sizeof held);
         hash = add_doubles(hash, m->supports[i].direction[0], 6);
+        hash = add(hash, m->supports[i].track, sizeof m->supports[i].track);
+        hash = add_doubles(hash, m->supports[i].dual[0], 6);
     }
     for (size_t i = 0; m->ride && i < nodes; i++) {
         const int64_t on[] = {m->ride[i].collider, m->ride[i].triangle};

@@ -71,6 +71,26 @@ static double outer_work(const drape_sim *sim, const drape_state *from, const dr
            drape_system_timed_work(sim->system, from, to, open);
 }
 
+/* Makes a step of the integrator and, whatever it left there, has supports hold what they hold. Their work on
+ * the mass that they move is what its energy along their directions has changed by: jumps at kinks. */
+static drape_status integrate(drape_sim *sim, drape_state *next, double h, drape_step_info *info)
+{
+    const drape_integrator_ops *integrator = sim->chosen.integrator;
+    const drape_motion *motion = drape_system_motion(sim->system);
+    const drape_state *now = drape_sim_state(sim);
+    const bool instant = !integrator->mean_velocities && integrator->own_steps;
+    const drape_state *from = integrator->in_space ? now : drape_system_to_frame(sim->system, now);
+    const drape_status status = integrator->step(sim->integrator, from, next, h, info);
+    drape_system_from_frame(sim->system, status && !info->usable ? NULL : next);
+    if (status && !info->usable)
+        return status;
+    drape_supports_hold(motion, now->t, now->x, next->t, next->x);
+    const double span[2] = {integrator->steady_state ? next->t : now->t, next->t};
+    drape_supports_hold_velocity(motion, span, instant, next->v);
+    info->pin_work += drape_supports_kinetic(motion, next->v) - drape_supports_kinetic(motion, now->v);
+    return status;
+}
+
 static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step_info *info)
 {
     drape_state *next = next_state(sim);
@@ -84,9 +104,8 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     if (drape_system_contact(sim->system) && !sim->chosen.integrator->own_steps)
         drape_sim_energy(sim); /* for the check, while contact is where the step begins */
     if (!status)
-        status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
+        status = integrate(sim, next, h, info);
     sim->solved_at = drape_clock_seconds();
-    drape_supports_hold(drape_system_motion(sim->system), drape_sim_state(sim)->x, next->x, next->v);
     if (status == DRAPE_E_STOPPED)
         info->reason = drape_reason_name(DRAPE_REASON_CANCELLED);
     if (status && !info->usable)

@@ -328,6 +328,9 @@ static drape_status hysteresis_of(const double *values, const double law[9], dra
     *out = (hysteresis){.elastic = 1};
     if (friction > 0 && isnan(begins))
         return drape_term_refuse(builder, "\"friction\" = %g needs \"friction_curvature\"", friction);
+    if (!(friction > 0) && !isnan(begins))
+        return drape_term_refuse(builder, "\"friction_curvature\" = %g is given without \"friction\"",
+                                 begins);
     if (isnan(yield) != isnan(hardening))
         return drape_term_refuse(builder, "\"%s\" is given without \"%s\"",
                                  isnan(yield) ? "hardening" : "yield_curvature",

@@ -103,6 +103,9 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     int32_t at[RESPONSES];
     if (friction > 0 && isnan(slips_at))
         return drape_term_refuse(builder, "\"shear_friction\" = %g needs \"friction_angle\"", friction);
+    if (!(friction > 0) && !isnan(slips_at))
+        return drape_term_refuse(builder, "\"friction_angle\" = %g is given without \"shear_friction\"",
+                                 values[PARAM_FRICTION_ANGLE]);
     if (cloth->triangle_count > INT32_MAX / responses)
         return drape_term_refuse(builder, "the mesh has %d triangles; at most %d", (int)cloth->triangle_count,
                                  INT32_MAX / responses);

@@ -92,6 +92,8 @@ START_TEST(quick_references_pass)
     check("mylar_balloon", 1, DRAPE_OUTCOME_PASS);
     for (int i = 0; i < find("curve_tension")->case_count; i++)
         check("curve_tension", i, DRAPE_OUTCOME_PASS);
+    for (int i = 0; i < find("roller_tension")->case_count; i++)
+        check("roller_tension", i, DRAPE_OUTCOME_PASS);
     for (int i = 0; i < find("curve_shear")->case_count; i++)
         check("curve_shear", i, DRAPE_OUTCOME_PASS);
     for (int i = 0; i < find("stress_relaxation")->case_count; i++)

@@ -325,6 +325,10 @@ START_TEST(incomplete_parameters_are_refused)
          "\"hardening\" is given without \"yield_curvature\""},
         {"'bend.midedge', 'poisson': 0, 'yield_curvature': 3, 'hardening': 1",
          "1 is not allowed; hardening is a"},
+        {"'bend.midedge', 'friction_curvature': 3",
+         "\"friction_curvature\" = 3 is given without \"friction\""},
+        {"'stretch.curve', 'friction_angle': 3",
+         "\"friction_angle\" = 3 is given without \"shear_friction\""},
         {"'stretch.curve', 'shear_friction': 3", "\"shear_friction\" = 3 needs \"friction_angle\""}};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         char text[1024];
