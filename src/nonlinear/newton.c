@@ -239,6 +239,7 @@ static drape_status assemble(drape_newton *s, const double *d, double positive_s
     drape_status status = extend_pattern(s, &e->point);
     if (status)
         return status;
+    drape_sun_linear_set_positions(s->linear, e->x, e->model->node_of_free);
     drape_step_equation_jacobian(e, drape_stress_predictor_stress(&s->predictor), share, s->linear->values);
     drape_sun_linear_forget_exact(s->linear);
     if (s->linear->near && share < 1) {
