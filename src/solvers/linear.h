@@ -50,9 +50,9 @@ struct drape_linear_ops {
      * singular to working precision or not finite. With borrows_heap also DRAPE_E_MEMORY, after which it
      * may be called again. */
     drape_status (*factor)(void *state, const double *values);
-    /* The same, but refuses a symmetric matrix that is not positive definite with DRAPE_RETRY_LINEAR, for
-     * callers that then use another matrix. NULL: the solver cannot tell, or factors such a matrix at no
-     * extra cost. */
+    /* The same, but refuses a symmetric matrix that is not positive definite with DRAPE_RETRY_LINEAR, here or
+     * in a solve that notices it, for callers that then use another matrix. NULL: the solver cannot tell, or
+     * factors such a matrix at no extra cost. */
     drape_status (*factor_definite)(void *state, const double *values);
     /* x = A^-1 b; b is not changed. DRAPE_RETRY_LINEAR if there are no factors, or x is not finite or misses
      * the solver's bound on its error. */

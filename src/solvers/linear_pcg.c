@@ -32,6 +32,7 @@ typedef struct pcg_state {
     drape_pcg pcg;
     drape_fallback fallback;
     bool factored; /* by this solver or by the fallback */
+    bool definite; /* a symmetric matrix that turns out not to be positive definite is refused */
 } pcg_state;
 
 static void multiply(const void *owner, const double *x, double *y)
@@ -125,15 +126,28 @@ static void set_positions(void *state, const double *x)
     memcpy(s->positions, x, (size_t)s->pattern->n * sizeof *x);
 }
 
-static drape_status factor(void *state, const double *values)
+static drape_status factor_any(pcg_state *s, const double *values, bool definite)
 {
-    pcg_state *s = state;
     s->fallback.active = s->factored = false;
     if (!drape_all_finite(values, (size_t)s->pattern->nonzeros))
         return DRAPE_RETRY_LINEAR;
     memcpy(s->values, values, (size_t)s->pattern->nonzeros * sizeof *values);
-    s->factored = is_symmetric(s) && !drape_multigrid_factor(s->multigrid, s->values, s->positions);
-    return s->factored ? DRAPE_OK : factor_general(s);
+    const bool symmetric = is_symmetric(s);
+    s->definite = definite && symmetric;
+    s->factored = symmetric && !drape_multigrid_factor(s->multigrid, s->values, s->positions);
+    if (s->factored)
+        return DRAPE_OK;
+    return s->definite ? DRAPE_RETRY_LINEAR : factor_general(s);
+}
+
+static drape_status factor(void *state, const double *values)
+{
+    return factor_any(state, values, false);
+}
+
+static drape_status factor_definite(void *state, const double *values)
+{
+    return factor_any(state, values, true);
 }
 
 static drape_status solve_inexact(void *state, const double *b, double *x, double tolerance,
@@ -148,7 +162,7 @@ static drape_status solve_inexact(void *state, const double *b, double *x, doubl
         *iterations = s->pcg.iterations;
         if (s->pcg.definite && s->pcg.converged && drape_all_finite(x, (size_t)s->pattern->n))
             return DRAPE_OK;
-        drape_status status = factor_general(s);
+        drape_status status = s->definite ? DRAPE_RETRY_LINEAR : factor_general(s);
         if (status)
             return status;
     }
@@ -165,6 +179,7 @@ static void archive(void *state, drape_archive *a, const double *values)
 {
     pcg_state *s = state;
     drape_fallback_archive(&s->fallback, &s->factored, a, values);
+    drape_archive_bool(a, &s->definite);
     if (!values)
         return;
     drape_archive_doubles(a, s->positions, (size_t)s->pattern->n);
@@ -199,6 +214,7 @@ const drape_linear_ops drape_linear_pcg = {
     .watch = watch,
     .set_positions = set_positions,
     .factor = factor,
+    .factor_definite = factor_definite,
     .solve = solve,
     .solve_inexact = solve_inexact,
     .archive = archive,
