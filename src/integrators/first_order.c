@@ -156,6 +156,7 @@ int drape_first_order_jacobian(drape_first_order *s, double t, double cj, const 
     s->failure = extend_pattern(s, &point);
     if (s->failure)
         return -1;
+    drape_sun_linear_set_positions(s->linear, point.x, drape_system_model(s->system)->node_of_free);
     drape_system_jacobian(s->system, &point, cj * cj, 0, s->linear->values);
     if (!s->newton.bounds)
         s->symmetric = choose_symmetric(s);

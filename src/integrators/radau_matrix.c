@@ -104,6 +104,7 @@ drape_status drape_radau_matrix_evaluate(drape_radau_matrix *m, const drape_poin
     if (status)
         return status;
     at.weight = 0;
+    drape_sun_linear_set_positions(m->linear, at.x, drape_system_model(m->system)->node_of_free);
     drape_system_jacobian(m->system, &at, 0, 0, m->stiffness);
     if (m->damping && point->contact == DRAPE_CONTACT_GAUSS_NEWTON)
         evaluate_bound(m, at);

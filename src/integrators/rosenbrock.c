@@ -224,6 +224,7 @@ static drape_status factor(rosenbrock_state *s, double w, drape_step_info *info)
         status = renew_matrices(s);
     if (status)
         return status;
+    drape_sun_linear_set_positions(s->linear, e->point.x, e->model->node_of_free);
     drape_system_jacobian(e->system, &e->point, w * w, 0, s->linear->values);
     if (s->damping)
         drape_system_damping(e->system, &e->point, s->damping);

@@ -155,6 +155,7 @@ static drape_status assemble(drape_factored_jacobian *s, const drape_point *at, 
     if (status)
         return status;
     drape_scalar_stiffness_weigh(&s->scalar, at->weight, mass_weight);
+    drape_sun_linear_set_positions(s->linear, point.x, drape_system_model(s->system)->node_of_free);
     drape_system_jacobian_without(s->system, &point, 0, share, s->flat, s->linear->values);
     add_scalars(s, s->linear->values);
     if (!s->nonsymmetric)

@@ -242,6 +242,7 @@ static drape_status assemble(drape_newton *s, const double *d, double positive_s
     drape_status status = extend_pattern(s, &e->point);
     if (status)
         return status;
+    drape_sun_linear_set_positions(s->linear, e->x, e->model->node_of_free);
     drape_step_equation_jacobian(e, drape_stress_predictor_stress(&s->predictor), share, s->linear->values);
     drape_sun_linear_forget_exact(s->linear);
     if (s->linear->near && share < 1) {
@@ -344,13 +345,14 @@ static drape_status guess_linearized(drape_newton *s, double *d)
 
 /* ---- Correct ---- */
 
-/* Not a descent direction: the matrix is indefinite, which the linear solver did not detect. The one with the
- * whole positive parts is factored instead, and gives p. */
-static drape_status ensure_descent(drape_newton *s, const double *minus_f, double *p)
+/* No solution or not a descent direction: the matrix is indefinite, which the factorisation did not detect.
+ * The one with the whole positive parts is factored instead, and gives p. */
+static drape_status ensure_descent(drape_newton *s, drape_status status, const double *minus_f, double *p)
 {
-    if (drape_step_equation_dot(s->equation, minus_f, p) > 0 || s->positive_share == 1)
-        return DRAPE_OK;
-    drape_status status = factor_with_share(s, 1);
+    const bool descends = !status && drape_step_equation_dot(s->equation, minus_f, p) > 0;
+    if (status < 0 || descends || s->positive_share == 1)
+        return status;
+    status = factor_with_share(s, 1);
     return status ? status : drape_sun_linear_solve(s->linear, minus_f, p);
 }
 
@@ -452,7 +454,7 @@ static drape_status add_chords(drape_newton *s, const double *d, double *p, cons
             s->chord_minus_f[i] = -e->f[i];
         drape_status status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
         if (status || drape_step_equation_make_feasible(e, s->chord) < 1)
-            return status;
+            return status < 0 ? status : DRAPE_OK;
         for (size_t i = 0; i < e->dofs; i++)
             s->trial[i] = d[i] + (p[i] + s->chord[i]);
         s->trial_evaluated = drape_step_equation_evaluate(e, s->trial);
@@ -487,8 +489,8 @@ static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
     drape_step_equation *e = s->equation;
     const double *d = N_VGetArrayPointer(s->unknown);
     drape_status status = drape_sun_linear_solve(s->linear, minus_f, p);
-    if (!status && s->searches)
-        status = ensure_descent(s, minus_f, p);
+    if (s->searches)
+        status = ensure_descent(s, status, minus_f, p);
     if (status || !drape_all_finite(p, e->dofs))
         return status;
     s->indefinite = s->indefinite && longest(e, p) > SMALL_STEP * s->edge;

@@ -76,7 +76,7 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
         DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver",                     \
                      .aliases = drape_linears_aliases),                                                      \
     [DRAPE_NEWTON_LINEAR_TOLERANCE] =                                                                        \
-        DRAPE_NUMBER("linear_tolerance", "1", 1e-3, 1e-14, DRAPE_BELOW(1),                                   \
+        DRAPE_NUMBER("linear_tolerance", "1", 1e-2, 1e-14, DRAPE_BELOW(1),                                   \
                      "relative residual that iterative linear solvers leave in a correction"),               \
     [DRAPE_NEWTON_CORRECTION_TOLERANCE] = DRAPE_NUMBER(                                                      \
         "correction_tolerance", "m", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1,                               \

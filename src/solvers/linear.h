@@ -43,13 +43,16 @@ struct drape_linear_ops {
     /* Sets where the address of a flag is, or NULL, that ends a factorisation with DRAPE_E_STOPPED when it
      * becomes true; the place must outlive the solver. NULL: its factorisations cannot be cancelled. */
     void (*watch)(void *state, const atomic_bool *const *cancel);
+    /* Sets the positions of the nodes (pattern->n) [m] for the next factorisation, which chooses its coarse
+     * spaces by them. NULL: it has no use for them. */
+    void (*set_positions)(void *state, const double *x);
     /* Factors the matrix with these values (pattern->nonzeros). DRAPE_OK, or DRAPE_RETRY_LINEAR if it is
      * singular to working precision or not finite. With borrows_heap also DRAPE_E_MEMORY, after which it
      * may be called again. */
     drape_status (*factor)(void *state, const double *values);
-    /* The same, but refuses a symmetric matrix that is not positive definite with DRAPE_RETRY_LINEAR, for
-     * callers that then use another matrix. NULL: the solver cannot tell, or factors such a matrix at no
-     * extra cost. */
+    /* The same, but refuses a symmetric matrix that is not positive definite with DRAPE_RETRY_LINEAR, here or
+     * in a solve that notices it, for callers that then use another matrix. NULL: the solver cannot tell, or
+     * factors such a matrix at no extra cost. */
     drape_status (*factor_definite)(void *state, const double *values);
     /* x = A^-1 b; b is not changed. DRAPE_RETRY_LINEAR if there are no factors, or x is not finite or misses
      * the solver's bound on its error. */

@@ -55,6 +55,13 @@ static void watch(void *state, const atomic_bool *const *cancel)
         s->ops->watch(s->solver, cancel);
 }
 
+static void set_positions(void *state, const double *x)
+{
+    auto_state *s = state;
+    if (s->ops->set_positions)
+        s->ops->set_positions(s->solver, x);
+}
+
 static drape_status factor(void *state, const double *values)
 {
     auto_state *s = state;
@@ -71,6 +78,15 @@ static drape_status solve(void *state, const double *b, double *x)
 {
     auto_state *s = state;
     return s->ops->solve(s->solver, b, x);
+}
+
+static drape_status solve_inexact(void *state, const double *b, double *x, double tolerance,
+                                  int64_t *iterations)
+{
+    auto_state *s = state;
+    *iterations = 1;
+    return s->ops->solve_inexact ? s->ops->solve_inexact(s->solver, b, x, tolerance, iterations)
+                                 : s->ops->solve(s->solver, b, x);
 }
 
 static void archive(void *state, drape_archive *a, const double *values)
@@ -102,14 +118,16 @@ static void report(const void *state, drape_linear_report *out)
 
 const drape_linear_ops drape_linear_auto = {
     .entry = {.name = "auto",
-              .summary = "the fastest direct solver of this build for the number of unknowns",
+              .summary = "the fastest solver of this build for the number of unknowns",
               .reference = "bench/linears"},
     .create = create,
     .use_threads = use_threads,
     .watch = watch,
+    .set_positions = set_positions,
     .factor = factor,
     .factor_definite = factor_definite,
     .solve = solve,
+    .solve_inexact = solve_inexact,
     .archive = archive,
     .destroy = destroy,
     .bytes = bytes,

@@ -110,7 +110,10 @@ static drape_status create_state(drape_sun_linear *linear, const drape_pattern *
     linear->pattern = pattern;
     linear->nonzeros = pattern->nonzeros;
     linear->values = drape_arena_take(&linear->arena, (size_t)pattern->nonzeros, sizeof *linear->values);
-    if (!linear->values)
+    linear->positions = NULL;
+    if (linear->ops->set_positions)
+        linear->positions = drape_arena_take(&linear->arena, (size_t)pattern->n, sizeof *linear->positions);
+    if (!linear->values || (linear->ops->set_positions && !linear->positions))
         return DRAPE_E_MEMORY;
     drape_status status = linear->near ? take_near(linear) : DRAPE_OK;
     if (!status)
@@ -169,6 +172,15 @@ void drape_sun_linear_keep_exact(drape_sun_linear *linear)
 void drape_sun_linear_forget_exact(drape_sun_linear *linear)
 {
     linear->corrects = false;
+}
+
+void drape_sun_linear_set_positions(drape_sun_linear *linear, const double *x, const int32_t *node)
+{
+    if (!linear->positions)
+        return;
+    for (int32_t j = 0; j < linear->pattern->block_count; j++)
+        memcpy(linear->positions + 3 * (size_t)j, x + 3 * (size_t)node[j], 3 * sizeof *x);
+    linear->ops->set_positions(linear->state, linear->positions);
 }
 
 drape_status drape_sun_linear_extend_pattern(drape_sun_linear *linear, const drape_pattern *pattern)

@@ -21,6 +21,8 @@ typedef struct drape_sun_linear {
     bool stale;     /* the system's pattern has changed: extend the solver's before its next use */
     void *owner;    /* for an integrator that reduces its system to this one before solving */
     double *values; /* (nonzeros) where the Jacobian is assembled */
+    double
+        *positions; /* (n) scratch of drape_sun_linear_set_positions; NULL: the solver has no use for them */
     const drape_pattern *pattern; /* of the values */
     bool near;     /* the matrix that is factored may be another one than that which is solved with: */
     bool corrects; /* `values` are near `exact`, and solves are corrected to `correction_tolerance` */
@@ -57,6 +59,9 @@ drape_status drape_sun_linear_use_near(drape_sun_linear *linear, double toleranc
  * tolerance or a cycle has ended. It lasts until drape_sun_linear_forget_exact. */
 void drape_sun_linear_keep_exact(drape_sun_linear *linear);
 void drape_sun_linear_forget_exact(drape_sun_linear *linear);
+
+/* Tells the solver where the nodes of the next matrix are. x (nodes x 3) [m]; node: of each block. */
+void drape_sun_linear_set_positions(drape_sun_linear *linear, const double *x, const int32_t *node);
 
 void drape_sun_linear_destroy(drape_sun_linear **linear); /* call it before the arena is freed */
 

@@ -398,6 +398,31 @@ START_TEST(fallbacks_are_counted)
 }
 END_TEST
 
+/* An indefinite matrix is refused if a definite one is asked for, at the latest when it is solved with; no
+ * other solver is needed then. */
+START_TEST(iterative_solvers_refuse_indefinite_matrices_if_asked)
+{
+    problem q = open_problem();
+    for (int i = 0; drape_linears[i]; i++) {
+        const drape_linear_ops *ops = drape_linears[i];
+        if (!falls_back(ops))
+            continue;
+        void *solver = open_solver(&q, ops);
+        for (uint64_t seed = 1; seed <= 5; seed++) {
+            fill(&q, INDEFINITE, seed);
+            drape_status status = ops->factor_definite(solver, q.values);
+            ck_assert_int_eq(status ? status : ops->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
+            fill(&q, SPD, seed);
+            ck_assert_int_eq(ops->factor_definite(solver, q.values), DRAPE_OK);
+            ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
+        }
+        ck_assert_int_eq(report_of(ops, solver).fallbacks, 0);
+        drape_linear_destroy(ops, &solver);
+    }
+    close_problem(&q);
+}
+END_TEST
+
 /* ---- A sheet of many supernodes ---- */
 
 typedef struct sheet {
@@ -979,7 +1004,8 @@ END_TEST
 SUITE("linears", entries_are_well_formed, equal_patterns_share_an_order, random_systems_are_solved,
       several_right_hand_sides_of_one_factorisation, broken_matrices_are_reported_and_good_ones_work_again,
       a_right_hand_side_that_is_not_finite_is_reported, kept_pivots_that_become_zero_are_chosen_again,
-      a_small_part_that_is_not_symmetric_is_not_lost, fallbacks_are_counted, a_sheet_of_many_supernodes,
+      a_small_part_that_is_not_symmetric_is_not_lost, fallbacks_are_counted,
+      iterative_solvers_refuse_indefinite_matrices_if_asked, a_sheet_of_many_supernodes,
       threads_give_the_same_bits, no_memory_for_other_matrices, made_again_on_other_patterns,
       hard_matrices_by_multifrontal, a_singular_matrix_is_refused_and_a_nearly_singular_one_solved,
       negative_eigenvalues_are_counted, a_factorisation_can_be_cancelled, the_best_solver_of_no_unknowns,

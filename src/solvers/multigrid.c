@@ -1,0 +1,568 @@
+/* multigrid.c: see multigrid.h. */
+#include "base/lanes.h"
+#include "solvers/multigrid_parts.h"
+
+#include <math.h>
+#include <string.h>
+
+#define POWER_STEPS 10        /* of the power iteration for the largest eigenvalue of D^-1 A */
+#define DAMPING     (4.0 / 3) /* of that eigenvalue's inverse: Vanek, Mandel & Brezina 1996 */
+#define SMALLEST    0.25      /* eigenvalue of a cycle times its matrix that the next finer level counts on */
+/* share of a column's length that must be left after the projection on those before it, or it counts as 0 */
+#define INDEPENDENT 1e-8
+
+/* ---- Small dense matrices ---- */
+
+/* Inverts a symmetric matrix in place by Gauss and Jordan; false if it is not positive definite. */
+static bool invert(int n, double *a)
+{
+    for (int k = 0; k < n; k++) {
+        const double pivot = a[n * k + k];
+        if (!(pivot > 0))
+            return false;
+        a[n * k + k] = 1;
+        for (int c = 0; c < n; c++)
+            a[n * k + c] /= pivot;
+        for (int r = 0; r < n; r++) {
+            if (r == k)
+                continue;
+            const double factor = a[n * r + k];
+            a[n * r + k] = 0;
+            for (int c = 0; c < n; c++)
+                a[n * r + c] -= factor * a[n * k + c];
+        }
+    }
+    return true;
+}
+
+static bool factor_dense(drape_multigrid *m)
+{
+    const matrix *a = &m->level[m->count - 1].a;
+    const size_t n = scalars(a), b = (size_t)a->size;
+    double *L = m->dense;
+    memset(L, 0, n * n * sizeof *L);
+    for (int32_t i = 0; i < a->count; i++)
+        for (size_t c = 0; c < b; c++) {
+            const double *row = a->values + b * (b * (size_t)a->start[i] + c * (size_t)length(a, i));
+            for (int32_t k = a->start[i]; k < a->start[i + 1]; k++)
+                for (size_t r = 0; r < b; r++)
+                    L[n * ((size_t)i * b + c) + (size_t)a->column[k] * b + r] = *row++;
+        }
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j <= i; j++) {
+            double sum = L[n * i + j];
+            for (size_t k = 0; k < j; k++)
+                sum -= L[n * i + k] * L[n * j + k];
+            if (i == j && !(sum > 0))
+                return false;
+            L[n * i + j] = i == j ? sqrt(sum) : sum / L[n * j + j];
+        }
+    return true;
+}
+
+static void solve_dense(const drape_multigrid *m, const double *b, double *x)
+{
+    const size_t n = scalars(&m->level[m->count - 1].a);
+    const double *L = m->dense;
+    for (size_t i = 0; i < n; i++) {
+        double sum = b[i];
+        for (size_t k = 0; k < i; k++)
+            sum -= L[n * i + k] * x[k];
+        x[i] = sum / L[n * i + i];
+    }
+    for (size_t i = n; i-- > 0;) {
+        x[i] /= L[n * i + i];
+        for (size_t k = 0; k < i; k++)
+            x[k] -= L[n * i + k] * x[i];
+    }
+}
+
+/* ---- Rows ---- */
+
+/* The products of a symmetric matrix need its rows up to the diagonal only, which halves the memory that they
+ * read: each serves for the row, and transposed for the column. `size` is a constant wherever these functions
+ * are called. */
+
+/* sum (size) -= the blocks of row i left of the diagonal, times x. */
+LANES_INLINE void gather(const matrix *a, const int size, int32_t i, const double *restrict x,
+                         double *restrict sum)
+{
+    const int64_t stride = size * length(a, i);
+    const double *row = a->values + (int64_t)size * size * a->start[i];
+    for (int32_t k = a->start[i]; k < a->diagonal[i]; k++, row += size) {
+        const double *at = x + (int64_t)size * a->column[k];
+#pragma GCC unroll 6
+        for (int c = 0; c < size; c++)
+#pragma GCC unroll 6
+            for (int r = 0; r < size; r++)
+                sum[c] -= row[c * stride + r] * at[r];
+    }
+}
+
+/* y -= the same blocks transposed, times x (size) of row i. */
+LANES_INLINE void scatter(const matrix *a, const int size, int32_t i, const double *restrict x,
+                          double *restrict y)
+{
+    const int64_t stride = size * length(a, i);
+    const double *row = a->values + (int64_t)size * size * a->start[i];
+    for (int32_t k = a->start[i]; k < a->diagonal[i]; k++, row += size) {
+        double *at = y + (int64_t)size * a->column[k];
+#pragma GCC unroll 6
+        for (int c = 0; c < size; c++)
+#pragma GCC unroll 6
+            for (int r = 0; r < size; r++)
+                at[r] -= row[c * stride + r] * x[c];
+    }
+}
+
+LANES_INLINE void multiply_block(const int size, const double *block, const double *from, double *to)
+{
+#pragma GCC unroll 6
+    for (int c = 0; c < size; c++) {
+        double sum = 0;
+#pragma GCC unroll 6
+        for (int r = 0; r < size; r++)
+            sum += block[size * c + r] * from[r];
+        to[c] = sum;
+    }
+}
+
+/* to (size x MODES) += a (size x size) times from (size x MODES); the rows of a are `stride` apart. */
+LANES_INLINE void add_block_product(const int size, const double *restrict a, int64_t stride,
+                                    const double *restrict from, double *restrict to)
+{
+    for (int c = 0; c < size; c++)
+#pragma GCC unroll 6
+        for (int r = 0; r < size; r++)
+#pragma GCC unroll 6
+            for (int u = 0; u < MODES; u++)
+                to[MODES * c + u] += a[c * stride + r] * from[MODES * r + u];
+}
+
+/* y = -A x. */
+LANES_INLINE void multiply_rows(const matrix *a, const int size, const double *x, double *y)
+{
+    for (int32_t i = 0; i < a->count; i++) {
+        const double *at = x + (int64_t)size * i, *block = a->values + (int64_t)size * size * a->start[i] +
+                                                           (int64_t)size * (a->diagonal[i] - a->start[i]);
+        double sum[MODES] = {0}, own[MODES];
+        gather(a, size, i, x, sum);
+#pragma GCC unroll 6
+        for (int c = 0; c < size; c++) {
+            own[c] = at[c];
+#pragma GCC unroll 6
+            for (int r = 0; r < size; r++)
+                sum[c] -= block[c * size * length(a, i) + r] * at[r];
+        }
+        scatter(a, size, i, own, y);
+        memcpy(y + (int64_t)size * i, sum, (size_t)size * sizeof *y);
+    }
+}
+
+LANES_DISPATCH static void multiply(const matrix *a, const double *x, double *y)
+{
+    const size_t n = scalars(a);
+    if (a->size == 3)
+        multiply_rows(a, 3, x, y);
+    else
+        multiply_rows(a, MODES, x, y);
+    for (size_t i = 0; i < n; i++)
+        y[i] = -y[i];
+}
+
+void drape_multigrid_multiply(const drape_multigrid *m, const double *x, double *y)
+{
+    multiply(&m->level[0].a, x, y);
+}
+
+/* ---- Prolongation ---- */
+
+static bool invert_diagonal(level *l)
+{
+    const matrix *a = &l->a;
+    const int b = a->size;
+    for (int32_t i = 0; i < a->count; i++) {
+        const double *row =
+            a->values + (int64_t)b * b * a->start[i] + (int64_t)b * (a->diagonal[i] - a->start[i]);
+        double *to = l->inverse + (int64_t)b * b * i;
+        for (int c = 0; c < b; c++)
+            for (int r = 0; r < b; r++)
+                to[b * c + r] = row[c * b * length(a, i) + r];
+        if (!invert(b, to))
+            return false;
+    }
+    return true;
+}
+
+/* The rigid motions of nodes at x: translations, and rotations about their mean, in units of their extent. */
+static void make_modes(level *l, const double *x)
+{
+    const size_t count = (size_t)l->a.count;
+    double mean[3] = {0}, extent = 0;
+    for (size_t i = 0; i < 3 * count; i++)
+        mean[i % 3] += x[i] / (double)count;
+    for (size_t i = 0; i < 3 * count; i++)
+        extent = fmax(extent, fabs(x[i] - mean[i % 3]));
+    const double scale = extent > 0 ? 1 / extent : 0;
+    memset(l->modes, 0, 3 * count * MODES * sizeof *l->modes);
+    for (size_t i = 0; i < count; i++)
+        for (size_t c = 0; c < 3; c++) {
+            const size_t next = (c + 1) % 3, last = (c + 2) % 3;
+            double *block = l->modes + 3 * MODES * i;
+            block[MODES * c + c] = 1;
+            block[MODES * next + 3 + c] = -scale * (x[3 * i + last] - mean[last]);
+            block[MODES * last + 3 + c] = scale * (x[3 * i + next] - mean[next]);
+        }
+}
+
+static double dot_columns(const level *l, int32_t I, int p, int q)
+{
+    double sum = 0;
+    for (int32_t n = l->member_start[I]; n < l->member_start[I + 1]; n++) {
+        const double *block = l->modes + (int64_t)l->a.size * MODES * l->member[n];
+        for (int c = 0; c < l->a.size; c++)
+            sum += block[MODES * c + p] * block[MODES * c + q];
+    }
+    return sum;
+}
+
+static void add_column(level *l, int32_t I, int to, double factor, int from)
+{
+    for (int32_t n = l->member_start[I]; n < l->member_start[I + 1]; n++) {
+        double *block = l->modes + (int64_t)l->a.size * MODES * l->member[n];
+        for (int c = 0; c < l->a.size; c++)
+            block[MODES * c + to] += factor * block[MODES * c + from];
+    }
+}
+
+/* Q R of the modes of each aggregate by the modified method of Gram and Schmidt, twice: they become Q, and R
+ * is what the aggregate's unknowns are in the global motions, the modes of the next level. A motion that
+ * depends on the others, such as the rotation of a line about itself, becomes 0. */
+static void orthonormalize(level *l, double *coarse_modes)
+{
+    for (int32_t I = 0; I < l->coarse; I++) {
+        double *R = coarse_modes + (int64_t)MODES * MODES * I;
+        memset(R, 0, sizeof *R * MODES * MODES);
+        for (int q = 0; q < MODES; q++) {
+            const double before = sqrt(dot_columns(l, I, q, q));
+            for (int pass = 0; pass < 2; pass++)
+                for (int p = 0; p < q; p++) {
+                    const double part = dot_columns(l, I, p, q);
+                    add_column(l, I, q, -part, p);
+                    R[MODES * p + q] += part;
+                }
+            const double after = sqrt(dot_columns(l, I, q, q));
+            const bool independent = after > INDEPENDENT * before;
+            R[MODES * q + q] = independent ? after : 0;
+            add_column(l, I, q, independent ? 1 / after - 1 : -1, q);
+        }
+    }
+}
+
+/* The largest eigenvalue of D^-1 A, D its diagonal blocks, from below, by the power iteration. */
+static double largest_eigenvalue(level *l)
+{
+    const size_t n = scalars(&l->a), b = (size_t)l->a.size;
+    double size = 0;
+    for (size_t i = 0; i < n; i++)
+        l->x[i] = (double)((i + 1) * 2654435761U % 65536) / 32768 - 1;
+    for (int k = 0; k <= POWER_STEPS; k++) {
+        double squared = 0;
+        for (size_t i = 0; k > 0 && i < n; i += b)
+            multiply_block(l->a.size, l->inverse + b * i, l->r + i, l->x + i);
+        for (size_t i = 0; i < n; i++)
+            squared += l->x[i] * l->x[i];
+        size = sqrt(squared);
+        for (size_t i = 0; i < n; i++)
+            l->x[i] /= size;
+        multiply(&l->a, l->x, l->r);
+    }
+    return size;
+}
+
+/* P = (1 - w D^-1 A) T, T the modes of the aggregates. */
+LANES_INLINE void smooth_row(level *l, const int size, int32_t i, double w)
+{
+    const matrix *a = &l->a;
+    const int32_t *columns = l->p_column + l->p_start[i], count = l->p_start[i + 1] - l->p_start[i];
+    const int64_t stride = size * length(a, i), block = (int64_t)size * MODES;
+    const double *row = a->values + (int64_t)size * size * a->start[i],
+                 *inverse = l->inverse + size * size * (int64_t)i;
+    double *p = l->p + block * l->p_start[i];
+    memset(p, 0, (size_t)(count * block) * sizeof *p);
+    for (int32_t k = a->start[i]; k < a->start[i + 1]; k++, row += size) {
+        const int32_t j = a->column[k];
+        int32_t at = 0;
+        if (l->aggregate[j] < 0)
+            continue;
+        while (columns[at] != l->aggregate[j])
+            at++;
+        add_block_product(size, row, stride, l->modes + block * j, p + block * at);
+    }
+    for (int32_t k = 0; k < count; k++) {
+        double product[MODES * MODES];
+        const double *t = l->modes + block * i;
+        const bool own = columns[k] == l->aggregate[i];
+        memcpy(product, p + block * k, (size_t)block * sizeof *p);
+        for (int c = 0; c < size; c++)
+            for (int q = 0; q < MODES; q++) {
+                double sum = 0;
+                for (int r = 0; r < size; r++)
+                    sum += inverse[size * c + r] * product[MODES * r + q];
+                p[block * k + MODES * c + q] = (own ? t[MODES * c + q] : 0) - w * sum;
+            }
+    }
+}
+
+LANES_DISPATCH static void smooth_prolongation(level *l)
+{
+    const double w = DAMPING / largest_eigenvalue(l);
+    for (int32_t i = 0; i < l->a.count; i++)
+        if (l->a.size == 3)
+            smooth_row(l, 3, i, w);
+        else
+            smooth_row(l, MODES, i, w);
+}
+
+/* ---- The coarse matrix P' A P ---- */
+
+/* Block row i of A P into m->product, its columns into m->hit. Returns their number. */
+LANES_INLINE int32_t multiply_prolongation(drape_multigrid *m, const level *l, const int size, int32_t i)
+{
+    const matrix *a = &l->a;
+    const int64_t stride = size * length(a, i), block = (int64_t)size * MODES;
+    const double *row = a->values + (int64_t)size * size * a->start[i];
+    int32_t count = 0;
+    for (int32_t k = a->start[i]; k < a->start[i + 1]; k++, row += size) {
+        const int32_t j = a->column[k];
+        for (int32_t q = l->p_start[j]; q < l->p_start[j + 1]; q++) {
+            int32_t *where = m->where + l->p_column[q];
+            if (*where < 0) {
+                memset(m->product + block * count, 0, (size_t)block * sizeof(double));
+                m->hit[count] = l->p_column[q];
+                *where = count++;
+            }
+            add_block_product(size, row, stride, l->p + block * q, m->product + block * *where);
+        }
+    }
+    return count;
+}
+
+/* Adds row i's part P_i' (A P)_i to the lower triangle of the coarse matrix. */
+LANES_INLINE void add_row(drape_multigrid *m, const level *l, level *next, const int size, int32_t i)
+{
+    const int64_t block = (int64_t)size * MODES;
+    const matrix *to = &next->a;
+    const int32_t count = multiply_prolongation(m, l, size, i);
+    for (int32_t q = l->p_start[i]; q < l->p_start[i + 1]; q++) {
+        const int32_t I = l->p_column[q];
+        const int64_t stride = MODES * length(to, I);
+        const double *p = l->p + block * q;
+        for (int32_t k = to->start[I]; k <= to->diagonal[I]; k++) {
+            const int32_t at = m->where[to->column[k]];
+            if (at < 0)
+                continue;
+            const double *restrict product = m->product + block * at;
+            double *restrict sum =
+                next->own + (int64_t)MODES * MODES * to->start[I] + MODES * (int64_t)(k - to->start[I]);
+            for (int c = 0; c < MODES; c++)
+#pragma GCC unroll 6
+                for (int r = 0; r < size; r++)
+#pragma GCC unroll 6
+                    for (int u = 0; u < MODES; u++)
+                        sum[c * stride + u] += p[MODES * r + c] * product[MODES * r + u];
+        }
+    }
+    for (int32_t k = 0; k < count; k++)
+        m->where[m->hit[k]] = -1;
+}
+
+static int32_t find(const matrix *a, int32_t row, int32_t column)
+{
+    int32_t low = a->start[row], high = a->start[row + 1] - 1;
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2;
+        if (a->column[middle] < column)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* Mirrors the lower triangle; an unknown that is in no motion of its aggregate gets the equation x = 0. */
+static void complete(level *l)
+{
+    const matrix *a = &l->a;
+    for (int32_t I = 0; I < a->count; I++)
+        for (int32_t k = a->start[I]; k <= a->diagonal[I]; k++) {
+            const int32_t J = a->column[k], back = find(a, J, I);
+            const int64_t stride = MODES * length(a, I), other = MODES * length(a, J);
+            double *from = l->own + (int64_t)MODES * MODES * a->start[I] + MODES * (int64_t)(k - a->start[I]),
+                   *to =
+                       l->own + (int64_t)MODES * MODES * a->start[J] + MODES * (int64_t)(back - a->start[J]);
+            for (int c = 0; c < MODES; c++)
+                for (int r = 0; r < (I == J ? c : MODES); r++)
+                    to[r * other + c] = from[c * stride + r];
+            for (int c = 0; I == J && c < MODES; c++)
+                if (from[c * stride + c] == 0)
+                    from[c * stride + c] = 1;
+        }
+}
+
+LANES_DISPATCH static void make_coarse(drape_multigrid *m, const level *l, level *next)
+{
+    memset(next->own, 0, nonzeros(&next->a) * sizeof *next->own);
+    memset(m->where, -1, (size_t)next->a.count * sizeof *m->where);
+    for (int32_t i = 0; i < l->a.count; i++)
+        if (l->a.size == 3)
+            add_row(m, l, next, 3, i);
+        else
+            add_row(m, l, next, MODES, i);
+    complete(next);
+}
+
+drape_status drape_multigrid_factor(drape_multigrid *m, const double *values, const double *x)
+{
+    m->level[0].a.values = values;
+    make_modes(&m->level[0], x);
+    for (int k = 0; k < m->count; k++) {
+        level *l = &m->level[k];
+        if (!invert_diagonal(l))
+            return DRAPE_RETRY_LINEAR;
+        if (k + 1 == m->count)
+            break;
+        orthonormalize(l, m->level[k + 1].modes);
+        smooth_prolongation(l);
+        make_coarse(m, l, &m->level[k + 1]);
+    }
+    return !m->dense || factor_dense(m) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
+}
+
+/* ---- The cycle ---- */
+
+/* A sweep forwards from x = 0, and the residual r that it leaves, which the blocks right of the diagonal
+ * alone contribute to. */
+LANES_INLINE void sweep_forwards(const level *l, const int size, const double *b, double *x, double *r)
+{
+    const matrix *a = &l->a;
+    memset(r, 0, scalars(a) * sizeof *r);
+    for (int32_t i = 0; i < a->count; i++) {
+        double sum[MODES], own[MODES];
+        memcpy(sum, b + (int64_t)size * i, (size_t)size * sizeof *sum);
+        gather(a, size, i, x, sum);
+        multiply_block(size, l->inverse + (int64_t)size * size * i, sum, own);
+        scatter(a, size, i, own, r);
+        memcpy(x + (int64_t)size * i, own, (size_t)size * sizeof *x);
+    }
+}
+
+/* rest is scratch: b less the product of the blocks right of the diagonal and the new x. */
+LANES_INLINE void sweep_backwards(const level *l, const int size, const double *b, double *x, double *rest)
+{
+    const matrix *a = &l->a;
+    memcpy(rest, b, scalars(a) * sizeof *rest);
+    for (int32_t i = a->count; i-- > 0;) {
+        double sum[MODES], own[MODES];
+        memcpy(sum, rest + (int64_t)size * i, (size_t)size * sizeof *sum);
+        gather(a, size, i, x, sum);
+        multiply_block(size, l->inverse + (int64_t)size * size * i, sum, own);
+        scatter(a, size, i, own, rest);
+        memcpy(x + (int64_t)size * i, own, (size_t)size * sizeof *x);
+    }
+}
+
+LANES_INLINE void restrict_residual(const level *l, const int size, const double *r, double *b)
+{
+    memset(b, 0, (size_t)l->coarse * MODES * sizeof *b);
+    for (int32_t i = 0; i < l->a.count; i++)
+        for (int32_t q = l->p_start[i]; q < l->p_start[i + 1]; q++) {
+            const double *p = l->p + (int64_t)size * MODES * q, *from = r + (int64_t)size * i;
+            double *to = b + (int64_t)MODES * l->p_column[q];
+#pragma GCC unroll 6
+            for (int c = 0; c < size; c++)
+#pragma GCC unroll 6
+                for (int u = 0; u < MODES; u++)
+                    to[u] += p[MODES * c + u] * from[c];
+        }
+}
+
+LANES_INLINE void add_correction(const level *l, const int size, const double *coarse, double *x)
+{
+    for (int32_t i = 0; i < l->a.count; i++)
+        for (int32_t q = l->p_start[i]; q < l->p_start[i + 1]; q++) {
+            const double *p = l->p + (int64_t)size * MODES * q,
+                         *from = coarse + (int64_t)MODES * l->p_column[q];
+#pragma GCC unroll 6
+            for (int c = 0; c < size; c++)
+#pragma GCC unroll 6
+                for (int u = 0; u < MODES; u++)
+                    x[(int64_t)size * i + c] += p[MODES * c + u] * from[u];
+        }
+}
+
+static void cycle(drape_multigrid *m, int k, const double *b, double *x);
+
+/* Two cycles on level k for its own b. With s an eigenvalue of a cycle times A, at most 1, they are the
+ * polynomial (1 - T(s)) / (1 + e) / s of the cycle, T that of Chebyshev of degree 2 with T(0) = 1 and
+ * |T| <= e on [SMALLEST, 1]: symmetric, positive definite, and within 1 again (Axelsson & Vassilevski 1989,
+ * Algebraic multilevel preconditioning methods, I). */
+static void cycle_twice(drape_multigrid *m, int k)
+{
+    level *l = &m->level[k];
+    if (k + 1 == m->count) {
+        cycle(m, k, l->b, l->x);
+        return;
+    }
+    const size_t n = scalars(&l->a);
+    const double middle = (1 + SMALLEST) / 2, radius = (1 - SMALLEST) / 2;
+    const double top = 2 * middle * middle / (radius * radius) - 1; /* of Chebyshev's at s = 0 */
+    const double factor = 2 / (radius * radius * (top + 1));
+    cycle(m, k, l->b, l->x);
+    for (size_t i = 0; i < n; i++)
+        l->sum[i] = 2 * middle * factor * l->x[i];
+    multiply(&l->a, l->x, l->b);
+    cycle(m, k, l->b, l->x);
+    for (size_t i = 0; i < n; i++)
+        l->x[i] = l->sum[i] - factor * l->x[i];
+}
+
+LANES_INLINE void cycle_rows(drape_multigrid *m, int k, const int size, const double *b, double *x)
+{
+    const level *l = &m->level[k];
+    sweep_forwards(l, size, b, x, l->r);
+    if (k + 1 < m->count) {
+        restrict_residual(l, size, l->r, m->level[k + 1].b);
+        cycle_twice(m, k + 1);
+        add_correction(l, size, m->level[k + 1].x, x);
+    }
+    sweep_backwards(l, size, b, x, l->r);
+}
+
+LANES_DISPATCH static void cycle(drape_multigrid *m, int k, const double *b, double *x)
+{
+    if (k + 1 == m->count && m->dense)
+        solve_dense(m, b, x);
+    else if (m->level[k].a.size == 3)
+        cycle_rows(m, k, 3, b, x);
+    else
+        cycle_rows(m, k, MODES, b, x);
+}
+
+void drape_multigrid_apply(drape_multigrid *m, const double *r, double *z)
+{
+    cycle(m, 0, r, z);
+}
+
+int drape_multigrid_levels(const drape_multigrid *m)
+{
+    return m->count;
+}
+
+double drape_multigrid_complexity(const drape_multigrid *m)
+{
+    double sum = 0;
+    for (int k = 0; k < m->count; k++)
+        sum += (double)nonzeros(&m->level[k].a);
+    return sum / (double)nonzeros(&m->level[0].a);
+}
