@@ -189,7 +189,7 @@ class Context:
         self.address = handle.value
         self.lock = threading.RLock()
         self.keep: list = []  # what must live as long as the context of the library
-        weakref.finalize(self, _destroy, lib.drape_context_destroy, handle, (self.memory, definition, self.keep))
+        weakref.finalize(self, _destroy, lib.drape_context_destroy, handle, (self.memory, definition, self.keep)).atexit = False
 
     def message(self) -> str:
         return lib.drape_context_message(self.address).decode(errors="replace")
@@ -204,11 +204,13 @@ def _destroy(function, handle, _keep):
 
 
 class Handle:
-    """An object of the library and what it needs: freed when neither it nor anything made from it is in use, or by close()."""
+    """An object of the library and what it needs: freed when neither it nor anything made from it is in use, or by close(). needs are kept from outside
+    of the collector's reach, so none may refer to what has the handle. When the interpreter ends nothing is freed: another thread may be using it."""
 
     def __init__(self, handle: ctypes.c_void_p, destroy, context: Context, *needs: Any):
         self.address, self.context = handle.value, context
         self.close = weakref.finalize(self, _destroy, destroy, handle, (context, *needs))
+        self.close.atexit = False
 
     def view(self, address: int, shape, dtype) -> np.ndarray:
         """A read-only array of the library's memory, without a copy."""
@@ -306,6 +308,13 @@ def real(value, name: str) -> float:
     if isinstance(value, (str, bytes)):
         raise TypeError(f"{name}: needs a number, has the text {value!r}")
     return float(value)
+
+
+def instance(value, kind, name: str):
+    """An object of a class of this package: of another, its address would be taken for what it is not."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{name}: needs a drape.{kind.__name__}, has {type(value).__name__}")
+    return value
 
 
 def function_of(value, name: str):

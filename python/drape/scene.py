@@ -13,7 +13,7 @@ import numpy as np
 
 from . import _binding as c
 from ._binding import CheckResult, ClothRange, ColliderMotion
-from ._library import ArgumentError, Context, Handle, encode, header, lib, numbers, real, record, to_json
+from ._library import ArgumentError, Context, Handle, encode, header, instance, lib, numbers, real, record, to_json
 from .mesh import Mesh
 from .terms import Term
 
@@ -167,7 +167,7 @@ class Model:
 
     def __init__(self, scene: Union[Scene, Mapping, str, os.PathLike], terms: Sequence[Term] = ()):
         self.scene = scene if isinstance(scene, Scene) else Scene(scene)
-        self.terms = tuple(terms)
+        self.terms = tuple(instance(term, Term, "terms") for term in terms)
         self._context = Context()
         for term in self.terms:
             term.register(self._context)

@@ -1,9 +1,11 @@
 """Running simulations."""
+import atexit
 import ctypes
 import math
 import os
 import _signal as signal  # the module signal turns numbers into enumerators and back at each call, which takes longer than the rest of it
 import threading
+import time
 import weakref
 from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
@@ -11,7 +13,7 @@ import numpy as np
 
 from . import _binding as c
 from ._binding import (Attempt, ColliderMotion, Energy, EventKind, EventRecord, Realtime, Relaxed, SeamReport, Statistics, Status, Untangling, Warning)
-from ._library import (ArgumentError, Context, Error, Handle, Stopped, encode, error_of, function_of, header, indices, lib, numbers, real, record,
+from ._library import (ArgumentError, Context, Error, Handle, Stopped, encode, error_of, function_of, header, indices, instance, lib, numbers, real, record,
                        whole)
 from .scene import Model, Scene
 
@@ -88,7 +90,9 @@ class Sim:
         definition.realtime_step, definition.teleport_speed = realtime_step, teleport_speed
         handle = ctypes.c_void_p()
         self._context.check(lib.drape_sim_create(self._context.address, self.model._address, definition, handle))
-        self._needs: Dict[str, Any] = {"model": self.model}  # must live as long as the sim of the library
+        self._needs: Dict[str, Any] = {"model": self.model._handle}  # must live as long as the sim of the library
+        self._wind: Optional[Wind] = None
+        self._events: List[Callable] = []
         self._handle = Handle(handle, lib.drape_sim_destroy, self._context, self._needs)
         self._address: Optional[int] = self._handle.address
         self._observers: List[Tuple[Observer, Tuple[EventKind, ...]]] = []
@@ -99,6 +103,7 @@ class Sim:
         self._shape = (self.model.node_count, 3)
         self._needs["observer"] = _observer(weakref.ref(self))
         self._call(lib.drape_sim_observe, self._needs["observer"], None)
+        _SIMS.add(self)
 
     # ---- Life ----
 
@@ -116,6 +121,9 @@ class Sim:
 
     def __exit__(self, *_: Any) -> None:
         self.close()
+
+    def __reduce_ex__(self, _: Any) -> Any:  # which copy and pickle call
+        raise TypeError("a Sim cannot be copied or pickled: restore_checkpoint(sim.checkpoint()) of another Sim(sim.model) puts that into the same state")
 
     def __repr__(self) -> str:
         return f"Sim({self.model.node_count} nodes, t = {self.time:g} s)" if self._address else "Sim(closed)"
@@ -444,9 +452,12 @@ class Sim:
         """Sets the velocity of the air for drag terms: wind(t, x) returns velocities (count x 3 [m/s]) at the time t [s] and the points x (count x 3 [m]), or
         these and their gradient (count x 3 x 3 [1/s], d wind_i / d x_j), with which Newton's method converges as fast as without wind. A single vector
         stands for the same wind everywhere. None: still air. An exception in it ends the advance and comes out of it."""
-        field: Any = c.drape_wind_field() if wind is None else _wind(weakref.ref(self), function_of(wind, "wind"))  # type: ignore[call-overload]
-        self._call(lib.drape_sim_set_wind, field, None)
-        self._needs["wind"] = field
+        if wind is not None:
+            function_of(wind, "wind")
+        field: Any = c.drape_wind_field() if wind is None else _wind(weakref.ref(self))  # type: ignore[call-overload]
+        with self._lock:
+            self._call(lib.drape_sim_set_wind, field, None)
+            self._needs["wind"], self._wind = field, wind
 
     # ---- Colliders ----
 
@@ -544,7 +555,7 @@ class Sim:
         model = scene if isinstance(scene, Model) else Model(scene)
         with self._lock:
             self._call(lib.drape_sim_change_model, model._address)
-            self.model = self._needs["model"] = model
+            self.model, self._needs["model"] = model, model._handle
 
     @header("drape_sim_untangle")
     def untangle(self, *, sweeps: Optional[int] = None, gap: Optional[float] = None, keep: Optional[bool] = None) -> Untangling:
@@ -650,9 +661,12 @@ class Sim:
         lib.drape_event_def_init(definition, ctypes.sizeof(definition))
         definition.name, definition.direction, definition.action, definition.once = encode(name), encode(direction), encode(action), once
         definition.cloth, definition.pins = encode(cloth), encode(pins)
-        callback = _event_function(weakref.ref(self), function_of(function, "function"))
-        self._call(lib.drape_sim_add_event, definition, callback, None)
-        self._needs.setdefault("events", []).append(callback)
+        function_of(function, "function")
+        with self._lock:
+            callback = _event_function(weakref.ref(self), len(self._events))
+            self._call(lib.drape_sim_add_event, definition, callback, None)
+            self._needs.setdefault("events", []).append(callback)
+            self._events.append(function)
 
     # ---- Whole runs ----
 
@@ -672,6 +686,7 @@ class Embedding:
     @header("drape_embedding_create")
     def __init__(self, model: Model, vertices, normals=None, cloth: int = -1):
         """Fixes vertices to one cloth of a model, or to all."""
+        instance(model, Model, "model")
         x = numbers(vertices, "vertices", -1, 3, dtype=np.float32)
         n = None if normals is None else numbers(normals, "normals", len(x), 3, dtype=np.float32)
         handle, context = ctypes.c_void_p(), Context()
@@ -691,7 +706,7 @@ class Embedding:
 # ---- Callbacks ----
 #
 # A callback keeps exceptions for the caller of the advance, as the library cannot pass them on. It refers to its sim weakly: the library's sim keeps the
-# callback alive, and the Python object keeps the library's sim.
+# callback alive, and the Python object keeps the library's sim, and the functions that the callback calls, which may refer to the object.
 
 def _observer(sim_of):
     def observe(_, pointer):
@@ -736,11 +751,11 @@ def _copy(address: int, shape) -> np.ndarray:
     return out
 
 
-def _wind(sim_of, wind: Wind):
+def _wind(sim_of):
     def field(_, t, count, x, out, gradient):
         sim = sim_of()
         try:
-            result = wind(t, _copy(x, (count, 3)))
+            result = sim._wind(t, _copy(x, (count, 3)))
             values, slope = result if isinstance(result, tuple) else (result, None)
             values = numbers(np.broadcast_to(values, (count, 3)), "the wind", count, 3)
             ctypes.memmove(out, values.ctypes.data, values.nbytes)
@@ -754,17 +769,36 @@ def _wind(sim_of, wind: Wind):
     return c.drape_wind_field(field)
 
 
-def _event_function(sim_of, function):
+def _event_function(sim_of, index: int):
     def measure(_, t, x, v, value):
         sim = sim_of()
         try:
-            ctypes.c_double.from_address(value).value = function(t, _copy(x, sim._shape), _copy(v, sim._shape))
+            ctypes.c_double.from_address(value).value = sim._events[index](t, _copy(x, sim._shape), _copy(v, sim._shape))
             return 0
         except BaseException as error:
             sim._pending = error
             return Status.E_STOPPED
 
     return c.drape_event_function(measure)
+
+
+# ---- The end of the interpreter ----
+
+_SIMS: "weakref.WeakSet[Sim]" = weakref.WeakSet()
+_PATIENCE = 10.0  # [s] for the steps in progress when the interpreter ends
+
+
+@atexit.register
+def _stop_all() -> None:
+    """A daemon thread may still advance a sim, whose callbacks need the interpreter. Such sims are stopped after the step in progress, and their locks are kept,
+    so that no further advance begins. A sim that does not stop in time is left as it is, with all that it needs."""
+    running = [sim for sim in list(_SIMS) if not sim._lock.acquire(blocking=False)]
+    for sim in running:
+        sim.cancel()
+    end = time.monotonic() + _PATIENCE
+    for sim in running:
+        if not sim._lock.acquire(timeout=max(0.0, end - time.monotonic())):
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(sim))
 
 
 class _Interrupt:

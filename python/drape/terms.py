@@ -1,6 +1,7 @@
 """Terms in Python: energies of elements, as functions of numpy arrays."""
 import ctypes
 import math
+import weakref
 from typing import Any, Callable, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
@@ -49,11 +50,13 @@ class Term:
         ops.struct_size = ctypes.sizeof(ops)
         ops.entry.name, ops.entry.summary, ops.entry.reference = encode(name), b"an energy in Python", encode(reference)
         ops.element_name, ops.nodes, ops.convex, ops.external = encode(element_name), nodes, convex, external
-        ops.build, ops.energy = kinds["build"](self._build), kinds["energy"](self._energy)
+        this = weakref.ref(self)  # a context keeps the callbacks, and must not keep functions that refer to what keeps the context
+        ops.build = kinds["build"](lambda *given: term._build(*given) if (term := this()) else Status.E_ARGUMENT)
+        ops.energy = kinds["energy"](lambda *given: term._energy(*given) if (term := this()) else None)
 
     def register(self, context: Context) -> None:
-        """Makes the term known to a context, which keeps it."""
-        context.keep.append(self)
+        """Makes the term known to a context. Who uses the context must keep the term."""
+        context.keep.append(self._ops)
         context.check(lib.drape_context_add_term(context.address, self._ops))
 
     def raise_pending(self) -> None:

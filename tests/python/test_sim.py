@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """test_sim.py: scenes and sims in Python. See package.py."""
+import copy
 import gc
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -136,8 +138,8 @@ def test_views_outlive():
         end(sim)
         del sim
         churn()
-        for array, copy in zip(arrays, before):
-            assert np.array_equal(array, copy)
+        for array, was in zip(arrays, before):
+            assert np.array_equal(array, was)
 
 
 def test_nothing_is_kept():
@@ -149,6 +151,53 @@ def test_nothing_is_kept():
     del sim
     assert gone() is None and len(blocks) <= 1, blocks  # without a collection; the block of the context goes with the view's
     assert np.isfinite(x).all()
+
+
+def test_cycles_are_collected():
+    """a wind, an event, an observer and a term that refer to what has the sim do not keep it"""
+    class Lab:
+        def __init__(self):
+            term = drape.Term("my.weight", 1, self.elements, self.energy, external=True)
+            self.sim = drape.Sim(drape.Model(sheet(terms=["stretch.edge", "drag.wind", "my.weight"]), terms=[term]))
+            self.sim.set_wind(self.wind)
+            self.sim.add_event("mine", self.event)
+            self.sim.observe(self.observe)
+
+        def wind(self, *_):
+            return [self.sim.time * 0, 0, 1]
+
+        def event(self, t, x, v):
+            return x[0, 0] + 1 + 0 * len(self.sim.positions)
+
+        def observe(self, _):
+            assert self.sim.time >= 0
+
+        def elements(self, cloth):
+            return np.arange(len(cloth.rest))[:, None], cloth.node_mass[:, None]
+
+        def energy(self, x, mass):
+            return mass[:, 0] * x[:, 0, 1], mass[:, :, None] * [0, 1, 0], np.zeros((3, 3))
+
+    gone = []
+    for _ in range(3):
+        lab = Lab()
+        lab.sim.advance(0.02)
+        gone += [weakref.ref(lab.sim), weakref.ref(lab.sim._context), weakref.ref(lab.sim.model._context)]
+    del lab
+    gc.collect()
+    equal([ref() for ref in gone], [None] * len(gone))
+
+
+def test_wind_goes():
+    """a wind that is replaced is called no more, and the sim goes on with a wind whose function is held by nothing else"""
+    sim, calls = drape.Sim(sheet()), []
+    sim.set_wind(lambda t, x: calls.append(1) or [1, 0, 0])
+    gc.collect()
+    sim.advance(0.02)
+    first = len(calls)
+    sim.set_wind(lambda t, x: calls.append(2) or [0, 0, 0])
+    sim.advance(0.04)
+    assert 1 in calls[:first] and 2 in calls[first:] and 1 not in calls[first:]
 
 
 def test_closing():
@@ -168,6 +217,48 @@ def test_interpreter_ends():
            "sim.set_wind(lambda t, x: [1, 0, 0])\nsim.advance(0.05)\nf = sim.frames(0.2)\nnext(f)\n"
     result = subprocess.run([sys.executable, "-X", "dev", "-c", code], env=ENVIRONMENT, capture_output=True, text=True, check=False)
     equal((result.returncode, result.stdout, result.stderr), (0, "", ""))
+
+
+def test_ends_while_advancing():
+    """the interpreter ends in order while a daemon thread advances a sim, whether that ends at once, advances again, or waits in a callback"""
+    code = """if True:
+        import drape, json, sys, threading, time
+        sim, started = drape.Sim(json.loads(sys.argv[1])), threading.Event()
+        sim.set_wind(lambda t, x: [1, 0, 0])
+
+        def work():
+            while True:
+                try:
+                    sim.advance(1e6)
+                except drape.Stopped:
+                    if sys.argv[2] == "once":
+                        return
+
+        def observe(event):
+            started.set()
+            if sys.argv[2] == "waits":
+                time.sleep(1e3)
+
+        sim.observe(observe)
+        if sys.argv[2] == "waits":
+            drape.sim._PATIENCE = 0.1
+        threading.Thread(target=work, daemon=True).start()
+        started.wait()"""
+    for kind in "once", "again", "waits":
+        result = subprocess.run([sys.executable, "-c", code, json.dumps(sheet()), kind], env=ENVIRONMENT, capture_output=True, text=True, check=False, timeout=60)
+        equal((result.returncode, result.stdout, result.stderr), (0, "", ""), kind)
+
+
+def test_objects():
+    """an object of another class is refused where its address would be taken, and a sim is not copied"""
+    sim = drape.Sim(sheet())
+    for what in (sim, None, sim.model._address, sheet()):
+        raises(TypeError, drape.Embedding, what, [[0, 0, 0]], says="model: needs a drape.Model")
+        raises(TypeError, drape.Model, sheet(), [what], says="terms: needs a drape.Term")
+    for call in (lambda: drape.Sim(sim), lambda: drape.Model(sim), lambda: drape.Model(sim.model), lambda: sim.change(sim), lambda: drape.run(sim.model)):
+        raises(TypeError, call, says="a scene is")
+    for copied in (copy.copy, copy.deepcopy, pickle.dumps):
+        raises(TypeError, copied, sim, says="restore_checkpoint")
 
 
 # ---- Advancing
