@@ -252,19 +252,36 @@ def record(struct):
 
 def encode(text) -> Optional[bytes]:
     """A text or a path for the library; None stays None."""
-    if text is None or isinstance(text, bytes):
+    if text is None:
         return text
-    if isinstance(text, os.PathLike):
-        return os.fsencode(text)
+    if isinstance(text, (bytes, os.PathLike)):
+        return _without_nul(os.fsencode(text))
     if not isinstance(text, str):
         raise TypeError(f"needs a text, has {type(text).__name__}: {text!r}")
-    return text.encode()
+    return _without_nul(text.encode())
+
+
+def _without_nul(text: bytes) -> bytes:
+    """The library's texts end at a NUL, so what has one would be cut."""
+    if b"\0" in text:
+        raise ArgumentError(f"{text.decode(errors='replace')!r}: a text or a name must not have a NUL character")
+    return text
+
+
+def file_name(path) -> bytes:
+    """The name of a file for the library."""
+    name = encode(path)
+    if not name:
+        raise ArgumentError("the name of the file is empty")
+    return name
 
 
 def numbers(values, name: str, *shape, dtype=np.float64) -> np.ndarray:
     """A contiguous array of this shape; -1 stands for any length. Numbers that dtype cannot hold are refused, never wrapped or cut."""
     try:
         given = np.asarray(values)
+        _check_shape(given, name, shape)  # before a conversion, for which there may be no memory
+        _check_kind(given, name)
         if np.issubdtype(dtype, np.integer):
             array = _whole_numbers(given, name, dtype)
         elif np.iscomplexobj(given):
@@ -277,10 +294,40 @@ def numbers(values, name: str, *shape, dtype=np.float64) -> np.ndarray:
         raise
     except (ValueError, OverflowError) as error:  # of numpy: texts, and lists of different lengths
         raise ArgumentError(f"{name}: {error}") from None
-    if array.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, array.shape)):
-        wanted = " x ".join("n" if n == -1 else str(n) for n in shape)
-        raise ArgumentError(f"{name}: has shape {array.shape}, needs {wanted}")
     return array
+
+
+def _check_shape(given: np.ndarray, name: str, shape) -> None:
+    if given.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, given.shape)):
+        wanted = " x ".join("n" if n == -1 else str(n) for n in shape)
+        raise ArgumentError(f"{name}: has shape {given.shape}, needs {wanted}")
+
+
+def _check_kind(given: np.ndarray, name: str) -> None:
+    """numpy makes NaN of None, and numbers of texts."""
+    if given.dtype.kind in "US" and given.size:
+        raise ArgumentError(f"{name}: needs numbers, has the text {str(given.flat[0])!r}")
+    if given.dtype == object and any(item is None for item in given.flat):
+        raise TypeError(f"{name}: needs numbers, has None")
+
+
+def given_array(values, name: str) -> np.ndarray:
+    """An array as the caller has it."""
+    try:
+        return np.asarray(values)
+    except ValueError as error:  # lists of different lengths
+        raise ArgumentError(f"{name}: {error}") from None
+
+
+def spread(values, name: str, *shape) -> np.ndarray:
+    """Numbers of this shape, from those of one row or of one number for all."""
+    given = given_array(values, name)
+    try:
+        return numbers(np.broadcast_to(given, shape), name, *shape)
+    except ValueError as error:
+        if isinstance(error, Error):
+            raise
+        raise ArgumentError(f"{name}: has shape {given.shape}, needs {' x '.join(map(str, shape))}, or one for all") from None
 
 
 def _whole_numbers(given: np.ndarray, name: str, dtype) -> np.ndarray:
@@ -297,6 +344,8 @@ def _whole_numbers(given: np.ndarray, name: str, dtype) -> np.ndarray:
 
 def whole(value, name: str) -> int:
     """A whole number that the library has room for."""
+    if isinstance(value, (float, np.floating)):
+        raise ArgumentError(f"{name}: needs a whole number, has {value}")
     try:
         return int(numbers([operator.index(value)], name, 1, dtype=np.int32)[0])
     except TypeError as error:
@@ -307,7 +356,12 @@ def real(value, name: str) -> float:
     """A number; a text is none."""
     if isinstance(value, (str, bytes)):
         raise TypeError(f"{name}: needs a number, has the text {value!r}")
-    return float(value)
+    try:
+        return float(value)
+    except TypeError:
+        raise TypeError(f"{name}: needs a number, has {type(value).__name__}") from None
+    except OverflowError as error:
+        raise ArgumentError(f"{name}: {error}") from None
 
 
 def instance(value, kind, name: str):
@@ -324,10 +378,12 @@ def function_of(value, name: str):
     return value
 
 
-def indices(values, name: str) -> np.ndarray:
-    """Node numbers; a single number, a sequence, or a mask of all nodes."""
-    array = np.atleast_1d(np.asarray(values))
+def indices(values, name: str, count: int) -> np.ndarray:
+    """Node numbers: a single number, a sequence, or a mask of all count nodes."""
+    array = np.atleast_1d(given_array(values, name))
     if array.dtype == bool:
+        if array.shape != (count,):
+            raise ArgumentError(f"{name}: a mask of shape {array.shape}, needs {count}")
         array = np.flatnonzero(array)
     return numbers(array, name, -1, dtype=np.int32)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from . import _binding as c
 from ._binding import CheckResult, ClothRange, ColliderMotion
-from ._library import ArgumentError, Context, Handle, encode, header, instance, lib, numbers, real, record, to_json
+from ._library import ArgumentError, Context, Handle, encode, header, instance, lib, numbers, real, record, to_json, whole
 from .mesh import Mesh
 from .terms import Term
 
@@ -259,7 +259,7 @@ class Model:
         names = self._colliders
         if isinstance(which, str) and which in names:
             return names.index(which)
-        if isinstance(which, str) or not 0 <= operator.index(which) < len(names):
+        if isinstance(which, str) or not 0 <= whole(which, "collider") < len(names):
             raise ArgumentError(f"no collider {which!r}: there are {', '.join(names) or 'none'}")
         return operator.index(which)
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from . import _binding as c
 from ._binding import (Attempt, ColliderMotion, Energy, EventKind, EventRecord, Realtime, Relaxed, SeamReport, Statistics, Status, Untangling, Warning)
-from ._library import (ArgumentError, Context, Error, Handle, Stopped, encode, error_of, function_of, header, indices, instance, lib, numbers, real, record,
-                       whole)
+from ._library import (ArgumentError, Context, Error, Handle, Stopped, encode, error_of, file_name, function_of, given_array, header, indices, instance, lib,
+                       numbers, real, record, spread, whole)
 from .scene import Model, Scene
 
 if TYPE_CHECKING:
@@ -86,8 +86,9 @@ class Sim:
         definition.integrator, definition.controller = encode(integrator), encode(controller)
         definition.integrator_settings, definition.integrator_setting_count = _settings(integrator_settings, keep)
         definition.controller_settings, definition.controller_setting_count = _settings(controller_settings, keep)
-        definition.dt, definition.dt_min, definition.frame_rate, definition.threads = dt, dt_min, frame_rate, whole(threads, "threads")
-        definition.realtime_step, definition.teleport_speed = realtime_step, teleport_speed
+        definition.dt, definition.dt_min, definition.frame_rate = real(dt, "dt"), real(dt_min, "dt_min"), real(frame_rate, "frame_rate")
+        definition.realtime_step, definition.teleport_speed = real(realtime_step, "realtime_step"), real(teleport_speed, "teleport_speed")
+        definition.threads = whole(threads, "threads")
         handle = ctypes.c_void_p()
         self._context.check(lib.drape_sim_create(self._context.address, self.model._address, definition, handle))
         self._needs: Dict[str, Any] = {"model": self.model._handle}  # must live as long as the sim of the library
@@ -182,7 +183,7 @@ class Sim:
             finally:
                 self._advancing = False
             if self._interrupt.came:
-                self._interrupt.pass_on()  # raises KeyboardInterrupt, unless the program has a handler of its own that does not
+                self._interrupt.pass_on()
             self._raise_pending()
             if status == Status.E_STOPPED and self._frame is not None:
                 return None
@@ -274,15 +275,15 @@ class Sim:
     def set_state(self, t: float, positions, velocities) -> None:
         """Goes on from time t [s], positions [m] and velocities [m/s] (nodes x 3)."""
         x, v = numbers(positions, "positions", *self._shape), numbers(velocities, "velocities", *self._shape)
-        self._call(lib.drape_sim_set_state, t, x.ctypes.data, v.ctypes.data)
+        self._call(lib.drape_sim_set_state, real(t, "t"), x.ctypes.data, v.ctypes.data)
 
     def save(self, path) -> None:
         """Writes a checkpoint, from which a sim of the same scene continues with the same bits."""
-        self._call(lib.drape_sim_save, encode(path))
+        self._call(lib.drape_sim_save, file_name(path))
 
     def restore(self, path) -> None:
         """Restores a checkpoint."""
-        self._call(lib.drape_sim_restore, encode(path))
+        self._call(lib.drape_sim_restore, file_name(path))
 
     def checkpoint(self) -> bytes:
         """A checkpoint as bytes."""
@@ -296,8 +297,12 @@ class Sim:
         self._call(lib.drape_sim_save_to, write, None)
         return b"".join(parts)
 
-    def restore_checkpoint(self, data: bytes) -> None:
+    def restore_checkpoint(self, data: Union[bytes, bytearray, memoryview]) -> None:
         """Restores a checkpoint from bytes."""
+        try:
+            data = memoryview(data).tobytes()
+        except TypeError:
+            raise TypeError(f"data: needs the bytes of a checkpoint, has {type(data).__name__}") from None
         self._call(lib.drape_sim_restore_from, ctypes.cast(ctypes.c_char_p(data), ctypes.c_void_p), len(data))
 
     # ---- Forces, energies, work ----
@@ -386,23 +391,26 @@ class Sim:
         """Lets pinned nodes go."""
         self._nodes(lib.drape_sim_unpin, nodes)
 
+    def _indices(self, nodes) -> np.ndarray:
+        return indices(nodes, "nodes", self._shape[0])
+
     def _nodes(self, function, nodes) -> None:
-        nodes = indices(nodes, "nodes")
+        nodes = self._indices(nodes)
         self._call(function, len(nodes), nodes.ctypes.data)
 
     @header("drape_sim_move_pins")
     def move_pins(self, nodes, positions, seconds: float, velocities=None) -> None:
         """Moves pinned nodes to positions (count x 3 [m]) within the next seconds [s] of simulated time, to arrive with velocities (count x 3 [m/s])."""
-        nodes = indices(nodes, "nodes")
-        x = numbers(np.atleast_2d(positions), "positions", len(nodes), 3)
-        v = None if velocities is None else numbers(np.atleast_2d(velocities), "velocities", len(nodes), 3)
-        self._call(lib.drape_sim_move_pins, len(nodes), nodes.ctypes.data, seconds, x.ctypes.data, None if v is None else v.ctypes.data)
+        nodes = self._indices(nodes)
+        x = numbers(_rows(positions, "positions"), "positions", len(nodes), 3)
+        v = None if velocities is None else numbers(_rows(velocities, "velocities"), "velocities", len(nodes), 3)
+        self._call(lib.drape_sim_move_pins, len(nodes), nodes.ctypes.data, real(seconds, "seconds"), x.ctypes.data, None if v is None else v.ctypes.data)
 
     @header("drape_sim_attach")
     def attach(self, collider: Which, nodes, triangles=None) -> None:
         """Lets a collider carry nodes from where they are. triangles: those of a collider that deforms; None: the nearest."""
-        nodes = indices(nodes, "nodes")
-        on = None if triangles is None else numbers(np.atleast_1d(triangles), "triangles", len(nodes), dtype=np.int32)
+        nodes = self._indices(nodes)
+        on = None if triangles is None else numbers(np.atleast_1d(given_array(triangles, "triangles")), "triangles", len(nodes), dtype=np.int32)
         with self._lock:
             self._call(lib.drape_sim_attach, self._collider(collider), len(nodes), nodes.ctypes.data, None if on is None else on.ctypes.data)
 
@@ -419,8 +427,8 @@ class Sim:
     @header("drape_sim_set_masses")
     def set_masses(self, nodes, masses) -> None:
         """Gives nodes other masses [kg]."""
-        nodes = indices(nodes, "nodes")
-        m = numbers(np.broadcast_to(masses, len(nodes)), "masses", len(nodes))
+        nodes = self._indices(nodes)
+        m = spread(masses, "masses", len(nodes))
         self._call(lib.drape_sim_set_masses, len(nodes), nodes.ctypes.data, m.ctypes.data)
 
     # ---- Forces of the host ----
@@ -434,9 +442,9 @@ class Sim:
     @header("drape_sim_set_drag_springs")
     def drag(self, nodes=(), targets=(), stiffness=0.0) -> None:
         """Drags nodes towards targets (count x 3 [m]) by springs of a stiffness [N/m]; without arguments: no more."""
-        nodes = indices(nodes, "nodes")
-        x = numbers(np.reshape(targets, (-1, 3)), "targets", len(nodes), 3)
-        k = numbers(np.broadcast_to(np.asarray(stiffness, float), len(nodes)), "stiffness", len(nodes))
+        nodes = self._indices(nodes)
+        x = numbers(_rows(targets, "targets"), "targets", len(nodes), 3)
+        k = spread(stiffness, "stiffness", len(nodes))
         self._call(lib.drape_sim_set_drag_springs, len(nodes), nodes.ctypes.data, k.ctypes.data, x.ctypes.data)
 
     @property
@@ -483,6 +491,7 @@ class Sim:
         quaternion w x y z) turns it as well, to arrive with an angular velocity [rad/s]."""
         d = numbers(displacement, "displacement", 3)
         v = None if velocity is None else numbers(velocity, "velocity", 3)
+        seconds = real(seconds, "seconds")
         at = None if v is None else v.ctypes.data
         if rotation is None:
             if angular_velocity is not None:
@@ -502,7 +511,7 @@ class Sim:
         x = numbers(positions, "positions", -1, 3)
         v = None if velocities is None else numbers(velocities, "velocities", len(x), 3)
         with self._lock:
-            self._call(lib.drape_sim_deform_collider, self._collider(which), seconds, len(x), x.ctypes.data, None if v is None else v.ctypes.data)
+            self._call(lib.drape_sim_deform_collider, self._collider(which), real(seconds, "seconds"), len(x), x.ctypes.data, None if v is None else v.ctypes.data)
 
     @header("drape_sim_collider_points")
     def collider_points(self, which: Which = 0) -> Tuple[np.ndarray, np.ndarray]:
@@ -541,7 +550,7 @@ class Sim:
         definition.center[:], definition.translate[:] = numbers(center, "center", 3).tolist(), numbers(translate, "translate", 3).tolist()
         definition.stop = stop
         if cloths is not None:
-            pieces = indices(cloths, "cloths")
+            pieces = indices(cloths, "cloths", len(self.model.cloths))
             definition.cloths, definition.cloth_count = pieces.ctypes.data, len(pieces)
         with self._lock:
             if colliders is not None:
@@ -562,7 +571,7 @@ class Sim:
         """Takes apart cloth that passes through itself, other cloth or colliders, and reports what was found and done."""
         definition, report = c.drape_untangle_def(), c.drape_untangling()
         lib.drape_untangle_def_init(definition, ctypes.sizeof(definition))
-        sweeps = None if sweeps is None else whole(sweeps, "sweeps")
+        sweeps, gap = None if sweeps is None else whole(sweeps, "sweeps"), None if gap is None else real(gap, "gap")
         given = {name: value for name, value in (("sweeps", sweeps), ("gap", gap), ("keep", keep)) if value is not None}
         for name, value in given.items():
             setattr(definition, name, value)
@@ -582,18 +591,18 @@ class Sim:
     def closest(self, points, within: float = math.inf, *, cloth: bool = True, colliders: bool = True) -> np.ndarray:
         """The nearest places on cloth and colliders to points (count x 3 [m]): a structured array with `found`, `collider`, `triangle`, `distance` [m],
         `point` [m], `normal`, `weights`."""
-        x = numbers(np.atleast_2d(points), "points", -1, 3)
+        x = numbers(_rows(points, "points"), "points", -1, 3)
         hits = np.zeros(len(x), np.dtype(c.drape_hit))
-        self._call(lib.drape_sim_closest, _what(cloth, colliders), len(x), x.ctypes.data, within, _pointer(hits, c.drape_hit))
+        self._call(lib.drape_sim_closest, _what(cloth, colliders), len(x), x.ctypes.data, real(within, "within"), _pointer(hits, c.drape_hit))
         return hits
 
     @header("drape_sim_closest")
     def cast(self, origins, directions, length: float = 1e6, *, cloth: bool = True, colliders: bool = True) -> np.ndarray:
         """The first places that rays meet, from origins (count x 3 [m]) along directions (count x 3), up to a length [m]: an array as of closest()."""
-        x, d = numbers(np.atleast_2d(origins), "origins", -1, 3), np.atleast_2d(np.asarray(directions, float))
-        d = numbers(np.broadcast_to(d, x.shape), "directions", len(x), 3)
+        x = numbers(_rows(origins, "origins"), "origins", -1, 3)
+        d = spread(directions, "directions", len(x), 3)
         hits = np.zeros(len(x), np.dtype(c.drape_hit))
-        self._call(lib.drape_sim_cast, _what(cloth, colliders), len(x), x.ctypes.data, d.ctypes.data, length, _pointer(hits, c.drape_hit))
+        self._call(lib.drape_sim_cast, _what(cloth, colliders), len(x), x.ctypes.data, d.ctypes.data, real(length, "length"), _pointer(hits, c.drape_hit))
         return hits
 
     @property
@@ -715,7 +724,7 @@ def _observer(sim_of):
             return 0
         try:
             event = pointer.contents
-            if sim._pending is not None or sim._interrupt.came:  # pending: of the wind or an event
+            if sim._pending is not None:  # of the wind or an event
                 return Status.E_STOPPED
             if sim.model.terms and any(term.failed for term in sim.model.terms):
                 return Status.E_STOPPED
@@ -730,7 +739,9 @@ def _observer(sim_of):
             if sim._wants_frame and event.kind == EventKind.FRAME:
                 sim._frame = Frame(event.frame, event.time, _copy(event.positions, sim._shape), _copy(event.velocities, sim._shape))
                 return 1
-            return Status.E_STOPPED if sim._interrupt.came else Status.OK
+            if sim._interrupt.came:
+                sim._interrupt.pass_on()
+            return Status.OK
         except BaseException as error:
             sim._pending = error
             return Status.E_STOPPED
@@ -755,12 +766,13 @@ def _wind(sim_of):
     def field(_, t, count, x, out, gradient):
         sim = sim_of()
         try:
-            result = sim._wind(t, _copy(x, (count, 3)))
-            values, slope = result if isinstance(result, tuple) else (result, None)
-            values = numbers(np.broadcast_to(values, (count, 3)), "the wind", count, 3)
+            points = _copy(x, (count, 3))
+            result = sim._wind(t, points)
+            values, slope = result if isinstance(result, tuple) and len(result) == 2 else (result, None)
+            values = _air(values, "the wind", points, 3)
             ctypes.memmove(out, values.ctypes.data, values.nbytes)
             if gradient and slope is not None:
-                slope = numbers(np.broadcast_to(slope, (count, 3, 3)), "the gradient of the wind", count, 3, 3)
+                slope = _air(slope, "the gradient of the wind", points, 3, 3)
                 ctypes.memmove(gradient, slope.ctypes.data, slope.nbytes)
         except BaseException as error:
             sim._pending = sim._pending or error
@@ -769,11 +781,23 @@ def _wind(sim_of):
     return c.drape_wind_field(field)
 
 
+def _air(values, name: str, points: np.ndarray, *shape: int) -> np.ndarray:
+    """What a wind returned for points. It is to blame for what is not finite, unless the points are those of an attempt that diverges."""
+    if values is None:
+        raise TypeError(f"{name}: the function returned None, needs {' x '.join(map(str, (len(points), *shape)))} numbers")
+    air = spread(values, name, len(points), *shape)
+    if not np.isfinite(air).all():
+        bad = np.flatnonzero(~np.isfinite(air.reshape(len(points), -1)).all(1) & np.isfinite(points).all(1))
+        if len(bad):
+            raise ArgumentError(f"{name}: is {air[bad[0]].tolist()} at point {bad[0]}, {points[bad[0]].tolist()}; it must be finite")
+    return air
+
+
 def _event_function(sim_of, index: int):
     def measure(_, t, x, v, value):
         sim = sim_of()
         try:
-            ctypes.c_double.from_address(value).value = sim._events[index](t, _copy(x, sim._shape), _copy(v, sim._shape))
+            ctypes.c_double.from_address(value).value = real(sim._events[index](t, _copy(x, sim._shape), _copy(v, sim._shape)), "what the function of an event returns")
             return 0
         except BaseException as error:
             sim._pending = error
@@ -802,27 +826,32 @@ def _stop_all() -> None:
 
 
 class _Interrupt:
-    """While the main thread advances a sim, Ctrl-C is noted, and the observer stops the run. Otherwise the exception would be raised in one of the
-    library's callbacks, before that can catch it, and be lost."""
+    """While the main thread advances a sim, Ctrl-C is noted, and the observer calls the handler of the program. Otherwise its exception would be raised in one
+    of the library's callbacks, before that can catch it, and be lost."""
 
     def __init__(self) -> None:
         self.came: Tuple[Any, ...] = ()
         self.before: Any = None
+        self.handler: Any = None  # before or, if that is of an advance whose observer makes this one, the handler before that
 
     def __enter__(self) -> "_Interrupt":
         if threading.current_thread() is threading.main_thread() and callable(signal.getsignal(signal.SIGINT)):
             self.before = signal.signal(signal.SIGINT, self._note)
+            outer = getattr(self.before, "__self__", None)
+            self.handler = outer.handler if isinstance(outer, _Interrupt) else self.before
         return self
 
     def __exit__(self, *_: Any) -> None:
-        if self.before is not None:
+        if self.before is not None and signal.getsignal(signal.SIGINT) == self._note:  # which the handler may have replaced
             signal.signal(signal.SIGINT, self.before)
 
     def _note(self, *arguments: Any) -> None:
         self.came = arguments
 
     def pass_on(self) -> None:
-        self.before(*self.came)
+        """Calls the handler: that of Python raises KeyboardInterrupt; after one that does not raise, the advance goes on."""
+        came, self.came = self.came, ()
+        self.handler(*came)
 
 
 # ---- Values ----
@@ -844,6 +873,12 @@ def _settings(values: Mapping[str, Any], keep: list):
             setting.number = value
     keep.append(array)
     return array if len(array) else None, len(array)
+
+
+def _rows(values, name: str) -> np.ndarray:
+    """An array of rows, from rows or a single one."""
+    given = given_array(values, name)
+    return given.reshape(0, 3) if given.shape == (0,) else np.atleast_2d(given)
 
 
 def _what(cloth: bool, colliders: bool) -> int:

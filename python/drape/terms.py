@@ -8,7 +8,7 @@ import numpy as np
 
 from . import _binding as c
 from ._binding import Status
-from ._library import ArgumentError, Context, encode, lib, numbers
+from ._library import ArgumentError, Context, encode, lib, numbers, spread
 
 
 class Cloth(NamedTuple):
@@ -96,9 +96,12 @@ class Term:
             rest = _read(el.rest, (el.rest_count, el.count))[:, first:first + count].T if el.rest_count else np.empty((count, 0))
             positions = _read(x, (int(nodes.max()) + 1, 3))[nodes]
             shapes = (count,), (count, self.nodes, 3), (count, d, d)
-            for out, values, shape in zip((energies, gradients, hessians), self.energy(positions, rest), shapes):
+            results = self.energy(positions, rest)
+            if not isinstance(results, (tuple, list)) or len(results) != 3:
+                raise TypeError(f"{self.name}: the energy function returned {type(results).__name__}, needs energies, gradients and Hessians")
+            for out, name, values, shape in zip((energies, gradients, hessians), ("energies", "gradients", "Hessians"), results, shapes):
                 if out:
-                    values = np.ascontiguousarray(np.broadcast_to(values, shape), float)
+                    values = spread(values, f"{self.name}: {name}", *shape)
                     ctypes.memmove(out, values.ctypes.data, values.nbytes)
         except BaseException as error:
             self._error = self._error or error

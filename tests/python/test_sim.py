@@ -428,19 +428,71 @@ def test_misuse():
                  lambda: sim.untangle(sweeps=2**32 + 3), lambda: drape.Sim(sheet(), threads=2**32 + 1), lambda: drape.Embedding(sim.model, [[0, 0, 0]], cloth=2**32),
                  lambda: drape.Mesh(np.eye(3), [[0, 1, 2**32 + 2]]), lambda: drape.Mesh(np.eye(3), [[0, 1, 1.5]]), lambda: sim.move_collider(2**32, [0, 0, 0], 1),
                  lambda: drape.Mesh.of({"vertices": np.eye(3), "faces": np.array([[0, 1, 2**32 + 2]])}), lambda: sim.push("a"), lambda: sim.push([[1, 2], [3]]),
-                 lambda: sim.place(rotate=[1, 2]), lambda: sim.place(center=["a", 0, 0]), lambda: sim.set_masses([1], [10**400])):
+                 lambda: sim.place(rotate=[1, 2]), lambda: sim.place(center=["a", 0, 0]), lambda: sim.set_masses([1], [10**400]), lambda: drape.Sim(sheet(), threads=1.5),
+                 lambda: sim.move_collider(0.5, [0, 0, 0], 1), lambda: sim.untangle(sweeps=1.5), lambda: sim.attached(1.5)):
         raises(drape.ArgumentError, call)
     for call in (lambda: sim.advance("1"), lambda: sim.advance(None), lambda: sim.advance_realtime("1", 1), lambda: sim.set_state("a", sim.positions, sim.velocities),
-                 lambda: sim.push(sim.positions * 1j), lambda: sim.restore(3), lambda: sim.restore_checkpoint("text"), lambda: sim.move_collider(0.5, [0, 0, 0], 1),
+                 lambda: sim.push(sim.positions * 1j), lambda: sim.restore(3), lambda: sim.restore_checkpoint("text"),
                  lambda: sim.move_collider(0, [0, 0, 0], "1"), lambda: sim.closest([[0, 0, 0]], within="far"), lambda: sim.set_wind("north"), lambda: sim.observe(3),
                  lambda: sim.add_event("name", 3), lambda: drape.Sim(3), lambda: drape.Sim([1]), lambda: drape.Sim(sheet(), integrator=3),
-                 lambda: drape.Sim(sheet(), threads=1.5), lambda: drape.Sim(sheet(), dt="a"), lambda: sim.model.collider("ball", "now"),
+                 lambda: drape.Sim(sheet(), dt="a"), lambda: sim.model.collider("ball", "now"),
                  lambda: sim.model.check_derivatives(seed="a"), lambda: sim.untangle(sweeps="many")):
         raises(TypeError, call)
     for call in (lambda: drape.Mesh(np.eye(3), [[0, 1, 2]]).write("none/x.ply"), lambda: drape.Scene(sheet()).write("none/x.json"), lambda: sim.save("none/x")):
         raises(OSError, call)
     equal(sim.time, 0)
     sim.advance(0.02)
+
+
+def test_messages():
+    """what is refused is named, with what it has and what it needs; no mask of another length, no text with NUL, nothing converted before its shape is known"""
+    sim = drape.Sim(sheet())
+    for kind, says, call in (
+            (TypeError, "dt: needs a number, has the text 'x'", lambda: drape.Sim(sheet(), dt="x")),
+            (TypeError, "until: needs a number, has NoneType", lambda: sim.advance(None)),
+            (TypeError, "seconds: needs a number", lambda: sim.move_pins([0], [[0, 0, 0]], "a")),
+            (drape.ArgumentError, "masses: has shape (3,), needs 2, or one for all", lambda: sim.set_masses([5, 6], [1, 2, 3])),
+            (drape.ArgumentError, "stiffness: has shape (3,), needs 2", lambda: sim.drag([5, 6], np.zeros((2, 3)), [1, 2, 3])),
+            (drape.ArgumentError, "targets: has shape (1, 4), needs 1 x 3", lambda: sim.drag([5], [1, 2, 3, 4], 1)),
+            (TypeError, "forces: needs numbers, has None", lambda: sim.push([[0, 0, None]] * 36)),
+            (drape.ArgumentError, "positions: needs numbers, has the text '1'", lambda: drape.Mesh([["1", "2", "3"]], [])),
+            (drape.ArgumentError, "the name of the file is empty", lambda: sim.save("")),
+            (drape.ArgumentError, "the name of the file is empty", lambda: sim.restore("")),
+            (drape.ArgumentError, "NUL", lambda: sim.save("nul\0x")),
+            (drape.ArgumentError, "NUL", lambda: sim.save(b"nul\0x")),
+            (drape.ArgumentError, "NUL", lambda: drape.Scene("a\0b")),
+            (drape.ArgumentError, "NUL", lambda: drape.Sim(sheet(), integrator="be\0x")),
+            (TypeError, "data: needs the bytes of a checkpoint, has str", lambda: sim.restore_checkpoint("text")),
+            (drape.ArgumentError, "node: needs a whole number, has 1.5", lambda: sim.attached(1.5)),
+            (drape.ArgumentError, "forces: has shape (1000000000, 3), needs 36 x 3", lambda: sim.push(np.broadcast_to(1., (10**9, 3))))):
+        raises(kind, call, says=says)
+    for mask in [True, False, True], [True] * 37, np.ones((6, 6), bool), True:
+        raises(drape.ArgumentError, sim.pin, np.array(mask), says="nodes: a mask of shape")
+    raises(drape.ArgumentError, sim.place, cloths=[True, False], says="cloths: a mask of shape (2,), needs 1")
+    assert not os.path.exists("nul")
+    sim.pin(np.arange(36) == 7)
+    equal(np.flatnonzero(sim.pinned).tolist(), [0, 5, 7])
+
+
+def test_bad_answers():
+    """a wind, an event or a term that returns nothing, or a wind that is not finite, is what the message is about"""
+    for kind, says, wind in ((TypeError, "the wind: the function returned None, needs 36 x 3 numbers", lambda t, x: None),
+                             (drape.ArgumentError, "the wind: is [nan, 0.0, 0.0] at point 3, [", lambda t, x: np.where(np.arange(36)[:, None] == 3, [np.nan, 0, 0], 0)),
+                             (drape.ArgumentError, "the gradient of the wind: is ", lambda t, x: (np.zeros(3), np.full((3, 3), np.inf))),
+                             (drape.ArgumentError, "the wind: has shape (4,), needs 36 x 3, or one for all", lambda t, x: [1, 2, 3, 4])):
+        sim = drape.Sim(sheet())
+        sim.set_wind(wind)
+        raises(kind, sim.advance, 0.1, says=says)
+        sim.set_wind(lambda t, x: (1, 0, 0))  # a vector, not a wind and its gradient
+        sim.advance(0.02)
+    sim = drape.Sim(sheet())
+    sim.add_event("mine", lambda *_: None)
+    raises(TypeError, sim.advance, 0.1, says="what the function of an event returns: needs a number, has NoneType")
+    for kind, says, energy in ((TypeError, "my.weight: the energy function returned NoneType", lambda x, rest: None),
+                               (TypeError, "my.weight: gradients: needs numbers, has None", lambda x, rest: (0.0, None, np.zeros((3, 3)))),
+                               (drape.ArgumentError, "my.weight: energies: has shape (3,), needs ", lambda x, rest: ([1, 2, 3], 0.0, 0.0))):
+        model = drape.Model(sheet(terms=["my.weight"]), [drape.Term("my.weight", 1, lambda cloth: np.arange(36)[:, None], energy)])
+        raises(kind, lambda model=model: drape.Sim(model).advance(0.1), says=says)
 
 
 def test_callbacks_in_threads():
@@ -466,6 +518,22 @@ def test_interrupt():
     straight = drape.Sim(sheet())
     straight.advance(0.2)
     equal(sim.hash, straight.hash)
+    try:  # after a handler that does not raise, the advance goes on; in an advance within an observer, as well
+        calls = []
+        signal.signal(signal.SIGINT, lambda *given: calls.append(given))
+        outer, inner = drape.Sim(sheet()), drape.Sim(sheet())
+        outer.observe(lambda event: inner.advance(0.2) if event.kind == KIND.FRAME and event.frame == 2 else None)
+        inner.observe(lambda event: os.kill(os.getpid(), signal.SIGINT) if event.kind == KIND.ATTEMPT and event.attempt.index == 5 else None)
+        outer.advance(0.2)
+        equal((outer.hash, inner.hash, len(calls)), (straight.hash, straight.hash, 1))
+        signal.signal(signal.SIGINT, before)
+        outer, inner = drape.Sim(sheet()), drape.Sim(sheet())
+        inner.observe(lambda event: os.kill(os.getpid(), signal.SIGINT) if event.kind == KIND.ATTEMPT and event.attempt.index == 5 else None)
+        outer.observe(lambda event: inner.advance(0.2))
+        raises(KeyboardInterrupt, outer.advance, 0.2)
+        assert inner.time < 0.1 and outer.time < 0.1 and signal.getsignal(signal.SIGINT) is before
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_saving():
@@ -474,7 +542,7 @@ def test_saving():
     sim.save("checkpoint")
     data = sim.checkpoint()
     sim.advance(0.2)
-    for restore, source in (("restore", "checkpoint"), ("restore_checkpoint", data)):
+    for restore, source in (("restore", "checkpoint"), ("restore_checkpoint", data), ("restore_checkpoint", bytearray(data)), ("restore_checkpoint", memoryview(data))):
         other = drape.Sim(sheet())
         getattr(other, restore)(source)
         equal(round(other.time, 9), 0.1)
