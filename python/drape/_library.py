@@ -18,9 +18,11 @@ from ._binding import Status
 
 
 class Error(Exception):
-    """A function of the library failed. `status` says how; the text says what is wrong, where, with which value, and what would be right."""
+    """A function of the library failed. `status` says how; the text says what is wrong, where, with which value, and what would be right. `run`: what
+    drape.run, Sim.record or Sim.view had recorded before, a drape.Run; None: it came from elsewhere, or before the first step."""
 
     status: Status = Status.E_ARGUMENT
+    run: Any = None
 
     def __init__(self, message: str, status: Optional[Status] = None):
         super().__init__(message)

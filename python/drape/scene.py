@@ -71,13 +71,13 @@ class Scene:
         return (place.settings if isinstance(place, Mesh) else place), last
 
     def __getitem__(self, pointer: str) -> Any:
-        if not pointer.startswith("/"):
+        if isinstance(pointer, str) and not pointer.startswith("/"):
             return self.data[pointer]
         place, key = self._place(pointer)
         return place[_index(place, key, pointer) if isinstance(place, list) else key]
 
     def __setitem__(self, pointer: str, value: Any) -> None:
-        if not pointer.startswith("/"):
+        if isinstance(pointer, str) and not pointer.startswith("/"):
             self.data[pointer] = value
             return
         place, key = self._place(pointer, True)
@@ -89,7 +89,7 @@ class Scene:
             raise KeyError(f"{pointer}: leads into a {type(place).__name__}")
 
     def __delitem__(self, pointer: str) -> None:
-        if not pointer.startswith("/"):
+        if isinstance(pointer, str) and not pointer.startswith("/"):
             del self.data[pointer]
             return
         place, key = self._place(pointer)

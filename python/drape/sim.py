@@ -680,7 +680,8 @@ class Sim:
     # ---- Whole runs ----
 
     def record(self, until: Optional[float] = None) -> "Run":
-        """Advances to the time `until` [s] (default: the duration of the scene) and keeps frames, steps and energies."""
+        """Advances to the time `until` [s] (default: the duration of the scene) and keeps frames, steps and energies. If that fails or is stopped, `run`
+        of the exception is the run up to there."""
         from .runs import record_sim
         return record_sim(self, until)
 

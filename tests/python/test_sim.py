@@ -41,6 +41,8 @@ def test_pointers():
     del scene["/colliders/1"]
     equal(drape.Model(scene).collider_count, 1)
     raises(KeyError, lambda: scene["/nothing/at/all"])
+    raises(KeyError, lambda: scene[5], says="5 is not a pointer")
+    assert 5 not in scene and scene.get(5) is None
     raises(IndexError, lambda: scene["/colliders/7"])
     other = scene.copy()
     other["/duration"] = 9
