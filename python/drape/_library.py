@@ -18,9 +18,11 @@ from ._binding import Status
 
 
 class Error(Exception):
-    """A function of the library failed. `status` says how; the text says what is wrong, where, with which value, and what would be right."""
+    """A function of the library failed. `status` says how; the text says what is wrong, where, with which value, and what would be right. `run`: what
+    drape.run, Sim.record or Sim.view had recorded before, a drape.Run; None: it came from elsewhere, or before the first step."""
 
     status: Status = Status.E_ARGUMENT
+    run: Any = None
 
     def __init__(self, message: str, status: Optional[Status] = None):
         super().__init__(message)
@@ -189,7 +191,7 @@ class Context:
         self.address = handle.value
         self.lock = threading.RLock()
         self.keep: list = []  # what must live as long as the context of the library
-        weakref.finalize(self, _destroy, lib.drape_context_destroy, handle, (self.memory, definition, self.keep))
+        weakref.finalize(self, _destroy, lib.drape_context_destroy, handle, (self.memory, definition, self.keep)).atexit = False
 
     def message(self) -> str:
         return lib.drape_context_message(self.address).decode(errors="replace")
@@ -204,11 +206,13 @@ def _destroy(function, handle, _keep):
 
 
 class Handle:
-    """An object of the library and what it needs: freed when neither it nor anything made from it is in use, or by close()."""
+    """An object of the library and what it needs: freed when neither it nor anything made from it is in use, or by close(). needs are kept from outside
+    of the collector's reach, so none may refer to what has the handle. When the interpreter ends nothing is freed: another thread may be using it."""
 
     def __init__(self, handle: ctypes.c_void_p, destroy, context: Context, *needs: Any):
         self.address, self.context = handle.value, context
         self.close = weakref.finalize(self, _destroy, destroy, handle, (context, *needs))
+        self.close.atexit = False
 
     def view(self, address: int, shape, dtype) -> np.ndarray:
         """A read-only array of the library's memory, without a copy."""
@@ -250,13 +254,28 @@ def record(struct):
 
 def encode(text) -> Optional[bytes]:
     """A text or a path for the library; None stays None."""
-    if text is None or isinstance(text, bytes):
+    if text is None:
         return text
-    if isinstance(text, os.PathLike):
-        return os.fsencode(text)
+    if isinstance(text, (bytes, os.PathLike)):
+        return _without_nul(os.fsencode(text))
     if not isinstance(text, str):
         raise TypeError(f"needs a text, has {type(text).__name__}: {text!r}")
-    return text.encode()
+    return _without_nul(text.encode())
+
+
+def _without_nul(text: bytes) -> bytes:
+    """The library's texts end at a NUL, so what has one would be cut."""
+    if b"\0" in text:
+        raise ArgumentError(f"{text.decode(errors='replace')!r}: a text or a name must not have a NUL character")
+    return text
+
+
+def file_name(path) -> bytes:
+    """The name of a file for the library."""
+    name = encode(path)
+    if not name:
+        raise ArgumentError("the name of the file is empty")
+    return name
 
 
 def check_finite(array: np.ndarray, name: str, given=None) -> None:
@@ -274,6 +293,8 @@ def numbers(values, name: str, *shape, dtype=np.float64, finite: bool = True) ->
     NaN and infinities."""
     try:
         given = np.asarray(values)
+        _check_shape(given, name, shape)  # before a conversion, for which there may be no memory
+        _check_kind(given, name)
         if np.issubdtype(dtype, np.integer):
             array = _whole_numbers(given, name, dtype)
         elif np.iscomplexobj(given):
@@ -287,12 +308,42 @@ def numbers(values, name: str, *shape, dtype=np.float64, finite: bool = True) ->
         raise
     except (ValueError, OverflowError) as error:  # of numpy: texts, and lists of different lengths
         raise ArgumentError(f"{name}: {error}") from None
-    if array.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, array.shape)):
-        wanted = " x ".join("n" if n == -1 else str(n) for n in shape)
-        raise ArgumentError(f"{name}: has shape {array.shape}, needs {wanted}")
     if finite:
         check_finite(array, name, given)
     return array
+
+
+def _check_shape(given: np.ndarray, name: str, shape) -> None:
+    if given.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, given.shape)):
+        wanted = " x ".join("n" if n == -1 else str(n) for n in shape)
+        raise ArgumentError(f"{name}: has shape {given.shape}, needs {wanted}")
+
+
+def _check_kind(given: np.ndarray, name: str) -> None:
+    """numpy makes NaN of None, and numbers of texts."""
+    if given.dtype.kind in "US" and given.size:
+        raise ArgumentError(f"{name}: needs numbers, has the text {str(given.flat[0])!r}")
+    if given.dtype == object and any(item is None for item in given.flat):
+        raise TypeError(f"{name}: needs numbers, has None")
+
+
+def given_array(values, name: str) -> np.ndarray:
+    """An array as the caller has it."""
+    try:
+        return np.asarray(values)
+    except ValueError as error:  # lists of different lengths
+        raise ArgumentError(f"{name}: {error}") from None
+
+
+def spread(values, name: str, *shape) -> np.ndarray:
+    """Numbers of this shape, from those of one row or of one number for all."""
+    given = given_array(values, name)
+    try:
+        return numbers(np.broadcast_to(given, shape), name, *shape)
+    except ValueError as error:
+        if isinstance(error, Error):
+            raise
+        raise ArgumentError(f"{name}: has shape {given.shape}, needs {' x '.join(map(str, shape))}, or one for all") from None
 
 
 def _whole_numbers(given: np.ndarray, name: str, dtype) -> np.ndarray:
@@ -309,6 +360,8 @@ def _whole_numbers(given: np.ndarray, name: str, dtype) -> np.ndarray:
 
 def whole(value, name: str) -> int:
     """A whole number that the library has room for."""
+    if isinstance(value, (float, np.floating)):
+        raise ArgumentError(f"{name}: needs a whole number, has {value}")
     try:
         return int(numbers([operator.index(value)], name, 1, dtype=np.int32)[0])
     except TypeError as error:
@@ -319,7 +372,19 @@ def real(value, name: str) -> float:
     """A number; a text is none."""
     if isinstance(value, (str, bytes)):
         raise TypeError(f"{name}: needs a number, has the text {value!r}")
-    return float(value)
+    try:
+        return float(value)
+    except TypeError:
+        raise TypeError(f"{name}: needs a number, has {type(value).__name__}") from None
+    except OverflowError as error:
+        raise ArgumentError(f"{name}: {error}") from None
+
+
+def instance(value, kind, name: str):
+    """An object of a class of this package: of another, its address would be taken for what it is not."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{name}: needs a drape.{kind.__name__}, has {type(value).__name__}")
+    return value
 
 
 def function_of(value, name: str):
@@ -329,10 +394,12 @@ def function_of(value, name: str):
     return value
 
 
-def indices(values, name: str) -> np.ndarray:
-    """Node numbers; a single number, a sequence, or a mask of all nodes."""
-    array = np.atleast_1d(np.asarray(values))
+def indices(values, name: str, count: int) -> np.ndarray:
+    """Node numbers: a single number, a sequence, or a mask of all count nodes."""
+    array = np.atleast_1d(given_array(values, name))
     if array.dtype == bool:
+        if array.shape != (count,):
+            raise ArgumentError(f"{name}: a mask of shape {array.shape}, needs {count}")
         array = np.flatnonzero(array)
     return numbers(array, name, -1, dtype=np.int32)
 

@@ -15,10 +15,10 @@ def _axes(ax: Any, **options: Any) -> Any:
     return plt.figure(figsize=(6, 4), constrained_layout=True).add_subplot(**options)
 
 
-def energy(run: Union[Run, Any], which: Sequence[str] = ("kinetic", "elastic", "gravity", "contact", "total", "dissipated", "numerical"), ax: Any = None) -> Any:
+def energy(run: Union[Run, Any], which: Union[str, Sequence[str]] = ("kinetic", "elastic", "gravity", "contact", "total", "dissipated", "numerical"), ax: Any = None) -> Any:
     """Energies [J] over time [s], of a run or of its table `energy`."""
     ax, columns = _axes(ax), run.energy if isinstance(run, Run) else run
-    for name in which:
+    for name in [which] if isinstance(which, str) else which:
         ax.plot(np.asarray(columns["t"]), np.asarray(columns[name]), label=name)
     ax.set(xlabel="time [s]", ylabel="energy [J]")
     ax.legend()
@@ -43,8 +43,10 @@ def cloth(what: Union[Run, Sim, Mesh], frame: int = -1, values: Optional[np.ndar
         mesh = what.mesh(frame)
     elif isinstance(what, Sim):
         mesh = what.model.mesh(positions=what.positions)
-    else:
+    elif isinstance(what, Mesh):
         mesh = what
+    else:
+        raise TypeError(f"what: needs a drape.Run, Sim or Mesh, has {type(what).__name__}")
     ax = _axes(ax, projection="3d")
     x = mesh.positions[:, [2, 0, 1]]  # matplotlib's third axis points up
     colour = {"color": "tab:blue"} if values is None else {"cmap": "viridis"}

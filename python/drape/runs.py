@@ -1,19 +1,22 @@
 """Finished runs, and the program that makes them."""
+import contextlib
 import csv
+import errno
 import html
 import json
 import math
 import os
+import shutil
 import subprocess
 import tempfile
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Union
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
 from ._binding import Energy, EventKind, Status
-from ._library import Error, FileError, error_of, lib, program, to_json
+from ._library import ArgumentError, Error, FileError, ParseError, error_of, lib, program, to_json
 from .mesh import Mesh
-from .scene import Model, Scene
+from .scene import _FILES, Model, Scene
 from .sim import Sim
 
 Table = Any  # a pandas.DataFrame or, without pandas, a dictionary of arrays
@@ -100,9 +103,13 @@ class Run:
         return Mesh(self.render_positions(frame), self.model.render_mesh().triangles)
 
     def save(self, folder) -> "Run":
-        """Writes a run that was recorded in memory into a new folder, from which drape.load and the program read it."""
+        """Writes a run that was recorded in memory into a new folder, from which drape.load and the program read it. The folder has copies of the meshes
+        that the scene names, as one of `drape run` has, so it can be moved; frames of an animated mesh in several files stay where they are."""
+        if self.positions is None:
+            raise FileError(f"{self}: has no positions.npy")
         os.makedirs(folder)
         self.scene.write(os.path.join(folder, "scene.json"))
+        _bring_files(folder)
         np.save(os.path.join(folder, "positions.npy"), np.ascontiguousarray(self.positions, "<f8"))
         for name, columns in (("steps", self.steps), ("energy", self.energy)):
             with open(os.path.join(folder, f"{name}.csv"), "w", newline="", encoding="utf-8") as file:
@@ -176,20 +183,62 @@ def run(scene: Union[Scene, Mapping, str, os.PathLike], values: Optional[Mapping
     """Runs a scene for its duration. values: changes of the scene by pointers, as {"/integrator/dt": 1e-3}.
 
     Without `out` the frames are kept in memory, and options are those of drape.Sim. With it, the program `drape run` writes a folder, and options are its
-    options (`drape run --help`), such as checkpoint_every=10, resume=True or format="npy,glb"; without a format, frames are written as npy."""
+    options (`drape run --help`), such as checkpoint_every=10, resume=True or format="npy,glb"; without a format, frames are written as npy.
+
+    A run that fails or is stopped raises an exception in both cases, and `run` of the exception is the run up to there."""
     scene = Scene(scene)
+    if not isinstance(values, (Mapping, type(None))):
+        raise TypeError(f"values: needs a dictionary of pointers and values, has {type(values).__name__}; a folder is given by out=")
     scene.update(values or {})
     if out is None:
         return Sim(scene, **options).record()
     if "format" not in options and "npy" not in (scene.get("/output/formats") or []):
         options["format"] = ",".join([*(scene.get("/output/formats") or []), "npy"])
     with SceneFile(scene) as path:
-        call("run", path, "--out", os.fspath(out), *arguments(options), folder=out)
+        try:
+            call("run", path, "--out", os.fspath(out), *arguments(options), folder=out)
+        except (ArgumentError, ParseError):  # before the first step
+            raise
+        except BaseException as error:
+            _attach(error, lambda: load(out))
+            raise
     return load(out)
 
 
+def _attach(error: BaseException, run_of: Callable[[], Run]) -> None:
+    """Gives an exception the run that it has ended; where that cannot be had, the exception matters more than why."""
+    error.run = None  # type: ignore[attr-defined]
+    with contextlib.suppress(Exception):
+        error.run = run_of()  # type: ignore[attr-defined]
+
+
+def _bring_files(folder) -> None:
+    """Copies the files that scene.json names into its folder, and names them there. What is several files is not copied."""
+    path = os.path.join(folder, "scene.json")
+    there: Dict[str, str] = {}
+
+    def bring(item, key=None):
+        if isinstance(item, dict):
+            return {name: bring(part, name) for name, part in item.items()}
+        if isinstance(item, list):
+            return [bring(part) for part in item]
+        if key not in _FILES or not isinstance(item, str) or not os.path.isfile(item):
+            return item
+        if os.path.realpath(os.path.dirname(item)) == os.path.realpath(folder):
+            return os.path.basename(item)
+        if item not in there:
+            there[item] = f"scene_file_{len(there)}{os.path.splitext(item)[1]}"
+            shutil.copyfile(item, os.path.join(folder, there[item]))
+        return there[item]
+
+    with open(path, encoding="utf-8") as file:
+        data = bring(json.load(file))
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(to_json(data) + "\n")
+
+
 def record_sim(sim: Sim, until: Optional[float]) -> Run:
-    """Advances a sim and keeps its frames, steps and energies in memory."""
+    """Advances a sim and keeps its frames, steps and energies in memory. An exception that ends the advance has the run up to there."""
     steps: Dict[str, list] = {name: [] for name in _STEPS}
     energies: Dict[str, list] = {name: [] for name in _ENERGY}
     frames: List[np.ndarray] = []
@@ -208,28 +257,32 @@ def record_sim(sim: Sim, until: Optional[float]) -> Run:
                 energies[name].append(value)
             frames.append(event.positions.copy())
 
-    status, message = Status.OK, ""
+    def run_so_far(status: Status, message: str) -> Run:
+        positions = np.array(frames).reshape(len(frames), sim.model.node_count, 3)
+        return Run(sim.model.scene.copy(), positions, table(steps), table(energies), _summary(sim, len(frames), status, message), model=sim.model)
+
     sim.observe(observe)
     try:
         stopped = sim.advance(sim.model.duration if until is None else until)
-        message = f"stopped by the event {stopped.name}" if stopped else ""
-    except Error as error:
-        if status_of(error) not in (Status.E_STEP_TOO_SMALL, Status.E_SOLVER):
-            raise
-        status, message = error.status, str(error)
+    except BaseException as error:
+        status = error.status if isinstance(error, Error) else Status.E_STOPPED
+        _attach(error, lambda: run_so_far(status, str(error) or type(error).__name__))
+        raise
     finally:
         sim.unobserve(observe)
+    return run_so_far(Status.OK, f"stopped by the event {stopped.name}" if stopped else "")
+
+
+def _summary(sim: Sim, frames: int, status: Status, message: str) -> Dict[str, Any]:
     s, e = sim.statistics, sim.energy
-    summary = {"status": _name(status), "message": message, "version": lib.drape_version().decode(), "nodes": sim.model.node_count,
-               "dofs": sim.model.dof_count, "nnz": sim.model.nonzero_count, "frames": len(frames), "time": sim.time,
-               "steps": {"accepted": s.steps_accepted, "rejected": s.steps_rejected, "unconverged": s.steps_unconverged, "held": s.steps_held,
-                         "h_min": s.h_min, "h_max": s.h_max, "reasons": sim.reasons},
-               "newton": {"iterations": s.newton_iterations, "jacobians": s.jacobians, "factorizations": s.factorizations,
-                          "linear_iterations": s.linear_iterations, "residuals": s.residuals},
-               "energy": e._asdict(), "strain": {"min": s.strain_min, "max": s.strain_max},
-               "warnings": [w._asdict() for w in sim.warnings], "hash": f"{sim.hash:016x}"}
-    positions = np.array(frames).reshape(len(frames), sim.model.node_count, 3)
-    return Run(sim.model.scene.copy(), positions, table(steps), table(energies), summary, model=sim.model)
+    return {"status": _name(status), "message": message, "version": lib.drape_version().decode(), "nodes": sim.model.node_count,
+            "dofs": sim.model.dof_count, "nnz": sim.model.nonzero_count, "frames": frames, "time": sim.time,
+            "steps": {"accepted": s.steps_accepted, "rejected": s.steps_rejected, "unconverged": s.steps_unconverged, "held": s.steps_held,
+                      "h_min": s.h_min, "h_max": s.h_max, "reasons": sim.reasons},
+            "newton": {"iterations": s.newton_iterations, "jacobians": s.jacobians, "factorizations": s.factorizations,
+                       "linear_iterations": s.linear_iterations, "residuals": s.residuals},
+            "energy": e._asdict(), "strain": {"min": s.strain_min, "max": s.strain_max},
+            "warnings": [w._asdict() for w in sim.warnings], "hash": f"{sim.hash:016x}"}
 
 
 # ---- The program ----
@@ -289,12 +342,12 @@ def call(*command: str, folder=None, accept: Sequence[int] = (0,)) -> str:
             name = json.load(file).get("status", "").upper()
         status = Status.__members__.get(name, status)
     lines = [line for line in errors.splitlines() if line.strip()] or output.splitlines()[-1:]
+    if lines and lines[-1].rpartition(": ")[2] in _OF_THE_SYSTEM:
+        status = Status.E_FILE
     raise error_of(status, "\n".join(lines[-3:]) or f"drape {command[0]} ended with {process.returncode}")
 
 
-def status_of(error: Error) -> Status:
-    """The status of an exception."""
-    return Status(error.status)
+_OF_THE_SYSTEM = {os.strerror(number) for number in errno.errorcode}  # ends of messages about files
 
 
 def _name(status: int) -> str:

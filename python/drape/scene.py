@@ -13,7 +13,7 @@ import numpy as np
 
 from . import _binding as c
 from ._binding import CheckResult, ClothRange, ColliderMotion
-from ._library import ArgumentError, Context, Handle, check_finite, encode, header, lib, numbers, real, record, to_json
+from ._library import ArgumentError, Context, Handle, check_finite, encode, header, instance, lib, numbers, real, record, to_json, whole
 from .mesh import Mesh
 from .terms import Term
 
@@ -71,13 +71,13 @@ class Scene:
         return (place.settings if isinstance(place, Mesh) else place), last
 
     def __getitem__(self, pointer: str) -> Any:
-        if not pointer.startswith("/"):
+        if isinstance(pointer, str) and not pointer.startswith("/"):
             return self.data[pointer]
         place, key = self._place(pointer)
         return place[_index(place, key, pointer) if isinstance(place, list) else key]
 
     def __setitem__(self, pointer: str, value: Any) -> None:
-        if not pointer.startswith("/"):
+        if isinstance(pointer, str) and not pointer.startswith("/"):
             self.data[pointer] = value
             return
         place, key = self._place(pointer, True)
@@ -89,7 +89,7 @@ class Scene:
             raise KeyError(f"{pointer}: leads into a {type(place).__name__}")
 
     def __delitem__(self, pointer: str) -> None:
-        if not pointer.startswith("/"):
+        if isinstance(pointer, str) and not pointer.startswith("/"):
             del self.data[pointer]
             return
         place, key = self._place(pointer)
@@ -167,7 +167,7 @@ class Model:
 
     def __init__(self, scene: Union[Scene, Mapping, str, os.PathLike], terms: Sequence[Term] = ()):
         self.scene = scene if isinstance(scene, Scene) else Scene(scene)
-        self.terms = tuple(terms)
+        self.terms = tuple(instance(term, Term, "terms") for term in terms)
         self._context = Context()
         for term in self.terms:
             term.register(self._context)
@@ -259,7 +259,7 @@ class Model:
         names = self._colliders
         if isinstance(which, str) and which in names:
             return names.index(which)
-        if isinstance(which, str) or not 0 <= operator.index(which) < len(names):
+        if isinstance(which, str) or not 0 <= whole(which, "collider") < len(names):
             raise ArgumentError(f"no collider {which!r}: there are {', '.join(names) or 'none'}")
         return operator.index(which)
 

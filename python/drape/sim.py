@@ -1,9 +1,11 @@
 """Running simulations."""
+import atexit
 import ctypes
 import math
 import os
 import _signal as signal  # the module signal turns numbers into enumerators and back at each call, which takes longer than the rest of it
 import threading
+import time
 import weakref
 from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
@@ -11,8 +13,8 @@ import numpy as np
 
 from . import _binding as c
 from ._binding import (Attempt, ColliderMotion, Energy, EventKind, EventRecord, Realtime, Relaxed, SeamReport, Statistics, Status, Untangling, Warning)
-from ._library import (ArgumentError, Context, Error, Handle, Stopped, encode, error_of, function_of, header, indices, lib, numbers, real, record,
-                       whole)
+from ._library import (ArgumentError, Context, Error, Handle, Stopped, encode, error_of, file_name, function_of, given_array, header, indices, instance, lib,
+                       numbers, real, record, spread, whole)
 from .scene import Model, Scene
 
 if TYPE_CHECKING:
@@ -84,11 +86,14 @@ class Sim:
         definition.integrator, definition.controller = encode(integrator), encode(controller)
         definition.integrator_settings, definition.integrator_setting_count = _settings(integrator_settings, keep)
         definition.controller_settings, definition.controller_setting_count = _settings(controller_settings, keep)
-        definition.dt, definition.dt_min, definition.frame_rate, definition.threads = dt, dt_min, frame_rate, whole(threads, "threads")
-        definition.realtime_step, definition.teleport_speed = realtime_step, teleport_speed
+        definition.dt, definition.dt_min, definition.frame_rate = real(dt, "dt"), real(dt_min, "dt_min"), real(frame_rate, "frame_rate")
+        definition.realtime_step, definition.teleport_speed = real(realtime_step, "realtime_step"), real(teleport_speed, "teleport_speed")
+        definition.threads = whole(threads, "threads")
         handle = ctypes.c_void_p()
         self._context.check(lib.drape_sim_create(self._context.address, self.model._address, definition, handle))
-        self._needs: Dict[str, Any] = {"model": self.model}  # must live as long as the sim of the library
+        self._needs: Dict[str, Any] = {"model": self.model._handle}  # must live as long as the sim of the library
+        self._wind: Optional[Wind] = None
+        self._events: List[Callable] = []
         self._handle = Handle(handle, lib.drape_sim_destroy, self._context, self._needs)
         self._address: Optional[int] = self._handle.address
         self._observers: List[Tuple[Observer, Tuple[EventKind, ...]]] = []
@@ -99,6 +104,7 @@ class Sim:
         self._shape = (self.model.node_count, 3)
         self._needs["observer"] = _observer(weakref.ref(self))
         self._call(lib.drape_sim_observe, self._needs["observer"], None)
+        _SIMS.add(self)
 
     # ---- Life ----
 
@@ -116,6 +122,9 @@ class Sim:
 
     def __exit__(self, *_: Any) -> None:
         self.close()
+
+    def __reduce_ex__(self, _: Any) -> Any:  # which copy and pickle call
+        raise TypeError("a Sim cannot be copied or pickled: restore_checkpoint(sim.checkpoint()) of another Sim(sim.model) puts that into the same state")
 
     def __repr__(self) -> str:
         return f"Sim({self.model.node_count} nodes, t = {self.time:g} s)" if self._address else "Sim(closed)"
@@ -174,7 +183,7 @@ class Sim:
             finally:
                 self._advancing = False
             if self._interrupt.came:
-                self._interrupt.pass_on()  # raises KeyboardInterrupt, unless the program has a handler of its own that does not
+                self._interrupt.pass_on()
             self._raise_pending()
             if status == Status.E_STOPPED and self._frame is not None:
                 return None
@@ -266,15 +275,15 @@ class Sim:
     def set_state(self, t: float, positions, velocities) -> None:
         """Goes on from time t [s], positions [m] and velocities [m/s] (nodes x 3)."""
         x, v = numbers(positions, "positions", *self._shape), numbers(velocities, "velocities", *self._shape)
-        self._call(lib.drape_sim_set_state, t, x.ctypes.data, v.ctypes.data)
+        self._call(lib.drape_sim_set_state, real(t, "t"), x.ctypes.data, v.ctypes.data)
 
     def save(self, path) -> None:
         """Writes a checkpoint, from which a sim of the same scene continues with the same bits."""
-        self._call(lib.drape_sim_save, encode(path))
+        self._call(lib.drape_sim_save, file_name(path))
 
     def restore(self, path) -> None:
         """Restores a checkpoint."""
-        self._call(lib.drape_sim_restore, encode(path))
+        self._call(lib.drape_sim_restore, file_name(path))
 
     def checkpoint(self) -> bytes:
         """A checkpoint as bytes."""
@@ -288,8 +297,12 @@ class Sim:
         self._call(lib.drape_sim_save_to, write, None)
         return b"".join(parts)
 
-    def restore_checkpoint(self, data: bytes) -> None:
+    def restore_checkpoint(self, data: Union[bytes, bytearray, memoryview]) -> None:
         """Restores a checkpoint from bytes."""
+        try:
+            data = memoryview(data).tobytes()
+        except TypeError:
+            raise TypeError(f"data: needs the bytes of a checkpoint, has {type(data).__name__}") from None
         self._call(lib.drape_sim_restore_from, ctypes.cast(ctypes.c_char_p(data), ctypes.c_void_p), len(data))
 
     # ---- Forces, energies, work ----
@@ -378,23 +391,26 @@ class Sim:
         """Lets pinned nodes go."""
         self._nodes(lib.drape_sim_unpin, nodes)
 
+    def _indices(self, nodes) -> np.ndarray:
+        return indices(nodes, "nodes", self._shape[0])
+
     def _nodes(self, function, nodes) -> None:
-        nodes = indices(nodes, "nodes")
+        nodes = self._indices(nodes)
         self._call(function, len(nodes), nodes.ctypes.data)
 
     @header("drape_sim_move_pins")
     def move_pins(self, nodes, positions, seconds: float, velocities=None) -> None:
         """Moves pinned nodes to positions (count x 3 [m]) within the next seconds [s] of simulated time, to arrive with velocities (count x 3 [m/s])."""
-        nodes = indices(nodes, "nodes")
-        x = numbers(np.atleast_2d(positions), "positions", len(nodes), 3)
-        v = None if velocities is None else numbers(np.atleast_2d(velocities), "velocities", len(nodes), 3)
-        self._call(lib.drape_sim_move_pins, len(nodes), nodes.ctypes.data, seconds, x.ctypes.data, None if v is None else v.ctypes.data)
+        nodes = self._indices(nodes)
+        x = numbers(_rows(positions, "positions"), "positions", len(nodes), 3)
+        v = None if velocities is None else numbers(_rows(velocities, "velocities"), "velocities", len(nodes), 3)
+        self._call(lib.drape_sim_move_pins, len(nodes), nodes.ctypes.data, real(seconds, "seconds"), x.ctypes.data, None if v is None else v.ctypes.data)
 
     @header("drape_sim_attach")
     def attach(self, collider: Which, nodes, triangles=None) -> None:
         """Lets a collider carry nodes from where they are. triangles: those of a collider that deforms; None: the nearest."""
-        nodes = indices(nodes, "nodes")
-        on = None if triangles is None else numbers(np.atleast_1d(triangles), "triangles", len(nodes), dtype=np.int32)
+        nodes = self._indices(nodes)
+        on = None if triangles is None else numbers(np.atleast_1d(given_array(triangles, "triangles")), "triangles", len(nodes), dtype=np.int32)
         with self._lock:
             self._call(lib.drape_sim_attach, self._collider(collider), len(nodes), nodes.ctypes.data, None if on is None else on.ctypes.data)
 
@@ -411,8 +427,8 @@ class Sim:
     @header("drape_sim_set_masses")
     def set_masses(self, nodes, masses) -> None:
         """Gives nodes other masses [kg]."""
-        nodes = indices(nodes, "nodes")
-        m = numbers(np.broadcast_to(masses, len(nodes)), "masses", len(nodes))
+        nodes = self._indices(nodes)
+        m = spread(masses, "masses", len(nodes))
         self._call(lib.drape_sim_set_masses, len(nodes), nodes.ctypes.data, m.ctypes.data)
 
     # ---- Forces of the host ----
@@ -426,9 +442,9 @@ class Sim:
     @header("drape_sim_set_drag_springs")
     def drag(self, nodes=(), targets=(), stiffness=0.0) -> None:
         """Drags nodes towards targets (count x 3 [m]) by springs of a stiffness [N/m]; without arguments: no more."""
-        nodes = indices(nodes, "nodes")
-        x = numbers(np.reshape(targets, (-1, 3)), "targets", len(nodes), 3)
-        k = numbers(np.broadcast_to(np.asarray(stiffness, float), len(nodes)), "stiffness", len(nodes))
+        nodes = self._indices(nodes)
+        x = numbers(_rows(targets, "targets"), "targets", len(nodes), 3)
+        k = spread(stiffness, "stiffness", len(nodes))
         self._call(lib.drape_sim_set_drag_springs, len(nodes), nodes.ctypes.data, k.ctypes.data, x.ctypes.data)
 
     @property
@@ -444,9 +460,12 @@ class Sim:
         """Sets the velocity of the air for drag terms: wind(t, x) returns velocities (count x 3 [m/s]) at the time t [s] and the points x (count x 3 [m]), or
         these and their gradient (count x 3 x 3 [1/s], d wind_i / d x_j), with which Newton's method converges as fast as without wind. A single vector
         stands for the same wind everywhere. None: still air. An exception in it ends the advance and comes out of it."""
-        field: Any = c.drape_wind_field() if wind is None else _wind(weakref.ref(self), function_of(wind, "wind"))  # type: ignore[call-overload]
-        self._call(lib.drape_sim_set_wind, field, None)
-        self._needs["wind"] = field
+        if wind is not None:
+            function_of(wind, "wind")
+        field: Any = c.drape_wind_field() if wind is None else _wind(weakref.ref(self))  # type: ignore[call-overload]
+        with self._lock:
+            self._call(lib.drape_sim_set_wind, field, None)
+            self._needs["wind"], self._wind = field, wind
 
     # ---- Colliders ----
 
@@ -472,6 +491,7 @@ class Sim:
         quaternion w x y z) turns it as well, to arrive with an angular velocity [rad/s]."""
         d = numbers(displacement, "displacement", 3)
         v = None if velocity is None else numbers(velocity, "velocity", 3)
+        seconds = real(seconds, "seconds")
         at = None if v is None else v.ctypes.data
         if rotation is None:
             if angular_velocity is not None:
@@ -491,7 +511,7 @@ class Sim:
         x = numbers(positions, "positions", -1, 3)
         v = None if velocities is None else numbers(velocities, "velocities", len(x), 3)
         with self._lock:
-            self._call(lib.drape_sim_deform_collider, self._collider(which), seconds, len(x), x.ctypes.data, None if v is None else v.ctypes.data)
+            self._call(lib.drape_sim_deform_collider, self._collider(which), real(seconds, "seconds"), len(x), x.ctypes.data, None if v is None else v.ctypes.data)
 
     @header("drape_sim_collider_points")
     def collider_points(self, which: Which = 0) -> Tuple[np.ndarray, np.ndarray]:
@@ -530,7 +550,7 @@ class Sim:
         definition.center[:], definition.translate[:] = numbers(center, "center", 3).tolist(), numbers(translate, "translate", 3).tolist()
         definition.stop = stop
         if cloths is not None:
-            pieces = indices(cloths, "cloths")
+            pieces = indices(cloths, "cloths", len(self.model.cloths))
             definition.cloths, definition.cloth_count = pieces.ctypes.data, len(pieces)
         with self._lock:
             if colliders is not None:
@@ -544,14 +564,14 @@ class Sim:
         model = scene if isinstance(scene, Model) else Model(scene)
         with self._lock:
             self._call(lib.drape_sim_change_model, model._address)
-            self.model = self._needs["model"] = model
+            self.model, self._needs["model"] = model, model._handle
 
     @header("drape_sim_untangle")
     def untangle(self, *, sweeps: Optional[int] = None, gap: Optional[float] = None, keep: Optional[bool] = None) -> Untangling:
         """Takes apart cloth that passes through itself, other cloth or colliders, and reports what was found and done."""
         definition, report = c.drape_untangle_def(), c.drape_untangling()
         lib.drape_untangle_def_init(definition, ctypes.sizeof(definition))
-        sweeps = None if sweeps is None else whole(sweeps, "sweeps")
+        sweeps, gap = None if sweeps is None else whole(sweeps, "sweeps"), None if gap is None else real(gap, "gap")
         given = {name: value for name, value in (("sweeps", sweeps), ("gap", gap), ("keep", keep)) if value is not None}
         for name, value in given.items():
             setattr(definition, name, value)
@@ -571,18 +591,18 @@ class Sim:
     def closest(self, points, within: float = math.inf, *, cloth: bool = True, colliders: bool = True) -> np.ndarray:
         """The nearest places on cloth and colliders to points (count x 3 [m]): a structured array with `found`, `collider`, `triangle`, `distance` [m],
         `point` [m], `normal`, `weights`."""
-        x = numbers(np.atleast_2d(points), "points", -1, 3)
+        x = numbers(_rows(points, "points"), "points", -1, 3)
         hits = np.zeros(len(x), np.dtype(c.drape_hit))
-        self._call(lib.drape_sim_closest, _what(cloth, colliders), len(x), x.ctypes.data, within, _pointer(hits, c.drape_hit))
+        self._call(lib.drape_sim_closest, _what(cloth, colliders), len(x), x.ctypes.data, real(within, "within"), _pointer(hits, c.drape_hit))
         return hits
 
     @header("drape_sim_closest")
     def cast(self, origins, directions, length: float = 1e6, *, cloth: bool = True, colliders: bool = True) -> np.ndarray:
         """The first places that rays meet, from origins (count x 3 [m]) along directions (count x 3), up to a length [m]: an array as of closest()."""
-        x, d = numbers(np.atleast_2d(origins), "origins", -1, 3), np.atleast_2d(np.asarray(directions, float))
-        d = numbers(np.broadcast_to(d, x.shape), "directions", len(x), 3)
+        x = numbers(_rows(origins, "origins"), "origins", -1, 3)
+        d = spread(directions, "directions", len(x), 3)
         hits = np.zeros(len(x), np.dtype(c.drape_hit))
-        self._call(lib.drape_sim_cast, _what(cloth, colliders), len(x), x.ctypes.data, d.ctypes.data, length, _pointer(hits, c.drape_hit))
+        self._call(lib.drape_sim_cast, _what(cloth, colliders), len(x), x.ctypes.data, d.ctypes.data, real(length, "length"), _pointer(hits, c.drape_hit))
         return hits
 
     @property
@@ -650,14 +670,18 @@ class Sim:
         lib.drape_event_def_init(definition, ctypes.sizeof(definition))
         definition.name, definition.direction, definition.action, definition.once = encode(name), encode(direction), encode(action), once
         definition.cloth, definition.pins = encode(cloth), encode(pins)
-        callback = _event_function(weakref.ref(self), function_of(function, "function"))
-        self._call(lib.drape_sim_add_event, definition, callback, None)
-        self._needs.setdefault("events", []).append(callback)
+        function_of(function, "function")
+        with self._lock:
+            callback = _event_function(weakref.ref(self), len(self._events))
+            self._call(lib.drape_sim_add_event, definition, callback, None)
+            self._needs.setdefault("events", []).append(callback)
+            self._events.append(function)
 
     # ---- Whole runs ----
 
     def record(self, until: Optional[float] = None) -> "Run":
-        """Advances to the time `until` [s] (default: the duration of the scene) and keeps frames, steps and energies."""
+        """Advances to the time `until` [s] (default: the duration of the scene) and keeps frames, steps and energies. If that fails or is stopped, `run`
+        of the exception is the run up to there."""
         from .runs import record_sim
         return record_sim(self, until)
 
@@ -672,6 +696,7 @@ class Embedding:
     @header("drape_embedding_create")
     def __init__(self, model: Model, vertices, normals=None, cloth: int = -1):
         """Fixes vertices to one cloth of a model, or to all."""
+        instance(model, Model, "model")
         x = numbers(vertices, "vertices", -1, 3, dtype=np.float32)
         n = None if normals is None else numbers(normals, "normals", len(x), 3, dtype=np.float32)
         handle, context = ctypes.c_void_p(), Context()
@@ -691,7 +716,7 @@ class Embedding:
 # ---- Callbacks ----
 #
 # A callback keeps exceptions for the caller of the advance, as the library cannot pass them on. It refers to its sim weakly: the library's sim keeps the
-# callback alive, and the Python object keeps the library's sim.
+# callback alive, and the Python object keeps the library's sim, and the functions that the callback calls, which may refer to the object.
 
 def _observer(sim_of):
     def observe(_, pointer):
@@ -700,7 +725,7 @@ def _observer(sim_of):
             return 0
         try:
             event = pointer.contents
-            if sim._pending is not None or sim._interrupt.came:  # pending: of the wind or an event
+            if sim._pending is not None:  # of the wind or an event
                 return Status.E_STOPPED
             if sim.model.terms and any(term.failed for term in sim.model.terms):
                 return Status.E_STOPPED
@@ -715,7 +740,9 @@ def _observer(sim_of):
             if sim._wants_frame and event.kind == EventKind.FRAME:
                 sim._frame = Frame(event.frame, event.time, _copy(event.positions, sim._shape), _copy(event.velocities, sim._shape))
                 return 1
-            return Status.E_STOPPED if sim._interrupt.came else Status.OK
+            if sim._interrupt.came:
+                sim._interrupt.pass_on()
+            return Status.OK
         except BaseException as error:
             sim._pending = error
             return Status.E_STOPPED
@@ -736,16 +763,17 @@ def _copy(address: int, shape) -> np.ndarray:
     return out
 
 
-def _wind(sim_of, wind: Wind):
+def _wind(sim_of):
     def field(_, t, count, x, out, gradient):
         sim = sim_of()
         try:
-            result = wind(t, _copy(x, (count, 3)))
-            values, slope = result if isinstance(result, tuple) else (result, None)
-            values = numbers(np.broadcast_to(values, (count, 3)), "the wind", count, 3, finite=False)  # the attempt is rejected
+            points = _copy(x, (count, 3))
+            result = sim._wind(t, points)
+            values, slope = result if isinstance(result, tuple) and len(result) == 2 else (result, None)
+            values = _air(values, "the wind", points, 3)
             ctypes.memmove(out, values.ctypes.data, values.nbytes)
             if gradient and slope is not None:
-                slope = numbers(np.broadcast_to(slope, (count, 3, 3)), "the gradient of the wind", count, 3, 3, finite=False)
+                slope = _air(slope, "the gradient of the wind", points, 3, 3)
                 ctypes.memmove(gradient, slope.ctypes.data, slope.nbytes)
         except BaseException as error:
             sim._pending = sim._pending or error
@@ -754,11 +782,23 @@ def _wind(sim_of, wind: Wind):
     return c.drape_wind_field(field)
 
 
-def _event_function(sim_of, function):
+def _air(values, name: str, points: np.ndarray, *shape: int) -> np.ndarray:
+    """What a wind returned for points. It is to blame for what is not finite, unless the points are those of an attempt that diverges."""
+    if values is None:
+        raise TypeError(f"{name}: the function returned None, needs {' x '.join(map(str, (len(points), *shape)))} numbers")
+    air = spread(values, name, len(points), *shape)
+    if not np.isfinite(air).all():
+        bad = np.flatnonzero(~np.isfinite(air.reshape(len(points), -1)).all(1) & np.isfinite(points).all(1))
+        if len(bad):
+            raise ArgumentError(f"{name}: is {air[bad[0]].tolist()} at point {bad[0]}, {points[bad[0]].tolist()}; it must be finite")
+    return air
+
+
+def _event_function(sim_of, index: int):
     def measure(_, t, x, v, value):
         sim = sim_of()
         try:
-            ctypes.c_double.from_address(value).value = function(t, _copy(x, sim._shape), _copy(v, sim._shape))
+            ctypes.c_double.from_address(value).value = real(sim._events[index](t, _copy(x, sim._shape), _copy(v, sim._shape)), "what the function of an event returns")
             return 0
         except BaseException as error:
             sim._pending = error
@@ -767,28 +807,52 @@ def _event_function(sim_of, function):
     return c.drape_event_function(measure)
 
 
+# ---- The end of the interpreter ----
+
+_SIMS: "weakref.WeakSet[Sim]" = weakref.WeakSet()
+_PATIENCE = 10.0  # [s] for the steps in progress when the interpreter ends
+
+
+@atexit.register
+def _stop_all() -> None:
+    """A daemon thread may still advance a sim, whose callbacks need the interpreter. Such sims are stopped after the step in progress, and their locks are kept,
+    so that no further advance begins. A sim that does not stop in time is left as it is, with all that it needs."""
+    running = [sim for sim in list(_SIMS) if not sim._lock.acquire(blocking=False)]
+    for sim in running:
+        sim.cancel()
+    end = time.monotonic() + _PATIENCE
+    for sim in running:
+        if not sim._lock.acquire(timeout=max(0.0, end - time.monotonic())):
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(sim))
+
+
 class _Interrupt:
-    """While the main thread advances a sim, Ctrl-C is noted, and the observer stops the run. Otherwise the exception would be raised in one of the
-    library's callbacks, before that can catch it, and be lost."""
+    """While the main thread advances a sim, Ctrl-C is noted, and the observer calls the handler of the program. Otherwise its exception would be raised in one
+    of the library's callbacks, before that can catch it, and be lost."""
 
     def __init__(self) -> None:
         self.came: Tuple[Any, ...] = ()
         self.before: Any = None
+        self.handler: Any = None  # before or, if that is of an advance whose observer makes this one, the handler before that
 
     def __enter__(self) -> "_Interrupt":
         if threading.current_thread() is threading.main_thread() and callable(signal.getsignal(signal.SIGINT)):
             self.before = signal.signal(signal.SIGINT, self._note)
+            outer = getattr(self.before, "__self__", None)
+            self.handler = outer.handler if isinstance(outer, _Interrupt) else self.before
         return self
 
     def __exit__(self, *_: Any) -> None:
-        if self.before is not None:
+        if self.before is not None and signal.getsignal(signal.SIGINT) == self._note:  # which the handler may have replaced
             signal.signal(signal.SIGINT, self.before)
 
     def _note(self, *arguments: Any) -> None:
         self.came = arguments
 
     def pass_on(self) -> None:
-        self.before(*self.came)
+        """Calls the handler: that of Python raises KeyboardInterrupt; after one that does not raise, the advance goes on."""
+        came, self.came = self.came, ()
+        self.handler(*came)
 
 
 # ---- Values ----
@@ -810,6 +874,12 @@ def _settings(values: Mapping[str, Any], keep: list):
             setting.number = value
     keep.append(array)
     return array if len(array) else None, len(array)
+
+
+def _rows(values, name: str) -> np.ndarray:
+    """An array of rows, from rows or a single one."""
+    given = given_array(values, name)
+    return given.reshape(0, 3) if given.shape == (0,) else np.atleast_2d(given)
 
 
 def _what(cloth: bool, colliders: bool) -> int:

@@ -1,13 +1,14 @@
 """Terms in Python: energies of elements, as functions of numpy arrays."""
 import ctypes
 import math
+import weakref
 from typing import Any, Callable, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
 
 from . import _binding as c
 from ._binding import Status
-from ._library import ArgumentError, Context, encode, lib, numbers
+from ._library import ArgumentError, Context, encode, lib, numbers, spread
 
 
 class Cloth(NamedTuple):
@@ -49,11 +50,13 @@ class Term:
         ops.struct_size = ctypes.sizeof(ops)
         ops.entry.name, ops.entry.summary, ops.entry.reference = encode(name), b"an energy in Python", encode(reference)
         ops.element_name, ops.nodes, ops.convex, ops.external = encode(element_name), nodes, convex, external
-        ops.build, ops.energy = kinds["build"](self._build), kinds["energy"](self._energy)
+        this = weakref.ref(self)  # a context keeps the callbacks, and must not keep functions that refer to what keeps the context
+        ops.build = kinds["build"](lambda *given: term._build(*given) if (term := this()) else Status.E_ARGUMENT)
+        ops.energy = kinds["energy"](lambda *given: term._energy(*given) if (term := this()) else None)
 
     def register(self, context: Context) -> None:
-        """Makes the term known to a context, which keeps it."""
-        context.keep.append(self)
+        """Makes the term known to a context. Who uses the context must keep the term."""
+        context.keep.append(self._ops)
         context.check(lib.drape_context_add_term(context.address, self._ops))
 
     def raise_pending(self) -> None:
@@ -93,9 +96,12 @@ class Term:
             rest = _read(el.rest, (el.rest_count, el.count))[:, first:first + count].T if el.rest_count else np.empty((count, 0))
             positions = _read(x, (int(nodes.max()) + 1, 3))[nodes]
             shapes = (count,), (count, self.nodes, 3), (count, d, d)
-            for out, values, shape in zip((energies, gradients, hessians), self.energy(positions, rest), shapes):
+            results = self.energy(positions, rest)
+            if not isinstance(results, (tuple, list)) or len(results) != 3:
+                raise TypeError(f"{self.name}: the energy function returned {type(results).__name__}, needs energies, gradients and Hessians")
+            for out, name, values, shape in zip((energies, gradients, hessians), ("energies", "gradients", "Hessians"), results, shapes):
                 if out:
-                    values = np.ascontiguousarray(np.broadcast_to(values, shape), float)
+                    values = spread(values, f"{self.name}: {name}", *shape)
                     ctypes.memmove(out, values.ctypes.data, values.nbytes)
         except BaseException as error:
             self._error = self._error or error

@@ -3,6 +3,7 @@
 import glob
 import os
 import shutil
+import signal
 import subprocess
 import sys
 
@@ -46,12 +47,60 @@ def test_runs():
 def test_failures():
     """a run that fails has the status and the message; what the program refuses is an argument error"""
     stops = sheet(controller={"type": "fixed"}, integrator={"dt": 0.01, "max_iterations": 1, "tolerance": 1e-12})
-    raises(drape.StepError, drape.run, stops, out="run", says="t=0")
-    run = drape.Sim(stops).record()
-    equal((run.summary["status"], "t=0" in run.summary["message"]), ("e_solver", True))
+    for call in (lambda: drape.run(stops, out="run"), lambda: drape.run(stops), lambda: drape.Sim(stops).record(), lambda: drape.Sim(stops).view()):
+        run = raises(drape.SolverError, call, says="t=0").run
+        equal((run.summary["status"], "t=0" in run.summary["message"], run.positions.shape), ("e_solver", True, (1, 36, 3)))
+        assert not any(columns(run.steps)["accepted"])
     raises(drape.ArgumentError, drape.run, sheet(), {"/integrator/dt": -1}, out="other", says="/integrator/dt: -1 is not allowed")
     raises(drape.FileError, drape.load, "nowhere", says="scene.json")
     equal(os.path.exists("other"), False)
+    raises(TypeError, drape.run, sheet(), "other", says="out=")
+    open("a_file", "w", encoding="utf-8").close()
+    raises(drape.FileError, drape.run, sheet(), out="a_file", says="a_file")
+    raises(drape.FileError, drape.run(sheet(duration=0.02)).report, "none/x.html", says="none/x.html")
+
+
+def test_stopped():
+    """what ends a recording, an observer that stops or raises or Ctrl-C, comes out of it with the run up to there, which is the beginning of the whole one"""
+    whole = drape.run(sheet())
+
+    def ends(how):
+        sim = drape.Sim(sheet())
+        sim.observe(lambda event: how() if event.kind == drape.EventKind.FRAME and event.frame == 3 else None)
+        return sim.record
+
+    def fail():
+        raise ZeroDivisionError
+
+    for kind, how, message in ((drape.Stopped, lambda: True, "asked to stop"), (ZeroDivisionError, fail, "ZeroDivisionError"),
+                               (KeyboardInterrupt, lambda: os.kill(os.getpid(), signal.SIGINT), "KeyboardInterrupt")):
+        run = raises(kind, ends(how)).run
+        equal((run.summary["status"], message in run.summary["message"]), ("e_stopped", True))
+        count = len(run.times)
+        assert count in (3, 4) and np.array_equal(run.positions, whole.positions[:count]) and len(columns(run.steps)["t"]) < len(columns(whole.steps)["t"])
+    equal(raises(drape.ArgumentError, drape.Sim, {"drape": 1}).run, None)
+
+
+def test_moved():
+    """the folder of a saved run has its meshes, and can be moved; so can one that was loaded and saved again"""
+    os.mkdir("meshes")
+    drape.Model(sheet()).mesh(0).write("meshes/cloth.ply")
+    x = np.array([[0.1, -0.3, -0.4], [0.4, -0.3, -0.4], [0.25, -0.3, -0.1], [0.25, -0.15, -0.3]])
+    body = drape.Mesh(x, [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
+    scene = drape.Scene(sheet(mesh={"file": "meshes/cloth.ply"}, pins=[{"nodes": [0]}], colliders=[{"type": "mesh", "file": "meshes/body.obj"}], duration=0.02))
+    body.write("meshes/body.obj")
+    drape.run(scene).save("first")
+    drape.run(drape.Scene(sheet(mesh=drape.Model(sheet()).mesh(0), pins=[{"nodes": [0]}], duration=0.02))).save("second")
+    os.rename("first", "moved")
+    os.rename("second", "there")
+    shutil.rmtree("meshes")
+    drape.load("moved").save("again")
+    os.rename("moved", "elsewhere")
+    for folder in "elsewhere", "there", "again":
+        run = drape.load(folder)
+        assert np.array_equal(run.mesh(-1).positions, run.positions[-1])
+        assert "<html" in run.report().text
+    equal(sorted(name for name in os.listdir("again") if name.startswith("scene")), ["scene.json", "scene_file_0.ply", "scene_file_1.obj"])
 
 
 def test_changes():
@@ -139,6 +188,8 @@ def test_plots():
     ax = drape.plot.energy(run)
     assert np.array_equal(ax.lines[0].get_ydata(), columns(run.energy)["kinetic"]) and "[J]" in ax.get_ylabel()
     drape.plot.energy(run.energy, ["kinetic"], ax=ax)
+    assert np.array_equal(drape.plot.energy(run.energy, "elastic").lines[0].get_ydata(), columns(run.energy)["elastic"])
+    raises(TypeError, drape.plot.cloth, run.scene, says="has Scene")
     drape.plot.steps(run)
     sim = drape.Sim(sheet())
     for what in (run, sim, run.mesh(0)):

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """test_sim.py: scenes and sims in Python. See package.py."""
+import copy
 import gc
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -39,6 +41,8 @@ def test_pointers():
     del scene["/colliders/1"]
     equal(drape.Model(scene).collider_count, 1)
     raises(KeyError, lambda: scene["/nothing/at/all"])
+    raises(KeyError, lambda: scene[5], says="5 is not a pointer")
+    assert 5 not in scene and scene.get(5) is None
     raises(IndexError, lambda: scene["/colliders/7"])
     other = scene.copy()
     other["/duration"] = 9
@@ -166,8 +170,8 @@ def test_views_outlive():
         end(sim)
         del sim
         churn()
-        for array, copy in zip(arrays, before):
-            assert np.array_equal(array, copy)
+        for array, was in zip(arrays, before):
+            assert np.array_equal(array, was)
 
 
 def test_nothing_is_kept():
@@ -179,6 +183,53 @@ def test_nothing_is_kept():
     del sim
     assert gone() is None and len(blocks) <= 1, blocks  # without a collection; the block of the context goes with the view's
     assert np.isfinite(x).all()
+
+
+def test_cycles_are_collected():
+    """a wind, an event, an observer and a term that refer to what has the sim do not keep it"""
+    class Lab:
+        def __init__(self):
+            term = drape.Term("my.weight", 1, self.elements, self.energy, external=True)
+            self.sim = drape.Sim(drape.Model(sheet(terms=["stretch.edge", "drag.wind", "my.weight"]), terms=[term]))
+            self.sim.set_wind(self.wind)
+            self.sim.add_event("mine", self.event)
+            self.sim.observe(self.observe)
+
+        def wind(self, *_):
+            return [self.sim.time * 0, 0, 1]
+
+        def event(self, t, x, v):
+            return x[0, 0] + 1 + 0 * len(self.sim.positions)
+
+        def observe(self, _):
+            assert self.sim.time >= 0
+
+        def elements(self, cloth):
+            return np.arange(len(cloth.rest))[:, None], cloth.node_mass[:, None]
+
+        def energy(self, x, mass):
+            return mass[:, 0] * x[:, 0, 1], mass[:, :, None] * [0, 1, 0], np.zeros((3, 3))
+
+    gone = []
+    for _ in range(3):
+        lab = Lab()
+        lab.sim.advance(0.02)
+        gone += [weakref.ref(lab.sim), weakref.ref(lab.sim._context), weakref.ref(lab.sim.model._context)]
+    del lab
+    gc.collect()
+    equal([ref() for ref in gone], [None] * len(gone))
+
+
+def test_wind_goes():
+    """a wind that is replaced is called no more, and the sim goes on with a wind whose function is held by nothing else"""
+    sim, calls = drape.Sim(sheet()), []
+    sim.set_wind(lambda t, x: calls.append(1) or [1, 0, 0])
+    gc.collect()
+    sim.advance(0.02)
+    first = len(calls)
+    sim.set_wind(lambda t, x: calls.append(2) or [0, 0, 0])
+    sim.advance(0.04)
+    assert 1 in calls[:first] and 2 in calls[first:] and 1 not in calls[first:]
 
 
 def test_closing():
@@ -198,6 +249,48 @@ def test_interpreter_ends():
            "sim.set_wind(lambda t, x: [1, 0, 0])\nsim.advance(0.05)\nf = sim.frames(0.2)\nnext(f)\n"
     result = subprocess.run([sys.executable, "-X", "dev", "-c", code], env=ENVIRONMENT, capture_output=True, text=True, check=False)
     equal((result.returncode, result.stdout, result.stderr), (0, "", ""))
+
+
+def test_ends_while_advancing():
+    """the interpreter ends in order while a daemon thread advances a sim, whether that ends at once, advances again, or waits in a callback"""
+    code = """if True:
+        import drape, json, sys, threading, time
+        sim, started = drape.Sim(json.loads(sys.argv[1])), threading.Event()
+        sim.set_wind(lambda t, x: [1, 0, 0])
+
+        def work():
+            while True:
+                try:
+                    sim.advance(1e6)
+                except drape.Stopped:
+                    if sys.argv[2] == "once":
+                        return
+
+        def observe(event):
+            started.set()
+            if sys.argv[2] == "waits":
+                time.sleep(1e3)
+
+        sim.observe(observe)
+        if sys.argv[2] == "waits":
+            drape.sim._PATIENCE = 0.1
+        threading.Thread(target=work, daemon=True).start()
+        started.wait()"""
+    for kind in "once", "again", "waits":
+        result = subprocess.run([sys.executable, "-c", code, json.dumps(sheet()), kind], env=ENVIRONMENT, capture_output=True, text=True, check=False, timeout=60)
+        equal((result.returncode, result.stdout, result.stderr), (0, "", ""), kind)
+
+
+def test_objects():
+    """an object of another class is refused where its address would be taken, and a sim is not copied"""
+    sim = drape.Sim(sheet())
+    for what in (sim, None, sim.model._address, sheet()):
+        raises(TypeError, drape.Embedding, what, [[0, 0, 0]], says="model: needs a drape.Model")
+        raises(TypeError, drape.Model, sheet(), [what], says="terms: needs a drape.Term")
+    for call in (lambda: drape.Sim(sim), lambda: drape.Model(sim), lambda: drape.Model(sim.model), lambda: sim.change(sim), lambda: drape.run(sim.model)):
+        raises(TypeError, call, says="a scene is")
+    for copied in (copy.copy, copy.deepcopy, pickle.dumps):
+        raises(TypeError, copied, sim, says="restore_checkpoint")
 
 
 # ---- Advancing
@@ -367,19 +460,71 @@ def test_misuse():
                  lambda: sim.untangle(sweeps=2**32 + 3), lambda: drape.Sim(sheet(), threads=2**32 + 1), lambda: drape.Embedding(sim.model, [[0, 0, 0]], cloth=2**32),
                  lambda: drape.Mesh(np.eye(3), [[0, 1, 2**32 + 2]]), lambda: drape.Mesh(np.eye(3), [[0, 1, 1.5]]), lambda: sim.move_collider(2**32, [0, 0, 0], 1),
                  lambda: drape.Mesh.of({"vertices": np.eye(3), "faces": np.array([[0, 1, 2**32 + 2]])}), lambda: sim.push("a"), lambda: sim.push([[1, 2], [3]]),
-                 lambda: sim.place(rotate=[1, 2]), lambda: sim.place(center=["a", 0, 0]), lambda: sim.set_masses([1], [10**400])):
+                 lambda: sim.place(rotate=[1, 2]), lambda: sim.place(center=["a", 0, 0]), lambda: sim.set_masses([1], [10**400]), lambda: drape.Sim(sheet(), threads=1.5),
+                 lambda: sim.move_collider(0.5, [0, 0, 0], 1), lambda: sim.untangle(sweeps=1.5), lambda: sim.attached(1.5)):
         raises(drape.ArgumentError, call)
     for call in (lambda: sim.advance("1"), lambda: sim.advance(None), lambda: sim.advance_realtime("1", 1), lambda: sim.set_state("a", sim.positions, sim.velocities),
-                 lambda: sim.push(sim.positions * 1j), lambda: sim.restore(3), lambda: sim.restore_checkpoint("text"), lambda: sim.move_collider(0.5, [0, 0, 0], 1),
+                 lambda: sim.push(sim.positions * 1j), lambda: sim.restore(3), lambda: sim.restore_checkpoint("text"),
                  lambda: sim.move_collider(0, [0, 0, 0], "1"), lambda: sim.closest([[0, 0, 0]], within="far"), lambda: sim.set_wind("north"), lambda: sim.observe(3),
                  lambda: sim.add_event("name", 3), lambda: drape.Sim(3), lambda: drape.Sim([1]), lambda: drape.Sim(sheet(), integrator=3),
-                 lambda: drape.Sim(sheet(), threads=1.5), lambda: drape.Sim(sheet(), dt="a"), lambda: sim.model.collider("ball", "now"),
+                 lambda: drape.Sim(sheet(), dt="a"), lambda: sim.model.collider("ball", "now"),
                  lambda: sim.model.check_derivatives(seed="a"), lambda: sim.untangle(sweeps="many")):
         raises(TypeError, call)
     for call in (lambda: drape.Mesh(np.eye(3), [[0, 1, 2]]).write("none/x.ply"), lambda: drape.Scene(sheet()).write("none/x.json"), lambda: sim.save("none/x")):
         raises(OSError, call)
     equal(sim.time, 0)
     sim.advance(0.02)
+
+
+def test_messages():
+    """what is refused is named, with what it has and what it needs; no mask of another length, no text with NUL, nothing converted before its shape is known"""
+    sim = drape.Sim(sheet())
+    for kind, says, call in (
+            (TypeError, "dt: needs a number, has the text 'x'", lambda: drape.Sim(sheet(), dt="x")),
+            (TypeError, "until: needs a number, has NoneType", lambda: sim.advance(None)),
+            (TypeError, "seconds: needs a number", lambda: sim.move_pins([0], [[0, 0, 0]], "a")),
+            (drape.ArgumentError, "masses: has shape (3,), needs 2, or one for all", lambda: sim.set_masses([5, 6], [1, 2, 3])),
+            (drape.ArgumentError, "stiffness: has shape (3,), needs 2", lambda: sim.drag([5, 6], np.zeros((2, 3)), [1, 2, 3])),
+            (drape.ArgumentError, "targets: has shape (1, 4), needs 1 x 3", lambda: sim.drag([5], [1, 2, 3, 4], 1)),
+            (TypeError, "forces: needs numbers, has None", lambda: sim.push([[0, 0, None]] * 36)),
+            (drape.ArgumentError, "positions: needs numbers, has the text '1'", lambda: drape.Mesh([["1", "2", "3"]], [])),
+            (drape.ArgumentError, "the name of the file is empty", lambda: sim.save("")),
+            (drape.ArgumentError, "the name of the file is empty", lambda: sim.restore("")),
+            (drape.ArgumentError, "NUL", lambda: sim.save("nul\0x")),
+            (drape.ArgumentError, "NUL", lambda: sim.save(b"nul\0x")),
+            (drape.ArgumentError, "NUL", lambda: drape.Scene("a\0b")),
+            (drape.ArgumentError, "NUL", lambda: drape.Sim(sheet(), integrator="be\0x")),
+            (TypeError, "data: needs the bytes of a checkpoint, has str", lambda: sim.restore_checkpoint("text")),
+            (drape.ArgumentError, "node: needs a whole number, has 1.5", lambda: sim.attached(1.5)),
+            (drape.ArgumentError, "forces: has shape (1000000000, 3), needs 36 x 3", lambda: sim.push(np.broadcast_to(1., (10**9, 3))))):
+        raises(kind, call, says=says)
+    for mask in [True, False, True], [True] * 37, np.ones((6, 6), bool), True:
+        raises(drape.ArgumentError, sim.pin, np.array(mask), says="nodes: a mask of shape")
+    raises(drape.ArgumentError, sim.place, cloths=[True, False], says="cloths: a mask of shape (2,), needs 1")
+    assert not os.path.exists("nul")
+    sim.pin(np.arange(36) == 7)
+    equal(np.flatnonzero(sim.pinned).tolist(), [0, 5, 7])
+
+
+def test_bad_answers():
+    """a wind, an event or a term that returns nothing, or a wind that is not finite, is what the message is about"""
+    for kind, says, wind in ((TypeError, "the wind: the function returned None, needs 36 x 3 numbers", lambda t, x: None),
+                             (drape.ArgumentError, "the wind: is [nan, 0.0, 0.0] at point 3, [", lambda t, x: np.where(np.arange(36)[:, None] == 3, [np.nan, 0, 0], 0)),
+                             (drape.ArgumentError, "the gradient of the wind: is ", lambda t, x: (np.zeros(3), np.full((3, 3), np.inf))),
+                             (drape.ArgumentError, "the wind: has shape (4,), needs 36 x 3, or one for all", lambda t, x: [1, 2, 3, 4])):
+        sim = drape.Sim(sheet())
+        sim.set_wind(wind)
+        raises(kind, sim.advance, 0.1, says=says)
+        sim.set_wind(lambda t, x: (1, 0, 0))  # a vector, not a wind and its gradient
+        sim.advance(0.02)
+    sim = drape.Sim(sheet())
+    sim.add_event("mine", lambda *_: None)
+    raises(TypeError, sim.advance, 0.1, says="what the function of an event returns: needs a number, has NoneType")
+    for kind, says, energy in ((TypeError, "my.weight: the energy function returned NoneType", lambda x, rest: None),
+                               (TypeError, "my.weight: gradients: needs numbers, has None", lambda x, rest: (0.0, None, np.zeros((3, 3)))),
+                               (drape.ArgumentError, "my.weight: energies: has shape (3,), needs ", lambda x, rest: ([1, 2, 3], 0.0, 0.0))):
+        model = drape.Model(sheet(terms=["my.weight"]), [drape.Term("my.weight", 1, lambda cloth: np.arange(36)[:, None], energy)])
+        raises(kind, lambda model=model: drape.Sim(model).advance(0.1), says=says)
 
 
 def test_callbacks_in_threads():
@@ -405,6 +550,22 @@ def test_interrupt():
     straight = drape.Sim(sheet())
     straight.advance(0.2)
     equal(sim.hash, straight.hash)
+    try:  # after a handler that does not raise, the advance goes on; in an advance within an observer, as well
+        calls = []
+        signal.signal(signal.SIGINT, lambda *given: calls.append(given))
+        outer, inner = drape.Sim(sheet()), drape.Sim(sheet())
+        outer.observe(lambda event: inner.advance(0.2) if event.kind == KIND.FRAME and event.frame == 2 else None)
+        inner.observe(lambda event: os.kill(os.getpid(), signal.SIGINT) if event.kind == KIND.ATTEMPT and event.attempt.index == 5 else None)
+        outer.advance(0.2)
+        equal((outer.hash, inner.hash, len(calls)), (straight.hash, straight.hash, 1))
+        signal.signal(signal.SIGINT, before)
+        outer, inner = drape.Sim(sheet()), drape.Sim(sheet())
+        inner.observe(lambda event: os.kill(os.getpid(), signal.SIGINT) if event.kind == KIND.ATTEMPT and event.attempt.index == 5 else None)
+        outer.observe(lambda event: inner.advance(0.2))
+        raises(KeyboardInterrupt, outer.advance, 0.2)
+        assert inner.time < 0.1 and outer.time < 0.1 and signal.getsignal(signal.SIGINT) is before
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_saving():
@@ -413,7 +574,7 @@ def test_saving():
     sim.save("checkpoint")
     data = sim.checkpoint()
     sim.advance(0.2)
-    for restore, source in (("restore", "checkpoint"), ("restore_checkpoint", data)):
+    for restore, source in (("restore", "checkpoint"), ("restore_checkpoint", data), ("restore_checkpoint", bytearray(data)), ("restore_checkpoint", memoryview(data))):
         other = drape.Sim(sheet())
         getattr(other, restore)(source)
         equal(round(other.time, 9), 0.1)
