@@ -59,6 +59,7 @@ static void run(const scene *c, int side, const char *linear, int steps, FILE *c
 
 static void run_alone(const scene *c, int side, const char *linear, int steps, FILE *csv)
 {
+    fflush(NULL); /* or the child would write what is buffered once more */
     const pid_t child = fork();
     if (child == 0) {
         run(c, side, linear, steps, csv);

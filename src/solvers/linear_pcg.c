@@ -19,7 +19,7 @@
 #define EXACT          1e-14   /* relative residual for callers that want all digits */
 #define MAX_ITERATIONS 2000    /* a matrix that needs more goes to the fallback */
 #define SYMMETRY       1e-13   /* as in linear_multifrontal.c: rounding error in mirrored entries */
-#define MAX_FALLBACK   1000000 /* unknowns: factors of a larger matrix take tens of gigabytes */
+#define MAX_FALLBACK   1000000 /* unknowns: at a third of these, factors take 1.6 GB */
 
 extern const drape_linear_ops drape_linear_pcg;
 
@@ -207,7 +207,7 @@ const drape_linear_ops drape_linear_pcg = {
              "conjugate gradients preconditioned by algebraic multigrid, no factors of the matrix; a "
              "matrix that is not symmetric positive definite is given to multifrontal, up to 1e6 unknowns",
          .reference = "Hestenes & Stiefel 1952; Vanek, Mandel & Brezina 1996"},
-    .best_from = 1000000, /* where factors take tens of gigabytes: bench/large */
+    .best_from = 1000000, /* faster at 3e5, slower at 3e4; factors would take gigabytes */
     .borrows_heap = true, /* for the fallback */
     .create = create,
     .use_threads = use_threads,
