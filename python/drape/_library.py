@@ -335,11 +335,11 @@ def given_array(values, name: str) -> np.ndarray:
         raise ArgumentError(f"{name}: {error}") from None
 
 
-def spread(values, name: str, *shape) -> np.ndarray:
-    """Numbers of this shape, from those of one row or of one number for all."""
+def spread(values, name: str, *shape, finite: bool = True) -> np.ndarray:
+    """Numbers of this shape, from those of one row or of one number for all; finite: as for `numbers`."""
     given = given_array(values, name)
     try:
-        return numbers(np.broadcast_to(given, shape), name, *shape)
+        return numbers(np.broadcast_to(given, shape), name, *shape, finite=finite)
     except ValueError as error:
         if isinstance(error, Error):
             raise

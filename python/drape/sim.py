@@ -786,7 +786,7 @@ def _air(values, name: str, points: np.ndarray, *shape: int) -> np.ndarray:
     """What a wind returned for points. It is to blame for what is not finite, unless the points are those of an attempt that diverges."""
     if values is None:
         raise TypeError(f"{name}: the function returned None, needs {' x '.join(map(str, (len(points), *shape)))} numbers")
-    air = spread(values, name, len(points), *shape)
+    air = spread(values, name, len(points), *shape, finite=False)
     if not np.isfinite(air).all():
         bad = np.flatnonzero(~np.isfinite(air.reshape(len(points), -1)).all(1) & np.isfinite(points).all(1))
         if len(bad):

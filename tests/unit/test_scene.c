@@ -1263,7 +1263,8 @@ END_TEST
 /* ---- Every key ---- */
 
 static const char whole[] =
-    "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g', 'transform': {}}, 'terms': [{'type': 't'}],"
+    "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g', 'transform': {}}, 'render_mesh': {'grid': "
+    "'g', 'transform': {}}, 'terms': [{'type': 't'}],"
     "'start': {'transform': {}, 'folds': [{'point': [0, 0, 0], 'axis': [0, 0, 1], 'side': [1, 0, 0]}]},"
     "'pins': [{'nodes': [0], 'turns': [{'time': 0, 'rotate': [0, 0, 1]}]}], 'masses': [{'nodes': [0], 'add': "
     "1}]}], 'colliders': [{'type': 'c', 'turns': "
