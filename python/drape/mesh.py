@@ -17,13 +17,15 @@ class Mesh:
         self.positions = numbers(positions, "positions", -1, 3)
         self.triangles = numbers(triangles, "triangles", -1, 3, dtype=np.int32)
         self.settings = settings
-        if self.triangles.size and not 0 <= self.triangles.min() <= self.triangles.max() < len(self.positions):
-            raise ArgumentError(f"triangles: has node {self.triangles.max()} of {len(self.positions)}, or a negative one")
+        outside = np.argwhere((self.triangles < 0) | (self.triangles >= len(self.positions)))
+        if len(outside):
+            row, corner = outside[0].tolist()
+            raise ArgumentError(f"triangles[{row}, {corner}]: there is no node {self.triangles[row, corner]}: there are {len(self.positions)}, from 0")
 
     @classmethod
     def of(cls, mesh: Any, **settings: Any) -> "Mesh":
         """A mesh from another package: a dictionary or an object with `vertices` and `faces`, as trimesh has, or with `points` and `cells`, as meshio
-        has; quadrangles and larger polygons of meshio's cells are divided into triangles from their first corner."""
+        has; quadrangles and larger polygons are divided into triangles from their first corner. Vertices and lines of meshio's cells are left out."""
         if isinstance(mesh, Mapping):
             get: Any = mesh.get
         else:
@@ -32,12 +34,11 @@ class Mesh:
         if isinstance(mesh, cls):
             return mesh
         if get("vertices") is not None and get("faces") is not None:
-            return cls(get("vertices"), _fans([get("faces")]), **settings)
+            return cls(get("vertices"), _fans([("faces", get("faces"))]), **settings)
         if get("points") is not None and get("cells") is not None:
             cells = get("cells")
             blocks: Any = cells.items() if isinstance(cells, Mapping) else [b if isinstance(b, tuple) else (b.type, b.data) for b in cells]
-            faces = [data for kind, data in blocks if kind in ("triangle", "quad", "polygon")]
-            return cls(get("points"), _fans(faces), **settings)
+            return cls(get("points"), _fans([(f"cells, {kind}", data) for kind, data in blocks if _is_face(kind)]), **settings)
         if get("positions") is not None and get("triangles") is not None:
             return cls(get("positions"), get("triangles"), **settings)
         raise ArgumentError("a mesh needs vertices and faces, points and cells, or positions and triangles")
@@ -52,8 +53,11 @@ class Mesh:
 
     def write(self, path) -> None:
         """Writes a PLY file (binary, double precision), or an OBJ file if the name ends in .obj, with all digits."""
+        ending = os.path.splitext(os.fsdecode(path))[1].lower()
+        if ending not in (".ply", ".obj"):
+            raise ArgumentError(f"{os.fsdecode(path)!r}: a mesh is written as .ply or .obj")
         check_finite(self.positions, "positions")
-        if os.fspath(path).endswith(".obj"):
+        if ending == ".obj":
             with open(path, "w", encoding="ascii") as file:
                 file.writelines("v %r %r %r\n" % tuple(x) for x in self.positions.tolist())
                 file.writelines("f %d %d %d\n" % tuple(t) for t in (self.triangles + 1).tolist())
@@ -69,13 +73,28 @@ class Mesh:
         return f"Mesh({len(self.positions)} nodes, {len(self.triangles)} triangles)"
 
 
+def _is_face(kind: str) -> bool:
+    """Whether a block of meshio's cells has faces, or less, which is left out; what has other cells is no mesh of faces."""
+    if kind == "vertex" or kind.startswith("line"):
+        return False
+    if kind in ("triangle", "quad") or kind.startswith("polygon"):
+        return True
+    raise ArgumentError(f"cells: has {kind}; faces are triangle, quad or polygon")
+
+
 def _fans(blocks) -> np.ndarray:
-    """Triangles of polygons; each block is an array of polygons, or a list of polygons of any length."""
+    """Triangles of polygons; each block, with its name, is an array of polygons, or a list of polygons of any length."""
     triangles = []
-    for block in blocks:
-        for polygon in block if not isinstance(block, np.ndarray) or block.ndim != 2 else []:
+    for name, block in blocks:
+        flat = isinstance(block, np.ndarray) and block.ndim == 2
+        for k, polygon in enumerate(block[:1] if flat else block):
+            if np.ndim(polygon) != 1 or len(polygon) < 3:
+                raise ArgumentError(f"{name}[{k}]: {np.asarray(polygon).tolist()} is not a face; it needs the numbers of at least 3 nodes")
+        if flat:
+            triangles += np.stack([block[:, [0, k, k + 1]] for k in range(1, block.shape[1] - 1)], 1).reshape(-1, 3).tolist() if len(block) else []
+            continue
+        for polygon in block:
             triangles += [(polygon[0], polygon[k], polygon[k + 1]) for k in range(1, len(polygon) - 1)]
-        if isinstance(block, np.ndarray) and block.ndim == 2:
-            corners = block.shape[1]
-            triangles += np.stack([block[:, [0, k, k + 1]] for k in range(1, corners - 1)], 1).reshape(-1, 3).tolist()
-    return np.array(triangles, dtype=None if triangles else np.int32).reshape(-1, 3)
+    if not triangles:
+        raise ArgumentError(f"{', '.join(name for name, _ in blocks) or 'cells'}: there are no faces")
+    return np.array(triangles).reshape(-1, 3)

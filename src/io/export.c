@@ -135,13 +135,27 @@ void drape_frame_files_close(drape_frame_files *frames)
 
 /* ---- OBJ ---- */
 
-void drape_obj_put_name(drape_file *file, const char *statement, const char *name)
+static void put_name(drape_file *file, const char *statement, const char *name, size_t length)
 {
     drape_file_put_text(file, statement);
     drape_file_put_text(file, " ");
-    for (; *name; name++)
+    for (; length > 0; name++, length--)
         drape_file_put(file, (unsigned char)*name < ' ' ? "_" : name, 1);
     drape_file_put_text(file, "\n");
+}
+
+void drape_obj_put_name(drape_file *file, const char *statement, const char *name)
+{
+    put_name(file, statement, name, strlen(name));
+}
+
+/* One statement for each line of the names. */
+static void put_names(drape_file *file, const char *statement, const char *names)
+{
+    for (const char *end = names; *end; names = end + 1) {
+        end = names + strcspn(names, "\n");
+        put_name(file, statement, names, (size_t)(end - names));
+    }
 }
 
 void drape_obj_put_material_files(drape_file *file, const drape_render_surface *surface)
@@ -154,7 +168,7 @@ void drape_obj_put_material_files(drape_file *file, const drape_render_surface *
             named = other && strcmp(own, other) == 0;
         }
         if (!named)
-            drape_obj_put_name(file, "mtllib", own);
+            put_names(file, "mtllib", own);
     }
 }
 

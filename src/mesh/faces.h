@@ -18,7 +18,8 @@ typedef struct drape_faces {
     double *uv;          /* (uv_count x 2) each pair once */
     int32_t *material;   /* (count) -1: none */
     char **name;         /* (material_count) of the materials */
-    char *material_file; /* the file or files that define the materials, as the mesh names them; NULL: none */
+    char *material_file; /* the file or files that define the materials, as the mesh names them,
+                          * one statement a line; NULL: none */
     int32_t *corner;     /* (triangle_count x 3) the corner of a face at each corner of a triangle */
 } drape_faces;
 

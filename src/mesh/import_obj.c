@@ -6,7 +6,8 @@
  * ignored.
  *
  * What does not matter to the simulation is not refused: a face with a corner whose texture coordinates are
- * missing or are no numbers has none.
+ * missing or are no numbers has none. Of corners in a row at one node the first counts: "f 1 2 3 3" is a
+ * triangle.
  *
  * The file is read twice: the first pass only counts, so that the arrays are allocated once with the right
  * size.
@@ -20,6 +21,7 @@
 
 typedef struct obj_count {
     size_t nodes, uvs, faces, corners, materials; /* materials: statements */
+    size_t file_size;                             /* of the names in mtllib, each with its end */
 } obj_count;
 
 typedef struct obj_reader {
@@ -29,7 +31,8 @@ typedef struct obj_reader {
     drape_text text;
     int32_t nodes, uvs, faces, corners, materials; /* so far */
     drape_word *material;                          /* the name of each usemtl */
-    drape_word file;                               /* names of mtllib; of length 0: none */
+    char *file;                                    /* names of mtllib, one a line */
+    size_t file_size;                              /* of that so far */
 } obj_reader;
 
 static drape_text open_text(const char *data, size_t size)
@@ -38,6 +41,17 @@ static drape_text open_text(const char *data, size_t size)
     text.comment = '#';
     text.continuation = true;
     return text;
+}
+
+/* The rest of the line: names may contain blanks. Those at its end do not belong to it. */
+static drape_word rest_of_line(drape_text *text)
+{
+    drape_word word, rest = {text->at, 0};
+    for (bool first = true; drape_text_next_word(text, &word); first = false) {
+        rest.start = first ? word.start : rest.start;
+        rest.length = (size_t)(word.start + word.length - rest.start);
+    }
+    return rest;
 }
 
 static obj_count count_statements(const char *data, size_t size)
@@ -51,6 +65,8 @@ static obj_count count_statements(const char *data, size_t size)
         count.nodes += drape_word_is(word, "v");
         count.uvs += drape_word_is(word, "vt");
         count.materials += drape_word_is(word, "usemtl");
+        if (drape_word_is(word, "mtllib"))
+            count.file_size += rest_of_line(&text).length + 1;
         if (drape_word_is(word, "f"))
             for (count.faces++; drape_text_next_word(&text, &word);)
                 count.corners++;
@@ -82,17 +98,6 @@ static void read_uv(obj_reader *reader)
     for (int axis = 0; axis < 2; axis++)
         if (drape_text_next_word(&reader->text, &word) ? !drape_word_number(word, &uv[axis]) : axis == 0)
             uv[axis] = NAN;
-}
-
-/* The rest of the line: names may contain blanks. Those at its end do not belong to it. */
-static drape_word rest_of_line(drape_text *text)
-{
-    drape_word word, rest = {text->at, 0};
-    for (bool first = true; drape_text_next_word(text, &word); first = false) {
-        rest.start = first ? word.start : rest.start;
-        rest.length = (size_t)(word.start + word.length - rest.start);
-    }
-    return rest;
 }
 
 /* Parses up to three integers between slashes; those after the first may be empty, and are 0 then. */
@@ -145,18 +150,39 @@ static drape_status read_polygon(obj_reader *reader)
     drape_faces *faces = &reader->mesh->faces;
     drape_word word;
     const int32_t first = reader->corners;
-    for (; drape_text_next_word(&reader->text, &word); reader->corners++) {
-        const drape_status status =
-            read_corner(reader, word, &faces->node[reader->corners], &faces->uv_of[reader->corners]);
+    int32_t given = 0, end = first;
+    for (; drape_text_next_word(&reader->text, &word); given++) {
+        faces->uv_of[end] = -1;
+        const drape_status status = read_corner(reader, word, &faces->node[end], &faces->uv_of[end]);
         if (status)
             return status;
+        end += end == first || faces->node[end] != faces->node[end - 1];
     }
-    if (reader->corners - first < 3)
+    while (end - first > 1 && faces->node[end - 1] == faces->node[first])
+        end--;
+    if (given < 3)
         return drape_mesh_fail(reader->ctx, reader->source, reader->text.line,
-                               "a face with %d corners; it needs at least 3", reader->corners - first);
+                               "a face with %d corners; it needs at least 3", given);
+    if (end - first < 3)
+        return drape_mesh_fail(reader->ctx, reader->source, reader->text.line,
+                               "a face with corners at %d nodes; it needs at least 3; remedy: delete it",
+                               end - first);
+    reader->corners = end;
     faces->material[reader->faces++] = reader->materials - 1;
     faces->first[reader->faces] = reader->corners;
     return DRAPE_OK;
+}
+
+/* A file may have several of these statements. */
+static void read_file_name(obj_reader *reader)
+{
+    const drape_word name = rest_of_line(&reader->text);
+    if (name.length == 0)
+        return;
+    if (reader->file_size > 0)
+        reader->file[reader->file_size++] = '\n';
+    for (size_t i = 0; i < name.length; i++)
+        reader->file[reader->file_size++] = name.start[i] == '\n' ? ' ' : name.start[i];
 }
 
 static drape_status read_statements(obj_reader *reader)
@@ -172,8 +198,8 @@ static drape_status read_statements(obj_reader *reader)
             read_uv(reader);
         else if (drape_word_is(word, "usemtl"))
             reader->material[reader->materials++] = rest_of_line(&reader->text);
-        else if (drape_word_is(word, "mtllib") && reader->file.length == 0)
-            reader->file = rest_of_line(&reader->text);
+        else if (drape_word_is(word, "mtllib"))
+            read_file_name(reader);
         else if (drape_word_is(word, "f"))
             status = read_polygon(reader);
     } while (!status && drape_text_next_line(&reader->text));
@@ -235,8 +261,8 @@ static drape_status name_materials(obj_reader *reader, numbered_name *sorted, in
         }
         faces->material[f] = number[first] - 1;
     }
-    if (faces->material_count > 0 && reader->file.length > 0)
-        faces->material_file = copy_word(arena, reader->file);
+    if (faces->material_count > 0 && reader->file_size > 0)
+        faces->material_file = copy_word(arena, (drape_word){reader->file, reader->file_size});
     drape_arena_release(arena, number);
     return drape_arena_status(arena);
 }
@@ -252,11 +278,16 @@ static drape_status read_obj(drape_context *ctx, const drape_mesh_source *source
     drape_arena scratch = drape_arena_of(ctx);
     obj_reader reader = {.ctx = ctx, .source = source, .mesh = mesh, .text = open_text(data, size)};
     reader.material = drape_arena_take(&scratch, count.materials, sizeof *reader.material);
+    reader.file = drape_arena_take(&scratch, count.file_size, 1);
     numbered_name *sorted = drape_arena_take(&scratch, count.materials, sizeof *sorted);
     int32_t *same = drape_arena_take(&scratch, count.materials, sizeof *same);
     status = drape_arena_status(&scratch);
     if (!status)
         status = read_statements(&reader);
+    if (!status) {
+        mesh->faces.corner_count = reader.corners;
+        mesh->triangle_count = reader.corners - 2 * reader.faces;
+    }
     if (!status)
         status = name_materials(&reader, sorted, same);
     drape_arena_free(&scratch);

@@ -126,6 +126,20 @@ def test_meshes():
     for given in ({"vertices": x, "faces": [[0, 1, 2], [0, 2, 3]]}, {"points": x, "cells": [("quad", np.array(quads))]}, {"points": x, "cells": {"quad": quads}}):
         mesh = drape.Mesh.of(given)
         equal(mesh.triangles.tolist(), [[0, 1, 2], [0, 2, 3]])
+    corners = drape.Mesh.of({"points": x, "cells": [("vertex", [[0]]), ("line", [[0, 1]]), ("triangle", [[0, 1, 2]]), ("polygon", [[0, 2, 3]])]})
+    equal(corners.triangles.tolist(), [[0, 1, 2], [0, 2, 3]])
+    for given, says in (({"points": x, "cells": [("tetra", [[0, 1, 2, 3]])]}, "cells: has tetra"), ({"points": x, "cells": [("triangle6", [[0] * 6])]}, "cells: has triangle6"),
+                        ({"points": x, "cells": [("line", [[0, 1]])]}, "cells: there are no faces"), ({"vertices": x, "faces": []}, "faces: there are no faces"),
+                        ({"vertices": x, "faces": [0, 1, 2]}, "faces[0]: 0 is not a face"), ({"vertices": x, "faces": [[0, 1, 2], [0, 1]]}, "faces[1]: [0, 1] is not a face"),
+                        ({"vertices": x, "faces": np.array([[0, 1], [1, 2]])}, "faces[0]: [0, 1] is not a face"), ({"vertices": x, "faces": np.arange(3)}, "faces[0]: 0 is")):
+        raises(drape.ArgumentError, drape.Mesh.of, given, says=says)
+    raises(drape.ArgumentError, drape.Mesh, x, [[0, 1, 2], [0, 1, -1]], says="triangles[1, 2]: there is no node -1: there are 4, from 0")
+    raises(drape.ArgumentError, drape.Mesh, x, [[0, 4, 2]], says="triangles[0, 1]: there is no node 4")
+    for name, head in (("m.OBJ", b"v "), ("m.Ply", b"ply"), (b"m.obj", b"v ")):
+        mesh.write(name)
+        equal(open(name, "rb").read()[:len(head)], head)
+    for name in "m.stl", "m", ".obj", "m.obj.bak":
+        raises(drape.ArgumentError, mesh.write, name, says="is written as .ply or .obj")
     scene = drape.Scene(sheet(mesh=drape.Mesh(np.array(x) / 3, mesh.triangles, transform={"translate": [0, 1, 0]}), pins=[{"nodes": [0]}]))
     scene["/cloth/0/mesh/transform/scale"] = 2.0
     model = scene.compile()

@@ -121,12 +121,12 @@ START_TEST(polygons_of_any_kind_are_divided)
         drape_mesh_free(&mesh);
     }
     char text[16384] = "f";
-    for (int i = 0; i < 1000; i++)
+    for (int i = 0; i < 1001; i++)
         snprintf(text + strlen(text), sizeof text - strlen(text), " %d", i % 3 + 1);
     drape_mesh mesh;
     strcat(text, "\nv 0 0 0\nv 1 0 0\nv 0 1 0\n");
     parse(ctx, &drape_import_obj, text, &mesh);
-    ck_assert_int_eq(mesh.triangle_count, 998);
+    ck_assert_int_eq(mesh.triangle_count, 999);
     drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
@@ -148,6 +148,21 @@ START_TEST(what_a_simulation_does_not_need_is_not_refused)
             ck_assert_int_eq(mesh.faces.uv_of[3 * f + k] >= 0, has[f]);
     ck_assert_double_eq(mesh.faces.uv[2 * mesh.faces.uv_of[15]], .5);
     ck_assert_double_eq(mesh.faces.uv[2 * mesh.faces.uv_of[15] + 1], 0);
+    drape_mesh_free(&mesh);
+    /* corners in a row at one node are one, the first; the arrays have no gap */
+    parse(
+        ctx, &drape_import_obj,
+        "mtllib a.mtl\nmtllib\nmtllib b c.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\n"
+        "f 1/1 2/2 2/1 3/1 1/2\nf 1/1 1 3 3/2 4/2 4 1/2\nf 2 1 3 4\n",
+        &mesh);
+    ck_assert_int_eq(mesh.triangle_count, 4);
+    static const int32_t first[] = {0, 3, 6, 10}, node[] = {0, 1, 2, 0, 2, 3, 1, 0, 2, 3};
+    static const int32_t uv_of[] = {0, 1, 0, -1, -1, -1, -1, -1, -1, -1};
+    ck_assert_int_eq(mesh.faces.corner_count, 10);
+    ck_assert_int_eq(memcmp(mesh.faces.first, first, sizeof first), 0);
+    ck_assert_int_eq(memcmp(mesh.faces.node, node, sizeof node), 0);
+    ck_assert_int_eq(memcmp(mesh.faces.uv_of, uv_of, sizeof uv_of), 0);
+    ck_assert_str_eq(mesh.faces.material_file, "a.mtl\nb c.mtl");
     drape_mesh_free(&mesh);
     /* nothing of all that: the mesh has triangles only */
     parse(ctx, &drape_import_obj, "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nusemtl\nf 1/2 2/1 3\n",
@@ -314,7 +329,7 @@ END_TEST
 static void write_tube(const frames_folder *f, const char *name)
 {
     FILE *file = frames_file(f, name);
-    fprintf(file, "mtllib tube of\tcloth.mtl\n");
+    fprintf(file, "mtllib tube of\tcloth.mtl\nmtllib other.mtl\n");
     for (int r = 0; r < RINGS; r++)
         for (int s = 0; s < SIDES; s++)
             fprintf(file, "v %.6f %.6f %.6f\n", .1 * cos(s * 1.5707963), .1 * r, .1 * sin(s * 1.5707963));
@@ -399,7 +414,8 @@ START_TEST(obj_frames_have_the_faces_of_the_mesh)
         for (int32_t face = 0; face < QUADS + 1; face++)
             ck_assert_str_eq(to->name[to->material[face]], face / SIDES == 1 ? "lining" : "light denim");
         ck_assert_str_eq(to->name[to->material[QUADS + 1]], "cloth");
-        ck_assert_str_eq(to->material_file, "tube of_cloth.mtl"); /* without the control character */
+        ck_assert_str_eq(to->material_file,
+                         "tube of_cloth.mtl\nother.mtl"); /* without the control character */
         drape_mesh_free(&mesh);
     }
     scene_close(&s);

@@ -669,7 +669,8 @@ START_TEST(content_faults_name_the_file)
     } cases[] = {
         {"", "/m/file: bad.obj: the mesh has no nodes"},
         {SQUARE, "/m/file: bad.obj: the mesh has no triangles"},
-        {SQUARE "f 1 2 3 4\nf 3 4 4\n", "/m/file: bad.obj: triangle 2 (nodes 2 3 3) uses a node twice"},
+        {SQUARE "f 1 2 3 4\nf 3 4 3\n",
+         "/m/file: bad.obj:6: a face with corners at 2 nodes; it needs at least 3; remedy: delete it"},
         {SQUARE "f 1 2 3\n", "/m/file: bad.obj: node 3 belongs to no triangle; remedy: delete loose "
                              "vertices, of which there is 1"},
         {SQUARE "f 1 2 3\nf 4 1 3\nf 3 1 2\n",
