@@ -27,13 +27,17 @@ CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
 def register():
     for kind in CLASSES:
         bpy.utils.register_class(kind)
+    for handlers, function in operators.HANDLERS:
+        handlers.append(function)
     bpy.types.Object.drape = PointerProperty(type=properties.DRAPE_object)
 
 
 def unregister():
-    for bake in operators.running.values():
-        bake.kill()
+    for one in operators.running:
+        one.bake.kill()
     operators.running.clear()
+    for handlers, function in operators.HANDLERS:
+        handlers.remove(function)
     del bpy.types.Object.drape
     for kind in reversed(CLASSES):
         bpy.utils.unregister_class(kind)

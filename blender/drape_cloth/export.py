@@ -4,13 +4,13 @@ import os
 import re
 import shutil
 import tempfile
-from typing import Any, Dict, List, NamedTuple, Optional, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 import bpy
 import numpy as np
 
 from . import cache, mesh
-from .program import SCENE, Problem
+from .program import SCENE, Problem, vertices_file
 
 MODIFIER = "Drape"
 """name of the Mesh Cache modifier of a cloth"""
@@ -23,20 +23,20 @@ KEEP_NODES = {"ARMATURE", "CAST", "CORRECTIVE_SMOOTH", "CURVE", "DATA_TRANSFER",
               "VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX", "VERTEX_WEIGHT_PROXIMITY", "WARP", "WAVE", "WEIGHTED_NORMAL"}
 """modifiers that leave the vertices of a mesh their numbers"""
 
-EXPORTED = re.compile(r"scene\.json|cloth\.obj|render\.obj|start\.obj|to_local\.npy|collider_\d+\.(obj|npy)")
+EXPORTED = re.compile(r"scene\.json|cloth\.obj|render\.obj|start\.obj|to_local\.npy|collider_\d+\.(obj|npy)|collider_\d+_vertices\.npy")
 """names of the files that an export writes"""
 
 
-class Exported(NamedTuple):
-    frames: int
-    warnings: List[str]
+def modifier_of(thing):
+    """The modifier that plays the bake of an object, or None. Another one may have its name, and Blender then adds a number to it."""
+    return next((modifier for modifier in thing.modifiers if modifier.type == "MESH_CACHE" and re.fullmatch(MODIFIER + r"(\.\d+)?", modifier.name)), None)
 
 
 def before_cloth(thing) -> int:
     """The number of modifiers at the head of the stack that deform the mesh before the cloth does: they move pins and give the shape in which it starts."""
-    count = 0
+    count, own = 0, modifier_of(thing)
     for modifier in thing.modifiers:
-        if modifier.name == MODIFIER or modifier.type not in KEEP_NODES:
+        if modifier == own or modifier.type not in KEEP_NODES:
             break
         count += 1
     return count
@@ -85,13 +85,19 @@ class Surface:
         self.matrices: List[np.ndarray] = []
         self.triangles: Optional[np.ndarray] = None
         self.shape = (0, 0)
+        self.warning = ""
 
     def sample(self, depsgraph, axes: np.ndarray) -> None:
+        if self.thing.type not in SHAPES:
+            raise Problem(f"{self.name}: is of the type {self.thing.type.title()}, which has no surface: its role can only be None")
         evaluated = self.thing.evaluated_get(depsgraph)
         self.matrices.append(axes @ np.array(evaluated.matrix_world, float))
-        surface = evaluated.to_mesh()
-        if surface is None:
-            raise Problem(f"{self.name}: has no surface")
+        if not _invertible(self.matrices[-1]):
+            raise Problem(f"{self.name}: is scaled to nothing along an axis in frame {bpy.context.scene.frame_current}")
+        try:
+            surface = evaluated.to_mesh()
+        except RuntimeError as error:
+            raise Problem(f"{self.name}: has no surface") from error
         try:
             x = np.empty(3 * len(surface.vertices), np.float32)
             surface.vertices.foreach_get("co", x)
@@ -112,6 +118,11 @@ class Surface:
     def points(self, frame: int) -> np.ndarray:
         """In the axes of the scene [m]."""
         return mesh.transformed(self.matrices[frame], self.local[frame].astype(float))
+
+
+def _invertible(matrix: np.ndarray) -> bool:
+    """Whether a 4 x 4 transform in metres keeps the dimensions of space."""
+    return bool(np.isfinite(matrix).all()) and np.linalg.svd(matrix[:3, :3], compute_uv=False).min() >= 1e-9
 
 
 def fans_of(surface) -> Tuple[np.ndarray, np.ndarray]:
@@ -178,7 +189,10 @@ class Samples:
     def _wind(self, field) -> np.ndarray:
         """[m/s]: the strength of a field along its z axis."""
         z = self.axes[:3, :3] @ np.array(field.matrix_world, float)[:3, 2]
-        return field.field.strength * z / np.linalg.norm(z)
+        length = np.linalg.norm(z)
+        if not 0 < length < np.inf:
+            raise Problem(f"{field.name}: is scaled to nothing along its z axis in frame {bpy.context.scene.frame_current}, so its wind has no direction")
+        return field.field.strength * z / length
 
 
 def _track(times: np.ndarray, d: np.ndarray) -> List[Any]:
@@ -224,8 +238,6 @@ def _at_rest(surface: Surface) -> Tuple[np.ndarray, np.ndarray]:
         raise Problem(f"{surface.name}: has no faces")
     if surface.shape[0] != len(local):
         raise Problem(f"{surface.name}: its mesh has {len(local)} vertices, and {surface.shape[0]} after the modifiers before the cloth")
-    if min(np.linalg.svd(matrix[:3, :3], compute_uv=False)) < 1e-9:
-        raise Problem(f"{surface.name}: is scaled to nothing along an axis")
     return local, mesh.transformed(matrix, local.astype(float))
 
 
@@ -306,6 +318,19 @@ def _body(surface: Surface, settings) -> Optional[Dict[str, Any]]:
     return None
 
 
+def _with_area(surface: Surface, rigid: bool) -> np.ndarray:
+    """The triangles of a collider but those that have no area in any frame, as text objects have: cloth meets the others there."""
+    none = mesh.without_area(surface.points(0), surface.triangles)
+    for frame in range(1, 1 if rigid else len(surface.local)):
+        none[none] = mesh.without_area(surface.points(frame), surface.triangles[none])
+    triangles = surface.triangles[~none]
+    if not len(triangles):
+        raise Problem(f"{surface.name}: its faces have no area")
+    if none.any() and mesh.is_closed(surface.triangles) and not mesh.is_closed(triangles):
+        surface.warning = f"{none.sum()} triangles without area are left out, and the surface is open there: merge vertices by distance"
+    return triangles
+
+
 def _collider(number: int, surface: Surface, folder: str, samples: Samples) -> Dict[str, Any]:
     settings, times = surface.thing.drape, samples.times
     common = {"name": surface.name, "friction": settings.friction}
@@ -317,13 +342,15 @@ def _collider(number: int, surface: Surface, folder: str, samples: Samples) -> D
         if rotations is None:
             raise Problem(f"{surface.name}: deforms, so it is no {body['type']}: choose the shape Mesh")
         return {**body, **common, **_motion(surface, rotations, times)}
-    nodes, triangles = mesh.used(surface.triangles)
+    nodes, triangles = mesh.used(_with_area(surface, rotations is not None))
     closed = mesh.is_closed(triangles)
     first = surface.points(0)[nodes]
     if closed:
         triangles = mesh.outward(first, triangles)
     obj, npy = f"collider_{number}.obj", f"collider_{number}.npy"
     mesh.write_obj(os.path.join(folder, obj), first, triangles)
+    if len(nodes) != surface.shape[0]:
+        np.save(os.path.join(folder, vertices_file(obj)), nodes)
     if closed and rotations is not None:
         return {"type": "mesh", "file": obj, **common, **_motion(surface, rotations, times)}
     moves = rotations is None or any((matrix != surface.matrices[0]).any() for matrix in surface.matrices)
@@ -331,8 +358,9 @@ def _collider(number: int, surface: Surface, folder: str, samples: Samples) -> D
     return {"type": "animated_mesh", "file": npy, "mesh": obj, "frame_rate": samples.rate, "open": not closed, "thickness": settings.surface_thickness, **common}
 
 
-def export(context, thing, folder: str) -> Exported:
-    """Writes the bake of a cloth, ready to be run by `drape run scene.json --out run` in that folder, which is left as it is if something is wrong."""
+def export(context, thing, folder: str) -> List[str]:
+    """Writes the bake of a cloth, ready to be run by `drape run scene.json --out run` in that folder, which is left as it is if something is wrong.
+    Returns warnings."""
     scene = context.scene
     if scene.frame_end <= scene.frame_start:
         raise Problem("the scene has one frame only: set its end")
@@ -347,7 +375,8 @@ def export(context, thing, folder: str) -> Exported:
                 os.remove(os.path.join(folder, name))
         for name in os.listdir(made):
             shutil.move(os.path.join(made, name), os.path.join(folder, name))
-    return Exported(len(samples.times), [course.warning for course in (samples.gravity, samples.wind) if course.warning])
+    return [f"{thing.name}: {course.warning}" for course in (samples.gravity, samples.wind) if course.warning] + [
+        f"{surface.name}: {surface.warning}" for surface in samples.colliders if surface.warning]
 
 
 def _write(thing, samples: Samples, folder: str) -> None:

@@ -5,6 +5,8 @@ import numpy as np
 
 RIGID = 1e-4
 """largest deviation of a motion from a rigid one, relative: Blender's matrices are in float32"""
+THIN = 1e-9
+"""altitude over longest edge below which a triangle has no area: the library refuses those below 1e-12, and a transform rounds"""
 
 
 def split(polygons: List[Tuple[int, ...]], fans: np.ndarray, fan_of: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -63,6 +65,13 @@ def used(triangles: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """The nodes that triangles have, in ascending order, and the triangles with numbers among these."""
     nodes, numbers = np.unique(triangles, return_inverse=True)
     return nodes, numbers.reshape(-1, 3)
+
+
+def without_area(x: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Whether the corners of each triangle lie on a line."""
+    a, b, c = (x[triangles[:, k]] for k in range(3))
+    longest = np.maximum.reduce([np.einsum("ij,ij->i", side, side) for side in (b - a, c - b, a - c)])
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1) <= THIN * longest
 
 
 def is_closed(triangles: np.ndarray) -> bool:

@@ -1,39 +1,99 @@
 """Baking, resuming, cancelling and clearing, as operators of Blender."""
 import os
-from typing import Dict, List
+import re
+from typing import List, Optional
 
 import bpy
+from bpy.app.handlers import persistent
 
 from . import cache, export, program
 from .properties import addon_preferences, find_program
 
-running: Dict[str, program.Bake] = {}
-"""bakes in progress, by the name of their object"""
+
+class Running:
+    """A bake in progress, and its cloth, which may be renamed or deleted meanwhile."""
+
+    def __init__(self, thing, folder: str, bake: program.Bake, frame_start: int):
+        self.folder, self.bake, self.frame_start = folder, bake, frame_start
+        self.first_name = self.name = thing.name
+        self._thing = thing
+
+    def thing(self):
+        """The cloth, or None if it is in no scene any more."""
+        try:
+            self.name = self._thing.name
+            return self._thing if self._thing.users_scene else None
+        except ReferenceError:
+            return None
+
+    def find(self) -> None:
+        """After an undo, which may have made the object anew."""
+        found = (bpy.data.objects.get(name) for name in (self.name, self.first_name))
+        self._thing = next((thing for thing in found if thing and thing.type == "MESH" and thing.drape.role == "CLOTH"), self._thing)
+
+
+running: List[Running] = []
+"""bakes in progress"""
+
+
+def bake_of(thing) -> Optional[Running]:
+    """The bake of this object that is in progress."""
+    return next((one for one in running if one.thing() == thing), None) if thing else None
+
+
+@persistent
+def before_undo(*_) -> None:
+    """The names by which the objects are found again."""
+    for one in running:
+        one.thing()
+
+
+@persistent
+def after_undo(*_) -> None:
+    for one in running:
+        if one.thing() is None:
+            one.find()
+
+
+HANDLERS = [(bpy.app.handlers.undo_pre, before_undo), (bpy.app.handlers.redo_pre, before_undo), (bpy.app.handlers.undo_post, after_undo), (bpy.app.handlers.redo_post, after_undo)]
+
+
+def folder_name(name: str) -> str:
+    """A name for files: other characters than letters, digits, and - . _ and space are written as in addresses, so that different names remain so."""
+    return re.sub(r"[^\w. -]", lambda sign: "".join(f"%{byte:02X}" for byte in sign.group().encode("utf-8", "surrogateescape")), name)
 
 
 def folder_of(thing) -> str:
     """Where the bake of a cloth is kept. A file that was not saved yet has its bakes in a temporary folder, which is removed with it."""
     named = thing.drape.folder
     if not named:
-        named = "//drape_" + bpy.path.clean_name(thing.name)
+        named = "//drape_" + folder_name(thing.name)
     if named.startswith("//") and not bpy.data.filepath:
         return os.path.join(bpy.app.tempdir, named[2:])
     return os.path.normpath(bpy.path.abspath(named))
 
 
-def attach(context, thing, folder: str, frames: int) -> None:
+def check_modifiers(thing) -> None:
+    """Raises a Problem if the modifier could not be set after the bake."""
+    if thing.library:
+        raise program.Problem(f"{thing.name}: is linked from {thing.library.filepath}, so its modifiers cannot be changed here: make it local, or a library override")
+    if export.modifier_of(thing) is None and any(modifier.is_override_data for modifier in list(thing.modifiers)[export.before_cloth(thing):]):
+        raise program.Problem(f"{thing.name}: has modifiers from its library, which a bake cannot be put before: make the object local")
+
+
+def attach(context, thing, folder: str, frame_start: int) -> None:
     """Sets the modifier that moves the mesh, behind those that deform it before the cloth does. The mesh itself stays as it is."""
-    modifier = thing.modifiers.get(export.MODIFIER)
-    if modifier is None or modifier.type != "MESH_CACHE":
+    modifier = export.modifier_of(thing)
+    if modifier is None:
         at = export.before_cloth(thing)
-        modifier = thing.modifiers.new(export.MODIFIER, "MESH_CACHE")
+        name = thing.modifiers.new(export.MODIFIER, "MESH_CACHE").name
         with context.temp_override(object=thing):
-            bpy.ops.object.modifier_move_to_index(modifier=modifier.name, index=at)
-        modifier = thing.modifiers[export.MODIFIER]
+            bpy.ops.object.modifier_move_to_index(modifier=name, index=at)
+        modifier = thing.modifiers[name]
     path = os.path.join(folder, cache.CACHE)
     modifier.cache_format = "PC2"
     modifier.filepath = bpy.path.relpath(path) if bpy.data.filepath else path
-    modifier.frame_start = context.scene.frame_start
+    modifier.frame_start = frame_start
     modifier.frame_scale = 1
     modifier.time_mode, modifier.play_mode, modifier.interpolation, modifier.deform_mode = "FRAME", "SCENE", "LINEAR", "OVERWRITE"
     modifier.forward_axis, modifier.up_axis, modifier.flip_axis = "POS_Y", "POS_Z", set()
@@ -47,63 +107,85 @@ class Baking:
     a timer looks after the process, and one may work on meanwhile."""
 
     bl_options = {"REGISTER", "UNDO"}
+    bake, interrupted = None, False
 
     @classmethod
     def poll(cls, context):
         thing = context.object
-        return thing is not None and thing.type == "MESH" and thing.mode == "OBJECT" and thing.drape.role == "CLOTH" and thing.name not in running
+        return thing is not None and thing.type == "MESH" and thing.mode == "OBJECT" and thing.drape.role == "CLOTH" and not bake_of(thing)
 
     def start(self, context) -> None:
         """Starts the program; raises a Problem."""
-        thing = context.object
-        self.cloth, self.folder = thing.name, folder_of(thing)
-        self.simulated = thing.drape.simulated.name if thing.drape.simulated else None
+        thing, folder = context.object, folder_of(context.object)
         preferences = addon_preferences()
         path = find_program()
+        check_modifiers(thing)
+        for one in list(running):
+            if os.path.realpath(one.folder) == os.path.realpath(folder):
+                if one.thing() is None:
+                    running.remove(one)
+                    one.bake.cancel()
+                    one.bake.wait()
+                    continue
+                raise program.Problem(f"{thing.name}: {one.name} is being baked into the same folder, {folder}: cancel that bake, or choose another folder")
         for other in bpy.data.objects:
-            if other != thing and other.type == "MESH" and other.drape.role == "CLOTH" and folder_of(other) == self.folder:
-                raise program.Problem(f"{thing.name}: {other.name} has the same folder, {self.folder}: choose another one")
-        frames, warnings = self.scene(context, thing, self.folder)
-        for text in warnings:
-            self.report({"WARNING"}, f"{thing.name}: {text}")
-        self.bake = running[self.cloth] = program.Bake(path, self.folder, frames, self.resume, preferences.threads)
+            if other != thing and other.type == "MESH" and not other.library and other.drape.role == "CLOTH" and folder_of(other) == folder:
+                raise program.Problem(f"{thing.name}: {other.name} has the same folder, {folder}: choose another one")
+        for text in self.prepare(context, thing, folder):
+            self.report({"WARNING"}, text)
+        frames, self.names = program.read(folder, thing.drape.simulated.name if thing.drape.simulated else None)
+        self.bake = program.Bake(path, folder, frames, self.resume, preferences.threads)
+        self.run = Running(thing, folder, self.bake, context.scene.frame_start)
+        running.append(self.run)
 
     def end(self, context) -> set:
         """After the end of the process: the frames so far are shown, whatever ended it."""
-        del running[self.cloth]
-        thing = context.scene.objects.get(self.cloth)
+        running.remove(self.run)
+        thing, name, folder = self.run.thing(), self.run.name, self.run.folder
         done, failed = self.bake.done(), None
         try:
-            names = program.Names.of(program.read_scene(self.folder), self.simulated)
-            failed = self.bake.result(names)
-            for text in self.bake.warnings(names):
+            failed = self.bake.result(self.names)
+            for text in self.bake.warnings(self.names):
                 self.report({"WARNING"}, text)
+            if thing and folder_of(thing) != folder and name != self.run.first_name:
+                thing.drape.folder = "//drape_" + folder_name(self.run.first_name)  # where Resume finds it
             if done and thing:
-                attach(context, thing, self.folder, cache.write(self.folder))
-        except (program.Problem, OSError) as problem:
-            failed = failed or str(problem)
+                cache.write(folder)
+                attach(context, thing, folder, self.run.frame_start)
+        except (program.Problem, OSError, RuntimeError) as problem:
+            failed = failed or f"{name}: {problem}"
+        if self.interrupted and not failed:
+            failed = f"{name}: interrupted after {done} of {self.bake.frames} frames; Resume continues"
         if failed:
             self.report({"ERROR"}, failed)
             return {"CANCELLED"}
         if not thing:
-            self.report({"WARNING"}, f"{self.cloth}: there is no such object any more; its bake is in {self.folder}")
+            self.report({"WARNING"}, f"{name}: there is no such object any more; {done} of {self.bake.frames} frames of its bake are in {folder}")
         elif self.bake.cancelled:
-            self.report({"INFO"}, f"{self.cloth}: cancelled after {done} of {self.bake.frames} frames; Resume continues")
+            self.report({"INFO"}, f"{name}: cancelled after {done} of {self.bake.frames} frames; Resume continues")
         else:
-            self.report({"INFO"}, f"{self.cloth}: {done} frames")
+            self.report({"INFO"}, f"{name}: {done} frames")
         return {"FINISHED"}
 
-    def execute(self, context):
-        try:
-            self.start(context)
-        except (program.Problem, OSError) as problem:
-            self.report({"ERROR"}, str(problem))
-            return {"CANCELLED"}
-        try:
-            self.bake.wait()
-        except KeyboardInterrupt:
+    def interrupt(self) -> None:
+        """Ctrl-C in the terminal. It also reaches the program there, but not if only Blender is sent the signal."""
+        self.interrupted = True
+        if self.bake:
             self.bake.cancel()
-            self.bake.wait()
+
+    def execute(self, context):
+        with program.interrupts(self.interrupt):
+            try:
+                self.start(context)
+            except (program.Problem, OSError) as problem:
+                self.report({"ERROR"}, str(problem))
+                return {"CANCELLED"}
+            if self.interrupted:
+                self.bake.cancel()
+            try:
+                self.bake.wait()
+            except program.Problem:  # it could not start again
+                pass
         return self.end(context)
 
     def invoke(self, context, _event):
@@ -128,14 +210,23 @@ class Baking:
                 for area in window.screen.areas:
                     if area.type == "PROPERTIES":
                         area.tag_redraw()
-        if self.bake.running():
-            return {"PASS_THROUGH"}
+        if self.run not in running:  # another cloth has the folder
+            context.window_manager.event_timer_remove(self.timer)
+            return {"CANCELLED"}
+        if self.run.thing() is None:
+            self.bake.cancel()  # nobody could, as the panel is that of the object
+        try:
+            if self.bake.running():
+                return {"PASS_THROUGH"}
+        except program.Problem:  # it could not start again
+            pass
         context.window_manager.event_timer_remove(self.timer)
         return self.end(context)
 
     def cancel(self, context):
         """Blender is being closed, or another file opened."""
-        running.pop(self.cloth, None)
+        if self.run in running:
+            running.remove(self.run)
         self.bake.kill()
         context.window_manager.event_timer_remove(self.timer)
 
@@ -146,7 +237,7 @@ class DRAPE_OT_bake(Baking, bpy.types.Operator):
     bl_description = "Simulate the cloth over the frames of the scene, and play the result on the mesh"
     resume = False
 
-    def scene(self, context, thing, folder: str) -> export.Exported:
+    def prepare(self, context, thing, folder: str) -> List[str]:
         return export.export(context, thing, folder)
 
 
@@ -156,9 +247,8 @@ class DRAPE_OT_resume(Baking, bpy.types.Operator):
     bl_description = "Continue a bake that was cancelled, with the scene as it was then; the result is that of a bake without interruption"
     resume = True
 
-    def scene(self, context, thing, folder: str) -> export.Exported:
-        made = program.read_scene(folder)
-        return export.Exported(1 + round(made["duration"] * made["frame_rate"]), [])
+    def prepare(self, context, thing, folder: str) -> List[str]:
+        return []
 
 
 class DRAPE_OT_cancel(bpy.types.Operator):
@@ -168,10 +258,10 @@ class DRAPE_OT_cancel(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.object is not None and context.object.name in running
+        return bake_of(context.object) is not None
 
     def execute(self, context):
-        running[context.object.name].cancel()
+        bake_of(context.object).bake.cancel()
         return {"FINISHED"}
 
 
@@ -184,10 +274,10 @@ class DRAPE_OT_clear(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         thing = context.object
-        return thing is not None and export.MODIFIER in thing.modifiers and thing.name not in running
+        return thing is not None and export.modifier_of(thing) is not None and not bake_of(thing)
 
     def execute(self, context):
-        context.object.modifiers.remove(context.object.modifiers[export.MODIFIER])
+        context.object.modifiers.remove(export.modifier_of(context.object))
         return {"FINISHED"}
 
 

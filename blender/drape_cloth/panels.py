@@ -45,8 +45,9 @@ class DRAPE_PT_drape(Panel, bpy.types.Panel):
             self.draw_bake(context, thing, layout)
 
     def draw_bake(self, context, thing, layout):
-        bake = operators.running.get(thing.name)
-        if bake:
+        run = operators.bake_of(thing)
+        if run:
+            bake = run.bake
             layout.label(text=f"Frame {bake.done()} of {bake.frames}", icon="TIME")
             layout.operator("drape.cancel", icon="X")
             return

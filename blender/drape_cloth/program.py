@@ -1,11 +1,17 @@
 """The program `drape`: where it is, what it offers, and a run of it in the background. Nothing here needs Blender."""
+import contextlib
+import ctypes
+import itertools
 import json
 import os
 import re
 import shutil
 import signal
 import subprocess
-from typing import Dict, List, Optional, Tuple
+import threading
+from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Tuple
+
+import numpy as np
 
 SCENE = "scene.json"
 """the scene in the folder of a bake"""
@@ -17,6 +23,8 @@ CHECKPOINT_EVERY = 5
 """frames from one checkpoint to the next"""
 INTERRUPTED = 130
 """exit code of a run that was asked to stop"""
+MAX_ASIDE = 20
+"""changed files that a bake sets aside at most: a run has fewer"""
 
 
 class Problem(Exception):
@@ -63,28 +71,67 @@ def fabrics(program: str) -> List[Tuple[str, str]]:
     return _fabrics[key]
 
 
+@contextlib.contextmanager
+def interrupts(call: Callable[[], None]) -> Iterator[None]:
+    """Calls this function at Ctrl-C. Without a window Blender takes the signal by a handler of its own, which Python neither sees nor can put back."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    get, put = ctypes.pythonapi.PyOS_getsig, ctypes.pythonapi.PyOS_setsig
+    get.restype = put.restype = ctypes.c_void_p
+    get.argtypes, put.argtypes = [ctypes.c_int], [ctypes.c_int, ctypes.c_void_p]
+    of_process, of_python = get(signal.SIGINT), signal.signal(signal.SIGINT, lambda *_: call())
+    try:
+        yield
+    finally:
+        if of_python is not None:
+            signal.signal(signal.SIGINT, of_python)
+        put(signal.SIGINT, of_process)
+
+
 class Bake:
     """`drape run` on the scene in a folder, in a process of its own. Frames appear in the folder `run`, with a checkpoint now and then, so that
-    a run that is cancelled or killed can be resumed. resume: continue such a run, with the scene as it was."""
+    a run that is cancelled or killed can be resumed. resume: continue such a run, with the scene as it was.
+
+    A file of an earlier run that was changed since, which the program refuses to replace, is set aside under another name, and the run starts again."""
 
     def __init__(self, program: str, folder: str, frames: int, resume: bool = False, threads: int = 1):
         self.folder, self.frames = folder, frames
-        command = [program, "run", SCENE, "--out", RUN, "--checkpoint-every", str(CHECKPOINT_EVERY), "--threads", str(threads)]
-        self.cancelled = False
+        self._command = [program, "run", SCENE, "--out", RUN, "--checkpoint-every", str(CHECKPOINT_EVERY), "--threads", str(threads)] + ["--resume"] * resume
+        self.cancelled, self._resume = False, resume
+        self.aside: List[str] = []  # what happened to changed files
         self._frames = os.path.join(folder, RUN, "energy.csv")
         self._before = None if resume else self._written()
-        with open(os.path.join(folder, LOG), "wb") as log:
+        self._start()
+
+    def _start(self) -> None:
+        with open(os.path.join(self.folder, LOG), "wb") as log:
             try:
-                self._process = subprocess.Popen(command + ["--resume"] * resume, cwd=folder, stdin=subprocess.DEVNULL, stdout=log,
-                                                 stderr=subprocess.STDOUT, env=environment())
+                self._process = subprocess.Popen(self._command, cwd=self.folder, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, env=environment())
             except OSError as error:
-                raise Problem(f"{program} cannot be started: {error}") from error
+                raise Problem(f"{self._command[0]} cannot be started: {error}") from error
 
     def running(self) -> bool:
-        return self._process.poll() is None
+        return self._process.poll() is None or not self.cancelled and not self._resume and self._set_aside()
 
     def wait(self) -> None:
-        self._process.wait()
+        while self.running():
+            self._process.wait()
+
+    def _set_aside(self) -> bool:
+        """After the end: whether a changed file stopped the run, and no longer does."""
+        refused = re.search(rf'"({RUN}/[^"/]+)" (?:would be replaced, but|is not a manifest)', self.log()) if self._process.returncode else None
+        if not refused or len(self.aside) == MAX_ASIDE:
+            return False
+        name = os.path.join(self.folder, refused.group(1))
+        kept = next(path for path in (f"{name}.changed{number or ''}" for number in itertools.count()) if not os.path.lexists(path))
+        try:
+            os.rename(name, kept)
+        except OSError:
+            return False  # the program's message remains
+        self.aside.append(f"{refused.group(1)} had been changed since it was baked: it is now {os.path.basename(kept)}")
+        self._start()
+        return True
 
     def done(self) -> int:
         """Frames that are finished. Each has a line in energy.csv, which also has a line of titles."""
@@ -126,30 +173,28 @@ class Bake:
 
     def warnings(self, names: "Names") -> List[str]:
         """What the program found unusual about the run."""
-        return [names.explain(line[len("warning: "):]) for line in self.log().splitlines() if line.startswith("warning: ")]
+        return [f"{names.cloth.name}: {text}" for text in self.aside] + [names.explain(line[len("warning: "):]) for line in self.log().splitlines() if line.startswith("warning: ")]
 
     def log(self) -> str:
         with open(os.path.join(self.folder, LOG), encoding="utf-8", errors="replace") as file:
             return file.read()
 
 
+class Part(NamedTuple):
+    """What a part of a scene was made from."""
+    name: str  # of the object
+    vertices: Optional[np.ndarray] = None  # of the object, by the number of the node; None: nodes have the numbers of vertices
+
+
 class Names:
     """The objects of Blender that the parts of a scene were made from, for messages: cloth, what is simulated for it, and those of the colliders by number."""
 
-    def __init__(self, cloth: str, simulated: str, colliders: List[str], files: Dict[str, str]):
-        self.cloth, self.simulated, self.colliders, self.files = cloth, simulated, colliders, files
-
-    @staticmethod
-    def of(scene: dict, simulated: Optional[str] = None) -> "Names":
-        """From the names that the scene gives them, and the files that it reads. simulated: the object that is simulated in place of the cloth."""
-        colliders = [item["name"] for item in scene["colliders"]]
-        files = {item[key]: item["name"] for item in scene["colliders"] for key in ("file", "mesh") if key in item}
-        cloth = scene["cloth"][0]["name"]
-        simulated = simulated if simulated and "render_mesh" in scene["cloth"][0] else cloth
-        return Names(cloth, simulated, colliders, {scene["cloth"][0]["mesh"]["file"]: simulated, **files})
+    def __init__(self, cloth: str, simulated: str, colliders: List[Part], files: Dict[str, Part]):
+        self.cloth, self.simulated, self.colliders, self.files = Part(cloth), Part(simulated), colliders, files
 
     def explain(self, message: str) -> str:
-        """The message of the library, with the name of the object that it is about in place of line and column of the scene file."""
+        """The message of the library as it is true in Blender: with the name of the object that it is about in place of line and column of the scene file,
+        the numbers of its vertices, and places in the axes of Blender."""
         message = re.sub(rf"^{re.escape(SCENE)}:\d+:\d+: ", "", message)
         place = re.search(r"/(cloth|colliders)/(\d+)\b", message)
         about = None
@@ -158,14 +203,60 @@ class Names:
             of_mesh = re.match(r"/(mesh|pins|start)\b", message[place.end():])
             about = (self.simulated if of_mesh else self.cloth) if place.group(1) == "cloth" else self.colliders[number] if number < len(self.colliders) else None
         else:
-            about = next((name for file, name in self.files.items() if re.search(rf"(?<![\w.]){re.escape(file)}(?![\w.])", message)), None)
-        return f"{about or self.cloth}: {message}"
+            about = next((part for file, part in self.files.items() if re.search(rf"(?<![\w.]){re.escape(file)}(?![\w.])", message)), None)
+        about = about or self.cloth
+        return f"{about.name}: {z_up(renumbered(message, about.vertices))}"
 
 
-def read_scene(folder: str) -> dict:
-    """The scene of a bake."""
+def renumbered(message: str, vertices: Optional[np.ndarray]) -> str:
+    """The message with vertices[i] in place of node i."""
+    def number(match):
+        node = int(match.group())
+        return str(vertices[node]) if node < len(vertices) else match.group()
+
+    if vertices is None:
+        return message
+    return re.sub(r"\b(?:nodes?|edge|vertex) \d+(?:,? (?:and )?\d+)*", lambda phrase: re.sub(r"\d+", number, phrase.group()), message)
+
+
+def z_up(message: str) -> str:
+    """The message with its places, which have y up, in the axes of Blender: (x, y, z) becomes (x, -z, y)."""
+    def turned(match):
+        x, y, z = match.groups()
+        return f"({x}, {z[1:] if z[0] == '-' else z if float(z) == 0 else '-' + z}, {y})"
+
+    real = r"(-?\d[\d.]*(?:e[-+]?\d+)?)"
+    return re.sub(rf"\({real},? {real},? {real}\)", turned, message)
+
+
+class Exported(NamedTuple):
+    """A scene that an export wrote, as it is read again."""
+    frames: int
+    names: Names
+
+
+def vertices_file(mesh: str) -> str:
+    """Name of the file beside the mesh of a collider that has the number of the vertex of each of its nodes, if they differ."""
+    return os.path.splitext(mesh)[0] + "_vertices.npy"
+
+
+def read(folder: str, simulated: Optional[str] = None) -> Exported:
+    """The scene in the folder of a bake. simulated: the object that is simulated in place of the cloth."""
+    def part(item):
+        path = os.path.join(folder, vertices_file(item["mesh" if "mesh" in item else "file"])) if "file" in item else ""
+        return Part(item["name"], np.load(path) if os.path.exists(path) else None)
+
     try:
         with open(os.path.join(folder, SCENE), encoding="utf-8") as file:
-            return json.load(file)
-    except (OSError, ValueError) as error:
+            scene = json.load(file)
+        cloth = scene["cloth"][0]
+        colliders = [part(item) for item in scene["colliders"]]
+        files = {item[key]: made for item, made in zip(scene["colliders"], colliders) for key in ("file", "mesh") if key in item}
+        simulated = simulated if simulated and "render_mesh" in cloth else cloth["name"]
+        return Exported(1 + round(scene["duration"] * scene["frame_rate"]), Names(cloth["name"], simulated, colliders, {cloth["mesh"]["file"]: Part(simulated), **files}))
+    except OSError as error:
         raise Problem(f"there is no bake in {folder}: {error}") from error
+    except (ValueError, ArithmeticError, EOFError) as error:
+        raise Problem(f"{os.path.join(folder, SCENE)} is not the scene of a bake: {error}") from error
+    except (LookupError, TypeError, AttributeError) as error:
+        raise Problem(f"{os.path.join(folder, SCENE)} is not the scene of a bake") from error

@@ -1,10 +1,12 @@
 """Tests of the add-on that Blender runs: see test_blender.py, which starts it. Each begins with the scene of a new file, a cube of 2 m, its camera and
 its lamp. Written for Blender 3.4."""
+import ctypes
 import importlib
 import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -400,8 +402,8 @@ def test_wind():
     fields[0].keyframe_insert("rotation_euler", frame=1)
     fields[0].rotation_euler.z += 1
     fields[0].keyframe_insert("rotation_euler", frame=2 * FRAMES)
-    warning, = export.export(bpy.context, cloth, os.path.abspath("other")).warnings
-    assert warning.startswith("the wind (") and "changes its direction: the cloth feels that of the first frame" in warning
+    warning, = export.export(bpy.context, cloth, os.path.abspath("other"))
+    assert warning.startswith("Tablecloth: the wind (") and "changes its direction: the cloth feels that of the first frame" in warning
     cloth.drape.air = False
     scene.use_gravity = False
     made = scene_of(bake(cloth))
@@ -416,9 +418,9 @@ def test_cancel_and_resume():
     cloth = sheet(side=12, quality="STANDARD")
 
     def cancel():
-        while cloth.name not in operators.running or operators.running[cloth.name].done() < 12:
+        while not operators.running or operators.running[0].bake.done() < 12:
             time.sleep(0.01)
-        operators.running[cloth.name].cancel()
+        operators.running[0].bake.cancel()
 
     thread = threading.Thread(target=cancel)
     thread.start()
@@ -452,9 +454,9 @@ def test_crash():
     cloth.vertex_groups.new(name="rim").add([0, 11], 1, "REPLACE")
 
     def crash():
-        while cloth.name not in operators.running or operators.running[cloth.name].done() < 12:
+        while not operators.running or operators.running[0].bake.done() < 12:
             time.sleep(0.01)
-        operators.running[cloth.name]._process.kill()
+        operators.running[0].bake._process.kill()
 
     thread = threading.Thread(target=crash)
     thread.start()
@@ -508,6 +510,181 @@ def test_errors():
     bpy.context.scene.frame_end = 3
     cloth = sheet()
     assert bake(cloth).startswith(bpy.app.tempdir)  # a file that was never saved
+
+
+def mesh_object(name, points, faces):
+    """An object of these vertices and faces, active."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(points, [], faces)
+    thing = bpy.data.objects.new(name, mesh)
+    bpy.context.collection.objects.link(thing)
+    bpy.context.view_layer.objects.active = thing
+    return thing
+
+
+def test_places_and_numbers():
+    """messages have places in the axes of Blender, and the numbers of the vertices of colliders, too, which may have loose ones"""
+    new_file()
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    cloth = mesh_object("Rag", [(0, 2, 1), (1, 2, 1), (3, 2, 1), (1, 3, 1)], [(0, 1, 2), (0, 2, 3)])
+    cloth.drape.role = "CLOTH"
+    assert "; remedy: move node 1, at (1, 2, 1) m, off the line" in refused(cloth)
+    cloth.data.vertices[1].co.y = 1
+    rock = collider(mesh_object("Rock", [(9, 9, 9), (0, 0, 0), (0, 0, -1), (0, 1, -1), (1, 0, -1), (-1, 0, -1)], [(2, 3, 1), (3, 2, 4), (2, 3, 5)]))
+    said = refused(cloth)
+    assert "Rock: " in said and "edge 2 3 is shared by triangles 0, 1 and 2;" in said and "between (0, 0, -1) and (0, 1, -1) m" in said, said
+    rock.data.clear_geometry()
+    rock.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    folder = bake(cloth)
+    assert not [name for name in os.listdir(folder) if name.endswith("_vertices.npy")]
+    numbers = np.array([4, 7, 9])
+    assert program.renumbered("triangle 2 (nodes 0 1 2): nodes 1 and 2, at node 0, edge 0 8", numbers) == "triangle 2 (nodes 4 7 9): nodes 7 and 9, at node 4, edge 4 8"
+    assert program.z_up("at (1.5, -2e-07, 3) and (0 1 -0)") == "at (1.5, -3, -2e-07) and (0, 0, 1)"
+
+
+def test_refusals():
+    """what Blender allows and a bake does not is said in words before the bake, not by a traceback or after it"""
+    scene = new_file()
+    cube = collider(bpy.data.objects["Cube"])
+    cloth = sheet(quality="REALTIME")
+    for shape in "MESH", "BOX", "SPHERE", "PLANE":
+        cube.drape.shape, cube.scale.z = shape, 0
+        assert "Cube: is scaled to nothing along an axis in frame 1" in refused(cloth), shape
+    cube.drape.shape = "MESH"
+    for thing in cube, cloth:
+        for scale, frame in (1, 1), (0, 3), (1, FRAMES):
+            thing.scale.z = scale
+            thing.keyframe_insert("scale", frame=frame)
+        scene.frame_set(1)
+        assert f"{thing.name}: is scaled to nothing along an axis in frame 3" in refused(cloth)
+        thing.animation_data_clear()
+        thing.scale.z = 1
+    bpy.ops.object.empty_add()
+    for thing in bpy.context.object, bpy.data.objects["Light"]:
+        thing.drape.role = "COLLIDER"
+        assert f"{thing.name}: is of the type {thing.type.title()}, which has no surface" in refused(cloth)
+        thing.drape.role = "NONE"
+    bpy.ops.object.effector_add(type="WIND")
+    wind = bpy.context.object
+    wind.scale = 0, 0, 0
+    assert f"{wind.name}: is scaled to nothing along its z axis in frame 1, so its wind has no direction" in refused(cloth)
+    bpy.data.objects.remove(wind)
+
+    folder = bake(cloth)
+    bpy.ops.drape.clear()
+    other = cloth.modifiers.new("Drape", "SUBSURF")
+    bake(cloth)
+    assert [(modifier.name, modifier.type) for modifier in cloth.modifiers] == [("Drape.001", "MESH_CACHE"), ("Drape", "SUBSURF")]
+    other.show_viewport = False
+    plays(cloth, folder)
+    bake(cloth)
+    assert len(cloth.modifiers) == 2
+    bpy.ops.drape.clear()
+    assert list(cloth.modifiers) == [other]
+    cloth.modifiers.remove(other)
+
+    bpy.context.view_layer.objects.active = cloth
+    for text in '{"a": 1}', "[1]", "{", '{"cloth": [], "colliders": []}', '{"cloth": [{"name": "x", "mesh": {"file": "y"}}], "colliders": [], "duration": NaN, "frame_rate": 1}':
+        with open(folder + "/scene.json", "w", encoding="utf-8") as file:
+            file.write(text)
+        try:
+            bpy.ops.drape.resume()
+            raise AssertionError("resumed")
+        except RuntimeError as error:
+            assert "scene.json is not the scene of a bake" in str(error) and "Traceback" not in str(error), error
+
+
+def test_linked():
+    """a linked cloth is refused before the bake; a library override bakes, unless the bake would come before modifiers of the library"""
+    new_file()
+    cloth = sheet(quality="REALTIME", folder="//linked")
+    bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath("library.blend"))
+    cloth.modifiers.new("Smoother", "SUBSURF")
+    bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath("smooth.blend"))
+    for library in "library", "smooth":
+        new_file()
+        with bpy.data.libraries.load(os.path.abspath(library + ".blend"), link=True) as (_, to):
+            to.objects = ["Tablecloth"]
+        linked, = to.objects
+        bpy.context.collection.objects.link(linked)
+        said = refused(linked)
+        assert f"Tablecloth: is linked from {os.path.abspath(library)}.blend" in said and not os.path.exists("linked"), said
+        own = linked.override_create(remap_local_usages=True)
+        if library == "library":
+            plays(own, bake(own))
+            shutil.rmtree("linked")
+        else:
+            assert "Tablecloth: has modifiers from its library" in refused(own) and not os.path.exists("linked")
+
+
+def test_text():
+    """text is a collider, flat or thick, though Blender gives it triangles without area; a closed mesh that has such is open there, which the bake says"""
+    new_file()
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    bpy.ops.object.text_add(location=(-1, -0.2, 1))
+    text = collider(bpy.context.object, surface_thickness=0.01)
+    cloth = sheet(z=1.2, quality="REALTIME")
+    for extrude in 0, 0.1:
+        text.data.extrude = extrude
+        x = plays(cloth, bake(cloth))
+        assert x[-1][:, 2].max() > 1 + extrude  # some of it lies on the letters
+    bpy.data.objects.remove(text)
+    cut = collider(mesh_object("Cut", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0.5, 0, 0)], [(0, 2, 1), (0, 4, 3), (4, 1, 3), (1, 2, 3), (2, 0, 3), (0, 1, 4)]))
+    warning, = export.export(bpy.context, cloth, os.path.abspath("other"))
+    assert warning == "Cut: 1 triangles without area are left out, and the surface is open there: merge vertices by distance", warning
+    assert scene_of("other")["colliders"][0]["open"]
+    cut.data.clear_geometry()
+    cut.data.from_pydata([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [], [(0, 1, 2)])
+    assert "Cut: its faces have no area" in refused(cloth)
+
+
+def test_changed_files():
+    """files of an earlier bake that were damaged do not block a new one, which keeps them; Resume says what is wrong"""
+    new_file()
+    cloth = sheet(quality="REALTIME", z=2)
+    folder = bake(cloth)
+    x = positions(folder)
+    for damage in "", "x" * 100:
+        for name in "positions.npy", "energy.csv":
+            with open(f"{folder}/run/{name}", "w", encoding="utf-8") as file:
+                file.write(damage)
+        try:
+            bake(cloth, "resume")
+            raise AssertionError("resumed")
+        except RuntimeError as error:
+            assert "Tablecloth: drape run: cannot continue" in str(error) and "it is damaged" in str(error), error
+        assert (positions(bake(cloth)) == x).all()
+    changed = sorted(name for name in os.listdir(folder + "/run") if ".changed" in name)
+    assert changed == [f"{name}.changed{number}" for name in ("energy.csv", "positions.npy") for number in ("", 1)], changed
+    names = [operators.folder_name(name) for name in ("Täch", "Tüch", "T_ch", "a/b", "a:b", "a%2Fb", "Cube.001", "Cube_001")]
+    assert names[:4] == ["Täch", "Tüch", "T_ch", "a%2Fb"] and len(set(names)) == len(names), names
+    for name in "Täch", "Tüch":
+        cloth.name = name
+        assert bake(cloth) == os.path.abspath("drape_" + name)
+
+
+def test_interrupt():
+    """Ctrl-C, which Blender takes for itself, ends the bake and the script, and the bake can be resumed"""
+    new_file(frames=120)
+    cloth = sheet(side=12, pin_group="rim")
+    cloth.vertex_groups.new(name="rim").add([0, 11], 1, "REPLACE")
+    handler = ctypes.pythonapi.PyOS_getsig
+    handler.restype = ctypes.c_void_p
+    before = handler(signal.SIGINT)
+
+    def interrupt():
+        while not operators.running or operators.running[0].bake.done() < 12:
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    said = refused(cloth)
+    thread.join()
+    assert "Tablecloth: interrupted after " in said and "Resume continues" in said and not operators.running, said
+    assert handler(signal.SIGINT) == before
+    assert 12 <= len(plays(cloth, operators.folder_of(cloth))) < 120
+    assert len(positions(bake(cloth, "resume"))) == 120
 
 
 def test_choices():
