@@ -182,11 +182,13 @@ typedef struct drape_pin_def {
                            file, from 0; -1: for each node the nearest one at t = 0 */
     double normal[3];   /* the nodes are held along this direction only: each stays in the plane across it
                            through its start, as on rollers or in a symmetry plane; a track moves the
-                           plane; not with turns or attach. Default NaN: none */
+                           plane; not with attach, and with turns only those of a clamp. Default NaN: none */
     double axis[3]; /* the nodes are held across this direction: each stays on a line along it, as on a rail;
                            not with a normal. Default NaN: none */
     const drape_turn_key *turns; /* the nodes turn about the pivot as one rigid body, and the track displaces
-                                    them from there; not with attach or clamp. NULL: they do not turn */
+                                    them from there; with clamp, the direction of the sheet turns too, and
+                                    with a normal or an axis it alone. Not with attach. NULL: they do not
+                                    turn */
     size_t turn_count;           /* length of turns */
     double pivot[3]; /* [m] at the start; default NaN: the mean of the positions at which the nodes start */
 } drape_pin_def;

@@ -204,6 +204,8 @@ typedef struct drape_cloth_view {
     void *user;                           /* of the term's ops */
     drape_points warp_curve, weft_curve;  /* strain of a strip [1] and force per width [N/m] */
     drape_points shear_curve;             /* shear angle [degrees] and force per length [N/m] */
+    const int32_t *edge_turn; /* (edge_count) for drape_term_turn_part: the turns of the pin that clamps the
+                                 edge, -1: none; NULL: no edge turns */
 } drape_cloth_view;
 
 /* A seam at rest: two sides, each a list of nodes of one cloth, which may be the same cloth. Nodes of equal
@@ -245,7 +247,12 @@ DRAPE_API void drape_term_set_part(drape_term_builder *builder, int32_t part, co
  * later ones get smaller numbers. */
 DRAPE_API void drape_term_link(drape_term_builder *builder, int32_t element, int32_t part, double weight);
 
-/* Declares that elements of this cloth are attached to fixed directions in space, so that their forces have a
+/* Declares that a part belongs to a direction in space which turns with a pin: turn is an entry of edge_turn,
+ * -1: it does not turn. The direction at the present time is that of drape_elements_direction. Turning the
+ * nodes of the part with the direction must not change s. */
+DRAPE_API void drape_term_turn_part(drape_term_builder *builder, int32_t part, int32_t turn);
+
+/* Declares that elements of this cloth are attached to directions in space, so that their forces have a
  * torque. */
 DRAPE_API void drape_term_anchor(drape_term_builder *builder);
 
@@ -329,10 +336,11 @@ typedef struct drape_parts {
     const int32_t *first_user; /* (count + 1) a part's links are user[first_user[p]] ...
                                   user[first_user[p + 1] - 1] */
     const int32_t *user;       /* (link_count) numbers of links */
+    const int32_t *turn;       /* (count) of drape_term_turn_part; NULL: no part turns */
 } drape_parts;
 
 /* The elements of one term on one cloth or one seam; constant after the model is compiled, but for
- * progress. Allocated by the library alone: it may grow at its end. */
+ * progress, factor and t. Allocated by the library alone: it may grow at its end. */
 typedef struct drape_elements {
     int32_t count;            /* number of elements */
     int nodes;                /* nodes per element */
@@ -346,7 +354,13 @@ typedef struct drape_elements {
     double factor;        /* of the history that a parameter "history" names, at the present time; else 1 */
     int32_t shared_count; /* length of shared */
     const double *shared; /* numbers of drape_term_share; NULL: none */
+    double t;             /* [s] the time at which they are evaluated */
+    const struct drape_track *tracks; /* of the pins; opaque */
 } drape_elements;
+
+/* Where a direction that is `rest` at rest points at the time el->t, with the turns of that part. */
+DRAPE_API void drape_elements_direction(const drape_elements *el, int32_t part, const double rest[3],
+                                        double direction[3]);
 
 /* The fault that a check found, for the message of a rejected step. */
 typedef struct drape_fault {

@@ -400,7 +400,7 @@ static void evaluate_measures(const drape_term *term, const drape_request *want,
 /* The elements as energies see them. */
 static drape_elements elements_at(const drape_term *term, const drape_point *point)
 {
-    drape_elements el = term->elements;
+    drape_elements el = drape_term_elements(term, point->t);
     const bool full = point->full && term->ops->external;
     el.progress = full || point->done ? 1 : drape_term_progress(term, point->t) + point->progressed;
     if (term->history)

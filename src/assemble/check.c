@@ -50,6 +50,7 @@ typedef struct checker {
     drape_check_result *results;
     int result_count;
     double progress; /* of terms that depend on time, when they are checked element by element */
+    double t;        /* [s] while directions turn */
 } checker;
 
 /* In [-1, 1]; a linear congruential generator (Knuth's MMIX), so that every machine sees the same state. */
@@ -149,7 +150,7 @@ typedef struct local {
 static void evaluate(const checker *c, const drape_term *term, int32_t e, local *out)
 {
     const double *x = c->x, *v = c->v, *internal = c->internal;
-    drape_elements el = term->elements;
+    drape_elements el = drape_term_elements(term, c->t);
     el.progress = c->progress;
     const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
     memset(out, 0, sizeof *out);
@@ -319,7 +320,7 @@ static void check_elements(checker *c, const drape_term *term)
 static void check_invariance(checker *c, int32_t t)
 {
     const drape_term *term = &c->model->terms[t];
-    const drape_point point = {.x = c->x, .v = c->v, .internal = c->internal};
+    const drape_point point = {.x = c->x, .v = c->v, .internal = c->internal, .t = c->t};
     double net[6] = {0}, scale = 0, size = 0;
     size_t n = (size_t)c->model->node_count;
     memset(c->g1, 0, 3 * n * sizeof *c->g1);
@@ -443,8 +444,13 @@ static double largest_direction_error(checker *c, double step, const drape_point
 
 static drape_status check_jacobian(checker *c, const char *what, double weight, const double *history)
 {
-    const drape_point point = {
-        .x = c->x, .v = c->v, .internal = c->internal, .weight = weight, .history = history};
+    const drape_point point = {.x = c->x,
+                               .v = c->v,
+                               .internal = c->internal,
+                               .weight = weight,
+                               .history = history,
+                               .t = c->t,
+                               .turning = true};
     drape_status status = prepare_jacobian(c, &point);
     if (status)
         return status;
@@ -563,6 +569,17 @@ static drape_status check_contact(checker *c, const drape_state *rest)
 
 /* ---- All checks ---- */
 
+/* A time at which the directions of some term turn; 0 without such. */
+static double turning_time(const drape_model *model)
+{
+    for (int32_t i = 0; i < model->track_count; i++) {
+        const drape_turns *turns = &model->tracks[i].turns;
+        if (model->tracks[i].clamps && turns->key_count > 1)
+            return turns->keys[0].time + 0.385 * (turns->keys[1].time - turns->keys[0].time);
+    }
+    return 0;
+}
+
 static drape_status allocate(checker *c, drape_arena *arena)
 {
     size_t n = 3 * (size_t)c->model->node_count, measures = (size_t)c->model->measure_count;
@@ -596,8 +613,12 @@ drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, u
     const drape_model *model = drape_system_model(system);
     drape_arena arena = drape_arena_of(ctx);
     drape_state rest;
-    checker c = {
-        .system = system, .model = model, .random = seed, .size = mean_edge(model), .results = results};
+    checker c = {.system = system,
+                 .model = model,
+                 .random = seed,
+                 .size = mean_edge(model),
+                 .results = results,
+                 .t = turning_time(model)};
     *result_count = 0;
     drape_status status = drape_state_create(&arena, model, &rest);
     if (!status)

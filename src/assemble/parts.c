@@ -2,6 +2,8 @@
 #include "assemble/parts.h"
 
 #include "base/lanes.h"
+#include "base/vec3.h"
+#include "model/track.h"
 
 #include <string.h>
 
@@ -32,38 +34,75 @@ drape_parts_work *drape_parts_create(drape_arena *arena, const drape_term *term)
 
 /* ---- By part ---- */
 
-/* ds . v with the nodes' v. */
-static double along(const drape_parts *p, int32_t part, const double *ds, const double *v)
+/* The v of the nodes of a part (nodes x 3). */
+static void gather(const drape_parts *p, int32_t part, const double *v, double *own)
+{
+    for (int a = 0; a < p->nodes; a++)
+        memcpy(own + 3 * a, v + 3 * (size_t)p->node[(size_t)part * (size_t)p->nodes + (size_t)a],
+               3 * sizeof *own);
+}
+
+/* ds . v with the v of its nodes. */
+static double along(const drape_parts *p, const double *ds, const double *v)
 {
     double sum = 0;
-    for (int a = 0; a < p->nodes; a++) {
-        const double *of = v + 3 * (size_t)p->node[(size_t)part * (size_t)p->nodes + (size_t)a];
+    for (int a = 0; a < p->nodes; a++)
         for (int k = 0; k < 3; k++)
-            sum += ds[LANES * a + k] * of[k];
-    }
+            sum += ds[LANES * a + k] * v[3 * a + k];
     return sum;
 }
 
+/* The angular velocity w of the direction of a part. Nodes that turn with it do not change s: the
+ * rate of s is that in a frame which turns, ds . (v - w x (x - x0)) for any x0, and not ds . v. */
+static bool turns_at(const drape_elements *el, int32_t part, const drape_point *point, double w[3])
+{
+    const int32_t turn = el->parts->turn ? el->parts->turn[part] : -1;
+    if (turn < 0 || !(point->turning || point->instant || point->span[0] < point->span[1]))
+        return false;
+    drape_turns_velocity(&el->tracks[turn].turns,
+                         point->turning ? point->t : (point->span[0] + point->span[1]) / 2, w);
+    return true;
+}
+
+/* v -= w x (x - x0) at the nodes of a part. */
+static void leave_turn(const drape_parts *p, int32_t part, const double *x, const double w[3], double *v)
+{
+    double own[3 * NODES], arm[3], turning[3];
+    gather(p, part, x, own);
+    for (int a = 1; a < p->nodes; a++) {
+        vec3_sub(own + 3 * a, own, arm);
+        vec3_cross(w, arm, turning);
+        vec3_add_scaled(-1, turning, v + 3 * a);
+    }
+}
+
 /* dds v of the part in lane l. */
-static void turn_of(const drape_parts *p, int32_t part, const double *dds, int l, const double *v,
-                    double *turn)
+static void turn_of(const drape_parts *p, const double *dds, int l, const double *v, double *turn)
 {
     const int n = 3 * p->nodes;
-    const int32_t *node = p->node + (size_t)part * (size_t)p->nodes;
     for (int i = 0; i < n; i++) {
         double sum = 0;
         for (int j = 0; j < n; j++)
-            sum += dds[LANES * (i / 3 >= j / 3 ? n * i + j : n * j + i) + l] *
-                   v[3 * (size_t)node[j / 3] + (size_t)(j % 3)];
+            sum += dds[LANES * (i / 3 >= j / 3 ? n * i + j : n * j + i) + l] * v[j];
         turn[LANES * (i / 3) + i % 3] = sum;
+    }
+}
+
+/* The derivative by x of what leave_turn takes off the rate: w x ds. */
+static void add_turned(const drape_parts *p, const double *ds, const double w[3], double *turn)
+{
+    double by[3];
+    for (int a = 0; a < p->nodes; a++) {
+        vec3_cross(w, ds + (ptrdiff_t)LANES * a, by);
+        vec3_add_scaled(1, by, turn + (ptrdiff_t)LANES * a);
     }
 }
 
 void drape_parts_measure(const drape_term *term, const drape_request *want, int32_t block, drape_block *b,
                          drape_parts_work *work)
 {
-    const drape_elements *el = &term->elements;
-    const drape_parts *p = el->parts;
+    const drape_elements el = drape_term_elements(term, want->point->t + want->point->ahead);
+    const drape_parts *p = el.parts;
     const int32_t first = block * DRAPE_BLOCK,
                   last = first + DRAPE_BLOCK < p->count ? first + DRAPE_BLOCK : p->count;
     const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
@@ -71,22 +110,31 @@ void drape_parts_measure(const drape_term *term, const drape_request *want, int3
     const bool rates = drape_block_has_rates(term) && !want->point->history && want->point->v;
     for (int32_t i = first; i < last; i += LANES) {
         int32_t number[LANES];
-        double s[LANES];
+        double s[LANES], v[3 * NODES], w[3];
         for (int32_t l = 0; l < LANES; l++)
             number[l] = i + l < last ? i + l : last - 1;
-        term->ops->part(el, number, want->point->x, internal, s, b->dq, turns ? b->hessian : NULL);
+        term->ops->part(&el, number, want->point->x, internal, s, b->dq, turns ? b->hessian : NULL);
         for (int32_t l = 0; l < LANES && i + l < last; l++) {
             const size_t at = (size_t)(i + l) * (size_t)p->nodes * LANES;
             double *ds = work->ds + at;
             work->s[i + l] = s[l];
             for (int k = 0; k < 3 * p->nodes; k++)
                 ds[LANES * (k / 3) + k % 3] = b->dq[LANES * k + l];
-            if (rates)
-                work->rate[i + l] = along(p, i + l, ds, want->point->v);
-            if (want->along)
-                work->ahead[i + l] = along(p, i + l, ds, want->along);
+            if (want->along) {
+                gather(p, i + l, want->along, v);
+                work->ahead[i + l] = along(p, ds, v);
+            }
+            if (!rates)
+                continue;
+            gather(p, i + l, want->point->v, v);
+            const bool turned = turns_at(&el, i + l, want->point, w);
+            if (turned)
+                leave_turn(p, i + l, want->point->x, w, v);
+            work->rate[i + l] = along(p, ds, v);
             if (turns)
-                turn_of(p, i + l, b->hessian, l, want->point->v, work->turn + at);
+                turn_of(p, b->hessian, l, v, work->turn + at);
+            if (turns && turned)
+                add_turned(p, ds, w, work->turn + at);
         }
     }
 }
@@ -141,6 +189,22 @@ static double gather_users(const drape_parts *p, int32_t part, const double *of_
     return sum;
 }
 
+double drape_parts_turning_power(const drape_term *term, const drape_point *point,
+                                 const drape_parts_work *work)
+{
+    const drape_parts *p = &term->parts;
+    double power = 0, w[3];
+    for (int32_t i = 0; i < p->count; i++) {
+        double v[3 * NODES] = {0};
+        if (!turns_at(&term->elements, i, point, w))
+            continue;
+        leave_turn(p, i, point->x, w, v);
+        power +=
+            gather_users(p, i, work->force) * along(p, work->ds + (size_t)i * (size_t)p->nodes * LANES, v);
+    }
+    return power;
+}
+
 LANES_DISPATCH static void scale_hessians(int d, const double *weight, double *h)
 {
     const lanes w = lanes_load(weight);
@@ -152,8 +216,8 @@ LANES_DISPATCH static void scale_hessians(int d, const double *weight, double *h
 void drape_parts_evaluate(const drape_term *term, const drape_request *want, const drape_parts_work *work,
                           drape_block *b)
 {
-    const drape_elements *el = &term->elements;
-    const drape_parts *p = el->parts;
+    const drape_elements el = drape_term_elements(term, want->point->t + want->point->ahead);
+    const drape_parts *p = el.parts;
     const int d = 3 * p->nodes;
     const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
     b->pairs = false;
@@ -178,7 +242,7 @@ void drape_parts_evaluate(const drape_term *term, const drape_request *want, con
         int32_t number[LANES];
         for (int32_t l = 0; l < LANES; l++)
             number[l] = b->first + (i + l < b->count ? i + l : b->count - 1);
-        term->ops->part(el, number, want->point->x, internal, b->q + i, NULL, b->hessian + i * d * d);
+        term->ops->part(&el, number, want->point->x, internal, b->q + i, NULL, b->hessian + i * d * d);
         scale_hessians(d, b->of_ddq + i, b->hessian + i * d * d);
     }
 }

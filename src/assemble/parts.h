@@ -28,6 +28,11 @@ void drape_parts_measure(const drape_term *term, const drape_request *want, int3
 void drape_parts_stress(const drape_term *term, const drape_request *want, int32_t block, drape_block *b,
                         drape_parts_work *work);
 
+/* When the forces on all elements are known: their power by the directions that turn, as they move s with the
+ * nodes at rest [W]. */
+double drape_parts_turning_power(const drape_term *term, const drape_point *point,
+                                 const drape_parts_work *work);
+
 /* The sum of a quantity over the parts of an element, each with its weight. */
 double drape_parts_combine(const drape_parts *parts, int32_t element, const double *of_part);
 

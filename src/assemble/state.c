@@ -8,23 +8,24 @@
 #include <string.h>
 
 /* The strains q - q0 of a range of at most DRAPE_PAIR_BLOCK elements. */
-static void strains_of(const drape_term *term, int32_t first, int32_t count, const double *x,
+static void strains_of(const drape_term *term, int32_t first, int32_t count, double t, const double *x,
                        const double *internal, double *strain)
 {
-    const drape_elements *el = &term->elements;
-    const double *q0 = el->rest + (size_t)el->count + first;
-    term->ops->measure(el, first, count, x,
+    const drape_elements el = drape_term_elements(term, t);
+    const double *q0 = el.rest + (size_t)el.count + first;
+    term->ops->measure(&el, first, count, x,
                        term->first_internal >= 0 ? internal + term->first_internal : NULL, strain, NULL,
                        NULL);
     for (int32_t i = 0; i < count; i++)
         strain[i] -= q0[i];
 }
 
-static void all_strains_of(const drape_term *term, const double *x, const double *internal, double *strain)
+static void all_strains_of(const drape_term *term, double t, const double *x, const double *internal,
+                           double *strain)
 {
     const int32_t elements = term->elements.count;
     for (int32_t e = 0; e < elements; e += DRAPE_PAIR_BLOCK)
-        strains_of(term, e, elements - e < DRAPE_PAIR_BLOCK ? elements - e : DRAPE_PAIR_BLOCK, x, internal,
+        strains_of(term, e, elements - e < DRAPE_PAIR_BLOCK ? elements - e : DRAPE_PAIR_BLOCK, t, x, internal,
                    strain + e);
 }
 
@@ -42,14 +43,15 @@ drape_status drape_state_create(drape_arena *arena, const drape_model *model, dr
     drape_model_place_pins(model, 0, state->x);
     for (int32_t i = 0; i < model->term_count; i++) {
         const drape_term *term = &model->terms[i];
+        const drape_elements el = drape_term_elements(term, 0);
         if (term->ops->initial)
-            term->ops->initial(&term->elements, 0, drape_term_pieces(term).count, model->start,
+            term->ops->initial(&el, 0, drape_term_pieces(term).count, model->start,
                                state->internal + term->first_internal);
         for (int s = 0; s < term->sliders; s++)
-            all_strains_of(term, model->start, state->internal,
+            all_strains_of(term, 0, model->start, state->internal,
                            state->internal + term->first_slider + s * (int64_t)term->elements.count);
         if (term->branch_count > 0) /* at the time 0, and without extensions */
-            all_strains_of(term, model->start, state->internal, state->internal + term->first_branch + 1);
+            all_strains_of(term, 0, model->start, state->internal, state->internal + term->first_branch + 1);
     }
     return DRAPE_OK;
 }
@@ -58,8 +60,9 @@ void drape_state_commit(const drape_model *model, const drape_state *before, dra
 {
     for (int32_t i = 0; i < model->term_count; i++) {
         const drape_term *term = &model->terms[i];
+        const drape_elements el = drape_term_elements(term, after->t);
         if (term->ops->commit)
-            term->ops->commit(&term->elements, 0, drape_term_pieces(term).count, after->x,
+            term->ops->commit(&el, 0, drape_term_pieces(term).count, after->x,
                               before->internal + term->first_internal,
                               after->internal + term->first_internal);
     }
@@ -72,7 +75,7 @@ static double slide_term(const drape_term *term, const drape_state *before, drap
     for (int32_t e = 0; e < elements; e += DRAPE_PAIR_BLOCK) {
         const int32_t count = elements - e < DRAPE_PAIR_BLOCK ? elements - e : DRAPE_PAIR_BLOCK;
         double strain[DRAPE_PAIR_BLOCK];
-        strains_of(term, e, count, after->x, after->internal, strain);
+        strains_of(term, e, count, after->t, after->x, after->internal, strain);
         for (int s = 0; s < term->sliders; s++) {
             const size_t first = (size_t)s * (size_t)elements + (size_t)e;
             const double *from = before->internal + term->first_slider + first;
@@ -95,7 +98,7 @@ static double relax_term(const drape_term *term, const drape_state *before, bool
     const double *k = term->elements.rest, *from = before->internal + term->first_branch;
     double dissipated = 0, *to = after->internal + term->first_branch;
     to[0] = after->t;
-    all_strains_of(term, after->x, after->internal, to + 1);
+    all_strains_of(term, after->t, after->x, after->internal, to + 1);
     for (int n = 0; n < term->branch_count; n++) {
         const drape_branch *branch = &term->branches[n];
         const drape_decay decay = drape_decay_over(branch->time, relaxed ? INFINITY : after->t - from[0]);

@@ -459,6 +459,12 @@ void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_
         *energy = sum;
 }
 
+double drape_summer_turning_power(drape_summer *s, const drape_term *term, const drape_request *want)
+{
+    prepare_term(s, term, want);
+    return drape_parts_turning_power(term, want->point, s->parts[term - s->model->terms]);
+}
+
 void drape_summer_measure(drape_summer *s, const drape_term *term, const drape_point *point, double *q)
 {
     const drape_request want = {.point = point, .conservative = true};

@@ -38,6 +38,9 @@ void drape_summer_add(drape_summer *summer, const drape_request *want, const dra
 void drape_summer_add_term(drape_summer *summer, const drape_term *term, const drape_request *want,
                            const drape_sums *to, double *energy);
 
+/* The power of the forces of a term by its directions that turn [W], on the calling thread. */
+double drape_summer_turning_power(drape_summer *summer, const drape_term *term, const drape_request *want);
+
 /* The measures q (element count) of one term at a point, on the calling thread. */
 void drape_summer_measure(drape_summer *summer, const drape_term *term, const drape_point *point, double *q);
 

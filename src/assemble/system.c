@@ -31,9 +31,10 @@ struct drape_system {
     double *push; /* (node_count x 3) [N], if pushed */
     bool pushed;
     double *load;        /* (node_count x 3) scratch, if the model has histories */
+    double *middle[2];   /* (node_count x 3) scratch: x and v of a step, if directions turn */
     double *held;        /* (node_count x 3) [N] the last forces on supports; NULL: none of them moves */
     bool in_frame;       /* positions are in the frame of the supports, and the next of these are scratch: */
-    double frame_t;      /* [s] of the last evaluation there */
+    double frame_t;      /* [s] of the last evaluation, or of the end of the last step */
     drape_state started; /* of a step, in the frame */
     double *space[3];    /* (node_count x 3) what was given, in space: x, v, and further positions */
     drape_wind wind;
@@ -41,6 +42,14 @@ struct drape_system {
 };
 
 /* ---- Creation ---- */
+
+static bool has_turning(const drape_model *model)
+{
+    bool found = false;
+    for (int32_t i = 0; i < model->term_count && !found; i++)
+        found = drape_term_turns(&model->terms[i]);
+    return found;
+}
 
 drape_status drape_system_create(drape_arena *arena, const drape_model *model, int threads,
                                  drape_system **out)
@@ -53,6 +62,8 @@ drape_status drape_system_create(drape_arena *arena, const drape_model *model, i
     system->push = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->push);
     if (model->history_count > 0)
         system->load = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->load);
+    for (int k = 0; k < 2 && has_turning(model); k++)
+        system->middle[k] = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof(double));
     double **const moved[] = {&system->held,     &system->started.x, &system->started.v,
                               &system->space[0], &system->space[1],  &system->space[2]};
     for (size_t i = 0; model->supports_move && i < sizeof moved / sizeof *moved; i++)
@@ -178,6 +189,8 @@ void drape_system_from_frame(drape_system *system, drape_state *out)
 {
     if (system->in_frame && out)
         drape_supports_displace(system->motion, out->t, 1, out->x);
+    if (out)
+        system->frame_t = out->t;
     system->in_frame = false;
 }
 
@@ -775,8 +788,44 @@ static double history_work(drape_system *system, const drape_term *term, const d
     return work;
 }
 
+/* The work of directions that turn: what their turn by itself changes the energy by, with the nodes half
+ * where the step begins and half where it ends; the nodes change the rest. */
+static double turning_work(drape_system *system, const drape_term *term, const drape_point *from,
+                           const drape_point *to)
+{
+    const double h = to->t - from->t, ahead[4] = {0, h, -h, 0};
+    double energy[4] = {0, 0, 0, 0};
+    for (int k = 0; k < 4; k++) {
+        drape_point point = k < 2 ? *from : *to;
+        point.ahead = ahead[k];
+        const drape_request want = {.point = &point, .energy = true, .conservative = true};
+        drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy[k]);
+    }
+    return (energy[1] - energy[0] + energy[3] - energy[2]) / 2;
+}
+
+/* The work of such directions against the dissipative forces of the term, by the midpoint rule. */
+static double turning_dissipation(drape_system *system, const drape_term *term, const drape_point *from,
+                                  const drape_point *to)
+{
+    const double h = to->t - from->t;
+    if (!(h > 0))
+        return 0;
+    for (size_t i = 0; i < 3 * (size_t)system->model->node_count; i++) {
+        system->middle[0][i] = (from->x[i] + to->x[i]) / 2;
+        system->middle[1][i] = (to->x[i] - from->x[i]) / h;
+    }
+    const drape_point point = {.x = system->middle[0],
+                               .v = system->middle[1],
+                               .internal = from->internal,
+                               .t = (from->t + to->t) / 2,
+                               .turning = true};
+    return h * drape_summer_turning_power(system->summer, term,
+                                          &(drape_request){.point = &point, .dissipative = true});
+}
+
 double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
-                               double *open)
+                               double *open, double *dissipated)
 {
     const drape_point from = {.x = before->x, .v = before->v, .internal = before->internal, .t = before->t},
                       to = {.x = after->x, .v = after->v, .internal = before->internal, .t = after->t};
@@ -787,6 +836,12 @@ double drape_system_timed_work(drape_system *system, const drape_state *before, 
             work += timed_work(system, term, &from, &to);
         if (term->history && has_energy(system, term))
             work += history_work(system, term, &from, &to, open);
+        if (drape_term_turns(term)) {
+            const double loss = dissipated ? turning_dissipation(system, term, &from, &to) : 0;
+            work += turning_work(system, term, &from, &to) + loss;
+            if (dissipated)
+                *dissipated += loss;
+        }
     }
     return work;
 }
@@ -887,7 +942,8 @@ drape_status drape_system_check(const drape_system *system, const double *given,
         if (!term->ops->check || drape_summer_leaves(system->summer, term))
             continue;
         const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
-        drape_status status = term->ops->check(&term->elements, x, before, own, &fault);
+        const drape_elements el = drape_term_elements(term, system->frame_t);
+        drape_status status = term->ops->check(&el, x, before, own, &fault);
         if (status) {
             *reason = fault.reason;
             *diagnostic = diagnose_element(term, &fault);

@@ -33,6 +33,8 @@ typedef struct drape_point {
     bool relaxed;      /* an infinite time after the internal variables: Maxwell branches have no force */
     bool full;         /* loads from outside are taken at progress 1 and without their histories */
     double progressed; /* added to their progress, for differences */
+    double ahead;      /* [s] added to the time of directions that turn */
+    bool turning;      /* these have their velocities of time t though the ends of span are equal */
     double span[2];    /* [s] over which the velocities of colliders are taken; equal: they are at rest */
     bool instant;      /* those that turn have their velocities of time t instead, as the pins of methods that
                        follow the solution between the kinks of the motion, at the ends of span */
@@ -85,10 +87,11 @@ double drape_system_push_work(const drape_system *system, const double *x, const
 
 /* Whether a term depends on time, and the work that this does in a step from one state to another [J], by the
  * internal variables of the former. *open grows by how much that may be off if histories change at another
- * time of the step than an integrator sees: at its end, for some. */
+ * time of the step than an integrator sees: at its end, for some. *dissipated grows by what of the work is
+ * done on dashpots; NULL: nothing moves them. */
 bool drape_system_is_timed(const drape_system *system);
 double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
-                               double *open);
+                               double *open, double *dissipated);
 
 /* From now on the medium moves with this field, if the model has a term that feels it; NULL: it is at
  * rest. */

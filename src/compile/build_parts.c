@@ -30,6 +30,9 @@ drape_status drape_term_reserve_parts(drape_term_builder *builder, int32_t part_
     p->weight = builder->link_weight = drape_arena_take(arena, links, sizeof *builder->link_weight);
     for (size_t i = 0; builder->part_node && i < parts * nodes; i++)
         builder->part_node[i] = -1;
+    builder->part_turn = drape_arena_take(arena, parts, sizeof *builder->part_turn);
+    for (size_t i = 0; builder->part_turn && i < parts; i++)
+        builder->part_turn[i] = -1;
     builder->term->elements.parts = p;
     return drape_arena_status(arena);
 }
@@ -45,6 +48,19 @@ void drape_term_set_part(drape_term_builder *builder, int32_t part, const int32_
         builder->part_node[(size_t)part * (size_t)p->nodes + (size_t)a] = builder->first_node + nodes[a];
     for (int k = 0; k < p->rest_count; k++)
         builder->part_rest[(size_t)k * (size_t)p->count + (size_t)part] = rest[k];
+}
+
+void drape_term_turn_part(drape_term_builder *builder, int32_t part, int32_t turn)
+{
+    drape_parts *p = &builder->term->parts;
+    const drape_model *model = builder->model;
+    if (!builder->part_turn || part < 0 || part >= p->count || turn < -1 || turn >= model->track_count) {
+        builder->strayed = true;
+        return;
+    }
+    builder->part_turn[part] = turn;
+    if (turn >= 0)
+        p->turn = builder->part_turn;
 }
 
 void drape_term_link(drape_term_builder *builder, int32_t element, int32_t part, double weight)
@@ -80,6 +96,7 @@ static void drop_unused(drape_term_builder *builder, int32_t *number)
             continue;
         memmove(builder->part_node + (size_t)p->count * nodes, builder->part_node + from * nodes,
                 nodes * sizeof *builder->part_node);
+        builder->part_turn[p->count] = builder->part_turn[from];
         number[from] = p->count++;
     }
     for (int32_t i = 0; i < p->link_count; i++)

@@ -34,6 +34,7 @@ drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t eleme
     el->nodes = nodes;
     el->rest_count = rest_count;
     el->params = builder->term->params;
+    el->tracks = builder->model->tracks;
     el->node = builder->node =
         drape_arena_take(arena, (size_t)element_count * (size_t)el->nodes, sizeof *builder->node);
     el->rest = builder->rest =
@@ -185,6 +186,7 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .hinge_edge = m->hinge_edge,
                               .triangle_edge = m->triangle_edge,
                               .edge_clamped = cloth->edge_clamped,
+                              .edge_turn = cloth->edge_turn,
                               .node_area = m->node_area,
                               .node_mass = cloth->node_mass,
                               .rows = m->rows,

@@ -78,7 +78,7 @@ static drape_status take_node(void *user, const char *key, int32_t local)
     int32_t node = pin->cloth->first_node + local;
     if (pin->count > 0) {
         for (int i = 0; i < pin->count && !pin->held[node]; i++)
-            if (!add_direction(pin->direction[i], pin->track, &pin->all[node]))
+            if (!add_direction(pin->direction[i], pin->def->key_count > 0 ? pin->track : -1, &pin->all[node]))
                 return refuse_motions(pin, key, local);
         pin->clamped[node] |= pin->def->clamp;
         pin->held[node] = 1;
@@ -142,10 +142,11 @@ static drape_status find_directions(pin_place *pin)
     pin->count = normal ? 1 : line ? 2 : 0;
     if (normal && line)
         return refuse(pin, "/axis", "a pin has a normal or an axis, not both");
-    if (pin->count > 0 && (def->turn_count > 0 || def->attach))
-        return refuse(pin, normal ? "/normal" : "/axis",
-                      "a pin that holds its nodes in some directions only may have a track, but no "
-                      "turns and no attach");
+    if (pin->count > 0 && ((def->turn_count > 0 && !def->clamp) || def->attach))
+        return refuse(
+            pin, normal ? "/normal" : "/axis",
+            "a pin that holds its nodes in some directions only may have a track, and turns with clamp, "
+            "but no attach");
     if ((normal && vec3_norm(n) == 0) || (line && vec3_norm(axis) == 0))
         return refuse(pin, normal ? "/normal" : "/axis", "0 0 0 has no direction");
     if (!line)
@@ -171,10 +172,6 @@ static drape_status keep_track(pin_place *pin)
         return refuse(pin, "/attach", "a pin is carried by a collider or moves along a track, not both");
     if (pin->def->turn_count > 0 && pin->def->attach)
         return refuse(pin, "/turns", "a pin is carried by a collider or turns about a pivot, not both");
-    if (pin->def->turn_count > 0 && pin->def->clamp)
-        return refuse(pin, "/clamp",
-                      "a clamped edge keeps its direction in space; to turn it, pin two "
-                      "rows of nodes");
     if (pin->def->attach)
         pin->track = model->track_count++; /* without keys: drape_compile_rides has its motion */
     if (pin->def->key_count == 0 && pin->def->turn_count == 0)
@@ -249,6 +246,9 @@ static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, in
         to->slides = pin->count > 0;
         if (!status)
             status = keep_track(pin);
+        to->turn = to->clamps && pin->def->turn_count > 0 ? pin->track : -1;
+        if (!status && to->turn >= 0)
+            model->tracks[to->turn].clamps = true;
         if (!status)
             status = take_selection(pin);
         if (!status)
@@ -409,6 +409,66 @@ static drape_status clamp_edges(drape_model *model, const uint8_t *clamped)
     return DRAPE_OK;
 }
 
+enum { UNKNOWN = -2 }; /* the turns of an edge */
+
+static drape_status refuse_turns(const drape_model *model, int32_t c, const int32_t *end)
+{
+    char at[64];
+    snprintf(at, sizeof at, "/cloth/%d/pins", (int)c);
+    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
+                         "pins that turn differently clamp the edge between nodes %d and %d; let one pin "
+                         "clamp it",
+                         (int)end[0], (int)end[1]);
+}
+
+/* Gives the edges between nodes of a pin that clamps its turns. held: (node_count) 0. */
+static drape_status turn_edges_of(drape_model *model, const drape_pin *pin, uint8_t *held)
+{
+    const drape_cloth *cloth = &model->cloths[pin->cloth];
+    const uint8_t *of_node = held + cloth->first_node;
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; i < pin->node_count; i++)
+        held[pin->node[i]] = 1;
+    for (int32_t e = 0; !status && e < cloth->mesh.edge_count; e++) {
+        const int32_t *end = cloth->mesh.edge + 2 * (size_t)e;
+        if (!of_node[end[0]] || !of_node[end[1]])
+            continue;
+        if (cloth->edge_turn[e] != UNKNOWN && cloth->edge_turn[e] != pin->turn)
+            status = refuse_turns(model, pin->cloth, end);
+        cloth->edge_turn[e] = pin->turn;
+    }
+    for (int32_t i = 0; i < pin->node_count; i++)
+        held[pin->node[i]] = 0;
+    return status;
+}
+
+/* Finds the turns that clamped edges follow. */
+static drape_status turn_edges(drape_model *model, uint8_t *held)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t p = 0; p < model->pin_count; p++) {
+        drape_cloth *cloth = &model->cloths[model->pins[p].cloth];
+        if (model->pins[p].turn < 0 || cloth->edge_turn)
+            continue;
+        cloth->edge_turn =
+            drape_arena_take(&model->arena, (size_t)cloth->mesh.edge_count, sizeof *cloth->edge_turn);
+        if (!cloth->edge_turn)
+            return DRAPE_E_MEMORY;
+        for (int32_t e = 0; e < cloth->mesh.edge_count; e++)
+            cloth->edge_turn[e] = UNKNOWN;
+    }
+    for (int32_t p = 0; !status && p < model->pin_count; p++)
+        if (model->pins[p].clamps && model->cloths[model->pins[p].cloth].edge_turn)
+            status = turn_edges_of(model, &model->pins[p], held);
+    for (int32_t c = 0; !status && c < model->cloth_count; c++) {
+        const drape_cloth *cloth = &model->cloths[c];
+        for (int32_t e = 0; !status && cloth->edge_turn && e < cloth->mesh.edge_count; e++)
+            if (cloth->edge_clamped[e] && cloth->edge_turn[e] == UNKNOWN)
+                status = refuse_turns(model, c, cloth->mesh.edge + 2 * (size_t)e);
+    }
+    return status;
+}
+
 drape_status drape_compile_number_nodes(drape_model *model, const int32_t *track_of_node)
 {
     for (int32_t i = 0; i < model->node_count; i++) {
@@ -461,6 +521,8 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
             status = list_supports(model, &pin);
         if (!status)
             status = clamp_edges(model, clamped);
+        if (!status)
+            status = turn_edges(model, held);
         if (!status)
             status = drape_compile_number_nodes(model, track_of_node);
     }

@@ -15,7 +15,7 @@ struct drape_term_builder {
     double *rest;
     bool strayed; /* the term set an element, a part or a link outside the range that it announced */
     bool reserved_parts;
-    int32_t *part_node, *link_element, *link_part; /* the arrays of parts, writable */
+    int32_t *part_node, *part_turn, *link_element, *link_part; /* the arrays of parts, writable */
     double *part_rest, *link_weight;
     int32_t links; /* made so far */
 };

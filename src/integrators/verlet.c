@@ -211,7 +211,10 @@ static void evaluate(verlet_state *s, const substep *sub, double share, double t
 {
     double start = drape_clock_seconds();
     drape_verlet_force_sum(
-        s->force, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal, .t = t, .span = {t, t}}, g);
+        s->force,
+        &(drape_point){
+            .x = sub->x, .v = v, .internal = sub->internal, .t = t, .span = {t, t}, .turning = true},
+        g);
     s->work.residual_seconds += drape_clock_seconds() - start;
     s->work.residuals++;
     sub->info->pin_work += share * sub->h * drape_verlet_friction(&s->contact, t, sub->x, v, g);
@@ -224,7 +227,9 @@ static void audit_dissipation(verlet_state *s, const substep *sub, double share,
     if (!s->dissipated)
         return;
     drape_system_dissipation(
-        s->system, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal, .t = t, .span = {t, t}},
+        s->system,
+        &(drape_point){
+            .x = sub->x, .v = v, .internal = sub->internal, .t = t, .span = {t, t}, .turning = true},
         s->dissipated);
     for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++)
         power += s->dissipated[i] * v[i];

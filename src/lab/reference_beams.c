@@ -112,6 +112,41 @@ DRAPE_REFERENCE(end_moment, .entry.summary = "rise of the end w/L", .unit = "1",
                 .entry.reference = "an arc of curvature M/B", .tolerance = 0.005, .expected = arc_rise,
                 .scene = moment_scene, .measure = measure_rise);
 
+/* Two clamps turned against each other by half of the angle each, of which the right one slides along x: the
+ * moment and with it the curvature is the same everywhere, and E = B kappa^2 L w/2. */
+static double rolled_energy(double angle)
+{
+    return angle * angle / 2;
+}
+
+static int rolled_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    const double half = c->parameter * 90 / 3.1415926535897932;
+    return snprintf(
+        text, DRAPE_LAB_TEXT,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 41, 'rows': 4, 'width': 1, "
+        "'height': 0.05},\n 'material': {'young_modulus': %g, 'poisson_ratio': 0, 'thickness': 0.01, "
+        "'areal_density': %g}, 'terms': ['stretch.cst', 'bend.midedge'],\n 'pins': [{'edge': 'left', "
+        "'clamp': true, 'turns': [{'time': 0, 'rotate': [0, 0, 1, 0]}, {'time': 1, 'rotate': [0, 0, 1, "
+        "%.17g]}]},\n {'edge': 'right', 'clamp': true, 'axis': [1, 0, 0], 'turns': [{'time': 0, 'rotate': "
+        "[0, 0, 1, 0]}, {'time': 1, 'rotate': [0, 0, 1, %.17g]}]}]}],\n 'gravity': [0, 0, 0], "
+        "'integrator': {'method': 'static', 'tolerance': 1e-10}, 'duration': 1}",
+        STRIP_RIGIDITY * 12 / 1e-6, STRIP_DENSITY, half, -half);
+}
+
+static drape_status measure_rolled(drape_reference_run *run, double *value)
+{
+    const drape_status status = lab_advance(run);
+    *value = drape_sim_energy(run->sim).elastic / (STRIP_RIGIDITY * 0.05);
+    return status;
+}
+
+DRAPE_REFERENCE(rolled_strip, .entry.summary = "energy of a strip between clamps that turn, E L/(B w)",
+                .unit = "1", .parameter = "angle [rad]", DRAPE_CASES(0.5, 1, 2, 3.1415926535897932),
+                .model = "stretch.cst, bend.midedge; irregular", .entry.reference = "an arc: angle^2/2",
+                .tolerance = 0.001, .expected = rolled_energy, .scene = rolled_scene,
+                .measure = measure_rolled);
+
 /* The strip starts flat. */
 static int curved_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {

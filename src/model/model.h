@@ -65,10 +65,24 @@ static inline bool drape_term_is_timed(const drape_term *term)
     return term->timed[0] < term->timed[1];
 }
 
+/* Whether directions that belong to it turn. */
+static inline bool drape_term_turns(const drape_term *term)
+{
+    return term->parts.turn;
+}
+
 /* Whether its forces depend on time. */
 static inline bool drape_term_changes(const drape_term *term)
 {
-    return drape_term_is_timed(term) || term->history;
+    return drape_term_is_timed(term) || term->history || drape_term_turns(term);
+}
+
+/* Its elements at a time. */
+static inline drape_elements drape_term_elements(const drape_term *term, double t)
+{
+    drape_elements el = term->elements;
+    el.t = t;
+    return el;
 }
 
 /* From 0 at the beginning of this time to 1 at its end, with rate 0 at both. */
@@ -179,6 +193,8 @@ typedef struct drape_cloth {
     double *node_mass;     /* (mesh.node_count) [kg] with the "masses" of the scene; material_mass itself
                                      if there are none */
     uint8_t *edge_clamped; /* (mesh.edge_count) 1: both nodes are held by pins that clamp */
+    int32_t *edge_turn;    /* (mesh.edge_count) the track whose turns its clamp follows, -1: none; NULL: no
+                              edge turns */
     double velocity[3];    /* [m/s] at t = 0 */
     int32_t first_node, first_triangle;
     const struct drape_term **laws; /* (law_count) */
@@ -205,6 +221,7 @@ typedef struct drape_track {
     size_t key_count;
     drape_turns turns; /* of pins, about the pivot; of a collider it is a member of that */
     double pivot[3];   /* [m] at the start */
+    bool clamps;       /* its turns are those of the directions of clamped edges */
 } drape_track;
 
 /* One obstacle. */
@@ -265,7 +282,8 @@ typedef struct drape_pin {
     int32_t *node; /* (node_count) ascending node numbers of the model */
     int32_t node_count;
     bool clamps;
-    bool slides; /* it holds them in some directions only */
+    int32_t turn; /* the track whose turns the clamp follows, -1: none */
+    bool slides;  /* it holds them in some directions only */
 } drape_pin;
 
 /* A node that pins hold in some directions only (model/support.h). */

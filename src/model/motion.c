@@ -985,6 +985,14 @@ static course support_course(const drape_motion *motion, int32_t i, int directio
     return (course){.path = &none, .track = track >= 0 ? &motion->model->tracks[track] : NULL};
 }
 
+/* The turns of a track, if clamped edges follow them. */
+static course clamp_course(const drape_motion *motion, int32_t track)
+{
+    static const drape_path none;
+    const drape_track *of = &motion->model->tracks[track];
+    return (course){.path = &none, .turns = of->clamps ? &of->turns : NULL};
+}
+
 double drape_motion_next_kink(const drape_motion *motion, double t, double end)
 {
     for (int32_t i = 0; i < motion->moved_count; i++) {
@@ -1001,6 +1009,10 @@ double drape_motion_next_kink(const drape_motion *motion, double t, double end)
             const course c = support_course(motion, i, d);
             end = next_kink_of(&c, t, end);
         }
+    for (int32_t i = 0; i < motion->model->track_count; i++) {
+        const course c = clamp_course(motion, i);
+        end = next_kink_of(&c, t, end);
+    }
     for (int32_t i = 0; i < motion->model->history_count; i++)
         if (motion->model->histories[i].used)
             end = drape_history_next_kink(&motion->model->histories[i], t, end);
@@ -1021,6 +1033,10 @@ bool drape_motion_at_kink(const drape_motion *motion, double t)
     for (int32_t i = 0; !found && i < 2 * motion->model->support_count; i++) {
         const course c = support_course(motion, i / 2, i % 2);
         found = i % 2 < motion->model->supports[i / 2].count && at_kink_of(&c, t);
+    }
+    for (int32_t i = 0; !found && i < motion->model->track_count; i++) {
+        const course c = clamp_course(motion, i);
+        found = at_kink_of(&c, t);
     }
     return found;
 }

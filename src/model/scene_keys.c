@@ -56,7 +56,8 @@ static const drape_scene_key pin_keys[] = {
                    "the triangle that carries the nodes, of a collider that deforms, from 0"),
      IN(drape_pin_def, triangle)},
     {DRAPE_BOOLEAN("clamp", false,
-                   "edges between these nodes keep the direction of the sheet across them; for bend.midedge"),
+                   "edges between these nodes keep the direction of the sheet across them, or turn it with "
+                   "`turns`; for bend.midedge"),
      IN(drape_pin_def, clamp)},
     {DRAPE_VECTOR("normal", "1", DRAPE_DERIVED("none: held in all directions"), LOWEST, HIGHEST,
                   "the only direction in which the nodes are held: each stays in the plane across it, as on "
@@ -66,7 +67,8 @@ static const drape_scene_key pin_keys[] = {
                   "the only direction in which the nodes are free: each stays on a line, as on a rail"),
      IN(drape_pin_def, axis)},
     {SHAPED(DRAPE_SCENE_OBJECTS, "turns", DRAPE_DERIVED("none: they do not turn"),
-            "rotation of the nodes as one body about the pivot, steady between the times"),
+            "rotation of the nodes as one body about the pivot, and of the direction that they clamp, steady "
+            "between the times"),
      ARRAY(drape_pin_def, turns, turn_count), .at_least = 1, .child = &drape_form_turn},
     {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the mean of the nodes"), -1e9, 1e9,
                   "the point about which they turn, at the start; the track displaces it; with `turns`"),

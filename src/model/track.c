@@ -88,6 +88,18 @@ void drape_turns_velocity(const drape_turns *turns, double t, double velocity[3]
         vec3_add_scaled(key->degrees * (PI / 180) / (key[1].time - key->time), key->axis, velocity);
 }
 
+void drape_elements_direction(const drape_elements *el, int32_t part, const double rest[3],
+                              double direction[3])
+{
+    const int32_t turn = el->parts->turn ? el->parts->turn[part] : -1;
+    double rotation[9];
+    memmove(direction, rest, 3 * sizeof *direction);
+    if (turn < 0)
+        return;
+    drape_turns_rotation(&el->tracks[turn].turns, el->t, rotation);
+    drape_rotation_turn(rotation, direction, direction);
+}
+
 /* ---- Pins ---- */
 
 bool drape_track_moves(const drape_track *track)

@@ -70,14 +70,19 @@ static void set_point(bench *s, double dt)
     const drape_state *from = drape_sim_state(s->sim);
     deform(s, dt);
     if (s->history) {
-        drape_system_measures(s->sim->system, &(drape_point){.x = from->x, .internal = from->internal},
+        drape_system_measures(s->sim->system,
+                              &(drape_point){.x = from->x, .internal = from->internal, .t = from->t},
                               s->history);
         for (int64_t i = 0; i < s->sim->model->measure_count; i++)
             s->history[i] /= -dt;
     }
     s->mass_weight = 1 / (dt * dt);
-    s->point = (drape_point){
-        .x = s->x, .v = s->v, .internal = from->internal, .weight = 1 / dt, .history = s->history};
+    s->point = (drape_point){.x = s->x,
+                             .v = s->v,
+                             .internal = from->internal,
+                             .weight = 1 / dt,
+                             .history = s->history,
+                             .t = from->t};
 }
 
 static drape_status create(bench *s)

@@ -64,11 +64,13 @@ static bool may_relax(const drape_sim *sim)
 }
 
 /* The work from one state to another of what no integrator counts: the forces of the host, and terms that
- * depend on time, of which *open may be wrong. */
-static double outer_work(const drape_sim *sim, const drape_state *from, const drape_state *to, double *open)
+ * depend on time, of which *open may be wrong. Adds what of it is dissipated. */
+static double outer_work(const drape_sim *sim, const drape_state *from, const drape_state *to, double *open,
+                         double *dissipated)
 {
     return drape_system_push_work(sim->system, from->x, to->x) +
-           drape_system_timed_work(sim->system, from, to, open);
+           drape_system_timed_work(sim->system, from, to, open,
+                                   sim->chosen.integrator->steady_state ? NULL : dissipated);
 }
 
 /* Makes a step of the integrator and, whatever it left there, has supports hold what they hold. Their work on
@@ -111,7 +113,7 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     if (status && !info->usable)
         return status;
     info->open_work = 0;
-    info->pin_work += outer_work(sim, drape_sim_state(sim), next, &info->open_work);
+    info->pin_work += outer_work(sim, drape_sim_state(sim), next, &info->open_work, &info->dissipated);
     drape_status refused = check(sim, info);
     if (refused)
         info->usable = false;
@@ -266,8 +268,8 @@ static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
     const drape_state *now = drape_sim_state(sim);
     drape_state *next = next_state(sim);
     const double t = sim->schedule.cut_end, share = (t - now->t) / (next->t - now->t);
-    double open = 0;
-    const double outer = outer_work(sim, now, next, &open);
+    double open = 0, lost = 0;
+    const double outer = outer_work(sim, now, next, &open, &lost);
     info->open_work = 0;
     if (!sim->chosen.integrator->interpolate_velocities)
         return false;
@@ -277,8 +279,9 @@ static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
     memcpy(next->v, sim->frame_velocity, 3 * (size_t)sim->model->node_count * sizeof *next->v);
     next->t = t;
     info->h = t - now->t;
-    info->dissipated *= share;
-    info->pin_work = share * (info->pin_work - outer) + outer_work(sim, now, next, &info->open_work);
+    info->dissipated = share * (info->dissipated - lost);
+    info->pin_work =
+        share * (info->pin_work - outer) + outer_work(sim, now, next, &info->open_work, &info->dissipated);
     return !check(sim, info);
 }
 

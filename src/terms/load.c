@@ -58,3 +58,29 @@ drape_status drape_load_count(const drape_cloth_view *cloth, const double *value
         return drape_term_refuse(builder, "no edge of the boundary of the mesh lies in the box");
     return DRAPE_OK;
 }
+
+/* Whether triangle t goes from node a to node b. */
+static bool goes(const drape_cloth_view *cloth, int32_t t, int32_t a, int32_t b)
+{
+    const int32_t *corner = cloth->triangle + 3 * (size_t)t;
+    bool found = false;
+    for (int k = 0; k < 3; k++)
+        found = found || (corner[k] == a && corner[(k + 1) % 3] == b);
+    return found;
+}
+
+drape_status drape_load_check_faces(const drape_cloth_view *cloth, drape_term_builder *builder)
+{
+    for (int32_t e = 0; e < cloth->edge_count; e++) {
+        const int32_t *end = cloth->edge + 2 * (size_t)e, *beside = cloth->edge_triangle + 2 * (size_t)e;
+        if (beside[1] >= 0 &&
+            goes(cloth, beside[0], end[0], end[1]) == goes(cloth, beside[1], end[0], end[1]))
+            return drape_term_refuse(
+                builder,
+                "triangles %d and %d beside the edge between nodes %d and %d have opposite "
+                "orientations, with normals on different sides of the sheet: orient all faces "
+                "of the mesh alike",
+                (int)beside[0], (int)beside[1], (int)end[0], (int)end[1]);
+    }
+    return DRAPE_OK;
+}

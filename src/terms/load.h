@@ -27,6 +27,10 @@ bool drape_load_takes(const drape_cloth_view *cloth, const double *values, int32
 /* Whether a point lies in a box, boundary and rounding included. */
 bool drape_load_in_box(const double *x, const double *low, const double *high);
 
+/* Refuses a mesh with two triangles of opposite orientations beside an edge: a load along normals would push
+ * one of them forth and the other one back. */
+drape_status drape_load_check_faces(const drape_cloth_view *cloth, drape_term_builder *builder);
+
 /* How the load varies in time; the library multiplies by it. One value each, after all others. */
 #define DRAPE_LOAD_HISTORY                                                                                   \
     DRAPE_TEXT("history", "name of a history of the scene, by which the load is multiplied",                 \

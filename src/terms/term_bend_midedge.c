@@ -8,7 +8,8 @@
  * triangle measure: six on lattices, otherwise up to twelve, followed by copies of the first.
  *
  * A clamped edge has a direction in space instead of a second triangle: x3 = (x0 + x1)/2 + r with r as at
- * rest. Such a hinge belongs to one triangle, and its fourth node is a copy of the first.
+ * rest, or turned with its pin. Such a hinge belongs to one triangle, and its fourth node is a copy of the
+ * first.
  *
  * Hysteresis and creases are sliders (model/slider.h) on the squares. Friction between yarns, of KES-FB2's
  * moment HB = B friction per width: a slider of the limit HB that slips after a change of curvature by
@@ -95,17 +96,20 @@ static const drape_param params[LIST_COUNT] = {
 };
 
 /* x3 of the parts that are clamped. Returns the lanes in which they are, as bits. */
-LANES_INLINE int place_clamps(const drape_parts *parts, const int32_t *part, lanes corner[4][3])
+LANES_INLINE int place_clamps(const drape_elements *el, const int32_t *part, lanes corner[4][3])
 {
+    const drape_parts *parts = el->parts;
     int clamped = 0;
     for (int l = 0; l < LANES; l++) {
         const double *r = parts->rest + part[l];
         const size_t next = (size_t)parts->count;
         if (r[0] == 0 && r[next] == 0 && r[2 * next] == 0)
             continue;
+        double now[3] = {r[0], r[next], r[2 * next]};
+        drape_elements_direction(el, part[l], now, now);
         clamped |= 1 << l;
         for (int i = 0; i < 3; i++)
-            corner[3][i][l] = (corner[0][i][l] + corner[1][i][l]) / 2 + r[(size_t)i * next];
+            corner[3][i][l] = (corner[0][i][l] + corner[1][i][l]) / 2 + now[i];
     }
     return clamped;
 }
@@ -124,7 +128,7 @@ LANES_DISPATCH static void measure_angles(const drape_elements *el, const int32_
         lanes_gather(x, node, corner[a]);
     }
     if (parts->rest_count == CLAMP_COUNT)
-        clamped = place_clamps(parts, part, corner);
+        clamped = place_clamps(el, part, corner);
     drape_dihedral_measure(corner, &h);
     for (int l = 0; l < LANES; l++)
         s[l] = drape_nearest_branch(h.theta[l], internal[part[l]]);
@@ -299,6 +303,8 @@ static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch,
             part[h] = hinge_at(cloth, patch->edge[h]);
         theta[h] = rest_angle(cloth, node, r);
         drape_term_set_part(builder, part[h], node, r);
+        if (clamped && cloth->edge_turn)
+            drape_term_turn_part(builder, part[h], cloth->edge_turn[patch->edge[h]]);
     }
 }
 

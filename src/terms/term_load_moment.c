@@ -260,7 +260,9 @@ static void put_hessian(const twist *w, double scale, double *hess)
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     int32_t count, next = 0;
-    drape_status status = drape_load_count(cloth, values, builder, &count);
+    drape_status status = drape_load_check_faces(cloth, builder);
+    if (!status)
+        status = drape_load_count(cloth, values, builder, &count);
     if (!status)
         status = drape_term_reserve(builder, count, REST_COUNT);
     for (int32_t e = 0; !status && e < cloth->edge_count; e++) {

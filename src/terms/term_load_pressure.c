@@ -29,8 +29,10 @@ static const drape_param params[LIST_COUNT] = {
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
-    drape_status status = drape_term_reserve(builder, cloth->triangle_count, 0);
+    drape_status status = drape_load_check_faces(cloth, builder);
     (void)values;
+    if (!status)
+        status = drape_term_reserve(builder, cloth->triangle_count, 0);
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++)
         drape_term_set(builder, t, cloth->triangle + 3 * (size_t)t, NULL);
     return status;

@@ -69,6 +69,7 @@ START_TEST(quick_references_pass)
     check("cantilever", 2, DRAPE_OUTCOME_PASS);
     check("rest_curvature", 0, DRAPE_OUTCOME_PASS);
     check("end_moment", 1, DRAPE_OUTCOME_PASS);
+    check("rolled_strip", 3, DRAPE_OUTCOME_PASS);
     check("self_buckling", 0, DRAPE_OUTCOME_PASS);
     check("pendulum", 1, DRAPE_OUTCOME_PASS);
     check("free_fall", 0, DRAPE_OUTCOME_PASS);
