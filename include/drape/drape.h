@@ -614,9 +614,10 @@ DRAPE_API drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_d
 /* Puts the sim into a user-defined state, from which the next advance starts: time [s], 0 to 1e9, before or
  * after the present one; positions [m] and velocities [m/s], node_count x 3 each, which are copied. Pinned
  * nodes must lie where their pins are at t, to within 1e-9 of the size of the scene, and are put there
- * exactly; nodes that drape_sim_move_pins has moved rest where x has them. Velocities of fixed pins become 0;
- * those of moving pins are kept until a step replaces them by the mean velocity of the track. Internal
- * variables follow from the positions: a hinge angle is taken on the branch nearest to its present value.
+ * exactly; nodes that drape_sim_move_pins has moved rest where x has them. Velocities of fixed pins become 0,
+ * as do those along directions in which pins at rest hold nodes; those of moving pins are kept until a step
+ * replaces them by the mean velocity of the track. Internal variables follow from the positions: a hinge
+ * angle is taken on the branch nearest to its present value.
  *
  * The integrator and the controller start anew, as after a kink; steps are counted from t, and the energies
  * dissipated and numerical from 0; the check that energy does not come out of nothing still knows what was

@@ -46,6 +46,40 @@ void drape_supports_project_free(const drape_motion *motion, double *free_nodes)
     }
 }
 
+static bool has_track(const drape_support *support)
+{
+    for (int i = 0; i < support->count; i++)
+        if (support->track[i] >= 0)
+            return true;
+    return false;
+}
+
+/* The support of a node; NULL: it has none. Supports are in the order of their nodes; if nodes are asked for
+ * in this order, *next, at first 0, becomes that of the node or of a later one. */
+static const drape_support *find_support(const drape_model *m, int32_t node, int32_t *next)
+{
+    while (*next < m->support_count && m->supports[*next].node < node)
+        ++*next;
+    return *next < m->support_count && m->supports[*next].node == node ? &m->supports[*next] : NULL;
+}
+
+void drape_supports_stop(const drape_motion *motion, const drape_motion *before, const double *v0, double *v)
+{
+    const drape_model *m = motion->model;
+    int32_t next = 0;
+    for (int32_t i = 0; i < m->support_count; i++) {
+        const drape_support *now = &m->supports[i], *old = find_support(before->model, now->node, &next);
+        const size_t at = 3 * (size_t)now->node;
+        double n[2][3], had[2][3];
+        const int count = directions(motion, now, n);
+        const bool same =
+            old && directions(before, old, had) == count && memcmp(n, had, (size_t)count * sizeof *n) == 0;
+        const bool rests = same && !has_track(old) && memcmp(v + at, v0 + at, 3 * sizeof *v) == 0;
+        if (!(same && has_track(now)) && !rests)
+            project(count, n, v + at);
+    }
+}
+
 /* Projects the three columns of a block, or its three rows. */
 static void project_block(int count, double n[2][3], double *block, int64_t stride, bool rows)
 {
@@ -98,17 +132,16 @@ void drape_supports_project_matrix(const drape_motion *motion, const drape_patte
 void drape_supports_keep_reactions(const drape_motion *motion, double *g)
 {
     const drape_model *m = motion->model;
-    int32_t next = 0; /* supports are in the order of their nodes */
+    int32_t next = 0;
     for (int32_t f = 0; f < m->free_count; f++) {
         double *at = g + 3 * (size_t)m->node_of_free[f], n[2][3], across[3];
-        while (next < m->support_count && m->supports[next].node < m->node_of_free[f])
-            next++;
-        if (next == m->support_count || m->supports[next].node != m->node_of_free[f]) {
+        const drape_support *support = find_support(m, m->node_of_free[f], &next);
+        if (!support) {
             memset(at, 0, 3 * sizeof *at);
             continue;
         }
         memcpy(across, at, sizeof across);
-        project(directions(motion, &m->supports[next], n), n, across);
+        project(directions(motion, support, n), n, across);
         vec3_add_scaled(-1, across, at);
     }
 }

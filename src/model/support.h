@@ -35,6 +35,11 @@ double drape_supports_kinetic(const drape_motion *motion, const double *v);
 void drape_supports_project(const drape_motion *motion, double *nodes);
 void drape_supports_project_free(const drape_motion *motion, double *free_nodes);
 
+/* Takes what lies along the directions that are held out of velocities that come from elsewhere, but not from
+ * those that a step left there: `before` is the motion and v0 the velocities (node_count x 3) up to now.
+ * Where the same directions are held as before, moving supports keep theirs, those at rest that of v0. */
+void drape_supports_stop(const drape_motion *motion, const drape_motion *before, const double *v0, double *v);
+
 /* values: of a matrix over the free nodes. */
 void drape_supports_project_matrix(const drape_motion *motion, const drape_pattern *pattern, double *values);
 

@@ -2,6 +2,7 @@
  * beside the present one, as when a checkpoint is restored, and has the same cloth. Terms, colliders and
  * events are the same if their names are. The integrator and the controller start anew, as after a kink. */
 #include "base/elementary.h"
+#include "model/support.h"
 #include "model/track.h"
 #include "sim/attach.h"
 
@@ -116,7 +117,7 @@ static drape_status hold(drape_sim *to, const drape_sim *from)
         else
             drape_motion_hold_pin(motion, i, x);
     }
-    drape_system_project(to->system, state->v);
+    drape_supports_stop(motion, drape_system_motion(from->system), drape_sim_state(from)->v, state->v);
     return status;
 }
 

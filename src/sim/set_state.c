@@ -5,6 +5,7 @@
  */
 #include "base/elementary.h"
 #include "base/finite.h"
+#include "model/support.h"
 #include "sim/sim.h"
 
 #include <math.h>
@@ -53,9 +54,9 @@ static void place_pinned(const drape_sim *sim, const double *given, double t, do
     }
 }
 
-/* Fixed nodes have no velocity, those with supports none along what is held, nor have those at rest where
- * the host put them; pinned nodes that move keep the given one until a step sets it to the mean over their
- * displacement. */
+/* Fixed nodes have no velocity, those with supports at rest none along what is held, nor have those at rest
+ * where the host put them; pinned nodes and supports that move keep the given one until a step sets it to the
+ * mean over their displacement. */
 static void stop_fixed(const drape_sim *sim, const double *given, drape_state *state)
 {
     const drape_model *m = sim->model;
@@ -63,7 +64,7 @@ static void stop_fixed(const drape_sim *sim, const double *given, drape_state *s
     for (int32_t i = 0; i < m->node_count; i++)
         if (m->pinned[i])
             memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
-    drape_system_project(sim->system, state->v);
+    drape_supports_stop(motion, motion, drape_sim_state(sim)->v, state->v);
     for (int32_t i = 0; i < motion->moved_count; i++) {
         size_t at = 3 * (size_t)motion->moved_node[i];
         if (!motion->pin_path[i].given)

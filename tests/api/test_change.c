@@ -118,6 +118,51 @@ START_TEST(same_model_changes_nothing)
 }
 END_TEST
 
+/* Nodes that supports hold, at rest and moving, along directions of space and oblique ones, keep their state
+ * to the bit through a change to the same model, new masses and set_state with the sim's own arrays. */
+START_TEST(supports_keep_their_velocities)
+{
+    static const char *const holds[] = {"'normal': [1, 0, 0]", "'normal': [1, 0, 0.2]",
+                                        "'axis': [1, 0.3, 0.2]"};
+    static const char *const tracks[] = {"", ", 'track': [[0, [0, 0, 0]], [1, [-0.1, 0.04, 0]]]"};
+    for (int i = 0; i < METHODS; i++)
+        for (int k = 0; k < 6; k++) {
+            char text[1024];
+            failing_allocator memory = {0};
+            snprintf(text, sizeof text,
+                     "{'drape': 1, 'cloth': [{" CLOTH ", 'pins': [{'corner': 'top-left'}, {'edge': 'right', "
+                     "%s%s}]}], 'integrator': {'rtol': 1e-5}, 'frame_rate': 64, 'duration': 1}",
+                     holds[k % 3], tracks[k / 3]);
+            changing c = open_changing(&memory, methods[i], text);
+            const size_t size = 3 * (size_t)nodes_of(&c) * sizeof(double);
+            const int32_t node = 7;
+            double mass = 1e-3, x[60], v[60];
+            ck_assert_uint_le(size, sizeof x);
+            advance(&c, 4 * FRAME);
+            const uint64_t hash = drape_sim_hash(c.h.sim);
+            const double kinetic = drape_sim_energy(c.h.sim).kinetic;
+            for (int again = 0; again < 2; again++) {
+                good(&c.h, drape_sim_change(c.h.sim, c.scene));
+                ck_assert_msg(drape_sim_hash(c.h.sim) == hash, "%s: %s", methods[i], text);
+            }
+            ck_assert_double_eq(drape_sim_energy(c.h.sim).kinetic, kinetic);
+            memcpy(x, drape_sim_positions(c.h.sim), size);
+            memcpy(v, drape_sim_velocities(c.h.sim), size);
+            good(&c.h, drape_sim_set_state(c.h.sim, drape_sim_time(c.h.sim), x, v));
+            ck_assert_mem_eq(drape_sim_velocities(c.h.sim), v, size);
+            good(&c.h, drape_sim_set_masses(c.h.sim, 1, &node, &mass));
+            ck_assert_mem_eq(drape_sim_positions(c.h.sim), x, size);
+            ck_assert_mem_eq(drape_sim_velocities(c.h.sim), v, size);
+            /* planes of another direction take out what lies across them, those that come to rest as well */
+            set(&c, "/cloth/0/pins/1", "{\"edge\": \"right\", \"normal\": [0, 1, 0]}");
+            good(&c.h, drape_sim_change(c.h.sim, c.scene));
+            for (int j = 4; j < 20; j += 5)
+                ck_assert_double_eq(drape_sim_velocities(c.h.sim)[3 * j + 1], 0);
+            close_changing(&c, &memory);
+        }
+}
+END_TEST
+
 /* ---- Gravity and materials ---- */
 
 /* A sheet that only falls has no forces within: without gravity it goes on at the velocity that it has, and
@@ -543,7 +588,7 @@ START_TEST(a_change_without_memory)
 }
 END_TEST
 
-SUITE("change", same_model_changes_nothing, without_gravity_cloth_flies_on,
+SUITE("change", same_model_changes_nothing, supports_keep_their_velocities, without_gravity_cloth_flies_on,
       a_stiffer_cloth_has_the_energy_of_its_strain, goes_on_as_with_the_value_from_the_start,
       floors_come_and_go, a_moved_collider_stays_where_it_is, pins_come_and_go,
       made_pins_stay_through_a_change, checkpoint_after_a_change, the_rest_goes_on,
