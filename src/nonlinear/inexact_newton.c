@@ -317,7 +317,7 @@ static bool crosses(drape_inexact_newton *s, const double *d)
 
 /* Where the path of the guess begins: at the start of the step, aside from moving colliders.
  *
- * Pins are at the end of the step by then. Where they have gone through cloth on their way, all of it goes
+ * Pins are at the end of the step already. Where they have gone through cloth by then, all of it goes
  * along with their mean displacement, or it would end on their wrong side. */
 static void start_aside(drape_inexact_newton *s, double *aside)
 {

@@ -611,9 +611,9 @@ START_TEST(both_matrices_follow_the_pattern)
 }
 END_TEST
 
-/* A strip is folded up over its pinned row, 12 mm from it, and the pins go through that place: 30 mm in a step,
- * in which free nodes that keep still are passed. All of the cloth follows them instead, in a step that is not
- * rejected, and the fold stays on its side. */
+/* A strip is folded up beside its pinned row, 12 mm from it, and the pins go through that place: 30 mm in a
+ * step, in which free nodes that keep still are passed. All of the cloth follows them instead, in a step that
+ * is not rejected, and the fold stays on its side. */
 START_TEST(pins_do_not_pass_through_cloth)
 {
     static const char text[] =
@@ -628,7 +628,7 @@ START_TEST(pins_do_not_pass_through_cloth)
     ck_assert_int_eq(n, 40);
     memcpy(x, drape_sim_positions(s.sim), sizeof x);
     const double side = x[2] + 0.012;
-    for (int32_t i = 15; i < n; i++) { /* from the third row on the strip goes up, beside the pins */
+    for (int32_t i = 15; i < n; i++) { /* from the fourth row on it goes up */
         x[3 * i + 1] = x[3 * (i % 5) + 1] - 0.08 + 0.04 * (i / 5 - 2);
         x[3 * i + 2] = side;
     }
@@ -644,7 +644,7 @@ START_TEST(pins_do_not_pass_through_cloth)
     ck_assert_int_eq(r.rejected, 0);
     ck_assert_int_eq((int)drape_sim_intersections(s.sim, -1), 0);
     const double *at = drape_sim_positions(s.sim);
-    for (int i = 0; i < 5; i++) /* the row at the height of the pins, or slightly below */
+    for (int i = 0; i < 5; i++)
         ck_assert_double_gt(at[3 * (20 + i) + 2], at[3 * i + 2]);
     scene_close(&s);
 }
