@@ -305,6 +305,35 @@ static drape_status guess_linearized(drape_inexact_newton *s, const drape_inexac
     return status < 0 ? status : DRAPE_OK;
 }
 
+/* Whether something is passed on the straight path from the start of the step to d, pins moving along. */
+static bool crosses(drape_inexact_newton *s, const double *d)
+{
+    drape_step_equation *e = s->equation;
+    const char *reason;
+    drape_diagnostic diagnostic;
+    drape_step_equation_move(e, d);
+    return drape_system_crosses(e->system, e->x, e->point.t, &reason, &diagnostic);
+}
+
+/* Where the path of the guess begins: at the start of the step, aside from moving colliders.
+ *
+ * Pins are at the end of the step already. Where they have gone through cloth by then, all of it goes
+ * along with their mean displacement, or it would end on their wrong side. */
+static void start_aside(drape_inexact_newton *s, double *aside)
+{
+    drape_step_equation *e = s->equation;
+    memset(aside, 0, e->dofs * sizeof *aside);
+    clear_colliders(s, aside);
+    if (!e->model->contact.self || !drape_step_equation_pins_move(e) || !crosses(s, aside))
+        return;
+    drape_step_equation_follow_pins(e, aside);
+    clear_colliders(s, aside);
+    if (!crosses(s, aside))
+        return;
+    memset(aside, 0, e->dofs * sizeof *aside);
+    clear_colliders(s, aside);
+}
+
 /* A guess that is shortened at some nodes has kinks, which become wrinkles that take many iterations to
  * vanish. It is nearer to the solution nevertheless where few iterations follow.
  *
@@ -318,8 +347,7 @@ static void make_guess_feasible(drape_inexact_newton *s, int iterations, double 
     if (!s->fraction)
         return;
     clear_colliders(s, d);
-    memset(aside, 0, e->dofs * sizeof *aside);
-    clear_colliders(s, aside);
+    start_aside(s, aside);
     drape_step_equation_move(e, aside);
     for (size_t i = 0; i < e->dofs; i++)
         d[i] -= aside[i];

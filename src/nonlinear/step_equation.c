@@ -139,6 +139,19 @@ bool drape_step_equation_pins_move(const drape_step_equation *s)
     return false;
 }
 
+void drape_step_equation_follow_pins(const drape_step_equation *s, double *d)
+{
+    const drape_motion *motion = drape_system_motion(s->system);
+    double mean[3] = {0};
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            const size_t at = 3 * (size_t)motion->moved_node[i] + k;
+            mean[k] += (s->x_base[at] - s->x_start[at]) / motion->moved_count;
+        }
+    for (size_t i = 0; i < s->dofs; i++)
+        d[i] = mean[drape_step_equation_at(s, i) % 3];
+}
+
 /* F at d = 0 with the pins where a share of their displacement takes them. */
 static void evaluate_with_pins(drape_step_equation *s, const double *zero, double share)
 {

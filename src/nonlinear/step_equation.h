@@ -97,6 +97,9 @@ void drape_step_equation_predict_contact(drape_step_equation *equation, const do
 /* Whether a track or a path moves a pin in this step. */
 bool drape_step_equation_pins_move(const drape_step_equation *equation);
 
+/* d by which all free nodes follow the mean displacement of the moved pins in the step. */
+void drape_step_equation_follow_pins(const drape_step_equation *s, double *d);
+
 /* Moves to the start of the step, pins too, and sets f (free DOFs) to F there plus its derivative by the
  * positions of pins times their displacement, a difference: then -J^-1 f is the displacement that the
  * linearized equation gives. zero (free DOFs) becomes 0. */
