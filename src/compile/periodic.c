@@ -441,13 +441,14 @@ static int compare_keys(const void *a, const void *b)
 }
 
 /* Whether elements of two nodes lie along both edges of a pair, which are one edge: they would count twice.
- * (Those of triangles do not: each is on one side.) */
+ * (Those of triangles do not: each is on one side.) A cloth of one or two cells between its edges may be
+ * refused for other elements between the same nodes. */
 static drape_status find_twins(const drape_model *m, const drape_term *term, bool *found)
 {
     const drape_elements *el = &term->elements;
     int32_t count = 0;
     *found = false;
-    if (el->nodes != 2 || term->ops->constraint)
+    if (el->nodes != 2 || el->count == 0 || term->ops->constraint)
         return DRAPE_OK;
     int64_t *key = drape_alloc(m->ctx, (size_t)el->count, sizeof *key); /* the sets of both nodes */
     if (!key)
