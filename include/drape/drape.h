@@ -209,6 +209,30 @@ typedef struct drape_mass_def {
     double mass; /* [kg] of each of these nodes, in place of its mass so far, in (0, 1e12]; NaN: not given */
 } drape_mass_def;
 
+/* Nodes of one cloth. They are selected as those of a pin, by exactly one of nodes, corner, edge, row (>=
+ * 0) and has_box. It is embedded in drape_periodic_def, so it can grow only into its reserved members. */
+typedef struct drape_selection_def {
+    const int32_t *nodes;          /* node_count node numbers, local to this cloth */
+    size_t node_count;             /* length of nodes */
+    const char *corner;            /* as in drape_pin_def */
+    const char *edge;              /* as in drape_pin_def */
+    int32_t row;                   /* as in drape_pin_def; -1: not selected by row */
+    bool has_box;                  /* whether box_min and box_max are set */
+    double box_min[3], box_max[3]; /* [m], as in drape_pin_def */
+    void *reserved[4];             /* must be NULL */
+} drape_selection_def;
+
+/* Two edges of a cloth that are the same edge but for a translation, so that the cloth is one cell of a sheet
+ * that repeats itself, or a tube. The nodes of `to` are those of `from`, displaced at rest by one vector, by
+ * which they are paired; at any time they are displaced by the period, and have the same velocity. Each of a
+ * pair has half of the mass of both. Initialise with drape_periodic_def_init. */
+typedef struct drape_periodic_def {
+    size_t struct_size;           /* set by drape_periodic_def_init */
+    drape_selection_def from, to; /* as many nodes of both */
+    double period[3]; /* [m] from a node of `from` to that of `to`; the cloth starts stretched evenly to it.
+                         Default NaN: the displacement at the start */
+} drape_periodic_def;
+
 /* A fold of a cloth about a line. Its far side, beyond the line in the direction `side`, turns about the
  * axis by the angle, which turns `side` about `axis` by the right-hand rule. With a radius the part next to
  * the line is rolled onto a cylinder that touches the sheet at the line, by its arc length: a plane sheet
@@ -276,7 +300,9 @@ typedef struct drape_cloth_def {
         *masses;           /* applied in this order to the masses that the material gives; NULL: none */
     size_t mass_count;     /* length of masses */
     drape_start_def start; /* in which shape and with which velocities it starts; default: at rest */
-    drape_render_mesh_def render_mesh; /* the mesh that frames show; default: the simulated one */
+    drape_render_mesh_def render_mesh;  /* the mesh that frames show; default: the simulated one */
+    const drape_periodic_def *periodic; /* edges that are the same; NULL: none */
+    size_t periodic_count;              /* length of periodic */
 } drape_cloth_def;
 
 /* One side of a seam: nodes of one cloth, in the order in which they are joined. They are selected as
@@ -396,6 +422,7 @@ DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
 DRAPE_API void drape_pin_def_init(drape_pin_def *def, size_t struct_size);
 DRAPE_API void drape_mass_def_init(drape_mass_def *def, size_t struct_size);
+DRAPE_API void drape_periodic_def_init(drape_periodic_def *def, size_t struct_size);
 DRAPE_API void drape_history_def_init(drape_history_def *def, size_t struct_size);
 DRAPE_API void drape_event_def_init(drape_event_def *def, size_t struct_size);
 DRAPE_API void drape_seam_def_init(drape_seam_def *def, size_t struct_size);

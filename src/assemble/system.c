@@ -5,6 +5,7 @@
 #include "base/clock.h"
 #include "base/finite.h"
 #include "model/history.h"
+#include "model/periodic.h"
 #include "model/support.h"
 
 #include <math.h>
@@ -327,9 +328,13 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
 {
     for (int32_t i = 0; of_node && i < system->model->node_count; i++)
         of_node[i] = 1;
-    return system->contact ? drape_contact_step_fraction(system->contact, in_space(system, t, x, 0),
-                                                         in_space(system, t, y, 2), t, of_node)
-                           : 1;
+    const double fraction = system->contact
+                                ? drape_contact_step_fraction(system->contact, in_space(system, t, x, 0),
+                                                              in_space(system, t, y, 2), t, of_node)
+                                : 1;
+    if (of_node)
+        drape_periodic_least(system->model, of_node);
+    return fraction;
 }
 
 void drape_system_set_contact_step(drape_system *system, double dt)
@@ -430,7 +435,7 @@ static drape_status extend(drape_system *system, int32_t pairs, const int32_t *n
 {
     const drape_model *model = system->model;
     drape_context *ctx = system->arena->ctx;
-    drape_coupling *couplings = drape_alloc(ctx, (size_t)model->term_count + 2, sizeof *couplings);
+    drape_coupling *couplings = drape_alloc(ctx, (size_t)model->term_count + 3, sizeof *couplings);
     if (pairs < 0 || !couplings) {
         drape_free(ctx, couplings);
         return DRAPE_E_MEMORY;

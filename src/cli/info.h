@@ -80,9 +80,11 @@ json_t *cli_key_json(const drape_scene_key *key, const void *def);
 json_t *cli_form_json(const drape_scene_object *form, const void *def);
 
 /* Of a cloth, as in a scene, new references: its pins with the nodes that they select, the triangles that
- * carry them and the pivot about which they turn; its masses; how it starts, NULL: at rest. */
+ * carry them and the pivot about which they turn; its masses; its periodic edges; how it starts, NULL: at
+ * rest. */
 json_t *cli_pins_json(const cli_info *info, int32_t c);
 json_t *cli_masses_json(const cli_info *info, int32_t c);
+json_t *cli_periodic_json(const cli_info *info, int32_t c);
 json_t *cli_start_json(const cli_info *info, int32_t c);
 json_t *cli_render_mesh_json(const cli_info *info, int32_t c); /* NULL: none */
 

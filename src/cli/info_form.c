@@ -184,6 +184,15 @@ json_t *cli_masses_json(const cli_info *info, int32_t c)
     return masses;
 }
 
+json_t *cli_periodic_json(const cli_info *info, int32_t c)
+{
+    const drape_cloth_def *def = &info->def.cloths[c];
+    json_t *periodic = json_array();
+    for (size_t i = 0; i < def->periodic_count; i++)
+        periodic = drape_json_append(periodic, cli_form_json(&drape_form_periodic, &def->periodic[i]));
+    return periodic;
+}
+
 json_t *cli_histories_json(const cli_info *info)
 {
     json_t *histories = json_array();

@@ -276,6 +276,7 @@ static json_t *cloth(const cli_info *info, int32_t c)
     object = with_keys(object, &drape_form_cloth, &info->def.cloths[c]);
     object = with_list(object, "pins", cli_pins_json(info, c));
     object = with_list(object, "masses", cli_masses_json(info, c));
+    object = with_list(object, "periodic", cli_periodic_json(info, c));
     json_t *start = cli_start_json(info, c);
     if (start)
         object = drape_json_with(object, "start", start);

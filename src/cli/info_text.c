@@ -209,6 +209,7 @@ static void print_cloth(const cli_info *info, int32_t c)
     print_pins(info->model, cloth, &info->cloths[c]);
     print_objects("pin", &drape_form_pin, cli_pins_json(info, c));
     print_objects("masses", &drape_form_mass, cli_masses_json(info, c));
+    print_objects("periodic", &drape_form_periodic, cli_periodic_json(info, c));
     print_part("start", cli_start_json(info, c));
     print_part("render_mesh", cli_render_mesh_json(info, c));
     print_material(cloth);

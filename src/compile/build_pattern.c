@@ -13,7 +13,7 @@ static drape_status place_term(drape_model *model, drape_term *term)
 
 drape_status drape_compile_pattern(drape_model *model)
 {
-    drape_coupling *couplings = drape_alloc(model->ctx, (size_t)model->term_count + 1, sizeof *couplings);
+    drape_coupling *couplings = drape_alloc(model->ctx, (size_t)model->term_count + 2, sizeof *couplings);
     if (!couplings)
         return DRAPE_E_MEMORY;
     const int count = drape_model_couplings(model, NULL, couplings);

@@ -5,6 +5,7 @@
 #include "base/vec3.h"
 
 #include "compile/stages.h"
+#include "model/periodic.h"
 #include "model/scene.h"
 
 #include <math.h>
@@ -224,25 +225,18 @@ static void stop_pinned(drape_model *model)
             double *v = model->velocity + 3 * (size_t)model->supports[i].node;
             vec3_add_scaled(-vec3_dot(n, v), n, v);
         }
+    drape_periodic_project(model, model->velocity);
 }
 
 drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape_model **out)
 {
-    static drape_status (*const stages[])(drape_model *,
-                                          const drape_scene_def *) = {copy_scene,
-                                                                      compile_cloths,
-                                                                      drape_compile_render_meshes,
-                                                                      drape_compile_start,
-                                                                      drape_compile_pins,
-                                                                      drape_compile_events,
-                                                                      drape_compile_contact,
-                                                                      drape_compile_colliders,
-                                                                      drape_compile_rides,
-                                                                      drape_compile_ignored,
-                                                                      drape_compile_contact_stiffness,
-                                                                      drape_compile_seams,
-                                                                      drape_compile_histories,
-                                                                      drape_compile_terms};
+    static drape_status (*const stages[])(drape_model *, const drape_scene_def *) = {
+        copy_scene,           compile_cloths,          drape_compile_render_meshes,
+        drape_compile_start,  drape_compile_periodic,  drape_compile_pins,
+        drape_compile_events, drape_compile_contact,   drape_compile_colliders,
+        drape_compile_rides,  drape_compile_ignored,   drape_compile_contact_stiffness,
+        drape_compile_seams,  drape_compile_histories, drape_compile_terms,
+        drape_compile_images};
     *out = NULL;
     drape_model *model = drape_alloc(ctx, 1, sizeof *model);
     if (!model)

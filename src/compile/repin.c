@@ -3,6 +3,7 @@
  * masses: weights and the stiffness of contact. Everything else is shared. */
 #include "compile/compile.h"
 #include "compile/stages.h"
+#include "model/periodic.h"
 
 #include <string.h>
 
@@ -45,7 +46,9 @@ static drape_status number(drape_model *model, const uint8_t *pinned)
         for (size_t i = 0; i < nodes; i++)
             model->pinned[i] = pinned[i] != 0;
         list_tracks(base, pinned, track_of_node);
-        status = drape_compile_number_nodes(model, track_of_node);
+        status = drape_compile_pinned_images(model);
+        if (!status)
+            status = drape_compile_number_nodes(model, track_of_node);
     }
     drape_free(model->ctx, track_of_node);
     return status;
@@ -61,6 +64,7 @@ static drape_status weigh(drape_model *model, const double *mass)
     if (drape_arena_status(&model->arena))
         return DRAPE_E_MEMORY;
     memcpy(model->mass, mass, nodes * sizeof *mass);
+    drape_periodic_share(model, model->mass);
     for (size_t c = 0; c < cloths; c++) {
         model->cloths[c] = from[c];
         model->cloths[c].node_mass = model->mass + from[c].first_node;

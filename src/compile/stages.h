@@ -23,6 +23,16 @@ drape_status drape_compile_render_meshes(drape_model *model, const drape_scene_d
 /* Computes where all cloths start and their initial velocities, after the meshes and masses. */
 drape_status drape_compile_start(drape_model *model, const drape_scene_def *def);
 
+/* Pairs the nodes of periodic edges, puts them where they start and shares their masses, after the start. */
+drape_status drape_compile_periodic(drape_model *model, const drape_scene_def *def);
+
+/* Checks that what a scene with periodic edges has besides them keeps the period, and lists the nodes that
+ * are coupled because their images are, after the terms. def is not used. */
+drape_status drape_compile_images(drape_model *model, const drape_scene_def *def);
+
+/* Checks that all images of a node are pinned or none is. */
+drape_status drape_compile_pinned_images(const drape_model *model);
+
 /* Marks the pinned nodes of all cloths, numbers the free ones, and stores the tracks. */
 drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def);
 

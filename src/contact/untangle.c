@@ -280,6 +280,8 @@ static drape_status set_up(drape_untangler *u, const drape_motion *motion, doubl
     }
     for (int32_t i = 0; i < m->support_count; i++) /* they would leave their planes */
         u->mobility[m->supports[i].node] = 0;
+    for (int32_t i = 0; m->image_set_count > 0 && i < m->image_start[m->image_set_count]; i++)
+        u->mobility[m->image[i]] = 0; /* nor would these keep their period */
     status = place_bodies(u, motion, t);
     if (!status)
         status = take_sheets(u);

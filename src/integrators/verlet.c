@@ -331,7 +331,7 @@ static void project(verlet_state *s, const substep *sub)
     sub->info->pin_work += drape_verlet_project(&s->contact, sub->t0, sub->t, sub->h, s->x0, sub->x);
     if (s->limit.count > 0)
         drape_verlet_limit_lengths(&s->limit, sub->x);
-    if (m->supports_move)
+    if (m->supports_move || m->image_set_count > 0)
         drape_supports_hold(s->motion, sub->t0, s->x0, sub->t, sub->x);
     take_velocities(3 * (size_t)m->node_count, sub->h, s->inverse, sub->x, s->x0, sub->v);
     s->work.contact_seconds += drape_clock_seconds() - start;

@@ -154,6 +154,9 @@ int drape_model_couplings(const drape_model *model, const bool *without, drape_c
     if (features)
         couplings[count++] =
             (drape_coupling){.count = model->triangle_count, .nodes = 3, .node = model->triangle};
+    if (model->image_coupled_count > 0)
+        couplings[count++] =
+            (drape_coupling){.count = model->image_coupled_count, .nodes = 2, .node = model->image_coupled};
     return count;
 }
 

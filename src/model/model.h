@@ -377,7 +377,13 @@ struct drape_model {
     drape_support
         *supports; /* (support_count) ascending nodes; those that are pinned altogether do not count */
     int32_t support_count;
-    bool supports_move;        /* some of them have a track */
+    bool supports_move;      /* some of them have a track */
+    int32_t image_set_count; /* sets of nodes of periodic edges that are the same node (model/periodic.h) */
+    int32_t *image_start;    /* (image_set_count + 1) */
+    int32_t *image;          /* the nodes of set s are image[image_start[s]] ... [image_start[s + 1] - 1] */
+    int32_t *image_set;      /* (node_count) the set of each node, -1: none; NULL: no periodic edges */
+    int32_t *image_coupled; /* (image_coupled_count x 2) pairs of nodes that couple because their images do */
+    int32_t image_coupled_count;
     drape_track *tracks;       /* of a pin that a collider carries, without keys and turns */
     drape_ride *ride;          /* (node_count) of pins that colliders carry; NULL: no pin of the scene */
     drape_collider *colliders; /* (collider_count) */
@@ -442,8 +448,8 @@ static inline double drape_collider_activation(const drape_model *model, int32_t
 void drape_model_place_pins(const drape_model *model, double t, double *x);
 
 /* Lists what couples nodes of the model in every state: the terms and, if a collider has features that the
- * faces and edges of cloth can touch, the triangles. without (term_count): terms to be left out; NULL: none.
- * couplings: of term_count + 1. Returns their number. */
+ * faces and edges of cloth can touch, the triangles; and images of coupled nodes. without (term_count):
+ * terms to be left out; NULL: none. couplings: of term_count + 2. Returns their number. */
 int drape_model_couplings(const drape_model *model, const bool *without, drape_coupling *couplings);
 
 /* Returns the cloth that a node belongs to. */

@@ -92,8 +92,9 @@ typedef struct drape_scene_object {
 
 /* The top-level object and some of its descendants. */
 extern const drape_scene_object drape_form_scene, drape_form_output, drape_form_cloth, drape_form_mesh,
-    drape_form_transform, drape_form_pin, drape_form_mass, drape_form_turn, drape_form_collider,
-    drape_form_event, drape_form_seam, drape_form_seam_side, drape_form_history;
+    drape_form_transform, drape_form_pin, drape_form_mass, drape_form_periodic, drape_form_selection,
+    drape_form_turn, drape_form_collider, drape_form_event, drape_form_seam, drape_form_seam_side,
+    drape_form_history;
 
 /* Returns the key of an object by its name; NULL if there is none. */
 const drape_scene_key *drape_scene_key_of(const drape_scene_object *object, const char *name);

@@ -230,6 +230,14 @@ void drape_mass_def_init(drape_mass_def *def, size_t struct_size)
     drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
+void drape_periodic_def_init(drape_periodic_def *def, size_t struct_size)
+{
+    drape_periodic_def defaults = {.struct_size = 0};
+    drape_scene_set_defaults(&drape_form_periodic, &defaults);
+    defaults.struct_size = struct_size;
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
+}
+
 /* ---- Keys as text ---- */
 
 void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size)

@@ -109,6 +109,40 @@ const drape_scene_object drape_form_mass = {.name = "mass",
                                             .def_size = sizeof(drape_mass_def),
                                             .least_size = sizeof(drape_mass_def)};
 
+static const drape_scene_key selection_keys[] = {
+    {DRAPE_INTEGER("nodes", "1", UNSAID, 0, INT32_MAX, "node numbers of this cloth"),
+     .shape = DRAPE_SCENE_LIST, ARRAY(drape_selection_def, nodes, node_count), .at_least = 1},
+    {DRAPE_CHOICE("corner", UNSAID, corners, "a corner of a grid; top is row 0, left is column 0"),
+     IN(drape_selection_def, corner)},
+    {DRAPE_CHOICE("edge", UNSAID, edges, "a side of a grid; top is row 0, left is column 0"),
+     IN(drape_selection_def, edge)},
+    {DRAPE_INTEGER("row", "1", UNSAID, 0, INT32_MAX, "a row of a grid, from 0"),
+     IN(drape_selection_def, row)},
+    {DRAPE_VECTOR("box", "m", UNSAID, LOWEST, HIGHEST,
+                  "nodes inside a box of rest coordinates after the transform, boundary included"),
+     .shape = DRAPE_SCENE_BOX, BOX(drape_selection_def)},
+};
+
+const drape_scene_object drape_form_selection = {.name = "selection",
+                                                 KEYS(selection_keys),
+                                                 .one_of = pin_selectors,
+                                                 .def_size = sizeof(drape_selection_def)};
+
+static const drape_scene_key periodic_keys[] = {
+    {SHAPED(DRAPE_SCENE_OBJECT, "from", DRAPE_REQUIRED, "the nodes of one edge"),
+     IN(drape_periodic_def, from), .child = &drape_form_selection},
+    {SHAPED(DRAPE_SCENE_OBJECT, "to", DRAPE_REQUIRED, "those of the other, displaced at rest by one vector"),
+     IN(drape_periodic_def, to), .child = &drape_form_selection},
+    {DRAPE_VECTOR("period", "m", DRAPE_DERIVED("the displacement at the start"), -1e9, 1e9,
+                  "from each node of `from` to that of `to`; the cloth starts stretched evenly to it"),
+     IN(drape_periodic_def, period)},
+};
+
+const drape_scene_object drape_form_periodic = {.name = "periodic",
+                                                KEYS(periodic_keys),
+                                                .def_size = sizeof(drape_periodic_def),
+                                                .least_size = sizeof(drape_periodic_def)};
+
 /* ---- Objects with settings ---- */
 
 static const drape_scene_key term_keys[] = {
@@ -250,6 +284,9 @@ static const drape_scene_key cloth_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECT, "render_mesh", DRAPE_DERIVED("none: frames show the simulated mesh"),
             "another mesh that frames show in its place, whose vertices follow it"),
      .optional = true, IN(drape_cloth_def, render_mesh), .child = &render_mesh},
+    {SHAPED(DRAPE_SCENE_OBJECTS, "periodic", DRAPE_DERIVED("none"),
+            "pairs of edges that are the same edge but for a translation"),
+     ARRAY(drape_cloth_def, periodic, periodic_count), .child = &drape_form_periodic},
 };
 
 const drape_scene_object drape_form_cloth = {.name = "cloth",

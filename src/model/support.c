@@ -2,6 +2,7 @@
 #include "model/support.h"
 
 #include "base/vec3.h"
+#include "model/periodic.h"
 #include "model/track.h"
 
 #include <math.h>
@@ -29,6 +30,7 @@ static void project(int count, double n[2][3], double *v)
 void drape_supports_project(const drape_motion *motion, double *nodes)
 {
     const drape_model *m = motion->model;
+    drape_periodic_project(m, nodes);
     for (int32_t i = 0; i < m->support_count; i++) {
         double n[2][3];
         project(directions(motion, &m->supports[i], n), n, nodes + 3 * (size_t)m->supports[i].node);
@@ -38,6 +40,7 @@ void drape_supports_project(const drape_motion *motion, double *nodes)
 void drape_supports_project_free(const drape_motion *motion, double *free_nodes)
 {
     const drape_model *m = motion->model;
+    drape_periodic_project_free(m, free_nodes);
     for (int32_t i = 0; i < m->support_count; i++) {
         double n[2][3];
         const int count = directions(motion, &m->supports[i], n);
@@ -94,18 +97,10 @@ static void project_block(int count, double n[2][3], double *block, int64_t stri
     }
 }
 
-static double largest_entry(const double *block, int64_t stride)
-{
-    double largest = 0;
-    for (int c = 0; c < 3; c++)
-        for (int r = 0; r < 3; r++)
-            largest = fmax(largest, fabs(block[c * stride + r]));
-    return largest > 0 ? largest : 1;
-}
-
 void drape_supports_project_matrix(const drape_motion *motion, const drape_pattern *pattern, double *values)
 {
     const drape_model *m = motion->model;
+    drape_periodic_project_matrix(m, pattern, values);
     for (int32_t i = 0; i < m->support_count; i++) {
         double n[2][3];
         const int count = directions(motion, &m->supports[i], n);
@@ -114,7 +109,7 @@ void drape_supports_project_matrix(const drape_motion *motion, const drape_patte
         if (count == 0)
             continue;
         double *diagonal = drape_pattern_at(pattern, values, j, pattern->diagonal[j], &stride);
-        const double scale = largest_entry(diagonal, stride);
+        const double largest = drape_pattern_largest(diagonal, stride), scale = largest > 0 ? largest : 1;
         for (int32_t k = pattern->block_start[j]; k < pattern->block_start[j + 1]; k++) {
             const int32_t row = pattern->block_row[k], mirrored = drape_pattern_find(pattern, j, row);
             double *block = drape_pattern_at(pattern, values, j, k, &stride);
@@ -129,13 +124,42 @@ void drape_supports_project_matrix(const drape_motion *motion, const drape_patte
     }
 }
 
+static const drape_support *support_of(const drape_model *m, int32_t node)
+{
+    for (int32_t i = 0; i < m->support_count; i++)
+        if (m->supports[i].node == node)
+            return &m->supports[i];
+    return NULL;
+}
+
+/* What the images of a node do not have in common, and what supports of theirs take from that. */
+static void keep_across(const drape_motion *motion, int32_t set, double *g)
+{
+    const drape_model *m = motion->model;
+    const int32_t *node = m->image + m->image_start[set],
+                  count = m->image_start[set + 1] - m->image_start[set];
+    const drape_support *support = support_of(m, node[0]);
+    double n[2][3], mean[3] = {0};
+    if (m->free_of_node[node[0]] < 0)
+        return;
+    for (int32_t i = 0; i < count; i++)
+        vec3_add_scaled(1.0 / count, g + 3 * (size_t)node[i], mean);
+    if (support)
+        project(directions(motion, support, n), n, mean);
+    for (int32_t i = 0; i < count; i++)
+        vec3_add_scaled(-1, mean, g + 3 * (size_t)node[i]);
+}
+
 void drape_supports_keep_reactions(const drape_motion *motion, double *g)
 {
     const drape_model *m = motion->model;
     int32_t next = 0;
     for (int32_t f = 0; f < m->free_count; f++) {
-        double *at = g + 3 * (size_t)m->node_of_free[f], n[2][3], across[3];
-        const drape_support *support = find_support(m, m->node_of_free[f], &next);
+        const int32_t node = m->node_of_free[f];
+        double *at = g + 3 * (size_t)node, n[2][3], across[3];
+        const drape_support *support = find_support(m, node, &next);
+        if (drape_periodic_has(m, node))
+            continue;
         if (!support) {
             memset(at, 0, 3 * sizeof *at);
             continue;
@@ -144,6 +168,8 @@ void drape_supports_keep_reactions(const drape_motion *motion, double *g)
         project(directions(motion, support, n), n, across);
         vec3_add_scaled(-1, across, at);
     }
+    for (int32_t s = 0; s < m->image_set_count; s++)
+        keep_across(motion, s, g);
 }
 
 /* ---- Supports that move ---- */
@@ -251,6 +277,7 @@ void drape_supports_hold(const drape_motion *motion, double t0, const double *x0
             vec3_add_scaled(-vec3_dot(n[d], moved), n[d], x + at);
         }
     }
+    drape_periodic_hold(m, x0, x);
 }
 
 void drape_supports_hold_velocity(const drape_motion *motion, const double span[2], bool instant, double *v)

@@ -4,7 +4,8 @@
  * matrices, g' = P g,   J' = P J P + s (I - P),   P = I - sum n n', with s > 0 the largest entry of the
  * node's diagonal block. From a state that moves across the directions, M v' + g' = 0 keeps every method
  * there: M is a multiple of I at each node. Displacements solve the equation in which the coordinates along
- * n are eliminated, whatever s is, and the sparsity stays.
+ * n are eliminated, whatever s is, and the sparsity stays. All of this also projects onto what periodic edges
+ * allow (model/periodic.h): a node and its images have the same directions.
  */
 #ifndef DRAPE_MODEL_SUPPORT_H
 #define DRAPE_MODEL_SUPPORT_H
@@ -43,8 +44,8 @@ void drape_supports_stop(const drape_motion *motion, const drape_motion *before,
 /* values: of a matrix over the free nodes. */
 void drape_supports_project_matrix(const drape_motion *motion, const drape_pattern *pattern, double *values);
 
-/* The forces of the supports: g (node_count x 3) without it, and 0 where a node is free in all directions;
- * pinned nodes are unchanged. */
+/* The forces of the supports, and those by which periodic edges hold each other: g (node_count x 3) without
+ * it, and 0 where a node is free in all directions; pinned nodes are unchanged. */
 void drape_supports_keep_reactions(const drape_motion *motion, double *g);
 
 /* Makes the displacement from x0 to x along these directions that of the supports from t0 to t1: takes out

@@ -281,6 +281,7 @@ static void clear_colliders(drape_inexact_newton *s, double *d)
         if (e->x_ahead[at] != e->x[at] + d[i])
             d[i] = e->x_ahead[at] - e->x[at];
     }
+    drape_system_project_free(e->system, d);
 }
 
 /* Where a pin takes a sheet along, nodes that keep their motion stay behind, and it takes many corrections

@@ -176,6 +176,11 @@ static uint64_t add_nodes(uint64_t hash, const drape_model *m)
         hash = add(hash, m->supports[i].track, sizeof m->supports[i].track);
         hash = add_doubles(hash, m->supports[i].dual[0], 6);
     }
+    if (m->image_set_count > 0) {
+        const size_t sets = (size_t)m->image_set_count;
+        hash = add(hash, m->image_start, (sets + 1) * sizeof *m->image_start);
+        hash = add(hash, m->image, (size_t)m->image_start[sets] * sizeof *m->image);
+    }
     for (size_t i = 0; m->ride && i < nodes; i++) {
         const int64_t on[] = {m->ride[i].collider, m->ride[i].triangle};
         hash = add(hash, on, sizeof on);

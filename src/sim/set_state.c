@@ -115,6 +115,30 @@ static drape_status check_supported(const drape_sim *sim, const double *given, d
     return DRAPE_OK;
 }
 
+/* Images stay displaced from each other as they are. */
+static drape_status check_images(const drape_sim *sim, const double *given)
+{
+    const drape_model *m = sim->model;
+    const double *now = drape_sim_state(sim)->x;
+    for (int32_t i = 0; m->image_set && i < m->node_count; i++) {
+        if (m->image_set[i] < 0 || m->pinned[i])
+            continue;
+        const int32_t first = m->image[m->image_start[m->image_set[i]]];
+        double off[3];
+        for (size_t k = 0, a = 3 * (size_t)i, b = 3 * (size_t)first; k < 3; k++)
+            off[k] = given[a + k] - given[b + k] - (now[a + k] - now[b + k]);
+        const double distance = drape_hypot(drape_hypot(off[0], off[1]), off[2]);
+        const drape_cloth *cloth = &m->cloths[drape_model_cloth_of(m, i)];
+        if (!(distance <= PIN_SLIP * m->length))
+            return drape_fail(
+                sim->ctx, DRAPE_E_ARGUMENT,
+                "drape_sim_set_state: node %d of %s is %g m from where the period of its periodic "
+                "edge has it from node %d",
+                (int)(i - cloth->first_node), cloth->name, distance, (int)(first - cloth->first_node));
+    }
+    return DRAPE_OK;
+}
+
 /* The index of the first frame at or after the present time. */
 static int64_t first_frame(const drape_sim *sim)
 {
@@ -149,7 +173,9 @@ drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, cons
     const drape_model *m = sim->model;
     const size_t size = 3 * (size_t)m->node_count * sizeof *x;
     double *placed = sim->query_scratch;
-    status = check_supported(sim, x, placed);
+    status = check_images(sim, x);
+    if (!status)
+        status = check_supported(sim, x, placed);
     if (status)
         return status;
     memcpy(placed, x, size);

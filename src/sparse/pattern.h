@@ -9,6 +9,8 @@
 #ifndef DRAPE_SPARSE_PATTERN_H
 #define DRAPE_SPARSE_PATTERN_H
 
+#include <math.h>
+
 #include "base/arena.h"
 
 typedef struct drape_pattern {
@@ -56,6 +58,16 @@ static inline double *drape_pattern_at(const drape_pattern *pattern, double *val
     int64_t start = pattern->block_start[column];
     *stride = 3 * (pattern->block_start[column + 1] - start);
     return values + 9 * start + 3 * (block - start);
+}
+
+/* The largest absolute value in a block. */
+static inline double drape_pattern_largest(const double *block, int64_t stride)
+{
+    double largest = 0;
+    for (int c = 0; c < 3; c++)
+        for (int r = 0; r < 3; r++)
+            largest = fmax(largest, fabs(block[c * stride + r]));
+    return largest;
 }
 
 #endif

@@ -1,0 +1,595 @@
+/* periodic.c: which nodes of a cloth are images of each other, where they start, and that the rest of the
+ * scene leaves them so. See model/periodic.h. */
+#include "model/periodic.h"
+
+#include "base/vec3.h"
+#include "compile/select.h"
+#include "compile/stages.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define SLIP 1e-6 /* of the size of the scene: how far a node may be from where the period puts it */
+
+/* One edge of a pair. */
+typedef struct side {
+    int32_t *node; /* (count) local to the cloth; room for all its nodes */
+    int32_t count;
+    uint8_t *taken; /* (nodes of the cloth) */
+    double mean[3]; /* [m] at rest */
+} side;
+
+/* One item of "periodic". */
+typedef struct pairing {
+    drape_model *model;
+    const drape_cloth *cloth;
+    const drape_periodic_def *def;
+    char pointer[96];
+    side from, to;
+    int32_t *partner; /* (from.count) of the node with the same number, local to the cloth */
+} pairing;
+
+static double distance(const double *a, const double *b)
+{
+    double d[3];
+    vec3_sub(a, b, d);
+    return vec3_norm(d);
+}
+
+/* ---- Pairs ---- */
+
+static drape_status take_node(void *user, const char *key, int32_t local)
+{
+    side *s = user;
+    (void)key;
+    if (!s->taken[local])
+        s->node[s->count++] = local;
+    s->taken[local] = 1;
+    return DRAPE_OK;
+}
+
+static drape_status list_side(const pairing *p, const char *key, const drape_selection_def *def,
+                              drape_arena *scratch, side *s)
+{
+    const drape_mesh *mesh = &p->cloth->mesh;
+    char pointer[128];
+    snprintf(pointer, sizeof pointer, "%s/%s", p->pointer, key);
+    s->node = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *s->node);
+    s->taken = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *s->taken);
+    const drape_selection selection = {.ctx = p->model->ctx,
+                                       .pointer = pointer,
+                                       .form = &drape_form_selection,
+                                       .mesh = mesh,
+                                       .nodes = def->nodes,
+                                       .node_count = def->node_count,
+                                       .corner = def->corner,
+                                       .edge = def->edge,
+                                       .row = def->row,
+                                       .has_box = def->has_box,
+                                       .box_min = def->box_min,
+                                       .box_max = def->box_max,
+                                       .take = take_node,
+                                       .user = s};
+    drape_status status = drape_arena_status(scratch);
+    if (!status)
+        status = drape_select_nodes(&selection);
+    for (int32_t i = 0; !status && i < s->count; i++)
+        vec3_add_scaled(1.0 / s->count, mesh->x + 3 * (size_t)s->node[i], s->mean);
+    return status;
+}
+
+typedef struct placed {
+    double along;
+    int32_t node;
+} placed;
+
+static int compare(const void *a, const void *b)
+{
+    const placed *p = a, *q = b;
+    return p->along != q->along ? (p->along > q->along) - (p->along < q->along) : p->node - q->node;
+}
+
+/* The axis along which the nodes of a side extend most. */
+static int longest_axis(const side *s, const double *x)
+{
+    double extent[3] = {0};
+    for (int32_t i = 0; i < s->count; i++)
+        for (size_t k = 0; k < 3; k++)
+            extent[k] = fmax(extent[k], fabs(x[3 * (size_t)s->node[i] + k] - s->mean[k]));
+    int axis = extent[1] > extent[0];
+    return extent[2] > extent[axis] ? 2 : axis;
+}
+
+static drape_status refuse_pair(const pairing *p, int32_t node, const double *at)
+{
+    const double *x = p->cloth->mesh.x;
+    int32_t nearest = p->to.node[0];
+    for (int32_t i = 0; i < p->to.count; i++)
+        if (distance(x + 3 * (size_t)p->to.node[i], at) < distance(x + 3 * (size_t)nearest, at))
+            nearest = p->to.node[i];
+    return drape_fail_at(
+        p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
+        "node %d displaced at rest as its edge is has no node of the other edge at (%g %g %g) "
+        "m; the nearest, node %d, is %g m away",
+        (int)node, at[0], at[1], at[2], (int)nearest, distance(x + 3 * (size_t)nearest, at));
+}
+
+/* Finds the node of `to` that lies where each of `from` is displaced to at rest: among those, in the order of
+ * one coordinate, whose coordinate is near. */
+static drape_status match(pairing *p, drape_arena *scratch)
+{
+    const double *x = p->cloth->mesh.x, slip = SLIP * p->model->length;
+    const size_t count = (size_t)p->to.count;
+    const size_t axis = (size_t)longest_axis(&p->to, x);
+    placed *list = drape_arena_take(scratch, count, sizeof *list);
+    p->partner = drape_arena_take(scratch, count, sizeof *p->partner);
+    if (drape_arena_status(scratch))
+        return DRAPE_E_MEMORY;
+    for (size_t i = 0; i < count; i++)
+        list[i] = (placed){x[3 * (size_t)p->to.node[i] + axis], p->to.node[i]};
+    qsort(list, count, sizeof *list, compare);
+    for (size_t i = 0; i < count; i++) {
+        double at[3];
+        size_t low = 0, high = count;
+        for (size_t k = 0; k < 3; k++)
+            at[k] = x[3 * (size_t)p->from.node[i] + k] + p->to.mean[k] - p->from.mean[k];
+        while (low < high) {
+            const size_t middle = (low + high) / 2;
+            if (list[middle].along < at[axis] - slip)
+                low = middle + 1;
+            else
+                high = middle;
+        }
+        while (low < count && list[low].along <= at[axis] + slip &&
+               !(p->to.taken[list[low].node] && distance(x + 3 * (size_t)list[low].node, at) <= slip))
+            low++;
+        if (low == count || list[low].along > at[axis] + slip)
+            return refuse_pair(p, p->from.node[i], at);
+        p->partner[i] = list[low].node;
+        p->to.taken[list[low].node] = 0; /* each is the partner of one */
+    }
+    return DRAPE_OK;
+}
+
+static drape_status find_pairs(pairing *p, drape_arena *scratch)
+{
+    drape_status status = list_side(p, "from", &p->def->from, scratch, &p->from);
+    if (!status)
+        status = list_side(p, "to", &p->def->to, scratch, &p->to);
+    if (status)
+        return status;
+    for (int32_t i = 0; i < p->from.count; i++)
+        if (p->to.taken[p->from.node[i]])
+            return drape_fail_at(p->model->ctx, DRAPE_E_ARGUMENT, p->pointer, "node %d is in both edges",
+                                 (int)p->from.node[i]);
+    if (p->from.count != p->to.count)
+        return drape_fail_at(p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
+                             "one edge has %d nodes and the other %d: they are paired one by one",
+                             (int)p->from.count, (int)p->to.count);
+    return match(p, scratch);
+}
+
+/* ---- The start ---- */
+
+/* How far x of the nodes of pair i are apart, less the displacement by. */
+static double off(const pairing *p, int32_t i, const double *x, const double by[3])
+{
+    double at[3];
+    memcpy(at, x + 3 * (size_t)p->from.node[i], sizeof at);
+    vec3_add_scaled(1, by, at);
+    return distance(at, x + 3 * (size_t)p->partner[i]);
+}
+
+static drape_status check_start(const pairing *p, const double *x, const double by[3])
+{
+    for (int32_t i = 0; i < p->from.count; i++)
+        if (!(off(p, i, x, by) <= SLIP * p->model->length))
+            return drape_fail_at(
+                p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
+                "at the start node %d is %g m from where the period (%g %g %g) m puts node %d",
+                (int)p->partner[i], off(p, i, x, by), by[0], by[1], by[2], (int)p->from.node[i]);
+    return DRAPE_OK;
+}
+
+/* Stretches the cloth by what the period is longer than the displacement at the start: in proportion to how
+ * far along the displacement at rest a node is. */
+static drape_status stretch(const pairing *p, const double now[3], double *x)
+{
+    const drape_mesh *mesh = &p->cloth->mesh;
+    double along[3], more[3];
+    vec3_sub(p->to.mean, p->from.mean, along);
+    vec3_sub(p->def->period, now, more);
+    const double square = vec3_dot(along, along);
+    if (!(vec3_norm(more) > SLIP * p->model->length))
+        return DRAPE_OK;
+    if (!(sqrt(square) > SLIP * p->model->length))
+        return drape_fail_at(p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
+                             "the edges coincide at rest, so the period is 0 0 0 or that of a \"start\"");
+    for (int32_t i = 0; i < mesh->node_count; i++) {
+        double arm[3];
+        vec3_sub(mesh->x + 3 * (size_t)i, p->from.mean, arm);
+        vec3_add_scaled(vec3_dot(arm, along) / square, more, x + 3 * (size_t)i);
+    }
+    return DRAPE_OK;
+}
+
+static drape_status own_start(drape_model *model)
+{
+    const size_t size = 3 * (size_t)model->node_count * sizeof *model->start;
+    if (model->start != model->rest)
+        return DRAPE_OK;
+    model->start = drape_arena_take(&model->arena, 1, size);
+    if (!model->start)
+        return DRAPE_E_MEMORY;
+    memcpy(model->start, model->rest, size);
+    return DRAPE_OK;
+}
+
+static drape_status place(pairing *p, bool may_move)
+{
+    drape_model *model = p->model;
+    const size_t first = 3 * (size_t)p->cloth->first_node;
+    double now[3] = {0};
+    const double *x = model->start + first;
+    for (int32_t i = 0; i < p->from.count; i++) {
+        vec3_add_scaled(1.0 / p->from.count, x + 3 * (size_t)p->partner[i], now);
+        vec3_add_scaled(-1.0 / p->from.count, x + 3 * (size_t)p->from.node[i], now);
+    }
+    const bool given = !isnan(p->def->period[0]);
+    drape_status status = check_start(p, x, given && !may_move ? p->def->period : now);
+    if (status || !given || !may_move)
+        return status;
+    status = own_start(model);
+    if (!status)
+        status = stretch(p, now, model->start + first);
+    for (int32_t i = 0; !status && i < p->from.count; i++)
+        for (size_t k = 0; k < 3; k++)
+            model->start[first + 3 * (size_t)p->partner[i] + k] =
+                model->start[first + 3 * (size_t)p->from.node[i] + k] + p->def->period[k];
+    return status;
+}
+
+/* ---- Sets of images ---- */
+
+static int32_t root_of(const int32_t *parent, int32_t node)
+{
+    while (parent[node] != node)
+        node = parent[node];
+    return node;
+}
+
+/* parent (node_count): a tree of each set, whose root is its first node. */
+static drape_status list_sets(drape_model *m, const int32_t *parent)
+{
+    int32_t members = 0;
+    m->image_set = drape_arena_take(&m->arena, (size_t)m->node_count, sizeof *m->image_set);
+    if (!m->image_set)
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < m->node_count; i++)
+        m->image_set[i] = -1;
+    for (int32_t i = 0; i < m->node_count; i++) {
+        int32_t *set = &m->image_set[root_of(parent, i)];
+        if (parent[i] == i)
+            continue;
+        members += 1 + (*set < 0);
+        *set = *set < 0 ? m->image_set_count++ : *set;
+        m->image_set[i] = *set;
+    }
+    m->image_start = drape_arena_take(&m->arena, (size_t)m->image_set_count + 1, sizeof *m->image_start);
+    m->image = drape_arena_take(&m->arena, (size_t)members, sizeof *m->image);
+    if (drape_arena_status(&m->arena))
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < m->node_count; i++)
+        if (m->image_set[i] >= 0)
+            m->image_start[m->image_set[i] + 1]++;
+    for (int32_t s = 0; s < m->image_set_count; s++)
+        m->image_start[s + 1] += m->image_start[s];
+    for (int32_t i = m->node_count; i-- > 0;) /* afterwards image_start[s + 1] is where s starts */
+        if (m->image_set[i] >= 0)
+            m->image[--m->image_start[m->image_set[i] + 1]] = i;
+    for (int32_t s = 0; s < m->image_set_count; s++)
+        m->image_start[s] = m->image_start[s + 1];
+    m->image_start[m->image_set_count] = members;
+    return DRAPE_OK;
+}
+
+/* parent NULL: only checks that edges which were paired later have left the period as it was. */
+static drape_status pair_edges(drape_model *model, size_t c, size_t i, const drape_periodic_def *def,
+                               int32_t *parent)
+{
+    drape_arena scratch = drape_arena_of(model->ctx);
+    const int32_t first = model->cloths[c].first_node;
+    pairing p = {.model = model, .cloth = &model->cloths[c], .def = def};
+    snprintf(p.pointer, sizeof p.pointer, "/cloth/%zu/periodic/%zu", c, i);
+    drape_status status = find_pairs(&p, &scratch);
+    if (!status)
+        status = place(&p, parent != NULL);
+    for (int32_t k = 0; parent && !status && k < p.from.count; k++) {
+        const int32_t a = root_of(parent, first + p.from.node[k]), b = root_of(parent, first + p.partner[k]);
+        parent[a > b ? a : b] = a < b ? a : b;
+    }
+    drape_arena_free(&scratch);
+    return status;
+}
+
+drape_status drape_compile_periodic(drape_model *model, const drape_scene_def *def)
+{
+    drape_status status = DRAPE_OK;
+    size_t count = 0;
+    for (size_t c = 0; c < def->cloth_count; c++)
+        count += def->cloths[c].periodic_count;
+    if (count == 0)
+        return DRAPE_OK;
+    int32_t *parent = drape_alloc(model->ctx, (size_t)model->node_count, sizeof *parent);
+    if (!parent)
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < model->node_count; i++)
+        parent[i] = i;
+    for (size_t c = 0; c < def->cloth_count; c++)
+        for (size_t i = 0; !status && i < def->cloths[c].periodic_count; i++)
+            status = pair_edges(model, c, i, &def->cloths[c].periodic[i], parent);
+    for (size_t c = 0; c < def->cloth_count; c++)
+        for (size_t i = 0; !status && i < def->cloths[c].periodic_count; i++)
+            status = pair_edges(model, c, i, &def->cloths[c].periodic[i], NULL);
+    if (!status)
+        status = list_sets(model, parent);
+    drape_free(model->ctx, parent);
+    if (status)
+        return status;
+    drape_periodic_share(model, model->mass);
+    for (int32_t c = 0; c < model->cloth_count; c++)
+        model->cloths[c].node_mass = model->mass + model->cloths[c].first_node;
+    return DRAPE_OK;
+}
+
+/* ---- What leaves images alike ---- */
+
+static drape_status refuse_nodes(const drape_model *m, int32_t a, int32_t b, const char *what)
+{
+    const int32_t c = drape_model_cloth_of(m, a), first = m->cloths[c].first_node;
+    char pointer[64];
+    snprintf(pointer, sizeof pointer, "/cloth/%d/periodic", (int)c);
+    return drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, pointer,
+                         "nodes %d and %d of periodic edges are the same node, but %s", (int)(a - first),
+                         (int)(b - first), what);
+}
+
+drape_status drape_compile_pinned_images(const drape_model *m)
+{
+    for (int32_t s = 0; s < m->image_set_count; s++)
+        for (int32_t k = m->image_start[s] + 1; k < m->image_start[s + 1]; k++) {
+            const int32_t a = m->image[m->image_start[s]], b = m->image[k];
+            if (m->pinned[a] != m->pinned[b])
+                return refuse_nodes(m, a, b, "only one of them is pinned");
+        }
+    return DRAPE_OK;
+}
+
+static const drape_support *support_of(const drape_model *m, int32_t node)
+{
+    for (int32_t i = 0; i < m->support_count; i++)
+        if (m->supports[i].node == node)
+            return &m->supports[i];
+    return NULL;
+}
+
+static bool holds_alike(const drape_support *a, const drape_support *b)
+{
+    return !a || !b ? a == b
+                    : a->count == b->count && memcmp(a->direction, b->direction, sizeof a->direction) == 0 &&
+                          memcmp(a->normal, b->normal, sizeof a->normal) == 0 &&
+                          memcmp(a->track, b->track, (size_t)a->count * sizeof *a->track) == 0;
+}
+
+static drape_status check_supports(const drape_model *m)
+{
+    for (int32_t s = 0; s < m->image_set_count; s++)
+        for (int32_t k = m->image_start[s] + 1; k < m->image_start[s + 1]; k++) {
+            const int32_t a = m->image[m->image_start[s]], b = m->image[k];
+            if (!holds_alike(support_of(m, a), support_of(m, b)))
+                return refuse_nodes(m, a, b, "pins hold them along different directions or tracks");
+        }
+    return DRAPE_OK;
+}
+
+static bool is_edge(const drape_mesh *mesh, int32_t a, int32_t b)
+{
+    const int32_t lower = a < b ? a : b, higher = a < b ? b : a;
+    int32_t low = 0, high = mesh->edge_count;
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2, *end = mesh->edge + 2 * (size_t)middle;
+        if (end[0] < lower || (end[0] == lower && end[1] < higher))
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < mesh->edge_count && mesh->edge[2 * (size_t)low] == lower &&
+           mesh->edge[2 * (size_t)low + 1] == higher;
+}
+
+static bool in_one_cell(const drape_mesh *mesh, int32_t a, int32_t b)
+{
+    return mesh->rows > 0 && abs(a / mesh->columns - b / mesh->columns) <= 1 &&
+           abs(a % mesh->columns - b % mesh->columns) <= 1;
+}
+
+/* Whether elements reach over edges of the mesh, as those of bending do: there would have to be one over the
+ * periodic edge, too, and there is none. Within a triangle or, between two nodes, a cell of a grid they do
+ * not. */
+static bool reaches_over_edges(const drape_model *m, const drape_term *term)
+{
+    const drape_elements *el = &term->elements;
+    const drape_mesh *mesh = &m->cloths[term->cloth].mesh;
+    for (int32_t e = 0; e < el->count; e++)
+        for (int a = 0; a < el->nodes; a++)
+            for (int b = 0; b < a; b++) {
+                const int32_t *node = el->node + (size_t)e * (size_t)el->nodes,
+                              first = m->cloths[term->cloth].first_node, i = node[a] - first,
+                              j = node[b] - first;
+                if (i != j && !is_edge(mesh, i, j) && !(el->nodes == 2 && in_one_cell(mesh, i, j)))
+                    return true;
+            }
+    return false;
+}
+
+static int compare_keys(const void *a, const void *b)
+{
+    const int64_t p = *(const int64_t *)a, q = *(const int64_t *)b;
+    return (p > q) - (p < q);
+}
+
+/* Whether elements of two nodes lie along both edges of a pair, which are one edge: they would count twice.
+ * (Those of triangles do not: each is on one side.) A cloth of one or two cells between its edges may be
+ * refused for other elements between the same nodes. */
+static drape_status find_twins(const drape_model *m, const drape_term *term, bool *found)
+{
+    const drape_elements *el = &term->elements;
+    int32_t count = 0;
+    *found = false;
+    if (el->nodes != 2 || el->count == 0 || term->ops->constraint)
+        return DRAPE_OK;
+    int64_t *key = drape_alloc(m->ctx, (size_t)el->count, sizeof *key); /* the sets of both nodes */
+    if (!key)
+        return DRAPE_E_MEMORY;
+    for (int32_t e = 0; e < el->count; e++) {
+        const int64_t a = m->image_set[el->node[2 * (size_t)e]],
+                      b = m->image_set[el->node[2 * (size_t)e + 1]];
+        if (a >= 0 && b >= 0)
+            key[count++] = (a < b ? a : b) * m->image_set_count + (a < b ? b : a);
+    }
+    qsort(key, (size_t)count, sizeof *key, compare_keys);
+    for (int32_t i = 1; i < count; i++)
+        *found = *found || key[i] == key[i - 1];
+    drape_free(m->ctx, key);
+    return DRAPE_OK;
+}
+
+static bool is_periodic(const drape_model *m, const drape_cloth *cloth)
+{
+    for (int32_t i = 0; i < cloth->mesh.node_count; i++)
+        if (m->image_set[cloth->first_node + i] >= 0)
+            return true;
+    return false;
+}
+
+static drape_status check_term(const drape_model *m, const drape_term *term)
+{
+    char pointer[64];
+    bool twins;
+    drape_status status = find_twins(m, term, &twins);
+    snprintf(pointer, sizeof pointer, "/cloth/%d/periodic", (int)term->cloth);
+    if (!status && twins)
+        status = drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, pointer,
+                               "%s has elements along both edges, which are one edge: they would count twice",
+                               term->ops->entry.name);
+    if (!status && reaches_over_edges(m, term))
+        status = drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, pointer,
+                               "%s couples nodes across edges of triangles, but would not across the "
+                               "periodic edge",
+                               term->ops->entry.name);
+    return status;
+}
+
+static drape_status check_terms(const drape_model *m)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; !status && i < m->term_count; i++) {
+        const drape_term *term = &m->terms[i];
+        if (term->seam < 0 && !term->ops->law && !term->ops->external &&
+            is_periodic(m, &m->cloths[term->cloth]))
+            status = check_term(m, term);
+    }
+    return status;
+}
+
+static drape_status check_contact(const drape_model *m)
+{
+    for (int32_t c = 0; m->contact.self && c < m->cloth_count; c++)
+        if (is_periodic(m, &m->cloths[c])) {
+            char pointer[64];
+            snprintf(pointer, sizeof pointer, "/cloth/%d/periodic", (int)c);
+            return drape_fail_at(
+                m->ctx, DRAPE_E_ARGUMENT, pointer,
+                "cloth with periodic edges has no self_contact: it would not touch its images");
+        }
+    return DRAPE_OK;
+}
+
+/* ---- Couplings ---- */
+
+/* Lists or, if list is NULL, counts the pairs of images of a pair of nodes. */
+static int64_t list_images(const drape_model *m, int32_t a, int32_t b, int32_t *list)
+{
+    const int32_t sets[2] = {m->image_set[a], m->image_set[b]}, own[2] = {a, b};
+    const int32_t *node[2];
+    int32_t count[2];
+    int64_t listed = 0;
+    for (int k = 0; k < 2; k++) {
+        node[k] = sets[k] >= 0 ? m->image + m->image_start[sets[k]] : &own[k];
+        count[k] = sets[k] >= 0 ? m->image_start[sets[k] + 1] - m->image_start[sets[k]] : 1;
+    }
+    if (sets[0] < 0 && sets[1] < 0)
+        return 0;
+    for (int32_t i = 0; i < count[0]; i++)
+        for (int32_t j = 0; j < count[1]; j++, listed++)
+            if (list) {
+                list[2 * listed] = node[0][i];
+                list[2 * listed + 1] = node[1][j];
+            }
+    return listed;
+}
+
+static int64_t visit_couplings(const drape_model *m, const drape_coupling *couplings, int count,
+                               int32_t *list)
+{
+    int64_t listed = 0;
+    for (int32_t s = 0; s < m->image_set_count; s++) {
+        const int32_t node = m->image[m->image_start[s]];
+        listed += list_images(m, node, node, list ? list + 2 * listed : NULL);
+    }
+    for (int c = 0; c < count; c++)
+        for (int32_t e = 0; e < couplings[c].count; e++) {
+            const int32_t *node = couplings[c].node + (size_t)e * (size_t)couplings[c].nodes;
+            for (int a = 0; a < couplings[c].nodes; a++)
+                for (int b = 0; b < a; b++)
+                    listed += list_images(m, node[a], node[b], list ? list + 2 * listed : NULL);
+        }
+    return listed;
+}
+
+static drape_status couple_images(drape_model *m)
+{
+    drape_coupling *couplings = drape_alloc(m->ctx, (size_t)m->term_count + 2, sizeof *couplings);
+    if (!couplings)
+        return DRAPE_E_MEMORY;
+    const int count = drape_model_couplings(m, NULL, couplings);
+    const int64_t pairs = visit_couplings(m, couplings, count, NULL);
+    drape_status status = DRAPE_OK;
+    if (pairs > INT32_MAX)
+        status = drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, "/cloth", "periodic edges have too many nodes");
+    else
+        m->image_coupled = drape_arena_take(&m->arena, 2 * (size_t)pairs, sizeof *m->image_coupled);
+    if (!status && !m->image_coupled)
+        status = DRAPE_E_MEMORY;
+    if (!status)
+        m->image_coupled_count = (int32_t)visit_couplings(m, couplings, count, m->image_coupled);
+    drape_free(m->ctx, couplings);
+    return status;
+}
+
+drape_status drape_compile_images(drape_model *m, const drape_scene_def *def)
+{
+    (void)def;
+    if (m->image_set_count == 0)
+        return DRAPE_OK;
+    drape_status status = drape_compile_pinned_images(m);
+    if (!status)
+        status = check_supports(m);
+    if (!status)
+        status = check_contact(m);
+    if (!status)
+        status = check_terms(m);
+    return status ? status : couple_images(m);
+}

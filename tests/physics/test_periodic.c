@@ -1,0 +1,340 @@
+/* test_periodic.c: cloth with periodic edges, under every integrator. */
+#include "integrators/integrator.h"
+#include "support/bytes.h"
+#include "support/scene.h"
+
+/* The methods that step in time, and newton_k with its other matrix. */
+static const char *methods[64];
+static size_t method_count;
+
+__attribute__((constructor)) static void list_methods(void)
+{
+    for (int i = 0; drape_integrators[i]; i++)
+        if (!drape_integrators[i]->steady_state)
+            methods[method_count++] = drape_integrators[i]->entry.name;
+    methods[method_count++] = "newton_k', 'corrections': 'conjugate_gradients";
+}
+
+static const char *controller(const char *method)
+{
+    return strcmp(method, "verlet") == 0 ? "stable" : "halving";
+}
+
+/* A periodic sheet drawn out to `stretch` of its width, with the other edges free. */
+static scene drawn_out(double stretch)
+{
+    return scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 4, 'width': "
+                      "0.5, 'height': 0.3},"
+                      "'material': {'young_modulus': 1e5, 'poisson_ratio': 0.25, 'thickness': 1e-3, "
+                      "'areal_density': 0.2},"
+                      "'terms': ['stretch.cst'], 'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': "
+                      "'right'}, 'period': [%.17g, 0, 0]}], 'pins': [{'nodes': [8]}]}],"
+                      "'gravity': [0, 0, 0], 'integrator': {'method': 'static', 'tolerance': 1e-12}, "
+                      "'duration': 1}",
+                      0.5 * stretch);
+}
+
+/* Stretched evenly, free across: with e = (stretch^2 - 1)/2 the energy is E e^2/2 of the volume, and the
+ * tension E e stretch of the section, of which each edge is the reaction of the other. To the residual of
+ * 1e-12 N. */
+START_TEST(a_stretched_sheet_has_even_tension)
+{
+    const double stretch = 1.05, e = (stretch * stretch - 1) / 2;
+    scene s = drawn_out(stretch);
+    double force[72], tension[2] = {0};
+    ck_assert_int_eq(s.model->image_set_count, 4);
+    scene_advance(&s, 1);
+    ck_assert_int_eq(drape_sim_reactions(s.sim, force), DRAPE_OK);
+    for (int row = 0; row < 4; row++) {
+        tension[0] += force[3 * (6 * row)];
+        tension[1] += force[3 * (6 * row + 5)];
+        for (int k = 0; k < 3; k++) /* of a pair they are opposite */
+            ck_assert_double_le(fabs(force[18 * row + k] + force[18 * row + 15 + k]), 1e-12);
+    }
+    ck_assert_double_eq_tol(tension[0], -1e5 * e * stretch * 0.3e-3, 1e-10);
+    ck_assert_double_eq_tol(tension[1], 1e5 * e * stretch * 0.3e-3, 1e-10);
+    ck_assert_double_eq_tol(drape_sim_energy(s.sim).elastic, 0.5 * 1e5 * e * e * 0.15e-3, 1e-12);
+    const double *x = scene_state(&s)->x;
+    for (int i = 0; i < 24; i++) /* every cell is as wide, and every row contracts alike */
+        ck_assert_double_eq_tol(x[3 * i] - x[3 * (i - i % 6)], stretch * 0.1 * (i % 6), 1e-9);
+    scene_close(&s);
+}
+END_TEST
+
+#define CELL_SCENE                                                                                           \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': %d, 'rows': 3, 'width': %.17g, "          \
+    "'height': 0.1, 'orientation': 'horizontal'},"                                                           \
+    "'material': {'young_modulus': 1e4, 'poisson_ratio': 0.3, 'thickness': 1e-3, 'areal_density': 0.2},"     \
+    "'terms': ['stretch.cst', {'type': 'damp.kelvin_voigt', 'beta': 0.005}, {'type': 'drag.viscous', "       \
+    "'coefficient': 0.05}], 'velocity': [0.1, 0, 0.2], 'pins': [{'edge': 'top'}],"                           \
+    "'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right'}, 'period': [%.17g, 0, 0]}],"            \
+    "'masses': [{'nodes': [%s], 'add': 0.002}, {'nodes': [%s], 'add': 0.003}]}],"                            \
+    "'colliders': [{'type': 'plane', 'point': [0, %g, 0], 'normal': [0, 1, 0], 'friction': 0.3}],"           \
+    "'contact': {'distance': 0.005, 'stiffness': 5e4},"                                                      \
+    "'integrator': {'method': '%s', 'dt': 0.005, 'tolerance': 1e-10, 'rtol': 1e-7, 'error': 1e-9, "          \
+    "'iterations': 8, 'linear_tolerance': 1e-10}, 'controller': {'type': '%s'}, 'duration': 1}"
+
+/* A sheet of cells of 4 x 2, in each a weight within and one on its edge, that hangs from a line and falls,
+ * onto a plane with friction at this height. A weight on the periodic edge is on one of its two nodes. */
+static scene cells(const char *method, int count, double plane)
+{
+    return count == 1 ? scene_open(CELL_SCENE, 5, 0.2, 0.206, "12", "10", plane, method, controller(method))
+                      : scene_open(CELL_SCENE, 13, 0.6, 0.618, "28,32,36", "26,30,34", plane, method,
+                                   controller(method));
+}
+
+/* The largest distance of a node of three cells from its image of one. */
+static double differ(const double *one, const double *three)
+{
+    double most = 0;
+    for (int row = 0; row < 3; row++)
+        for (int c = 0; c < 13; c++)
+            for (int k = 0; k < 3; k++) {
+                const int cell = c == 12 ? 2 : c / 4;
+                const double shift = k == 0 ? 0.206 * cell : 0;
+                most = fmax(most, fabs(three[3 * (13 * row + c) + k] - shift -
+                                       one[3 * (5 * row + c - 4 * cell) + k]));
+            }
+    return most;
+}
+
+static void compare_cells(const char *method, double plane, double limit)
+{
+    scene one = cells(method, 1, plane), three = cells(method, 3, plane);
+    scene_advance(&one, 0.1);
+    scene_advance(&three, 0.1);
+    const double *x = scene_state(&one)->x, *v = scene_state(&one)->v,
+                 most = differ(x, scene_state(&three)->x);
+    printf("# %s, plane at %g m: %.2g, sag %.3g\n", method, plane, most, -x[3 * 12 + 1]);
+    ck_assert_double_gt(-x[3 * 12 + 1], 0.004);
+    ck_assert_msg(most < limit, "%s, plane at %g m: %g", method, plane, most);
+    for (int row = 1; row < 3; row++)
+        for (int k = 0; k < 3; k++) {
+            const int left = 15 * row + k, right = left + 12;
+            ck_assert_double_eq_tol(x[right] - x[left], k == 0 ? 0.206 : 0, 1e-14);
+            ck_assert_double_eq_tol(v[right], v[left], 1e-13);
+        }
+    scene_close(&one), scene_close(&three);
+}
+
+/* One cell moves as each of three: methods that solve their steps, to a residual of 1e-10 N, differ by that;
+ * those that choose their steps, by their error of 1e-7 of the size. */
+START_TEST(one_cell_moves_as_each_of_three)
+{
+    for (size_t i = 0; i < method_count; i++)
+        compare_cells(methods[i], -9, 1e-7);
+}
+END_TEST
+
+/* The same onto the plane. Methods that choose their steps do so anew at each touch; those that keep the
+ * energy of a bounce diverge where rounding decides which steps are rejected, and are left out. */
+START_TEST(cells_touch_a_plane_alike)
+{
+    for (size_t i = 0; i < method_count; i++)
+        if (strcmp(methods[i], "midpoint") != 0 && strcmp(methods[i], "generalized_alpha") != 0)
+            compare_cells(methods[i], -0.02, 1e-5);
+}
+END_TEST
+
+/* An infinite sheet that hangs from a line: all columns have the same height and depth at any time. */
+START_TEST(an_endless_sheet_hangs_alike_everywhere)
+{
+    scene s =
+        scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 6, 'diagonals': "
+                   "'parallel', 'width': "
+                   "0.2, 'height': 0.25, 'orientation': 'horizontal'},"
+                   "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 0.2},"
+                   "'terms': ['stretch.cst'], 'pins': [{'edge': 'top'}], 'periodic': [{'from': {'edge': "
+                   "'left'}, 'to': {'edge': 'right'}}]}],"
+                   "'integrator': {'dt': 0.005, 'tolerance': 1e-13}, 'duration': 1}");
+    scene_advance(&s, 0.2);
+    const double *x = scene_state(&s)->x;
+    ck_assert_double_gt(-x[3 * 29 + 1], 0.05);
+    for (int i = 0; i < 30; i++)
+        for (int k = 0; k < 3; k++)
+            ck_assert_double_eq_tol(x[3 * i + k] - x[3 * (i - i % 5) + k], k == 0 ? 0.05 * (i % 5) : 0,
+                                    1e-12);
+    scene_close(&s);
+}
+END_TEST
+
+/* Periodic along both sides, where the corners are one node, a sheet falls freely at its velocity: backward
+ * Euler, 10 steps, h^2 g (1 + ... + 10), and is at rest within itself. The nodes keep their whole mass. */
+START_TEST(sheets_repeat_in_two_directions)
+{
+    scene s =
+        scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, 'width': "
+                   "0.3, 'height': 0.2},"
+                   "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 0.2},"
+                   "'terms': ['stretch.cst', {'type': 'spring.shear', 'stiffness': 10}], 'velocity': [1, 0, "
+                   "2], 'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right'}, 'period': [0.32, "
+                   "0, 0]}, {'from': {'edge': 'top'}, 'to': {'edge': 'bottom'}, 'period': [0, -0.19, 0]}]}],"
+                   "'integrator': {'dt': 0.01, 'tolerance': 1e-12}, 'duration': 1}");
+    double mass = 0, start[48];
+    ck_assert_int_eq(s.model->image_set_count, 5);
+    ck_assert_int_eq(s.model->image_start[1], 4);
+    for (int i = 0; i < 16; i++)
+        mass += s.model->mass[i];
+    ck_assert_double_eq_tol(mass, 0.2 * 0.06, 1e-15);
+    memcpy(start, scene_state(&s)->x, sizeof start);
+    scene_advance(&s, 0.1);
+    const double to[3] = {0.1, -9.81 * 1e-4 * 55, 0.2};
+    for (int i = 0; i < 48; i++)
+        ck_assert_double_eq_tol(scene_state(&s)->x[i] - start[i], to[i % 3], 1e-9);
+    scene_close(&s);
+}
+END_TEST
+
+START_TEST(the_jacobian_is_that_of_the_shared_forces)
+{
+    drape_check_result rows[64];
+    int32_t count = 0, jacobians = 0;
+    scene s =
+        scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
+                    "'width': 0.3, 'height': 0.3},"
+                    "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
+                    "'terms': ['stretch.cst', {'type': 'damp.kelvin_voigt', 'beta': 0.01}, {'type': "
+                    "'drag.viscous', 'coefficient': 1}], 'periodic': [{'from': {'edge': 'left'}, 'to': "
+                    "{'edge': 'right'}}, {'from': {'edge': 'top'}, 'to': {'edge': 'bottom'}}],"
+                    "'pins': [{'edge': 'left', 'normal': [1, 2, 3]}, {'edge': 'right', 'normal': [1, 2, 3]},"
+                    "{'nodes': [12], 'normal': [1, 2, 3]}]}], 'duration': 1}");
+    ck_assert_int_eq(drape_model_check_derivatives(s.model, 1, rows, 64, &count), DRAPE_OK);
+    for (int32_t i = 0; i < count && i < 64; i++) {
+        ck_assert_msg(rows[i].pass, "%s %s: %g", rows[i].term, rows[i].what, rows[i].error);
+        jacobians += strcmp(rows[i].term, "assembled") == 0;
+    }
+    ck_assert_int_gt(jacobians, 0);
+    scene_close(&s);
+}
+END_TEST
+
+/* Without damping the implicit midpoint rule keeps the energy of a weighted cell but for its error: that of
+ * the account, which knows no work of the periodic edges. Threads change no bit. */
+START_TEST(periodic_edges_do_no_work)
+{
+    uint64_t hash[2];
+    for (int threads = 1; threads <= 3; threads += 2) {
+        scene s =
+            scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, "
+                        "'width': 0.2, 'height': 0.15, 'orientation': 'horizontal'},"
+                        "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
+                        "'terms': ['stretch.cst'], 'pins': [{'edge': 'top'}], 'masses': [{'nodes': [10], "
+                        "'add': 0.002}], 'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': "
+                        "'right'}, 'period': [0.21, 0, 0]}]}],"
+                        "'integrator': {'method': 'midpoint', 'dt': 0.001, 'tolerance': 1e-12}, "
+                        "'duration': 1}");
+        drape_sim_def def;
+        drape_sim_def_init(&def, sizeof def);
+        def.threads = threads;
+        scene_start(&s, &def);
+        const drape_energy before = drape_sim_energy(s.sim);
+        scene_advance(&s, 0.1);
+        const drape_energy after = drape_sim_energy(s.sim);
+        const double moved = after.kinetic - before.kinetic;
+        ck_assert_double_gt(moved, 1e-3);
+        const double change =
+            after.kinetic + after.elastic + after.gravity - before.kinetic - before.elastic - before.gravity;
+        printf("# energy %g of %g J\n", change, moved);
+        ck_assert_double_le(fabs(change), 1e-3 * moved);
+        hash[threads / 2] = drape_state_hash(s.model, scene_state(&s));
+        scene_close(&s);
+    }
+    ck_assert_uint_eq(hash[0], hash[1]);
+}
+END_TEST
+
+/* A run goes on from a checkpoint with the same bits; a scene of another period refuses it. */
+START_TEST(checkpoints_keep_the_period)
+{
+    scene a = cells("be", 1, -0.02), b = cells("be", 1, -0.02), drawn[2] = {drawn_out(1.1), drawn_out(1.2)};
+    scene_advance(&a, 0.05);
+    bytes saved = bytes_save(a.sim), other = bytes_save(drawn[0].sim);
+    ck_assert_int_eq(drape_sim_restore_from(b.sim, saved.data, saved.size), DRAPE_OK);
+    ck_assert_int_ne(drape_sim_restore_from(drawn[1].sim, other.data, other.size), DRAPE_OK);
+    free(saved.data), free(other.data);
+    scene_advance(&a, 0.05);
+    scene_advance(&b, 0.05);
+    ck_assert_uint_eq(drape_state_hash(a.model, scene_state(&a)), drape_state_hash(b.model, scene_state(&b)));
+    scene_close(&a), scene_close(&b), scene_close(&drawn[0]), scene_close(&drawn[1]);
+}
+END_TEST
+
+/* A host cannot take images apart: not by a state, and not by pinning one of them. */
+START_TEST(hosts_keep_the_period)
+{
+    scene s = cells("be", 1, -0.02);
+    double x[45], v[45] = {0};
+    const int32_t seam[2] = {5, 9};
+    memcpy(x, scene_state(&s)->x, sizeof x);
+    for (int k = 0; k < 2; k++)
+        x[3 * seam[k] + 1] += 0.01;
+    ck_assert_int_eq(drape_sim_set_state(s.sim, 0, x, v), DRAPE_OK);
+    x[3 * 5 + 1] += 0.01;
+    ck_assert_int_eq(drape_sim_set_state(s.sim, 0, x, v), DRAPE_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "0.01 m from where the period"));
+    ck_assert_int_eq(drape_sim_pin(s.sim, 1, seam), DRAPE_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "only one of them is pinned"));
+    ck_assert_int_eq(drape_sim_pin(s.sim, 2, seam), DRAPE_OK);
+    scene_advance(&s, 0.02);
+    ck_assert_int_eq(drape_sim_unpin(s.sim, 2, seam), DRAPE_OK);
+    scene_advance(&s, 0.02);
+    ck_assert_double_eq_tol(scene_state(&s)->x[3 * 9] - scene_state(&s)->x[3 * 5], 0.206, 1e-13);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Refusals ---- */
+
+static const struct refusal {
+    const char *mesh, *terms, *rest, *message;
+} refusals[] = {
+    {"'columns': 4, 'rows': 3", "", "'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'top'}}]",
+     "node 0 is in both edges"},
+    {"'columns': 4, 'rows': 3", "", "'periodic': [{'from': {'nodes': [4]}, 'to': {'edge': 'right'}}]",
+     "one edge has 1 nodes and the other 3"},
+    {"'columns': 4, 'rows': 3", "", "'periodic': [{'from': {'nodes': [0, 4]}, 'to': {'nodes': [3, 11]}}]",
+     "the nearest, node 3, is 0.05 m away"},
+    {"'columns': 4, 'rows': 3", ", 'bend.hinge'",
+     "'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right'}}]", "bend.hinge couples nodes across"},
+    {"'columns': 4, 'rows': 3", ", 'stretch.edge'",
+     "'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right'}}]", "would count twice"},
+    {"'columns': 4, 'rows': 3", "",
+     "'pins': [{'edge': 'left'}], 'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right'}}]",
+     "nodes 0 and 3 of periodic edges are the same node, but only one of them is pinned"},
+    {"'columns': 4, 'rows': 3", "",
+     "'pins': [{'edge': 'left', 'normal': [0, 1, 0]}], 'periodic': [{'from': {'edge': 'left'}, 'to': "
+     "{'edge': "
+     "'right'}}]",
+     "pins hold them along different directions"},
+    {"'columns': 4, 'rows': 3", "",
+     "'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right', 'row': 1}}]",
+     "exactly one of nodes, corner, edge, row, box"},
+};
+
+START_TEST(what_does_not_repeat_is_refused)
+{
+    for (size_t i = 0; i < sizeof refusals / sizeof *refusals; i++) {
+        char text[1024];
+        scene s = scene_empty();
+        drape_scene *parsed = NULL;
+        snprintf(text, sizeof text,
+                 "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', %s, 'width': 0.3, 'height': 0.2},"
+                 "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
+                 "'terms': ['stretch.cst'%s], %s}], 'duration': 1}",
+                 refusals[i].mesh, refusals[i].terms, refusals[i].rest);
+        for (char *c = text; *c; c++)
+            *c = *c == '\'' ? '"' : *c;
+        ck_assert_int_eq(drape_scene_parse(s.ctx, text, "test", &parsed), DRAPE_OK);
+        ck_assert_int_ne(drape_scene_compile(parsed, &s.model), DRAPE_OK);
+        ck_assert_msg(strstr(drape_context_message(s.ctx), refusals[i].message) != NULL, "%s: %s",
+                      refusals[i].message, drape_context_message(s.ctx));
+        drape_scene_destroy(&parsed);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+SUITE("periodic", a_stretched_sheet_has_even_tension, one_cell_moves_as_each_of_three,
+      cells_touch_a_plane_alike, an_endless_sheet_hangs_alike_everywhere, sheets_repeat_in_two_directions,
+      the_jacobian_is_that_of_the_shared_forces, periodic_edges_do_no_work, checkpoints_keep_the_period,
+      hosts_keep_the_period, what_does_not_repeat_is_refused)
