@@ -18,6 +18,7 @@ typedef struct holding {
     double direction[3][3]; /* of length 1, at right angles */
     double normal[3][3];    /* of the pins, of length 1 */
     int32_t track[3];       /* of the pins; -1: fixed */
+    int32_t pin[3];         /* numbers of the pins in the model */
 } holding;
 
 /* One pin under construction: its place in the scene, and the cloth that it pins. */
@@ -42,34 +43,132 @@ static drape_status refuse(const pin_place *pin, const char *key, const char *te
     return drape_fail_at(pin->model->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
 }
 
-/* What of a direction the others of a node do not hold already: planes that meet at a node leave it a line,
- * and three of them nothing. False if pins that move differently hold
- * the node along one direction. */
-static bool add_direction(const double *direction, int32_t track, holding *all)
+/* ---- Motions of nodes ---- */
+
+/* Duals of the normals: dual[i] . normal[j] = 1 if i = j, else 0, spanning the same. Normals at right angles
+ * are their own. */
+static void find_duals(const holding *all, double dual[3][3])
 {
-    double n[3] = {direction[0], direction[1], direction[2]};
-    bool same = true;
+    memcpy(dual, all->normal, sizeof all->normal);
+    if (all->count == 1)
+        return;
     for (int i = 0; i < all->count; i++) {
-        /* with the others at right angles only those along it matter */
-        same = same && (all->track[i] == track || fabs(vec3_dot(all->normal[i], direction)) <= PARALLEL);
+        const double *b = all->normal[(i + 1) % all->count];
+        double own[3] = {all->normal[i][0], all->normal[i][1], all->normal[i][2]};
+        if (all->count == 2)
+            vec3_add_scaled(-vec3_dot(b, own), b, own);
+        else
+            vec3_cross(b, all->normal[(i + 2) % 3], own);
+        const double scale = vec3_dot(own, all->normal[i]);
+        for (int k = 0; k < 3; k++)
+            dual[i][k] = own[k] / scale;
+    }
+}
+
+static bool moves(const holding *all)
+{
+    bool found = false;
+    for (int i = 0; i < all->count; i++)
+        found = found || all->track[i] >= 0;
+    return found;
+}
+
+/* The displacement along a track at a time; and the first key after it: INFINITY if there is none. */
+static double displace_along(const drape_model *model, int32_t number, double t, double d[3])
+{
+    double next = INFINITY;
+    memset(d, 0, 3 * sizeof *d);
+    if (number < 0)
+        return next;
+    const drape_track *track = &model->tracks[number];
+    drape_track_displacement(track->keys, track->key_count, t, d);
+    for (size_t k = track->key_count; k-- > 0 && track->keys[k].time > t;)
+        next = track->keys[k].time;
+    return next;
+}
+
+/* The same of a node along all directions that are held, and of the keys of all tracks. */
+static double displace(const drape_model *model, const holding *all, double t, double d[3])
+{
+    double next = INFINITY, dual[3][3], by[3];
+    find_duals(all, dual);
+    memset(d, 0, 3 * sizeof *d);
+    for (int i = 0; i < all->count; i++) {
+        next = fmin(next, displace_along(model, all->track[i], t, by));
+        vec3_add_scaled(vec3_dot(all->normal[i], by), dual[i], d);
+    }
+    return next;
+}
+
+/* Whether a track moves a node along a direction, of length 1, as those do that hold it along this one. Both
+ * are linear between keys. */
+static bool moves_alike(const drape_model *model, const double *n, int32_t track, const holding *all)
+{
+    double apart = 0, size = 0, d[2][3];
+    for (double t = -INFINITY; t < INFINITY;) {
+        t = fmin(displace_along(model, track, t, d[0]), displace(model, all, t, d[1]));
+        apart = fmax(apart, fabs(vec3_dot(n, d[0]) - vec3_dot(n, d[1])));
+        size = fmax(size, fmax(vec3_norm(d[0]), vec3_norm(d[1])));
+    }
+    return apart <= PARALLEL * size;
+}
+
+/* Neither turns nor is carried by a collider. */
+static bool only_displaces(const drape_model *model, int32_t track)
+{
+    return track < 0 || (model->tracks[track].key_count > 0 && model->tracks[track].turns.key_count == 0);
+}
+
+/* Whether two pins move the nodes that both hold in all directions alike. */
+static bool tracks_agree(const drape_model *model, int32_t a, int32_t b)
+{
+    static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    holding all = {.count = 3, .track = {b, b, b}};
+    memcpy(all.normal, axes, sizeof axes);
+    bool same = only_displaces(model, a) && only_displaces(model, b);
+    for (int k = 0; same && k < 3; k++)
+        same = moves_alike(model, axes[k], a, &all);
+    return same || a == b;
+}
+
+static drape_status refuse_motions(const drape_model *model, const char *at, int32_t node, const double *n,
+                                   const drape_pin *other)
+{
+    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
+                         "node %d is held along (%g %g %g) by this pin and by \"%s\", which moves "
+                         "differently",
+                         (int)(node - model->cloths[other->cloth].first_node), n[0] + 0.0, n[1] + 0.0,
+                         n[2] + 0.0, other->name); /* + 0.0: no -0 */
+}
+
+/* ---- Nodes of pins ---- */
+
+/* Adds what of a direction the others of a node do not hold already: planes that meet at a node leave it a
+ * line, and three of them nothing. If all of it is held already, its pins must move alike along it. */
+static drape_status add_direction(const pin_place *pin, const char *key, int32_t node,
+                                  const double *direction, int32_t track)
+{
+    holding *all = &pin->all[node];
+    double n[3] = {direction[0], direction[1], direction[2]};
+    int other = -1;
+    for (int i = 0; i < all->count; i++) {
+        other = other < 0 && fabs(vec3_dot(all->normal[i], direction)) > PARALLEL ? i : other;
         vec3_add_scaled(-vec3_dot(all->direction[i], n), all->direction[i], n);
     }
     const double length = vec3_norm(n);
-    if (all->count == 3 || !(length > PARALLEL))
-        return same;
+    if (other >= 0 && (all->count == 3 || !(length > PARALLEL))) {
+        char at[192];
+        snprintf(at, sizeof at, "%s%s", pin->pointer, key);
+        return moves_alike(pin->model, direction, track, all)
+                   ? DRAPE_OK
+                   : refuse_motions(pin->model, at, node, direction, &pin->model->pins[all->pin[other]]);
+    }
     for (int k = 0; k < 3; k++)
         all->direction[all->count][k] = n[k] / length;
     memcpy(all->normal[all->count], direction, 3 * sizeof *direction);
+    all->pin[all->count] = pin->model->pin_count - 1;
     all->track[all->count++] = track;
-    return true;
-}
-
-static drape_status refuse_motions(const pin_place *pin, const char *key, int32_t local)
-{
-    char text[128];
-    snprintf(text, sizeof text, "node %d is held along one direction by pins that move differently",
-             (int)local);
-    return refuse(pin, key, text);
+    return DRAPE_OK;
 }
 
 static drape_status take_node(void *user, const char *key, int32_t local)
@@ -77,22 +176,24 @@ static drape_status take_node(void *user, const char *key, int32_t local)
     pin_place *pin = user;
     int32_t node = pin->cloth->first_node + local;
     if (pin->count > 0) {
-        for (int i = 0; i < pin->count && !pin->held[node]; i++)
-            if (!add_direction(pin->direction[i], pin->def->key_count > 0 ? pin->track : -1, &pin->all[node]))
-                return refuse_motions(pin, key, local);
+        drape_status status = DRAPE_OK;
+        for (int i = 0; !status && i < pin->count && !pin->held[node]; i++)
+            status =
+                add_direction(pin, key, node, pin->direction[i], pin->def->key_count > 0 ? pin->track : -1);
         pin->clamped[node] |= pin->def->clamp;
         pin->held[node] = 1;
-        return DRAPE_OK;
+        return status;
     }
-    if (pin->model->pinned[node] && pin->track_of_node[node] != pin->track) {
+    if (pin->model->pinned[node] && !tracks_agree(pin->model, pin->track_of_node[node], pin->track)) {
         char text[128];
         snprintf(text, sizeof text, "node %d is pinned twice, along different tracks or colliders",
                  (int)local);
         return refuse(pin, key, text);
     }
+    if (!pin->model->pinned[node])
+        pin->track_of_node[node] = pin->track;
     pin->model->pinned[node] = 1;
     pin->clamped[node] |= pin->def->clamp;
-    pin->track_of_node[node] = pin->track;
     pin->held[node] = 1;
     return DRAPE_OK;
 }
@@ -267,55 +368,7 @@ static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, p
     return status;
 }
 
-/* Duals of the normals: dual[i] . normal[j] = 1 if i = j, else 0, spanning the same. Normals at right angles
- * are their own. */
-static void find_duals(const holding *all, double dual[3][3])
-{
-    memcpy(dual, all->normal, sizeof all->normal);
-    if (all->count == 1)
-        return;
-    for (int i = 0; i < all->count; i++) {
-        const double *b = all->normal[(i + 1) % all->count];
-        double own[3] = {all->normal[i][0], all->normal[i][1], all->normal[i][2]};
-        if (all->count == 2)
-            vec3_add_scaled(-vec3_dot(b, own), b, own);
-        else
-            vec3_cross(b, all->normal[(i + 2) % 3], own);
-        const double scale = vec3_dot(own, all->normal[i]);
-        for (int k = 0; k < 3; k++)
-            dual[i][k] = own[k] / scale;
-    }
-}
-
-static bool moves(const holding *all)
-{
-    bool found = false;
-    for (int i = 0; i < all->count; i++)
-        found = found || all->track[i] >= 0;
-    return found;
-}
-
-/* The displacement of a node that is held in three directions, at a time; and the first key of these after
- * it: INFINITY if there is none. */
-static double displace(const drape_model *model, const holding *all, double t, double d[3])
-{
-    double next = INFINITY, dual[3][3];
-    find_duals(all, dual);
-    memset(d, 0, 3 * sizeof *d);
-    for (int i = 0; i < 3; i++) {
-        if (all->track[i] < 0)
-            continue;
-        const drape_track *track = &model->tracks[all->track[i]];
-        double by[3];
-        drape_track_displacement(track->keys, track->key_count, t, by);
-        vec3_add_scaled(vec3_dot(all->normal[i], by), dual[i], d);
-        for (size_t k = track->key_count; k-- > 0 && track->keys[k].time > t;)
-            next = fmin(next, track->keys[k].time);
-    }
-    return next;
-}
-
-/* The track of such a node: piecewise linear between the keys of all its tracks. */
+/* The track of a node that is held in three directions: linear between the keys of all its tracks. */
 static drape_status join_tracks(drape_model *model, const holding *all, drape_track *track)
 {
     double d[3];
@@ -328,6 +381,39 @@ static drape_status join_tracks(drape_model *model, const holding *all, drape_tr
     for (size_t k = 0; k < track->key_count; k++) {
         track->keys[k].time = t;
         t = displace(model, all, t, track->keys[k].displacement);
+    }
+    return DRAPE_OK;
+}
+
+/* The first pin that holds a node in all directions. */
+static const drape_pin *full_pin_of(const drape_model *model, int32_t node)
+{
+    for (const drape_pin *pin = model->pins;; pin++)
+        for (int32_t i = 0; !pin->slides && i < pin->node_count; i++)
+            if (pin->node[i] == node)
+                return pin;
+}
+
+/* Nodes that some pins hold in all directions and others in some: these move alike. Pins that turn or that a
+ * collider carries go before. */
+static drape_status check_both(const drape_model *model, const pin_place *pin)
+{
+    for (int32_t node = 0; node < model->node_count; node++) {
+        const holding *all = &pin->all[node];
+        const int32_t track = pin->track_of_node[node];
+        if (!model->pinned[node] || !only_displaces(model, track))
+            continue;
+        for (int i = 0; i < all->count; i++) {
+            const drape_pin *first = &model->pins[all->pin[i]];
+            char at[64];
+            if (moves_alike(model, all->normal[i], track, all))
+                continue;
+            while (first > model->pins && first[-1].cloth == first->cloth)
+                first--;
+            snprintf(at, sizeof at, "/cloth/%d/pins/%d", (int)first->cloth,
+                     (int)(&model->pins[all->pin[i]] - first));
+            return refuse_motions(model, at, node, all->normal[i], full_pin_of(model, node));
+        }
     }
     return DRAPE_OK;
 }
@@ -515,6 +601,8 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
         pin_place pin = {
             .model = model, .track_of_node = track_of_node, .clamped = clamped, .held = held, .all = all};
         status = pin_cloths(model, def, &pin);
+        if (!status)
+            status = check_both(model, &pin);
         if (!status)
             status = pin_held(model, &pin);
         if (!status)
