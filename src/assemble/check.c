@@ -393,7 +393,7 @@ static void multiply(const checker *c, double *y)
     for (int64_t j = 0; j < pattern->n; j++) {
         double p = c->direction[3 * (int64_t)m->node_of_free[j / 3] + j % 3];
         for (int64_t k = pattern->column[j]; k < pattern->column[j + 1]; k++) {
-            int64_t i = pattern->row[k];
+            int64_t i = drape_pattern_row(pattern, j, k);
             y[3 * (int64_t)m->node_of_free[i / 3] + i % 3] += c->values[k] * p;
         }
     }

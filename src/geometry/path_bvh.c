@@ -20,6 +20,17 @@ static int children_of(const drape_bvh *from, int32_t branch, int32_t child[LANE
     return count;
 }
 
+static int32_t count_branches(const drape_bvh *from, int32_t branch)
+{
+    int32_t child[LANES], count = 1;
+    if (from->branches[branch].second == 0)
+        return 1;
+    for (int i = children_of(from, branch, child); i-- > 0;)
+        if (from->branches[child[i]].second > 0)
+            count += count_branches(from, child[i]);
+    return count;
+}
+
 /* Stored in depth-first order: children come after their parent. */
 static void merge(drape_path_bvh *bvh, const drape_bvh *from, int32_t branch)
 {
@@ -44,7 +55,8 @@ drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, 
     if (count == 0)
         return DRAPE_OK;
     drape_status status = drape_bvh_build(&temporary, count, nodes, node, x, &binary);
-    bvh->branches = status ? NULL : drape_arena_take(arena, (size_t)count, sizeof *bvh->branches);
+    const size_t branches = status ? 0 : (size_t)count_branches(&binary, 0);
+    bvh->branches = status ? NULL : drape_arena_take(arena, branches, sizeof *bvh->branches);
     bvh->place = status ? NULL : drape_arena_take(arena, (size_t)count, sizeof *bvh->place);
     bvh->order = status ? NULL : drape_arena_take(arena, (size_t)count, sizeof *bvh->order);
     const bool complete = bvh->branches && bvh->place && bvh->order;

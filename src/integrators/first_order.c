@@ -181,7 +181,7 @@ static void add_damping(const drape_first_order *s, const double *r)
         return;
     for (int64_t j = 0; j < p->n; j++)
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
-            s->reduced[p->row[k]] += s->damping[k] * r[j];
+            s->reduced[drape_pattern_row(p, j, k)] += s->damping[k] * r[j];
 }
 
 /* With r2 + c_j M r1 in `reduced`. r1 and dv may be the same. */

@@ -242,7 +242,7 @@ static void add_damping(const rosenbrock_state *s, const double *x, double *y)
         return;
     for (int64_t j = 0; j < p->n; j++)
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
-            y[p->row[k]] += s->damping[k] * x[j];
+            y[drape_pattern_row(p, j, k)] += s->damping[k] * x[j];
 }
 
 /* ---- Stages ---- */

@@ -312,7 +312,7 @@ static double absolute(const drape_pattern *pattern, const double *values, int64
 {
     double sum = 0;
     for (int64_t k = pattern->column[j]; k < pattern->column[j + 1]; k++)
-        sum += fabs(values[k] * x[pattern->row[k]]);
+        sum += fabs(values[k] * x[drape_pattern_row(pattern, j, k)]);
     return sum;
 }
 
@@ -327,7 +327,7 @@ static double backward_error(problem *p, double value, const double *u)
         double sum = y[j], size = absolute(t->pattern, t->values, j, u);
         if (p->buckling) {
             for (int64_t k = t->pattern->column[j]; k < t->pattern->column[j + 1]; k++)
-                sum += (value - p->shift) * p->slope[k] * u[t->pattern->row[k]];
+                sum += (value - p->shift) * p->slope[k] * u[drape_pattern_row(t->pattern, j, k)];
             size += fabs(value - p->shift) * absolute(t->pattern, p->slope, j, u);
         } else {
             sum -= value * t->mass[j] * u[j];

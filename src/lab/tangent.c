@@ -174,7 +174,7 @@ void lab_tangent_multiply(const lab_tangent *t, const double *values, const doub
     for (int64_t j = 0; j < p->n; j++) {
         double sum = 0;
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
-            sum += values[k] * x[p->row[k]];
+            sum += values[k] * x[drape_pattern_row(p, j, k)];
         y[j] = sum;
     }
 }

@@ -14,7 +14,7 @@ static void scale(const drape_pattern *p, const double *row, const double *colum
     for (int64_t j = 0; j < p->n; j++) {
         double most = 0;
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++) {
-            const int64_t i = p->row[k];
+            const int64_t i = drape_pattern_row(p, j, k);
             scaled[k] *= row[i] * column[j];
             const double size = fabs(scaled[k]);
             most = size > most ? size : most;

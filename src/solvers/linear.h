@@ -46,7 +46,8 @@ struct drape_linear_ops {
     /* Sets the positions of the nodes (pattern->n) [m] for the next factorisation, which chooses its coarse
      * spaces by them. NULL: it has no use for them. */
     void (*set_positions)(void *state, const double *x);
-    /* Factors the matrix with these values (pattern->nonzeros). DRAPE_OK, or DRAPE_RETRY_LINEAR if it is
+    /* Factors the matrix with these values (pattern->nonzeros), which must stay as they are until the last
+     * solve with it: an iterative solver keeps no copy. DRAPE_OK, or DRAPE_RETRY_LINEAR if it is
      * singular to working precision or not finite. With borrows_heap also DRAPE_E_MEMORY, after which it
      * may be called again. */
     drape_status (*factor)(void *state, const double *values);

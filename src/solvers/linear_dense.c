@@ -42,7 +42,7 @@ static drape_status factor(void *state, const double *values)
     memset(s->values, 0, (size_t)p->n * (size_t)p->n * sizeof *s->values);
     for (int64_t j = 0; j < p->n; j++)
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
-            s->column[j][p->row[k]] = values[k];
+            s->column[j][drape_pattern_row(p, j, k)] = values[k];
     s->factored = drape_all_finite(values, (size_t)p->nonzeros) &&
                   SUNDlsMat_denseGETRF(s->column, p->n, p->n, s->pivot) == 0;
     return s->factored ? DRAPE_OK : DRAPE_RETRY_LINEAR;

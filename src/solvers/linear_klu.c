@@ -18,6 +18,7 @@
 
 typedef struct klu_state {
     const drape_pattern *pattern;
+    int64_t *row; /* (nonzeros) of the pattern */
     klu_l_common common;
     klu_l_symbolic *symbolic;
     klu_l_numeric *numeric; /* NULL before the first and after a failed factorisation */
@@ -51,9 +52,11 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     s->common.ordering = ORDER_AMD;
     s->common.btf = 0;
     s->chosen_for = drape_arena_take(arena, (size_t)pattern->nonzeros, sizeof *s->chosen_for);
-    if (!s->chosen_for)
+    s->row = drape_arena_take(arena, (size_t)pattern->nonzeros, sizeof *s->row);
+    if (!s->chosen_for || !s->row)
         return DRAPE_E_MEMORY;
-    s->symbolic = klu_l_analyze(pattern->n, indices(pattern->column), indices(pattern->row), &s->common);
+    drape_pattern_list_rows(pattern, s->row);
+    s->symbolic = klu_l_analyze(pattern->n, indices(pattern->column), indices(s->row), &s->common);
     if (!s->symbolic)
         return drape_fail(arena->ctx, s->common.status == KLU_OUT_OF_MEMORY ? DRAPE_E_MEMORY : DRAPE_E_SOLVER,
                           "KLU cannot analyse the %lld x %lld Jacobian: status %d", (long long)pattern->n,
@@ -73,7 +76,7 @@ static bool refactor(klu_state *s, double *values)
     const drape_pattern *p = s->pattern;
     s->refactored = true;
     return s->numeric &&
-           klu_l_refactor(indices(p->column), indices(p->row), values, s->symbolic, s->numeric, &s->common) &&
+           klu_l_refactor(indices(p->column), indices(s->row), values, s->symbolic, s->numeric, &s->common) &&
            s->common.status == KLU_OK && well_conditioned(s);
 }
 
@@ -84,7 +87,7 @@ static bool factor_afresh(klu_state *s, double *values)
     s->refactored = false;
     if (values != s->chosen_for)
         memcpy(s->chosen_for, values, (size_t)p->nonzeros * sizeof *values);
-    s->numeric = klu_l_factor(indices(p->column), indices(p->row), values, s->symbolic, &s->common);
+    s->numeric = klu_l_factor(indices(p->column), indices(s->row), values, s->symbolic, &s->common);
     return s->numeric && s->common.status == KLU_OK && well_conditioned(s);
 }
 

@@ -26,8 +26,8 @@ extern const drape_linear_ops drape_linear_pcg;
 typedef struct pcg_state {
     drape_arena *arena;
     const drape_pattern *pattern;
-    double *values;    /* (nonzeros) of the last factor call */
-    double *positions; /* (n) of the nodes at the next factor call [m] */
+    const double *values; /* (nonzeros) of the last factor call: the caller's */
+    double *positions;    /* (n) of the nodes at the next factor call [m] */
     drape_multigrid *multigrid;
     drape_pcg pcg;
     drape_fallback fallback;
@@ -54,7 +54,6 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     s->arena = arena;
     s->pattern = pattern;
     s->fallback = drape_fallback_of(arena, pattern);
-    s->values = drape_arena_take(arena, (size_t)pattern->nonzeros, sizeof *s->values);
     s->positions = drape_arena_take(arena, n, sizeof *s->positions);
     s->pcg = drape_pcg_of(arena, pattern->n, s, multiply, precondition);
     drape_status status = drape_arena_status(arena);
@@ -75,14 +74,15 @@ static void destroy(void **state)
 static bool is_symmetric(const pcg_state *s)
 {
     const drape_pattern *p = s->pattern;
+    double *const values = (double *)(uintptr_t)s->values; /* only read */
     for (int32_t j = 0; j < p->block_count; j++)
         for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
             int64_t stride, mirrored, own, other;
             int32_t i = p->block_row[k];
-            const double *a = drape_pattern_at(p, s->values, j, k, &stride),
-                         *b = drape_pattern_at(p, s->values, i, drape_pattern_find(p, j, i), &mirrored),
-                         *d = drape_pattern_at(p, s->values, j, p->diagonal[j], &own),
-                         *e = drape_pattern_at(p, s->values, i, p->diagonal[i], &other);
+            const double *a = drape_pattern_at(p, values, j, k, &stride),
+                         *b = drape_pattern_at(p, values, i, drape_pattern_find(p, j, i), &mirrored),
+                         *d = drape_pattern_at(p, values, j, p->diagonal[j], &own),
+                         *e = drape_pattern_at(p, values, i, p->diagonal[i], &other);
             for (int c = 0; c < 3; c++)
                 for (int r = 0; r < 3; r++) {
                     double difference = a[c * stride + r] - b[r * mirrored + c];
@@ -131,7 +131,7 @@ static drape_status factor_any(pcg_state *s, const double *values, bool definite
     s->fallback.active = s->factored = false;
     if (!drape_all_finite(values, (size_t)s->pattern->nonzeros))
         return DRAPE_RETRY_LINEAR;
-    memcpy(s->values, values, (size_t)s->pattern->nonzeros * sizeof *values);
+    s->values = values;
     const bool symmetric = is_symmetric(s);
     s->definite = definite && symmetric;
     s->factored = symmetric && !drape_multigrid_factor(s->multigrid, s->values, s->positions);
@@ -185,7 +185,7 @@ static void archive(void *state, drape_archive *a, const double *values)
     drape_archive_doubles(a, s->positions, (size_t)s->pattern->n);
     if (!drape_archive_has_read(a))
         return;
-    memcpy(s->values, values, (size_t)s->pattern->nonzeros * sizeof *values);
+    s->values = values;
     if (s->factored && !s->fallback.active)
         drape_multigrid_factor(s->multigrid, s->values, s->positions);
 }

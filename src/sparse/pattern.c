@@ -98,7 +98,6 @@ static drape_status allocate(drape_arena *arena, drape_pattern *pattern, int32_t
     pattern->block_row = drape_arena_take(arena, (size_t)blocks, sizeof *pattern->block_row);
     pattern->diagonal = drape_arena_take(arena, (size_t)block_count, sizeof *pattern->diagonal);
     pattern->column = drape_arena_take(arena, (size_t)pattern->n + 1, sizeof *pattern->column);
-    pattern->row = drape_arena_take(arena, (size_t)pattern->nonzeros, sizeof *pattern->row);
     return drape_arena_status(arena);
 }
 
@@ -112,17 +111,11 @@ static void fill_blocks(drape_pattern *pattern, const neighbours *list)
     }
 }
 
-static void fill_scalars(drape_pattern *pattern)
+static void fill_columns(drape_pattern *pattern)
 {
-    int64_t next = 0;
-    for (int32_t j = 0; j < pattern->block_count; j++)
-        for (int c = 0; c < 3; c++) {
-            pattern->column[3 * (int64_t)j + c] = next;
-            for (int32_t k = pattern->block_start[j]; k < pattern->block_start[j + 1]; k++)
-                for (int r = 0; r < 3; r++)
-                    pattern->row[next++] = 3 * (int64_t)pattern->block_row[k] + r;
-        }
-    pattern->column[pattern->n] = next;
+    for (int64_t j = 0; j < pattern->n; j++)
+        pattern->column[j + 1] =
+            pattern->column[j] + 3 * (int64_t)(pattern->block_start[j / 3 + 1] - pattern->block_start[j / 3]);
 }
 
 drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const int32_t *block_of_node,
@@ -140,7 +133,7 @@ drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const 
         status = allocate(arena, pattern, block_count, blocks);
     if (!status) {
         fill_blocks(pattern, &list);
-        fill_scalars(pattern);
+        fill_columns(pattern);
     }
     drape_arena_free(&scratch);
     return status;
@@ -167,6 +160,13 @@ int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t co
     const int32_t block = search_column(pattern, row, column);
     assert(pattern->block_row[block] == row);
     return block;
+}
+
+void drape_pattern_list_rows(const drape_pattern *pattern, int64_t *row)
+{
+    for (int64_t j = 0; j < pattern->n; j++)
+        for (int64_t k = pattern->column[j]; k < pattern->column[j + 1]; k++)
+            row[k] = drape_pattern_row(pattern, j, k);
 }
 
 bool drape_pattern_has(const drape_pattern *pattern, int32_t row, int32_t column)

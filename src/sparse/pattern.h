@@ -20,7 +20,6 @@ typedef struct drape_pattern {
     int32_t *block_row;   /* (blocks) */
     int32_t *diagonal;    /* (block_count) number of the diagonal block of each column */
     int64_t *column;      /* (n + 1) CSC column pointers */
-    int64_t *row;         /* (nonzeros) CSC row indices */
 } drape_pattern;
 
 /* Elements that couple all their nodes: node (count x nodes) holds numbers that block_of_node maps to block
@@ -50,6 +49,16 @@ void drape_pattern_symmetrize(const drape_pattern *pattern, double *values);
 
 /* The largest difference of two mirrored entries, in parts of the largest entry. */
 double drape_pattern_asymmetry(const drape_pattern *pattern, const double *values);
+
+/* Writes the CSC row indices: row (nonzeros). */
+void drape_pattern_list_rows(const drape_pattern *pattern, int64_t *row);
+
+/* Returns the CSC row index of value number k, which is in scalar column j. */
+static inline int64_t drape_pattern_row(const drape_pattern *pattern, int64_t j, int64_t k)
+{
+    const int64_t q = k - pattern->column[j];
+    return 3 * (int64_t)pattern->block_row[pattern->block_start[j / 3] + q / 3] + q % 3;
+}
 
 /* Returns the first value of a block and the distance to its next column. */
 static inline double *drape_pattern_at(const drape_pattern *pattern, double *values, int32_t column,

@@ -114,7 +114,8 @@ static double error_of(probe *t, double weight, double time)
     memset(t->jp, 0, 3 * (size_t)m->node_count * sizeof *t->jp);
     for (int64_t j = 0; j < pattern->n; j++)
         for (int64_t k = pattern->column[j]; k < pattern->column[j + 1]; k++)
-            t->jp[3 * m->node_of_free[pattern->row[k] / 3] + pattern->row[k] % 3] +=
+            t->jp[3 * m->node_of_free[drape_pattern_row(pattern, j, k) / 3] +
+                  drape_pattern_row(pattern, j, k) % 3] +=
                 t->values[k] * t->p[3 * m->node_of_free[j / 3] + j % 3];
     for (double e = 1e-6; e > 5e-10; e /= 10) {
         force_beside(t, point, e, t->g[0]);
@@ -130,7 +131,7 @@ static double error_of(probe *t, double weight, double time)
 static double value_at(const drape_pattern *p, const double *values, int64_t i, int64_t j)
 {
     for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
-        if (p->row[k] == i)
+        if (drape_pattern_row(p, j, k) == i)
             return values[k];
     return 0;
 }
@@ -154,7 +155,7 @@ static void check_symmetrized(probe *t, const char *what, double weight, double 
     drape_system_symmetrize(t->system, &point, share, t->values);
     for (int64_t j = 0; j < p->n; j++)
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++) {
-            ck_assert_msg(t->values[k] == value_at(p, t->values, j, p->row[k]), "%s", what);
+            ck_assert_msg(t->values[k] == value_at(p, t->values, j, drape_pattern_row(p, j, k)), "%s", what);
             largest = fmax(largest, fabs(exact[k]));
             change = fmax(change, fabs(t->values[k] - exact[k]));
         }
@@ -409,7 +410,9 @@ static double stiffness_along(probe *t, const double *p)
     drape_system_jacobian(t->system, &point, 0, 0, t->values);
     for (int64_t j = 0; j < pattern->n; j++)
         for (int64_t k = pattern->column[j]; k < pattern->column[j + 1]; k++)
-            sum += pattern->row[k] % 3 == 1 ? t->values[k] * p[3 * m->node_of_free[j / 3] + j % 3] : 0;
+            sum += drape_pattern_row(pattern, j, k) % 3 == 1
+                       ? t->values[k] * p[3 * m->node_of_free[j / 3] + j % 3]
+                       : 0;
     return sum;
 }
 

@@ -74,7 +74,7 @@ static void fill(problem *q, matrix_kind kind, uint64_t seed)
     for (int64_t c = 0; c < p->n; c++) {
         double *diagonal = NULL, sum = 0;
         for (int64_t k = p->column[c]; k < p->column[c + 1]; k++) {
-            int64_t r = p->row[k], low = r < c ? r : c, high = r < c ? c : r;
+            int64_t r = drape_pattern_row(p, c, k), low = r < c ? r : c, high = r < c ? c : r;
             uint64_t own = seed * 1000003 + (uint64_t)(low * p->n + high) +
                            (kind == UNSYMMETRIC && r < c ? 77777777 : 0);
             random_number(&own);
@@ -97,7 +97,7 @@ static void solve_dense(problem *q)
     memset(a, 0, n * w * sizeof *a);
     for (size_t c = 0; c < n; c++)
         for (int64_t k = q->p->column[c]; k < q->p->column[c + 1]; k++)
-            a[w * (size_t)q->p->row[k] + c] = q->values[k];
+            a[w * (size_t)drape_pattern_row(q->p, (int64_t)c, k) + c] = q->values[k];
     for (size_t i = 0; i < n; i++)
         a[w * i + n] = q->b[i];
     for (size_t k = 0; k < n; k++) {
@@ -232,9 +232,10 @@ static void clear_column(problem *q, int64_t c)
 
 static void clear_row(problem *q, int64_t r)
 {
-    for (int64_t k = 0; k < q->p->nonzeros; k++)
-        if (q->p->row[k] == r)
-            q->values[k] = 0;
+    for (int64_t c = 0; c < q->p->n; c++)
+        for (int64_t k = q->p->column[c]; k < q->p->column[c + 1]; k++)
+            if (drape_pattern_row(q->p, c, k) == r)
+                q->values[k] = 0;
 }
 
 static void break_matrix(problem *q, int how)
@@ -328,8 +329,9 @@ START_TEST(kept_pivots_that_become_zero_are_chosen_again)
         check_solution(&q, drape_linears[i], solver, "diagonal pivots");
         for (int64_t c = 0; c < q.p->n; c++)
             for (int64_t k = q.p->column[c]; k < q.p->column[c + 1]; k++) {
-                bool own = q.p->row[k] / 3 == c / 3;
-                q.values[k] = own ? (q.p->row[k] % 3 == (c + 1) % 3 ? 2.385 : 0) : 1e-3 * q.values[k];
+                bool own = drape_pattern_row(q.p, c, k) / 3 == c / 3;
+                q.values[k] =
+                    own ? (drape_pattern_row(q.p, c, k) % 3 == (c + 1) % 3 ? 2.385 : 0) : 1e-3 * q.values[k];
             }
         check_solution(&q, drape_linears[i], solver, "other pivots");
         drape_linear_destroy(drape_linears[i], &solver);
@@ -351,7 +353,7 @@ START_TEST(a_small_part_that_is_not_symmetric_is_not_lost)
                 fill(&q, SPD, 5);
                 int64_t c = 3 * (q.p->n / 6) + upper; /* entry (1 - upper, upper) of that block */
                 for (int64_t k = q.p->column[c]; k < q.p->column[c + 1]; k++)
-                    if (q.p->row[k] == c + 1 - 2 * upper)
+                    if (drape_pattern_row(q.p, c, k) == c + 1 - 2 * upper)
                         q.values[k] *= 1 + size;
                 check_solution(&q, drape_linears[i], solver, "a little unsymmetric");
             }
@@ -476,7 +478,7 @@ static void fill_sheet(sheet *q, double shift, uint64_t seed)
     for (int64_t c = 0; c < q->p.n; c++) {
         double *diagonal = NULL, sum = 0;
         for (int64_t k = q->p.column[c]; k < q->p.column[c + 1]; k++) {
-            int64_t r = q->p.row[k], low = r < c ? r : c, high = r < c ? c : r;
+            int64_t r = drape_pattern_row(&q->p, c, k), low = r < c ? r : c, high = r < c ? c : r;
             uint64_t own = seed * 1000003 + (uint64_t)(low * q->p.n + high);
             random_number(&own);
             q->values[k] = random_number(&own);
@@ -498,8 +500,8 @@ static double backward_error(const sheet *q)
     }
     for (int64_t c = 0; c < q->p.n; c++)
         for (int64_t k = q->p.column[c]; k < q->p.column[c + 1]; k++) {
-            r[q->p.row[k]] += q->values[k] * q->x[c];
-            size[q->p.row[k]] += fabs(q->values[k] * q->x[c]);
+            r[drape_pattern_row(&q->p, c, k)] += q->values[k] * q->x[c];
+            size[drape_pattern_row(&q->p, c, k)] += fabs(q->values[k] * q->x[c]);
         }
     for (int64_t i = 0; i < q->p.n; i++)
         max = fmax(max, fabs(r[i]) / size[i]);
@@ -704,7 +706,7 @@ static void fill_hard(sheet *q, hard_kind kind)
     const drape_pattern *p = &q->p;
     for (int64_t c = 0; c < p->n; c++)
         for (int64_t k = p->column[c]; k < p->column[c + 1]; k++) {
-            const int64_t r = p->row[k];
+            const int64_t r = drape_pattern_row(p, c, k);
             double *v = &q->values[k];
             if (kind == SADDLE && r / 3 == c / 3 && c / 3 % 3 == 1)
                 *v = 0;
@@ -727,7 +729,9 @@ static void fill_laplacian(sheet *q, double shift)
     for (int64_t c = 0; c < p->n; c++) {
         const double neighbours = (double)(p->column[c + 1] - p->column[c]) / 3 - 1;
         for (int64_t k = p->column[c]; k < p->column[c + 1]; k++)
-            q->values[k] = p->row[k] == c ? neighbours * (1 + shift) : p->row[k] % 3 == c % 3 ? -1 : 0;
+            q->values[k] = drape_pattern_row(p, c, k) == c           ? neighbours * (1 + shift)
+                           : drape_pattern_row(p, c, k) % 3 == c % 3 ? -1
+                                                                     : 0;
     }
 }
 
@@ -870,7 +874,7 @@ START_TEST(the_symmetric_part_is_exact)
     ck_assert(memcmp(symmetric, q.values, (size_t)q.p.nonzeros * sizeof *symmetric) == 0);
     for (int64_t c = 0; c < q.p.n; c++)
         for (int64_t k = q.p.column[c]; k < q.p.column[c + 1]; k++) {
-            const int64_t r = q.p.row[k];
+            const int64_t r = drape_pattern_row(&q.p, c, k);
             q.values[k] += sin((double)(r * r - c * c)); /* odd in (r, c) */
         }
     drape_pattern_symmetrize(&q.p, q.values);
@@ -907,7 +911,7 @@ static double residual_of(problem *q)
     memcpy(q->kept, q->b, q->n * sizeof *q->b);
     for (size_t c = 0; c < q->n; c++)
         for (int64_t k = q->p->column[c]; k < q->p->column[c + 1]; k++)
-            q->kept[q->p->row[k]] -= q->values[k] * q->x[c];
+            q->kept[drape_pattern_row(q->p, (int64_t)c, k)] -= q->values[k] * q->x[c];
     return euclidean(q->n, q->kept, q->expected);
 }
 

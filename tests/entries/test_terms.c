@@ -724,8 +724,8 @@ static void check_projection(drape_context *ctx, const variant *v, const drape_m
             b[i] = random_number(&seed);
         for (int64_t c = 0; c < p->n; c++)
             for (int64_t k = p->column[c]; k < p->column[c + 1]; k++) {
-                sum += b[c] * j[k] * b[p->row[k]];
-                size += fabs(b[c] * j[k] * b[p->row[k]]);
+                sum += b[c] * j[k] * b[drape_pattern_row(p, c, k)];
+                size += fabs(b[c] * j[k] * b[drape_pattern_row(p, c, k)]);
             }
         ck_assert_msg(sum >= -1e-13 * size, "%s: %g of %g", name_of(v), sum, size);
     }

@@ -101,7 +101,7 @@ static inline int ida_full_jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N
     for (int64_t j = 0; j < p->n; j++) {
         *to++ = -1;
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
-            *to++ = f->d[k] + (p->row[k] == j ? cj * ida_full_mass(f, j) : 0);
+            *to++ = f->d[k] + (drape_pattern_row(p, j, k) == j ? cj * ida_full_mass(f, j) : 0);
     }
     drape_sun_newton_forget(&f->newton);
     f->jacobians++;
@@ -123,7 +123,7 @@ static inline void ida_full_pattern(ida_full *f)
         column[j] = at;
         row[at++] = j % p->n;
         for (int64_t k = p->column[j % p->n]; k < p->column[j % p->n + 1]; k++)
-            row[at++] = p->n + p->row[k];
+            row[at++] = p->n + drape_pattern_row(p, j % p->n, k);
     }
     column[2 * p->n] = at;
     f->matrix->ops->zero = ida_full_keep;

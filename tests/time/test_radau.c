@@ -296,8 +296,8 @@ static void residual_of(drape_radau_matrix *m, double h, const double *b, const 
         const double re = x[j], im = x[n + j];
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++) {
             const double stiff = m->stiffness[k], damp = m->damping ? m->damping[k] : 0;
-            r[p->row[k]] -= stiff * re + damp * (mu[0] * re - mu[1] * im);
-            r[n + p->row[k]] -= stiff * im + damp * (mu[0] * im + mu[1] * re);
+            r[drape_pattern_row(p, j, k)] -= stiff * re + damp * (mu[0] * re - mu[1] * im);
+            r[n + drape_pattern_row(p, j, k)] -= stiff * im + damp * (mu[0] * im + mu[1] * re);
         }
         r[j] -= m->mass[j] * (square[0] * re - square[1] * im);
         r[n + j] -= m->mass[j] * (square[0] * im + square[1] * re);
