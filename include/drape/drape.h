@@ -792,6 +792,7 @@ DRAPE_API drape_status drape_sim_change_model(drape_sim *sim, const drape_model 
 
 /* Pins nodes where they are, or lets them go, as drape_sim_change does with a model that has other pins;
  * count numbers of nodes of the sim. Nodes that are so already are left alone; if all are, nothing happens.
+ * Nodes that a "normal" or an "axis" holds are free in this sense: drape_sim_unpin leaves them held.
  * A drag spring of a node that becomes pinned is removed. Otherwise the sim goes on with a model of its own,
  * which shares all but the numbers of unknowns and the sparsity with the one that was compiled. Checkpoints
  * keep these pins. Must not be called by an observer.
@@ -1163,10 +1164,13 @@ DRAPE_API bool drape_model_collider_rotation(const drape_model *model, int32_t i
 
 /* Energies of the last accepted state [J]. */
 typedef struct drape_energy {
-    double kinetic;    /* [J] of the free nodes only, as the motion of pinned nodes is prescribed */
-    double elastic;    /* [J] of all terms that have an energy, and of drape_sim_set_drag_spring */
-    double gravity;    /* [J] potential energy, zero at the origin */
-    double contact;    /* [J] of pairs that are closer than their activation distance */
+    double
+        kinetic; /* [J] of the free nodes only, as the motion of pinned nodes is prescribed; nodes that pins
+                          hold in some directions only count with all of their velocity */
+    double elastic; /* [J] of all terms that have an energy, and of drape_sim_set_drag_spring */
+    double gravity; /* [J] of the weight, zero at the origin, and of loads with a potential, such as -p V of
+                          load.pressure */
+    double contact; /* [J] of pairs that are closer than their activation distance */
     double dissipated; /* [J] work taken by damping and drag terms since t = 0 or drape_sim_set_state */
     double numerical;  /* [J] the rest of the balance, after the work of moving pins and colliders and of
                           drape_sim_push: the integrator's own dissipation; negative: a gain */

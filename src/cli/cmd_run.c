@@ -235,7 +235,10 @@ static void print_energy(const run *r)
                  {"contact", e.contact}, {"dissipated", e.dissipated}, {"numerical", e.numerical}};
     fputs("energy   ", stdout);
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        printf("%s %s %.5g J", i ? "," : "", parts[i].name, parts[i].value);
+        if (isnan(parts[i].value)) /* a start that collapses elements */
+            printf("%s %s undefined", i ? "," : "", parts[i].name);
+        else
+            printf("%s %s %.5g J", i ? "," : "", parts[i].name, parts[i].value);
     fputc('\n', stdout);
 }
 

@@ -51,11 +51,17 @@ static void print_scene(const cli_info *info)
 static void print_pins(const drape_model *model, const drape_cloth *cloth, const cli_cloth_info *info)
 {
     int listed = 0;
-    int supported = 0;
-    for (int32_t i = 0; i < model->support_count; i++)
-        supported += drape_model_cloth_of(model, model->supports[i].node) == cloth - model->cloths;
+    int supported = 0, moved = 0;
+    for (int32_t i = 0; i < model->support_count; i++) {
+        const drape_support *support = &model->supports[i];
+        if (drape_model_cloth_of(model, support->node) != cloth - model->cloths)
+            continue;
+        supported++;
+        moved += support->track[0] >= 0 || (support->count > 1 && support->track[1] >= 0);
+    }
     if (supported > 0)
-        printf("  supports  %d node%s held in some directions only\n", supported, supported == 1 ? "" : "s");
+        printf("  supports  %d node%s held in some directions only, %d moved\n", supported,
+               supported == 1 ? "" : "s", moved);
     printf("  pins      %d node%s, %d moved", (int)info->pinned, info->pinned == 1 ? "" : "s",
            (int)info->moved);
     for (int32_t i = 0; i < cloth->mesh.node_count && listed < MAX_LISTED; i++)

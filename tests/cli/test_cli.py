@@ -436,6 +436,18 @@ def test_failure():
     assert all(row["accepted"] == "0" for row in read_steps("out")), "the last attempt failed, and all before it"
 
 
+def test_undefined_energy():
+    """the bending energy of a start that collapses elements is undefined, not a number"""
+    write_scene(cloth=[{"mesh": {"grid": "square", "columns": 6, "rows": 6, "width": 0.5, "height": 0.5},
+                        "material": {"young_modulus": 1e5, "thickness": 1e-3, "areal_density": 0.2},
+                        "terms": ["stretch.cst", "bend.midedge"],
+                        "pins": [{"edge": "left", "track": [[0, [0.1, 0, 0]]]}]}])
+    result = drape("run", "scene.json", "--out", "collapsed")
+    equal(result.returncode, 1, result.stderr)
+    assert "area_collapse" in result.stderr, result.stderr
+    assert "elastic undefined" in result.stdout and "nan" not in result.stdout, result.stdout
+
+
 def interrupt(signals, *args):
     """Signals a run when its step log has begun to fill. Returns the exit code and stderr."""
     with subprocess.Popen([PROGRAM, "run", "scene.json", "--out", "out", *args],
