@@ -101,7 +101,7 @@ class Term:
                 raise TypeError(f"{self.name}: the energy function returned {type(results).__name__}, needs energies, gradients and Hessians")
             for out, name, values, shape in zip((energies, gradients, hessians), ("energies", "gradients", "Hessians"), results, shapes):
                 if out:
-                    values = spread(values, f"{self.name}: {name}", *shape)
+                    values = spread(values, f"{self.name}: {name}", *shape, finite=False)  # not finite: the attempt is rejected
                     ctypes.memmove(out, values.ctypes.data, values.nbytes)
         except BaseException as error:
             self._error = self._error or error

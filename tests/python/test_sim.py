@@ -539,6 +539,18 @@ def test_bad_answers():
                                (drape.ArgumentError, "my.weight: energies: has shape (3,), needs ", lambda x, rest: ([1, 2, 3], 0.0, 0.0))):
         model = drape.Model(sheet(terms=["my.weight"]), [drape.Term("my.weight", 1, lambda cloth: np.arange(36)[:, None], energy)])
         raises(kind, lambda model=model: drape.Sim(model).advance(0.1), says=says)
+    attempts = []
+
+    def grows(x, mass):  # not finite in the third attempt, as an energy may be in a state that a diverging iteration reaches
+        bad = np.nan if len(attempts) == 2 else 1
+        return mass[:, 0] * x[:, 0, 1] * bad, mass[:, :, None] * [0, bad, 0], np.zeros((3, 3))
+
+    model = drape.Model(sheet(terms=["stretch.edge", "my.weight"]),
+                        [drape.Term("my.weight", 1, lambda cloth: (np.arange(len(cloth.rest))[:, None], cloth.node_mass[:, None]), grows, external=True)])
+    sim = drape.Sim(model)
+    sim.observe(lambda event: attempts.append(event.attempt.accepted), KIND.ATTEMPT)
+    sim.advance(0.1)
+    equal((attempts[2], sim.time), (0, 0.1))
 
 
 def test_callbacks_in_threads():
