@@ -69,6 +69,8 @@ def colliders_of(context, thing) -> List[Any]:
 def simulated_of(context, thing):
     """The object that is simulated in place of a cloth."""
     other = thing.drape.simulated
+    if other.type != "MESH":
+        raise Problem(f"{other.name}: is of the type {other.type.title()}; only a mesh can be simulated for {thing.name}")
     if other.name not in context.view_layer.objects or other.hide_viewport:
         raise Problem(f"{other.name}: is disabled in viewports or not in this view layer, so it cannot be simulated for {thing.name}: hide it by the eye")
     if other in colliders_of(context, thing):

@@ -1164,9 +1164,8 @@ DRAPE_API bool drape_model_collider_rotation(const drape_model *model, int32_t i
 
 /* Energies of the last accepted state [J]. */
 typedef struct drape_energy {
-    double
-        kinetic; /* [J] of the free nodes only, as the motion of pinned nodes is prescribed; nodes that pins
-                          hold in some directions only count with all of their velocity */
+    double kinetic; /* [J] of all nodes but pinned ones, whose motion is prescribed; nodes that pins hold
+                       in some directions only count with all of their velocity */
     double elastic; /* [J] of all terms that have an energy, and of drape_sim_set_drag_spring */
     double gravity; /* [J] of the weight, zero at the origin, and of loads with a potential, such as -p V of
                           load.pressure */

@@ -303,10 +303,7 @@ class Model:
     def render_mesh(self, cloth: Optional[int] = None, positions=None) -> Mesh:
         """The mesh that frames show of one cloth, or of all of them: the render_mesh of the scene, or the simulated mesh of a cloth without one. At rest, or for
         nodes at positions (nodes x 3 [m]). Polygons are divided into triangles."""
-        which = -1 if cloth is None else operator.index(cloth)
-        mesh = lib.drape_model_render_mesh(self._address, which)
-        if not mesh.vertex_count:
-            raise ArgumentError(f"no cloth {cloth}: there are {len(self.cloths)}")
+        mesh = lib.drape_model_render_mesh(self._address, self._which(cloth))
         triangles = self._handle.view(mesh.triangles, (mesh.triangle_count, 3), np.int32)
         if positions is None:
             return Mesh(self._handle.view(mesh.rest, (mesh.vertex_count, 3), np.float64), triangles)
@@ -315,11 +312,20 @@ class Model:
     @header("drape_model_render_positions")
     def render_positions(self, positions, cloth: Optional[int] = None) -> np.ndarray:
         """Positions (vertices x 3 [m]) of render_mesh for nodes at positions (nodes x 3 [m]), as frames have them."""
-        which = -1 if cloth is None else operator.index(cloth)
+        which = self._which(cloth)
         x = numbers(positions, "positions", self.node_count, 3)
+        normals = self.normals(x)
         out = np.empty((lib.drape_model_render_mesh(self._address, which).vertex_count, 3))
-        lib.drape_model_render_positions(self._address, which, x.ctypes.data, self.normals(x).ctypes.data, out.ctypes.data)
+        lib.drape_model_render_positions(self._address, which, x.ctypes.data, normals.ctypes.data, out.ctypes.data)
         return out
+
+    def _which(self, cloth: Optional[int]) -> int:
+        """The number of a cloth for the library, which has -1 for all of them."""
+        if cloth is None:
+            return -1
+        if not 0 <= operator.index(cloth) < len(self.cloths):
+            raise ArgumentError(f"no cloth {cloth}: there are {len(self.cloths)}")
+        return operator.index(cloth)
 
     def __repr__(self) -> str:
         return f"Model({self.node_count} nodes, {self.triangle_count} triangles)"

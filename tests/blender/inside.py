@@ -213,6 +213,11 @@ def test_simulated_mesh():
     cage.hide_viewport = True
     assert "Cage: is disabled in viewports" in refused(cloth)
     cage.hide_viewport = False
+    empty = bpy.data.objects.new("Nothing", None)
+    bpy.context.scene.collection.objects.link(empty)
+    cloth.drape.simulated = empty  # as a script may, past the list of the panel
+    assert "Nothing: is of the type Empty; only a mesh can be simulated for Napkin" in refused(cloth)
+    cloth.drape.simulated = cage
     cage.hide_set(True)
     assert (positions(bake(cloth)) == coarse).all()
     cage.hide_set(False)

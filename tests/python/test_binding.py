@@ -82,7 +82,7 @@ def test_documented():
     """functions, records and their members have the comments of the header"""
     sys.path.insert(0, BUILD + "/python")
     import drape  # pylint: disable=import-outside-toplevel
-    assert "[J] of the free nodes only" in drape.Energy.kinetic.__doc__
+    assert "[J] of all nodes but pinned ones" in drape.Energy.kinetic.__doc__
     assert "Steps end at t0 + k dt" in drape.Sim.advance.__doc__ and "[s]" in drape.Sim.advance.__doc__
     for kind in (drape.Sim, drape.Scene, drape.Model, drape.Run, drape.Mesh):
         for name, member in vars(kind).items():

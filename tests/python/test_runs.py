@@ -130,7 +130,12 @@ def test_render_mesh():
     assert 0.009 < np.linalg.norm(shown.positions - run.positions[2], axis=1).min() < 0.0101
     assert np.array_equal(plain.render_positions(2), plain.positions[2]) and not os.path.exists("plain/render_positions.npy")
     assert np.array_equal(drape.Sim(scene).record(0.05).render_positions(1), run.render_positions(1))
-    raises(drape.ArgumentError, model.render_mesh, 1, says="no cloth 1")
+    for cloth in (1, -2, 10**20):
+        raises(drape.ArgumentError, model.render_mesh, cloth, says="no cloth")
+        raises(drape.ArgumentError, model.render_positions, model.rest_positions, cloth, says="no cloth")
+    napkin = drape.Model(os.path.join(SOURCES, "examples/scenes/napkin.json"))  # of another size: its arrays lie elsewhere
+    at_rest = napkin.render_positions(np.array(napkin.rest_positions))
+    assert np.abs(at_rest - napkin.render_mesh().positions).max() < 1e-15  # sums of three products of numbers below 1
     scene["/cloth/0/render_mesh/max_distance"] = 0.005
     raises(drape.Error, drape.Model, scene, says="vertex 0, at (")
 
