@@ -5,6 +5,7 @@
 #include "base/vec3.h"
 #include "compile/select.h"
 #include "compile/stages.h"
+#include "model/support.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -367,14 +368,6 @@ drape_status drape_compile_pinned_images(const drape_model *m)
     return DRAPE_OK;
 }
 
-static const drape_support *support_of(const drape_model *m, int32_t node)
-{
-    for (int32_t i = 0; i < m->support_count; i++)
-        if (m->supports[i].node == node)
-            return &m->supports[i];
-    return NULL;
-}
-
 static bool holds_alike(const drape_support *a, const drape_support *b)
 {
     return !a || !b ? a == b
@@ -388,7 +381,7 @@ static drape_status check_supports(const drape_model *m)
     for (int32_t s = 0; s < m->image_set_count; s++)
         for (int32_t k = m->image_start[s] + 1; k < m->image_start[s + 1]; k++) {
             const int32_t a = m->image[m->image_start[s]], b = m->image[k];
-            if (!holds_alike(support_of(m, a), support_of(m, b)))
+            if (!holds_alike(drape_support_of(m, a), drape_support_of(m, b)))
                 return refuse_nodes(m, a, b, "pins hold them along different directions or tracks");
         }
     return DRAPE_OK;

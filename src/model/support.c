@@ -57,21 +57,24 @@ static bool has_track(const drape_support *support)
     return false;
 }
 
-/* The support of a node; NULL: it has none. Supports are in the order of their nodes; if nodes are asked for
- * in this order, *next, at first 0, becomes that of the node or of a later one. */
-static const drape_support *find_support(const drape_model *m, int32_t node, int32_t *next)
+const drape_support *drape_support_of(const drape_model *m, int32_t node)
 {
-    while (*next < m->support_count && m->supports[*next].node < node)
-        ++*next;
-    return *next < m->support_count && m->supports[*next].node == node ? &m->supports[*next] : NULL;
+    int32_t low = 0, high = m->support_count;
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2;
+        if (m->supports[middle].node < node)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < m->support_count && m->supports[low].node == node ? &m->supports[low] : NULL;
 }
 
 void drape_supports_stop(const drape_motion *motion, const drape_motion *before, const double *v0, double *v)
 {
     const drape_model *m = motion->model;
-    int32_t next = 0;
     for (int32_t i = 0; i < m->support_count; i++) {
-        const drape_support *now = &m->supports[i], *old = find_support(before->model, now->node, &next);
+        const drape_support *now = &m->supports[i], *old = drape_support_of(before->model, now->node);
         const size_t at = 3 * (size_t)now->node;
         double n[2][3], had[2][3];
         const int count = directions(motion, now, n);
@@ -124,21 +127,13 @@ void drape_supports_project_matrix(const drape_motion *motion, const drape_patte
     }
 }
 
-static const drape_support *support_of(const drape_model *m, int32_t node)
-{
-    for (int32_t i = 0; i < m->support_count; i++)
-        if (m->supports[i].node == node)
-            return &m->supports[i];
-    return NULL;
-}
-
 /* What the images of a node do not have in common, and what supports of theirs take from that. */
 static void keep_across(const drape_motion *motion, int32_t set, double *g)
 {
     const drape_model *m = motion->model;
     const int32_t *node = m->image + m->image_start[set],
                   count = m->image_start[set + 1] - m->image_start[set];
-    const drape_support *support = support_of(m, node[0]);
+    const drape_support *support = drape_support_of(m, node[0]);
     double n[2][3], mean[3] = {0};
     if (m->free_of_node[node[0]] < 0)
         return;
@@ -153,11 +148,10 @@ static void keep_across(const drape_motion *motion, int32_t set, double *g)
 void drape_supports_keep_reactions(const drape_motion *motion, double *g)
 {
     const drape_model *m = motion->model;
-    int32_t next = 0;
     for (int32_t f = 0; f < m->free_count; f++) {
         const int32_t node = m->node_of_free[f];
         double *at = g + 3 * (size_t)node, n[2][3], across[3];
-        const drape_support *support = find_support(m, node, &next);
+        const drape_support *support = drape_support_of(m, node);
         if (drape_periodic_has(m, node))
             continue;
         if (!support) {

@@ -12,6 +12,9 @@
 
 #include "model/motion.h"
 
+/* The support of a node; NULL: it has none. */
+const drape_support *drape_support_of(const drape_model *model, int32_t node);
+
 /* Pins with a track displace what they hold: a node by u(t) along the directions that are held, by nothing
  * along the others. Integrators compute in the frame that moves with u (drape_system_to_frame), where
  * supports rest. */
