@@ -30,14 +30,7 @@ static drape_status apply(drape_model *model, const char *pointer, const drape_m
                                        .pointer = pointer,
                                        .form = &drape_form_mass,
                                        .mesh = mesh,
-                                       .nodes = def->nodes,
-                                       .node_count = def->node_count,
-                                       .corner = def->corner,
-                                       .edge = def->edge,
-                                       .row = def->row,
-                                       .has_box = def->has_box,
-                                       .box_min = def->box_min,
-                                       .box_max = def->box_max,
+                                       DRAPE_SELECTED_BY(def),
                                        .take = take_node,
                                        .user = item};
     if (isnan(def->add) == isnan(def->mass))

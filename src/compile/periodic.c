@@ -63,14 +63,7 @@ static drape_status list_side(const pairing *p, const char *key, const drape_sel
                                        .pointer = pointer,
                                        .form = &drape_form_selection,
                                        .mesh = mesh,
-                                       .nodes = def->nodes,
-                                       .node_count = def->node_count,
-                                       .corner = def->corner,
-                                       .edge = def->edge,
-                                       .row = def->row,
-                                       .has_box = def->has_box,
-                                       .box_min = def->box_min,
-                                       .box_max = def->box_max,
+                                       DRAPE_SELECTED_BY(def),
                                        .take = take_node,
                                        .user = s};
     drape_status status = drape_arena_status(scratch);

@@ -206,14 +206,7 @@ static drape_status take_selection(pin_place *pin)
                                        .pointer = pin->pointer,
                                        .form = &drape_form_pin,
                                        .mesh = &pin->cloth->mesh,
-                                       .nodes = def->nodes,
-                                       .node_count = def->node_count,
-                                       .corner = def->corner,
-                                       .edge = def->edge,
-                                       .row = def->row,
-                                       .has_box = def->has_box,
-                                       .box_min = def->box_min,
-                                       .box_max = def->box_max,
+                                       DRAPE_SELECTED_BY(def),
                                        .take = take_node,
                                        .user = pin};
     return drape_select_nodes(&selection);

@@ -113,14 +113,7 @@ static drape_status list_side(side *s, drape_arena *scratch)
                                        .pointer = s->pointer,
                                        .form = &drape_form_seam_side,
                                        .mesh = mesh,
-                                       .nodes = def->nodes,
-                                       .node_count = def->node_count,
-                                       .corner = def->corner,
-                                       .edge = def->edge,
-                                       .row = def->row,
-                                       .has_box = def->has_box,
-                                       .box_min = def->box_min,
-                                       .box_max = def->box_max,
+                                       DRAPE_SELECTED_BY(def),
                                        .take = take_node,
                                        .user = s};
     status = drape_arena_status(scratch);

@@ -1,4 +1,4 @@
-/* select.h: the nodes of a cloth that a pin or a side of a seam selects. */
+/* select.h: the nodes of a cloth that a part of the scene, such as a pin, selects. */
 #ifndef DRAPE_COMPILE_SELECT_H
 #define DRAPE_COMPILE_SELECT_H
 
@@ -23,6 +23,11 @@ typedef struct drape_selection {
     drape_select_take *take;
     void *user;
 } drape_selection;
+
+/* The members of a selection that a def has: that of a pin, a mass, a side of a seam or an edge. */
+#define DRAPE_SELECTED_BY(def)                                                                               \
+    .nodes = (def)->nodes, .node_count = (def)->node_count, .corner = (def)->corner, .edge = (def)->edge,    \
+    .row = (def)->row, .has_box = (def)->has_box, .box_min = (def)->box_min, .box_max = (def)->box_max
 
 /* Takes each selected node: of a list in its order, else in ascending order. Errors: DRAPE_E_ARGUMENT (a node
  * that is not in the mesh, nothing selected, or by more than one key), those of take. */
