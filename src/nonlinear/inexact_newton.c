@@ -67,8 +67,6 @@
  * iterations, and 66 stiff or swung sheets were a sixth further off. */
 #define MAX_CONTRACTION 0.9
 #define STEPS_KEPT      4
-/* Times the last estimate in a solve: a larger residual is not compared with a new one */
-#define FAR_FROM_ROUNDING 1e3
 /* Power of the error if nothing but inertia resisted it, and with contact, whose matrix is stiffer. */
 #define INERTIAL         0.08
 #define INERTIAL_CONTACT 0.2
@@ -494,12 +492,7 @@ static double estimate_error(drape_inexact_newton *s, double *d, bool corrected)
 /* A residual that does not fall may be the rounding error of its forces. */
 static bool is_rounding(drape_inexact_newton *s, const double *d, drape_solve_report *report)
 {
-    drape_step_equation *e = s->equation;
-    const double residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
-    if (residual > FAR_FROM_ROUNDING * s->rounding)
-        return false;
-    s->rounding = drape_step_equation_rounding(e, d, DRAPE_NORM_MAX);
-    if (!(residual <= s->rounding))
+    if (!drape_step_equation_is_rounding(s->equation, d, DRAPE_NORM_MAX, &s->rounding))
         return false;
     report->reason = drape_reason_name(DRAPE_REASON_ROUNDING);
     return true;

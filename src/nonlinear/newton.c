@@ -83,8 +83,6 @@
 /* A solve is laborious after more iterations than the larger of these: a number, and a share of the most. */
 #define EASY       10
 #define EASY_SHARE 0.4
-/* Times the last estimate in a solve: a larger residual is not compared with a new one */
-#define FAR_FROM_ROUNDING 1e3
 
 struct drape_newton {
     drape_step_equation *equation;
@@ -181,13 +179,10 @@ static bool is_rounding(drape_newton *s, const double *d, bool *finite)
     s->residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
     if (s->residual <= max_norm_bound(s) || !(s->residual > STALLED * before) || s->positive_share > 0)
         return false;
-    const drape_norm norm = (drape_norm)s->values[DRAPE_NEWTON_NORM];
-    const double size = drape_step_equation_norm(e, norm);
-    if (size > FAR_FROM_ROUNDING * s->rounding)
-        return false;
-    s->rounding = drape_step_equation_rounding(e, d, norm);
+    const bool rounding =
+        drape_step_equation_is_rounding(e, d, (drape_norm)s->values[DRAPE_NEWTON_NORM], &s->rounding);
     *finite = !isnan(s->rounding);
-    return size <= s->rounding;
+    return rounding;
 }
 
 /* KINSOL must never get a NaN: its norms ignore it, so it would look like convergence. After a line search

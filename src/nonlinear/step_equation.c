@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 
+#define FAR_FROM_ROUNDING 1e3 /* times the last estimate of a solve */
 #define MAX_PASSES 3    /* of shortening a displacement at nodes */
 #define PROBED     1e-6 /* of the displacement of pins: their pull is a difference over that much */
 
@@ -232,6 +233,16 @@ double drape_step_equation_rounding(drape_step_equation *s, const double *d, dra
         add_entry(&sum, DRAPE_ROUNDINGS * s->weight[i / 3] * error);
     }
     return choose(&sum, norm);
+}
+
+bool drape_step_equation_is_rounding(drape_step_equation *s, const double *d, drape_norm norm,
+                                     double *rounding)
+{
+    const double size = drape_step_equation_norm(s, norm);
+    if (size > FAR_FROM_ROUNDING * *rounding)
+        return false;
+    *rounding = drape_step_equation_rounding(s, d, norm);
+    return size <= *rounding;
 }
 
 drape_diagnostic drape_step_equation_diagnose(const drape_step_equation *s, double tolerance)

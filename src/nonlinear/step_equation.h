@@ -113,6 +113,12 @@ double drape_step_equation_norm(const drape_step_equation *equation, drape_norm 
  * cancel count in full. */
 double drape_step_equation_rounding(drape_step_equation *equation, const double *d, drape_norm norm);
 
+/* Whether the norm of F, evaluated last at d, is no larger than that. *rounding: the last estimate of this
+ * solve, INFINITY before the first; a norm that is far above it is not compared with a new one, which would
+ * cost an evaluation of F. NaN: F is not finite near d. */
+bool drape_step_equation_is_rounding(drape_step_equation *equation, const double *d, drape_norm norm,
+                                     double *rounding);
+
 /* Multiple of DBL_EPSILON within which errors of a computed force are taken as rounding. */
 #define DRAPE_ROUNDINGS 4
 
