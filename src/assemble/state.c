@@ -47,9 +47,12 @@ drape_status drape_state_create(drape_arena *arena, const drape_model *model, dr
         if (term->ops->initial)
             term->ops->initial(&el, 0, drape_term_pieces(term).count, model->start,
                                state->internal + term->first_internal);
-        for (int s = 0; s < term->sliders; s++)
-            all_strains_of(term, 0, model->start, state->internal,
-                           state->internal + term->first_slider + s * (int64_t)term->elements.count);
+        double *slid = state->internal + term->first_slider;
+        const size_t elements = (size_t)term->elements.count;
+        if (term->sliders > 0)
+            all_strains_of(term, 0, model->start, state->internal, slid);
+        for (int s = 1; s < term->sliders; s++)
+            memcpy(slid + (size_t)s * elements, slid, elements * sizeof *slid);
         if (term->branch_count > 0) /* at the time 0, and without extensions */
             all_strains_of(term, 0, model->start, state->internal, state->internal + term->first_branch + 1);
     }
