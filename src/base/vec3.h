@@ -3,6 +3,8 @@
 #define DRAPE_BASE_VEC3_H
 
 #include <math.h>
+#include <stddef.h>
+#include <stdint.h>
 
 static inline void vec3_sub(const double *a, const double *b, double *out)
 {
@@ -35,6 +37,18 @@ static inline void vec3_add_scaled(double s, const double *a, double *out)
     out[0] += s * a[0];
     out[1] += s * a[1];
     out[2] += s * a[2];
+}
+
+/* The normal of length 1 of a triangle (three nodes) at x; 0 if it has no area. */
+static inline void vec3_triangle_normal(const int32_t *node, const double *x, double normal[3])
+{
+    double u[3], v[3];
+    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], u);
+    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], v);
+    vec3_cross(u, v, normal);
+    const double length = vec3_norm(normal);
+    for (int k = 0; k < 3; k++)
+        normal[k] = length > 0 ? normal[k] / length : 0;
 }
 
 #endif

@@ -176,7 +176,7 @@ static void join(const drape_contact *c, const uint8_t *take, int32_t *parent)
 
 static double normal_of(const drape_contact *c, int32_t face, double normal[3])
 {
-    drape_triangle_normal(c->model->triangle + 3 * (size_t)face, c->x, normal);
+    vec3_triangle_normal(c->model->triangle + 3 * (size_t)face, c->x, normal);
     return c->broad.face_area[face];
 }
 

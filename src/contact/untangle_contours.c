@@ -316,7 +316,7 @@ static int pass(drape_untangler *u, int32_t triangle, int32_t other, int8_t wron
                   *corner = u->sheets.triangle + 3 * (size_t)other;
     double n[3], weight[3], height[3], sum[2] = {0};
     int number[2] = {0};
-    drape_triangle_normal(u->sheets.triangle + 3 * (size_t)other, u->x, n);
+    vec3_triangle_normal(u->sheets.triangle + 3 * (size_t)other, u->x, n);
     weights_of(u, other, n, at, weight);
     for (int a = 0; a < 3; a++) {
         double from[3];
@@ -373,7 +373,7 @@ static void follow_part(drape_untangler *u, int32_t node, int32_t sheet, int sid
     const int32_t *corner = tree->node + 3 * (size_t)place.triangle;
     if (is_at_boundary(&u->sheets, corner, place.weights))
         return;
-    drape_triangle_normal(corner, u->x, n);
+    vec3_triangle_normal(corner, u->x, n);
     memcpy(d, x, sizeof d);
     for (int a = 0; a < 3; a++)
         vec3_add_scaled(-place.weights[a], u->x + 3 * (size_t)corner[a], d);
@@ -460,7 +460,7 @@ static void gradient_of(const drape_untangler *u, const drape_crossing *c, doubl
     const drape_sheets *s = &u->sheets;
     const int32_t *ends = s->edge + 2 * (size_t)c->edge;
     double n[3], e[3];
-    drape_triangle_normal(u->sheets.triangle + 3 * (size_t)c->triangle, u->x, n);
+    vec3_triangle_normal(u->sheets.triangle + 3 * (size_t)c->triangle, u->x, n);
     vec3_sub(u->x + 3 * (size_t)ends[1], u->x + 3 * (size_t)ends[0], e);
     const double length = vec3_norm(e);
     double sine = vec3_dot(e, n) / length;
@@ -473,7 +473,7 @@ static void gradient_of(const drape_untangler *u, const drape_crossing *c, doubl
         if (face < 0)
             continue;
         const int32_t *t = s->triangle + 3 * (size_t)face;
-        drape_triangle_normal(u->sheets.triangle + 3 * (size_t)face, u->x, own);
+        vec3_triangle_normal(u->sheets.triangle + 3 * (size_t)face, u->x, own);
         vec3_cross(own, n, r);
         const double size = vec3_norm(r);
         for (int a = 0; a < 3; a++)
@@ -502,7 +502,7 @@ static void shorten(drape_untangler *u, const curve *k)
         const double size = vec3_norm(g);
         if (!(size > 0))
             continue;
-        drape_triangle_normal(u->sheets.triangle + 3 * (size_t)c->triangle, u->x, n);
+        vec3_triangle_normal(u->sheets.triangle + 3 * (size_t)c->triangle, u->x, n);
         weights_of(u, c->triangle, n, c->x, weight);
         vec3_sub(u->x + 3 * (size_t)ends[1], u->x + 3 * (size_t)ends[0], e);
         const double stride = STRIDE * vec3_norm(e) * size / sqrt(1 + size * size);

@@ -16,7 +16,7 @@ static void bind_flat(const double *x, const double point[3], drape_embedded *to
     vec3_sub(x + 3 * (size_t)to->node[1], x0, u);
     vec3_sub(x + 3 * (size_t)to->node[2], x0, v);
     vec3_sub(point, x0, d);
-    drape_triangle_normal(to->node, x, n);
+    vec3_triangle_normal(to->node, x, n);
     const double uu = vec3_dot(u, u), uv = vec3_dot(u, v), vv = vec3_dot(v, v), area = uu * vv - uv * uv;
     const double du = vec3_dot(d, u), dv = vec3_dot(d, v);
     to->weights[1] = area > 0 ? (vv * du - uv * dv) / area : 0;

@@ -7,17 +7,6 @@
 #include <math.h>
 #include <string.h>
 
-void drape_triangle_normal(const int32_t *node, const double *x, double normal[3])
-{
-    double u[3], v[3];
-    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], u);
-    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], v);
-    vec3_cross(u, v, normal);
-    const double length = vec3_norm(normal);
-    for (int k = 0; k < 3; k++)
-        normal[k] = length > 0 ? normal[k] / length : 0;
-}
-
 /* What is searched, and the best place so far. */
 typedef struct search {
     const drape_bvh *tree;

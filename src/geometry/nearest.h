@@ -20,7 +20,4 @@ drape_on_triangle drape_nearest_on(const drape_bvh *tree, const double *x, const
 drape_on_triangle drape_first_on_ray(const drape_bvh *tree, const double *x, const double origin[3],
                                      const double direction[3], double length);
 
-/* The normal of length 1 of a triangle (three nodes) at x; 0 if it has no area. */
-void drape_triangle_normal(const int32_t *node, const double *x, double normal[3]);
-
 #endif

@@ -8,17 +8,6 @@
 #include "base/vec3.h"
 #include "model/model.h"
 
-static void flat_normal(const int32_t *node, const double *x, double n[3])
-{
-    double u[3], v[3];
-    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], u);
-    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], v);
-    vec3_cross(u, v, n);
-    const double length = vec3_norm(n);
-    for (int k = 0; k < 3; k++)
-        n[k] = length > 0 ? n[k] / length : 0;
-}
-
 void drape_embedded_point(const drape_embedded *e, const double *x, const double *normals, double point[3])
 {
     double n[3] = {0};
@@ -26,7 +15,7 @@ void drape_embedded_point(const drape_embedded *e, const double *x, const double
     for (int a = 0; a < 3; a++)
         vec3_add_scaled(e->weights[a], x + 3 * (size_t)e->node[a], point);
     if (e->flat)
-        flat_normal(e->node, x, n);
+        vec3_triangle_normal(e->node, x, n);
     for (int a = 0; !e->flat && a < 3; a++)
         vec3_add_scaled(e->weights[a], normals + 3 * (size_t)e->node[a], n);
     vec3_add_scaled(e->height, n, point);

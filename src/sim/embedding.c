@@ -29,7 +29,7 @@ static frame frame_of(const int32_t *node, const double *x)
     frame f;
     vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], f.u);
     vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], f.v);
-    drape_triangle_normal(node, x, f.n);
+    vec3_triangle_normal(node, x, f.n);
     return f;
 }
 

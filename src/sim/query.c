@@ -30,7 +30,7 @@ static void set_cloth(const drape_sim *sim, const drape_on_triangle *at, drape_h
     const double *x = drape_sim_state(sim)->x;
     *hit = (drape_hit){.found = true, .collider = -1, .triangle = at->triangle, .distance = at->distance};
     memcpy(hit->weights, at->weights, sizeof hit->weights);
-    drape_triangle_normal(node, x, hit->normal);
+    vec3_triangle_normal(node, x, hit->normal);
     for (int a = 0; a < 3; a++)
         vec3_add_scaled(at->weights[a], x + 3 * (size_t)node[a], hit->point);
 }
