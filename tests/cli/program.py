@@ -1,7 +1,7 @@
 """What tests of the program `drape` share: calls of the program, scenes, readers of its files, and the loop over the tests of a file.
 
 DRAPE_BUILD is the build folder, DRAPE_SOURCE the source folder; or: test_x.py PROGRAM [SOURCES]. A test is a function test_*; its
-docstring is its name. Everything is written below a temporary folder. Output is TAP.
+docstring is its name; with ONLY=word those run whose names have that word. Everything is written below a temporary folder. Output is TAP.
 """
 import csv
 import json
@@ -116,12 +116,13 @@ def claim(folder, name):
 
 
 def run_tests(module):
-    tests = [test for name, test in module.items() if name.startswith("test_")]
+    only = os.environ.get("ONLY", "")
+    tests = [test for name, test in module.items() if name.startswith("test_") and only in name]
     print(f"1..{len(tests)}", flush=True)
     failed = 0
     for number, test in enumerate(tests, 1):
         words = f"{number} - {test.__doc__}"
-        with tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
             os.chdir(folder)
             try:
                 test()

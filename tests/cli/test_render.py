@@ -12,26 +12,18 @@ import signal
 import struct
 import subprocess
 import sys
-import tempfile
 import time
-import traceback
 import zlib
 
-from program import without_warnings
+from program import LIMIT, PROGRAM, Skip, drape, equal, good, run_tests
 
 try:
     import numpy
 except ImportError:
     numpy = None
 
-PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAPE_BUILD"] + "/drape")
 GOLDEN = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "golden", "render")
-LIMIT = 300  # [s] for one call: sanitizers are slow
 SIZE = (320, 200)
-
-
-class Skip(Exception):
-    pass
 
 
 # ---- Scenes, calls, pictures
@@ -57,21 +49,6 @@ def write_scene(name="ball.json", **changes):
     with open(name, "w", encoding="utf-8") as file:
         json.dump(whole, file)
     return name
-
-
-def drape(*args, env=None, **options):
-    return subprocess.run([PROGRAM, *args], capture_output=True, text=True, timeout=LIMIT,
-                          env={**os.environ, **(env or {})}, **options)
-
-
-def equal(found, expected, what=""):
-    assert found == expected, f"{what}: found {found!r}, expected {expected!r}"
-
-
-def good(*args, **options):
-    result = drape(*args, **options)
-    equal((result.returncode, without_warnings(result.stderr)), (0, ""), " ".join(args))
-    return result.stdout
 
 
 def one_line(result, code, says):
@@ -478,7 +455,7 @@ def test_refused():
 def test_no_driver():
     """without an EGL driver, drawing is one line and exit 2, and the program still runs scenes"""
     need_pictures()
-    env = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent", "__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}
+    env = {**os.environ, "__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent", "__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}
     one_line(drape("render", write_scene(), "--out", "x.png", env=env), 2, "libgl1-mesa-dri")
     assert not os.path.exists("x.png")
     good("run", "ball.json", "--duration", "0.02", env=env)
@@ -488,14 +465,14 @@ def test_no_ffmpeg():
     """without ffmpeg a film is one line and exit 2; if ffmpeg dies: one line with its last message, exit 1, no file"""
     need_pictures()
     os.mkdir("bin")
-    one_line(drape("render", write_scene(), "--out", "x.mp4", env={"PATH": os.path.abspath("bin")}), 2, "ffmpeg")
+    one_line(drape("render", write_scene(), "--out", "x.mp4", env={**os.environ, "PATH": os.path.abspath("bin")}), 2, "ffmpeg")
     for script, says in (("echo first; echo 'no such codec' >&2; exit 3", "no such codec"), ("exit 4", "exit code 4"),
                          ("kill -9 $$", "signal 9")):
         with open("bin/ffmpeg", "w", encoding="utf-8") as file:
             file.write("#!/bin/sh\n" + script + "\n")
         os.chmod("bin/ffmpeg", 0o755)
         path = os.path.abspath("bin") + ":" + os.environ["PATH"]
-        one_line(drape("render", "ball.json", "--out", "x.mp4", env={"PATH": path}), 1, says)
+        one_line(drape("render", "ball.json", "--out", "x.mp4", env={**os.environ, "PATH": path}), 1, says)
     equal([name for name in os.listdir(".") if name.startswith("x.")], [], "files")
 
 
@@ -659,31 +636,6 @@ def test_no_display():
     one_line(result, 2, "there is no display")
 
 
-def main():
-    tests = [(name, function) for name, function in globals().items() if name.startswith("test_")]
-    only = os.environ.get("ONLY")
-    tests = [(name, function) for name, function in tests if not only or only in name]
-    print(f"1..{len(tests)}")
-    failed = 0
-    for number, (name, function) in enumerate(tests, 1):
-        title = function.__doc__.strip()
-        with tempfile.TemporaryDirectory() as folder:
-            home = os.getcwd()
-            os.chdir(folder)
-            try:
-                function()
-                print(f"ok {number} - {title}", flush=True)
-            except Skip as reason:
-                print(f"ok {number} - {title} # SKIP {reason}", flush=True)
-            except Exception:
-                failed += 1
-                for line in traceback.format_exc().splitlines():
-                    print(f"# {line}")
-                print(f"not ok {number} - {title}", flush=True)
-            finally:
-                os.chdir(home)
-    return failed > 0
-
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_tests(globals()))

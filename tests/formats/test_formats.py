@@ -11,14 +11,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
-import traceback
 
-PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAPE_BUILD"] + "/drape")
 HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path.insert(0, os.path.join(HERE, "..", "cli"))
+from program import LIMIT, PROGRAM, Skip, run_tests  # noqa: E402  pylint: disable=wrong-import-position
+
 PYTHON = "/usr/bin/python3"  # Debian's python3, for which its packages are made
-LIMIT = 300  # [s]
 FORMATS = "npy,obj,ply,vtp,pc2,glb,usd"
 
 CLOTH = {"material": {"young_modulus": 1e4, "thickness": 1e-3, "density": 200}, "terms": ["stretch.edge", "bend.hinge"],
@@ -29,10 +28,6 @@ SCENE = {
               {**CLOTH, "name": "second", "mesh": {"grid": "equilateral", "edges": 4, "edge_length": 0.1,
                                                    "transform": {"translate": [1, 0.5, 0]}}}],
     "integrator": {"dt": 0.01}, "duration": 0.25, "frame_rate": 30}
-
-
-class Skip(Exception):
-    pass
 
 
 def need(there, what):
@@ -227,25 +222,5 @@ def test_full_disk():
     read_vtk("vtp", "y", "alone")
 
 
-def main():
-    tests = [(name, test) for name, test in globals().items() if name.startswith("test_")]
-    print(f"1..{len(tests)}", flush=True)
-    failed = 0
-    for number, (_, test) in enumerate(tests, 1):
-        words = f"{number} - {test.__doc__}"
-        with tempfile.TemporaryDirectory() as folder:
-            os.chdir(folder)
-            try:
-                test()
-                print("ok", words, flush=True)
-            except Skip as reason:
-                print("ok", words, "# SKIP", reason, flush=True)
-            except Exception:  # pylint: disable=broad-except
-                failed += 1
-                print("not ok", words, flush=True)
-                print("# " + traceback.format_exc().rstrip().replace("\n", "\n# "), flush=True)
-            os.chdir("/")
-    return failed > 0
 
-
-sys.exit(main())
+sys.exit(run_tests(globals()))

@@ -13,12 +13,11 @@ import shutil
 import struct
 import subprocess
 import sys
-import tempfile
-import traceback
 import zlib
 
-PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAPE_BUILD"] + "/drape")
-LIMIT = 300  # [s]
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "cli"))
+from program import LIMIT, PROGRAM, Skip, drape, good, read_npy, run_tests  # noqa: E402  pylint: disable=wrong-import-position
+
 TRICK = "quotes \" and ' and </script><script>throw Error('markup')</script> <!-- and \u00e9"
 
 SCENE = {
@@ -32,20 +31,6 @@ SCENE = {
                   {"type": "capsule", "a": [-0.5, -0.7, 0], "b": [-0.5, -0.5, 0.2], "radius": 0.05},
                   {"type": "cylinder", "a": [-0.5, -0.7, -0.8], "b": [-0.5, -0.4, -0.8], "radius": 0.05}],
     "integrator": {"dt": 0.02, "max_iterations": 7}, "duration": 0.5, "frame_rate": 40}
-
-
-class Skip(Exception):
-    pass
-
-
-def drape(*args):
-    return subprocess.run([PROGRAM, *args], capture_output=True, text=True, timeout=LIMIT, check=False)
-
-
-def good(*args):
-    result = drape(*args)
-    assert (result.returncode, re.sub(r"^warning: [^\n]+\n", "", result.stderr, flags=re.M)) == (0, ""), result
-    return result.stdout
 
 
 def refused(*args, code=2, says=""):
@@ -74,13 +59,6 @@ def numbers(page, name, kind):
     return struct.unpack(f"<{len(data) // struct.calcsize(kind)}{kind}", data)
 
 
-def read_npy(path):
-    with open(path, "rb") as file:
-        data = file.read()
-    frames, nodes = (int(n) for n in re.search(rb"\((\d+), (\d+), 3\)", data).groups())
-    return frames, nodes, struct.unpack(f"<{frames * nodes * 3}d", data[128:])
-
-
 # ---- The page
 
 
@@ -91,7 +69,7 @@ def test_contents():
     assert re.fullmatch(r"report    out/report.html, [\d.]+ MB, 21 of 21 frames\n", said), said
     page = read("out/report.html")
     data = json.loads(block(page, "run"))
-    frames, nodes, positions = read_npy("out/positions.npy")
+    (frames, nodes, _), positions = read_npy("out/positions.npy")
     field = data["fields"][0]
     levels = numbers(page, "positions", "H")
     assert (data["nodes"], data["frames"]["all"], len(levels)) == (nodes, frames, len(positions))
@@ -118,7 +96,7 @@ def test_strain_and_speed():
     good("report", "out")
     page = read("out/report.html")
     data = json.loads(block(page, "run"))
-    frames, nodes, x = read_npy("out/positions.npy")
+    (frames, nodes, _), x = read_npy("out/positions.npy")
     speed, levels, k = data["fields"][2], numbers(page, "speed", "H"), 7
     for node in range(nodes):
         displacement = [x[(((k + 1) * nodes) + node) * 3 + i] - x[((k - 1) * nodes + node) * 3 + i] for i in range(3)]
@@ -498,25 +476,5 @@ def test_no_view():
         assert all("WebGL" in complaint for complaint in page.complaints) and len(page.complaints) == 1, page.complaints
 
 
-def main():
-    tests = [(name, test) for name, test in globals().items() if name.startswith("test_")]
-    print(f"1..{len(tests)}", flush=True)
-    failed = 0
-    for number, (_, test) in enumerate(tests, 1):
-        words = f"{number} - {test.__doc__}"
-        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            os.chdir(folder)
-            try:
-                test()
-                print("ok", words, flush=True)
-            except Skip as reason:
-                print("ok", words, "# SKIP", reason, flush=True)
-            except Exception:  # pylint: disable=broad-except
-                failed += 1
-                print("not ok", words, flush=True)
-                print("# " + traceback.format_exc().rstrip().replace("\n", "\n# "), flush=True)
-            os.chdir("/")
-    return failed > 0
 
-
-sys.exit(main())
+sys.exit(run_tests(globals()))
