@@ -7,9 +7,9 @@
 #include <math.h>
 #include <string.h>
 
-#define FAR_FROM_ROUNDING 1e3 /* times the last estimate of a solve */
-#define MAX_PASSES 3    /* of shortening a displacement at nodes */
-#define PROBED     1e-6 /* of the displacement of pins: their pull is a difference over that much */
+#define FAR_FROM_ROUNDING 1e3  /* times the last estimate of a solve */
+#define MAX_PASSES        3    /* of shortening a displacement at nodes */
+#define PROBED            1e-6 /* of the displacement of pins: their pull is a difference over that much */
 
 drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, drape_step_equation *s)
 {
