@@ -216,13 +216,22 @@ static bool project(const window_view *w, const drape_view *view, const float *p
     return q[3] > 0;
 }
 
+/* The place of a node of the simulation, which the surface that is drawn may not have. */
+static const float *node_place(const window_view *w, int32_t node, float place[3])
+{
+    for (int k = 0; k < 3; k++)
+        place[k] = (float)drape_sim_positions(w->v.in.sim)[3 * (size_t)node + (size_t)k];
+    return place;
+}
+
 /* Draws the drag spring, from its node to its target. */
 static void mark_drag_spring(window_view *w)
 {
     static const float blue[4] = {0.05f, 0.30f, 0.75f, 0.95f};
     drape_overlay *o = drape_painter_overlay(w->painter);
     const drape_view view = view_of(w);
-    const float *from = drape_reel_positions(&w->reel, 0) + 3 * (size_t)w->v.dragged;
+    float place[3];
+    const float *from = node_place(w, w->v.dragged, place);
     const float to[3] = {(float)w->v.drag_target[0], (float)w->v.drag_target[1], (float)w->v.drag_target[2]};
     float a[3], b[3], size = 3 * o->unit;
     if (!project(w, &view, from, &a[0], &a[1], &a[2]) || !project(w, &view, to, &b[0], &b[1], &b[2]))
@@ -363,9 +372,8 @@ static int32_t node_at(const window_view *w, double x, double y, float *depth)
     float reach = REACH * drape_painter_overlay(w->painter)->unit, best = INFINITY;
     int32_t found = -1;
     for (int32_t i = 0; i < m->node_count; i++) {
-        float px, py, pz;
-        if (m->pinned[i] ||
-            !project(w, &view, drape_reel_positions(&w->reel, 0) + 3 * (size_t)i, &px, &py, &pz))
+        float place[3], px, py, pz;
+        if (m->pinned[i] || !project(w, &view, node_place(w, i, place), &px, &py, &pz))
             continue;
         float offset = hypotf(px - (float)x, py - (float)y);
         if (offset < reach && pz * (1 + offset / reach * 0.02f) < best) {
@@ -499,7 +507,7 @@ static drape_status set_up(window_view *w, int width, int height)
     if (!status)
         status = make_painter(w);
     if (!status)
-        status = drape_reel_create(w->ctx, (size_t)w->v.in.model->node_count, true, &w->reel);
+        status = drape_reel_create(w->ctx, w->v.in.model, true, &w->reel);
     if (!status)
         status = make_stage(w);
     if (!status)

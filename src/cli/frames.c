@@ -41,7 +41,7 @@ int cli_source_open(const cli_command *command, const char *operand, const cli_f
                           "--shade %s: the frames of a run do not have it; give the scene, which is "
                           "simulated again: %s/scene.json",
                           def->field->entry.name, operand);
-    if (drape_reel_create(command->ctx, (size_t)out->in.model->node_count, def->field, &out->reel))
+    if (drape_reel_create(command->ctx, out->in.model, def->field, &out->reel))
         return cli_report(command, CLI_BAD_INPUT);
     return CLI_GO_ON;
 }

@@ -8,6 +8,8 @@
 #include "base/vec3.h"
 #include "model/model.h"
 
+#define LEAST_WEIGHT 1e-9 /* less is rounding: the node carries nothing */
+
 void drape_embedded_point(const drape_embedded *e, const double *x, const double *normals, double point[3])
 {
     double n[3] = {0};
@@ -84,7 +86,8 @@ void drape_render_pinned(const drape_model *model, uint8_t *out)
         for (int32_t i = 0; i < cloth->mesh->node_count; i++, out++) {
             *out = cloth->bound ? 1 : model->pinned[model->cloths[c].first_node + i];
             for (int a = 0; cloth->bound && a < 3; a++)
-                *out = *out && (cloth->bound[i].weights[a] <= 0 || model->pinned[cloth->bound[i].node[a]]);
+                *out = *out &&
+                       (cloth->bound[i].weights[a] < LEAST_WEIGHT || model->pinned[cloth->bound[i].node[a]]);
         }
     }
 }

@@ -1,15 +1,25 @@
 /* reel.c: see reel.h. */
 #include "render/reel.h"
 
+#include "model/model.h"
+
 #include <math.h>
 
 #define SAME_TIME 1e-9 /* [s] two frames that differ by less are at one time */
 
-drape_status drape_reel_create(drape_context *ctx, size_t nodes, bool with_values, drape_reel *reel)
+drape_status drape_reel_create(drape_context *ctx, const drape_model *model, bool with_values,
+                               drape_reel *reel)
 {
-    *reel = (drape_reel){.arena = drape_arena_of(ctx), .nodes = nodes, .with_values = with_values};
+    const size_t nodes = (size_t)model->node_count, shown = (size_t)model->surface.node_count;
+    *reel = (drape_reel){
+        .arena = drape_arena_of(ctx), .model = model, .nodes = shown, .with_values = with_values};
     drape_reel_clear(reel);
     reel->scratch = drape_arena_take(&reel->arena, nodes, sizeof *reel->scratch);
+    if (model->surface.bound) {
+        reel->normals = drape_arena_take(&reel->arena, nodes, 3 * sizeof *reel->normals);
+        reel->shown = drape_arena_take(&reel->arena, shown, 3 * sizeof *reel->shown);
+        reel->shown_values = drape_arena_take(&reel->arena, shown, sizeof *reel->shown_values);
+    }
     return drape_arena_status(&reel->arena);
 }
 
@@ -38,21 +48,35 @@ static drape_status reserve(drape_reel *r)
     return drape_arena_status(&r->arena);
 }
 
+/* Positions of the surface for nodes at x. */
+static const double *surface_of(drape_reel *r, const double *x)
+{
+    if (!r->shown)
+        return x;
+    drape_model_normals(r->model, x, r->normals);
+    drape_render_positions(r->model, -1, x, r->normals, r->shown);
+    return r->shown;
+}
+
 drape_status drape_reel_add(drape_reel *reel, double t, const double *x, drape_sim *sim,
                             const drape_field_ops *field)
 {
+    const double *values = reel->shown ? reel->shown_values : reel->scratch;
     drape_status status = reserve(reel);
     if (status)
         return status;
+    const double *shown = surface_of(reel, x);
     reel->times[reel->count] = t;
     for (size_t i = 0; i < 3 * reel->nodes; i++)
-        reel->positions[3 * reel->nodes * reel->count + i] = (float)x[i];
+        reel->positions[3 * reel->nodes * reel->count + i] = (float)shown[i];
     if (field)
         status = field->measure(sim, x, reel->scratch);
+    if (field && !status && reel->shown)
+        drape_render_values(reel->model, reel->scratch, 1, reel->shown_values);
     for (size_t i = 0; field && i < reel->nodes && !status; i++) {
-        reel->values[reel->count * reel->nodes + i] = (float)reel->scratch[i];
-        reel->low = fmin(reel->low, reel->scratch[i]);
-        reel->high = fmax(reel->high, reel->scratch[i]);
+        reel->values[reel->count * reel->nodes + i] = (float)values[i];
+        reel->low = fmin(reel->low, values[i]);
+        reel->high = fmax(reel->high, values[i]);
     }
     if (!status)
         reel->count++;

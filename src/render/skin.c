@@ -7,6 +7,7 @@
 #include "render/matrix.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define DRAWN_TRIANGLES 36000 /* about as many are drawn of a mesh that has fewer */
@@ -24,13 +25,13 @@
 
 /* ---- Numbering of edges and points ---- */
 
-/* Edges are ordered by (lower, higher) node over the whole model. */
-static int32_t find_edge(const drape_model *m, int32_t a, int32_t b)
+/* Edges are ordered by (lower, higher) node over the whole surface. */
+static int32_t find_edge(const drape_skin *s, int32_t a, int32_t b)
 {
-    int32_t lower = a < b ? a : b, higher = a < b ? b : a, first = 0, last = m->edge_count - 1;
+    int32_t lower = a < b ? a : b, higher = a < b ? b : a, first = 0, last = s->edge_count - 1;
     while (first < last) {
         int32_t middle = first + (last - first) / 2;
-        const int32_t *edge = m->edge + 2 * (size_t)middle;
+        const int32_t *edge = s->edges + 2 * (size_t)middle;
         if (edge[0] < lower || (edge[0] == lower && edge[1] < higher))
             first = middle + 1;
         else
@@ -47,8 +48,7 @@ static size_t inner_points(int level)
 /* Point (i, j) of triangle t: i steps from corner 0 to 1, j from corner 0 to 2. */
 static uint32_t point_number(const drape_skin *s, int32_t t, int i, int j)
 {
-    const drape_model *m = s->model;
-    const int32_t *corner = m->triangle + 3 * (size_t)t, *edge = s->triangle_edge + 3 * (size_t)t;
+    const int32_t *corner = s->triangle + 3 * (size_t)t, *edge = s->triangle_edge + 3 * (size_t)t;
     int n = s->level, k = n - i - j, side = -1, along = 0;
     if (k == n || i == n || j == n)
         return (uint32_t)corner[k == n ? 0 : i == n ? 1 : 2];
@@ -61,12 +61,12 @@ static uint32_t point_number(const drape_skin *s, int32_t t, int i, int j)
     if (side >= 0) {
         int32_t e = edge[side] >= 0 ? edge[side] : -1 - edge[side];
         along = edge[side] >= 0 ? along : n - along;
-        return (uint32_t)((size_t)m->node_count + (size_t)e * (size_t)(n - 1) + (size_t)(along - 1));
+        return (uint32_t)((size_t)s->node_count + (size_t)e * (size_t)(n - 1) + (size_t)(along - 1));
     }
     size_t before = 0; /* inner points of the rows below j */
     for (int row = 1; row < j; row++)
         before += (size_t)(n - 1 - row);
-    return (uint32_t)((size_t)m->node_count + (size_t)m->edge_count * (size_t)(n - 1) +
+    return (uint32_t)((size_t)s->node_count + (size_t)s->edge_count * (size_t)(n - 1) +
                       (size_t)t * inner_points(n) + before + (size_t)(i - 1));
 }
 
@@ -74,7 +74,7 @@ static uint32_t point_number(const drape_skin *s, int32_t t, int i, int j)
 static void make_indices(drape_skin *s)
 {
     uint32_t *to = s->index;
-    for (int32_t t = 0; t < s->model->triangle_count; t++)
+    for (int32_t t = 0; t < s->triangle_count; t++)
         for (int j = 0; j < s->level; j++)
             for (int i = 0; i + j < s->level; i++) {
                 *to++ = point_number(s, t, i, j);
@@ -92,9 +92,8 @@ static void make_indices(drape_skin *s)
 /* ---- Texture coordinates ---- */
 
 /* Texture coordinates of a grid: rest distances along its first row, and across it. */
-static void unroll_grid(const drape_cloth *cloth, float *uv)
+static void unroll_grid(const drape_mesh *mesh, float *uv)
 {
-    const drape_mesh *mesh = &cloth->mesh;
     const double *origin = mesh->x, *right = mesh->x + 3 * (size_t)(mesh->columns - 1),
                  *last = mesh->x + 3 * (size_t)(mesh->rows - 1) * (size_t)mesh->columns;
     double u[3], v[3], low = INFINITY, high[2] = {0, 0};
@@ -118,9 +117,8 @@ static void unroll_grid(const drape_cloth *cloth, float *uv)
 }
 
 /* Texture coordinates of other meshes: a projection along the shortest side of their bounding box. */
-static void flatten(const drape_cloth *cloth, float *uv)
+static void flatten(const drape_mesh *mesh, float *uv)
 {
-    const drape_mesh *mesh = &cloth->mesh;
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     int shortest = 0;
     for (size_t i = 0; i < 3 * (size_t)mesh->node_count; i++) {
@@ -177,13 +175,12 @@ static void reverse(const drape_mesh *mesh, float *uv, int k)
         uv[2 * i + k] = highest - uv[2 * i + k];
 }
 
-static void unroll(const drape_cloth *cloth, float *uv)
+static void unroll(const drape_mesh *mesh, float *uv)
 {
-    const drape_mesh *mesh = &cloth->mesh;
     if (mesh->rows > 0)
-        unroll_grid(cloth, uv);
+        unroll_grid(mesh, uv);
     else
-        flatten(cloth, uv);
+        flatten(mesh, uv);
     if (is_mirrored(mesh, uv))
         reverse(mesh, uv, 1);
     if (!is_upside_down(mesh, uv))
@@ -197,13 +194,13 @@ static void unroll(const drape_cloth *cloth, float *uv)
 /* Lists the edges that belong to one triangle, and numbers the triangles of their hem. */
 static drape_status create_hem(drape_arena *arena, drape_skin *s)
 {
-    const drape_model *m = s->model;
-    const size_t ring = 2 * HEM_POINTS, sides = 3 * (size_t)m->triangle_count;
+    const size_t ring = 2 * HEM_POINTS, sides = 3 * (size_t)s->triangle_count;
     drape_arena scratch = drape_arena_of(arena->ctx);
-    int32_t *uses = drape_arena_take(&scratch, (size_t)m->edge_count, sizeof *uses);
+    int32_t *uses = drape_arena_take(&scratch, (size_t)s->edge_count, sizeof *uses);
     for (size_t i = 0; uses && i < sides; i++)
-        s->border_count +=
-            ++uses[s->triangle_edge[i] >= 0 ? s->triangle_edge[i] : -1 - s->triangle_edge[i]] == 1 ? 1 : -1;
+        ++uses[s->triangle_edge[i] >= 0 ? s->triangle_edge[i] : -1 - s->triangle_edge[i]];
+    for (int32_t e = 0; uses && e < s->edge_count; e++)
+        s->border_count += uses[e] == 1;
     const size_t pieces = s->border_count * (size_t)s->level;
     s->hem_count = s->border_count * (size_t)(s->level + 1) * ring;
     s->border = drape_arena_take(arena, 2 * s->border_count, sizeof *s->border);
@@ -234,23 +231,66 @@ static drape_status create_hem(drape_arena *arena, drape_skin *s)
     return DRAPE_OK;
 }
 
-static float mean_edge(const drape_model *m)
+static float mean_edge(const drape_skin *s)
 {
+    const drape_model *m = s->model;
     double sum = 0;
-    for (int32_t e = 0; e < m->edge_count; e++)
-        sum += m->edge_length[e];
-    return (float)(sum / m->edge_count);
+    for (int32_t e = 0; e < s->edge_count; e++) {
+        double d[3];
+        vec3_sub(m->surface.rest + 3 * (size_t)s->edges[2 * (size_t)e + 1],
+                 m->surface.rest + 3 * (size_t)s->edges[2 * (size_t)e], d);
+        sum += m->surface.bound ? vec3_norm(d) : m->edge_length[e];
+    }
+    return (float)(sum / s->edge_count);
+}
+
+static int compare_edges(const void *left, const void *right)
+{
+    const int32_t *a = left, *b = right;
+    const int k = a[0] == b[0];
+    return (a[k] > b[k]) - (a[k] < b[k]);
+}
+
+/* The edges of a surface that is not the simulated one, of which the model has them. */
+static drape_status list_edges(drape_arena *arena, drape_skin *s)
+{
+    const size_t sides = 3 * (size_t)s->triangle_count;
+    int32_t *edge = drape_arena_take(arena, sides, 2 * sizeof *edge);
+    if (!edge)
+        return DRAPE_E_MEMORY;
+    for (size_t i = 0; i < sides; i++) {
+        const int32_t a = s->triangle[i], b = s->triangle[i - i % 3 + (i + 1) % 3];
+        edge[2 * i] = a < b ? a : b;
+        edge[2 * i + 1] = a < b ? b : a;
+    }
+    qsort(edge, sides, 2 * sizeof *edge, compare_edges);
+    for (size_t i = 0; i < sides; i++)
+        if (i == 0 || compare_edges(edge + 2 * i, edge + 2 * i - 2) != 0) {
+            memmove(edge + 2 * (size_t)s->edge_count, edge + 2 * i, 2 * sizeof *edge);
+            s->edge_count++;
+        }
+    s->edges = edge;
+    return DRAPE_OK;
 }
 
 drape_status drape_skin_create(drape_arena *arena, const drape_model *model, drape_skin *skin)
 {
-    const size_t nodes = (size_t)model->node_count, triangles = (size_t)model->triangle_count;
-    const double pieces = sqrt(DRAWN_TRIANGLES / fmax(1, model->triangle_count));
+    const drape_render_surface *surface = &model->surface;
+    const size_t nodes = (size_t)surface->node_count, triangles = (size_t)surface->triangle_count;
+    const double pieces = sqrt(DRAWN_TRIANGLES / fmax(1, surface->triangle_count));
     const int level = (int)lround(fmin(fmax(pieces, 1), MAX_LEVEL));
-    *skin = (drape_skin){.model = model, .level = level};
+    *skin = (drape_skin){.model = model,
+                         .level = level,
+                         .node_count = surface->node_count,
+                         .triangle_count = surface->triangle_count,
+                         .triangle = surface->triangle,
+                         .edge_count = surface->bound ? 0 : model->edge_count,
+                         .edges = model->edge};
+    if (surface->bound && list_edges(arena, skin))
+        return DRAPE_E_MEMORY;
     skin->vertex_count =
-        nodes + (size_t)model->edge_count * (size_t)(level - 1) + triangles * inner_points(level);
-    skin->segment_count = (size_t)model->edge_count * (size_t)level;
+        nodes + (size_t)skin->edge_count * (size_t)(level - 1) + triangles * inner_points(level);
+    skin->segment_count = (size_t)skin->edge_count * (size_t)level;
     skin->triangle_edge = drape_arena_take(arena, 3 * triangles, sizeof *skin->triangle_edge);
     skin->uv = drape_arena_take(arena, 2 * nodes, sizeof *skin->uv);
     skin->normal = drape_arena_take(arena, 3 * nodes, sizeof *skin->normal);
@@ -260,23 +300,23 @@ drape_status drape_skin_create(drape_arena *arena, const drape_model *model, dra
     skin->index = drape_arena_take(arena, 3 * triangles * (size_t)(level * level), sizeof *skin->index);
     skin->segment = drape_arena_take(arena, 6 * skin->segment_count, sizeof *skin->segment);
     skin->gap = drape_arena_take(arena, nodes, sizeof *skin->gap);
-    skin->roundness = drape_arena_take(arena, (size_t)model->edge_count, sizeof *skin->roundness);
+    skin->roundness = drape_arena_take(arena, (size_t)skin->edge_count, sizeof *skin->roundness);
     skin->outward = drape_arena_take(arena, 3 * nodes, sizeof *skin->outward);
-    skin->edge = mean_edge(model);
+    skin->edge = mean_edge(skin);
     skin->hem_radius = fminf(HEM * (float)model->length, HEM_GRID * skin->edge);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < 3 * triangles; i++) {
-        int32_t a = model->triangle[i], b = model->triangle[i - i % 3 + (i + 1) % 3];
-        int32_t e = find_edge(model, a, b);
+        int32_t a = skin->triangle[i], b = skin->triangle[i - i % 3 + (i + 1) % 3];
+        int32_t e = find_edge(skin, a, b);
         skin->triangle_edge[i] = a < b ? e : -1 - e;
     }
     make_indices(skin);
-    for (int32_t c = 0; c < model->cloth_count; c++) {
-        const drape_cloth *cloth = &model->cloths[c];
-        unroll(cloth, skin->uv + 2 * (size_t)cloth->first_node);
-        for (int32_t i = 0; i < cloth->mesh.node_count; i++)
-            skin->cloth[cloth->first_node + i] = (float)c;
+    for (int32_t c = 0, first = 0; c < surface->cloth_count; c++) {
+        const drape_mesh *mesh = surface->cloths[c].mesh;
+        unroll(mesh, skin->uv + 2 * (size_t)first);
+        for (int32_t i = 0; i < mesh->node_count; i++)
+            skin->cloth[first++] = (float)c;
     }
     return create_hem(arena, skin);
 }
@@ -332,12 +372,11 @@ static void orthogonalize(const float *normal, float *tangent)
 
 static void update_nodes(drape_skin *s, const float *x, const float *values)
 {
-    const drape_model *m = s->model;
-    memset(s->normal, 0, 3 * (size_t)m->node_count * sizeof *s->normal);
-    memset(s->tangent, 0, 3 * (size_t)m->node_count * sizeof *s->tangent);
-    for (int32_t t = 0; t < m->triangle_count; t++)
-        add_triangle(s, x, m->triangle + 3 * (size_t)t);
-    for (size_t i = 0; i < (size_t)m->node_count; i++) {
+    memset(s->normal, 0, 3 * (size_t)s->node_count * sizeof *s->normal);
+    memset(s->tangent, 0, 3 * (size_t)s->node_count * sizeof *s->tangent);
+    for (int32_t t = 0; t < s->triangle_count; t++)
+        add_triangle(s, x, s->triangle + 3 * (size_t)t);
+    for (size_t i = 0; i < (size_t)s->node_count; i++) {
         drape_skin_vertex *v = &s->vertex[i];
         drape_normalize(s->normal + 3 * i);
         orthogonalize(s->normal + 3 * i, s->tangent + 3 * i);
@@ -446,10 +485,9 @@ static void normalize(drape_skin_vertex *v)
 static void update_edge(drape_skin *s, double t, int32_t e)
 {
     float flat[MAX_LEVEL][3];
-    const drape_model *m = s->model;
-    const drape_skin_vertex *const ends[2] = {&s->vertex[m->edge[2 * (size_t)e]],
-                                              &s->vertex[m->edge[2 * (size_t)e + 1]]};
-    drape_skin_vertex *to = &s->vertex[(size_t)m->node_count + (size_t)e * (size_t)(s->level - 1)];
+    const drape_skin_vertex *const ends[2] = {&s->vertex[s->edges[2 * (size_t)e]],
+                                              &s->vertex[s->edges[2 * (size_t)e + 1]]};
+    drape_skin_vertex *to = &s->vertex[(size_t)s->node_count + (size_t)e * (size_t)(s->level - 1)];
     float from_a[3], from_b[3], normal[3];
     control_point(ends[0], ends[1], from_a);
     control_point(ends[1], ends[0], from_b);
@@ -467,7 +505,7 @@ static void update_edge(drape_skin *s, double t, int32_t e)
     }
     /* between the ends a curve bulges by less than its length */
     s->roundness[e] = 1;
-    if (fminf(s->gap[m->edge[2 * (size_t)e]], s->gap[m->edge[2 * (size_t)e + 1]]) <
+    if (fminf(s->gap[s->edges[2 * (size_t)e]], s->gap[s->edges[2 * (size_t)e + 1]]) <
         distance(ends[0]->p, ends[1]->p))
         s->roundness[e] =
             flatten_points(s, t, to - (s->level - 1), (const float(*)[3])flat, (size_t)(s->level - 1), 1);
@@ -484,7 +522,7 @@ typedef struct patch {
 static void make_patch(const drape_skin *s, int32_t t, patch *p)
 {
     for (int k = 0; k < 3; k++)
-        p->corner[k] = &s->vertex[s->model->triangle[3 * (size_t)t + (size_t)k]];
+        p->corner[k] = &s->vertex[s->triangle[3 * (size_t)t + (size_t)k]];
     for (int k = 0; k < 3; k++) {
         const drape_skin_vertex *a = p->corner[k], *b = p->corner[(k + 1) % 3];
         control_point(a, b, p->side[k][0]);
@@ -541,7 +579,7 @@ static void update_triangle(drape_skin *s, double t, int32_t triangle)
         }
     for (int k = 0; k < 3; k++) {
         int32_t e = s->triangle_edge[3 * (size_t)triangle + (size_t)k];
-        nearest = fminf(nearest, s->gap[s->model->triangle[3 * (size_t)triangle + (size_t)k]]);
+        nearest = fminf(nearest, s->gap[s->triangle[3 * (size_t)triangle + (size_t)k]]);
         longest = fmaxf(longest, distance(p.corner[k]->p, p.corner[(k + 1) % 3]->p));
         roundness = fminf(roundness, s->roundness[e >= 0 ? e : -1 - e]);
     }
@@ -552,11 +590,11 @@ static void update_triangle(drape_skin *s, double t, int32_t triangle)
 void drape_skin_update(drape_skin *skin, double t, const float *positions, const float *values)
 {
     update_nodes(skin, positions, values);
-    for (int32_t i = 0; i < skin->model->node_count; i++)
+    for (int32_t i = 0; i < skin->node_count; i++)
         skin->gap[i] = clearance(skin, t, skin->vertex[i].p);
-    for (int32_t e = 0; skin->level > 1 && e < skin->model->edge_count; e++)
+    for (int32_t e = 0; skin->level > 1 && e < skin->edge_count; e++)
         update_edge(skin, t, e);
-    for (int32_t k = 0; skin->level > 2 && k < skin->model->triangle_count; k++)
+    for (int32_t k = 0; skin->level > 2 && k < skin->triangle_count; k++)
         update_triangle(skin, t, k);
 }
 
@@ -603,12 +641,12 @@ void drape_skin_update_hem(drape_skin *skin)
 {
     const int n = skin->level;
     drape_skin_vertex *to = skin->hem;
-    memset(skin->outward, 0, 3 * (size_t)skin->model->node_count * sizeof *skin->outward);
+    memset(skin->outward, 0, 3 * (size_t)skin->node_count * sizeof *skin->outward);
     for (size_t i = 0; i < skin->border_count; i++)
-        add_outward(skin, skin->model->triangle + 3 * (size_t)skin->border[2 * i], skin->border[2 * i + 1]);
+        add_outward(skin, skin->triangle + 3 * (size_t)skin->border[2 * i], skin->border[2 * i + 1]);
     for (size_t i = 0; i < skin->border_count; i++) {
         const int32_t t = skin->border[2 * i], side = skin->border[2 * i + 1];
-        const int32_t *corner = skin->model->triangle + 3 * (size_t)t;
+        const int32_t *corner = skin->triangle + 3 * (size_t)t;
         const float *a = skin->outward + 3 * (size_t)corner[side],
                     *b = skin->outward + 3 * (size_t)corner[(side + 1) % 3];
         for (int k = 0; k <= n; k++) {
@@ -625,14 +663,13 @@ void drape_skin_update_hem(drape_skin *skin)
 
 void drape_skin_update_segments(drape_skin *skin)
 {
-    const drape_model *m = skin->model;
     float *to = skin->segment;
-    for (int32_t e = 0; e < m->edge_count; e++) {
-        const drape_skin_vertex *last = &skin->vertex[m->edge[2 * (size_t)e]];
+    for (int32_t e = 0; e < skin->edge_count; e++) {
+        const drape_skin_vertex *last = &skin->vertex[skin->edges[2 * (size_t)e]];
         for (int i = 1; i <= skin->level; i++, to += 6) {
             const drape_skin_vertex *next =
-                i == skin->level ? &skin->vertex[m->edge[2 * (size_t)e + 1]]
-                                 : &skin->vertex[(size_t)m->node_count +
+                i == skin->level ? &skin->vertex[skin->edges[2 * (size_t)e + 1]]
+                                 : &skin->vertex[(size_t)skin->node_count +
                                                  (size_t)e * (size_t)(skin->level - 1) + (size_t)(i - 1)];
             memcpy(to, last->p, sizeof last->p);
             memcpy(to + 3, next->p, sizeof next->p);

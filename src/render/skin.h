@@ -1,9 +1,10 @@
 /*
- * skin.h: the surface of all cloth of a model as it is drawn: smooth normals and tangents weighted by area,
- * texture coordinates, and curved point-normal triangles (Vlachos, Peters, Boyd & Mitchell 2001) through
- * the nodes, so that a coarse mesh has a smooth outline and enough points to be displaced. Nodes are drawn
- * where they are. Where a curved triangle would cut a collider that the flat one clears, it is flattened.
- * The border of a cloth has a hem: a tube just inside it, so that cloth is seen to have a thickness.
+ * skin.h: the surface of all cloth of a model as it is drawn, which is a render mesh where a cloth has one:
+ * smooth normals and tangents weighted by area, texture coordinates, and curved point-normal triangles
+ * (Vlachos, Peters, Boyd & Mitchell 2001) through the nodes, so that a coarse mesh has a smooth outline and
+ * enough points to be displaced. Nodes are drawn where they are. Where a curved triangle would cut a collider
+ * that the flat one clears, it is flattened. The border of a cloth has a hem: a tube just inside it, so that
+ * cloth is seen to have a thickness.
  */
 #ifndef DRAPE_RENDER_SKIN_H
 #define DRAPE_RENDER_SKIN_H
@@ -21,10 +22,13 @@ typedef struct drape_skin_vertex {
 
 typedef struct drape_skin {
     const drape_model *model;
-    const drape_collider *const
-        *collider;           /* (collider_count) of which distances count, in the coordinates of the
-                                              model's; NULL: those */
-    int level;               /* pieces of an edge */
+    /* (collider_count) of which distances count, in the coordinates of the model's; NULL: those */
+    const drape_collider *const *collider;
+    int level; /* pieces of an edge */
+
+    int32_t node_count, triangle_count, edge_count; /* of the surface */
+    const int32_t *triangle;                        /* (triangle_count x 3) */
+    const int32_t *edges;    /* (edge_count x 2) lower node first, sorted by (lower, higher) */
     float edge;              /* mean length of the edges at rest [m] */
     int32_t *triangle_edge;  /* (triangle_count x 3) edge e from corner k to k + 1; -1 - e if e is reversed */
     float *uv;               /* (node_count x 2) */

@@ -63,8 +63,13 @@ static drape_status create_bodies(drape_stage *s)
 static drape_status create_cloth(drape_stage *s)
 {
     static const int vertex[] = {3, 3, 3, 2, 1, 1, 0}, segment[] = {3, 3, 0}, point[] = {3, 0};
-    for (int32_t i = 0; i < s->model->node_count; i++)
-        s->pin_count += s->model->pinned[i];
+    const size_t nodes = (size_t)s->model->surface.node_count;
+    s->pinned = drape_arena_take(&s->arena, nodes, sizeof *s->pinned);
+    if (!s->pinned)
+        return DRAPE_E_MEMORY;
+    drape_render_pinned(s->model, s->pinned);
+    for (size_t i = 0; i < nodes; i++)
+        s->pin_count += s->pinned[i];
     s->pin = drape_arena_take(&s->arena, s->pin_count, 3 * sizeof *s->pin);
     drape_status status = drape_skin_create(&s->arena, s->model, &s->skin);
     s->skin.collider = s->collider;
@@ -101,8 +106,8 @@ drape_status drape_stage_create(drape_context *ctx, const drape_model *model, dr
 {
     *stage = (drape_stage){.arena = drape_arena_of(ctx), .model = model};
     empty_box(stage);
-    for (int32_t i = 0; i < model->node_count; i++) {
-        const double *x = model->rest + 3 * (size_t)i;
+    for (int32_t i = 0; i < model->surface.node_count; i++) {
+        const double *x = model->surface.rest + 3 * (size_t)i;
         extend_box(stage, (const float[]){(float)x[0], (float)x[1], (float)x[2]}, 1, 3, nowhere);
     }
     drape_status status = create_bodies(stage);
@@ -142,7 +147,7 @@ static void move_bodies(drape_stage *s, double t)
 
 void drape_stage_add(drape_stage *stage, const float *positions)
 {
-    extend_box(stage, positions, (size_t)stage->model->node_count, 3, nowhere);
+    extend_box(stage, positions, (size_t)stage->model->surface.node_count, 3, nowhere);
 }
 
 void drape_stage_finish(drape_stage *stage)
@@ -168,7 +173,7 @@ void drape_stage_frame(drape_stage *stage, drape_framing *framing, double t, con
                        const float *offset)
 {
     move_bodies(stage, t);
-    drape_framing_add(framing, positions, (size_t)stage->model->node_count, offset);
+    drape_framing_add(framing, positions, (size_t)stage->model->surface.node_count, offset);
     for (int32_t c = 0; c < stage->body_count; c++) {
         const drape_stage_body *body = &stage->bodies[c];
         for (size_t i = 0; !body->shape.endless && i < body->shape.vertex_count; i++) {
@@ -198,8 +203,8 @@ void drape_stage_set(drape_stage *stage, const drape_moment *moment, bool wires)
     drape_skin_update_segments(&stage->skin);
     drape_gl_mesh_fill(&stage->wires, stage->skin.segment, stage->skin.segment_count, true);
     stage->wire_count = stage->skin.segment_count;
-    for (size_t i = 0; i < (size_t)stage->model->node_count; i++)
-        if (stage->model->pinned[i]) {
+    for (size_t i = 0; i < (size_t)stage->model->surface.node_count; i++)
+        if (stage->pinned[i]) {
             memcpy(pin, moment->positions + 3 * i, 3 * sizeof *pin);
             pin += 3;
         }

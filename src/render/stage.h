@@ -12,8 +12,8 @@
 /* The state of a run at one time. */
 typedef struct drape_moment {
     double t;               /* [s] */
-    const float *positions; /* (node_count x 3) [m] */
-    const float *values;    /* (node_count) of the field shown; NULL: none */
+    const float *positions; /* (nodes of the surface that frames show x 3) [m] */
+    const float *values;    /* (as many) of the field shown; NULL: none */
 } drape_moment;
 
 typedef struct drape_stage_body {
@@ -34,6 +34,7 @@ typedef struct drape_stage {
     const drape_collider **collider; /* (body_count) of which distances count now */
     int32_t body_count;
     size_t wire_count, pin_count;
+    uint8_t *pinned;         /* (nodes of the surface) */
     float *pin;              /* (pinned nodes x 3) */
     float center[3], radius; /* [m] of the box of the cloth at all times and of the bounded colliders */
     float floor;             /* height of the floor that receives shadows [m] */

@@ -4,7 +4,8 @@
 
 #include "report/source.h"
 
-/* A field at the nodes in all kept frames: the integer i stands for low + i step. */
+/* A field at the nodes of the surface that frames show, which is a render mesh where a cloth has one, in all
+ * kept frames: the integer i stands for low + i step. */
 typedef struct drape_report_field {
     const char *name, *unit;
     int width; /* numbers per node */
@@ -22,14 +23,16 @@ typedef struct drape_report_body {
 
 typedef struct drape_report_data {
     const drape_report_source *run;
-    drape_arena arena;           /* of all arrays */
-    int64_t kept;                /* frames in the page */
-    int64_t *frame;              /* (kept) their numbers */
-    double *x;                   /* (node_count x 3) positions in the loaded frame */
-    double *before, *after;      /* (node_count x 3) positions in its neighbours */
-    double *strain;              /* (triangle_count x 2) */
-    double *weight;              /* (node_count) a third of the area of the triangles around [m2] */
-    double *node_strain, *speed; /* (node_count) */
+    drape_arena arena;                  /* of all arrays */
+    int64_t kept;                       /* frames in the page */
+    int64_t *frame;                     /* (kept) their numbers */
+    double *x;                          /* (node_count x 3) positions in the loaded frame */
+    double *before, *after;             /* (node_count x 3) positions in its neighbours */
+    double *strain;                     /* (triangle_count x 2) */
+    double *weight;                     /* (node_count) a third of the area of the triangles around [m2] */
+    double *node_strain, *speed;        /* (node_count) */
+    double *normals;                    /* (node_count x 3); NULL, as the next: no cloth has a render mesh */
+    double *shown[DRAPE_REPORT_FIELDS]; /* the fields of the loaded frame at the nodes of the surface */
     drape_report_field fields[DRAPE_REPORT_FIELDS];
     drape_report_body *bodies; /* (body_count) */
     int32_t body_count;

@@ -51,7 +51,19 @@ static drape_status find_speed(const drape_report_data *d, int64_t frame)
 
 static const double *values_of(const drape_report_data *d, int field)
 {
-    return field == 0 ? d->x : field == 1 ? d->node_strain : d->speed;
+    return d->shown[field] ? d->shown[field] : field == 0 ? d->x : field == 1 ? d->node_strain : d->speed;
+}
+
+/* The fields of the loaded frame where render meshes are. */
+static void show(const drape_report_data *d)
+{
+    const drape_model *model = d->run->model;
+    if (!model->surface.bound)
+        return;
+    drape_model_normals(model, d->x, d->normals);
+    drape_render_positions(model, -1, d->x, d->normals, d->shown[0]);
+    drape_render_values(model, d->node_strain, 1, d->shown[1]);
+    drape_render_values(model, d->speed, 1, d->shown[2]);
 }
 
 static drape_status load(const drape_report_data *d, int64_t frame)
@@ -62,7 +74,10 @@ static drape_status load(const drape_report_data *d, int64_t frame)
     if (status)
         return status;
     find_strain(d);
-    return find_speed(d, frame);
+    status = find_speed(d, frame);
+    if (!status)
+        show(d);
+    return status;
 }
 
 /* ---- Colliders that deform ---- */
@@ -102,7 +117,7 @@ static drape_status find_bodies(drape_report_data *d)
 static drape_status choose_frames(drape_report_data *d, size_t max_bytes)
 {
     int64_t all = d->run->record.frames;
-    double numbers = 5.0 * d->run->model->node_count;
+    double numbers = 5.0 * d->run->model->surface.node_count;
     for (int32_t b = 0; b < d->body_count; b++)
         numbers += 3.0 * collider_of(d, b)->shape.point_count;
     const double bytes = 2 * 4.0 / 3 * numbers; /* of a frame: 16 bits a number, in base64 */
@@ -157,7 +172,7 @@ static drape_status find_ranges(drape_report_data *d)
     static const drape_report_field fields[DRAPE_REPORT_FIELDS] = {
         {"positions", "m", 3, {0}, {0}}, {"strain", "1", 1, {0}, {0}}, {"speed", "m/s", 1, {0}, {0}}};
     double high[DRAPE_REPORT_FIELDS][3];
-    size_t nodes = (size_t)d->run->model->node_count;
+    size_t nodes = (size_t)d->run->model->surface.node_count;
     memcpy(d->fields, fields, sizeof fields);
     for (int f = 0; f < DRAPE_REPORT_FIELDS; f++)
         begin_range(&d->fields[f], high[f]);
@@ -186,6 +201,12 @@ drape_status drape_report_data_make(const drape_report_source *run, size_t max_b
     data->weight = drape_arena_take(&data->arena, nodes, sizeof *data->weight);
     data->node_strain = drape_arena_take(&data->arena, nodes, sizeof *data->node_strain);
     data->speed = drape_arena_take(&data->arena, nodes, sizeof *data->speed);
+    if (model->surface.bound) {
+        const size_t shown = (size_t)model->surface.node_count;
+        data->normals = drape_arena_take(&data->arena, 3 * nodes, sizeof *data->normals);
+        for (int f = 0; f < DRAPE_REPORT_FIELDS; f++)
+            data->shown[f] = drape_arena_take(&data->arena, (f == 0 ? 3 : 1) * shown, sizeof *data->shown[f]);
+    }
     drape_status status = drape_arena_status(&data->arena);
     if (!status)
         status = find_bodies(data);
@@ -251,7 +272,8 @@ drape_status drape_report_put_field(const drape_report_data *data, int field, dr
         drape_status status = load(data, data->frame[k]);
         if (status)
             return status;
-        put_values(&e, f, values_of(data, field), (size_t)data->run->model->node_count * (size_t)f->width);
+        put_values(&e, f, values_of(data, field),
+                   (size_t)data->run->model->surface.node_count * (size_t)f->width);
     }
     if (e.count > 0)
         put_group(&e);
@@ -271,11 +293,11 @@ drape_status drape_report_put_body(const drape_report_data *data, int32_t body, 
 
 void drape_report_put_triangles(const drape_report_data *data, drape_file *file)
 {
-    const drape_model *model = data->run->model;
+    const drape_render_surface *surface = &data->run->model->surface;
     encoder e = {.file = file};
-    for (size_t i = 0; i < 3 * (size_t)model->triangle_count; i++)
+    for (size_t i = 0; i < 3 * (size_t)surface->triangle_count; i++)
         for (int b = 0; b < 4; b++)
-            put_byte(&e, (uint32_t)model->triangle[i] >> 8 * b);
+            put_byte(&e, (uint32_t)surface->triangle[i] >> 8 * b);
     if (e.count > 0)
         put_group(&e);
 }

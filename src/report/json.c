@@ -149,12 +149,18 @@ static json_t *colliders(const drape_report_data *data)
     return array;
 }
 
-static json_t *pinned(const drape_model *model)
+/* NULL: no memory. */
+static json_t *pinned(drape_context *ctx, const drape_model *model)
 {
-    json_t *array = json_array();
-    for (int32_t i = 0; i < model->node_count; i++)
-        if (model->pinned[i])
+    drape_arena scratch = drape_arena_of(ctx);
+    uint8_t *is_pinned = drape_arena_take(&scratch, (size_t)model->surface.node_count, sizeof *is_pinned);
+    json_t *array = is_pinned ? json_array() : NULL;
+    if (is_pinned)
+        drape_render_pinned(model, is_pinned);
+    for (int32_t i = 0; is_pinned && i < model->surface.node_count; i++)
+        if (is_pinned[i])
             array = drape_json_append(array, json_integer(i));
+    drape_arena_free(&scratch);
     return array;
 }
 
@@ -207,12 +213,14 @@ drape_status drape_report_put_json(const drape_report_data *data, drape_file *fi
         status = read_energies(run, &energies);
     const char *slash = strrchr(run->record.folder, '/');
     json_t *json = json_pack(
-        "{s:s, s:o, s:o, s:o, s:i, s:i, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "version", drape_version(),
+        "{s:s, s:o, s:o, s:o, s:i, s:i, s:i, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "version", drape_version(),
         "name", drape_json_text(slash && slash[1] ? slash + 1 : run->record.folder), "scene",
         drape_json_text(run->scene_text), "summary", run->summary ? json_incref(run->summary) : json_null(),
-        "nodes", (int)run->model->node_count, "triangles", (int)run->model->triangle_count, "length",
-        drape_json_number(run->model->length), "pinned", pinned(run->model), "colliders", colliders(data),
-        "frames", frames(data), "fields", fields(data), "steps", steps, "energies", energies);
+        "nodes", (int)run->model->surface.node_count, "triangles", (int)run->model->surface.triangle_count,
+        "simulated_triangles", (int)run->model->triangle_count, "length",
+        drape_json_number(run->model->length), "pinned", pinned(run->ctx, run->model), "colliders",
+        colliders(data), "frames", frames(data), "fields", fields(data), "steps", steps, "energies",
+        energies);
     if (!status &&
         (!json || json_dump_callback(json, put_escaped, file, JSON_COMPACT | JSON_REAL_PRECISION(9))))
         status = drape_fail_memory(run->ctx, 1);

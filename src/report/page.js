@@ -107,7 +107,7 @@ function summarize(s) {
   const percent = (x) => `${format(100 * x, 3)} %`;
   const numbers = (object, unit) => Object.entries(object).map(([name, value]) => [name, `${format(value)}${unit}`]);
   return [
-    lines('Model', [['nodes', s.nodes], ['triangles', run.triangles], ['unknowns', s.dofs], ['nonzeros', s.nnz], ['smallest strain', percent(s.strain.min)], ['largest strain', percent(s.strain.max)]]),
+    lines('Model', [['nodes', s.nodes], ['triangles', run.simulated_triangles], ['unknowns', s.dofs], ['nonzeros', s.nnz], ['smallest strain', percent(s.strain.min)], ['largest strain', percent(s.strain.max)]]),
     lines('Steps', [['simulated', `${format(s.time)} s`], ['accepted', s.steps.accepted], ['rejected', s.steps.rejected],
       ...Object.entries(s.steps.reasons || {}), ['unconverged', s.steps.unconverged || null], ['shortest step', `${format(s.steps.h_min, 3)} s`], ['longest step', `${format(s.steps.h_max, 3)} s`]]),
     lines('Newton', Object.entries(s.newton).map(([name, value]) => [name.replace('_', ' '), value])),

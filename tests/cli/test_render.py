@@ -189,6 +189,29 @@ def test_run_and_scene():
     assert data[0] == data[1] == data[2]
 
 
+def test_render_mesh():
+    """a render mesh is drawn in place of the simulated mesh: the same mesh gives the same picture, half of it a cloth half as wide"""
+    need_pictures()
+    whole = {"grid": "square", "columns": 13, "rows": 13, "width": 1, "height": 1, "transform": {"translate": [-0.5, 0.52, 0.5]}}
+    half = {**whole, "columns": 20, "width": 0.5}
+    pictures = []
+    for name, mesh in ("plain", None), ("same", whole), ("half", half):
+        scene = write_scene()
+        if mesh:
+            with open(scene, encoding="utf-8") as file:
+                data = json.load(file)
+            data["cloth"][0]["render_mesh"] = mesh
+            with open(scene, "w", encoding="utf-8") as file:
+                json.dump(data, file)
+        good("run", scene, "--out", name)
+        pictures.append(render(name, "--camera", "0,89.9", "--shade", "normals", out=name + ".png").astype(int))
+    plain, same, half = pictures
+    assert (abs(plain - same) > 8).mean() < 1e-3  # rounding of positions
+    for image, wanted in (plain, 1), (half, 0.5):
+        ys, xs = numpy.nonzero(image.max(axis=2) - image.min(axis=2) > 40)
+        assert abs(numpy.ptp(xs) / numpy.ptp(ys) - wanted) < 0.15, (numpy.ptp(xs), numpy.ptp(ys))
+
+
 def test_texture():
     """seen from the front, a texture has the orientation of its file; from below it is mirrored"""
     need_pictures()

@@ -39,9 +39,9 @@ def refused(*args, code=2, says=""):
     assert re.fullmatch(r"[^\n]+\n", result.stderr) and says in result.stderr, (says, result.stderr)
 
 
-def make_run(*args, folder="out"):
+def make_run(*args, folder="out", scene=None):
     with open("scene_of_test.json", "w", encoding="utf-8") as file:
-        json.dump(SCENE, file)
+        json.dump(scene or SCENE, file)
     good("run", "scene_of_test.json", "--out", folder, *args)
 
 
@@ -88,6 +88,22 @@ def test_contents():
     assert data["scene"] == read("out/scene.json") and json.loads(data["scene"])["description"] == TRICK
     assert len(data["colliders"]) == 5 and len(data["colliders"][0]["displacements"]) == frames
     assert data["pinned"] == [0, 8]
+
+
+def test_render_mesh():
+    """the page shows the render mesh of a cloth, and counts the triangles of the simulated one"""
+    cloth = {**SCENE["cloth"][0], "render_mesh": {"grid": "square", "columns": 15, "rows": 12, "width": 0.8, "height": 0.6}}
+    make_run(scene={**SCENE, "cloth": [cloth]})
+    good("report", "out")
+    page = read("out/report.html")
+    data = json.loads(block(page, "run"))
+    (_, vertices, _), x = read_npy("out/render_positions.npy")
+    levels, field = numbers(page, "positions", "H"), data["fields"][0]
+    assert (data["nodes"], data["triangles"], data["simulated_triangles"], len(levels)) == (vertices, 2 * 14 * 11, 2 * 8 * 6, len(x))
+    for i, level in enumerate(levels):
+        assert abs(field["low"][i % 3] + field["step"][i % 3] * level - x[i]) < field["step"][i % 3] + 1e-9, i
+    assert max(numbers(page, "triangles", "I")) == vertices - 1 and len(numbers(page, "triangles", "I")) == 3 * data["triangles"]
+    assert data["pinned"] == [0, 14] and len(numbers(page, "strain", "H")) == len(x) // 3
 
 
 def test_strain_and_speed():
