@@ -6,6 +6,7 @@ import html
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -288,7 +289,7 @@ def _summary(sim: Sim, frames: int, status: Status, message: str) -> Dict[str, A
 # ---- The program ----
 
 class SceneFile:
-    """A scene as a file for the program: its own, if it has not been changed, else one that is removed afterwards."""
+    """A scene as a file for the program: its own, if it has not been changed, else one that is removed afterwards, and that errors do not name."""
 
     def __init__(self, scene: Union[Scene, Mapping, str, os.PathLike]):
         self.scene = scene if isinstance(scene, Scene) else Scene(scene)
@@ -302,9 +303,13 @@ class SceneFile:
         self.scene.write(path)
         return path
 
-    def __exit__(self, *_: Any) -> None:
-        if self.folder:
-            self.folder.cleanup()
+    def __exit__(self, _kind: Any, error: Any, _trace: Any) -> None:
+        if not self.folder:
+            return
+        if isinstance(error, Error):
+            written = re.escape(os.path.join(self.folder.name, "scene.json"))
+            error.args = (re.sub(written + r"(:\d+)*", lambda _: self.scene.path or "scene", str(error)), *error.args[1:])
+        self.folder.cleanup()
 
 
 def arguments(options: Mapping[str, Any]) -> List[str]:

@@ -111,6 +111,13 @@ def test_changes():
     equal((len(run.times), scene["/duration"], run.summary["nodes"]), (6, 0.2, 36))
     assert np.ptp(run.positions, axis=0).max() < 1e-12 and len(glob.glob("run/*.obj")) > 5
     equal(drape.load("run").model.node_count, 36)
+    said = str(raises(drape.ArgumentError, drape.run, sheet(), {"/integrator/dt": -1}, says="/integrator/dt: -1"))
+    assert "drape-" not in said, said
+    scene.write("own.json")
+    scene = drape.Scene("own.json")
+    scene["/duration"] = -1
+    said = str(raises(drape.ArgumentError, drape.info, scene, says="own.json: /duration"))
+    assert "drape-" not in said, said
 
 
 def test_render_mesh():
