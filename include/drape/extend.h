@@ -488,6 +488,10 @@ typedef struct drape_term_ops {
     /* Passed on unchanged to build, build_seam and, in el, to all others but law. It must outlive the context
      * and every model compiled with it, and must not change while sims run: they do not know. */
     void *user;
+
+    /* The term reads the measured curves of the material. Where no term of a cloth does, a scene that gives
+     * curves has the warning "unused_curve". */
+    bool takes_curves;
 } drape_term_ops;
 
 /* Registers a user-defined term, which scenes compiled with this context may then use by name. *ops is

@@ -335,7 +335,7 @@ static drape_status points_value(drape_context *ctx, const char *pointer, const 
     const double *v = setting->vector;
     char given[48];
     snprintf(given, sizeof given, count ? "an array of %zu numbers" : "an empty array", count);
-    if (count == 0 || count % 2)
+    if (count == 0 || count % 2 || setting->number != 2)
         return drape_param_refuse(ctx, pointer, param, given);
     for (size_t i = 0; i < count / 2; i++) {
         const double x = v[2 * i], y = v[2 * i + 1], x0 = i ? v[2 * i - 2] : 0, y0 = i ? v[2 * i - 1] : 0;

@@ -334,15 +334,14 @@ static void print_term(const cli_info *info, int32_t i)
                term->elements.nodes, term->elements.nodes == 1 ? "" : "s");
     for (int p = 0; p < term->ops->entry.param_count; p++) {
         const double *value = term->params + drape_param_place(term->ops->entry.params, p);
-        if (term->ops->entry.params[p].kind == DRAPE_PARAM_TEXT) {
-            if (term->history && *term->history->name)
-                printf("; history %s", CLI_SHOWN(term->history->name));
+        if (term->ops->entry.params[p].kind == DRAPE_PARAM_TEXT)
             continue;
-        }
         printf("; %s ", term->ops->entry.params[p].name);
         print_value(&term->ops->entry.params[p], value);
         fputs(is_default(&term->ops->entry.params[p], value) ? " (default)" : "", stdout);
     }
+    if (term->history && *term->history->name)
+        printf("; history %s", CLI_SHOWN(term->history->name));
     fputc('\n', stdout);
 }
 

@@ -38,8 +38,11 @@ static drape_status load(const cli_command *command, const char *path, cli_choos
         status = drape_scene_compile(s->scene, &s->model);
     if (!status && choose)
         status = choose(user, s, &def);
-    if (!status)
-        status = drape_sim_create(s->ctx, s->model, &def, &s->sim);
+    if (status)
+        return status;
+    status = drape_sim_create(s->ctx, s->model, &def, &s->sim);
+    if (status && *s->ctx->pointer) /* as where the integrator of the scene does not take its terms */
+        drape_scene_locate_fault(s->scene);
     return status ? status : check_formats(s);
 }
 

@@ -9,8 +9,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define FRACTION_ROUNDING 1e-12 /* of a sum of decimal fractions */
-
 drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count)
 {
     return drape_term_reserve_nodes(builder, element_count, builder->term->ops->nodes, rest_count);
@@ -116,7 +114,7 @@ drape_status drape_term_add_branch(drape_term_builder *builder, double fraction,
                                  name, fraction, time, DRAPE_MAX_BRANCHES);
     for (int i = 0; i < cloth->branch_count; i++)
         sum += cloth->branches[i].fraction;
-    if (sum > 1 + FRACTION_ROUNDING)
+    if (sum > 1 + DRAPE_FRACTION_ROUNDING)
         return drape_term_refuse(
             builder, "the fractions of the stiffness that relax have the sum %.12g; it is at most 1", sum);
     cloth->branches[cloth->branch_count++] = (drape_branch){fraction, time};
@@ -358,14 +356,15 @@ static drape_status build_named(drape_model *model, int32_t c, const char *point
     return build_term(model, c, pointer, ops, def);
 }
 
-/* Builds a term that the scene's gravity adds. */
+/* Builds a term that the scene's gravity adds. history: its name, or NULL. */
 static drape_status build_implied(drape_model *model, int32_t c, const drape_term_ops *ops,
                                   const char *history)
 {
-    const drape_setting setting = {.name = DRAPE_HISTORY_PARAM, .text = history};
-    const drape_entry_def def = {
-        .type = ops->entry.name, .settings = &setting, .setting_count = history != NULL};
-    return build_term(model, c, "/gravity", ops, &def);
+    drape_term *term = &model->terms[model->term_count];
+    const drape_status status =
+        build_term(model, c, "/gravity", ops, &(drape_entry_def){.type = ops->entry.name});
+    return status || !history ? status
+                              : drape_compile_history_named(model, "/gravity_history", history, term);
 }
 
 /* Builds the terms that the scene names, then those that its gravity adds if it is not zero. */

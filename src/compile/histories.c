@@ -103,10 +103,19 @@ static const char *text_of(const drape_entry_def *def, const char *name)
     return text;
 }
 
-static drape_status find_named(drape_model *model, const char *pointer, const char *name, drape_term *term)
+static drape_status refuse_timed(drape_model *model, const char *pointer, const drape_term *term)
+{
+    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
+                         "%s has a course in time of its own, and no history", term->ops->entry.name);
+}
+
+drape_status drape_compile_history_named(drape_model *model, const char *pointer, const char *name,
+                                         drape_term *term)
 {
     const char *names[16];
     size_t known = 0;
+    if (drape_term_is_timed(term))
+        return refuse_timed(model, pointer, term);
     for (int32_t i = 0; i < model->history_count && !term->history; i++) {
         drape_history *history = &model->histories[i];
         if (*history->name && strcmp(history->name, name) == 0) {
@@ -133,19 +142,15 @@ drape_status drape_compile_history_of(drape_model *model, const char *pointer, c
     const char *name = text_of(def, DRAPE_HISTORY_PARAM);
     const double rise = ramp < 0 ? 0 : term->params[drape_param_place(entry->params, ramp)];
     char at[160];
-    if (term->ops->from_scene_gravity)
-        snprintf(at, sizeof at, "/gravity_history");
-    else
-        snprintf(at, sizeof at, "%s/%s", pointer, DRAPE_HISTORY_PARAM);
-    if (term->timed[0] < term->timed[1])
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
-                             "%s has a course in time of its own, and no history", entry->name);
+    snprintf(at, sizeof at, "%s/%s", pointer, DRAPE_HISTORY_PARAM);
     if (name && rise > 0)
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "a load has a history or a ramp, not both");
     if (name)
-        return find_named(model, at, name, term);
+        return drape_compile_history_named(model, at, name, term);
     if (!(rise > 0))
         return DRAPE_OK;
+    if (drape_term_is_timed(term))
+        return refuse_timed(model, at, term);
     if (rise < LEAST_RAMP) {
         snprintf(at, sizeof at, "%s/ramp", pointer);
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,

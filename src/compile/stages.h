@@ -80,6 +80,10 @@ drape_status drape_compile_histories(drape_model *model, const drape_scene_def *
 drape_status drape_compile_history_of(drape_model *model, const char *pointer, const drape_entry_def *def,
                                       drape_term *term);
 
+/* Gives a term the history of this name. pointer: that of the name. */
+drape_status drape_compile_history_named(drape_model *model, const char *pointer, const char *name,
+                                         drape_term *term);
+
 /* Builds the terms of all cloths and seams and assigns indices to measures and internal variables. */
 drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def);
 

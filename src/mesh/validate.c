@@ -64,15 +64,15 @@ static double thinness(const drape_mesh *mesh, const int32_t *n)
     return longest_squared > 0 ? vec3_norm(normal) / longest_squared : 0;
 }
 
-drape_status drape_mesh_validate_shapes(drape_context *ctx, const drape_mesh_source *source,
-                                        const drape_mesh *mesh)
+static drape_status check_shapes(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh,
+                                 bool may_merge)
 {
     for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
         const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
         const double ratio = thinness(mesh, n);
         if (!(ratio >= MIN_THINNESS)) {
             char remedy[DRAPE_REMEDY_SIZE];
-            drape_remedy_degenerate(mesh, n, remedy);
+            drape_remedy_degenerate(mesh, n, may_merge, remedy);
             return drape_mesh_fail(ctx, source, 0,
                                    "triangle %d (nodes %d %d %d) is degenerate: altitude / longest "
                                    "edge is %g, at least %g is needed%s",
@@ -80,6 +80,12 @@ drape_status drape_mesh_validate_shapes(drape_context *ctx, const drape_mesh_sou
         }
     }
     return DRAPE_OK;
+}
+
+drape_status drape_mesh_validate_shapes(drape_context *ctx, const drape_mesh_source *source,
+                                        const drape_mesh *mesh)
+{
+    return check_shapes(ctx, source, mesh, false);
 }
 
 /* Returns the nodes of each triangle in ascending order. (triangle_count x 3) */
@@ -135,7 +141,7 @@ drape_status drape_mesh_validate_triangles(drape_context *ctx, const drape_mesh_
     if (!status)
         status = check_corners(ctx, source, mesh);
     if (!status)
-        status = drape_mesh_validate_shapes(ctx, source, mesh);
+        status = check_shapes(ctx, source, mesh, true);
     if (!status)
         status = check_duplicates(ctx, source, mesh);
     return status;

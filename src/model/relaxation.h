@@ -18,6 +18,17 @@ typedef struct drape_branch {
     double fraction, time;
 } drape_branch;
 
+#define DRAPE_FRACTION_ROUNDING 1e-12 /* of a sum of decimal fractions */
+
+/* The part of the stiffness that no branch relaxes; 0 if no more than rounding is left of it. */
+static inline double drape_branches_lasting(const drape_branch *branches, int count)
+{
+    double part = 1;
+    for (int i = 0; i < count; i++)
+        part -= branches[i].fraction;
+    return part > DRAPE_FRACTION_ROUNDING ? part : 0;
+}
+
 /* keeps and follows; mean: of the extensions that follow d = 1 over the step; constant: keeps^2/follows. */
 typedef struct drape_decay {
     double keeps, follows, mean, constant;

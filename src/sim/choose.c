@@ -125,12 +125,26 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
                              "\"%s\" chooses the step size, but so does the integrator \"%s\"; choose the "
                              "controller \"halving\"",
                              chosen->controller->entry.name, chosen->integrator->entry.name);
-    if (model->has_branches && chosen->integrator->own_steps && !chosen->integrator->steady_state)
+    return DRAPE_OK;
+}
+
+/* Maxwell branches follow the steps of a method, or are relaxed where it finds an equilibrium. */
+drape_status drape_chosen_check(drape_context *ctx, const drape_chosen *chosen, const drape_model *model)
+{
+    const drape_integrator_ops *integrator = chosen->integrator;
+    if (model->has_branches && integrator->own_steps && !integrator->steady_state)
         return drape_fail_at(
             ctx, DRAPE_E_ARGUMENT, "/integrator/method",
             "\"%s\" chooses its own steps, over which Maxwell branches (\"relax.maxwell\") "
             "are not integrated to its tolerance; choose a method of fixed steps, or \"static\"",
-            chosen->integrator->entry.name);
+            integrator->entry.name);
+    for (int32_t c = 0; integrator->steady_state && c < model->cloth_count; c++)
+        if (drape_branches_lasting(model->cloths[c].branches, model->cloths[c].branch_count) == 0)
+            return drape_fail_at(
+                ctx, DRAPE_E_ARGUMENT, "/integrator/method",
+                "\"%s\" finds the equilibrium after an infinite time, in which nothing is left of the "
+                "stiffness of %.60s: the fractions of \"relax.maxwell\" have the sum 1; below 1 a part lasts",
+                integrator->entry.name, model->cloths[c].name);
     return DRAPE_OK;
 }
 

@@ -17,6 +17,9 @@ typedef struct drape_chosen {
 drape_status drape_choose(drape_context *ctx, const drape_model *model, const drape_sim_def *def,
                           drape_chosen *chosen);
 
+/* Refuses a model that the chosen integrator cannot take, at "/integrator/method". */
+drape_status drape_chosen_check(drape_context *ctx, const drape_chosen *chosen, const drape_model *model);
+
 /* The value of the named parameter; fallback if there is no such parameter. */
 double drape_chosen_integrator_value(const drape_chosen *chosen, const char *name, double fallback);
 double drape_chosen_controller_value(const drape_chosen *chosen, const char *name, double fallback);

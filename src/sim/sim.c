@@ -162,7 +162,9 @@ static drape_status open_sim(drape_context *ctx, const drape_model *model, const
 /* Creates everything that a sim with its choices needs, except its energy account. */
 static drape_status start_sim(drape_sim *sim, int threads)
 {
-    drape_status status = create_states(sim);
+    drape_status status = drape_chosen_check(sim->ctx, &sim->chosen, sim->model);
+    if (!status)
+        status = create_states(sim);
     if (!status)
         status = drape_check_cancel(sim->ctx);
     if (!status)

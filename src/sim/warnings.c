@@ -5,6 +5,7 @@
 #include "sim/warnings.h"
 
 #include "colliders/deformed.h"
+#include "compile/compile.h"
 #include "sim/inside.h"
 #include "sim/relaxed.h"
 #include "sim/sim.h"
@@ -41,6 +42,31 @@ static bool has_no_terms(drape_sim *sim, char *text, size_t size)
              "bend.hinge do",
              first, m->cloths[first].name, bare > 1 ? ", as with other cloths of this scene" : "");
     return true;
+}
+
+static bool takes_curves(const drape_model *m, int32_t cloth)
+{
+    bool takes = false;
+    for (int32_t i = 0; i < m->term_count; i++)
+        takes = takes || (m->terms[i].cloth == cloth && m->terms[i].ops->takes_curves);
+    return takes;
+}
+
+/* Measured curves that change nothing. */
+static bool has_unused_curve(drape_sim *sim, char *text, size_t size)
+{
+    const drape_model *m = sim->model;
+    const drape_entry *material = &drape_material_entry;
+    for (int32_t c = 0; c < m->cloth_count; c++)
+        for (int p = 0; p < material->param_count && !takes_curves(m, c); p++) {
+            const double points = m->cloths[c].material_values[drape_param_place(material->params, p)];
+            if (material->params[p].kind != DRAPE_PARAM_POINTS || isnan(points))
+                continue;
+            snprintf(text, size, "/cloth/%d/material/%s: no term of %s reads it; stretch.curve does", (int)c,
+                     material->params[p].name, m->cloths[c].name);
+            return true;
+        }
+    return false;
 }
 
 /* Not where integrator or controller choose their own steps, or substeps. */
@@ -318,12 +344,19 @@ static bool is_contact_thin(drape_sim *sim, char *text, size_t size)
 static const struct {
     const char *name;
     bool (*applies)(drape_sim *sim, char *text, size_t size);
-} checks[] = {{"no_terms", has_no_terms},        {"few_steps", has_few_steps},
-              {"large_mesh", has_large_file},    {"starts_inside", starts_inside},
-              {"ends_inside", ends_inside},      {"tangled", is_tangled},
-              {"no_room", had_no_room},          {"numerical_dissipation", dissipates_most},
-              {"slow_contact", is_contact_slow}, {"contact_distance", is_contact_thin},
-              {"inaccurate", is_inaccurate},     {"held", was_held},
+} checks[] = {{"no_terms", has_no_terms},
+              {"unused_curve", has_unused_curve},
+              {"few_steps", has_few_steps},
+              {"large_mesh", has_large_file},
+              {"starts_inside", starts_inside},
+              {"ends_inside", ends_inside},
+              {"tangled", is_tangled},
+              {"no_room", had_no_room},
+              {"numerical_dissipation", dissipates_most},
+              {"slow_contact", is_contact_slow},
+              {"contact_distance", is_contact_thin},
+              {"inaccurate", is_inaccurate},
+              {"held", was_held},
               {"time_dropped", drops_time}};
 
 bool drape_sim_take_warning_failure(drape_sim *sim)

@@ -1,9 +1,6 @@
 /* gravity: E = -m g . x of every node, with its lumped mass m. Linear: it has no Hessian. It is modelled if
  * the gravity of the scene is not zero. */
-#include "terms/load.h"
 #include "terms/terms.h"
-
-static const drape_param params[] = {DRAPE_LOAD_HISTORY};
 
 enum { REST_FORCE_X, REST_FORCE_Y, REST_FORCE_Z, REST_COUNT };
 
@@ -39,9 +36,9 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
 const drape_term_ops drape_term_gravity = {
     .struct_size = sizeof(drape_term_ops),
     .entry = {.name = "gravity",
-              .summary = "weight of every node: E = -m g . x; acts whenever the scene's gravity is not zero",
-              .reference = "lumped masses: a third of each triangle to each of its nodes",
-              DRAPE_PARAMS(params)},
+              .summary = "weight of every node: E = -m g . x; acts whenever the scene's gravity is not zero, "
+                         "multiplied by its \"gravity_history\"",
+              .reference = "lumped masses: a third of each triangle to each of its nodes"},
     .element_name = "node",
     .nodes = 1,
     .linear = true,

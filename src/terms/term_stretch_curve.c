@@ -342,4 +342,5 @@ const drape_term_ops drape_term_stretch_curve = {
     .measure = measure,
     .positive = positive,
     .check = check,
+    .takes_curves = true,
 };

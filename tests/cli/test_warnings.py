@@ -49,6 +49,18 @@ def test_no_terms():
     assert "/cloth/1: bare has no \"terms\"" in warnings("scene.json")["no_terms"]
 
 
+def test_unused_curve():
+    """a measured curve that no term of its cloth reads has a warning; that of a fabric, which nobody gave, has none"""
+    def found(terms, **material):
+        whole = scene(**FINE)
+        write_scene(**FINE, cloth=[{**whole["cloth"][0], "terms": terms, "material": {**whole["cloth"][0]["material"], **material}}])
+        return warnings("scene.json").get("unused_curve")
+    curve = [[0.01, 20], [0.03, 90]]
+    equal(found(["stretch.cst"], weft_curve=curve), "/cloth/0/material/weft_curve: no term of sheet reads it; stretch.curve does", "text")
+    equal(found(["stretch.curve"], weft_curve=curve), None, "used")
+    equal(found(["stretch.cst"], fabric="wang2011_denim"), None, "of a fabric")
+
+
 def test_few_steps():
     """a duration of fewer than 20 steps has a warning; 20 steps have none, nor have integrators that choose their steps"""
     for steps, there in ((19, True), (20, False)):

@@ -98,9 +98,9 @@ static inline drape_status try_model(drape_context *ctx, const model_def *def, d
                                       {"poisson_ratio", 0.3, NULL},
                                       {"thickness", def->thickness > 0 ? def->thickness : 1e-3, NULL},
                                       {"areal_density", 0.2, NULL},
-                                      {"warp_curve", 0, NULL, warp, 6},
-                                      {"weft_curve", 0, NULL, weft, 6},
-                                      {"shear_curve", 0, NULL, shear, 6}};
+                                      {"warp_curve", 2, NULL, warp, 6},
+                                      {"weft_curve", 2, NULL, weft, 6},
+                                      {"shear_curve", 2, NULL, shear, 6}};
     const drape_setting equilateral[] = {{"edges", 3, NULL}, {"edge_length", 0.1, NULL}};
     const drape_setting square[] = {
         {"columns", 4, NULL}, {"rows", 5, NULL}, {"width", 0.3, NULL}, {"height", 0.5, NULL}};

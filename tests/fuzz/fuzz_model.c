@@ -74,6 +74,7 @@ static void draw_value(fuzz_bytes *in, const drape_param *p, int span, drape_set
         vector[0] = draw_number(in, p), vector[1] = fuzz_magnitude(in, 1e-9, 1e15);
         vector[2] = draw_number(in, p), vector[3] = fuzz_magnitude(in, 1e-9, 1e15);
         s->vector = vector;
+        s->number = 2;
         s->vector_count = fuzz_below(in, 2) ? 4 : 2;
     } else {
         for (int k = 0; k < 3; k++)

@@ -198,6 +198,19 @@ START_TEST(a_new_model_keeps_branches)
 }
 END_TEST
 
+/* A sim goes on with no model that its integrator refuses. */
+START_TEST(a_new_model_is_refused_as_a_first_one)
+{
+    scene s = sheet("{'type': 'damp.kelvin_voigt', 'beta': 0.001}", "{'edge': 'left'}",
+                    "'integrator': {'method': 'ida'}, 'duration': 1"),
+          other = falling("{'method': 'be'}");
+    ck_assert_int_eq(drape_sim_change_model(s.sim, other.model), DRAPE_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "over which Maxwell branches"));
+    scene_advance(&s, 0.01);
+    scene_close(&s), scene_close(&other);
+}
+END_TEST
+
 /* Threads add in a fixed order: the same bits. */
 START_TEST(threads_change_no_bit)
 {
@@ -296,7 +309,23 @@ START_TEST(integrators_with_steps_of_their_own_refuse_it)
 }
 END_TEST
 
+/* Of nothing that lasts there is no equilibrium: where the fractions have the sum 1, also by rounding. */
+START_TEST(equilibria_need_a_lasting_part)
+{
+    refused(
+        "'fraction_1': 1, 'time_1': 1", "static",
+        "/integrator/method: \"static\" finds the equilibrium after an infinite time, in which nothing is "
+        "left of the stiffness of cloth0: the fractions of \"relax.maxwell\" have the sum 1");
+    refused("'fraction_1': 0.1, 'time_1': 1, 'fraction_2': 0.2, 'time_2': 2, 'fraction_3': 0.3, 'time_3': 3, "
+            "'fraction_4': 0.4, 'time_4': 4",
+            "static", "nothing is left of the stiffness of cloth0");
+    scene s = sheet("{'type': 'relax.maxwell', 'fraction_1': 0.999999, 'time_1': 0.1}", "{'edge': 'left'}",
+                    "'integrator': {'method': 'static'}, 'duration': 1");
+    scene_close(&s);
+}
+END_TEST
+
 SUITE("relaxation", coefficients_of_a_step, stress_relaxes_by_the_prony_series, equilibria_are_relaxed,
-      losses_are_in_the_balance, checkpoints_keep_branches, a_new_model_keeps_branches, threads_change_no_bit,
-      derivatives_agree_with_differences, wrong_series_are_refused,
-      integrators_with_steps_of_their_own_refuse_it)
+      losses_are_in_the_balance, checkpoints_keep_branches, a_new_model_keeps_branches,
+      a_new_model_is_refused_as_a_first_one, threads_change_no_bit, derivatives_agree_with_differences,
+      wrong_series_are_refused, integrators_with_steps_of_their_own_refuse_it, equilibria_need_a_lasting_part)

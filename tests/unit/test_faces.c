@@ -270,16 +270,26 @@ START_TEST(an_open_mesh_has_a_remedy)
     open_has_remedy(
         ctx, CORNERS "f 1 3 2\nf 1 2 4\nf 1 4 3\n",
         "; remedy: fill the holes, which have 3 open edges, this one from (1, 0, 0) to (0, 1, 0) m");
-    open_has_remedy(
-        ctx, CORNERS CORNERS CORNERS CORNERS "f 1 3 2\nf 5 6 8\nf 9 12 11\nf 14 15 16\n",
-        "; remedy: merge vertices by a distance of 0.001 m: the nodes of its 12 open edges lie in "
-        "pairs, at most 0 m apart");
-    open_has_remedy(
-        ctx,
-        CORNERS "v .01 0 0\nv 1.01 0 0\nv .01 0 1\nv 0 .02 0\nv 0 .02 1\nv 0 1.02 0\nv 1 0 .03\nv 0 1 "
-                ".03\nv 0 0 1.03\nf 1 3 2\nf 5 6 7\nf 8 9 10\nf 11 12 13\n",
-        "; remedy: merge vertices by a distance of 0.063 m: the nodes of its 12 open edges lie in "
-        "pairs, at most 0.032 m apart");
+    open_has_remedy(ctx, CORNERS CORNERS CORNERS CORNERS "f 1 3 2\nf 5 6 8\nf 9 12 11\nf 14 15 16\n",
+                    "; remedy: merge vertices by a distance of 0.001 m: that closes its 12 open edges, whose "
+                    "nodes are at "
+                    "most 0 m apart");
+    open_has_remedy(ctx,
+                    CORNERS
+                    "v .01 0 0\nv 1.01 0 0\nv .01 0 1\nv 0 .02 0\nv 0 .02 1\nv 0 1.02 0\nv 1 0 .03\nv 0 1 "
+                    ".03\nv 0 0 1.03\nf 1 3 2\nf 5 6 7\nf 8 9 10\nf 11 12 13\n",
+                    "; remedy: merge vertices by a distance of 0.063 m: that closes its 12 open edges, whose "
+                    "nodes are at "
+                    "most 0.032 m apart");
+    open_has_remedy(/* one face has a corner of its own: only that is doubled */
+                    ctx, CORNERS "v 0 0 1.002\nf 1 3 2\nf 1 2 4\nf 1 5 3\nf 2 3 4\n",
+                    "; remedy: merge vertices by a distance of 0.004 m: that closes its 4 open edges, whose "
+                    "nodes are at "
+                    "most 0.002 m apart");
+    open_has_remedy(/* a doubled corner beside a hole: merging does not close it */
+                    ctx, CORNERS "v 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 5 3\n",
+                    "; remedy: fill the holes, which have 5 open edges, this one from (0, 0, 0) to (0, 0, 1) "
+                    "m");
     open_has_remedy(
         ctx, CORNERS "f 1 2 3\n",
         "; remedy: fill the holes, which have 3 open edges, this one from (0, 0, 0) to (1, 0, 0) m");
@@ -306,11 +316,15 @@ START_TEST(a_degenerate_triangle_has_a_remedy)
     drape_mesh mesh;
     char remedy[DRAPE_REMEDY_SIZE];
     parse(ctx, &drape_import_obj, "v 0 0 0\nv 1 0 0\nv 3 0 0\nv 3 0 1e-14\nf 1 2 3\nf 1 3 4\n", &mesh);
-    drape_remedy_degenerate(&mesh, mesh.triangle, remedy);
+    drape_remedy_degenerate(&mesh, mesh.triangle, true, remedy);
     ck_assert_str_eq(
         remedy, "; remedy: move node 1, at (1, 0, 0) m, off the line between the others, or dissolve it");
-    drape_remedy_degenerate(&mesh, mesh.triangle + 3, remedy);
+    drape_remedy_degenerate(&mesh, mesh.triangle + 3, true, remedy);
     ck_assert_str_eq(remedy, "; remedy: merge nodes 2 and 3, which are 1e-14 m apart");
+    drape_remedy_degenerate(&mesh, mesh.triangle, false, remedy); /* as in the start of a cloth */
+    ck_assert_str_eq(remedy, "; remedy: move node 1, at (1, 0, 0) m, off the line between the others");
+    drape_remedy_degenerate(&mesh, mesh.triangle + 3, false, remedy);
+    ck_assert_str_eq(remedy, "; remedy: move nodes 2 and 3, which are 1e-14 m apart, away from each other");
     drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
