@@ -9,6 +9,9 @@
 /* Points and segments of colliders up to which the trees of the cloth are not fitted for them: to fit costs
  * as much as twenty scans. */
 #define FEW 16
+/* Activation distance of round features, in the depth by which the middle of an edge may be nearer than its
+ * ends: where nodes are held by a wide distance from a fast body, their edges are held by them. */
+#define SAGS 2
 
 /* ---- Creation ---- */
 
@@ -83,6 +86,28 @@ static void share_areas(drape_broad_phase *s)
             0.5 * (s->node_area[m->edge[2 * (size_t)e]] + s->node_area[m->edge[2 * (size_t)e + 1]]);
 }
 
+/* How much nearer to a round feature of radius r, or deeper inside, the middle of an edge is than its ends on
+ * the surface. */
+static double sag(double r, double edge)
+{
+    const double half = 0.5 * edge;
+    return half < r ? r - sqrt(r * r - half * half) : half;
+}
+
+static void bound_features(drape_broad_phase *s)
+{
+    const drape_model *m = s->model;
+    double edge = 0;
+    for (int32_t e = 0; e < m->edge_count; e++)
+        edge = fmax(edge, m->edge_length[e]);
+    for (int32_t i = 0; i < m->collider_count; i++) {
+        s->distance[i] = drape_collider_activation(m, i);
+        s->feature_most[i] = m->colliders[i].ops->smooth
+                                 ? fmax(s->distance[i], SAGS * sag(m->colliders[i].shape.radius, edge))
+                                 : INFINITY;
+    }
+}
+
 /* Trees of what can meet something. */
 static drape_status build_trees(drape_arena *arena, drape_broad_phase *s, int32_t corners, int32_t triangles)
 {
@@ -118,6 +143,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->triangle = drape_arena_take(arena, 3 * (size_t)triangles, sizeof *s->triangle);
     s->triangle_collider = drape_arena_take(arena, (size_t)triangles, sizeof *s->triangle_collider);
     s->distance = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->distance);
+    s->feature_most = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->feature_most);
     s->side = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->side);
     s->near = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near);
     s->near_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near_node);
@@ -136,8 +162,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->face_area = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->face_area);
     if (drape_arena_status(arena) || drape_distant_create(arena, m, &s->distant))
         return DRAPE_E_MEMORY;
-    for (int32_t i = 0; i < m->collider_count; i++)
-        s->distance[i] = drape_collider_activation(m, i);
+    bound_features(s);
     for (int32_t i = 0; i < m->collider_count; i++)
         if (!m->colliders[i].ops->smooth)
             s->obstacle_radius = fmax(s->obstacle_radius, m->colliders[i].shape.radius);
@@ -170,7 +195,7 @@ static void set_collider(const drape_broad_phase *s, int32_t collider, drape_pai
 {
     p->collider = collider;
     p->radius = s->model->colliders[collider].shape.radius;
-    p->distance = s->distance[collider];
+    p->distance = drape_broad_phase_feature_distance(s, collider);
 }
 
 /* ---- Searching ---- */
@@ -289,7 +314,8 @@ static void set_reaches(drape_broad_phase *s)
     for (size_t i = 0; i < sizeof of / sizeof *of; i++)
         for (int32_t k = 0; k < of[i].count; k++) {
             const int32_t collider = of[i].collider[k];
-            of[i].reach[k] = s->model->colliders[collider].shape.radius + s->distance[collider];
+            of[i].reach[k] =
+                s->model->colliders[collider].shape.radius + drape_broad_phase_feature_distance(s, collider);
         }
 }
 
@@ -439,7 +465,7 @@ static int32_t list_near(drape_broad_phase *s, const drape_broad_query *want, in
     const drape_collider_pose *pose[2] = {&want->pose[0][collider], &want->pose[want->y ? 1 : 0][collider]};
     const bool turns = (pose[0]->turned || pose[1]->turned) &&
                        memcmp(pose[0]->turn, pose[1]->turn, sizeof pose[0]->turn) != 0;
-    const double reach = s->distance[collider] + want->reach + of->edge;
+    const double reach = drape_broad_phase_feature_distance(s, collider) + want->reach + of->edge;
     int32_t count = 0;
     for (int32_t i = 0; i < of->edges.points; i++) {
         const int32_t node = of->edges.point[i];

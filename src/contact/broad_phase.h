@@ -34,6 +34,7 @@ typedef struct drape_broad_phase {
     int32_t *marked_node, *marked_face, *marked_edge; /* scratch: lists of what is marked */
     double *node_area, *edge_area, *face_area;        /* area of the sheet that belongs to each [m2] */
     double *distance;       /* (collider_count) activation distance of cloth and each collider [m] */
+    double *feature_most;   /* (collider_count) that of its features is no more than this [m] */
     double rounding;        /* what rounding can change in a gap, set by who moves the points [m] */
     double obstacle_radius; /* largest radius around the triangles of an obstacle [m] */
 } drape_broad_phase;
@@ -56,6 +57,12 @@ typedef struct drape_broad_query {
 typedef void drape_broad_phase_visit(void *user, const drape_pair *pair);
 void drape_broad_phase_pairs(drape_broad_phase *broad, const drape_broad_query *want,
                              drape_broad_phase_visit *visit, void *user);
+
+/* The activation distance of cloth and the features of a collider [m]. */
+static inline double drape_broad_phase_feature_distance(const drape_broad_phase *broad, int32_t collider)
+{
+    return fmin(broad->distance[collider], broad->feature_most[collider]);
+}
 
 /* The pair of a free node and a smooth collider. */
 drape_pair drape_broad_phase_surface(const drape_broad_phase *broad, int32_t node, int32_t collider);
