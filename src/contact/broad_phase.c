@@ -301,8 +301,14 @@ static void begin_stage(query *q, int32_t stage, drape_pair_kind kind)
     q->pair = (drape_pair){.kind = kind, .collider = -1, .rank = {stage}};
 }
 
+/* How far from the features of a collider pairs are wanted, without the reach of the query [m]. */
+static double feature_reach(const drape_broad_phase *s, int32_t collider, bool passing)
+{
+    return drape_broad_phase_wanted(s, passing, drape_broad_phase_feature_distance(s, collider));
+}
+
 /* How far from the features of each collider contact begins. */
-static void set_reaches(drape_broad_phase *s)
+static void set_reaches(drape_broad_phase *s, bool passing)
 {
     const struct {
         const int32_t *collider;
@@ -314,8 +320,7 @@ static void set_reaches(drape_broad_phase *s)
     for (size_t i = 0; i < sizeof of / sizeof *of; i++)
         for (int32_t k = 0; k < of[i].count; k++) {
             const int32_t collider = of[i].collider[k];
-            of[i].reach[k] =
-                s->model->colliders[collider].shape.radius + drape_broad_phase_feature_distance(s, collider);
+            of[i].reach[k] = s->model->colliders[collider].shape.radius + feature_reach(s, collider, passing);
         }
 }
 
@@ -330,7 +335,7 @@ static void fit(drape_broad_phase *s, const drape_broad_query *want)
               {&s->corners, s->corner_reach},
               {&s->segment_tree, s->segment_reach},
               {&s->obstacles, s->obstacle_reach}};
-    set_reaches(s);
+    set_reaches(s, want->passing);
     for (size_t i = 0; i < sizeof of / sizeof *of; i++)
         drape_path_bvh_fit(of[i].tree, want->x, want->y, want->marked, of[i].reach);
 }
@@ -338,7 +343,8 @@ static void fit(drape_broad_phase *s, const drape_broad_query *want)
 static void search_self(query *q)
 {
     drape_broad_phase *s = q->broad;
-    const double distance = 2 * s->model->contact.self_thickness, reach = distance + q->want->reach;
+    const double distance = 2 * s->model->contact.self_thickness,
+                 reach = drape_broad_phase_wanted(s, q->want->passing, distance) + q->want->reach;
     begin_stage(q, OWN_FACES, DRAPE_PAIR_TRIANGLE);
     q->pair.distance = distance;
     drape_path_bvh_join(&s->nodes, &s->faces, q->want->y, reach, meet_own_face, q);
@@ -465,7 +471,7 @@ static int32_t list_near(drape_broad_phase *s, const drape_broad_query *want, in
     const drape_collider_pose *pose[2] = {&want->pose[0][collider], &want->pose[want->y ? 1 : 0][collider]};
     const bool turns = (pose[0]->turned || pose[1]->turned) &&
                        memcmp(pose[0]->turn, pose[1]->turn, sizeof pose[0]->turn) != 0;
-    const double reach = drape_broad_phase_feature_distance(s, collider) + want->reach + of->edge;
+    const double reach = feature_reach(s, collider, want->passing) + want->reach + of->edge;
     int32_t count = 0;
     for (int32_t i = 0; i < of->edges.points; i++) {
         const int32_t node = of->edges.point[i];
@@ -514,7 +520,7 @@ static void scan_features(query *q)
     const bool *marked = q->want->marked;
     scanned_cloth all = {.edge = -1}, some = {.edge = -1}; /* listed where they are needed first */
     int32_t segment = 0;
-    set_reaches(s);
+    set_reaches(s, q->want->passing);
     for (int32_t k = 0; k < m->collider_count; k++) {
         const drape_collider_shape *shape = &m->colliders[k].shape;
         const int32_t corner = s->first_point[k] - m->node_count, last = segment + shape->segment_count;

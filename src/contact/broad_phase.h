@@ -42,11 +42,12 @@ typedef struct drape_broad_phase {
 drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *model, drape_broad_phase *out);
 
 /* Which pairs are searched: those whose pieces may be within their activation distance plus reach, at x or
- * anywhere on the straight path from x to y. */
+ * anywhere on the straight path from x to y; if `passing`, within their least gap plus reach. */
 typedef struct drape_broad_query {
     const double *x, *y;                /* (points x 3); y NULL: only at x */
     const drape_collider_pose *pose[2]; /* (collider_count) at x, and at y */
     double reach;
+    bool passing;
     const bool *marked; /* (points) only pairs with a marked point; NULL: all */
 } drape_broad_query;
 
@@ -62,6 +63,12 @@ void drape_broad_phase_pairs(drape_broad_phase *broad, const drape_broad_query *
 static inline double drape_broad_phase_feature_distance(const drape_broad_phase *broad, int32_t collider)
 {
     return fmin(broad->distance[collider], broad->feature_most[collider]);
+}
+
+/* The gap within which a pair is searched, without the reach [m]. */
+static inline double drape_broad_phase_wanted(const drape_broad_phase *broad, bool passing, double distance)
+{
+    return passing ? fmin(fmax(DRAPE_LEAST_GAP * distance, broad->rounding), 0.5 * distance) : distance;
 }
 
 /* The pair of a free node and a smooth collider. */
