@@ -9,6 +9,9 @@
 /* Points and segments of colliders up to which the trees of the cloth are not fitted for them: to fit costs
  * as much as twenty scans. */
 #define FEW 16
+/* Activation distance of round features, in the depth by which the middle of an edge may be nearer than its
+ * ends: where nodes are held by a wide distance from a fast body, their edges are held by them. */
+#define SAGS 2
 
 /* ---- Creation ---- */
 
@@ -83,6 +86,28 @@ static void share_areas(drape_broad_phase *s)
             0.5 * (s->node_area[m->edge[2 * (size_t)e]] + s->node_area[m->edge[2 * (size_t)e + 1]]);
 }
 
+/* How much nearer to a round feature of radius r, or deeper inside, the middle of an edge is than its ends on
+ * the surface. */
+static double sag(double r, double edge)
+{
+    const double half = 0.5 * edge;
+    return half < r ? r - sqrt(r * r - half * half) : half;
+}
+
+static void bound_features(drape_broad_phase *s)
+{
+    const drape_model *m = s->model;
+    double edge = 0;
+    for (int32_t e = 0; e < m->edge_count; e++)
+        edge = fmax(edge, m->edge_length[e]);
+    for (int32_t i = 0; i < m->collider_count; i++) {
+        s->distance[i] = drape_collider_activation(m, i);
+        s->feature_most[i] = m->colliders[i].ops->smooth
+                                 ? fmax(s->distance[i], SAGS * sag(m->colliders[i].shape.radius, edge))
+                                 : INFINITY;
+    }
+}
+
 /* Trees of what can meet something. */
 static drape_status build_trees(drape_arena *arena, drape_broad_phase *s, int32_t corners, int32_t triangles)
 {
@@ -118,6 +143,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->triangle = drape_arena_take(arena, 3 * (size_t)triangles, sizeof *s->triangle);
     s->triangle_collider = drape_arena_take(arena, (size_t)triangles, sizeof *s->triangle_collider);
     s->distance = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->distance);
+    s->feature_most = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->feature_most);
     s->side = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->side);
     s->near = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near);
     s->near_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near_node);
@@ -136,8 +162,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->face_area = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->face_area);
     if (drape_arena_status(arena) || drape_distant_create(arena, m, &s->distant))
         return DRAPE_E_MEMORY;
-    for (int32_t i = 0; i < m->collider_count; i++)
-        s->distance[i] = drape_collider_activation(m, i);
+    bound_features(s);
     for (int32_t i = 0; i < m->collider_count; i++)
         if (!m->colliders[i].ops->smooth)
             s->obstacle_radius = fmax(s->obstacle_radius, m->colliders[i].shape.radius);
@@ -170,7 +195,7 @@ static void set_collider(const drape_broad_phase *s, int32_t collider, drape_pai
 {
     p->collider = collider;
     p->radius = s->model->colliders[collider].shape.radius;
-    p->distance = s->distance[collider];
+    p->distance = drape_broad_phase_feature_distance(s, collider);
 }
 
 /* ---- Searching ---- */
@@ -276,8 +301,14 @@ static void begin_stage(query *q, int32_t stage, drape_pair_kind kind)
     q->pair = (drape_pair){.kind = kind, .collider = -1, .rank = {stage}};
 }
 
+/* How far from the features of a collider pairs are wanted, without the reach of the query [m]. */
+static double feature_reach(const drape_broad_phase *s, int32_t collider, bool passing)
+{
+    return drape_broad_phase_wanted(s, passing, drape_broad_phase_feature_distance(s, collider));
+}
+
 /* How far from the features of each collider contact begins. */
-static void set_reaches(drape_broad_phase *s)
+static void set_reaches(drape_broad_phase *s, bool passing)
 {
     const struct {
         const int32_t *collider;
@@ -289,7 +320,7 @@ static void set_reaches(drape_broad_phase *s)
     for (size_t i = 0; i < sizeof of / sizeof *of; i++)
         for (int32_t k = 0; k < of[i].count; k++) {
             const int32_t collider = of[i].collider[k];
-            of[i].reach[k] = s->model->colliders[collider].shape.radius + s->distance[collider];
+            of[i].reach[k] = s->model->colliders[collider].shape.radius + feature_reach(s, collider, passing);
         }
 }
 
@@ -304,7 +335,7 @@ static void fit(drape_broad_phase *s, const drape_broad_query *want)
               {&s->corners, s->corner_reach},
               {&s->segment_tree, s->segment_reach},
               {&s->obstacles, s->obstacle_reach}};
-    set_reaches(s);
+    set_reaches(s, want->passing);
     for (size_t i = 0; i < sizeof of / sizeof *of; i++)
         drape_path_bvh_fit(of[i].tree, want->x, want->y, want->marked, of[i].reach);
 }
@@ -312,7 +343,8 @@ static void fit(drape_broad_phase *s, const drape_broad_query *want)
 static void search_self(query *q)
 {
     drape_broad_phase *s = q->broad;
-    const double distance = 2 * s->model->contact.self_thickness, reach = distance + q->want->reach;
+    const double distance = 2 * s->model->contact.self_thickness,
+                 reach = drape_broad_phase_wanted(s, q->want->passing, distance) + q->want->reach;
     begin_stage(q, OWN_FACES, DRAPE_PAIR_TRIANGLE);
     q->pair.distance = distance;
     drape_path_bvh_join(&s->nodes, &s->faces, q->want->y, reach, meet_own_face, q);
@@ -439,7 +471,7 @@ static int32_t list_near(drape_broad_phase *s, const drape_broad_query *want, in
     const drape_collider_pose *pose[2] = {&want->pose[0][collider], &want->pose[want->y ? 1 : 0][collider]};
     const bool turns = (pose[0]->turned || pose[1]->turned) &&
                        memcmp(pose[0]->turn, pose[1]->turn, sizeof pose[0]->turn) != 0;
-    const double reach = s->distance[collider] + want->reach + of->edge;
+    const double reach = feature_reach(s, collider, want->passing) + want->reach + of->edge;
     int32_t count = 0;
     for (int32_t i = 0; i < of->edges.points; i++) {
         const int32_t node = of->edges.point[i];
@@ -488,7 +520,7 @@ static void scan_features(query *q)
     const bool *marked = q->want->marked;
     scanned_cloth all = {.edge = -1}, some = {.edge = -1}; /* listed where they are needed first */
     int32_t segment = 0;
-    set_reaches(s);
+    set_reaches(s, q->want->passing);
     for (int32_t k = 0; k < m->collider_count; k++) {
         const drape_collider_shape *shape = &m->colliders[k].shape;
         const int32_t corner = s->first_point[k] - m->node_count, last = segment + shape->segment_count;

@@ -34,6 +34,7 @@ typedef struct drape_broad_phase {
     int32_t *marked_node, *marked_face, *marked_edge; /* scratch: lists of what is marked */
     double *node_area, *edge_area, *face_area;        /* area of the sheet that belongs to each [m2] */
     double *distance;       /* (collider_count) activation distance of cloth and each collider [m] */
+    double *feature_most;   /* (collider_count) that of its features is no more than this [m] */
     double rounding;        /* what rounding can change in a gap, set by who moves the points [m] */
     double obstacle_radius; /* largest radius around the triangles of an obstacle [m] */
 } drape_broad_phase;
@@ -41,11 +42,12 @@ typedef struct drape_broad_phase {
 drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *model, drape_broad_phase *out);
 
 /* Which pairs are searched: those whose pieces may be within their activation distance plus reach, at x or
- * anywhere on the straight path from x to y. */
+ * anywhere on the straight path from x to y; if `passing`, within their least gap plus reach. */
 typedef struct drape_broad_query {
     const double *x, *y;                /* (points x 3); y NULL: only at x */
     const drape_collider_pose *pose[2]; /* (collider_count) at x, and at y */
     double reach;
+    bool passing;
     const bool *marked; /* (points) only pairs with a marked point; NULL: all */
 } drape_broad_query;
 
@@ -56,6 +58,18 @@ typedef struct drape_broad_query {
 typedef void drape_broad_phase_visit(void *user, const drape_pair *pair);
 void drape_broad_phase_pairs(drape_broad_phase *broad, const drape_broad_query *want,
                              drape_broad_phase_visit *visit, void *user);
+
+/* The activation distance of cloth and the features of a collider [m]. */
+static inline double drape_broad_phase_feature_distance(const drape_broad_phase *broad, int32_t collider)
+{
+    return fmin(broad->distance[collider], broad->feature_most[collider]);
+}
+
+/* The gap within which a pair is searched, without the reach [m]. */
+static inline double drape_broad_phase_wanted(const drape_broad_phase *broad, bool passing, double distance)
+{
+    return passing ? fmin(fmax(DRAPE_LEAST_GAP * distance, broad->rounding), 0.5 * distance) : distance;
+}
 
 /* The pair of a free node and a smooth collider. */
 drape_pair drape_broad_phase_surface(const drape_broad_phase *broad, int32_t node, int32_t collider);

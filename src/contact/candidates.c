@@ -40,16 +40,24 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
 
 /* A search in progress. */
 typedef struct search {
+    const drape_broad_phase *broad;
     const drape_straight_path *path;
     drape_configuration rest;
-    bool moves; /* the ends differ */
+    bool moves;   /* the ends differ */
+    bool passing; /* as in drape_broad_query */
     double reach;
     drape_broad_phase_visit *visit;
     void *user;
 } search;
 
+/* The gap at which a pair counts as found. */
+static double wanted_gap(const search *s, const drape_pair *pair)
+{
+    return drape_broad_phase_wanted(s->broad, s->passing, pair->distance) + s->reach;
+}
+
 /* Whether a node stays beyond the reach of a surface on the whole path. */
-static bool stays_beyond(const drape_broad_phase *broad, const search *s, const drape_pair *pair)
+static bool stays_beyond(const search *s, const drape_pair *pair)
 {
     const int32_t node = pair->node[0], collider = pair->collider;
     bool beyond = true;
@@ -57,7 +65,7 @@ static bool stays_beyond(const drape_broad_phase *broad, const search *s, const 
         const drape_configuration *at = &s->path->end[end];
         double own[3];
         drape_pose_own(&at->pose[collider], at->x + 3 * (size_t)node, own);
-        beyond = drape_distant_keeps(&broad->distant, collider, node, own, pair->distance + s->reach);
+        beyond = drape_distant_keeps(&s->broad->distant, collider, node, own, wanted_gap(s, pair));
     }
     return beyond;
 }
@@ -101,11 +109,11 @@ static void consider(void *user, const drape_pair *found)
 {
     search *s = user;
     drape_pair pair = *found;
-    pair.gap_at_search = least_gap(s, &pair, pair.distance + s->reach);
-    if (pair.gap_at_search >= pair.distance + s->reach)
+    pair.gap_at_search = least_gap(s, &pair, wanted_gap(s, &pair));
+    if (pair.gap_at_search >= wanted_gap(s, &pair))
         return;
     pair.distance = drape_pair_activation_distance(&pair, &s->rest);
-    if (pair.gap_at_search < pair.distance + s->reach)
+    if (pair.gap_at_search < wanted_gap(s, &pair))
         s->visit(s->user, &pair);
 }
 
@@ -118,12 +126,14 @@ static bool differ(const drape_broad_phase *broad, const drape_configuration end
 }
 
 void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *path, double margin,
-                           const bool *marked, drape_broad_phase_visit *visit, void *user)
+                           bool passing, const bool *marked, drape_broad_phase_visit *visit, void *user)
 {
     const drape_model *m = broad->model;
-    search s = {.path = path,
+    search s = {.broad = broad,
+                .path = path,
                 .rest = {.model = m, .x = broad->rest, .pose = path->end[0].pose},
                 .moves = differ(broad, path->end),
+                .passing = passing,
                 .reach = 2 * margin + ROUNDING * m->length,
                 .visit = visit,
                 .user = user};
@@ -133,8 +143,7 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
         for (int32_t i = 0; i < m->free_count; i++) {
             const drape_pair pair = drape_broad_phase_surface(broad, m->node_of_free[i], k);
             if (!drape_model_ignores(m, k, pair.node[0]) &&
-                (!marked || marked[broad->points + k] || marked[pair.node[0]]) &&
-                !stays_beyond(broad, &s, &pair))
+                (!marked || marked[broad->points + k] || marked[pair.node[0]]) && !stays_beyond(&s, &pair))
                 consider(&s, &pair);
         }
     }
@@ -142,6 +151,7 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
                                     .y = s.moves ? path->end[1].x : NULL,
                                     .pose = {path->end[0].pose, path->end[1].pose},
                                     .reach = s.reach,
+                                    .passing = passing,
                                     .marked = marked};
     drape_broad_phase_pairs(broad, &want, consider, &s);
 }
@@ -176,7 +186,7 @@ static drape_status collect(drape_candidates *c, drape_candidate_set *set, const
     }
     set->count = 0;
     set->known = true;
-    drape_candidates_find(c->broad, &own, c->margin, marked, add, &(collector){c->arena, set});
+    drape_candidates_find(c->broad, &own, c->margin, false, marked, add, &(collector){c->arena, set});
     return set->known ? drape_sort_pairs(&c->sorter, set->pairs, set->count) : DRAPE_E_MEMORY;
 }
 

@@ -124,14 +124,22 @@ static const drape_candidates *with_stray(const drape_candidates *candidates, do
                                                                                            : NULL;
 }
 
+/* Whether nothing limits the path but a gap that falls to its least. */
+static bool keeps_least(const drape_keep *keep)
+{
+    return keep->above == 0 && keep->arrival == 0;
+}
+
 /* The candidates that are valid on the whole path, and how far it is from theirs: as far as its ends are, at
- * most. Searched if there are none; NULL for a path that is too long, or if there is no memory. */
+ * most. Searched if there are none; NULL for a path that is too long or on which only few pairs matter, or if
+ * there is no memory. */
 static const drape_candidates *candidates_of(drape_contact *c, const drape_straight_path *straight,
-                                             double length, double stray, drape_distances *away)
+                                             double length, double stray, const drape_keep *keep,
+                                             drape_distances *away)
 {
     const drape_candidates *candidates =
         with_stray(drape_contact_valid_candidates(c, straight, away), stray, away);
-    if (candidates || length > MAX_PATH * c->mean_edge)
+    if (candidates || keeps_least(keep) || length > MAX_PATH * c->mean_edge)
         return candidates;
     return with_stray(drape_contact_search(c, straight, away), stray, away);
 }
@@ -164,13 +172,13 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
               .relaxed = &c->relaxed};
     drape_distances away;
     drape_candidate_cursor cursor = {0};
-    const drape_candidates *candidates = candidates_of(c, straight, longest_move(c, &p), stray, &away);
+    const drape_candidates *candidates = candidates_of(c, straight, longest_move(c, &p), stray, keep, &away);
     const drape_pair *pair;
     while (candidates && (pair = drape_candidates_next(candidates, &away, &cursor)))
         follow(&p, pair);
     if (!candidates) {
         const double start = drape_clock_seconds();
-        drape_candidates_find(&c->broad, straight, stray / 2, NULL, follow, &p);
+        drape_candidates_find(&c->broad, straight, stray / 2, keeps_least(keep), NULL, follow, &p);
         c->search_seconds += drape_clock_seconds() - start;
     }
     for (int32_t k = 0; of_surfaces && k < c->model->collider_count; k++)

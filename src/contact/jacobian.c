@@ -434,7 +434,7 @@ static void visit_near(drape_contact *c, listing *list)
             list_near(list, pair);
         return;
     }
-    drape_candidates_find(&c->broad, &here, 0.5 * margin, NULL, list_near, list);
+    drape_candidates_find(&c->broad, &here, 0.5 * margin, false, NULL, list_near, list);
     c->search_seconds += drape_clock_seconds() - start;
 }
 

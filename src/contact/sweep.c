@@ -11,6 +11,7 @@
  * of areal density sigma to a speed v within a step h is K b'(y), with K = sigma (2 g L + v^2)/d, so b'(y) =
  * v d/(h (2 g L + v^2)): y is 0.7 to 1 for what moves by d and less in a step. */
 #define RESTING    0.8
+#define EDGES      0.5 /* the same for the middle of an edge, of the activation distance of features */
 #define CLOSE      0.05 /* of the activation distance: how far above that a march along the path may end */
 #define MAX_STEPS  50   /* of a march: where it ends the path is free */
 #define MAX_PASSES 2    /* over all colliders: one may push a node towards another */
@@ -56,16 +57,50 @@ static bool slide(const drape_collider *collider, double distance, double roundi
     return true;
 }
 
+/* Nodes that slide round a body may leave the middle of their edge in it, where nothing would push it out
+ * before the end of the step. Moves the nodes of such edges outwards alike. slides: (node_count). */
+static void lift_edges(const drape_contact *c, int32_t collider, const bool *slides, double *y)
+{
+    const drape_model *m = c->model;
+    const drape_collider *k = &m->colliders[collider];
+    const drape_collider_pose *from = &c->start_pose[collider], *to = &c->path_pose[collider];
+    const double aim = EDGES * drape_broad_phase_feature_distance(&c->broad, collider);
+    for (int32_t e = 0; e < m->edge_count; e++) {
+        const int32_t *n = m->edge + 2 * (size_t)e;
+        const double *a = c->start + 3 * (size_t)n[0], *b = c->start + 3 * (size_t)n[1];
+        double *const end[2] = {y + 3 * (size_t)n[0], y + 3 * (size_t)n[1]};
+        double middle[3], own[3], normal[3];
+        if (!(slides[n[0]] | slides[n[1]]) || drape_contact_lets_in(c, collider, n, 2))
+            continue;
+        for (int i = 0; i < 3; i++)
+            middle[i] = 0.5 * (end[0][i] + end[1][i]);
+        drape_pose_own(to, middle, own);
+        const double gap = distance_from(k, own, normal);
+        if (gap >= aim)
+            continue;
+        for (int i = 0; i < 3; i++)
+            middle[i] = 0.5 * (a[i] + b[i]);
+        drape_pose_own(from, middle, own);
+        const double lack = fmin(aim, distance_from(k, own, NULL)) - gap;
+        drape_pose_direction(to, normal);
+        for (int i = 0; lack > 0 && i < 2; i++)
+            if (m->free_of_node[n[i]] >= 0)
+                vec3_add_scaled(lack, normal, end[i]);
+    }
+}
+
 /* Lets the nodes of y that a collider reaches slide on it; returns whether there are any. A node that its
  * surface does not hold goes where it goes. */
 static bool sweep(drape_contact *c, int32_t collider, double *y)
 {
+    bool *slides = c->broad.near;
     const drape_collider *k = &c->model->colliders[collider];
     const drape_collider_pose *from = &c->start_pose[collider], *to = &c->path_pose[collider];
     const double reach = c->broad.distance[collider];
     bool moved = false;
     if (c->deformed[collider])
         return false;
+    memset(slides, 0, (size_t)c->model->node_count * sizeof *slides);
     for (int32_t i = 0; i < c->model->free_count; i++) {
         const int32_t node = c->model->node_of_free[i];
         const size_t at = 3 * (size_t)node;
@@ -80,8 +115,10 @@ static bool sweep(drape_contact *c, int32_t collider, double *y)
         if (!slide(k, reach, c->broad.rounding, a, b))
             continue;
         drape_pose_point(to, b, y + at);
-        moved = true;
+        slides[node] = moved = true;
     }
+    if (moved)
+        lift_edges(c, collider, slides, y);
     return moved;
 }
 
