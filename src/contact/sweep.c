@@ -11,7 +11,7 @@
  * of areal density sigma to a speed v within a step h is K b'(y), with K = sigma (2 g L + v^2)/d, so b'(y) =
  * v d/(h (2 g L + v^2)): y is 0.7 to 1 for what moves by d and less in a step. */
 #define RESTING    0.8
-#define EDGES      0.5 /* the same for the middle of an edge, of the activation distance of features */
+#define EDGES      0.5  /* the same for the middle of an edge, of the activation distance of features */
 #define CLOSE      0.05 /* of the activation distance: how far above that a march along the path may end */
 #define MAX_STEPS  50   /* of a march: where it ends the path is free */
 #define MAX_PASSES 2    /* over all colliders: one may push a node towards another */
