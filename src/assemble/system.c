@@ -324,13 +324,13 @@ const drape_load *drape_system_on_colliders(const drape_system *system)
 }
 
 double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t,
-                                  double *of_node)
+                                  bool again, double *of_node)
 {
-    for (int32_t i = 0; of_node && i < system->model->node_count; i++)
+    for (int32_t i = 0; of_node && !(again && system->contact) && i < system->model->node_count; i++)
         of_node[i] = 1;
     const double fraction = system->contact
                                 ? drape_contact_step_fraction(system->contact, in_space(system, t, x, 0),
-                                                              in_space(system, t, y, 2), t, of_node)
+                                                              in_space(system, t, y, 2), t, again, of_node)
                                 : 1;
     if (of_node)
         drape_periodic_least(system->model, of_node);

@@ -248,9 +248,9 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
 
 /* The largest fraction of the displacement from nodes x to y along which nothing passes through anything
  * else, with the colliders in their pose at time t. of_node (node_count), unless NULL, receives the fraction
- * to which the pieces at each node limit it: 1 without contact. */
+ * to which the pieces at each node limit it: 1 without contact. again: as in contact/contact.h. */
 double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t,
-                                  double *of_node);
+                                  bool again, double *of_node);
 
 /* See contact/contact.h. */
 void drape_system_set_contact_step(drape_system *system, double dt);

@@ -146,6 +146,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->feature_most = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->feature_most);
     s->side = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->side);
     s->near = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near);
+    s->close = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->close);
     s->near_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near_node);
     s->near_element = drape_arena_take(
         arena, (size_t)(m->edge_count > m->triangle_count ? m->edge_count : m->triangle_count),
@@ -463,37 +464,49 @@ static bool is_distant(const drape_broad_phase *s, const drape_broad_query *want
     return distant;
 }
 
-/* Marks and lists the nodes that a collider may meet. All of them if it turns: its features move straight,
- * which is no straight path in its coordinates. Returns their number. */
+/* The gap from which on nodes keep an element from features: where the square of the distance from a point or a
+ * segment is at least D^2 at the corners, it is at least D^2 less a third of that of the longest edge. */
+static double gap_of_nodes(double radius, double gap, double edge)
+{
+    return sqrt((radius + gap) * (radius + gap) + edge * edge / 3) - radius;
+}
+
+/* Marks and lists the nodes of elements that a collider may meet: all nodes of one are near, one is close. All of
+ * them if it turns: its features move straight, which is no straight path in its coordinates. Returns their
+ * number. */
 static int32_t list_near(drape_broad_phase *s, const drape_broad_query *want, int32_t collider,
                          const scanned_cloth *of)
 {
     const drape_collider_pose *pose[2] = {&want->pose[0][collider], &want->pose[want->y ? 1 : 0][collider]};
     const bool turns = (pose[0]->turned || pose[1]->turned) &&
                        memcmp(pose[0]->turn, pose[1]->turn, sizeof pose[0]->turn) != 0;
-    const double reach = feature_reach(s, collider, want->passing) + want->reach + of->edge;
+    const double gap = feature_reach(s, collider, want->passing) + want->reach, reach = gap + of->edge,
+                 close = gap_of_nodes(s->model->colliders[collider].shape.radius, gap, of->edge);
     int32_t count = 0;
     for (int32_t i = 0; i < of->edges.points; i++) {
         const int32_t node = of->edges.point[i];
         s->near[node] = turns || !is_distant(s, want, collider, node, reach);
+        s->close[node] = turns || (s->near[node] && !is_distant(s, want, collider, node, close));
         s->near_node[count] = node;
         count += s->near[node];
     }
     return count;
 }
 
-/* Lists those elements of a tree all of whose nodes are near. */
+/* Lists those elements of a tree all of whose nodes are near, and one is close. */
 static drape_path_elements list_elements(drape_broad_phase *s, const drape_path_bvh *tree,
                                          const drape_path_elements *of, int32_t points)
 {
     drape_path_elements among = {.element = s->near_element, .point = s->near_node, .points = points};
     for (int32_t i = 0; points > 0 && i < of->elements; i++) {
         const int32_t e = of->element[i], *node = tree->node + (size_t)e * (size_t)tree->nodes;
-        bool near = s->near[node[0]];
-        for (int a = 1; a < tree->nodes; a++)
+        bool near = s->near[node[0]], close = s->close[node[0]];
+        for (int a = 1; a < tree->nodes; a++) {
             near = near & s->near[node[a]];
+            close = close | s->close[node[a]];
+        }
         s->near_element[among.elements] = e;
-        among.elements += near;
+        among.elements += near & close;
     }
     return among;
 }

@@ -28,8 +28,8 @@ typedef struct drape_broad_phase {
     int32_t *triangle; /* (obstacles.count x 3) of colliders */
     int32_t *triangle_collider;
     drape_distant distant;             /* nodes far from smooth colliders */
-    uint8_t *side;                     /* (node_count) scratch of drape_path_bvh_scan */
-    bool *near;                        /* (node_count) scratch: nodes that a collider may meet, */
+    uint8_t *side;                     /* (node_count) scratch of drape_path_bvh_scan, and of a sweep */
+    bool *near, *close;                /* (node_count) scratch: nodes that a collider may meet, */
     int32_t *near_node, *near_element; /* (node_count), (edges or triangles) and lists of what it may */
     int32_t *marked_node, *marked_face, *marked_edge; /* scratch: lists of what is marked */
     double *node_area, *edge_area, *face_area;        /* area of the sheet that belongs to each [m2] */

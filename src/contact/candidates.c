@@ -138,7 +138,7 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
                 .visit = visit,
                 .user = user};
     for (int32_t k = 0; k < m->collider_count; k++) {
-        if (!m->colliders[k].ops->smooth)
+        if (!m->colliders[k].ops->smooth || passing)
             continue;
         for (int32_t i = 0; i < m->free_count; i++) {
             const drape_pair pair = drape_broad_phase_surface(broad, m->node_of_free[i], k);

@@ -29,7 +29,8 @@ typedef struct path {
     double fraction; /* of pairs of features */
     double surface_fraction;
     drape_pair limiting;
-    double *of_node; /* (nodes) the smallest fraction of a pair at each node; NULL: not wanted */
+    double *of_node;      /* (nodes) the smallest fraction of a pair at each node; NULL: not wanted */
+    const double *before; /* (nodes) pairs whose nodes all have 1 limit nothing; NULL: none is known */
     int32_t nodes;
     const drape_relaxed_set *relaxed; /* their pairs limit nothing */
     const drape_contact *surfaces;    /* its surfaces limit nodes, too; NULL: they do not */
@@ -74,6 +75,15 @@ static void follow_surface(const drape_contact *c, int32_t collider, int32_t nod
         p->of_node[node] = fmin(p->of_node[node], own);
 }
 
+/* Whether it is known that a pair limits nothing. */
+static bool is_known(const path *p, const drape_pair *pair, int points)
+{
+    bool known = p->before;
+    for (int k = 0; known && k < points; k++)
+        known = pair->node[k] >= p->nodes || p->before[pair->node[k]] == 1;
+    return known;
+}
+
 /* A pair that does not come near limits nothing, so it makes no difference whether it is a candidate. Does
  * not search beyond the step fraction that another pair leaves: if forces throw nodes very far, a pair
  * approaches so slowly relative to its speed that searching each to its own end would take for ever. Of equal
@@ -83,9 +93,10 @@ static void follow(void *user, const drape_pair *pair)
     path *p = user;
     const drape_configuration from = {.x = p->x};
     p->cancelled = p->cancelled || (p->cancel && atomic_load(p->cancel));
-    if (p->cancelled)
+    const int points = drape_pair_points(pair);
+    if (p->cancelled || is_known(p, pair, points))
         return;
-    if (drape_pair_points(pair) == 1) {
+    if (points == 1) {
         if (p->surfaces && lists_limits(p->surfaces, pair->collider))
             follow_surface(p->surfaces, pair->collider, pair->node[0], p);
         return;
@@ -151,7 +162,8 @@ double drape_contact_stray(const drape_collider *collider, double angle)
 
 double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *straight,
                                    const drape_swing *swing, const drape_keep *keep, double *of_node,
-                                   double *of_surfaces, const atomic_bool *cancel, drape_pair *limiting)
+                                   double *of_surfaces, const double *before, const atomic_bool *cancel,
+                                   drape_pair *limiting)
 {
     const drape_swings swings = {.of = swing, .nodes = c->model->node_count};
     double stray = 0;
@@ -165,6 +177,7 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
               .keep = keep,
               .fraction = 1,
               .of_node = of_node,
+              .before = before,
               .nodes = c->model->node_count,
               .surface_fraction = 1,
               .surfaces = of_surfaces ? c : NULL,
@@ -183,7 +196,8 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
     }
     for (int32_t k = 0; of_surfaces && k < c->model->collider_count; k++)
         for (int32_t i = 0; !lists_limits(c, k) && i < c->model->free_count; i++)
-            follow_surface(c, k, c->model->node_of_free[i], &p);
+            if (!before || before[c->model->node_of_free[i]] < 1)
+                follow_surface(c, k, c->model->node_of_free[i], &p);
     if (of_surfaces)
         *of_surfaces = p.surface_fraction;
     *limiting = p.limiting;
@@ -304,7 +318,7 @@ static double shorten_whole(const drape_contact *c, const double *x, const doubl
     return farthest > longest && isfinite(farthest) ? longest / farthest : 1;
 }
 
-double drape_contact_step_fraction(drape_contact *c, const double *x, const double *y, double t,
+double drape_contact_step_fraction(drape_contact *c, const double *x, const double *y, double t, bool again,
                                    double *of_node)
 {
     const double start = drape_clock_seconds();
@@ -315,6 +329,12 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
                              .arrival = ARRIVAL};
     drape_pair limiting;
     double of_surfaces;
+    const double *before = again && c->looked ? c->before : NULL;
+    c->looked = false;
+    if (again)
+        memcpy(c->before, of_node, (size_t)c->model->node_count * sizeof *c->before);
+    for (int32_t i = 0; again && i < c->model->node_count; i++)
+        of_node[i] = 1;
     if (of_node) {
         const double shortened = shorten_long(c, x, y, of_node);
         if (shortened < 1)
@@ -329,7 +349,8 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
     const drape_straight_path straight = {{{.model = c->model, .x = c->from, .pose = c->path_pose},
                                            {.model = c->model, .x = c->to, .pose = c->path_pose}}};
     const double of_features = drape_contact_free_fraction(c, &straight, NULL, &keep, of_node, &of_surfaces,
-                                                           c->cancel ? *c->cancel : NULL, &limiting);
+                                                           before, c->cancel ? *c->cancel : NULL, &limiting);
+    c->looked = of_node && of_features >= 0;
     c->seconds += drape_clock_seconds() - start;
     if (of_features < 0) {
         for (int32_t i = 0; of_node && i < c->model->node_count; i++)

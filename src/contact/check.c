@@ -187,7 +187,7 @@ static drape_status check_features(drape_contact *c, const piece *p, const char 
     const drape_keep keep = drape_contact_keep_step(c);
     drape_pair limiting;
     const double fraction =
-        drape_contact_free_fraction(c, &p->path, c->swing, &keep, NULL, NULL, NULL, &limiting);
+        drape_contact_free_fraction(c, &p->path, c->swing, &keep, NULL, NULL, NULL, NULL, &limiting);
     if (fraction >= 1)
         return DRAPE_OK;
     refuse(c, &limiting);

@@ -66,6 +66,7 @@ static drape_status take_arrays(drape_arena *arena, drape_contact *c)
     c->on_point = drape_arena_take(arena, largest > 0 ? points - (size_t)c->model->node_count : 0,
                                    3 * sizeof *c->on_point);
     c->swing = drape_arena_take(arena, colliders, sizeof *c->swing);
+    c->before = drape_arena_take(arena, (size_t)c->model->node_count, sizeof *c->before);
     return drape_arena_status(arena);
 }
 

@@ -164,9 +164,11 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
  * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered
  * at each node to the smallest fraction of its pairs; where a displacement is longer than a few edges, to
  * such a length without a look at pairs. One that throws nodes farther than the scene is large is
- * shortened to about an edge. If the watched flag is raised meanwhile: 0, also at each node. */
+ * shortened to about an edge. again: of_node is that of the last call from x, and y what it left of the
+ * displacement at each node, so that pairs which it did not shorten are not looked at again; of_node is set to
+ * the fractions of y. If the watched flag is raised meanwhile: 0, also at each node. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
-                                   double *of_node);
+                                   bool again, double *of_node);
 
 /* Moves the free nodes of y (node_count x 3), a guess of the end of the step at time t, aside from
  * moving colliders: a node that one of them would reach on the straight path from the beginning of the step

@@ -222,7 +222,7 @@ typedef struct pair_path {
     bool rests[4];
 } pair_path;
 
-static double gap_at(const drape_pair *pair, const pair_path *path, double t, double radius)
+static double gap_at(const drape_pair *pair, const pair_path *path, double t, double radius, double normal[3])
 {
     double at[4][3];
     drape_closest closest;
@@ -234,7 +234,24 @@ static double gap_at(const drape_pair *pair, const pair_path *path, double t, do
             drape_swing_own(path->swing, path->x[a], path->p[a], path->rests[a] ? 0 : t, at[a]);
     }
     finders[pair->kind](at, &closest);
+    memcpy(normal, closest.normal, sizeof closest.normal);
     return closest.distance - radius;
+}
+
+/* How far the first piece is ahead of the second at a step fraction along the normal of an earlier one, at
+ * which they were as far apart along it: on a straight path they are never nearer in between than at both. */
+static double lead_at(const drape_pair *pair, const pair_path *path, const double normal[3], double t)
+{
+    const int split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    double first = INFINITY, second = -INFINITY;
+    for (int a = 0; a < 4; a++) {
+        const double at = vec3_dot(normal, path->x[a]) + t * vec3_dot(normal, path->p[a]);
+        if (a < split)
+            first = at < first ? at : first;
+        else
+            second = at > second ? at : second;
+    }
+    return first - second;
 }
 
 /* Of straight displacements the common part is taken out, too. */
@@ -262,7 +279,7 @@ double drape_pair_step_fraction(const drape_pair *pair, const double *from, cons
         path.rests[a] = turns && pair->node[a] >= swings->nodes;
     }
     const double speed = speed_of(pair, &path), least = drape_pair_least_gap(pair, keep->rounding);
-    double gap = gap_at(pair, &path, 0, radius);
+    double normal[3], gap = gap_at(pair, &path, 0, radius, normal);
     if (keep->core && !drape_gap_has_side(gap, keep->rounding)) {
         gap += radius;
         radius = 0;
@@ -273,9 +290,9 @@ double drape_pair_step_fraction(const drape_pair *pair, const double *from, cons
                  slack = (1 - ADVANCE) * fmin(end, gap - end);
     for (int i = 0; i < MAX_ADVANCES; i++) {
         t += ADVANCE * (gap - end) / speed;
-        if (t >= limit)
+        if (t >= limit || (!path.swing && lead_at(pair, &path, normal, limit) - radius > end + slack))
             return limit;
-        gap = gap_at(pair, &path, t, radius);
+        gap = gap_at(pair, &path, t, radius, normal);
         if (gap <= end + slack)
             return t;
     }

@@ -69,9 +69,11 @@ struct drape_contact {
     drape_predictions predicted, predicting; /* for the next Jacobian, and while they are made; not archived:
                                                 empty when a step begins */
     double *from, *to;                       /* (points x 3) the ends of a displacement: ccd.c */
-    drape_collider_pose *path_pose;          /* (collider_count) */
-    drape_collider_pose *kink_pose;          /* (collider_count) */
-    int32_t *coupling;                       /* (coupling_count of coupling_room x 4) */
+    double *before; /* (node_count) of_node of the last step fraction, if it looked at pairs: */
+    bool looked;
+    drape_collider_pose *path_pose; /* (collider_count) */
+    drape_collider_pose *kink_pose; /* (collider_count) */
+    int32_t *coupling;              /* (coupling_count of coupling_room x 4) */
     int32_t coupling_count, coupling_room;
     double *own, *own_end; /* (largest point_count x 3) points of a collider that deforms, and elsewhere */
     double *on_point;      /* (points - node_count, x 3) [N] forces on points of colliders that deform */
@@ -163,7 +165,8 @@ void drape_contact_velocities(const drape_contact *c, const drape_active_contact
  * the result is negative. */
 double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *straight,
                                    const drape_swing *swing, const drape_keep *keep, double *of_node,
-                                   double *of_surfaces, const atomic_bool *cancel, drape_pair *limiting);
+                                   double *of_surfaces, const double *before, const atomic_bool *cancel,
+                                   drape_pair *limiting);
 
 /* The same for the path of a node from x to y, and the smooth surface of a collider, which goes from one pose
  * to another, by its swing unless that is NULL. */

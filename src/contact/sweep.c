@@ -11,7 +11,7 @@
  * of areal density sigma to a speed v within a step h is K b'(y), with K = sigma (2 g L + v^2)/d, so b'(y) =
  * v d/(h (2 g L + v^2)): y is 0.7 to 1 for what moves by d and less in a step. */
 #define RESTING    0.8
-#define EDGES      0.5 /* the same for the middle of an edge, of the activation distance of features */
+#define EDGES      0.5  /* the same for the middle of an edge, of the activation distance of features */
 #define CLOSE      0.05 /* of the activation distance: how far above that a march along the path may end */
 #define MAX_STEPS  50   /* of a march: where it ends the path is free */
 #define MAX_PASSES 2    /* over all colliders: one may push a node towards another */
@@ -58,8 +58,8 @@ static bool slide(const drape_collider *collider, double distance, double roundi
 }
 
 /* Nodes that slide round a body may leave the middle of their edge in it, where nothing would push it out
- * before the end of the step. Moves the nodes of such edges outwards alike. slides: (node_count). */
-static void lift_edges(const drape_contact *c, int32_t collider, const bool *slides, double *y)
+ * before the end of the step. Moves the nodes of such edges outwards alike, and marks them: the pass of each (node_count) in which it slid last. */
+static void lift_edges(const drape_contact *c, int32_t collider, int pass, uint8_t *slid, double *y)
 {
     const drape_model *m = c->model;
     const drape_collider *k = &m->colliders[collider];
@@ -70,7 +70,7 @@ static void lift_edges(const drape_contact *c, int32_t collider, const bool *sli
         const double *a = c->start + 3 * (size_t)n[0], *b = c->start + 3 * (size_t)n[1];
         double *const end[2] = {y + 3 * (size_t)n[0], y + 3 * (size_t)n[1]};
         double middle[3], own[3], normal[3];
-        if (!(slides[n[0]] | slides[n[1]]) || drape_contact_lets_in(c, collider, n, 2))
+        if ((slid[n[0]] != pass && slid[n[1]] != pass) || drape_contact_lets_in(c, collider, n, 2))
             continue;
         for (int i = 0; i < 3; i++)
             middle[i] = 0.5 * (end[0][i] + end[1][i]);
@@ -84,28 +84,29 @@ static void lift_edges(const drape_contact *c, int32_t collider, const bool *sli
         const double lack = fmin(aim, distance_from(k, own, NULL)) - gap;
         drape_pose_direction(to, normal);
         for (int i = 0; lack > 0 && i < 2; i++)
-            if (m->free_of_node[n[i]] >= 0)
+            if (m->free_of_node[n[i]] >= 0) {
                 vec3_add_scaled(lack, normal, end[i]);
+                slid[n[i]] = (uint8_t)pass;
+            }
     }
 }
 
 /* Lets the nodes of y that a collider reaches slide on it; returns whether there are any. A node that its
- * surface does not hold goes where it goes. */
-static bool sweep(drape_contact *c, int32_t collider, double *y)
+ * surface does not hold goes where it goes. After the first pass only those that slid in the last one are
+ * elsewhere. */
+static bool sweep(drape_contact *c, int32_t collider, int pass, uint8_t *slid, double *y)
 {
-    bool *slides = c->broad.near;
     const drape_collider *k = &c->model->colliders[collider];
     const drape_collider_pose *from = &c->start_pose[collider], *to = &c->path_pose[collider];
     const double reach = c->broad.distance[collider];
     bool moved = false;
     if (c->deformed[collider])
         return false;
-    memset(slides, 0, (size_t)c->model->node_count * sizeof *slides);
     for (int32_t i = 0; i < c->model->free_count; i++) {
         const int32_t node = c->model->node_of_free[i];
         const size_t at = 3 * (size_t)node;
         double a[3], b[3];
-        if (drape_contact_lets_in(c, collider, &node, 1))
+        if (slid[node] < pass - 1 || drape_contact_lets_in(c, collider, &node, 1))
             continue;
         drape_pose_own(from, c->start + at, a);
         drape_pose_own(to, y + at, b);
@@ -115,10 +116,11 @@ static bool sweep(drape_contact *c, int32_t collider, double *y)
         if (!slide(k, reach, c->broad.rounding, a, b))
             continue;
         drape_pose_point(to, b, y + at);
-        slides[node] = moved = true;
+        slid[node] = (uint8_t)pass;
+        moved = true;
     }
     if (moved)
-        lift_edges(c, collider, slides, y);
+        lift_edges(c, collider, pass, slid, y);
     return moved;
 }
 
@@ -138,13 +140,18 @@ static bool sweep_meshes(drape_contact *c, double *y)
 void drape_contact_sweep(drape_contact *c, double t, double *y)
 {
     const double start = drape_clock_seconds();
+    uint8_t *slid = c->broad.side;
     bool moved = true;
     drape_contact_poses(c, t, c->path_pose);
-    for (int pass = 0; pass < MAX_PASSES && moved; pass++) {
+    memset(slid, 0, (size_t)c->model->node_count * sizeof *slid);
+    for (int pass = 1; pass <= MAX_PASSES && moved; pass++) {
         moved = false;
         for (int32_t k = 0; k < c->model->collider_count; k++)
-            moved = sweep(c, k, y) || moved;
-        moved = sweep_meshes(c, y) || moved;
+            moved = sweep(c, k, pass, slid, y) || moved;
+        if (sweep_meshes(c, y)) {
+            memset(slid, pass, (size_t)c->model->node_count * sizeof *slid);
+            moved = true;
+        }
     }
     c->seconds += drape_clock_seconds() - start;
 }

@@ -44,6 +44,8 @@
  * end in time. Three capes of 900 nodes on a body that walks, 4 s each of three runs, had 349 late frames of
  * 1923 and 9 rejected attempts with it, 558 and 14 without. */
 #define ENOUGH 0.6
+/* Of the residual before: one that has fallen further is not the rounding error of its forces. */
+#define STALLED 0.5
 /* In edges: by how much pins may be ahead before the step begins with the linearized equation. */
 #define MAX_AHEAD 0.1
 /* Without contact, in sizes of the scene: how far nodes would move in a step with the energy that is left,
@@ -103,13 +105,16 @@ struct drape_inexact_newton {
     bool unstable;                     /* the last matrix of this solve was, as far as it was tried */
     bool shortened;                    /* a correction of this solve was, by the line search */
     double length;                     /* that the line search gave the last correction */
-    double rounding;                   /* [N] error of forces as estimated last in this solve; INFINITY */
-    double edge;                       /* [m] mean length of an edge */
-    contraction first;                 /* of the first correction */
-    bool nonlinear;                    /* forces are, along the correction of the last estimate */
-    double *p, *minus_f, *trial;       /* free DOFs */
-    double *fraction;                  /* nodes; NULL without contact */
-    double *f, *g;                     /* free DOFs, nodes: kept while F is evaluated elsewhere */
+    double
+        friction_seconds; /* of the last solution with the matrix of friction; not archived: with a deadline
+                                alone it matters, and then results depend on the clock */
+    double rounding;      /* [N] error of forces as estimated last in this solve; INFINITY */
+    double edge;          /* [m] mean length of an edge */
+    contraction first;    /* of the first correction */
+    bool nonlinear;       /* forces are, along the correction of the last estimate */
+    double *p, *minus_f, *trial; /* free DOFs */
+    double *fraction;            /* nodes; NULL without contact */
+    double *f, *g;               /* free DOFs, nodes: kept while F is evaluated elsewhere */
 };
 
 /* Conjugate gradients leave a part of the stretch of a correction, which predicted stress would not see. */
@@ -243,13 +248,32 @@ static drape_status update_definite(drape_inexact_newton *s)
     return status;
 }
 
+/* Whether an iteration that only reduces the error is expected to end in time. */
+static bool has_time(const drape_inexact_settings *settings, double seconds)
+{
+    return settings->deadline == INFINITY || drape_clock_seconds() + seconds <= settings->deadline;
+}
+
+static bool is_in_contact(const drape_inexact_newton *s)
+{
+    double gap;
+    return s->fraction && drape_contact_active(drape_system_contact(s->equation->system), &gap) > 0;
+}
+
+/* With a deadline, the first steps in contact have more effort than there is time for. */
 static drape_status correct(drape_inexact_newton *s, const drape_inexact_settings *settings)
 {
     drape_step_equation *e = s->equation;
+    const bool friction = !s->cheap && has_time(settings, MIN_IN_CONTACT * s->friction_seconds);
     drape_status status = s->factored ? update_definite(s)
                                       : drape_approx_jacobian_update(s->approximate, &e->point,
-                                                                     e->mass_weight, !s->cheap, &e->work);
-    return status ? status : solve(s, settings->linear_tolerance, settings->max_linear_iterations);
+                                                                     e->mass_weight, friction, &e->work);
+    const double start = drape_clock_seconds();
+    if (!status)
+        status = solve(s, settings->linear_tolerance, settings->max_linear_iterations);
+    if (friction && !s->factored && is_in_contact(s))
+        s->friction_seconds = drape_clock_seconds() - start;
+    return status;
 }
 
 /* Predicts stress for the matrix of a next iteration. */
@@ -498,18 +522,6 @@ static bool is_rounding(drape_inexact_newton *s, const double *d, drape_solve_re
     return true;
 }
 
-/* Whether an iteration that only reduces the error is expected to end in time. */
-static bool has_time(const drape_inexact_settings *settings, double seconds)
-{
-    return settings->deadline == INFINITY || drape_clock_seconds() + seconds <= settings->deadline;
-}
-
-static bool is_in_contact(const drape_inexact_newton *s)
-{
-    double gap;
-    return s->fraction && drape_contact_active(drape_system_contact(s->equation->system), &gap) > 0;
-}
-
 /* Where cloth touches something, so many iterations are made whatever the time, unless fewer meet the bound:
  * what one leaves throws the cloth about, so that later steps need more (docs/realtime.md, "What is saved
  * first"). */
@@ -522,6 +534,7 @@ static int least_iterations(const drape_inexact_newton *s)
 typedef struct progress {
     int iteration;
     double start, bound;     /* |F|^2 of the guess, and what it must fall below */
+    double left;             /* |F|^2 before the last iteration */
     double first, last;      /* [m] RMS of the first and of the last correction */
     double ratio;            /* of the last one to the one before */
     double step[STEPS_KEPT]; /* [m] RMS of the last corrections as they were made, the last one first */
@@ -632,7 +645,9 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         report->iterations = p.iteration;
         bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;
         report->reason = drape_reason_name(converged ? DRAPE_REASON_CONVERGED : DRAPE_REASON_ITERATIONS);
-        converged |= least && left >= p.bound && is_rounding(s, d, report);
+        converged |=
+            least && left >= p.bound && left > STALLED * STALLED * p.left && is_rounding(s, d, report);
+        p.left = left;
         const bool fell = converged || has_fallen(s, settings, &p, left);
         const double expected = expected_error(s, &p);
         if (fell && expected <= MAX_EXPECTED * settings->error && is_quiet(s, expected)) {

@@ -97,7 +97,7 @@ double drape_step_equation_make_feasible(drape_step_equation *s, double *p)
     memcpy(s->x_ahead, s->x, s->nodes * sizeof *s->x_ahead);
     for (size_t i = 0; i < s->dofs; i++)
         s->x_ahead[drape_step_equation_at(s, i)] += p[i];
-    double fraction = drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t, NULL);
+    double fraction = drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t, false, NULL);
     for (size_t i = 0; fraction < 1 && i < s->dofs; i++)
         p[i] *= fraction;
     return fraction;
@@ -109,7 +109,7 @@ bool drape_step_equation_shorten_nodes(drape_step_equation *s, double *p, double
         memcpy(s->x_ahead, s->x, s->nodes * sizeof *s->x_ahead);
         for (size_t i = 0; i < s->dofs; i++)
             s->x_ahead[drape_step_equation_at(s, i)] += p[i];
-        if (drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t, fraction) == 1)
+        if (drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t, pass > 0, fraction) == 1)
             return true;
         for (size_t i = 0; i < s->dofs; i++)
             p[i] *= fraction[drape_step_equation_at(s, i) / 3];
