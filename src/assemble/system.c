@@ -337,6 +337,11 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
     return fraction;
 }
 
+bool drape_system_may_meet(drape_system *system, const double *x, const double *v, double t, double seconds)
+{
+    return system->contact && drape_contact_may_meet(system->contact, x, v, t, seconds);
+}
+
 void drape_system_set_contact_step(drape_system *system, double dt)
 {
     if (system->contact)

@@ -253,6 +253,7 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
                                   bool again, double *of_node);
 
 /* See contact/contact.h. */
+bool drape_system_may_meet(drape_system *system, const double *x, const double *v, double t, double seconds);
 void drape_system_set_contact_step(drape_system *system, double dt);
 
 /* drape_contact_sweep. */

@@ -175,6 +175,12 @@ double drape_contact_step_fraction(drape_contact *contact, const double *x, cons
  * slides on it from there on. Nodes that begin inside stay. */
 void drape_contact_sweep(drape_contact *contact, double t, double *y);
 
+/* Whether cloth at x with velocities v (node_count x 3) at time t may meet a body or another piece of cloth in
+ * the next so many seconds: free nodes go straight on, pins and colliders as far as their motion is known. An
+ * estimate, because forces are left out. */
+bool drape_contact_may_meet(drape_contact *contact, const double *x, const double *v, double t,
+                            double seconds);
+
 /* Whether a pair of features would be too near at x, as drape_contact_check tests it, or too near on the
  * path from the beginning of the step to there, while pins and colliders move straight between the kinks of
  * their motion up to time t. */

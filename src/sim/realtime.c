@@ -91,11 +91,11 @@ static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *
     return false;
 }
 
-/* The longest step to keep up with. Not above dt in contact: in a longer step a body moves farther, which
- * costs more iterations and rejected steps than it saves (docs/realtime.md, "A budget"). */
+/* The longest step to keep up with. Not above dt in contact, or where a longer step might lead to it: bodies
+ * move farther, which costs more iterations and rejected steps than it saves (docs/realtime.md, "A budget"). */
 static double longest_step(const drape_realtime_memory *m)
 {
-    return m->touches ? m->dt : m->longest;
+    return m->touches || m->meets ? m->dt : m->longest;
 }
 
 static bool is_in_contact(const drape_sim *sim)
@@ -108,21 +108,27 @@ static bool is_in_contact(const drape_sim *sim)
 /* Steps at the lowest level of effort, longer than dt: as many as fit into the budget. If not even one
  * fits, one step for so many frames that it costs no more than their budgets together, and no step before
  * that many frames are owed. */
-static plan plan_stretched(const drape_sim *sim, double owed, double frame, double budget)
+static plan plan_stretched(drape_sim *sim, double owed, double frame, double budget)
 {
+    drape_realtime_memory *m = &sim->realtime;
+    const drape_state *now = drape_sim_state(sim);
     int effort = effort_count(sim) - 1;
-    double longest = fmin(longest_step(&sim->realtime), sim->realtime.cap);
-    double fit = KEEP * budget / expected(sim, effort);
-    int64_t most = steps_of(owed, sim->realtime.dt);
-    if (fit < 1 && owed < (1 - SAME) * fmin(longest, ceil(1 / fit) * frame))
+    const double fit = KEEP * budget / expected(sim, effort),
+                 enough = fit < 1 ? fmax(owed, ceil(1 / fit) * frame) : owed;
+    m->meets = !m->touches && m->longest > m->dt &&
+               drape_system_may_meet(sim->system, now->x, now->v, now->t, fmin(enough, m->longest));
+    const double longest = fmin(longest_step(m), m->cap);
+    int64_t most = steps_of(owed, m->dt);
+    if (fit < 1 && owed < (1 - SAME) * fmin(longest, enough))
         return (plan){.effort = effort};
     int64_t steps = fit < 1 ? 1 : fit < (double)most ? (int64_t)fit : most;
     return (plan){.effort = effort, .steps = steps, .h = fmin(owed / (double)steps, longest)};
 }
 
-static plan make_plan(const drape_sim *sim, double owed, double frame, double budget)
+static plan make_plan(drape_sim *sim, double owed, double frame, double budget)
 {
     plan p;
+    sim->realtime.meets = false;
     return plan_effort(sim, owed, budget, &p) ? p : plan_stretched(sim, owed, frame, budget);
 }
 

@@ -50,6 +50,7 @@ typedef struct drape_realtime_memory {
     int effort;                     /* the integrator's level of effort; 0 is the best */
     bool stretched;                 /* steps were longer than dt, or time was left over */
     bool touches;                   /* the last attempt of a call ended in contact */
+    bool meets;                     /* a longer step of this call might meet something */
     double cap;                     /* [s] longer steps were rejected recently; INFINITY: no limit */
     int64_t inaccurate;             /* calls that were not accurate */
 } drape_realtime_memory;
