@@ -11,6 +11,8 @@
  *   - dissipation: a force g(x, v), counted positive against the motion, with its derivatives
  *   - law: a force along the strain measures of the other terms of its cloth, such as a damping
  *
+ * and beside a dissipation, if the term has inertia of its own, kinetic: an energy of motion T(x, v).
+ *
  * The library provides the loops, sparsity, assembly, projection, boundary conditions and threads.
  *
  * Thread-safety: every function of a term may be called from several threads at once on different ranges; it
@@ -377,6 +379,17 @@ typedef struct drape_fault {
 /* The number of elements in one call of lanes. */
 #define DRAPE_LANES 4
 
+/* Where the function kinetic of a term writes T(x, v) and its derivatives, with d as below. NULL: not
+ * needed. Allocated by the library alone: it may grow at its end. */
+typedef struct drape_kinetic {
+    double *t;    /* (count) T [J] */
+    double *by_x; /* (count x d) dT/dx [N] */
+    double *by_v; /* (count x d) dT/dv, the momentum [kg m/s] */
+    double *xx;   /* (count x d x d) d2T/dx dx [N/m] */
+    double *vx;   /* (count x d x d) d2T/dv dx [kg/s]: row i by v_i, column j by x_j */
+    double *vv;   /* (count x d x d) d2T/dv dv [kg] */
+} drape_kinetic;
+
 /*
  * A term. Exactly one of measure, energy, dissipation and law is set. A range consists of elements first ...
  * first + count - 1; outputs are element-major: item i belongs to element first + i. d is 3 * nodes.
@@ -492,6 +505,14 @@ typedef struct drape_term_ops {
     /* The term reads the measured curves of the material. Where no term of a cloth does, a scene that gives
      * curves has the warning "unused_curve". */
     bool takes_curves;
+
+    /* Optional, beside dissipation: an energy of motion T(x, v), quadratic in v, of what moves with the
+     * cloth, such as the air beside it. The library adds Lagrange's d/dt dT/dv - dT/dx to the equation of
+     * motion. Only integrators that step momenta take it ("be", "bdf2", "trbdf2", "newton_k"), and "static",
+     * for which v is 0; others refuse the scene. With in_medium, v is relative to the wind, whose derivatives
+     * by place are left out. */
+    void (*kinetic)(const drape_elements *el, int32_t first, int32_t count, const double *x, const double *v,
+                    const drape_kinetic *out);
 } drape_term_ops;
 
 /* Registers a user-defined term, which scenes compiled with this context may then use by name. *ops is

@@ -452,14 +452,68 @@ static void carry_wind(const drape_term *term, const double *gradient, const dou
         }
 }
 
+/* The energies of motion and their momenta. */
+static void evaluate_momenta(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    const drape_elements el = elements_at(term, want->point);
+    const double *v = want->against && term->ops->in_medium ? want->against : want->point->v;
+    term->ops->kinetic(&el, b->first, b->count, want->point->x, v,
+                       &(drape_kinetic){.t = b->energy, .by_v = b->gradient});
+}
+
+/* Adds r dT/dv - dT/dx of one element to its force, and the derivatives by x and v to dg_dx and dg_dv (d x
+ * d), unless they are NULL. In a step w = r: what r T_vx - w T_xv adds is antisymmetric, and the positive
+ * semidefinite part is w r T_vv. */
+static void add_kinetic(const drape_term *term, const drape_elements *el, const drape_request *want,
+                        const double *v, int32_t element, double *g, double *dg_dx, double *dg_dv)
+{
+    const int d = 3 * el->nodes;
+    const drape_point *point = want->point;
+    const double r = point->momentum, exact = 1 - want->positive_share;
+    double by_x[D], by_v[D], xx[D * D], vx[D * D], vv[D * D];
+    term->ops->kinetic(el, element, 1, point->x, v,
+                       &(drape_kinetic){.by_x = by_x,
+                                        .by_v = by_v,
+                                        .xx = dg_dx ? xx : NULL,
+                                        .vx = dg_dx ? vx : NULL,
+                                        .vv = dg_dx ? vv : NULL});
+    for (int i = 0; i < d; i++)
+        g[i] += r * by_v[i] - by_x[i];
+    for (int i = 0; dg_dx && i < d; i++)
+        for (int j = 0; j < d; j++) {
+            dg_dx[d * i + j] += r * vx[d * i + j] - exact * xx[d * i + j];
+            dg_dv[d * i + j] += r * vv[d * i + j] - vx[d * j + i];
+        }
+}
+
+/* The force of the dissipation, if that is wanted, else 0. */
+static void evaluate_drag(const drape_term *term, const drape_elements *el, const drape_request *want,
+                          const double *v, drape_block *b)
+{
+    const size_t d = 3 * (size_t)el->nodes, count = (size_t)b->count;
+    memset(b->energy, 0, count * sizeof *b->energy);
+    if (want->dissipative) {
+        term->ops->dissipation(el, b->first, b->count, want->point->x, v, b->gradient,
+                               want->hessian ? b->hessian : NULL, want->hessian ? b->scratch : NULL);
+        return;
+    }
+    memset(b->gradient, 0, count * d * sizeof *b->gradient);
+    for (size_t i = 0; want->hessian && i < count * d * d; i++)
+        b->hessian[i] = b->scratch[i] = 0;
+}
+
 static void evaluate_dissipations(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const int d = 3 * term->elements.nodes;
     const bool hessian = want->hessian, wind = want->against && term->ops->in_medium;
     const drape_elements el = elements_at(term, want->point);
-    memset(b->energy, 0, (size_t)b->count * sizeof *b->energy);
-    term->ops->dissipation(&el, b->first, b->count, want->point->x, wind ? want->against : want->point->v,
-                           b->gradient, hessian ? b->hessian : NULL, hessian ? b->scratch : NULL);
+    const double *v = wind ? want->against : want->point->v;
+    evaluate_drag(term, &el, want, v, b);
+    for (int32_t i = 0; term->ops->kinetic && want->conservative && i < b->count; i++) {
+        const size_t at = (size_t)i * (size_t)(d * d);
+        add_kinetic(term, &el, want, v, b->first + i, b->gradient + (size_t)i * (size_t)d,
+                    hessian ? b->hessian + at : NULL, hessian ? b->scratch + at : NULL);
+    }
     for (int32_t i = 0; wind && hessian && !want->velocity && i < b->count; i++)
         carry_wind(term, want->wind_gradient, b->scratch + (size_t)i * (size_t)(d * d), b->first + i,
                    b->hessian + (size_t)i * (size_t)(d * d));
@@ -495,6 +549,8 @@ void drape_block_evaluate(const drape_term *term, const drape_request *want, dra
         evaluate_measures(term, want, b);
     else if (term->ops->energy)
         evaluate_energies(term, want, b);
+    else if (want->momentum)
+        evaluate_momenta(term, want, b);
     else
         evaluate_dissipations(term, want, b);
     const int d = 3 * term->elements.nodes;

@@ -4,6 +4,8 @@
  *     g = f dq,  f summed over elasticity, the elements' own dashpots and laws
  *     H = f ddq + (df/dq + w df/dq') dq dq'                       step methods: q' = w q + history
  *     H = f ddq + df/dq dq dq' + df/dq' dq (ddq v + w dq)'        continuous time: q' = dq . v
+ * An energy of motion T becomes the force r dT/dv - dT/dx, r of drape_point, with
+ *     H = r T_vx - T_xx + w (r T_vv - T_xv)
  * Inner loops run over elements, so that compilers can vectorise them.
  */
 #ifndef DRAPE_ASSEMBLE_BLOCK_H
@@ -21,6 +23,7 @@ typedef struct drape_request {
     double positive_share;       /* how much of the positive semidefinite part, see drape_system_jacobian */
     bool velocity;               /* the Hessian wanted is dg/dv alone */
     bool remainder;              /* only what belongs to no measure */
+    bool momentum;               /* only the energies of motion and, in place of forces, their momenta */
     const double *along;         /* (node_count x 3) displacement of the nodes; NULL: none */
     double *stress;              /* (measure_count) gets the forces on measures; NULL: not wanted */
     const bool *without;         /* (term_count) terms that are left out; NULL: none */

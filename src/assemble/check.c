@@ -294,6 +294,41 @@ static errors min_scale(const checker *c, const drape_term *term, int32_t stride
                     MIN_SCALE * max.symmetry};
 }
 
+/* T of one element and its gradients. */
+static double kinetic_of(const checker *c, const drape_term *term, int32_t e, double *by_x, double *by_v)
+{
+    const drape_elements el = drape_term_elements(term, c->t);
+    double t = 0;
+    term->ops->kinetic(&el, e, 1, c->x, c->v, &(drape_kinetic){.t = &t, .by_x = by_x, .by_v = by_v});
+    return t;
+}
+
+/* The largest error of one gradient of T over the elements, relative to its largest entry there: in place of
+ * positions or of velocities. The second derivatives are in the assembled Jacobian. */
+static double kinetic_error(const checker *c, const drape_term *term, double *array)
+{
+    const drape_elements *el = &term->elements;
+    const double step = DIFFERENCE_STEP * c->size;
+    const int32_t stride = el->count / SAMPLE + 1;
+    double error = 0, scale = 0, gradients[2][D];
+    for (int32_t e = 0; e < el->count; e += stride) {
+        kinetic_of(c, term, e, gradients[0], gradients[1]);
+        for (int i = 0; i < 3 * el->nodes; i++) {
+            double *at =
+                array + 3 * (size_t)el->node[(size_t)e * (size_t)el->nodes + (size_t)(i / 3)] + i % 3;
+            const double kept = *at, gradient = gradients[array == c->v][i];
+            *at = kept + step;
+            const double after = kinetic_of(c, term, e, NULL, NULL);
+            *at = kept - step;
+            const double before = kinetic_of(c, term, e, NULL, NULL);
+            *at = kept;
+            error = fmax(error, fabs((after - before) / (2 * step) - gradient));
+            scale = fmax(scale, fabs(gradient));
+        }
+    }
+    return ratio(error, scale);
+}
+
 static void check_elements(checker *c, const drape_term *term)
 {
     errors max = {0};
@@ -306,6 +341,12 @@ static void check_elements(checker *c, const drape_term *term)
     if (term->ops->dissipation) {
         report(c, term->ops->entry.name, "force by position", max.hessian, HESSIAN_LIMIT);
         report(c, term->ops->entry.name, "force by velocity", max.velocity, HESSIAN_LIMIT);
+        if (term->ops->kinetic) {
+            report(c, term->ops->entry.name, "energy of motion by position", kinetic_error(c, term, c->x),
+                   HESSIAN_LIMIT);
+            report(c, term->ops->entry.name, "energy of motion by velocity", kinetic_error(c, term, c->v),
+                   HESSIAN_LIMIT);
+        }
         return;
     }
     report(c, term->ops->entry.name, term->ops->measure ? "gradient of measure" : "gradient", max.gradient,
@@ -448,6 +489,7 @@ static drape_status check_jacobian(checker *c, const char *what, double weight, 
                                .v = c->v,
                                .internal = c->internal,
                                .weight = weight,
+                               .momentum = weight,
                                .history = history,
                                .t = c->t,
                                .turning = true};

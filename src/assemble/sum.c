@@ -283,11 +283,14 @@ static bool contributes(const drape_summer *s, const drape_term *term, const dra
 {
     if (term->ops->law || drape_summer_leaves(s, term) || (to->values && !to->g && term->ops->linear))
         return false;
+    if (want->momentum)
+        return term->ops->kinetic;
     if (term->ops->measure && want->remainder)
         return false;
     if (term->ops->measure)
         return want->conservative || term->law_count > 0 || term->damping;
-    return term->ops->dissipation ? want->dissipative : want->conservative;
+    return term->ops->dissipation ? want->dissipative || (term->ops->kinetic && want->conservative)
+                                  : want->conservative;
 }
 
 /* Evaluates one block of pieces. Of a term with parts, those were prepared. */

@@ -31,7 +31,9 @@ struct drape_system {
     drape_drag_springs drag;
     double *push; /* (node_count x 3) [N], if pushed */
     bool pushed;
-    double *load;        /* (node_count x 3) scratch, if the model has histories */
+    double *load; /* (node_count x 3) scratch, if the model has histories */
+    double
+        *moving[2]; /* (node_count x 3) scratch: momenta, and no velocity, if a term has a kinetic energy */
     double *middle[2];   /* (node_count x 3) scratch: x and v of a step, if directions turn */
     double *held;        /* (node_count x 3) [N] the last forces on supports; NULL: none of them moves */
     bool in_frame;       /* positions are in the frame of the supports, and the next of these are scratch: */
@@ -63,6 +65,8 @@ drape_status drape_system_create(drape_arena *arena, const drape_model *model, i
     system->push = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->push);
     if (model->history_count > 0)
         system->load = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->load);
+    for (int k = 0; k < 2 && model->has_kinetic; k++)
+        system->moving[k] = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof(double));
     for (int k = 0; k < 2 && has_turning(model); k++)
         system->middle[k] = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof(double));
     double **const moved[] = {&system->held,     &system->started.x, &system->started.v,
@@ -527,6 +531,15 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
     drape_system_project_forces(system, g);
 }
 
+void drape_system_momentum(drape_system *system, const drape_point *given, double *p)
+{
+    const drape_point point = point_in_space(system, given);
+    drape_request want = {.point = &point, .momentum = true};
+    evaluate_wind(system, &want);
+    drape_summer_add(system->summer, &want, &(drape_sums){.g = p});
+    drape_supports_project(system->motion, p);
+}
+
 void drape_system_reactions(drape_system *system, const drape_point *point, double *g)
 {
     drape_system_sum_forces(system, point, NULL, g);
@@ -715,6 +728,37 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
     *elastic += drape_drag_springs_energy(&system->drag, point->x);
 }
 
+/* The energy of motion of a term, and its momenta in scratch. */
+static double measure_motion(drape_system *system, const drape_term *term, const drape_request *want)
+{
+    double energy = 0;
+    memset(system->moving[0], 0, 3 * (size_t)system->model->node_count * sizeof *system->moving[0]);
+    drape_summer_add_term(system->summer, term, want, &(drape_sums){.g = system->moving[0]}, &energy);
+    return energy;
+}
+
+void drape_system_motion_energy(drape_system *system, const drape_point *point, double *kinetic,
+                                double *potential)
+{
+    drape_point rest = *point;
+    rest.v = system->moving[1];
+    *kinetic = *potential = 0;
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        drape_request want = {.point = &rest, .momentum = true};
+        if (!term->ops->kinetic)
+            continue;
+        evaluate_wind(system, &want);
+        const double still = measure_motion(system, term, &want);
+        want.point = point;
+        evaluate_wind(system, &want);
+        *kinetic += still - measure_motion(system, term, &want);
+        for (size_t k = 0; k < 3 * (size_t)system->model->node_count; k++)
+            *kinetic += system->moving[0][k] * point->v[k];
+        *potential -= still;
+    }
+}
+
 bool drape_system_is_timed(const drape_system *system)
 {
     for (int32_t i = 0; i < system->model->term_count; i++)
@@ -834,6 +878,28 @@ static double turning_dissipation(drape_system *system, const drape_term *term, 
                                           &(drape_request){.point = &point, .dissipative = true});
 }
 
+/* The work of wind that changes on the energy of motion T of a term, whose v . dT/dv - T grows by -dT/dt: the
+ * change of T by that of the wind from where and when the step begins to where and when it ends, with the
+ * nodes half at each end. */
+static double gust_work(drape_system *system, const drape_term *term, const drape_point *from,
+                        const drape_point *to)
+{
+    const drape_point *const end[2] = {from, to};
+    double work = 0;
+    for (int k = 0; k < 4; k++) {
+        const drape_point *nodes = end[k / 2], *wind = end[k % 2];
+        drape_point point = *nodes;
+        drape_request want = {.point = &point, .momentum = true};
+        point.t = wind->t;
+        if (system->wind.field) {
+            drape_wind_evaluate(&system->wind, system->model->node_count, wind->t, wind->x, nodes->v, false);
+            want.against = system->wind.against;
+        }
+        work += (k % 2 ? -0.5 : 0.5) * measure_motion(system, term, &want);
+    }
+    return work;
+}
+
 double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
                                double *open, double *dissipated)
 {
@@ -846,6 +912,8 @@ double drape_system_timed_work(drape_system *system, const drape_state *before, 
             work += timed_work(system, term, &from, &to);
         if (term->history && has_energy(system, term))
             work += history_work(system, term, &from, &to, open);
+        if (term->ops->kinetic && (term->history || system->wind.field))
+            work += gust_work(system, term, &from, &to);
         if (drape_term_turns(term)) {
             const double loss = dissipated ? turning_dissipation(system, term, &from, &to) : 0;
             work += turning_work(system, term, &from, &to) + loss;

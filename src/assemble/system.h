@@ -29,6 +29,7 @@ typedef struct drape_point {
     const double *history;  /* (measure_count) [q/s]; NULL: q' = grad q . v, as in continuous time */
     const double *stress;   /* (measure_count) the f before ddq in a Jacobian; NULL: the forces here */
     double t;               /* [s] time of the colliders' poses, and of terms that depend on it */
+    double momentum;        /* r [1/s]: d/dt dT/dv = r dT/dv + const for energies of motion T; 0: without */
     bool done;              /* energies that depend on time are taken at progress 1, loads at their largest */
     bool relaxed;      /* an infinite time after the internal variables: Maxwell branches have no force */
     bool full;         /* loads from outside are taken at progress 1 and without their histories */
@@ -167,8 +168,11 @@ drape_status drape_system_status(const drape_system *system);
  * supports hold nodes (model/support.h). */
 void drape_system_force(drape_system *system, const drape_point *point, double *g);
 
-/* The same without the terms marked in `without` (term_count; NULL: none), for callers that sum those
- * themselves; drape_system_sum_forces: also along these directions. */
+/* dT/dv (node_count x 3) [kg m/s] of the terms with an energy of motion T. */
+void drape_system_momentum(drape_system *system, const drape_point *point, double *p);
+
+/* The same as drape_system_force without the terms marked in `without` (term_count; NULL: none), for callers
+ * that sum those themselves; drape_system_sum_forces: also along these directions. */
 void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
                                 double *g);
 void drape_system_sum_forces(drape_system *system, const drape_point *point, const bool *without, double *g);
@@ -237,6 +241,12 @@ const drape_load *drape_system_on_colliders(const drape_system *system);
 /* Energies of the terms, elastic and gravitational [J]; energy of contact [J]. */
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity);
 double drape_system_contact_energy(drape_system *system, const drape_point *point);
+
+/* Of the energies of motion T of terms, which with v - w in place of v are T2 + T1 + T0 by powers of v: T2,
+ * and -T0, the potential of the force that steady wind w has on cloth at rest [J]. Their sum v . dT/dv - T is
+ * conserved in steady wind. */
+void drape_system_motion_energy(drape_system *system, const drape_point *point, double *kinetic,
+                                double *potential);
 
 /* The elastic energy by node (node_count) [J]: each element's energy in equal parts on its nodes. */
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy);

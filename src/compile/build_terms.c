@@ -273,6 +273,7 @@ static drape_status begin_term(drape_model *model, int32_t c, int32_t seam, cons
     term->first_internal = term->first_measure = term->first_slider = term->first_branch = -1;
     model->term_count++;
     model->has_dissipation = model->has_dissipation || term->ops->dissipative || term->ops->dissipation;
+    model->has_kinetic = model->has_kinetic || term->ops->kinetic;
     return DRAPE_OK;
 }
 
@@ -523,7 +524,7 @@ static bool well_formed(const drape_term_ops *ops)
            (!ops->part ||
             (ops->measure && ops->part_nodes >= 1 && ops->part_nodes <= DRAPE_MAX_ELEMENT_NODES)) &&
            (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
-           (!ops->build_seam || !ops->part) &&
+           (!ops->kinetic || ops->dissipation) && (!ops->build_seam || !ops->part) &&
            drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }
 
@@ -549,7 +550,8 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
             "the ops of term \"%s\" are not well formed: name, summary, reference, "
             "element_name, exactly one of measure, "
             "energy, dissipation, law; nodes 1 to %d and build or build_seam but for a law; commit and "
-            "initial with has_internal; damped with a measure alone, in_medium with a dissipation; part with "
+            "initial with has_internal; damped with a measure alone, in_medium and kinetic with a "
+            "dissipation; part with "
             "a measure and part_nodes, and without build_seam; "
             "at most %d values of parameters, each with name and unit, a choice with choices",
             ops->entry.name ? ops->entry.name : "?", DRAPE_MAX_ELEMENT_NODES, DRAPE_MAX_PARAMS);

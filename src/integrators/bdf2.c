@@ -3,7 +3,8 @@
  * r^2/(1 + 2 r) and the weight w = (1 + 2 r)/(1 + r)/h:
  *     v1 = w (x1 - x0 - a (x0 - x_))
  *     M w (v1 - v0 - a (v0 - v_)) + g(x1, v1) = 0,  q' = w (q1 - q0 - a (q0 - q_))
- * where x_, v_, q_ belong to the state before the present one. With d = x1 - x0 and c = a (x0 - x_):
+ * where x_, v_, q_ belong to the state before the present one; momenta P as M v. With d = x1 - x0 and c = a
+ * (x0 - x_):
  *     M w^2 (d - p) + g(x0 + d, w (d - c)) = 0,  p = c + (v0 + a (v0 - v_))/w
  * A- and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling satisfy.
  * Hairer, Norsett & Wanner 1993, III.5. The first step, and the first one after a discontinuity, are
@@ -17,6 +18,7 @@
 typedef struct past {
     double t, h;          /* [s] time of the state; size of the step that led to it */
     double *dx, *dv, *dq; /* x0 - x_, v0 - v_ (nodes), q0 - q_ (measures) */
+    double *dp;           /* P0 - P_ (nodes); NULL if no term has momenta */
     bool known;
 } past;
 
@@ -33,6 +35,8 @@ static void create_past(drape_arena *arena, const drape_implicit *common, past *
     p->dv = drape_arena_take(arena, e->nodes, sizeof *p->dv);
     if (common->history)
         p->dq = drape_arena_take(arena, (size_t)e->model->measure_count, sizeof *p->dq);
+    if (e->momentum)
+        p->dp = drape_arena_take(arena, e->nodes, sizeof *p->dp);
 }
 
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
@@ -72,6 +76,8 @@ static void set_equation(bdf2_state *s, const drape_state *in, double a, double 
         e->v_base[at] = -w * dx;
         e->inertia[i] = dx + (in->v[at] + dv) / w;
     }
+    drape_implicit_momentum(c, in, c->momentum[0]);
+    drape_implicit_set_momenta(c, w, 1, c->momentum[0], a, a > 0 ? s->past.dp : NULL);
     e->point.history = c->history;
     if (!c->history)
         return;
@@ -91,6 +97,10 @@ static void remember(bdf2_state *s, const drape_state *in, const drape_state *ou
         s->made.dx[i] = out->x[i] - in->x[i];
         s->made.dv[i] = out->v[i] - in->v[i];
     }
+    drape_implicit_momentum(
+        c, &(drape_state){.t = out->t, .x = out->x, .v = out->v, .internal = in->internal}, c->momentum[1]);
+    for (size_t i = 0; s->made.dp && i < c->equation.nodes; i++)
+        s->made.dp[i] = c->momentum[1][i] - c->momentum[0][i];
     if (!c->history)
         return;
     drape_implicit_measure(c, &(drape_state){.t = out->t, .x = out->x, .internal = in->internal}, s->made.dq);
@@ -138,6 +148,8 @@ static void archive_past(const bdf2_state *s, past *p, drape_archive *a)
     drape_archive_doubles(a, p->dv, e->nodes);
     if (p->dq)
         drape_archive_doubles(a, p->dq, (size_t)e->model->measure_count);
+    if (p->dp)
+        drape_archive_doubles(a, p->dp, e->nodes);
 }
 
 static void archive(void *state, drape_archive *a)
@@ -158,6 +170,7 @@ const drape_integrator_ops drape_integrator_bdf2 = {
          DRAPE_PARAMS(drape_newton_params)},
     .order = 2,
     .create = create,
+    .momenta = true,
     .step = step,
     .restart = restart,
     .residual = drape_implicit_residual,

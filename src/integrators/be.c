@@ -34,6 +34,7 @@ const drape_integrator_ops drape_integrator_be = {
               DRAPE_PARAMS(drape_newton_params)},
     .order = 1,
     .create = drape_implicit_create,
+    .momenta = true,
     .step = step,
     .restart = drape_implicit_restart,
     .residual = drape_implicit_residual,

@@ -15,6 +15,8 @@ drape_status drape_implicit_init(drape_arena *arena, drape_system *system, drape
         s->history = drape_arena_take(arena, (size_t)m->measure_count, sizeof *s->history);
     if (m->has_dissipation)
         s->dissipated = drape_arena_take(arena, 3 * (size_t)m->node_count, sizeof *s->dissipated);
+    for (int k = 0; m->has_kinetic && k < 2; k++)
+        s->momentum[k] = drape_arena_take(arena, 3 * (size_t)m->node_count, sizeof(double));
     return status ? status : drape_arena_status(arena);
 }
 
@@ -76,12 +78,31 @@ void drape_implicit_backward_euler(drape_implicit *s, const drape_state *in, dou
     e->mass_weight = mass_weight;
     for (size_t i = 0; i < e->dofs; i++)
         e->inertia[i] = h * in->v[drape_step_equation_at(e, i)];
+    drape_implicit_momentum(s, in, s->momentum[0]);
+    drape_implicit_set_momenta(s, 1 / h, 1, s->momentum[0], 0, NULL);
     e->point.history = s->history;
     if (!s->history)
         return;
     drape_implicit_measure(s, in, s->history);
     for (int64_t i = 0; i < e->model->measure_count; i++)
         s->history[i] /= -h;
+}
+
+void drape_implicit_momentum(drape_implicit *s, const drape_state *at, double *p)
+{
+    if (s->equation.momentum)
+        drape_system_momentum(s->equation.system,
+                              &(drape_point){.x = at->x, .v = at->v, .internal = at->internal, .t = at->t},
+                              p);
+}
+
+void drape_implicit_set_momenta(drape_implicit *s, double rate, double a, const double *p_a, double b,
+                                const double *p_b)
+{
+    drape_step_equation *e = &s->equation;
+    e->point.momentum = e->momentum ? rate : 0;
+    for (size_t i = 0; e->momentum && i < e->nodes; i++)
+        e->momentum[i] = -rate * (a * p_a[i] + (p_b ? b * p_b[i] : 0));
 }
 
 void drape_implicit_measure(drape_implicit *s, const drape_state *state, double *q)
@@ -178,7 +199,8 @@ void drape_implicit_audit_stage(drape_implicit *s, const double *from, const dou
     for (int32_t i = 0; i < s->motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)s->motion->moved_node[i] + k;
-            info->pin_work += g[at] * (to[at] - from[at]);
+            const double gained = s->momentum[0] ? s->momentum[1][at] - s->momentum[0][at] : 0;
+            info->pin_work += (g[at] + gained / span) * (to[at] - from[at]);
         }
     drape_implicit_audit_dissipation(s, from, to, t, span, info);
 }

@@ -16,6 +16,7 @@ typedef struct drape_implicit {
     double *d;            /* free DOFs: the unknown */
     double *history;      /* measures; NULL if no law needs rates */
     double *dissipated;   /* nodes; NULL if nothing dissipates */
+    double *momentum[2];  /* nodes: at the beginning and at the end of a stage; NULL if no term has any */
     bool inertial_guess;  /* d = p; else d = 0 */
 } drape_implicit;
 
@@ -48,6 +49,12 @@ void drape_implicit_base(drape_implicit *implicit, const drape_state *in, double
 void drape_implicit_backward_euler(drape_implicit *implicit, const drape_state *in, double t, double h,
                                    double mass_weight);
 
+/* Where no term has an energy of motion these do nothing. drape_implicit_momentum computes the momenta P
+ * (nodes) at a state; drape_implicit_set_momenta has the equation add d/dt P = r (P - a P_a - b P_b). */
+void drape_implicit_momentum(drape_implicit *implicit, const drape_state *at, double *p);
+void drape_implicit_set_momenta(drape_implicit *implicit, double rate, double a, const double *p_a, double b,
+                                const double *p_b);
+
 /* Computes q (measures) at the positions of a state, if a law needs rates. */
 void drape_implicit_measure(drape_implicit *implicit, const drape_state *state, double *q);
 
@@ -75,7 +82,7 @@ void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const
  * not that of the displacement. In an impact within a step of such a method, a pair may approach by its
  * velocity and part by its displacement, and would dissipate negative energy. If powers at the two ends were
  * used, the force of a stiff dashpot at a jump of a pin's velocity would count for a large part of the step.
- * Overwrites the base of the equation and g (nodes). */
+ * momentum must be that of the ends of the stage. Overwrites the base of the equation and g (nodes). */
 void drape_implicit_audit_stage(drape_implicit *implicit, const double *from, const double *to, double t,
                                 double span, double *g, drape_step_info *info);
 /* The part of it that is dissipated. */

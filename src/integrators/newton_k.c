@@ -313,6 +313,7 @@ const drape_integrator_ops drape_integrator_newton_k = {
               DRAPE_PARAMS(params)},
     .order = 1,
     .create = create,
+    .momenta = true,
     .step = step,
     .restart = restart,
     .efforts = sizeof efforts / sizeof *efforts,

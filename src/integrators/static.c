@@ -250,6 +250,7 @@ const drape_integrator_ops drape_integrator_static = {
               DRAPE_PARAMS(params)},
     .order = 0,
     .create = create,
+    .momenta = true,
     .own_steps = true,
     .steady_state = true,
     .step = step,

@@ -6,7 +6,7 @@
  *     xg = x0 + (v0 + vg)/w,         M w (vg - v0) + g0 + gg = 0
  *     x1 = a1 xg - a0 x0 + v1/w,     M w (v1 - a1 vg + a0 v0) + g1 = 0
  * As Newton problems: d = xg - x0 and p = 2 v0/w - M^-1 g0/w^2; d = v1/w and p = (a1 vg - a0 v0)/w. Rates
- * of measures are grad q . v.
+ * of measures are grad q . v; momenta P as M v.
  */
 #include "integrators/implicit.h"
 
@@ -19,6 +19,7 @@
 typedef struct trbdf2_state {
     drape_implicit common; /* first */
     double *g0, *xg, *vg;  /* nodes */
+    double *p0;            /* nodes: the momenta at the beginning of the step; NULL if no term has any */
 } trbdf2_state;
 
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
@@ -31,10 +32,12 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     s->g0 = drape_arena_take(arena, nodes, sizeof *s->g0);
     s->xg = drape_arena_take(arena, nodes, sizeof *s->xg);
     s->vg = drape_arena_take(arena, nodes, sizeof *s->vg);
+    if (s->common.equation.momentum)
+        s->p0 = drape_arena_take(arena, nodes, sizeof *s->p0);
     return status ? status : drape_arena_status(arena);
 }
 
-/* Solves for the end x, v of a stage, whose base, inertia and guess must be set. */
+/* Solves for the end x, v of a stage, whose base, inertia, momenta and guess must be set. */
 static drape_status solve_stage(trbdf2_state *s, double w, double *x, double *v, drape_step_info *info)
 {
     drape_step_equation *e = &s->common.equation;
@@ -81,7 +84,13 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
         e->inertia[i] = flight - s->g0[at] / (e->model->mass[at / 3] * w * w);
         c->d[i] = c->inertial_guess ? flight : 0;
     }
+    drape_implicit_momentum(c, in, s->p0);
+    drape_implicit_set_momenta(c, w, 1, s->p0, 0, NULL);
     drape_status status = solve_stage(s, w, s->xg, s->vg, info);
+    if (s->p0)
+        memcpy(c->momentum[0], s->p0, e->nodes * sizeof *s->p0);
+    drape_implicit_momentum(
+        c, &(drape_state){.t = e->point.t, .x = s->xg, .v = s->vg, .internal = in->internal}, c->momentum[1]);
     if (!status || info->usable)
         drape_implicit_audit_stage(c, in->x, s->xg, in->t, GAMMA * h, s->g0, info);
     return status;
@@ -108,7 +117,12 @@ static drape_status differentiate(trbdf2_state *s, const drape_state *in, double
         e->inertia[i] = (A1 * s->vg[at] - A0 * in->v[at]) / w;
         c->d[i] = c->inertial_guess ? e->inertia[i] : 0;
     }
+    if (s->p0)
+        memcpy(c->momentum[0], c->momentum[1], e->nodes * sizeof *s->p0);
+    drape_implicit_set_momenta(c, w, A1, c->momentum[0], -A0, s->p0);
     drape_status status = solve_stage(s, w, out->x, out->v, info);
+    drape_implicit_momentum(
+        c, &(drape_state){.t = out->t, .x = out->x, .v = out->v, .internal = in->internal}, c->momentum[1]);
     if (!status || info->usable)
         drape_implicit_audit_stage(c, s->xg, out->x, in->t + GAMMA * h, (1 - GAMMA) * h, s->g0, info);
     return status;
@@ -142,6 +156,7 @@ const drape_integrator_ops drape_integrator_trbdf2 = {
               DRAPE_PARAMS(drape_newton_params)},
     .order = 2,
     .create = create,
+    .momenta = true,
     .step = step,
     .restart = drape_implicit_restart,
     .residual = drape_implicit_residual,

@@ -106,6 +106,10 @@ drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor,
     *t = (lab_tangent){.ctx = sim->ctx, .sim = sim, .factor = factor, .arena = arena};
     if (m->free_count == 0)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "all nodes are pinned: there are no modes");
+    if (m->has_kinetic)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "a term has an energy of motion, so that the mass matrix depends on the shape: "
+                          "modes are only computed without");
     int32_t *same = drape_arena_take(arena, (size_t)m->collider_count, sizeof *same);
     t->zero = drape_arena_take(arena, 3 * (size_t)m->node_count, sizeof *t->zero);
     t->mass = drape_arena_take(arena, 3 * (size_t)m->free_count, sizeof *t->mass);

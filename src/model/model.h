@@ -400,6 +400,7 @@ struct drape_model {
     bool has_laws;        /* some term needs the rates of measures */
     bool has_dissipation; /* some term dissipates energy */
     bool has_branches;    /* some measure has Maxwell branches */
+    bool has_kinetic;     /* some term has an energy of motion */
     drape_pattern pattern;
     size_t pattern_bytes; /* bytes of the pattern in the arena */
     double length;        /* diagonal of the rest bounding box [m], > 0 */

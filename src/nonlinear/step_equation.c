@@ -30,6 +30,8 @@ drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, 
     for (size_t i = 0; s->weight && i < s->dofs / 3; i++)
         s->weight[i] = 1;
     s->max_residual = INFINITY;
+    if (model->has_kinetic)
+        s->momentum = drape_arena_take(arena, s->nodes, sizeof *s->momentum);
     if (drape_system_contact(system))
         s->x_ahead = drape_arena_take(arena, s->nodes, sizeof *s->x_ahead);
     s->point = (drape_point){.x = s->x, .v = s->v};
@@ -51,11 +53,19 @@ void drape_step_equation_move(drape_step_equation *s, const double *d)
     }
 }
 
+/* g at the point. */
+static void evaluate_forces(drape_step_equation *s, double *g)
+{
+    drape_system_force(s->system, &s->point, g);
+    for (size_t i = 0; s->momentum && i < s->nodes; i++)
+        g[i] += s->momentum[i];
+}
+
 bool drape_step_equation_evaluate(drape_step_equation *s, const double *d)
 {
     double start = drape_system_clock(s->system);
     drape_step_equation_move(s, d);
-    drape_system_force(s->system, &s->point, s->g);
+    evaluate_forces(s, s->g);
     for (size_t i = 0; i < s->dofs; i++) {
         size_t at = drape_step_equation_at(s, i);
         s->f[i] = s->mass_weight * s->model->mass[at / 3] * (d[i] - s->inertia[i]) + s->g[at];
@@ -221,7 +231,7 @@ double drape_step_equation_rounding(drape_step_equation *s, const double *d, dra
     norms sum = {0};
     drape_step_equation_shift(s->x, s->nodes);
     drape_step_equation_shift(s->v, s->nodes);
-    drape_system_force(s->system, &s->point, s->probe);
+    evaluate_forces(s, s->probe);
     drape_step_equation_begin(s);
     drape_step_equation_move(s, d);
     if (!drape_all_finite(s->probe, s->nodes))

@@ -4,6 +4,8 @@
  *     x = x_base + d,  v = v_base + w d
  *     F(d) = m_w M (d - p) + g(x, v) = 0       [N]
  *     J(d) = m_w M + dg/dx + w dg/dv           [N/m]
+ * where g contains d/dt of the momenta P(x, v) that terms have, as a combination r P + const of P here and of
+ * those of earlier states: with r = m_w/w, that by which M v' is a combination of M v.
  * An integrator is a choice of the base, the weights m_w and w, the inertial displacement p and the history
  * of strain rates. Backward Euler: m_w = 1/h^2, w = 1/h, p = h v0. The unknowns are displacements, not
  * positions, so that M (d - p) keeps its digits at small h wherever the scene is.
@@ -30,6 +32,7 @@ typedef struct drape_step_equation {
     double *x_base, *v_base; /* nodes: at d = 0; pinned nodes as at the end of the step */
     double *inertia;         /* free DOFs: p [m] */
     double mass_weight;      /* m_w [1/s2] */
+    double *momentum;        /* nodes: added to g, the const of point.momentum [N]; NULL: no term has one */
     drape_point point;       /* w, history, internal variables, time; its x and v are those below */
     const double *x_start;   /* nodes: the beginning of the step or stage; NULL: no stress prediction
                                 (stress_predictor.h) */

@@ -54,6 +54,12 @@ static drape_energy measure_at(const drape_sim *sim, const drape_point *point)
     drape_energy e = {.kinetic = kinetic(sim->model, point->v)};
     drape_system_energy(sim->system, point, &e.elastic, &e.gravity);
     e.contact = drape_system_contact_energy(sim->system, point);
+    if (sim->model->has_kinetic) {
+        double of_terms = 0, potential = 0;
+        drape_system_motion_energy(sim->system, point, &of_terms, &potential);
+        e.kinetic += of_terms;
+        e.gravity += potential;
+    }
     return e;
 }
 

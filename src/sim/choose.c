@@ -97,6 +97,35 @@ static drape_status apply_number(drape_context *ctx, const choice *c, int chosen
     return apply(ctx, c, chosen, &(drape_setting){.name = name, .number = number}, values);
 }
 
+/* The first term with an energy of motion. */
+static const char *moving_term(const drape_model *model)
+{
+    int32_t i = 0;
+    while (!model->terms[i].ops->kinetic)
+        i++;
+    return model->terms[i].ops->entry.name;
+}
+
+static drape_status check_momenta(drape_context *ctx, const drape_model *model,
+                                  const drape_integrator_ops *integrator)
+{
+    char names[256] = "";
+    size_t used = 0;
+    for (int i = 0; drape_integrators[i]; i++)
+        if (drape_integrators[i]->momenta)
+            used += (size_t)snprintf(names + used, sizeof names - used, "%s\"%s\"", used ? ", " : "",
+                                     drape_integrators[i]->entry.name);
+    if (!integrator->momenta)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/integrator/method",
+                             "\"%s\" does not step the momentum of the term \"%s\"; choose one of %s",
+                             integrator->entry.name, moving_term(model), names);
+    if (model->supports_move && !integrator->steady_state)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/integrator/method",
+                             "the term \"%s\" has momentum, which is not stepped with supports that move",
+                             moving_term(model));
+    return DRAPE_OK;
+}
+
 drape_status drape_choose(drape_context *ctx, const drape_model *model, const drape_sim_def *def,
                           drape_chosen *chosen)
 {
@@ -145,7 +174,7 @@ drape_status drape_chosen_check(drape_context *ctx, const drape_chosen *chosen, 
                 "\"%s\" finds the equilibrium after an infinite time, in which nothing is left of the "
                 "stiffness of %.60s: the fractions of \"relax.maxwell\" have the sum 1; below 1 a part lasts",
                 integrator->entry.name, model->cloths[c].name);
-    return DRAPE_OK;
+    return model->has_kinetic ? check_momenta(ctx, model, integrator) : DRAPE_OK;
 }
 
 double drape_chosen_integrator_value(const drape_chosen *chosen, const char *name, double fallback)

@@ -164,8 +164,8 @@ static state make_state(drape_context *ctx, const drape_model *model, uint64_t s
     }
     for (int64_t i = 0; i < model->measure_count; i++)
         s.history[i] = random_number(&seed);
-    s.point =
-        (drape_point){.x = s.x, .v = s.v, .internal = s.rest.internal, .weight = 60, .history = s.history};
+    s.point = (drape_point){
+        .x = s.x, .v = s.v, .internal = s.rest.internal, .weight = 60, .momentum = 60, .history = s.history};
     return s;
 }
 
