@@ -5,9 +5,10 @@
 #include <math.h>
 #include <string.h>
 
-#define POWER_STEPS 10        /* of the power iteration for the largest eigenvalue of D^-1 A */
-#define DAMPING     (4.0 / 3) /* of that eigenvalue's inverse: Vanek, Mandel & Brezina 1996 */
-#define SMALLEST    0.25      /* eigenvalue of a cycle times its matrix that the next finer level counts on */
+#define LANCZOS_STEPS 5         /* for the largest eigenvalue of D^-1 A */
+#define BISECTIONS    20        /* for that of the tridiagonal matrix, to 1e-6 of it */
+#define DAMPING       (4.0 / 3) /* of the largest eigenvalue's inverse: Vanek, Mandel & Brezina 1996 */
+#define SMALLEST      0.25      /* eigenvalue of a cycle times its matrix that the next finer level counts on */
 /* share of a column's length that must be left after the projection on those before it, or it counts as 0 */
 #define INDEPENDENT 1e-8
 
@@ -259,25 +260,70 @@ static void orthonormalize(level *l, double *coarse_modes)
     }
 }
 
-/* The largest eigenvalue of D^-1 A, D its diagonal blocks, from below, by the power iteration. */
+/* The largest eigenvalue of a symmetric tridiagonal matrix, by bisection: as many eigenvalues are above a
+ * number as A less that number has positive pivots. off[k] is the square of the entry between k and k + 1. */
+static double largest_tridiagonal(int n, const double *diagonal, const double *off)
+{
+    double low = 0, high = 0;
+    for (int k = 0; k < n; k++)
+        high = fmax(high, diagonal[k] + (k > 0 ? sqrt(off[k - 1]) : 0) + (k + 1 < n ? sqrt(off[k]) : 0));
+    for (int step = 0; step < BISECTIONS; step++) {
+        const double middle = (low + high) / 2;
+        double pivot = 0;
+        bool above = false;
+        for (int k = 0; k < n; k++) {
+            pivot = diagonal[k] - middle - (k > 0 ? off[k - 1] / pivot : 0);
+            above |= pivot > 0;
+        }
+        *(above ? &low : &high) = middle;
+    }
+    return high;
+}
+
+/* z = D^-1 r. Returns r'z. */
+static double divide_by_diagonal(const level *l, const double *r, double *z)
+{
+    const size_t size = (size_t)l->a.size, n = scalars(&l->a);
+    double product = 0;
+    for (size_t i = 0; i < n; i += size)
+        multiply_block(l->a.size, l->inverse + size * i, r + i, z + i);
+    for (size_t i = 0; i < n; i++)
+        product += r[i] * z[i];
+    return product;
+}
+
+/* The largest eigenvalue of D^-1 A, D its diagonal blocks, from below: that of the tridiagonal matrix of
+ * Lanczos' method, which the coefficients of conjugate gradients with the preconditioner D make up (Saad 2003,
+ * Iterative methods for sparse linear systems, section 6.7.3). As good as three times as many steps of the
+ * power iteration. */
 static double largest_eigenvalue(level *l)
 {
-    const size_t n = scalars(&l->a), b = (size_t)l->a.size;
-    double size = 0;
+    const size_t n = scalars(&l->a);
+    double diagonal[LANCZOS_STEPS], off[LANCZOS_STEPS], *r = l->r, *p = l->x, *q = l->b, last = 0;
     for (size_t i = 0; i < n; i++)
-        l->x[i] = (double)((i + 1) * 2654435761U % 65536) / 32768 - 1;
-    for (int k = 0; k <= POWER_STEPS; k++) {
-        double squared = 0;
-        for (size_t i = 0; k > 0 && i < n; i += b)
-            multiply_block(l->a.size, l->inverse + b * i, l->r + i, l->x + i);
+        r[i] = (double)((i + 1) * 2654435761U % 65536) / 32768 - 1;
+    double size = divide_by_diagonal(l, r, p);
+    int k = 0;
+    while (k < LANCZOS_STEPS) {
+        double curvature = 0;
+        multiply(&l->a, p, q);
         for (size_t i = 0; i < n; i++)
-            squared += l->x[i] * l->x[i];
-        size = sqrt(squared);
+            curvature += p[i] * q[i];
+        if (!(curvature > 0)) /* it is exact already, or A is not positive definite */
+            break;
+        const double a = size / curvature, before = size;
         for (size_t i = 0; i < n; i++)
-            l->x[i] /= size;
-        multiply(&l->a, l->x, l->r);
+            r[i] -= a * q[i];
+        size = divide_by_diagonal(l, r, q);
+        const double b = size / before;
+        for (size_t i = 0; i < n; i++)
+            p[i] = q[i] + b * p[i];
+        diagonal[k] = 1 / a + last;
+        off[k] = b / (a * a);
+        last = b / a;
+        k++;
     }
-    return size;
+    return k > 0 ? largest_tridiagonal(k, diagonal, off) : 1;
 }
 
 /* P = (1 - w D^-1 A) T, T the modes of the aggregates. */

@@ -5,14 +5,54 @@
 
 #define DENSE      64  /* largest number of block rows that are factored as one dense matrix */
 #define STAGNATION 0.7 /* of the rows of a level: with more on the next one, that is not made */
+/* of the largest weight of a row: neighbours with less are in no aggregate of its, among nodes and among
+ * aggregates */
+#define CLOSE_NODES      0.8
+#define CLOSE_AGGREGATES 0.5
 
-/* The neighbours of each row, itself among them. */
+/* The neighbours of each row, itself among them, and how near they are: for nodes, how many neighbours both
+ * share; for aggregates, how many couplings are between them. */
 typedef struct graph {
     int32_t count;
-    int32_t *start, *neighbor;
+    int32_t *start, *neighbor, *weight;
 } graph;
 
 /* ---- Aggregates ---- */
+
+/* mark (count) is scratch. */
+static void count_shared(graph *g, int32_t *mark)
+{
+    memset(mark, -1, (size_t)g->count * sizeof *mark);
+    for (int32_t i = 0; i < g->count; i++) {
+        for (int32_t k = g->start[i]; k < g->start[i + 1]; k++)
+            mark[g->neighbor[k]] = i;
+        for (int32_t k = g->start[i]; k < g->start[i + 1]; k++)
+            for (int32_t q = g->start[g->neighbor[k]]; q < g->start[g->neighbor[k] + 1]; q++)
+                g->weight[k] += mark[g->neighbor[q]] == i;
+    }
+}
+
+/* Drops the neighbours whose weight is below a share of the largest one of both rows: in a mesh the nodes
+ * across an edge, which bending alone couples; in a grid of aggregates those at the corners. A smoothed
+ * function of the next level reaches one coupling beyond its aggregate: between wide aggregates these
+ * functions interpolate badly, which slows the bending modes most. largest (count) is scratch. */
+static void drop_distant(graph *g, double share, int32_t *largest)
+{
+    memset(largest, 0, (size_t)g->count * sizeof *largest);
+    for (int32_t i = 0; i < g->count; i++)
+        for (int32_t k = g->start[i]; k < g->start[i + 1]; k++)
+            if (g->neighbor[k] != i && g->weight[k] > largest[i])
+                largest[i] = g->weight[k];
+    int32_t total = 0;
+    for (int32_t i = 0, k = 0; i < g->count; i++) {
+        for (; k < g->start[i + 1]; k++) {
+            const int32_t j = g->neighbor[k];
+            if (j == i || g->weight[k] >= share * (largest[i] < largest[j] ? largest[i] : largest[j]))
+                g->neighbor[total++] = j;
+        }
+        g->start[i + 1] = total;
+    }
+}
 
 static bool is_free(const graph *g, const int32_t *aggregate, int32_t row)
 {
@@ -60,22 +100,24 @@ static void list_members(level *l)
  * that it couples would be too large. */
 static drape_status shrink(drape_arena *scratch, const level *l, const graph *g, graph *out)
 {
-    int32_t *mark = drape_arena_take(scratch, (size_t)l->coarse, sizeof *mark);
+    int32_t *at = drape_arena_take(scratch, (size_t)l->coarse, sizeof *at); /* of the last row with each */
     *out = (graph){.count = l->coarse,
                    .start = drape_arena_take(scratch, (size_t)l->coarse + 1, sizeof *out->start),
-                   .neighbor = drape_arena_take(scratch, (size_t)g->start[g->count], sizeof *out->neighbor)};
+                   .neighbor = drape_arena_take(scratch, (size_t)g->start[g->count], sizeof *out->neighbor),
+                   .weight = drape_arena_take(scratch, (size_t)g->start[g->count], sizeof *out->weight)};
     if (drape_arena_status(scratch))
         return DRAPE_E_MEMORY;
-    memset(mark, -1, (size_t)l->coarse * sizeof *mark);
+    memset(at, -1, (size_t)l->coarse * sizeof *at);
     int32_t total = 0;
     for (int32_t I = 0; I < l->coarse; I++) {
         for (int32_t n = l->member_start[I]; n < l->member_start[I + 1]; n++)
             for (int32_t k = g->start[l->member[n]]; k < g->start[l->member[n] + 1]; k++) {
                 const int32_t J = l->aggregate[g->neighbor[k]];
-                if (mark[J] == I)
-                    continue;
-                mark[J] = I;
-                out->neighbor[total++] = J;
+                if (at[J] < out->start[I]) {
+                    at[J] = total;
+                    out->neighbor[total++] = J;
+                }
+                out->weight[at[J]]++;
             }
         out->start[I + 1] = total;
     }
@@ -204,9 +246,9 @@ static drape_status take_vectors(drape_arena *arena, level *l, bool finest)
     l->modes = drape_arena_take(arena, n * MODES, sizeof *l->modes);
     l->r = drape_arena_take(arena, n, sizeof *l->r);
     l->x = drape_arena_take(arena, n, sizeof *l->x);
+    l->b = drape_arena_take(arena, n, sizeof *l->b);
     if (finest)
         return drape_arena_status(arena);
-    l->b = drape_arena_take(arena, n, sizeof *l->b);
     l->sum = drape_arena_take(arena, n, sizeof *l->sum);
     l->own = drape_arena_take(arena, nonzeros(&l->a), sizeof *l->own);
     l->a.values = l->own;
@@ -235,16 +277,37 @@ static drape_status coarsen(drape_arena *arena, drape_arena *scratch, level *l, 
     drape_status status = shrink(scratch, l, g, &smaller);
     *g = smaller;
     if (!status)
+        drop_distant(g, CLOSE_AGGREGATES, joined);
+    if (!status)
         status = build_prolongation(arena, l);
     return status ? status : build_coarse(arena, scratch, l, next);
+}
+
+/* The close neighbours of each node. */
+static drape_status make_graph(drape_arena *scratch, const matrix *a, graph *out)
+{
+    const size_t entries = (size_t)a->start[a->count], count = (size_t)a->count;
+    int32_t *row = drape_arena_take(scratch, count, sizeof *row);
+    *out = (graph){.count = a->count,
+                   .start = drape_arena_take(scratch, count + 1, sizeof *out->start),
+                   .neighbor = drape_arena_take(scratch, entries, sizeof *out->neighbor),
+                   .weight = drape_arena_take(scratch, entries, sizeof *out->weight)};
+    if (drape_arena_status(scratch))
+        return DRAPE_E_MEMORY;
+    memcpy(out->start, a->start, (count + 1) * sizeof *out->start);
+    memcpy(out->neighbor, a->column, entries * sizeof *out->neighbor);
+    count_shared(out, row);
+    drop_distant(out, CLOSE_NODES, row);
+    return DRAPE_OK;
 }
 
 /* Makes the levels from the finest on, until one is small enough for a dense matrix or cannot be
  * coarsened. */
 static drape_status build_levels(drape_arena *arena, drape_arena *scratch, drape_multigrid *m)
 {
-    const matrix *finest = &m->level[0].a;
-    graph g = {.count = finest->count, .start = finest->start, .neighbor = finest->column};
+    graph g;
+    if (make_graph(scratch, &m->level[0].a, &g))
+        return DRAPE_E_MEMORY;
     for (m->count = 1;; m->count++) {
         level *l = &m->level[m->count - 1];
         drape_status status = take_vectors(arena, l, m->count == 1);

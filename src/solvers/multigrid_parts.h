@@ -22,7 +22,7 @@ typedef struct level {
     double *own;     /* the values, except on the finest level */
     double *inverse; /* (count, size x size) of the diagonal blocks */
     double *modes;   /* (count, size x MODES) the rigid motions; then those of each aggregate, orthonormal */
-    double *x, *b, *r, *sum;        /* (count x size); b and sum are NULL on the finest level */
+    double *x, *b, *r, *sum;        /* (count x size); sum is NULL on the finest level */
     int32_t coarse;                 /* aggregates; 0: this is the coarsest level */
     int32_t *member_start, *member; /* the rows of each */
     int32_t *aggregate;          /* (count) of a row; -1: it is coupled to no other, and smoothed exactly */

@@ -216,16 +216,16 @@ START_TEST(the_preconditioner_is_symmetric_and_positive_definite)
 }
 END_TEST
 
-/* 9 and 18 iterations; inertia, which bounds the condition number, is 16 times smaller in the large sheet.
+/* 8 and 13 iterations; inertia, which bounds the condition number, is 16 times smaller in the large sheet.
  * With a single coarse level or none the numbers are a multiple of these and grow with the nodes along a
- * side. */
+ * side; with aggregates of all nodes that bending couples they are 9 and 18. */
 START_TEST(a_large_stiff_sheet_takes_few_iterations)
 {
     sheet small = open_sheet(30), large = open_sheet(120);
     factor(&small);
     factor(&large);
     const int few = iterations(&small), many = iterations(&large);
-    ck_assert_msg(few <= 12 && many <= 24, "%d and %d iterations", few, many);
+    ck_assert_msg(few <= 10 && many <= 16, "%d and %d iterations", few, many);
     close_sheet(&small);
     close_sheet(&large);
 }
