@@ -67,6 +67,7 @@ typedef struct drape_integrator_ops {
     /* The velocities of a state are the means of the step that led to it, not those of its time: the
      * surfaces of colliders that turn have theirs with them. */
     bool mean_velocities;
+    bool by_ranks; /* it can step a model that several ranks share (base/ranks.h) */
     /* It moves supports itself. If not, it steps in their frame (drape_system_to_frame), where they rest. */
     bool in_space;
     /* Steps from in to out, whose t is set. h: the nominal size of the step, exact, while out->t - in->t is
