@@ -87,7 +87,8 @@ static double slide_term(const drape_term *term, const drape_state *before, drap
                 const double limit = term->slider_limit[first + (size_t)i];
                 const double slip =
                     drape_slider_slip(term->slider_stiffness[first + (size_t)i], limit, strain[i] - from[i]);
-                dissipated += limit * fabs(slip);
+                if (!term->counted || term->counted[e + i])
+                    dissipated += limit * fabs(slip);
                 to[i] = from[i] + slip;
             }
         }
@@ -108,7 +109,8 @@ static double relax_term(const drape_term *term, const drape_state *before, bool
         const int64_t first = 1 + (n + 1) * (int64_t)elements;
         for (int32_t e = 0; e < elements; e++) {
             const double d = to[1 + e] - from[1 + e], e0 = from[first + e];
-            dissipated += branch->fraction * k[e] * drape_decay_loss(&decay, e0, d);
+            if (!term->counted || term->counted[e])
+                dissipated += branch->fraction * k[e] * drape_decay_loss(&decay, e0, d);
             to[first + e] = drape_decay_extension(&decay, e0, d);
         }
     }
@@ -125,7 +127,7 @@ double drape_state_relax(const drape_model *model, const drape_state *before, bo
         if (model->terms[i].branch_count > 0)
             dissipated += relax_term(&model->terms[i], before, relaxed, after);
     }
-    return dissipated;
+    return drape_ranks_sum(drape_model_ranks(model), dissipated);
 }
 
 uint64_t drape_state_hash(const drape_model *model, const drape_state *state)

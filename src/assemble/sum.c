@@ -437,6 +437,12 @@ void drape_summer_stress(drape_summer *s, const drape_request *want)
     drape_parallel(s->pool, s->threads, stress_task, &o);
 }
 
+/* Whether the energy of an element counts here, or on another rank. */
+static bool is_counted(const drape_term *term, int32_t piece)
+{
+    return !term->counted || term->counted[piece];
+}
+
 void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_request *want,
                            const drape_sums *to, double *energy)
 {
@@ -450,14 +456,16 @@ void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_
         if (to->node_energy && !work)
             share_energies(term, &s->blocks[0], to->node_energy);
         for (int32_t i = 0; energy && !work && i < s->blocks[0].count; i++)
-            sum += s->blocks[0].energy[i];
+            if (is_counted(term, s->blocks[0].first + i))
+                sum += s->blocks[0].energy[i];
     }
     for (int32_t k = 0; to->values && k < blocks_of(term->patches.count); k++)
         add_patches(s, term, want, k, &all, to);
     if (to->node_energy && work)
         share_patch_energies(term, work, to->node_energy);
     for (int32_t e = 0; energy && work && e < term->elements.count; e++)
-        sum += work->energy[e];
+        if (is_counted(term, e))
+            sum += work->energy[e];
     if (energy)
         *energy = sum;
 }

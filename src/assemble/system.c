@@ -1,6 +1,7 @@
 /* system.c: see system.h. The sums over the elements of terms are in sum.h. */
 #include "assemble/system.h"
 
+#include "assemble/agree.h"
 #include "assemble/sum.h"
 #include "base/clock.h"
 #include "base/finite.h"
@@ -42,6 +43,8 @@ struct drape_system {
     double *space[3];    /* (node_count x 3) what was given, in space: x, v, and further positions */
     drape_wind wind;
     const atomic_bool *cancel; /* NULL: there is no flag to watch */
+    const drape_ranks *ranks;  /* the model's */
+    drape_agreed agreed;       /* texts of what other ranks found */
 };
 
 /* ---- Creation ---- */
@@ -60,8 +63,11 @@ drape_status drape_system_create(drape_arena *arena, const drape_model *model, i
     drape_system *system = *out = drape_arena_take(arena, 1, sizeof *system);
     if (!system)
         return DRAPE_E_MEMORY;
-    *system = (drape_system){
-        .arena = arena, .model = model, .pattern = &model->pattern, .extension = drape_arena_within(arena)};
+    *system = (drape_system){.arena = arena,
+                             .model = model,
+                             .pattern = &model->pattern,
+                             .extension = drape_arena_within(arena),
+                             .ranks = drape_model_ranks(model)};
     system->push = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->push);
     if (model->history_count > 0)
         system->load = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->load);
@@ -253,7 +259,7 @@ const atomic_bool *const *drape_system_cancel_flag(const drape_system *system)
 
 bool drape_system_cancelled(drape_system *system)
 {
-    bool cancelled = system->cancel && atomic_load(system->cancel);
+    const bool cancelled = drape_ranks_any(system->ranks, system->cancel && atomic_load(system->cancel));
     if (cancelled && !system->status)
         system->status = DRAPE_E_STOPPED;
     return cancelled;
@@ -338,7 +344,7 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
                                 : 1;
     if (of_node)
         drape_periodic_least(system->model, of_node);
-    return fraction;
+    return drape_ranks_least(system->ranks, fraction);
 }
 
 bool drape_system_may_meet(drape_system *system, const double *x, const double *v, double t, double seconds)
@@ -361,8 +367,12 @@ void drape_system_sweep(drape_system *system, double t, double *y)
 bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,
                           drape_diagnostic *diagnostic)
 {
-    return system->contact &&
-           drape_contact_crosses(system->contact, in_space(system, t, x, 0), t, reason, diagnostic);
+    if (!system->contact)
+        return false;
+    const bool crosses =
+        drape_contact_crosses(system->contact, in_space(system, t, x, 0), t, reason, diagnostic);
+    return drape_agree(&system->agreed, system->model, crosses ? DRAPE_RETRY_REJECTED : DRAPE_OK, reason,
+                       diagnostic) != DRAPE_OK;
 }
 
 void drape_system_expect(drape_system *system, double t1, bool may_relax)
@@ -380,7 +390,8 @@ drape_status drape_system_relax(drape_system *system, double t1, drape_relax_ext
 drape_status drape_system_lacks_room(drape_system *system, double t1, drape_relax_extent extent, bool *lacks)
 {
     *lacks = false;
-    return system->contact ? drape_contact_lacks_room(system->contact, t1, extent, lacks) : DRAPE_OK;
+    return system->contact && !system->ranks ? drape_contact_lacks_room(system->contact, t1, extent, lacks)
+                                             : DRAPE_OK;
 }
 
 drape_status drape_system_let_in(drape_system *system, const double *x, double t1)
@@ -388,9 +399,13 @@ drape_status drape_system_let_in(drape_system *system, const double *x, double t
     return system->contact ? drape_contact_let_in(system->contact, x, t1) : DRAPE_OK;
 }
 
-bool drape_system_nearest(const drape_system *system, drape_diagnostic *diagnostic)
+bool drape_system_nearest(drape_system *system, drape_diagnostic *diagnostic)
 {
-    return system->contact && drape_contact_nearest(system->contact, diagnostic);
+    if (!system->contact)
+        return false;
+    const bool found = drape_contact_nearest(system->contact, diagnostic);
+    return drape_agree_largest(&system->agreed, system->model, found ? -diagnostic->value : -INFINITY,
+                               diagnostic) > -INFINITY;
 }
 
 double drape_system_take_contact_work(drape_system *system)
@@ -401,9 +416,11 @@ double drape_system_take_contact_work(drape_system *system)
 drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,
                                         drape_diagnostic *diagnostic)
 {
-    return system->contact
-               ? drape_contact_check(system->contact, in_space(system, t, x, 0), t, reason, diagnostic)
-               : DRAPE_OK;
+    if (!system->contact)
+        return DRAPE_OK;
+    const drape_status status =
+        drape_contact_check(system->contact, in_space(system, t, x, 0), t, reason, diagnostic);
+    return drape_agree(&system->agreed, system->model, status, reason, diagnostic);
 }
 
 /* ---- The pattern ---- */
@@ -452,9 +469,10 @@ static drape_status extend(drape_system *system, int32_t pairs, const int32_t *n
     int count = drape_model_couplings(model, system->left_out, couplings);
     couplings[count++] = (drape_coupling){.count = pairs, .nodes = 4, .node = nodes};
     forget_extension(system);
-    drape_status status = drape_pattern_build(&system->extension, model->free_count, model->free_of_node,
+    drape_status status = drape_pattern_build(&system->extension, model->block_count, model->free_of_node,
                                               couplings, count, &system->extended);
     drape_free(ctx, couplings);
+    system->extended.ranks = system->ranks;
     if (!status)
         status = place_terms(system);
     if (status) /* back to the model's pattern, which also differs from the one before this call */
@@ -725,6 +743,8 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
             drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
         *(term->ops->external ? gravity : elastic) += energy;
     }
+    *elastic = drape_ranks_sum(system->ranks, *elastic);
+    *gravity = drape_ranks_sum(system->ranks, *gravity);
     *elastic += drape_drag_springs_energy(&system->drag, point->x);
 }
 
@@ -816,7 +836,8 @@ static void measure_load(drape_system *system, const drape_term *term, const dra
     drape_summer_add_term(system->summer, term, &want, &(drape_sums){.g = g}, energy);
     *rate = 0;
     for (size_t i = 0; i < n; i++)
-        *rate += g[i] * at->v[i];
+        if (drape_model_owns(system->model, (int32_t)(i / 3)))
+            *rate += g[i] * at->v[i];
 }
 
 /* The work of a load E = f(t) E0(x) whose factor changes, int f' E0 dt = [f E0] - int f E0' dt, with E0 as
@@ -900,8 +921,9 @@ static double gust_work(drape_system *system, const drape_term *term, const drap
     return work;
 }
 
-double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
-                               double *open, double *dissipated)
+/* Adds to *dissipated only what is known here. */
+static double timed_work_here(drape_system *system, const drape_state *before, const drape_state *after,
+                              double *open, double *dissipated)
 {
     const drape_point from = {.x = before->x, .v = before->v, .internal = before->internal, .t = before->t},
                       to = {.x = after->x, .v = after->v, .internal = before->internal, .t = after->t};
@@ -922,6 +944,21 @@ double drape_system_timed_work(drape_system *system, const drape_state *before, 
         }
     }
     return work;
+}
+
+double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
+                               double *open, double *dissipated)
+{
+    double opened = 0, lost = 0;
+    if (!system->ranks)
+        return timed_work_here(system, before, after, open, dissipated);
+    if (!drape_system_is_timed(system))
+        return 0;
+    const double work = timed_work_here(system, before, after, &opened, dissipated ? &lost : NULL);
+    *open += drape_ranks_sum(system->ranks, opened);
+    if (dissipated)
+        *dissipated += drape_ranks_sum(system->ranks, lost);
+    return drape_ranks_sum(system->ranks, work);
 }
 
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy)
@@ -1009,7 +1046,7 @@ static drape_diagnostic diagnose_element(const drape_term *term, const drape_fau
     return diagnostic;
 }
 
-drape_status drape_system_check(const drape_system *system, const double *given, const double *given_before,
+static drape_status check_terms(const drape_system *system, const double *given, const double *given_before,
                                 const double *internal, const char **reason, drape_diagnostic *diagnostic)
 {
     const double *x = in_space(system, system->frame_t, given, 0),
@@ -1031,8 +1068,15 @@ drape_status drape_system_check(const drape_system *system, const double *given,
     return DRAPE_OK;
 }
 
-bool drape_system_breaks_limit(const drape_system *system, const double *given, const double *given_before,
-                               const double *internal)
+drape_status drape_system_check(drape_system *system, const double *x, const double *before,
+                                const double *internal, const char **reason, drape_diagnostic *diagnostic)
+{
+    const drape_status status = check_terms(system, x, before, internal, reason, diagnostic);
+    return drape_agree(&system->agreed, system->model, status, reason, diagnostic);
+}
+
+static bool breaks_limit_here(const drape_system *system, const double *given, const double *given_before,
+                              const double *internal)
 {
     const double *x = in_space(system, system->frame_t, given, 0),
                  *before = in_space(system, system->frame_t, given_before, 2);
@@ -1048,8 +1092,19 @@ bool drape_system_breaks_limit(const drape_system *system, const double *given, 
     return false;
 }
 
-drape_diagnostic drape_system_diagnose_dof(const drape_system *system, const double *free_vector,
-                                           const char *what, double limit)
+bool drape_system_breaks_limit(const drape_system *system, const double *x, const double *before,
+                               const double *internal)
+{
+    return drape_ranks_any(system->ranks, breaks_limit_here(system, x, before, internal));
+}
+
+void drape_system_agree_largest(drape_system *system, double value, drape_diagnostic *diagnostic)
+{
+    drape_agree_largest(&system->agreed, system->model, value, diagnostic);
+}
+
+static drape_diagnostic diagnose_dof_here(const drape_system *system, const double *free_vector,
+                                          const char *what, double limit)
 {
     const drape_model *model = system->model;
     int64_t largest = 0;
@@ -1069,6 +1124,14 @@ drape_diagnostic drape_system_diagnose_dof(const drape_system *system, const dou
                               .cloth = node >= 0 ? drape_model_cloth_of(model, node) : -1,
                               .value = model->free_count > 0 ? fabs(free_vector[largest]) : 0,
                               .limit = limit};
+}
+
+drape_diagnostic drape_system_diagnose_dof(drape_system *system, const double *free_vector, const char *what,
+                                           double limit)
+{
+    drape_diagnostic found = diagnose_dof_here(system, free_vector, what, limit);
+    drape_agree_largest(&system->agreed, system->model, found.value, &found);
+    return found;
 }
 
 /* ---- Checkpoints ---- */

@@ -285,7 +285,7 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
  * DRAPE_RETRY_DEGENERATE with *reason and *diagnostic filled in. x is the new state; before and
  * internal belong to the previous one. In the frame of supports both are at the time of the last evaluation.
  * before NULL: reports elements that were degenerate already, too. */
-drape_status drape_system_check(const drape_system *system, const double *x, const double *before,
+drape_status drape_system_check(drape_system *system, const double *x, const double *before,
                                 const double *internal, const char **reason, drape_diagnostic *diagnostic);
 
 /* Whether x violates a limit imposed by a term with `constraint`: drape_system_check restricted to those
@@ -299,7 +299,7 @@ bool drape_system_crosses(drape_system *system, const double *x, double t, const
                           drape_diagnostic *diagnostic);
 
 /* drape_contact_nearest; false without contact. */
-bool drape_system_nearest(const drape_system *system, drape_diagnostic *diagnostic);
+bool drape_system_nearest(drape_system *system, drape_diagnostic *diagnostic);
 
 /* The energy that changes of the stiffness of contact between steps have added since the last call [J]. */
 double drape_system_take_contact_work(drape_system *system);
@@ -310,9 +310,12 @@ double drape_system_take_contact_work(drape_system *system);
 drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,
                                         drape_diagnostic *diagnostic);
 
+/* drape_agree_largest (assemble/agree.h); the texts are valid until the next diagnostic. */
+void drape_system_agree_largest(drape_system *system, double value, drape_diagnostic *diagnostic);
+
 /* For a message about a vector over free DOFs: the node of its first entry that is not finite or, if all are
  * finite, of its largest one, and the cloth of that node. */
-drape_diagnostic drape_system_diagnose_dof(const drape_system *system, const double *free_vector,
-                                           const char *what, double limit);
+drape_diagnostic drape_system_diagnose_dof(drape_system *system, const double *free_vector, const char *what,
+                                           double limit);
 
 #endif

@@ -1,6 +1,7 @@
 /* cmd_run.c: `drape run`: simulates a scene and writes frames, step log and summary into a folder. */
 #include "cli/cli.h"
 #include "cli/progress.h"
+#include "cli/ranks.h"
 #include "cli/realtime.h"
 #include "cli/signals.h"
 
@@ -91,15 +92,18 @@ static drape_status begin_output(run *r)
 {
     if (!r->request->out || drape_recorder_is_finished(r->recorder))
         return DRAPE_OK;
+    if (r->recorder && !drape_recorder_writes(r->recorder))
+        return DRAPE_OK;
     if (r->recorder)
         return drape_folder_remove(drape_recorder_folder(r->recorder), is_summary, r);
     const char *path = r->request->command.operand;
     const bool copies = !drape_scene_copy_is(path, r->request->out);
     const drape_recorder_def def = recorder_def(r);
     drape_status status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
-    if (status || !copies)
+    if (status || !copies || !drape_recorder_writes(r->recorder))
         return status;
-    return drape_scene_copy(r->in.ctx, r->in.scene, r->in.model, path, drape_recorder_folder(r->recorder));
+    return drape_scene_copy(r->in.ctx, r->in.scene, drape_model_whole(r->in.model), path,
+                            drape_recorder_folder(r->recorder));
 }
 
 /* ---- Resuming ---- */
@@ -160,7 +164,8 @@ static int check_summary(run *r)
         return CLI_GO_ON;
     drape_status status = check_input(r, request->command.operand, "");
     if (!status)
-        status = drape_scene_files(r->in.ctx, r->in.model, request->command.operand, check_input, r);
+        status = drape_scene_files(r->in.ctx, drape_model_whole(r->in.model), request->command.operand,
+                                   check_input, r);
     if (status)
         return cli_report(&r->request->command, CLI_BAD_INPUT);
     return check_summary_folder(request);
@@ -330,7 +335,8 @@ static void print_results(const run *r)
     print_energy(r);
     print_events(r);
     print_untangling(r);
-    print_inside(r);
+    if (!model->part)
+        print_inside(r);
     print_wall(r, &s);
     if (r->request->realtime)
         cli_realtime_print(&r->realtime);
@@ -472,6 +478,13 @@ static int check_checkpoints(const run_request *request)
     return CLI_GO_ON;
 }
 
+static int check_ranks(const run_request *request)
+{
+    if (cli_ranks_count() == 1 || !request->realtime)
+        return CLI_GO_ON;
+    return cli_misuse(request->command.verb, "--realtime: a run on several ranks has no time budget");
+}
+
 /* Refuses options that would be ignored silently. */
 static int check_integrator(const run *r)
 {
@@ -490,11 +503,12 @@ static int check_integrator(const run *r)
     return CLI_GO_ON;
 }
 
-static int load_and_run(const void *command)
+static int load_and_run(const run_request *request)
 {
-    const run_request *request = command;
     run r = {.request = request, .start = drape_clock_seconds(), .realtime = {.command = &request->command}};
     int code = check_checkpoints(request);
+    if (code == CLI_GO_ON)
+        code = check_ranks(request);
     if (code != CLI_GO_ON)
         return code;
     code = cli_scene_load_with(&request->command, request->command.operand,
@@ -505,10 +519,11 @@ static int load_and_run(const void *command)
         code = check_folder(request);
     if (code == CLI_GO_ON)
         code = check_summary(&r);
+    code = cli_ranks_agree(&request->command, code);
     if (code == CLI_GO_ON)
-        code = resume(&r);
+        code = cli_ranks_agree(&request->command, resume(&r));
     if (code == CLI_GO_ON)
-        code = open_output(&r);
+        code = cli_ranks_agree(&request->command, open_output(&r));
     if (code == CLI_GO_ON)
         code = check_summary_folder(request);
     if (code == CLI_GO_ON) {
@@ -519,6 +534,13 @@ static int load_and_run(const void *command)
     drape_free(r.in.ctx, r.checkpoint);
     cli_scene_free(&r.in);
     return code;
+}
+
+static int run_on_ranks(const void *command)
+{
+    const run_request *request = command;
+    const int code = cli_ranks_begin(&request->command);
+    return code == CLI_GO_ON ? cli_ranks_end(load_and_run(request)) : code;
 }
 
 static const cli_option options[] = {
@@ -551,5 +573,5 @@ const drape_verb drape_verb_run = {
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(run_request),
-    .run = load_and_run,
+    .run = run_on_ranks,
 };

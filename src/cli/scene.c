@@ -1,6 +1,7 @@
 /* scene.c: from a command line to a sim. All errors of the input are found here, before any verb writes a
  * file. */
 #include "cli/cli.h"
+#include "cli/ranks.h"
 #include "cli/signals.h"
 
 #include "io/recorder.h"
@@ -38,6 +39,7 @@ static drape_status load(const cli_command *command, const char *path, cli_choos
         status = drape_scene_compile(s->scene, &s->model);
     if (!status && choose)
         status = choose(user, s, &def);
+    status = cli_ranks_share(status, s);
     if (status)
         return status;
     status = drape_sim_create(s->ctx, s->model, &def, &s->sim);
@@ -115,5 +117,6 @@ void cli_scene_free(cli_scene *scene)
 {
     drape_sim_destroy(&scene->sim);
     drape_model_destroy(&scene->model);
+    drape_model_destroy(&scene->whole);
     drape_scene_destroy(&scene->scene);
 }

@@ -18,9 +18,10 @@ drape_status drape_compile_pattern(drape_model *model)
         return DRAPE_E_MEMORY;
     const int count = drape_model_couplings(model, NULL, couplings);
     const size_t before = model->arena.bytes;
-    drape_status status = drape_pattern_build(&model->arena, model->free_count, model->free_of_node,
+    drape_status status = drape_pattern_build(&model->arena, model->block_count, model->free_of_node,
                                               couplings, count, &model->pattern);
     model->pattern_bytes = model->arena.bytes - before;
+    model->pattern.ranks = drape_model_ranks(model);
     drape_free(model->ctx, couplings);
     for (int32_t i = 0; !status && i < model->term_count; i++) {
         status = drape_check_cancel(model->ctx);

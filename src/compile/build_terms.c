@@ -438,8 +438,7 @@ static drape_status build_seam(drape_model *model, int32_t s, const drape_entry_
     return status;
 }
 
-/* Assigns the indices of internal variables in a state, and of measures in the list of all measures. */
-static void number_elements(drape_model *model, drape_term *term)
+void drape_compile_number_elements(drape_model *model, drape_term *term)
 {
     if (term->ops->has_internal) {
         term->first_internal = model->internal_count;
@@ -507,7 +506,7 @@ drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def)
     for (int32_t i = 0; model->sewn && i < model->node_count; i++) /* ascending: those before are final */
         model->sewn[i] = model->sewn[model->sewn[i]];
     for (int32_t i = 0; !status && i < model->term_count; i++)
-        number_elements(model, &model->terms[i]);
+        drape_compile_number_elements(model, &model->terms[i]);
     return status;
 }
 

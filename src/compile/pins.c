@@ -554,6 +554,7 @@ drape_status drape_compile_number_nodes(drape_model *model, const int32_t *track
         model->free_of_node[i] = model->pinned[i] ? -1 : model->free_count++;
         model->moved_count += track_of_node[i] >= 0;
     }
+    model->block_count = model->free_count;
     model->node_of_free =
         drape_arena_take(&model->arena, (size_t)model->free_count, sizeof *model->node_of_free);
     model->moved_node =

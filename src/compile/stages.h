@@ -87,6 +87,10 @@ drape_status drape_compile_history_named(drape_model *model, const char *pointer
 /* Builds the terms of all cloths and seams and assigns indices to measures and internal variables. */
 drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def);
 
+/* Assigns the indices of the internal variables of a term in a state, and of its measures in the list of all
+ * measures. */
+void drape_compile_number_elements(drape_model *model, drape_term *term);
+
 /* Builds the terms of the scene's gravity anew, for cloths whose masses have changed. */
 drape_status drape_compile_weight(drape_model *model);
 

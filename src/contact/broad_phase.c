@@ -71,6 +71,18 @@ static double area_of(const double *x, const int32_t *node)
     return 0.5 * sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
 }
 
+/* Nodes that another rank owns have triangles there. */
+static void fetch_areas(drape_broad_phase *s)
+{
+    const drape_ranks *ranks = drape_model_ranks(s->model);
+    const int32_t nodes = ranks ? s->model->node_count : 0;
+    for (int32_t i = 0; i < nodes; i++) /* rest is filled after this */
+        s->rest[3 * (size_t)i] = s->node_area[i];
+    drape_ranks_fetch(ranks, s->rest);
+    for (int32_t i = 0; i < nodes; i++)
+        s->node_area[i] = s->rest[3 * (size_t)i];
+}
+
 /* A node gets a third of the area of its triangles, an edge the mean of its two nodes. */
 static void share_areas(drape_broad_phase *s)
 {
@@ -81,6 +93,7 @@ static void share_areas(drape_broad_phase *s)
         for (int a = 0; a < 3; a++)
             s->node_area[node[a]] += s->face_area[f] / 3;
     }
+    fetch_areas(s);
     for (int32_t e = 0; e < m->edge_count; e++)
         s->edge_area[e] =
             0.5 * (s->node_area[m->edge[2 * (size_t)e]] + s->node_area[m->edge[2 * (size_t)e + 1]]);
@@ -167,8 +180,8 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     for (int32_t i = 0; i < m->collider_count; i++)
         if (!m->colliders[i].ops->smooth)
             s->obstacle_radius = fmax(s->obstacle_radius, m->colliders[i].shape.radius);
-    list_features(s);
     share_areas(s);
+    list_features(s);
     return build_trees(arena, s, points, triangles);
 }
 

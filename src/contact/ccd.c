@@ -273,15 +273,18 @@ double drape_contact_march(const drape_contact *c, int32_t k, const drape_collid
 static double farthest_throw(const drape_contact *c, const double *x, const double *y)
 {
     const size_t nodes = (size_t)c->model->node_count;
+    const double all = (double)drape_model_node_count(c->model);
     double largest = 0, mean[3] = {0}, move[3];
     for (size_t i = 0; i < 3 * nodes; i++)
-        mean[i % 3] += (y[i] - x[i]) / (double)nodes;
+        mean[i % 3] += drape_model_owns(c->model, (int32_t)(i / 3)) ? (y[i] - x[i]) / all : 0;
+    if (c->ranks)
+        c->ranks->sum(c->ranks, mean, 3);
     for (size_t i = 0; i < nodes; i++) {
         vec3_sub(y + 3 * i, x + 3 * i, move);
         vec3_sub(move, mean, move);
         largest = fmax(largest, vec3_dot(move, move));
     }
-    return sqrt(largest);
+    return sqrt(drape_ranks_largest(c->ranks, largest));
 }
 
 /* A correction that throws nodes farther than the scene is large is of no use, and a search among nodes
@@ -308,7 +311,7 @@ static double shorten_long(const drape_contact *c, const double *x, const double
         fraction[i] = longest / length;
         least = fmin(least, fraction[i]);
     }
-    return least;
+    return drape_ranks_least(c->ranks, least);
 }
 
 /* The fraction that leaves the whole displacement no longer than that. */

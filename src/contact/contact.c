@@ -92,17 +92,17 @@ static drape_status take_bodies(drape_arena *arena, drape_contact *c)
 drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion, drape_contact **out)
 {
     const drape_model *model = motion->model;
-    double edges = 0;
     *out = NULL;
     if (model->collider_count == 0 && !model->contact.self)
         return DRAPE_OK;
     drape_contact *c = drape_arena_take(arena, 1, sizeof *c);
     if (!c)
         return DRAPE_E_MEMORY;
-    for (int32_t e = 0; e < model->edge_count; e++)
-        edges += model->edge_length[e];
-    *c = (drape_contact){
-        .arena = arena, .model = model, .motion = motion, .mean_edge = edges / model->edge_count};
+    *c = (drape_contact){.arena = arena,
+                         .model = model,
+                         .ranks = drape_model_ranks(model),
+                         .motion = motion,
+                         .mean_edge = drape_model_mean_edge(model)};
     c->active.arena = c->inside.arena = arena;
     c->press = (drape_press){.factor = 1, .widest = 1};
     c->ahead_t = NAN;
@@ -429,6 +429,7 @@ void drape_contact_set_rounding(drape_contact *c, const double *x)
     double largest = 0;
     for (size_t i = 0; i < 3 * (size_t)c->broad.points; i++)
         largest = fmax(largest, fabs(x[i]));
+    largest = drape_ranks_largest(c->ranks, largest);
     c->broad.rounding = ROUNDING * next_power_of_two(largest);
 }
 
@@ -454,7 +455,8 @@ static double smallest_gap(const drape_contact *c, bool *last)
         least = fmin(least, contact->gap.value / contact->pair.distance);
         *last = *last || contact->gap.value < LAST * drape_pair_least_gap(&contact->pair, c->broad.rounding);
     }
-    return least;
+    *last = drape_ranks_any(c->ranks, *last);
+    return drape_ranks_least(c->ranks, least);
 }
 
 /* Makes contact stiffer where gaps shrink, and softer again. */
@@ -513,7 +515,7 @@ static double turning_path_of(const drape_contact *c, int32_t collider, double t
         largest = fmax(largest, drape_collider_distance(k, &from, x, NULL, NULL) -
                                     drape_collider_distance(k, &to, x, NULL, NULL));
     }
-    return largest;
+    return drape_ranks_largest(c->ranks, largest);
 }
 
 /* How far something moves: by itself or relative to a displacement `mean`, whichever is less. What rests is
@@ -555,9 +557,11 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
     drape_motion_collider(c->motion, collider, t, from);
     drape_motion_collider(c->motion, collider, t + c->dt, to);
     for (size_t i = 0; i < 3 * nodes; i++)
-        mean[i % 3] += c->v[i];
+        mean[i % 3] += drape_model_owns(c->model, (int32_t)(i / 3)) ? c->v[i] : 0;
+    if (c->ranks)
+        c->ranks->sum(c->ranks, mean, 3);
     for (size_t k = 0; k < 3; k++)
-        mean[k] *= c->dt / (double)nodes;
+        mean[k] *= c->dt / (double)drape_model_node_count(c->model);
     if (deforms)
         return deforming_path_of(c, collider, t, mean);
     return lesser_path(from, to, mean) + turning_path_of(c, collider, t);
@@ -576,7 +580,7 @@ static bool is_active(const drape_contact *c, int32_t collider)
     bool found = false;
     for (int32_t i = 0; i < c->active.count && !found; i++)
         found = c->active.contacts[i].pair.collider == collider;
-    return found;
+    return drape_ranks_any(c->ranks, found);
 }
 
 /* The distances that were widened beyond twice what they were go back to that where cloth is near already.
@@ -631,13 +635,15 @@ static drape_status adapt_distances(drape_contact *c, double t, bool retry)
 /* A step that is tried again begins where it did. */
 static bool is_retry(const drape_contact *c)
 {
-    return c->begun && memcmp(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x) == 0;
+    const bool same = c->begun && memcmp(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x) == 0;
+    return drape_ranks_all(c->ranks, same);
 }
 
 bool drape_contact_has_begun(const drape_contact *c, const double *x, double t)
 {
-    return c->begun && c->start_t == t &&
-           memcmp(c->start, x, 3 * (size_t)c->model->node_count * sizeof *x) == 0;
+    const bool same =
+        c->begun && c->start_t == t && memcmp(c->start, x, 3 * (size_t)c->model->node_count * sizeof *x) == 0;
+    return drape_ranks_all(c->ranks, same);
 }
 
 void drape_contact_measure_start(drape_contact *c)
@@ -648,6 +654,8 @@ void drape_contact_measure_start(drape_contact *c)
         if (near->pair.collider >= 0)
             c->start_least[near->pair.collider] = fmin(c->start_least[near->pair.collider], near->gap);
     }
+    for (int32_t i = 0; c->ranks && i < c->model->collider_count; i++)
+        c->start_least[i] = drape_ranks_least(c->ranks, c->start_least[i]);
 }
 
 /* Colliders have their velocities of time t here, because the size of the step is not known yet. */

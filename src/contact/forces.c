@@ -48,6 +48,15 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
         .restitution_velocity = def->restitution_velocity};
 }
 
+bool drape_contact_counts(const drape_contact *c, const drape_active_contact *contact)
+{
+    int32_t first = c->model->node_count;
+    for (int a = 0; c->ranks && a < contact->gap.closest.points; a++)
+        if (contact->gap.closest.c[a] != 0 && contact->pair.node[a] < first)
+            first = contact->pair.node[a];
+    return !c->ranks || (first < c->model->node_count && drape_model_owns(c->model, first));
+}
+
 bool drape_contact_rolls(const drape_contact *c, const drape_active_contact *contact)
 {
     const drape_pair *pair = &contact->pair;
@@ -158,7 +167,8 @@ static void add_moment(const drape_contact *c, const drape_active_contact *conta
 
 static void scatter(drape_contact *c, const drape_active_contact *contact, const double *from, double *g)
 {
-    const int32_t *node = contact->pair.node, collider = contact->pair.collider;
+    const int32_t *node = contact->pair.node,
+                  collider = drape_contact_counts(c, contact) ? contact->pair.collider : -1;
     for (int a = 0; a < contact->gap.closest.points; a++)
         for (int k = 0; k < 3 && node[a] < c->model->node_count; k++) {
             g[3 * (size_t)node[a] + (size_t)k] += from[3 * a + k];
@@ -245,7 +255,8 @@ double drape_contact_potential(const drape_contact *c)
     double sum = 0;
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_contact_law law = drape_contact_law_of(c, &c->active.contacts[i]);
-        sum += drape_contact_energy(&c->active.contacts[i].gap, &law);
+        if (drape_contact_counts(c, &c->active.contacts[i]))
+            sum += drape_contact_energy(&c->active.contacts[i].gap, &law);
     }
-    return sum;
+    return drape_ranks_sum(c->ranks, sum);
 }

@@ -33,6 +33,7 @@ struct drape_contact {
     drape_arena *arena;
     const atomic_bool *const *cancel; /* NULL: nothing is watched */
     const drape_model *model;
+    const drape_ranks *ranks;   /* the model's */
     const drape_motion *motion; /* of its colliders */
     double mean_edge;           /* [m] */
     double dt;                  /* [s] nominal step, by which activation distances grow; 0: there is none */
@@ -142,6 +143,10 @@ drape_status drape_contact_take_failure(drape_contact *c);
 
 /* Lists the active set of a configuration. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_list(drape_contact *c, const drape_configuration *at);
+
+/* Whether what a contact adds to sums over all contacts counts on this rank. Each rank with one of the nodes
+ * that have a weight in it knows the contact; the one that owns the first of these nodes counts it. */
+bool drape_contact_counts(const drape_contact *c, const drape_active_contact *contact);
 
 /* The constants of a contact. */
 drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_active_contact *contact);

@@ -15,5 +15,6 @@ const drape_controller_ops drape_controller_fixed = {
     .entry = {.name = "fixed",
               .summary = "steps of the nominal size only; a failed step ends the run with e_solver",
               .reference = "-"},
+    .by_ranks = true,
     .judge = judge,
 };

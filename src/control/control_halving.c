@@ -28,5 +28,6 @@ const drape_controller_ops drape_controller_halving = {
              "a failed step is rolled back and retried at half the size; the size grows back after successes",
          .reference = "DisMech halves steps that do not converge, too",
          DRAPE_PARAMS(params)},
+    .by_ranks = true,
     .judge = judge,
 };

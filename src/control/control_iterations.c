@@ -60,6 +60,7 @@ const drape_controller_ops drape_controller_iterations = {
               .reference = "Crisfield 1991, 9.5: increments by the number of iterations",
               DRAPE_PARAMS(params)},
     .own_steps = true,
+    .by_ranks = true,
     .check = check,
     .judge = judge,
 };

@@ -23,6 +23,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     memcpy(out->v, e->v_base, e->nodes * sizeof *out->v);
     for (size_t i = 0; i < e->dofs; i++)
         out->v[drape_step_equation_at(e, i)] = s->d[i] / h;
+    drape_ranks_fetch(e->ranks, out->v);
     drape_implicit_audit(s, in, out, info);
     return status;
 }
@@ -44,4 +45,5 @@ const drape_integrator_ops drape_integrator_be = {
     .bytes = drape_implicit_bytes,
     .destroy = drape_implicit_destroy,
     .mean_velocities = true,
+    .by_ranks = true,
 };

@@ -4,6 +4,7 @@
 
 #include "base/finite.h"
 #include "base/reason.h"
+#include "solvers/vector.h"
 
 #include <float.h>
 #include <math.h>
@@ -44,6 +45,8 @@ static drape_point place(drape_first_order *s, double t, const double *y)
         s->x[drape_first_order_at(s, i)] = y[i];
         s->v[drape_first_order_at(s, i)] = y[s->n + i];
     }
+    if (s->ranks)
+        s->ranks->fetch(s->ranks, (double *[]){s->x, s->v}, 2);
     return (drape_point){.x = s->x,
                          .v = s->v,
                          .internal = s->internal,
@@ -62,7 +65,7 @@ void drape_first_order_force(drape_first_order *s, double t, const double *y)
 
 int drape_first_order_judge(drape_first_order *s, double t, const double *out, double start)
 {
-    s->nonfinite = !drape_all_finite(out, 2 * (size_t)s->n);
+    s->nonfinite = !drape_ranks_all(s->ranks, drape_all_finite(out, 2 * (size_t)s->n));
     s->crossing =
         !s->nonfinite && drape_system_crosses(s->system, s->x, t, &s->crossing_reason, &s->crossing_pair);
     s->crossed |= s->crossing;
@@ -90,7 +93,7 @@ double drape_first_order_norm(const drape_first_order *s, N_Vector vector)
     double sum = 0;
     for (int64_t i = 0; i < 2 * s->n; i++)
         sum += a[i] / w[i] * (a[i] / w[i]);
-    return sqrt(sum / (double)(2 * s->n));
+    return sqrt(drape_ranks_sum(s->ranks, sum) / (6 * (double)drape_model_all_free(s->model)));
 }
 
 double drape_first_order_first_step(const drape_first_order *s)
@@ -177,11 +180,21 @@ int drape_first_order_jacobian(drape_first_order *s, double t, double cj, const 
 static void add_damping(const drape_first_order *s, const double *r)
 {
     const drape_pattern *p = drape_system_pattern(s->system);
+    const size_t own = (size_t)s->n * sizeof *r;
     if (!s->damping)
         return;
+    const double *from = s->ranks ? s->with_copies[0] : r;
+    double *to = s->ranks ? s->with_copies[1] : s->reduced;
+    if (s->ranks) {
+        memcpy(s->with_copies[0], r, own);
+        s->ranks->fetch_blocks(s->ranks, s->with_copies[0]);
+        memcpy(to, s->reduced, own);
+    }
     for (int64_t j = 0; j < p->n; j++)
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
-            s->reduced[drape_pattern_row(p, j, k)] += s->damping[k] * r[j];
+            to[drape_pattern_row(p, j, k)] += s->damping[k] * from[j];
+    if (s->ranks)
+        memcpy(s->reduced, to, own);
 }
 
 /* With r2 + c_j M r1 in `reduced`. r1 and dv may be the same. */
@@ -247,7 +260,8 @@ static void measure_powers(drape_first_order *s, double t, double powers[2])
     if (s->dissipated) {
         drape_system_dissipation(s->system, &point, s->dissipated);
         for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
-            powers[0] += s->dissipated[i] * s->v[i];
+            if (drape_model_owns(m, (int32_t)(i / 3)))
+                powers[0] += s->dissipated[i] * s->v[i];
         powers[0] += drape_system_support_power(s->system, s->dissipated, (s->span[0] + s->span[1]) / 2);
         powers[0] += collider_power(s, t, drape_system_on_colliders(s->system));
     }
@@ -258,8 +272,11 @@ static void measure_powers(drape_first_order *s, double t, double powers[2])
     for (int32_t i = 0; i < motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)motion->moved_node[i] + k;
-            powers[1] += s->g[at] * s->v[at];
+            if (drape_model_owns(m, motion->moved_node[i]))
+                powers[1] += s->g[at] * s->v[at];
         }
+    if (s->ranks)
+        s->ranks->sum(s->ranks, powers, 2);
 }
 
 /* Adds the work, by the trapezoidal rule. */
@@ -347,7 +364,9 @@ static drape_status start(drape_first_order *s, const drape_state *in, double h,
         rate[s->n + i] = -s->g[drape_first_order_at(s, i)] / s->mass[i];
     s->counted = 0;
     info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
-    if (!drape_all_finite(rate + s->n, (size_t)s->n)) /* the solver would cut its step ten times for it */
+    if (!drape_ranks_all(
+            s->ranks,
+            drape_all_finite(rate + s->n, (size_t)s->n))) /* the solver would cut its step ten times for it */
         return DRAPE_RETRY_NONFINITE;
     info->reason = drape_reason_name(DRAPE_REASON_SOLVER);
     return s->solver->begin(s, in->t, h) ? DRAPE_OK : DRAPE_E_SOLVER;
@@ -476,6 +495,7 @@ void drape_first_order_interpolate(void *state, double t, double *x)
     const double *y = N_VGetArrayPointer(s->between);
     for (int64_t i = 0; i < s->n; i++)
         x[drape_first_order_at(s, i)] = y[i];
+    drape_ranks_fetch(s->ranks, x);
 }
 
 void drape_first_order_interpolate_velocities(void *state, double t, double *v)
@@ -486,6 +506,7 @@ void drape_first_order_interpolate_velocities(void *state, double t, double *v)
     const double *y = N_VGetArrayPointer(s->between);
     for (int64_t i = 0; i < s->n; i++)
         v[drape_first_order_at(s, i)] = y[s->n + i];
+    drape_ranks_fetch(s->ranks, v);
 }
 
 void drape_first_order_restart(void *state, const drape_state *from)
@@ -511,6 +532,8 @@ static void create_arrays(drape_first_order *s)
     s->mass = drape_arena_take(s->arena, (size_t)s->n, sizeof *s->mass);
     for (int64_t i = 0; s->mass && i < s->n; i++)
         s->mass[i] = s->model->mass[s->model->node_of_free[i / 3]];
+    for (int k = 0; s->ranks && k < 2; k++)
+        s->with_copies[k] = drape_arena_take(s->arena, (size_t)s->model->block_count, 3 * sizeof(double));
     if (!s->model->has_dissipation)
         return;
     s->damping =
@@ -537,10 +560,10 @@ static void set_tolerances(drape_first_order *s, int loose_order, int tight_orde
 
 static drape_status create_vectors(drape_first_order *s)
 {
-    s->y = N_VNew_Serial(2 * s->n, s->sun);
-    s->rate = N_VNew_Serial(2 * s->n, s->sun);
-    s->weights = N_VNew_Serial(2 * s->n, s->sun);
-    s->between = N_VNew_Serial(2 * s->n, s->sun);
+    s->y = drape_vector_new(s->ranks, 2 * s->n, s->sun);
+    s->rate = drape_vector_new(s->ranks, 2 * s->n, s->sun);
+    s->weights = drape_vector_new(s->ranks, 2 * s->n, s->sun);
+    s->between = drape_vector_new(s->ranks, 2 * s->n, s->sun);
     if (!s->y || !s->rate || !s->weights || !s->between)
         return drape_fail_memory(s->arena->ctx, 2 * (size_t)s->n * sizeof(double));
     N_VConst(0, s->y);
@@ -557,6 +580,7 @@ drape_status drape_first_order_create(drape_first_order *s, const drape_first_or
     s->arena = arena;
     s->system = system;
     s->model = drape_system_model(system);
+    s->ranks = drape_model_ranks(s->model);
     s->motion = drape_system_motion(system);
     s->exact_span = 1;
     s->reached = s->from = NAN;
@@ -571,14 +595,14 @@ drape_status drape_first_order_create(drape_first_order *s, const drape_first_or
     if (!status && s->n > 0)
         set_tolerances(s, loose_order, tight_order);
     if (!status && s->n > 0)
-        status = drape_sun_linear_create(arena, s->sun,
-                                         drape_linears[(int)values[DRAPE_FIRST_ORDER_LINEAR_SOLVER]],
-                                         drape_system_pattern(s->system), drape_system_pool(s->system),
-                                         drape_system_cancel_flag(s->system), &s->linear);
+        status = drape_sun_linear_create(
+            arena, s->sun, drape_linear_of(s->ranks, (int)values[DRAPE_FIRST_ORDER_LINEAR_SOLVER]),
+            drape_system_pattern(s->system), drape_system_pool(s->system),
+            drape_system_cancel_flag(s->system), &s->linear);
     if (status || s->n == 0)
         return status;
     s->linear->owner = s;
-    if (!drape_sun_newton_create(&s->newton, s->y, s->sun) || !solver->create(s))
+    if (!drape_sun_newton_create(&s->newton, s->y, 2 * s->n, s->ranks, s->sun) || !solver->create(s))
         return drape_fail(ctx, DRAPE_E_MEMORY, "%s cannot be set up for %lld unknowns", solver->name,
                           (long long)(2 * s->n));
     return DRAPE_OK;
@@ -655,7 +679,7 @@ void drape_first_order_archive(void *state, drape_archive *a)
     if (s->n == 0)
         return;
     archive_factors(s, a);
-    if (!s->solver->archive(s, a) && a->reading)
+    if ((s->ranks || !s->solver->archive(s, a)) && a->reading)
         drape_first_order_restart(s, NULL);
 }
 

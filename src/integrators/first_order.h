@@ -126,11 +126,13 @@ struct drape_first_order {
     N_Vector y, rate, weights, between; /* (x, v), (x', v'), absolute tolerances, dense output */
     drape_sun_linear *linear;
     drape_sun_newton newton;
-    double *mass;       /* of the free DOFs */
-    double *x, *v, *g;  /* nodes: where the residual was evaluated last; g there */
-    double *damping;    /* D (nonzeros); NULL if nothing dissipates */
-    double *reduced;    /* right-hand side of the reduced system (n) */
-    double *dissipated; /* nodes; NULL if nothing dissipates */
+    double *mass;             /* of the free DOFs */
+    double *x, *v, *g;        /* nodes: where the residual was evaluated last; g there */
+    double *damping;          /* D (nonzeros); NULL if nothing dissipates */
+    const drape_ranks *ranks; /* the model's */
+    double *with_copies[2];   /* (pattern.n) scratch of products of D, if there are ranks */
+    double *reduced;          /* right-hand side of the reduced system (n) */
+    double *dissipated;       /* nodes; NULL if nothing dissipates */
 
     /* The matrix, kept between steps. */
     double factored_cj;      /* c_j of the factors */

@@ -170,6 +170,7 @@ const drape_integrator_ops drape_integrator_ida = {
     .order = 5,
     .create = create,
     .own_steps = true,
+    .by_ranks = true,
     .gain = DRAPE_FIRST_ORDER_GAIN,
     .smooth_forces = true,
     .step = drape_first_order_step,

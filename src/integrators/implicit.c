@@ -146,7 +146,20 @@ void drape_implicit_report(const drape_solve_report *report, drape_step_info *in
 
 double drape_implicit_collider_work(const drape_implicit *s, double t0, double t1)
 {
-    return drape_motion_collider_work(s->motion, drape_system_on_colliders(s->equation.system), t0, t1);
+    const double work =
+        drape_motion_collider_work(s->motion, drape_system_on_colliders(s->equation.system), t0, t1);
+    return drape_ranks_sum(s->equation.ranks, work);
+}
+
+/* Adds the work of forces (nodes) on a path. */
+static void add_work(const drape_step_equation *e, const double *g, const double *from, const double *to,
+                     double *sum)
+{
+    double work = e->ranks ? 0 : *sum;
+    for (size_t i = 0; i < e->nodes; i++)
+        if (drape_model_owns(e->model, (int32_t)(i / 3)))
+            work += g[i] * (to[i] - from[i]);
+    *sum = e->ranks ? *sum + drape_ranks_sum(e->ranks, work) : work;
 }
 
 void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_state *out,
@@ -157,8 +170,10 @@ void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_
     for (int32_t i = 0; i < s->motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)s->motion->moved_node[i] + k;
-            pin_work += e->g[at] * (out->x[at] - in->x[at]);
+            if (drape_model_owns(e->model, s->motion->moved_node[i]))
+                pin_work += e->g[at] * (out->x[at] - in->x[at]);
         }
+    pin_work = drape_ranks_sum(e->ranks, pin_work);
     pin_work += drape_system_support_work(e->system, NULL, in->t, out->t);
     info->pin_work += pin_work + drape_implicit_collider_work(s, in->t, out->t);
     info->residual_work += fmax(drape_step_equation_dot(e, e->f, s->d), 0);
@@ -166,8 +181,7 @@ void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_
         return;
     /* From here on the forces on colliders, whose work was added above, are their dissipative part. */
     drape_system_dissipation(e->system, &e->point, s->dissipated);
-    for (size_t i = 0; i < e->nodes; i++)
-        info->dissipated += s->dissipated[i] * (out->x[i] - in->x[i]);
+    add_work(e, s->dissipated, in->x, out->x, &info->dissipated);
     info->dissipated += drape_system_support_work(e->system, s->dissipated, in->t, out->t);
     info->dissipated += drape_implicit_collider_work(s, in->t, out->t);
 }
@@ -213,8 +227,7 @@ void drape_implicit_audit_dissipation(drape_implicit *s, const double *from, con
         return;
     const drape_point middle = middle_of(e, from, to, t, span);
     drape_system_dissipation(e->system, &middle, s->dissipated);
-    for (size_t i = 0; i < e->nodes; i++)
-        info->dissipated += s->dissipated[i] * (to[i] - from[i]);
+    add_work(e, s->dissipated, from, to, &info->dissipated);
     info->dissipated += drape_system_support_work(e->system, s->dissipated, t, t + span);
     info->dissipated += drape_implicit_collider_work(s, t, t + span);
 }

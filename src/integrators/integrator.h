@@ -69,6 +69,7 @@ typedef struct drape_integrator_ops {
     bool mean_velocities;
     /* Terms may have energies of motion: it steps their momenta, or nothing moves. */
     bool momenta;
+    bool by_ranks; /* it can step a model that several ranks share (base/ranks.h) */
     /* It moves supports itself. If not, it steps in their frame (drape_system_to_frame), where they rest. */
     bool in_space;
     /* Steps from in to out, whose t is set. h: the nominal size of the step, exact, while out->t - in->t is

@@ -92,7 +92,7 @@ static int begin(drape_sun_newton *newton, N_Vector y, void *library)
     int code = content_of(newton)->Sys(y, newton->residual, library);
     if (code)
         return code;
-    const int64_t n = N_VGetLength(y) / 2;
+    const int64_t n = newton->n / 2;
     const double *f = N_VGetArrayPointer(newton->residual), scale = scale_of(newton, library);
     double *v = N_VGetArrayPointer(y) + n;
     for (int64_t i = 0; i < n; i++)
@@ -103,12 +103,12 @@ static int begin(drape_sun_newton *newton, N_Vector y, void *library)
 /* Work of the residual of M v' + g along a correction; with masses, in a unit that is the same in a step. */
 static double work_along(const drape_sun_newton *newton, N_Vector correction)
 {
-    const int64_t n = N_VGetLength(correction) / 2;
+    const int64_t n = newton->n / 2;
     const double *f = N_VGetArrayPointer(newton->residual) + n, *dx = N_VGetArrayPointer(correction);
     double work = 0;
     for (int64_t i = 0; i < n; i++)
         work += (newton->mass ? newton->mass[i] * f[i] : f[i]) * dx[i];
-    return work;
+    return drape_ranks_sum(newton->ranks, work);
 }
 
 /* Moves y along the correction, as far as contact allows and as the residual does not push back by more
@@ -180,8 +180,11 @@ static int solve(SUNNonlinearSolver solver, N_Vector predicted, N_Vector y, N_Ve
 
 /* ---- The object ---- */
 
-bool drape_sun_newton_create(drape_sun_newton *newton, N_Vector like, SUNContext sun)
+bool drape_sun_newton_create(drape_sun_newton *newton, N_Vector like, int64_t n, const drape_ranks *ranks,
+                             SUNContext sun)
 {
+    newton->n = n;
+    newton->ranks = ranks;
     drape_sun_newton_forget(newton);
     newton->residual = N_VClone(like);
     newton->correction = N_VClone(like);

@@ -25,6 +25,7 @@
 #define DRAPE_INTEGRATORS_SUN_NEWTON_H
 
 #include "base/archive.h"
+#include "base/ranks.h"
 
 #include <sundials/sundials_nonlinearsolver.h>
 
@@ -32,6 +33,8 @@
 
 typedef struct drape_sun_newton {
     SUNNonlinearSolver solver;
+    int64_t n;                /* unknowns here */
+    const drape_ranks *ranks; /* NULL: all are */
     int (*undamped)(SUNNonlinearSolver, N_Vector, N_Vector, N_Vector, sunrealtype, int, void *);
     N_Vector residual, correction, next, trial; /* of the damped iteration */
     double first;                               /* norm of the first correction of a step */
@@ -48,8 +51,10 @@ typedef struct drape_sun_newton {
     void *user;
 } drape_sun_newton;
 
-/* Creates newton->solver. like: any vector of the unknowns (x, v). False: out of memory. */
-bool drape_sun_newton_create(drape_sun_newton *newton, N_Vector like, SUNContext sun);
+/* Creates newton->solver. like: any vector of the unknowns (x, v), of which n are here; ranks: that share them.
+ * False: out of memory. */
+bool drape_sun_newton_create(drape_sun_newton *newton, N_Vector like, int64_t n, const drape_ranks *ranks,
+                             SUNContext sun);
 
 /* To be called after newton->solver has been given to IDA, CVODE or ARKODE, which put their own test of
  * convergence into it. False: refused. */

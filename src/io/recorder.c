@@ -30,6 +30,10 @@ struct drape_recorder {
     drape_context *ctx;
     drape_arena arena;
     drape_sim *sim;
+    const drape_model *model; /* whole */
+    const drape_ranks *ranks; /* that share the model; NULL: none. Rank 0 writes all files */
+    bool writes;              /* this process does */
+    double *gathered;         /* (node_count x 3, three times) of the whole model, on rank 0 */
     drape_folder *folder;
     const char *const *also; /* of the def, until the recorder is made */
     size_t also_count;
@@ -53,7 +57,8 @@ struct drape_recorder {
     int64_t frames;
     double last_time; /* [s] of the last frame */
     bool moved;       /* a step was accepted after the last frame */
-    bool counted;     /* the def says how many frames come */
+    bool wants_fields;
+    bool counted; /* the def says how many frames come */
     bool finished;
     double seconds;
     drape_status failure; /* the first one; DRAPE_OK: none */
@@ -110,7 +115,7 @@ static const double *rotate(const double *from, size_t count, double *to)
 /* The fields at the nodes and triangles of the surface. */
 static void show_fields(drape_recorder *r, drape_frame *frame)
 {
-    const drape_model *model = drape_sim_model(r->sim);
+    const drape_model *model = r->model;
     const size_t nodes = (size_t)model->surface.node_count, triangles = (size_t)model->surface.triangle_count;
     double *velocities = r->shown, *density = velocities + 3 * nodes, *strain = density + nodes;
     drape_render_values(model, frame->velocities, 3, velocities);
@@ -123,15 +128,14 @@ static void show_fields(drape_recorder *r, drape_frame *frame)
     frame->pinned = r->pinned;
 }
 
-/* Adds the fields to the frame, if a format wants any. */
+/* Adds the fields to the frame, if a format wants any; their density of energy is there already. */
 static void add_fields(drape_recorder *r, const double *velocities, drape_frame *frame)
 {
-    const drape_model *model = drape_sim_model(r->sim);
+    const drape_model *model = r->model;
     if (!r->fields)
         return;
-    double *density = r->fields, *strain = density + drape_model_node_count(model);
+    double *density = r->fields, *strain = density + model->node_count;
     drape_model_strain(model, frame->nodes, strain);
-    drape_sim_energy_density(r->sim, density);
     frame->velocities = velocities;
     frame->strain = strain;
     frame->energy_density = density;
@@ -143,7 +147,7 @@ static void add_fields(drape_recorder *r, const double *velocities, drape_frame 
 /* Puts the vertices of render meshes where the nodes carry them. */
 static void show_positions(drape_recorder *r, drape_frame *frame)
 {
-    const drape_model *model = drape_sim_model(r->sim);
+    const drape_model *model = r->model;
     frame->positions = frame->nodes;
     if (!model->surface.bound)
         return;
@@ -186,7 +190,7 @@ static void rotate_pose(const drape_collider_pose *from, drape_collider_pose *to
 
 static drape_frame rotated_frame(const drape_recorder *r, const drape_frame *frame)
 {
-    size_t nodes = (size_t)drape_sim_model(r->sim)->surface.node_count;
+    size_t nodes = (size_t)r->model->surface.node_count;
     drape_frame rotated = *frame;
     rotated.positions = rotate(frame->positions, nodes, r->rotated);
     if (frame->velocities)
@@ -209,7 +213,30 @@ static void write_outputs(drape_recorder *r, const drape_frame *frame)
     }
 }
 
-static void write_frame(drape_recorder *r, double time, const double *positions, const double *velocities)
+/* Where ranks share the model, *values (here) become those of the whole on rank 0, in one of its arrays. */
+static void gather(drape_recorder *r, int array, int width, const double **values)
+{
+    double *all = r->gathered ? r->gathered + 3 * (size_t)array * (size_t)r->model->node_count : NULL;
+    if (!r->ranks)
+        return;
+    r->ranks->gather(r->ranks, *values, width, all);
+    *values = all;
+}
+
+/* The energy of each node per area, if a format wants any fields. */
+static void find_density(drape_recorder *r)
+{
+    const double *density = r->fields;
+    if (!r->wants_fields)
+        return;
+    drape_sim_energy_density(r->sim, r->fields);
+    gather(r, 2, 1, &density);
+    if (r->ranks && r->writes)
+        memcpy(r->fields, density, (size_t)r->model->node_count * sizeof *density);
+}
+
+static void write_all(drape_recorder *r, double time, const double *positions, const double *velocities,
+                      const drape_energy *energy)
 {
     drape_frame frame = {.index = r->frames, .time = time, .nodes = positions};
     show_positions(r, &frame);
@@ -218,9 +245,20 @@ static void write_frame(drape_recorder *r, double time, const double *positions,
         add_bodies(r, &frame);
     write_outputs(r, &frame);
     const drape_energy_row row = {
-        .frame = r->frames, .t = time, .t_state = drape_sim_time(r->sim), .energy = drape_sim_energy(r->sim)};
+        .frame = r->frames, .t = time, .t_state = drape_sim_time(r->sim), .energy = *energy};
     if (!r->failure)
         note(r, drape_energy_write(&r->energies, &row));
+}
+
+static void write_frame(drape_recorder *r, double time, const double *positions, const double *velocities)
+{
+    const drape_energy energy = drape_sim_energy(r->sim);
+    find_density(r);
+    gather(r, 0, 3, &positions);
+    if (r->wants_fields)
+        gather(r, 1, 3, &velocities);
+    if (r->writes)
+        write_all(r, time, positions, velocities, &energy);
     if (r->failure)
         return;
     r->frames++;
@@ -261,7 +299,7 @@ static void archive_progress(drape_recorder *r, drape_archive *a)
     archive_formats(r, a);
     archive_duration(r, a);
     drape_archive_same(a, "whether frames have z up", r->sim->model->z_up);
-    drape_archive_same(a, "the number of vertices in frames", r->sim->model->surface.node_count);
+    drape_archive_same(a, "the number of vertices in frames", r->model->surface.node_count);
     drape_archive_bool(a, &r->finished);
     drape_archive_int64(a, &r->frames);
     drape_archive_double(a, &r->last_time);
@@ -318,7 +356,8 @@ static void write_attempt(drape_recorder *r, const drape_attempt *attempt)
 {
     drape_energy energy = drape_sim_energy(r->sim);
     r->moved = r->moved || attempt->accepted;
-    note(r, drape_steps_write(&r->steps, attempt, &energy, &r->sim->events));
+    if (r->writes)
+        note(r, drape_steps_write(&r->steps, attempt, &energy, &r->sim->events));
 }
 
 static void write_due_checkpoint(drape_recorder *r)
@@ -356,7 +395,7 @@ static drape_status observe(void *user, const drape_event *event)
 static drape_export_def def_of(const drape_sim *sim)
 {
     const double counted = drape_model_duration(sim->model) * sim->frame_rate;
-    return (drape_export_def){.model = sim->model,
+    return (drape_export_def){.model = drape_model_whole(sim->model),
                               .frame_rate = sim->frame_rate,
                               .most_frames = counted < MAX_FRAMES ? (int64_t)counted + 3 : MAX_FRAMES};
 }
@@ -403,7 +442,7 @@ static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *
 /* What shows render meshes. */
 static drape_status allocate_surface(drape_recorder *r)
 {
-    const drape_model *model = r->sim->model;
+    const drape_model *model = r->model;
     const drape_render_surface *s = &model->surface;
     const size_t nodes = (size_t)s->node_count, triangles = (size_t)s->triangle_count;
     r->normals = drape_arena_take(&r->arena, (size_t)model->node_count, 3 * sizeof *r->normals);
@@ -422,13 +461,16 @@ static drape_status allocate_surface(drape_recorder *r)
 
 static drape_status allocate_arrays(drape_recorder *r)
 {
-    const drape_model *model = r->sim->model;
+    const drape_model *model = r->model;
     size_t nodes = (size_t)model->node_count, triangles = (size_t)model->triangle_count;
     bool fields = false, rotates = false;
     for (size_t i = 0; i < r->output_count; i++) {
         fields = fields || r->outputs[i].ops->wants_fields;
         rotates = rotates || (model->z_up && !r->outputs[i].ops->y_up);
     }
+    r->wants_fields = fields;
+    if (r->ranks && r->writes)
+        r->gathered = drape_arena_take(&r->arena, 3 * nodes, 3 * sizeof *r->gathered);
     if (fields)
         r->fields = drape_arena_take(&r->arena, nodes + 2 * triangles, sizeof *r->fields);
     if (rotates)
@@ -438,7 +480,7 @@ static drape_status allocate_arrays(drape_recorder *r)
 
 static drape_status make_bodies(drape_recorder *r)
 {
-    const drape_model *model = r->sim->model;
+    const drape_model *model = r->model;
     bool wanted = false;
     for (size_t i = 0; i < r->output_count; i++)
         wanted = wanted || r->outputs[i].ops->wants_bodies;
@@ -513,7 +555,7 @@ static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def
     if (!status && def->scene)
         status = drape_folder_protect(r->folder, def->scene);
     if (!status)
-        status = drape_scene_files(r->ctx, r->sim->model, def->scene ? def->scene : "", protect, r->folder);
+        status = drape_scene_files(r->ctx, r->model, def->scene ? def->scene : "", protect, r->folder);
     return status ? status : drape_folder_check(r->folder, resumes ? nothing : writes, clears, r);
 }
 
@@ -634,12 +676,14 @@ static drape_status set_up(drape_recorder *r, const drape_recorder_def *def, dra
         status = allocate_arrays(r);
     if (!status)
         status = make_bodies(r);
-    if (!status)
+    if (!status && r->writes)
         status = open_folder(r, def, a != NULL);
-    if (!status)
+    if (!status && r->writes)
         status = prepare_checkpoints(r, def);
-    if (!status)
+    if (!status && r->writes)
         status = a ? resume_files(r, a) : open_files(r);
+    if (drape_ranks_any(r->ranks, status != DRAPE_OK) && !status)
+        status = drape_fail(r->ctx, DRAPE_E_STOPPED, "another rank cannot write");
     r->start -= r->wall;
     if (!status) /* the last stage, because an observer cannot be removed from a sim */
         status = drape_sim_observe(r->sim, observe, r);
@@ -661,6 +705,9 @@ static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recor
     r->ctx = ctx;
     r->arena = drape_arena_of(ctx);
     r->sim = sim;
+    r->model = drape_model_whole(sim->model);
+    r->ranks = drape_model_ranks(sim->model);
+    r->writes = !r->ranks || r->ranks->rank == 0;
     scope s = scope_enter();
     note(r, set_up(r, def, a));
     scope_leave(r, s);
@@ -723,6 +770,11 @@ void drape_recorder_destroy(drape_recorder **recorder)
 }
 
 /* ---- Queries ---- */
+
+bool drape_recorder_writes(const drape_recorder *recorder)
+{
+    return recorder->writes;
+}
 
 drape_folder *drape_recorder_folder(const drape_recorder *recorder)
 {

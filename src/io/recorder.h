@@ -53,6 +53,9 @@ bool drape_recorder_is_finished(const drape_recorder *recorder);
  * DRAPE_E_FILE; then the previous checkpoint is unchanged. */
 drape_status drape_recorder_checkpoint(drape_recorder *recorder);
 
+/* Whether this process writes the files: of several ranks, rank 0 does. */
+bool drape_recorder_writes(const drape_recorder *recorder);
+
 /* The folder, in which the caller may write the files of def->also; open until drape_recorder_destroy. */
 drape_folder *drape_recorder_folder(const drape_recorder *recorder);
 

@@ -300,6 +300,8 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     object = drape_json_with(object, "strain", strain(&s));
     if (s.stability_known)
         object = drape_json_with(object, "equilibrium", stability(&s));
+    if (model->part) /* what follows needs the whole model */
+        return drape_json_with(object, "ranks", json_integer(model->part->ranks->count));
     object = with_inside(object, sim);
     object = with_untangling(object, sim);
     object = with_no_room(object, sim);
@@ -341,10 +343,12 @@ drape_status drape_summary_write(drape_context *ctx, drape_sim *sim, const drape
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "a summary needs a sim, a def and a path");
     drape_file file = {0};
     locale_t old = drape_locale_enter();
+    const drape_ranks *ranks = drape_model_ranks(sim->model);
     json_t *json = summary(sim, def);
     drape_status status =
-        json ? write_json(ctx, json, folder, path, &file)
-             : drape_fail(ctx, DRAPE_E_MEMORY, "out of memory for the summary \"%.500s\"", path);
+        json && ranks && ranks->rank > 0 ? DRAPE_OK /* rank 0 writes it */
+        : json                           ? write_json(ctx, json, folder, path, &file)
+               : drape_fail(ctx, DRAPE_E_MEMORY, "out of memory for the summary \"%.500s\"", path);
     json_decref(json);
     drape_file_destroy(&file);
     drape_locale_leave(old);

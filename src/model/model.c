@@ -11,7 +11,7 @@ void drape_model_destroy(drape_model **model)
         return;
     drape_model *m = *model;
     drape_context *ctx = m->ctx;
-    for (int32_t c = 0; c < m->cloth_count && !m->base; c++) {
+    for (int32_t c = 0; c < m->cloth_count && !m->base && !m->part; c++) {
         drape_mesh_free(&m->cloths[c].mesh);
         drape_mesh_free(&m->cloths[c].render_mesh);
     }
@@ -22,7 +22,7 @@ void drape_model_destroy(drape_model **model)
 
 int32_t drape_model_node_count(const drape_model *model)
 {
-    return model ? model->node_count : 0;
+    return model ? model->part ? model->part->all_nodes : model->node_count : 0;
 }
 
 int32_t drape_model_triangle_count(const drape_model *model)
@@ -32,12 +32,12 @@ int32_t drape_model_triangle_count(const drape_model *model)
 
 int64_t drape_model_dof_count(const drape_model *model)
 {
-    return model ? 3 * (int64_t)model->free_count : 0;
+    return model ? 3 * (int64_t)drape_model_all_free(model) : 0;
 }
 
 int64_t drape_model_nonzero_count(const drape_model *model)
 {
-    return model ? model->pattern.nonzeros : 0;
+    return model ? model->part ? model->part->all_nonzeros : model->pattern.nonzeros : 0;
 }
 
 const int32_t *drape_model_triangles(const drape_model *model)
@@ -158,6 +158,32 @@ int drape_model_couplings(const drape_model *model, const bool *without, drape_c
         couplings[count++] =
             (drape_coupling){.count = model->image_coupled_count, .nodes = 2, .node = model->image_coupled};
     return count;
+}
+
+double drape_model_mean_edge(const drape_model *m)
+{
+    const drape_ranks *ranks = drape_model_ranks(m);
+    double sum = 0, count = 0;
+    for (int32_t e = 0; e < m->edge_count; e++)
+        if (drape_model_owns(m, m->edge[2 * (size_t)e])) {
+            sum += m->edge_length[e];
+            count++;
+        }
+    return drape_ranks_sum(ranks, sum) / drape_ranks_sum(ranks, count);
+}
+
+int32_t drape_model_diagnosed(const drape_model *m, int32_t node, int32_t *number)
+{
+    int32_t c = 0;
+    if (m->part) {
+        while (c + 1 < m->cloth_count && m->part->cloth[c + 1] <= node)
+            c++;
+        *number = node - m->part->cloth[c];
+    } else {
+        c = drape_model_cloth_of(m, node);
+        *number = node - m->cloths[c].first_node;
+    }
+    return c;
 }
 
 int32_t drape_model_cloth_of(const drape_model *model, int32_t node)

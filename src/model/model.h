@@ -4,6 +4,7 @@
 #define DRAPE_MODEL_MODEL_H
 
 #include "base/arena.h"
+#include "base/ranks.h"
 #include "mesh/mesh.h"
 #include "mesh/sequence.h"
 #include "model/pose.h"
@@ -48,8 +49,10 @@ typedef struct drape_term {
     int64_t first_measure;                /* index of its measures in the list of all measures; -1: none */
     const struct drape_term *const *laws; /* laws of the cloth that act on this measure */
     int law_count;
-    const double *damping; /* (elements.count) its measures' own dashpots [J s/q2]; NULL: none */
-    int sliders;           /* of each element (slider.h) */
+    const double *damping;  /* (elements.count) its measures' own dashpots [J s/q2]; NULL: none */
+    const uint8_t *counted; /* (elements.count) 1: their energies count here, 0: on another rank; NULL: all */
+    const int32_t *element; /* (elements.count) their numbers in the whole model; NULL: the same */
+    int sliders;            /* of each element (slider.h) */
     double *slider_stiffness, *slider_limit; /* (sliders x elements.count) [J/q2], [J/q] */
     int64_t
         first_slider; /* index in a state of how far they have slid (sliders x elements.count); -1: none */
@@ -348,7 +351,21 @@ typedef struct drape_model_event {
     bool once; /* it is over after the first root */
 } drape_model_event;
 
+/* What a rank has of a model that several share (base/ranks.h). Its nodes, elements and so on are those of the
+ * whole model in the same order, without the rest. */
+typedef struct drape_part {
+    const drape_ranks *ranks;
+    const drape_model *whole;    /* without its large arrays, except on rank 0 */
+    uint8_t *own;                /* (node_count) 1: this rank computes the node; 0: it is a copy */
+    int32_t *node;               /* (node_count) its number in the whole model */
+    int32_t *cloth;              /* (cloth_count) the first node of each cloth there */
+    int32_t all_nodes, all_free; /* of the whole model */
+    int64_t all_nonzeros;
+    uint64_t hash; /* of the whole model (sim/identity.h) */
+} drape_part;
+
 struct drape_model {
+    const drape_part *part; /* NULL: it is whole */
     const drape_model
         *base;         /* the model that this one is with other pins and masses, and whose arrays it shares
                                 except those that depend on these; NULL: it is its own */
@@ -369,10 +386,11 @@ struct drape_model {
     double *edge_length;          /* (edge_count) [m] */
     uint8_t *pinned;              /* (node_count) */
     int32_t *free_of_node;        /* (node_count) number among the free nodes, -1: pinned */
-    int32_t *node_of_free;        /* (free_count) */
-    int32_t free_count;
-    int32_t *moved_node;  /* (moved_count) pinned nodes with a track or a ride */
-    int32_t *moved_track; /* (moved_count) */
+    int32_t *node_of_free;        /* (block_count) */
+    int32_t free_count;           /* of a part: those that this rank owns, */
+    int32_t block_count;          /* and with copies, which have the higher numbers; else the same */
+    int32_t *moved_node;          /* (moved_count) pinned nodes with a track or a ride */
+    int32_t *moved_track;         /* (moved_count) */
     int32_t moved_count, track_count;
     drape_support
         *supports; /* (support_count) ascending nodes; those that are pinned altogether do not count */
@@ -419,6 +437,31 @@ struct drape_model {
     int32_t *sewn; /* (node_count) the first of the nodes that a node is sewn to, or itself; NULL: no seams */
 };
 
+static inline const drape_ranks *drape_model_ranks(const drape_model *model)
+{
+    return model->part ? model->part->ranks : NULL;
+}
+
+static inline const drape_model *drape_model_whole(const drape_model *model)
+{
+    return model->part ? model->part->whole : model;
+}
+
+static inline bool drape_model_owns(const drape_model *model, int32_t node)
+{
+    return !model->part || model->part->own[node];
+}
+
+/* The free nodes of the whole model. */
+static inline int32_t drape_model_all_free(const drape_model *model)
+{
+    return model->part ? model->part->all_free : model->free_count;
+}
+
+/* For messages: the cloth of a node of a diagnostic, which has the number of the whole model, and the number
+ * in that cloth. */
+int32_t drape_model_diagnosed(const drape_model *model, int32_t node, int32_t *number);
+
 /* Nodes that are sewn together count as one where the neighbours of a node are concerned: pieces that have
  * one of these are not in contact, and may pass through each other at the seam. */
 static inline int32_t drape_model_sewn(const drape_model *model, int32_t node)
@@ -452,6 +495,9 @@ void drape_model_place_pins(const drape_model *model, double t, double *x);
  * faces and edges of cloth can touch, the triangles; and images of coupled nodes. without (term_count):
  * terms to be left out; NULL: none. couplings: of term_count + 2. Returns their number. */
 int drape_model_couplings(const drape_model *model, const bool *without, drape_coupling *couplings);
+
+/* The mean length of the edges [m], of all ranks. */
+double drape_model_mean_edge(const drape_model *model);
 
 /* Returns the cloth that a node belongs to. */
 int32_t drape_model_cloth_of(const drape_model *model, int32_t node);

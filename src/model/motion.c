@@ -16,7 +16,7 @@
 
 static size_t pinned_count(const drape_model *m)
 {
-    return (size_t)(m->node_count - m->free_count);
+    return (size_t)(m->node_count - m->block_count);
 }
 
 static void take_tracks(drape_motion *motion)

@@ -50,10 +50,10 @@
 #include "nonlinear/stress_predictor.h"
 #include "solvers/sun_linear.h"
 #include "solvers/sundials_memory.h"
+#include "solvers/vector.h"
 
 #include <kinsol/kinsol.h>
 #include <math.h>
-#include <nvector/nvector_serial.h>
 #include <string.h>
 
 /* KINSOL's settings that no user should need. All are set; none is left to a default. */
@@ -129,7 +129,7 @@ static int return_status(drape_newton *s, drape_status status)
 static double max_norm_bound(const drape_newton *s)
 {
     return drape_residual_component(s->values[DRAPE_NEWTON_TOLERANCE],
-                                    (drape_norm)s->values[DRAPE_NEWTON_NORM], (double)s->equation->dofs);
+                                    (drape_norm)s->values[DRAPE_NEWTON_NORM], s->equation->all_dofs);
 }
 
 /* ---- Guess ---- */
@@ -194,7 +194,8 @@ static int residual(N_Vector d_vector, N_Vector f, void *user)
     drape_step_equation *e = s->equation;
     const double *d = N_VGetArrayPointer(d_vector);
     bool finite = true;
-    if (!s->trial_evaluated || memcmp(d, s->trial, e->dofs * sizeof *d) != 0) {
+    const bool known = s->trial_evaluated && memcmp(d, s->trial, e->dofs * sizeof *d) == 0;
+    if (!drape_ranks_all(e->ranks, known)) {
         s->trial_evaluated = false;
         finite = drape_step_equation_evaluate(e, d);
     }
@@ -330,7 +331,7 @@ static drape_status guess_linearized(drape_newton *s, double *d)
         status = factor(s->linear->solver, NULL);
     if (!status)
         status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
-    if (!status && drape_all_finite(s->chord, e->dofs))
+    if (!status && drape_step_equation_is_finite(e, s->chord))
         memcpy(d, s->chord, e->dofs * sizeof *d);
     s->positive_share = 0;
     s->indefinite = false;
@@ -410,7 +411,7 @@ static double longest(const drape_step_equation *e, const double *p)
     double squared = 0;
     for (size_t i = 0; i < e->dofs; i += 3)
         squared = fmax(squared, vec3_dot(p + i, p + i));
-    return sqrt(squared);
+    return sqrt(drape_ranks_largest(e->ranks, squared));
 }
 
 static double largest(const drape_step_equation *e, const double *f)
@@ -418,7 +419,7 @@ static double largest(const drape_step_equation *e, const double *f)
     double max = 0;
     for (size_t i = 0; i < e->dofs; i++)
         max = fmax(max, e->weight[i / 3] * fabs(f[i]));
-    return max;
+    return drape_ranks_largest(e->ranks, max);
 }
 
 /* Whether a chord step is within correction_tolerance. It is what the correction before it has left where
@@ -426,11 +427,9 @@ static double largest(const drape_step_equation *e, const double *f)
  * NaN, the default, is false. */
 static bool is_near_enough(const drape_newton *s, const double *chord)
 {
-    const double nodes = (double)s->equation->dofs / 3;
-    double squared = 0;
-    for (size_t i = 0; i < s->equation->dofs; i++)
-        squared += chord[i] * chord[i];
-    return sqrt(squared / nodes) <= s->values[DRAPE_NEWTON_CORRECTION_TOLERANCE];
+    const double nodes = s->equation->all_dofs / 3;
+    return sqrt(drape_step_equation_dot(s->equation, chord, chord) / nodes) <=
+           s->values[DRAPE_NEWTON_CORRECTION_TOLERANCE];
 }
 
 /* Chord steps: if p lowered the residual so far that lowering it by the same factor once or twice more
@@ -486,7 +485,7 @@ static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
     drape_status status = drape_sun_linear_solve(s->linear, minus_f, p);
     if (s->searches)
         status = ensure_descent(s, status, minus_f, p);
-    if (status || !drape_all_finite(p, e->dofs))
+    if (status || !drape_step_equation_is_finite(e, p))
         return status;
     s->indefinite = s->indefinite && longest(e, p) > SMALL_STEP * s->edge;
     if (s->searches)
@@ -644,7 +643,7 @@ drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *
 
 static bool configure(drape_newton *s)
 {
-    const double length = s->equation->model->length, n = (double)s->equation->dofs;
+    const double length = s->equation->model->length, n = s->equation->all_dofs;
     bool exact = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT;
     DRAPE_KINSOL_QUIET(s->kin);
     return !KINInit(s->kin, residual, s->unknown) && !KINSetUserData(s->kin, s) &&
@@ -674,18 +673,18 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s)
     drape_system *system = s->equation->system;
     const int64_t n = (int64_t)s->equation->dofs;
     if (drape_sundials_context(&s->sun) || !(s->kin = KINCreate(s->sun)) ||
-        !(s->unknown = N_VMake_Serial(n, s->equation->f, s->sun)) || !(s->ones = N_VNew_Serial(n, s->sun)) ||
-        !(s->weights = N_VNew_Serial(n, s->sun)))
+        !(s->unknown = drape_vector_make(s->equation->ranks, n, s->equation->f, s->sun)) ||
+        !(s->ones = N_VClone(s->unknown)) || !(s->weights = N_VClone(s->unknown)))
         return drape_fail_memory(ctx, (size_t)n * sizeof(double));
     N_VConst(1, s->ones);
     for (int64_t i = 0; i < n; i++)
         N_VGetArrayPointer(s->weights)[i] = s->equation->weight[i / 3];
     if (n == 0)
         return DRAPE_OK;
-    drape_status status =
-        drape_sun_linear_create(arena, s->sun, drape_linears[(int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]],
-                                drape_system_pattern(system), drape_system_pool(system),
-                                drape_system_cancel_flag(system), &s->linear);
+    drape_status status = drape_sun_linear_create(
+        arena, s->sun, drape_linear_of(s->equation->ranks, (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]),
+        drape_system_pattern(system), drape_system_pool(system), drape_system_cancel_flag(system),
+        &s->linear);
     if (status)
         return status;
     if (s->searches && !drape_system_is_symmetric(system) &&
@@ -708,8 +707,7 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
         return DRAPE_E_MEMORY;
     s->equation = equation;
     s->repair_share = 1;
-    for (int32_t i = 0; i < equation->model->edge_count; i++)
-        s->edge += equation->model->edge_length[i] / equation->model->edge_count;
+    s->edge = drape_model_mean_edge(equation->model);
     memcpy(s->values, values, sizeof s->values);
     if (equation->x_ahead)
         s->fraction = drape_arena_take(arena, equation->nodes / 3, sizeof *s->fraction);

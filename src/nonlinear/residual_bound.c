@@ -49,6 +49,8 @@ static drape_status measure_start(drape_system *system, start *out)
             for (size_t k = at; k < at + 3; k++)
                 out->rounding = fmax(out->rounding, DRAPE_ROUNDINGS * fabs(shifted[k] - g[k]));
         }
+        out->load = drape_ranks_sum(drape_model_ranks(m), out->load);
+        out->rounding = drape_ranks_largest(drape_model_ranks(m), out->rounding);
     }
     drape_arena_free(&arena);
     return status;
@@ -84,7 +86,7 @@ static double acceleration_of(const drape_model *m, const start *at, double mass
     if (gravity > 0)
         return gravity;
     double a = fmin(m->length, least_bending(m)); /* over (1 s)^2 */
-    if (at->load > ABOVE_ROUNDING * at->rounding * m->free_count)
+    if (at->load > ABOVE_ROUNDING * at->rounding * drape_model_all_free(m))
         a = fmin(a, at->load / mass);
     return a;
 }
@@ -113,7 +115,7 @@ drape_status drape_residual_bound_set(drape_step_equation *e, drape_norm norm, d
                                       double *tolerance)
 {
     const drape_model *m = e->model;
-    const double component = drape_residual_component(given, norm, (double)e->dofs);
+    const double component = drape_residual_component(given, norm, e->all_dofs);
     double mass = 0;
     start at;
     *tolerance = given;
@@ -124,17 +126,19 @@ drape_status drape_residual_bound_set(drape_step_equation *e, drape_norm norm, d
         return status;
     for (int32_t f = 0; f < m->free_count; f++)
         mass += m->mass[m->node_of_free[f]];
+    mass = drape_ranks_sum(e->ranks, mass);
     const double a = acceleration_of(m, &at, mass);
-    const double mean = bound_of(a * mass / m->free_count, component, at.rounding);
+    const double mean = bound_of(a * mass / drape_model_all_free(m), component, at.rounding);
     double limit = INFINITY;
     for (int32_t f = 0; f < m->free_count; f++) {
         const double load = a * m->mass[m->node_of_free[f]];
         e->weight[f] = mean / bound_of(load, component, at.rounding);
         limit = fmin(limit, e->weight[f] * DRAPE_MAX_LOAD_SHARE * load);
     }
+    limit = drape_ranks_least(e->ranks, limit);
     if (least_gravity(m) > 0) /* else the load is a guess, which the forces may exceed by far */
-        e->max_residual = in_norm(limit, norm, (double)e->dofs);
+        e->max_residual = in_norm(limit, norm, e->all_dofs);
     if (mean != component)
-        *tolerance = in_norm(mean, norm, (double)e->dofs);
+        *tolerance = in_norm(mean, norm, e->all_dofs);
     return DRAPE_OK;
 }

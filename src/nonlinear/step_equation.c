@@ -16,8 +16,10 @@ drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, 
     const drape_model *model = drape_system_model(system);
     *s = (drape_step_equation){.system = system,
                                .model = model,
+                               .ranks = drape_model_ranks(model),
                                .nodes = 3 * (size_t)model->node_count,
-                               .dofs = 3 * (size_t)model->free_count};
+                               .dofs = 3 * (size_t)model->free_count,
+                               .all_dofs = 3 * (double)drape_model_all_free(model)};
     s->x_base = drape_arena_take(arena, s->nodes, sizeof *s->x_base);
     s->v_base = drape_arena_take(arena, s->nodes, sizeof *s->v_base);
     s->inertia = drape_arena_take(arena, s->dofs, sizeof *s->inertia);
@@ -51,6 +53,13 @@ void drape_step_equation_move(drape_step_equation *s, const double *d)
         s->x[at] = s->x_base[at] + d[i];
         s->v[at] = s->v_base[at] + s->point.weight * d[i];
     }
+    if (s->ranks)
+        s->ranks->fetch(s->ranks, (double *[]){s->x, s->v}, 2);
+}
+
+bool drape_step_equation_is_finite(const drape_step_equation *s, const double *a)
+{
+    return drape_ranks_all(s->ranks, drape_all_finite(a, s->dofs));
 }
 
 /* g at the point. */
@@ -72,7 +81,7 @@ bool drape_step_equation_evaluate(drape_step_equation *s, const double *d)
     }
     s->work.residuals++;
     s->work.residual_seconds += drape_system_clock(s->system) - start;
-    return drape_all_finite(s->f, s->dofs);
+    return drape_step_equation_is_finite(s, s->f);
 }
 
 bool drape_step_equation_try(drape_step_equation *s, const double *d, double a, const double *p,
@@ -107,6 +116,7 @@ double drape_step_equation_make_feasible(drape_step_equation *s, double *p)
     memcpy(s->x_ahead, s->x, s->nodes * sizeof *s->x_ahead);
     for (size_t i = 0; i < s->dofs; i++)
         s->x_ahead[drape_step_equation_at(s, i)] += p[i];
+    drape_ranks_fetch(s->ranks, s->x_ahead);
     double fraction = drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t, false, NULL);
     for (size_t i = 0; fraction < 1 && i < s->dofs; i++)
         p[i] *= fraction;
@@ -119,6 +129,7 @@ bool drape_step_equation_shorten_nodes(drape_step_equation *s, double *p, double
         memcpy(s->x_ahead, s->x, s->nodes * sizeof *s->x_ahead);
         for (size_t i = 0; i < s->dofs; i++)
             s->x_ahead[drape_step_equation_at(s, i)] += p[i];
+        drape_ranks_fetch(s->ranks, s->x_ahead);
         if (drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t, pass > 0, fraction) == 1)
             return true;
         for (size_t i = 0; i < s->dofs; i++)
@@ -134,6 +145,7 @@ void drape_step_equation_predict_contact(drape_step_equation *s, const double *p
     memset(s->x_ahead, 0, s->nodes * sizeof *s->x_ahead);
     for (size_t i = 0; p && i < s->dofs; i++)
         s->x_ahead[drape_step_equation_at(s, i)] = p[i];
+    drape_ranks_fetch(s->ranks, s->x_ahead);
     drape_system_predict_contact(s->system, p ? s->x_ahead : NULL, s->point.weight, s->mass_weight);
 }
 
@@ -142,12 +154,12 @@ void drape_step_equation_predict_contact(drape_step_equation *s, const double *p
 bool drape_step_equation_pins_move(const drape_step_equation *s)
 {
     const drape_motion *motion = drape_system_motion(s->system);
-    for (int32_t i = 0; i < motion->moved_count; i++) {
+    bool move = false;
+    for (int32_t i = 0; i < motion->moved_count && !move; i++) {
         const size_t at = 3 * (size_t)motion->moved_node[i];
-        if (memcmp(s->x_base + at, s->x_start + at, 3 * sizeof *s->x_base) != 0)
-            return true;
+        move = memcmp(s->x_base + at, s->x_start + at, 3 * sizeof *s->x_base) != 0;
     }
-    return false;
+    return drape_ranks_any(s->ranks, move);
 }
 
 void drape_step_equation_follow_pins(const drape_step_equation *s, double *d)
@@ -197,9 +209,11 @@ static void add_entry(norms *sum, double f)
     sum->squares += f * f;
 }
 
-static double choose(const norms *sum, drape_norm norm)
+static double choose(const drape_step_equation *s, const norms *sum, drape_norm norm)
 {
-    return norm == DRAPE_NORM_MAX ? sum->max : norm == DRAPE_NORM_L1 ? sum->l1 : sqrt(sum->squares);
+    return norm == DRAPE_NORM_MAX  ? drape_ranks_largest(s->ranks, sum->max)
+           : norm == DRAPE_NORM_L1 ? drape_ranks_sum(s->ranks, sum->l1)
+                                   : sqrt(drape_ranks_sum(s->ranks, sum->squares));
 }
 
 double drape_step_equation_norm(const drape_step_equation *s, drape_norm norm)
@@ -207,7 +221,7 @@ double drape_step_equation_norm(const drape_step_equation *s, drape_norm norm)
     norms sum = {0};
     for (size_t i = 0; i < s->dofs; i++)
         add_entry(&sum, s->weight[i / 3] * s->f[i]);
-    return choose(&sum, norm);
+    return choose(s, &sum, norm);
 }
 
 void drape_step_equation_shift(double *nodes, size_t n)
@@ -234,7 +248,7 @@ double drape_step_equation_rounding(drape_step_equation *s, const double *d, dra
     evaluate_forces(s, s->probe);
     drape_step_equation_begin(s);
     drape_step_equation_move(s, d);
-    if (!drape_all_finite(s->probe, s->nodes))
+    if (!drape_ranks_all(s->ranks, drape_all_finite(s->probe, s->nodes)))
         return NAN;
     for (size_t i = 0; i < s->dofs; i++) {
         size_t at = drape_step_equation_at(s, i);
@@ -242,7 +256,7 @@ double drape_step_equation_rounding(drape_step_equation *s, const double *d, dra
         double error = fabs(s->probe[at] - s->g[at]) + DBL_EPSILON * (inertia + fabs(s->g[at]));
         add_entry(&sum, DRAPE_ROUNDINGS * s->weight[i / 3] * error);
     }
-    return choose(&sum, norm);
+    return choose(s, &sum, norm);
 }
 
 bool drape_step_equation_is_rounding(drape_step_equation *s, const double *d, drape_norm norm,

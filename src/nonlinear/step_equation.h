@@ -26,7 +26,9 @@
 typedef struct drape_step_equation {
     drape_system *system;
     const drape_model *model;
-    size_t nodes, dofs; /* entries of these arrays */
+    const drape_ranks *ranks; /* the model's: sums below are those of all ranks */
+    size_t nodes, dofs;       /* entries of these arrays */
+    double all_dofs;          /* of all ranks */
 
     /* The equation, which an integrator sets before a solve. */
     double *x_base, *v_base; /* nodes: at d = 0; pinned nodes as at the end of the step */
@@ -143,7 +145,10 @@ static inline double drape_step_equation_dot(const drape_step_equation *equation
     double sum = 0;
     for (size_t i = 0; i < equation->dofs; i++)
         sum += a[i] * b[i];
-    return sum;
+    return drape_ranks_sum(equation->ranks, sum);
 }
+
+/* Whether all numbers (free DOFs) are finite. */
+bool drape_step_equation_is_finite(const drape_step_equation *equation, const double *a);
 
 #endif

@@ -27,6 +27,7 @@ void drape_stress_predictor_correct(drape_stress_predictor *s, const drape_point
         return;
     for (int64_t i = 0; i < 3 * (int64_t)model->free_count; i++)
         s->along[3 * (int64_t)model->node_of_free[i / 3] + i % 3] = p[i];
+    drape_ranks_fetch(drape_model_ranks(model), s->along);
     drape_system_stress(s->system, from, s->along, s->stress);
 }
 

@@ -45,7 +45,7 @@ static double kinetic(const drape_model *model, const double *v)
         sum += model->mass[i] *
                (v[3 * i] * v[3 * i] + v[3 * i + 1] * v[3 * i + 1] + v[3 * i + 2] * v[3 * i + 2]);
     }
-    return 0.5 * sum;
+    return 0.5 * drape_ranks_sum(drape_model_ranks(model), sum);
 }
 
 /* The energy of a state, given the internal variables of the state before it and the work so far. */
@@ -145,7 +145,8 @@ static double scene_energy(const drape_model *m)
     double mass = 0, atol_x = NAN, atol_v = NAN;
     drape_derive_tolerances(m, 1, &atol_x, &atol_v);
     for (int32_t i = 0; i < m->node_count; i++)
-        mass += m->mass[i];
+        mass += drape_model_owns(m, i) ? m->mass[i] : 0;
+    mass = drape_ranks_sum(drape_model_ranks(m), mass);
     return 0.5 * mass * atol_v * atol_v;
 }
 
@@ -157,7 +158,7 @@ double drape_sim_energy_received(drape_sim *sim)
 }
 
 /* The node with the largest kinetic energy. */
-static int32_t hottest(const drape_model *m, const double *v)
+static int32_t hottest(const drape_model *m, const double *v, double *most)
 {
     int32_t node = 0;
     double max = -1;
@@ -169,20 +170,24 @@ static int32_t hottest(const drape_model *m, const double *v)
             node = i;
         }
     }
+    *most = max;
     return node;
 }
 
-static drape_diagnostic gain_at(const drape_model *m, const double *v, const char *what, double value,
-                                double limit)
+static drape_diagnostic gain_at(drape_sim *sim, const double *v, const char *what, double value, double limit)
 {
-    int32_t node = hottest(m, v);
-    return (drape_diagnostic){.what = what,
-                              .term = "",
-                              .element = -1,
-                              .node = {node, -1, -1, -1},
-                              .cloth = drape_model_cloth_of(m, node),
-                              .value = value,
-                              .limit = limit};
+    const drape_model *m = sim->model;
+    double most;
+    const int32_t node = hottest(m, v, &most);
+    drape_diagnostic gain = {.what = what,
+                             .term = "",
+                             .element = -1,
+                             .node = {node, -1, -1, -1},
+                             .cloth = drape_model_cloth_of(m, node),
+                             .value = value,
+                             .limit = limit};
+    drape_system_agree_largest(sim->system, most, &gain);
+    return gain;
 }
 
 /* Whether kinetic energy exploded in one step; e is the energy at its beginning. What contact has stored in
@@ -226,21 +231,23 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
                                info->residual_work;
     sim->attempted = attempted;
     sim->attempted_known = true;
-    if (m->free_count == 0) /* all motion is prescribed: a gain is only an error in the sum of the pins'
+    if (drape_model_all_free(m) ==
+        0) /* all motion is prescribed: a gain is only an error in the sum of the pins'
                                work */
         return false;
     if (exploded(&e, &attempted, gain, info->open_work, quiet))
         info->diagnostic =
-            gain_at(m, out->v, "energy gained / kinetic energy", gain / attempted.kinetic, SHARE);
+            gain_at(sim, out->v, "energy gained / kinetic energy", gain / attempted.kinetic, SHARE);
     else if (gain - info->residual_work > STEP_GAIN * scale)
-        info->diagnostic = gain_at(m, out->v, "energy gained / energy available to the run",
+        info->diagnostic = gain_at(sim, out->v, "energy gained / energy available to the run",
                                    (gain - info->residual_work) / scale, STEP_GAIN);
     else if (gain > ROUNDED * scale && unexplained > max_gain * scale)
-        info->diagnostic = gain_at(m, out->v, "energy gained since its minimum / energy available to the run",
-                                   unexplained / scale, max_gain);
+        info->diagnostic =
+            gain_at(sim, out->v, "energy gained since its minimum / energy available to the run",
+                    unexplained / scale, max_gain);
     else if (gain > ROUNDED * scale && run > fmax(UNCONVERGED_GAIN, max_gain) * scale)
         info->diagnostic =
-            gain_at(m, out->v, "energy gained by unconverged steps / energy available to the run",
+            gain_at(sim, out->v, "energy gained by unconverged steps / energy available to the run",
                     run / scale, UNCONVERGED_GAIN);
     else
         return false;
@@ -292,7 +299,7 @@ void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info
 {
     const drape_audit *audit = &sim->audit;
     const double left = audit->residual_work + info->residual_work, before = drape_sim_energy(sim).numerical;
-    if (!(left > 0) || sim->model->free_count == 0)
+    if (!(left > 0) || drape_model_all_free(sim->model) == 0)
         return;
     drape_energy e = measure(sim, out, drape_sim_state(sim)->internal, audit->dissipated + info->dissipated,
                              audit->pin_work + info->pin_work);

@@ -5,6 +5,8 @@
  * by what is computed from it; tests/entries/test_identity.c tries every key of a scene. Two builds are the
  * same if they have the same solvers and compiler, and compute the same bits (sim/reproducible.h).
  */
+#include "sim/identity.h"
+
 #include "base/hash.h"
 #include "sim/reproducible.h"
 #include "sim/sim.h"
@@ -199,8 +201,10 @@ static uint64_t add_event(uint64_t hash, const drape_model_event *event)
     return add_doubles(hash, event->values, DRAPE_MAX_PARAMS);
 }
 
-static uint64_t model_hash(const drape_model *m)
+uint64_t drape_model_identity(const drape_model *m)
 {
+    if (m->part)
+        return m->part->hash;
     const int64_t sizes[] = {m->cloth_count, m->term_count,  m->node_count,     m->triangle_count,
                              m->edge_count,  m->moved_count, m->collider_count, m->internal_count};
     uint64_t hash = add(DRAPE_HASH_START, sizes, sizeof sizes);
@@ -290,7 +294,7 @@ void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
 {
     const drape_model *m = drape_sim_base_model(sim);
     if (!sim->identity_known) {
-        sim->model_hash = model_hash(m);
+        sim->model_hash = drape_model_identity(m);
         sim->choices_hash = choices_hash(sim);
         sim->identity_known = true;
     }
@@ -298,8 +302,8 @@ void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
     archive_build(a);
     archive_name(a, "integrator", sim->chosen.integrator->entry.name);
     archive_name(a, "controller", sim->chosen.controller->entry.name);
-    drape_archive_same(a, "the number of nodes", m->node_count);
-    drape_archive_same(a, "the number of free nodes", m->free_count);
+    drape_archive_same(a, "the number of nodes", drape_model_node_count(m));
+    drape_archive_same(a, "the number of free nodes", drape_model_all_free(m));
     archive_hash(a, "another model", sim->model_hash);
     archive_hash(a, "other settings of integrator, controller or frame rate", sim->choices_hash);
 }

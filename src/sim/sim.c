@@ -233,6 +233,18 @@ drape_status drape_sim_create_like(const drape_sim *like, const drape_model *mod
     return status;
 }
 
+/* Not every method can run on several ranks. */
+static drape_status check_ranks(const drape_sim *sim)
+{
+    if (!sim->chosen.integrator->by_ranks)
+        return drape_fail_at(sim->ctx, DRAPE_E_ARGUMENT, "/integrator/method",
+                             "a run on several ranks cannot use \"%s\"", sim->chosen.integrator->entry.name);
+    if (!sim->chosen.controller->by_ranks)
+        return drape_fail_at(sim->ctx, DRAPE_E_ARGUMENT, "/controller/type",
+                             "a run on several ranks cannot use \"%s\"", sim->chosen.controller->entry.name);
+    return DRAPE_OK;
+}
+
 drape_status drape_sim_create(drape_context *ctx, const drape_model *model, const drape_sim_def *given,
                               drape_sim **out)
 {
@@ -250,6 +262,8 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
         status = open_sim(ctx, model, &def, out);
     if (!status)
         status = drape_choose(ctx, model, &def, &(*out)->chosen);
+    if (!status && model->part)
+        status = check_ranks(*out);
     if (!status)
         status = start_sim(*out, def.threads);
     if (status) {
@@ -307,7 +321,7 @@ void drape_sim_cancel(drape_sim *sim)
 
 drape_status drape_sim_check_cancel(drape_sim *sim)
 {
-    if (!atomic_exchange(&sim->cancel, false))
+    if (!drape_ranks_any(drape_model_ranks(sim->model), atomic_exchange(&sim->cancel, false)))
         return DRAPE_OK;
     return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: cancelled", drape_sim_state(sim)->t);
 }
@@ -403,6 +417,9 @@ drape_status drape_sim_notify(drape_sim *sim, const drape_event *event)
         sim->notifying = true;
         drape_status status = sim->observers[i](sim->observer_users[i], event);
         sim->notifying = false;
+        if (drape_ranks_any(drape_model_ranks(sim->model), status != 0) && !status)
+            return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: another rank stopped the run",
+                              drape_sim_state(sim)->t);
         if (status > 0)
             return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: an observer asked to stop",
                               drape_sim_state(sim)->t);

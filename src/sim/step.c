@@ -35,7 +35,8 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
 {
     drape_state *next = next_state(sim);
     size_t n = 3 * (size_t)sim->model->node_count;
-    if (!drape_all_finite(next->x, n) || !drape_all_finite(next->v, n)) {
+    const bool finite = drape_all_finite(next->x, n) && drape_all_finite(next->v, n);
+    if (!drape_ranks_all(drape_model_ranks(sim->model), finite)) {
         info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
         return DRAPE_RETRY_NONFINITE;
     }
@@ -177,8 +178,8 @@ static void measure_strain(drape_sim *sim, const double *x)
         low = strain < low ? strain : low;
         high = strain > high ? strain : high;
     }
-    s->strain_min = low;
-    s->strain_max = high;
+    s->strain_min = drape_ranks_least(drape_model_ranks(m), low);
+    s->strain_max = drape_ranks_largest(drape_model_ranks(m), high);
 }
 
 /* Makes the new state the present one. The present one joins the past states that the controller wants; the
@@ -326,9 +327,10 @@ static void describe_diagnostic(const drape_model *model, const drape_diagnostic
         used = (size_t)snprintf(text, size, "; worst at (node");
     for (int a = 0; a < 4 && diagnostic->node[a] >= 0 && used < size; a++) {
         const int32_t node = diagnostic->node[a], next = a < 3 ? diagnostic->node[a + 1] : -1;
-        const int32_t in = drape_model_cloth_of(model, node);
-        used += (size_t)snprintf(text + used, size - used, " %d", (int)(node - model->cloths[in].first_node));
-        if (used < size && (next < 0 || drape_model_cloth_of(model, next) != in))
+        int32_t number, unused;
+        const int32_t in = drape_model_diagnosed(model, node, &number);
+        used += (size_t)snprintf(text + used, size - used, " %d", (int)number);
+        if (used < size && (next < 0 || drape_model_diagnosed(model, next, &unused) != in))
             used += (size_t)snprintf(text + used, size - used, " of %s%s", model->cloths[in].name,
                                      next < 0 ? "" : ",");
     }
@@ -394,7 +396,7 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
     describe_diagnostic(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
     describe_nearest(sim, attempt, nearest, sizeof nearest);
     /* a diagnostic that names only a node may not give the cause, which the distortion may */
-    if (attempt->diagnostic.element < 0)
+    if (attempt->diagnostic.element < 0 && !sim->model->part)
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
     if (stop == DRAPE_E_STEP_TOO_SMALL && describe_room(sim, attempt, room, sizeof room))
         return DRAPE_E_MEMORY;

@@ -369,6 +369,8 @@ bool drape_sim_take_warning_failure(drape_sim *sim)
 bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out)
 {
     drape_warning_cursor c = {0};
+    if (sim && sim->model->part) /* what is known here may be no reason, and all ranks must agree */
+        sim = NULL;
     if (sim && index > 0 && sim->warning_cursor.index <= index &&
         sim->warning_cursor.attempts == sim->attempts)
         c = sim->warning_cursor;

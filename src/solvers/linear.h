@@ -33,6 +33,8 @@ struct drape_linear_ops {
     /* It takes memory from the heap during a factorisation, or at the first matrix that needs it. If false,
      * it takes none from the second factorisation on. */
     bool borrows_heap;
+    /* Which solver stands for this one at a number of unknowns; NULL: itself. */
+    const drape_linear_ops *(*pick)(int64_t n);
     /* Creates the solver's state in an arena that stays at its address. The pattern must outlive it.
      * Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER; then *state is not set, and the memory taken stays in the
      * arena. */
@@ -87,6 +89,10 @@ void drape_linear_archive(const drape_linear_ops *ops, void *state, drape_archiv
 /* *state becomes NULL; it may be NULL already. */
 void drape_linear_destroy(const drape_linear_ops *ops, void **state);
 size_t drape_linear_bytes(const drape_linear_ops *ops, const void *state);
+
+/* The solver of that number in the table or, where ranks share the matrix (pattern->ranks), theirs: the direct
+ * one in place of direct ones, else the iterative one. */
+const drape_linear_ops *drape_linear_of(const drape_ranks *ranks, int number);
 
 /* The solver with the largest best_from that is at most n; if none is, the one with the smallest. */
 const drape_linear_ops *drape_linear_best(int64_t n);

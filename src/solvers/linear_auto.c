@@ -120,6 +120,7 @@ const drape_linear_ops drape_linear_auto = {
     .entry = {.name = "auto",
               .summary = "the fastest solver of this build for the number of unknowns",
               .reference = "bench/linears"},
+    .pick = drape_linear_best,
     .create = create,
     .use_threads = use_threads,
     .watch = watch,

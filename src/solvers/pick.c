@@ -25,6 +25,16 @@ const drape_linear_ops *drape_linear_best(int64_t n)
     return best;
 }
 
+const drape_linear_ops *drape_linear_of(const drape_ranks *ranks, int number)
+{
+    const drape_linear_ops *ops = drape_linears[number];
+    if (!ranks)
+        return ops;
+    if (ops->pick)
+        ops = ops->pick(3 * ranks->all_blocks);
+    return ops->solve_inexact ? ranks->iterative : ranks->direct;
+}
+
 void drape_linear_archive(const drape_linear_ops *ops, void *state, drape_archive *a, const double *values)
 {
     bool factored = values != NULL;

@@ -2,6 +2,7 @@
 #include "solvers/refine.h"
 
 #include <math.h>
+#include <string.h>
 
 /* A sum of about a hundred terms of size 1, as in a row of the matrix of a cloth, is off by 1e-14 at most,
  * and typically by 1e-15. */
@@ -13,9 +14,13 @@
 
 drape_status drape_refine_create(drape_arena *arena, const drape_pattern *pattern, drape_refine *w)
 {
-    drape_status status = drape_refine_init(arena, pattern->n, w);
+    drape_status status = drape_refine_init(arena, drape_pattern_own(pattern), w);
     w->pattern = pattern;
-    return status;
+    if (pattern->ranks) {
+        w->input = drape_arena_take(arena, (size_t)pattern->n, sizeof *w->input);
+        w->output = drape_arena_take(arena, (size_t)pattern->n, sizeof *w->output);
+    }
+    return status ? status : drape_arena_status(arena);
 }
 
 drape_status drape_refine_init(drape_arena *arena, int64_t unknowns, drape_refine *w)
@@ -28,42 +33,43 @@ drape_status drape_refine_init(drape_arena *arena, int64_t unknowns, drape_refin
     return drape_arena_status(arena);
 }
 
-static double norm(int64_t n, const double *x)
+static const drape_ranks *ranks_of(const drape_refine *w)
+{
+    return w->pattern ? w->pattern->ranks : NULL;
+}
+
+static double dot(const drape_refine *w, const double *x, const double *y)
 {
     double sum = 0;
-    for (int64_t i = 0; i < n; i++)
-        sum += x[i] * x[i];
-    return sqrt(sum);
+    for (int64_t i = 0; i < w->n; i++)
+        sum += x[i] * y[i];
+    return drape_ranks_sum(ranks_of(w), sum);
+}
+
+static double norm(const drape_refine *w, const double *x)
+{
+    return sqrt(dot(w, x, x));
 }
 
 /* NaN if there is one. */
-static double largest(int64_t n, const double *x)
+static double largest(const drape_refine *w, const double *x)
 {
     double most = 0;
-    for (int64_t i = 0; i < n; i++)
+    for (int64_t i = 0; i < w->n; i++)
         most = fabs(x[i]) <= most ? most : fabs(x[i]);
-    return most;
-}
-
-static double dot(int64_t n, const double *x, const double *y)
-{
-    double sum = 0;
-    for (int64_t i = 0; i < n; i++)
-        sum += x[i] * y[i];
-    return sum;
+    return drape_ranks_largest(ranks_of(w), most);
 }
 
 /* A matrix by the values of a pattern. */
 typedef struct entries {
     const drape_pattern *pattern;
     const double *values;
+    double *input, *output; /* of drape_refine */
 } entries;
 
-static void add_product(const void *owner, double factor, const double *x, double *y)
+static void add_blocks(const drape_pattern *p, const double *values, double factor, const double *x,
+                       double *y)
 {
-    const entries *a_entries = owner;
-    const drape_pattern *p = a_entries->pattern;
-    const double *values = a_entries->values;
     for (int32_t j = 0; j < p->block_count; j++) {
         const double x0 = factor * x[3 * j], x1 = factor * x[3 * j + 1], x2 = factor * x[3 * j + 2];
         for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
@@ -76,6 +82,22 @@ static void add_product(const void *owner, double factor, const double *x, doubl
     }
 }
 
+static void add_product(const void *owner, double factor, const double *x, double *y)
+{
+    const entries *a = owner;
+    const drape_pattern *p = a->pattern;
+    const size_t own = (size_t)drape_pattern_own(p) * sizeof *x;
+    if (!p->ranks) {
+        add_blocks(p, a->values, factor, x, y);
+        return;
+    }
+    memcpy(a->input, x, own);
+    p->ranks->fetch_blocks(p->ranks, a->input);
+    memcpy(a->output, y, own);
+    add_blocks(p, a->values, factor, a->input, a->output);
+    memcpy(y, a->output, own);
+}
+
 static void find_residual(drape_refine *w, drape_add_product *product, const void *owner, const double *b,
                           const double *x)
 {
@@ -83,8 +105,8 @@ static void find_residual(drape_refine *w, drape_add_product *product, const voi
     for (int64_t i = 0; i < n; i++)
         w->residual[i] = b[i];
     product(owner, -1, x, w->residual);
-    w->error = largest(n, w->residual) / (largest(n, x) + largest(n, b));
-    if (largest(n, b) == 0 && largest(n, w->residual) == 0)
+    w->error = largest(w, w->residual) / (largest(w, x) + largest(w, b));
+    if (largest(w, b) == 0 && largest(w, w->residual) == 0)
         w->error = 0;
 }
 
@@ -96,11 +118,11 @@ static void orthogonalise(const drape_refine *w, int j, double *h)
     double *v = w->basis + (j + 1) * n;
     for (int i = 0; i <= j; i++) {
         const double *u = w->basis + i * n;
-        h[i] = dot(n, u, v);
+        h[i] = dot(w, u, v);
         for (int64_t k = 0; k < n; k++)
             v[k] -= h[i] * u[k];
     }
-    h[j + 1] = norm(n, v);
+    h[j + 1] = norm(w, v);
     for (int64_t k = 0; k < n && h[j + 1] > 0; k++)
         v[k] /= h[j + 1];
 }
@@ -142,7 +164,7 @@ static void correct(drape_refine *w, drape_preconditioner *apply, void *factors,
     const int64_t n = w->n;
     double h[VECTORS][VECTORS + 1] = {{0}}, c[VECTORS], s[VECTORS], g[VECTORS + 1] = {0};
     int j = 0;
-    g[0] = norm(n, w->residual);
+    g[0] = norm(w, w->residual);
     for (int64_t k = 0; k < n; k++)
         w->basis[k] = w->residual[k] / g[0];
     while (j < VECTORS && fabs(g[j]) > target) {
@@ -163,13 +185,13 @@ drape_status drape_refine_solve(drape_refine *w, drape_preconditioner *apply, vo
                                 const double *values, const double *b, double *x)
 {
     const int64_t n = w->n;
-    const entries a = {w->pattern, values};
+    const entries a = {w->pattern, values, w->input, w->output};
     double before = INFINITY;
     apply(factors, b, x);
     find_residual(w, add_product, &a, b, x);
     w->first_error = w->error;
     for (int cycle = 0; cycle < CYCLES && w->error > TARGET && w->error < before / 2; cycle++) {
-        const double size = largest(n, x) + largest(n, b);
+        const double size = largest(w, x) + largest(w, b);
         before = w->error;
         correct(w, apply, factors, add_product, &a, 0.1 * TARGET * size * sqrt((double)n), x);
         find_residual(w, add_product, &a, b, x);
@@ -181,16 +203,16 @@ void drape_refine_reduce_product(drape_refine *w, drape_preconditioner *apply, v
                                  drape_add_product *product, const void *owner, const double *b,
                                  double tolerance, double *x)
 {
-    const double target = tolerance * norm(w->n, b);
+    const double target = tolerance * norm(w, b);
     apply(factors, b, x);
     find_residual(w, product, owner, b, x);
-    if (norm(w->n, w->residual) > target)
+    if (norm(w, w->residual) > target)
         correct(w, apply, factors, product, owner, target, x);
 }
 
 void drape_refine_reduce(drape_refine *w, drape_preconditioner *apply, void *factors, const double *values,
                          const double *b, double tolerance, double *x)
 {
-    const entries a = {w->pattern, values};
+    const entries a = {w->pattern, values, w->input, w->output};
     drape_refine_reduce_product(w, apply, factors, add_product, &a, b, tolerance, x);
 }

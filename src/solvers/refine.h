@@ -16,8 +16,9 @@ typedef void drape_preconditioner(void *factors, const double *b, double *x);
 typedef void drape_add_product(const void *owner, double factor, const double *x, double *y);
 
 typedef struct drape_refine {
-    int64_t n;
+    int64_t n;                    /* of vectors here */
     const drape_pattern *pattern; /* NULL: the matrix is only known by its products */
+    double *input, *output;       /* (pattern->n) with copies of other ranks; NULL: there are none */
     double *residual;             /* (n) */
     double *basis, *correction;   /* (vectors + 1, n) and (vectors, n) */
     double first_error, error;    /* of the last solve, before and after refinement: see below */

@@ -3,8 +3,8 @@
 
 #include "base/clock.h"
 
-#include <nvector/nvector_serial.h>
 #include <string.h>
+#include <sundials/sundials_nvector.h>
 
 static SUNMatrix_ID matrix_id(SUNMatrix matrix)
 {
@@ -75,7 +75,7 @@ static void precondition(void *user, const double *b, double *x)
     if (!linear->status)
         linear->status = solve_factored(linear, b, x);
     if (linear->status)
-        memset(x, 0, (size_t)linear->pattern->n * sizeof *x);
+        memset(x, 0, (size_t)drape_pattern_own(linear->pattern) * sizeof *x);
 }
 
 drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x)

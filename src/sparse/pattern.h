@@ -12,15 +12,24 @@
 #include <math.h>
 
 #include "base/arena.h"
+#include "base/ranks.h"
 
 typedef struct drape_pattern {
-    int32_t block_count;  /* number of block columns */
-    int64_t n, nonzeros;  /* scalar sizes: n = 3 block_count */
-    int32_t *block_start; /* (block_count + 1) */
-    int32_t *block_row;   /* (blocks) */
-    int32_t *diagonal;    /* (block_count) number of the diagonal block of each column */
-    int64_t *column;      /* (n + 1) CSC column pointers */
+    int32_t block_count;      /* number of block columns */
+    int64_t n, nonzeros;      /* scalar sizes: n = 3 block_count */
+    int32_t *block_start;     /* (block_count + 1) */
+    int32_t *block_row;       /* (blocks) */
+    int32_t *diagonal;        /* (block_count) number of the diagonal block of each column */
+    int64_t *column;          /* (n + 1) CSC column pointers */
+    const drape_ranks *ranks; /* that share the matrix, of which the columns and rows of copies here are not
+                                 complete; NULL: it is all here */
 } drape_pattern;
+
+/* The number of scalars in vectors here. */
+static inline int64_t drape_pattern_own(const drape_pattern *pattern)
+{
+    return pattern->ranks ? 3 * (int64_t)pattern->ranks->own_blocks : pattern->n;
+}
 
 /* Elements that couple all their nodes: node (count x nodes) holds numbers that block_of_node maps to block
  * columns, or to -1. */

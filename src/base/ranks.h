@@ -1,0 +1,95 @@
+/*
+ * ranks.h: the processes of a distributed run. Each has a part of one model: the nodes that it owns, all
+ * elements that touch these, and copies of the other nodes of these elements (model/model.h). It computes the
+ * forces and the rows of matrices of the nodes that it owns, so that only the positions and velocities of
+ * copies are exchanged, and sums over all nodes.
+ *
+ * This is an interface: nothing here needs MPI, and NULL in place of a drape_ranks means that one process has
+ * everything, for which all functions below return at once. src/mpi implements it.
+ *
+ * All functions are collective: each rank must call them in the same order, and so must branch on their
+ * results, not on what it knows alone. Their results have the same bits on each rank.
+ */
+#ifndef DRAPE_BASE_RANKS_H
+#define DRAPE_BASE_RANKS_H
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct drape_ranks drape_ranks;
+struct drape_linear_ops;
+
+struct drape_ranks {
+    int rank, count;
+    int32_t own_blocks;   /* block columns of matrices that this rank owns: the first ones; the others are
+                                copies */
+    const int64_t *block; /* (block columns) the number of each in the matrix of all ranks */
+    int64_t all_blocks;   /* in that matrix */
+    /* In place of those of one process: a direct solver, and an iterative one for large matrices. */
+    const struct drape_linear_ops *direct, *iterative;
+
+    /* values (n) become their sums over the ranks, in the order of the ranks; their largest, of which NaN is
+     * larger than any number. */
+    void (*sum)(const drape_ranks *ranks, double *values, int n);
+    void (*largest)(const drape_ranks *ranks, double *values, int n);
+    /* Sets the copies in arrays of nodes (node_count x 3) to what their owners have there. */
+    void (*fetch)(const drape_ranks *ranks, double *const *nodes, int arrays);
+    /* The same in an array of block columns (block columns x 3). */
+    void (*fetch_blocks)(const drape_ranks *ranks, double *blocks);
+    /* Gathers what each rank has at its own nodes (`width` numbers a node here) into an array of the whole
+     * model, on rank 0; all: NULL elsewhere. */
+    void (*gather)(const drape_ranks *ranks, const double *nodes, int width, double *all);
+    /* bytes (size) become those of a rank. */
+    void (*broadcast)(const drape_ranks *ranks, int from, void *bytes, int size);
+    /* A vector of SUNDIALS over all ranks (N_Vector) with these n values here; NULL: out of memory. sun: a
+     * SUNContext. */
+    void *(*vector)(const drape_ranks *ranks, int64_t n, double *values, void *sun);
+};
+
+static inline double drape_ranks_sum(const drape_ranks *ranks, double value)
+{
+    if (ranks)
+        ranks->sum(ranks, &value, 1);
+    return value;
+}
+
+static inline double drape_ranks_largest(const drape_ranks *ranks, double value)
+{
+    if (ranks)
+        ranks->largest(ranks, &value, 1);
+    return value;
+}
+
+static inline double drape_ranks_least(const drape_ranks *ranks, double value)
+{
+    return ranks ? -drape_ranks_largest(ranks, -value) : value;
+}
+
+static inline bool drape_ranks_any(const drape_ranks *ranks, bool value)
+{
+    return ranks ? drape_ranks_largest(ranks, value) > 0 : value;
+}
+
+static inline bool drape_ranks_all(const drape_ranks *ranks, bool value)
+{
+    return ranks ? !drape_ranks_any(ranks, !value) : value;
+}
+
+static inline void drape_ranks_fetch(const drape_ranks *ranks, double *nodes)
+{
+    if (ranks)
+        ranks->fetch(ranks, &nodes, 1);
+}
+
+/* Which rank has the largest value, the lowest of several. */
+static inline int drape_ranks_find(const drape_ranks *ranks, double value)
+{
+    if (!ranks)
+        return 0;
+    const double largest = drape_ranks_largest(ranks, value);
+    const bool here = value == largest || (isnan(value) && isnan(largest));
+    return (int)-drape_ranks_largest(ranks, here ? -ranks->rank : -ranks->count);
+}
+
+#endif

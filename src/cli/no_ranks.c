@@ -1,0 +1,30 @@
+/* no_ranks.c: stands for ranks.c in a build without MPI: there is one rank. */
+#include "cli/ranks.h"
+
+int cli_ranks_begin(const cli_command *command)
+{
+    (void)command;
+    return CLI_GO_ON;
+}
+
+int cli_ranks_end(int code)
+{
+    return code;
+}
+
+int cli_ranks_count(void)
+{
+    return 1;
+}
+
+int cli_ranks_agree(const cli_command *command, int code)
+{
+    (void)command;
+    return code;
+}
+
+drape_status cli_ranks_share(drape_status status, cli_scene *scene)
+{
+    (void)scene;
+    return status;
+}

@@ -1,0 +1,78 @@
+/* ranks.c: see ranks.h. */
+#include "cli/ranks.h"
+
+#include "mpi/mpi.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <unistd.h>
+
+static drape_mpi *ranks;  /* NULL: there is one */
+static int messages = -1; /* the standard error of a rank that does not print */
+
+/* Results and messages of ranks other than 0 are the same as those of rank 0. */
+static void be_silent(void)
+{
+    const int nowhere = open("/dev/null", O_WRONLY);
+    fflush(stdout);
+    messages = dup(STDERR_FILENO);
+    if (nowhere < 0)
+        return;
+    dup2(nowhere, STDOUT_FILENO);
+    dup2(nowhere, STDERR_FILENO);
+    close(nowhere);
+}
+
+static void speak(void)
+{
+    if (messages >= 0)
+        dup2(messages, STDERR_FILENO);
+}
+
+int cli_ranks_begin(const cli_command *command)
+{
+    if (!drape_mpi_is_launched())
+        return CLI_GO_ON;
+    if (drape_mpi_begin(command->ctx, &ranks))
+        return cli_report(command, CLI_FAILED);
+    if (drape_mpi_rank(ranks) > 0)
+        be_silent();
+    return CLI_GO_ON;
+}
+
+int cli_ranks_end(int code)
+{
+    drape_mpi_end(&ranks);
+    return code;
+}
+
+int cli_ranks_count(void)
+{
+    return drape_mpi_count(ranks);
+}
+
+int cli_ranks_agree(const cli_command *command, int code)
+{
+    int agreed = code;
+    const int from = drape_mpi_agree(ranks, code != CLI_GO_ON, &agreed);
+    if (from > 0 && from == drape_mpi_rank(ranks)) {
+        speak();
+        cli_report(command, code);
+    }
+    return from < 0 ? CLI_GO_ON : agreed;
+}
+
+drape_status cli_ranks_share(drape_status status, cli_scene *s)
+{
+    if (!ranks)
+        return status;
+    int agreed = status;
+    const int from = drape_mpi_agree(ranks, status != DRAPE_OK, &agreed);
+    if (from > 0 && from == drape_mpi_rank(ranks))
+        speak(); /* the caller prints its message */
+    if (from >= 0)
+        return (drape_status)agreed;
+    s->whole = s->model;
+    s->model = NULL;
+    return drape_mpi_share(ranks, s->whole, &s->model);
+}

@@ -1,0 +1,431 @@
+/*
+ * linear.c: see linear.h. The rows of a rank's own nodes are complete in its values, and go into a matrix of
+ * PETSc of block size 3.
+ *
+ * Direct: MUMPS, LDL' of a symmetric matrix, whose inertia says whether it is definite, else LU.
+ * Iterative: conjugate gradients preconditioned by algebraic multigrid (GAMG: smoothed aggregation) with the
+ * rigid motions of the nodes as near null space. A matrix that is not symmetric, that the iteration finds
+ * indefinite, or that takes more than MAX_ITERATIONS goes to MUMPS, unless the caller asked for a definite one.
+ */
+#include "mpi/linear.h"
+
+#include "mpi/ranks.h"
+
+#include <math.h>
+#include <petscksp.h>
+#include <string.h>
+
+#define EXACT          1e-12 /* relative residual for callers that want all digits */
+#define MAX_ITERATIONS 500
+#define SYMMETRY       1e-13 /* as in solvers/linear_pcg.c */
+#define MORE           2 /* times the iterations after which the aggregates were made: they are made anew */
+
+typedef struct mpi_linear {
+    const drape_pattern *pattern;
+    const drape_mpi_ranks *ranks;
+    bool iterative;
+    double *positions; /* (pattern->n) of the nodes at the next matrix [m]; direct: NULL */
+    Mat matrix;
+    Vec b, x; /* without values of their own */
+    KSP direct, cg;
+    MatNullSpace modes;
+    bool symmetric, definite; /* of the last matrix; a definite one was asked for */
+    bool by_direct;           /* its solves are by factors */
+    bool factored;
+    PetscInt first; /* iterations with the present aggregates in their first solve; -1: there are none */
+    PetscInt last;
+    int64_t fallbacks;
+} mpi_linear;
+
+/* ---- The matrix ---- */
+
+/* The mirrored entries of blocks of which a row or column is of this rank, both of which are complete here. */
+static bool is_symmetric_here(const drape_pattern *p, double *values)
+{
+    for (int32_t j = 0; j < p->ranks->own_blocks; j++)
+        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
+            int64_t stride, mirrored;
+            const int32_t i = p->block_row[k];
+            const double *a = drape_pattern_at(p, values, j, k, &stride),
+                         *b = drape_pattern_at(p, values, i, drape_pattern_find(p, j, i), &mirrored);
+            const double size = fmax(drape_pattern_largest(a, stride), drape_pattern_largest(b, mirrored));
+            int64_t own;
+            const double *d = drape_pattern_at(p, values, j, p->diagonal[j], &own);
+            const double bound = SYMMETRY * fmax(size, drape_pattern_largest(d, own));
+            for (int c = 0; c < 3; c++)
+                for (int r = 0; r < 3; r++)
+                    if (!(fabs(a[c * stride + r] - b[r * mirrored + c]) <= bound))
+                        return false;
+        }
+    return true;
+}
+
+static PetscErrorCode create_matrix(mpi_linear *s, drape_context *ctx)
+{
+    const drape_pattern *p = s->pattern;
+    const drape_ranks *ranks = p->ranks;
+    const PetscInt own = ranks->own_blocks, n = 3 * own;
+    PetscInt *inside = drape_alloc(ctx, (size_t)n, sizeof *inside),
+             *outside = drape_alloc(ctx, (size_t)n, sizeof *outside);
+    PetscErrorCode code = inside && outside ? 0 : PETSC_ERR_MEM;
+    for (PetscInt i = 0; !code && i < own; i++) { /* the pattern is symmetric: columns are rows */
+        PetscInt blocks = 0;
+        for (int32_t k = p->block_start[i]; k < p->block_start[i + 1]; k++)
+            blocks += p->block_row[k] < own;
+        for (PetscInt r = 3 * i; r < 3 * i + 3; r++) {
+            inside[r] = 3 * blocks;
+            outside[r] = 3 * (p->block_start[i + 1] - p->block_start[i] - blocks);
+        }
+    }
+    if (!code)
+        code = MatCreate(s->ranks->comm, &s->matrix);
+    if (!code)
+        code = MatSetSizes(s->matrix, n, n, PETSC_DETERMINE, PETSC_DETERMINE);
+    if (!code)
+        code = MatSetType(s->matrix, MATAIJ); /* GAMG takes no BAIJ */
+    if (!code)
+        code = MatSetBlockSize(s->matrix, 3);
+    if (!code)
+        code = MatSeqAIJSetPreallocation(s->matrix, 0, inside);
+    if (!code)
+        code = MatMPIAIJSetPreallocation(s->matrix, 0, inside, 0, outside);
+    if (!code)
+        code = MatSetOption(s->matrix, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_TRUE);
+    if (!code)
+        code = MatSetOption(s->matrix, MAT_ROW_ORIENTED, PETSC_FALSE);
+    drape_free(ctx, inside);
+    drape_free(ctx, outside);
+    return code;
+}
+
+static PetscErrorCode fill_matrix(mpi_linear *s, const double *values)
+{
+    const drape_pattern *p = s->pattern;
+    const drape_ranks *ranks = p->ranks;
+    PetscErrorCode code = 0;
+    for (int32_t j = 0; j < p->block_count; j++) {
+        const PetscInt column = (PetscInt)ranks->block[j];
+        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1] && !code; k++) {
+            const int32_t i = p->block_row[k];
+            const PetscInt row = (PetscInt)(i < ranks->own_blocks ? ranks->block[i] : -1);
+            double block[9];
+            int64_t stride;
+            const double *from = drape_pattern_at(p, (double *)(uintptr_t)values, j, k, &stride);
+            if (row < 0)
+                continue;
+            for (int c = 0; c < 3; c++)
+                memcpy(block + 3 * c, from + c * stride, 3 * sizeof *block);
+            code = MatSetValuesBlocked(s->matrix, 1, &row, 1, &column, block, INSERT_VALUES);
+        }
+    }
+    if (!code)
+        code = MatAssemblyBegin(s->matrix, MAT_FINAL_ASSEMBLY);
+    if (!code)
+        code = MatAssemblyEnd(s->matrix, MAT_FINAL_ASSEMBLY);
+    if (!code)
+        code = MatSetOption(s->matrix, MAT_SYMMETRIC, s->symmetric ? PETSC_TRUE : PETSC_FALSE);
+    return code;
+}
+
+/* ---- Creation ---- */
+
+static void destroy(void **state)
+{
+    mpi_linear *s = *state;
+    KSPDestroy(&s->direct);
+    KSPDestroy(&s->cg);
+    MatNullSpaceDestroy(&s->modes);
+    VecDestroy(&s->b);
+    VecDestroy(&s->x);
+    MatDestroy(&s->matrix);
+}
+
+static drape_status create(drape_arena *arena, const drape_pattern *pattern, bool iterative, void **state)
+{
+    mpi_linear *s = drape_arena_take(arena, 1, sizeof *s);
+    if (!s)
+        return DRAPE_E_MEMORY;
+    s->pattern = pattern;
+    s->ranks = (const drape_mpi_ranks *)pattern->ranks; /* base is its first member */
+    s->iterative = iterative;
+    s->first = -1;
+    if (iterative) {
+        s->positions = drape_arena_take(arena, (size_t)pattern->n, sizeof *s->positions);
+        if (!s->positions)
+            return DRAPE_E_MEMORY;
+    }
+    const PetscInt n = 3 * pattern->ranks->own_blocks;
+    PetscErrorCode code = create_matrix(s, arena->ctx);
+    if (!code)
+        code = VecCreateMPIWithArray(s->ranks->comm, 3, n, PETSC_DETERMINE, NULL, &s->b);
+    if (!code)
+        code = VecCreateMPIWithArray(s->ranks->comm, 3, n, PETSC_DETERMINE, NULL, &s->x);
+    *state = s;
+    if (!code)
+        return DRAPE_OK;
+    destroy(state);
+    *state = NULL;
+    return drape_fail(arena->ctx, DRAPE_E_SOLVER, "PETSc cannot set up a matrix of %lld unknowns: code %d",
+                      (long long)(3 * pattern->ranks->all_blocks), (int)code);
+}
+
+static drape_status create_direct(drape_arena *arena, const drape_pattern *pattern, void **state)
+{
+    return create(arena, pattern, false, state);
+}
+
+static drape_status create_iterative(drape_arena *arena, const drape_pattern *pattern, void **state)
+{
+    return create(arena, pattern, true, state);
+}
+
+static void set_positions(void *state, const double *x)
+{
+    mpi_linear *s = state;
+    memcpy(s->positions, x, (size_t)s->pattern->n * sizeof *x);
+}
+
+/* ---- MUMPS ---- */
+
+static PetscErrorCode begin_direct(mpi_linear *s)
+{
+    PC pc;
+    Mat factors;
+    PetscErrorCode code = KSPDestroy(&s->direct); /* another kind of factors takes another object */
+    if (!code)
+        code = KSPCreate(s->ranks->comm, &s->direct);
+    if (!code)
+        code = KSPSetType(s->direct, KSPPREONLY);
+    if (!code)
+        code = KSPGetPC(s->direct, &pc);
+    if (!code)
+        code = PCSetType(pc, s->symmetric ? PCCHOLESKY : PCLU);
+    if (!code)
+        code = PCFactorSetMatSolverType(pc, MATSOLVERMUMPS);
+    if (!code)
+        code = KSPSetOperators(s->direct, s->matrix, s->matrix);
+    if (!code)
+        code = PCFactorSetUpMatSolverType(pc);
+    if (!code)
+        code = PCFactorGetMatrix(pc, &factors);
+    if (!code)
+        code = MatMumpsSetIcntl(factors, 13, 1); /* else the last front counts no negative pivots */
+    return code;
+}
+
+/* Whether there are factors and, if a definite matrix is asked for, no negative pivot. */
+static bool factor_direct(mpi_linear *s)
+{
+    PCType type = NULL;
+    PC pc = NULL;
+    Mat factors;
+    PCFailedReason failed = PC_NOERROR;
+    PetscInt negative = 0; /* pivots */
+    PetscErrorCode code = s->direct ? KSPGetPC(s->direct, &pc) : 0;
+    if (!code && pc)
+        code = PCGetType(pc, &type);
+    if (!code && (!pc || strcmp(type, s->symmetric ? PCCHOLESKY : PCLU) != 0))
+        code = begin_direct(s);
+    if (!code)
+        code = KSPSetOperators(s->direct, s->matrix, s->matrix);
+    if (!code)
+        code = KSPGetPC(s->direct, &pc);
+    if (!code)
+        code = KSPSetUp(s->direct);
+    if (!code)
+        code = PCGetFailedReason(pc, &failed);
+    if (!code && !failed && s->definite) {
+        code = PCFactorGetMatrix(pc, &factors);
+        if (!code)
+            code = MatMumpsGetInfog(factors, 12, &negative);
+    }
+    return drape_ranks_all(s->pattern->ranks, !code && !failed && negative == 0);
+}
+
+/* ---- Conjugate gradients ---- */
+
+static PetscErrorCode begin_cg(mpi_linear *s)
+{
+    PC pc;
+    PetscErrorCode code = KSPDestroy(&s->cg);
+    if (!code)
+        code = KSPCreate(s->ranks->comm, &s->cg);
+    if (!code)
+        code = KSPSetType(s->cg, KSPCG);
+    if (!code)
+        code = KSPSetNormType(s->cg, KSP_NORM_UNPRECONDITIONED);
+    if (!code)
+        code = KSPGetPC(s->cg, &pc);
+    if (!code)
+        code = PCSetType(pc, PCGAMG);
+    if (!code)
+        code = PCGAMGSetReuseInterpolation(pc, PETSC_TRUE);
+    if (!code)
+        code = KSPSetOptionsPrefix(s->cg, "drape_");
+    if (!code)
+        code = KSPSetFromOptions(s->cg);
+    return code;
+}
+
+/* The six rigid motions of the nodes where they are. */
+static PetscErrorCode set_modes(mpi_linear *s)
+{
+    Vec at;
+    MatNullSpaceDestroy(&s->modes);
+    PetscErrorCode code = VecCreateMPIWithArray(s->ranks->comm, 3, 3 * s->pattern->ranks->own_blocks,
+                                                PETSC_DETERMINE, s->positions, &at);
+    if (!code)
+        code = MatNullSpaceCreateRigidBody(at, &s->modes);
+    if (!code)
+        code = MatSetNearNullSpace(s->matrix, s->modes);
+    VecDestroy(&at);
+    return code;
+}
+
+static bool factor_cg(mpi_linear *s)
+{
+    const bool anew = s->first < 0 || s->last > MORE * s->first + 10;
+    PetscErrorCode code = anew ? set_modes(s) : 0;
+    if (!code && anew)
+        code = begin_cg(s);
+    if (anew)
+        s->first = -1;
+    if (!code)
+        code = KSPSetOperators(s->cg, s->matrix, s->matrix);
+    if (!code)
+        code = KSPSetUp(s->cg);
+    return drape_ranks_all(s->pattern->ranks, !code);
+}
+
+/* ---- Factor and solve ---- */
+
+static bool is_finite(const drape_pattern *p, const double *values)
+{
+    bool finite = true;
+    for (int64_t i = 0; i < 9 * (int64_t)p->block_start[p->ranks->own_blocks] && finite; i++)
+        finite = isfinite(values[i]);
+    return drape_ranks_all(p->ranks, finite);
+}
+
+static drape_status fall_back(mpi_linear *s)
+{
+    s->fallbacks++;
+    s->by_direct = s->factored = factor_direct(s);
+    return s->factored ? DRAPE_OK : DRAPE_RETRY_LINEAR;
+}
+
+static drape_status factor_any(mpi_linear *s, const double *values, bool definite)
+{
+    s->factored = s->by_direct = false;
+    if (!is_finite(s->pattern, values))
+        return DRAPE_RETRY_LINEAR;
+    s->symmetric =
+        drape_ranks_all(s->pattern->ranks, is_symmetric_here(s->pattern, (double *)(uintptr_t)values));
+    s->definite = definite && s->symmetric;
+    if (fill_matrix(s, values))
+        return DRAPE_E_SOLVER;
+    if (!s->iterative) {
+        s->by_direct = s->factored = factor_direct(s);
+        return s->factored ? DRAPE_OK : DRAPE_RETRY_LINEAR;
+    }
+    s->factored = s->symmetric && factor_cg(s);
+    if (s->factored)
+        return DRAPE_OK;
+    return s->definite ? DRAPE_RETRY_LINEAR : fall_back(s);
+}
+
+static drape_status factor(void *state, const double *values)
+{
+    return factor_any(state, values, false);
+}
+
+static drape_status factor_definite(void *state, const double *values)
+{
+    return factor_any(state, values, true);
+}
+
+/* By KSP; whether it converged. */
+static bool apply(mpi_linear *s, KSP ksp, const double *b, double *x)
+{
+    KSPConvergedReason reason = 0;
+    PetscErrorCode code = VecPlaceArray(s->b, b);
+    if (!code)
+        code = VecPlaceArray(s->x, x);
+    if (!code)
+        code = KSPSolve(ksp, s->b, s->x);
+    if (!code)
+        code = KSPGetConvergedReason(ksp, &reason);
+    VecResetArray(s->b);
+    VecResetArray(s->x);
+    return !code && reason > 0;
+}
+
+static drape_status finish(const mpi_linear *s, const double *x, bool solved)
+{
+    bool finite = solved;
+    for (int64_t i = 0; i < 3 * (int64_t)s->pattern->ranks->own_blocks && finite; i++)
+        finite = isfinite(x[i]);
+    return drape_ranks_all(s->pattern->ranks, finite) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
+}
+
+static drape_status solve_inexact(void *state, const double *b, double *x, double tolerance,
+                                  int64_t *iterations)
+{
+    mpi_linear *s = state;
+    *iterations = 1;
+    if (!s->factored)
+        return DRAPE_RETRY_LINEAR;
+    if (!s->by_direct) {
+        if (KSPSetTolerances(s->cg, tolerance, 0, PETSC_DEFAULT, MAX_ITERATIONS))
+            return DRAPE_E_SOLVER;
+        const bool solved = apply(s, s->cg, b, x);
+        KSPGetIterationNumber(s->cg, &s->last);
+        *iterations = s->last;
+        s->first = s->first < 0 ? s->last : s->first;
+        if (solved && finish(s, x, true) == DRAPE_OK)
+            return DRAPE_OK;
+        const drape_status status = s->definite ? DRAPE_RETRY_LINEAR : fall_back(s);
+        if (status)
+            return status;
+    }
+    return finish(s, x, apply(s, s->direct, b, x));
+}
+
+static drape_status solve(void *state, const double *b, double *x)
+{
+    int64_t iterations;
+    return solve_inexact(state, b, x, EXACT, &iterations);
+}
+
+/* The caller makes factors anew from the values. */
+static void archive(void *state, drape_archive *a, const double *values)
+{
+    if (drape_archive_has_read(a) && values && factor(state, values))
+        drape_archive_fail(a, DRAPE_E_SOLVER, "a matrix of the checkpoint has no factors here");
+}
+
+const drape_linear_ops drape_linear_mpi_direct = {
+    .entry = {.name = "mpi_direct", .summary = "MUMPS by PETSc", .reference = "Amestoy et al. 2001, MUMPS"},
+    .borrows_heap = true,
+    .create = create_direct,
+    .factor = factor,
+    .factor_definite = factor_definite,
+    .solve = solve,
+    .archive = archive,
+    .destroy = destroy,
+};
+
+const drape_linear_ops drape_linear_mpi_iterative = {
+    .entry = {.name = "mpi_iterative",
+              .summary = "conjugate gradients preconditioned by GAMG, both of PETSc",
+              .reference = "Balay et al., PETSc; Vanek, Mandel & Brezina 1996"},
+    .borrows_heap = true,
+    .create = create_iterative,
+    .set_positions = set_positions,
+    .factor = factor,
+    .factor_definite = factor_definite,
+    .solve = solve,
+    .solve_inexact = solve_inexact,
+    .archive = archive,
+    .destroy = destroy,
+};

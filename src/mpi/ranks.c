@@ -1,0 +1,295 @@
+/* ranks.c: see ranks.h. Sums are of gathered numbers in the order of the ranks, so that all ranks have the same
+ * bits, and a run has the same bits each time. */
+#include "mpi/ranks.h"
+
+#include "mpi/linear.h"
+
+#include <nvector/nvector_parallel.h>
+#include <string.h>
+
+static drape_mpi_ranks *of(const drape_ranks *ranks)
+{
+    return (drape_mpi_ranks *)(uintptr_t)ranks; /* base is its first member */
+}
+
+/* ---- Sums ---- */
+
+static void gather(drape_mpi_ranks *r, const double *values, int n)
+{
+    MPI_Allgather(values, n, MPI_DOUBLE, r->gathered, n, MPI_DOUBLE, r->comm);
+}
+
+static void sum(const drape_ranks *ranks, double *values, int n)
+{
+    drape_mpi_ranks *r = of(ranks);
+    for (int first = 0; first < n; first += DRAPE_MPI_VALUES) {
+        const int count = n - first < DRAPE_MPI_VALUES ? n - first : DRAPE_MPI_VALUES;
+        gather(r, values + first, count);
+        for (int i = 0; i < count; i++) {
+            values[first + i] = 0;
+            for (int k = 0; k < ranks->count; k++)
+                values[first + i] += r->gathered[k * count + i];
+        }
+    }
+}
+
+static void largest(const drape_ranks *ranks, double *values, int n)
+{
+    drape_mpi_ranks *r = of(ranks);
+    for (int first = 0; first < n; first += DRAPE_MPI_VALUES) {
+        const int count = n - first < DRAPE_MPI_VALUES ? n - first : DRAPE_MPI_VALUES;
+        gather(r, values + first, count);
+        for (int i = 0; i < count; i++) {
+            double most = r->gathered[i];
+            for (int k = 1; k < ranks->count; k++)
+                most = r->gathered[k * count + i] <= most || isnan(most) ? most : r->gathered[k * count + i];
+            values[first + i] = most;
+        }
+    }
+}
+
+static void broadcast(const drape_ranks *ranks, int from, void *bytes, int size)
+{
+    MPI_Bcast(bytes, size, MPI_BYTE, from, of(ranks)->comm);
+}
+
+/* ---- Copies ---- */
+
+static void exchange(const drape_mpi_ranks *r, const drape_mpi_exchange *x, double *const *arrays, int count)
+{
+    const size_t each = 3 * (size_t)count;
+    for (int k = 0; k < x->neighbour_count; k++)
+        MPI_Irecv(x->received + each * (size_t)x->first_in[k],
+                  (int)each * (x->first_in[k + 1] - x->first_in[k]), MPI_DOUBLE, x->neighbour[k], 0, r->comm,
+                  &x->requests[k]);
+    for (int k = 0; k < x->neighbour_count; k++) {
+        for (int32_t i = x->first_out[k]; i < x->first_out[k + 1]; i++)
+            for (size_t a = 0; a < (size_t)count; a++)
+                memcpy(x->sent + each * (size_t)i + 3 * a, arrays[a] + 3 * (size_t)x->out[i],
+                       3 * sizeof **arrays);
+        MPI_Isend(x->sent + each * (size_t)x->first_out[k],
+                  (int)each * (x->first_out[k + 1] - x->first_out[k]), MPI_DOUBLE, x->neighbour[k], 0,
+                  r->comm, &x->requests[x->neighbour_count + k]);
+    }
+    MPI_Waitall(2 * x->neighbour_count, x->requests, MPI_STATUSES_IGNORE);
+    for (int32_t i = 0; i < x->first_in[x->neighbour_count]; i++)
+        for (size_t a = 0; a < (size_t)count; a++)
+            memcpy(arrays[a] + 3 * (size_t)x->in[i], x->received + each * (size_t)i + 3 * a,
+                   3 * sizeof **arrays);
+}
+
+static void fetch(const drape_ranks *ranks, double *const *nodes, int arrays)
+{
+    for (int first = 0; first < arrays; first += DRAPE_MPI_ARRAYS)
+        exchange(of(ranks), &of(ranks)->nodes, nodes + first,
+                 arrays - first < DRAPE_MPI_ARRAYS ? arrays - first : DRAPE_MPI_ARRAYS);
+}
+
+static void fetch_blocks(const drape_ranks *ranks, double *blocks)
+{
+    exchange(of(ranks), &of(ranks)->blocks, &blocks, 1);
+}
+
+/* ---- Gathering ---- */
+
+#define CHUNK 65536 /* nodes of a rank in a message */
+
+/* In pieces, so that only one piece is in memory twice. */
+static void collect(const drape_ranks *ranks, const double *nodes, int width, double *all)
+{
+    drape_mpi_ranks *r = of(ranks);
+    const size_t w = (size_t)width;
+    for (int k = 0; k < ranks->count && ranks->rank == 0; k++)
+        for (int first = 0; first < r->counts[k]; first += CHUNK) {
+            const int n = r->counts[k] - first < CHUNK ? r->counts[k] - first : CHUNK;
+            const int32_t *to = r->whole + r->places[k] + first;
+            if (k > 0)
+                MPI_Recv(r->piece, n * width, MPI_DOUBLE, k, 1, r->comm, MPI_STATUS_IGNORE);
+            for (size_t i = 0; i < (size_t)n; i++)
+                memcpy(all + w * (size_t)to[i],
+                       k > 0 ? r->piece + w * i : nodes + w * (size_t)r->own[first + (int)i],
+                       w * sizeof *all);
+        }
+    for (int32_t first = 0; first < r->own_count && ranks->rank > 0; first += CHUNK) {
+        const int32_t n = r->own_count - first < CHUNK ? r->own_count - first : CHUNK;
+        for (size_t i = 0; i < (size_t)n; i++)
+            memcpy(r->piece + w * i, nodes + w * (size_t)r->own[(size_t)first + i], w * sizeof *nodes);
+        MPI_Send(r->piece, n * width, MPI_DOUBLE, 0, 1, r->comm);
+    }
+}
+
+static drape_status plan_gathering(drape_mpi_ranks *r, const drape_model *m)
+{
+    const int count = r->base.count;
+    r->own = drape_arena_take(&r->arena, (size_t)m->node_count, sizeof *r->own);
+    r->piece = drape_arena_take(&r->arena, CHUNK, 3 * sizeof *r->piece);
+    r->counts = drape_arena_take(&r->arena, 2 * (size_t)count, sizeof *r->counts);
+    r->places = r->counts ? r->counts + count : NULL;
+    int32_t *numbers = drape_arena_take(&r->arena, (size_t)m->node_count, sizeof *numbers);
+    if (r->base.rank == 0)
+        r->whole = drape_arena_take(&r->arena, (size_t)m->part->all_nodes, sizeof *r->whole);
+    if (drape_arena_status(&r->arena))
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < m->node_count; i++)
+        if (m->part->own[i]) {
+            numbers[r->own_count] = m->part->node[i];
+            r->own[r->own_count++] = i;
+        }
+    MPI_Gather(&r->own_count, 1, MPI_INT, r->counts, 1, MPI_INT, 0, r->comm);
+    for (int k = 1; k < count; k++)
+        r->places[k] = r->places[k - 1] + r->counts[k - 1];
+    MPI_Gatherv(numbers, r->own_count, MPI_INT32_T, r->whole, r->counts, r->places, MPI_INT32_T, 0, r->comm);
+    drape_arena_release(&r->arena, numbers);
+    return DRAPE_OK;
+}
+
+/* ---- Vectors ---- */
+
+static void *vector(const drape_ranks *ranks, int64_t n, double *values, void *sun)
+{
+    const int64_t all = n / ranks->own_blocks * ranks->all_blocks; /* some numbers for each block */
+    return values ? N_VMake_Parallel(of(ranks)->comm, n, all, values, sun)
+                  : N_VNew_Parallel(of(ranks)->comm, n, all, sun);
+}
+
+/* ---- Plans ---- */
+
+static int32_t find(const int32_t *sorted, int32_t count, int32_t value)
+{
+    int32_t low = 0, high = count;
+    while (high - low > 1) {
+        const int32_t middle = (low + high) / 2;
+        *(sorted[middle] <= value ? &low : &high) = middle;
+    }
+    return low;
+}
+
+/* wanted (ranks): how many nodes of each rank have copies here; asked (ranks): of this one there. */
+static drape_status take(drape_mpi_ranks *r, const int *wanted, const int *asked, drape_mpi_exchange *x)
+{
+    int32_t in = 0, out = 0;
+    int n = 0;
+    for (int k = 0; k < r->base.count; k++) {
+        n += wanted[k] > 0 || asked[k] > 0;
+        in += wanted[k];
+        out += asked[k];
+    }
+    *x = (drape_mpi_exchange){0};
+    x->neighbour = drape_arena_take(&r->arena, (size_t)n, sizeof *x->neighbour);
+    x->requests = drape_arena_take(&r->arena, 2 * (size_t)n, sizeof *x->requests);
+    x->first_in = drape_arena_take(&r->arena, (size_t)n + 1, sizeof *x->first_in);
+    x->first_out = drape_arena_take(&r->arena, (size_t)n + 1, sizeof *x->first_out);
+    x->in = drape_arena_take(&r->arena, (size_t)in, sizeof *x->in);
+    x->out = drape_arena_take(&r->arena, (size_t)out, sizeof *x->out);
+    x->sent = drape_arena_take(&r->arena, (size_t)out, 3 * DRAPE_MPI_ARRAYS * sizeof *x->sent);
+    x->received = drape_arena_take(&r->arena, (size_t)in, 3 * DRAPE_MPI_ARRAYS * sizeof *x->received);
+    if (drape_arena_status(&r->arena))
+        return DRAPE_E_MEMORY;
+    for (int k = 0; k < r->base.count; k++)
+        if (wanted[k] > 0 || asked[k] > 0) {
+            const int i = x->neighbour_count++;
+            x->neighbour[i] = k;
+            x->first_in[i + 1] = x->first_in[i] + wanted[k];
+            x->first_out[i + 1] = x->first_out[i] + asked[k];
+        }
+    return DRAPE_OK;
+}
+
+/* Asks the owners of the copies for them, by their numbers in the whole model, in ascending order. */
+static drape_status ask(drape_mpi_ranks *r, const drape_model *m, const int32_t *owner, drape_mpi_exchange *x)
+{
+    drape_arena scratch = drape_arena_of(r->arena.ctx);
+    const int32_t *node = m->part->node;
+    int *wanted = drape_arena_take(&scratch, (size_t)r->base.count, sizeof *wanted),
+        *asked = drape_arena_take(&scratch, (size_t)r->base.count, sizeof *asked);
+    drape_status status = drape_arena_status(&scratch);
+    for (int32_t i = 0; !status && i < m->node_count; i++)
+        if (!m->part->own[i])
+            wanted[owner[node[i]]]++;
+    if (!status) {
+        MPI_Alltoall(wanted, 1, MPI_INT, asked, 1, MPI_INT, r->comm);
+        status = take(r, wanted, asked, x);
+    }
+    for (int k = 0; !status && k < x->neighbour_count; k++) {
+        int32_t to = x->first_in[k];
+        for (int32_t i = 0; i < m->node_count; i++)
+            if (!m->part->own[i] && owner[node[i]] == x->neighbour[k])
+                x->in[to++] = node[i];
+    }
+    for (int k = 0; !status && k < x->neighbour_count; k++) {
+        MPI_Irecv(x->out + x->first_out[k], x->first_out[k + 1] - x->first_out[k], MPI_INT32_T,
+                  x->neighbour[k], 0, r->comm, &x->requests[k]);
+        MPI_Isend(x->in + x->first_in[k], x->first_in[k + 1] - x->first_in[k], MPI_INT32_T, x->neighbour[k],
+                  0, r->comm, &x->requests[x->neighbour_count + k]);
+    }
+    if (!status)
+        MPI_Waitall(2 * x->neighbour_count, x->requests, MPI_STATUSES_IGNORE);
+    for (int32_t i = 0; !status && i < x->first_in[x->neighbour_count]; i++)
+        x->in[i] = find(node, m->node_count, x->in[i]);
+    for (int32_t i = 0; !status && i < x->first_out[x->neighbour_count]; i++)
+        x->out[i] = find(node, m->node_count, x->out[i]);
+    drape_arena_free(&scratch);
+    return status;
+}
+
+/* The same exchange for block columns: without pinned nodes, which are so on both sides. */
+static void keep_free(const drape_model *m, int neighbours, int32_t *first, int32_t *list)
+{
+    int32_t to = 0, from = 0;
+    for (int k = 0; k < neighbours; k++) {
+        for (; from < first[k + 1]; from++)
+            if (m->free_of_node[list[from]] >= 0)
+                list[to++] = m->free_of_node[list[from]];
+        first[k + 1] = to;
+    }
+}
+
+drape_status drape_mpi_ranks_plan(drape_mpi_ranks *r, const drape_model *part, const int32_t *owner)
+{
+    drape_status status = ask(r, part, owner, &r->nodes);
+    if (!status)
+        status = ask(r, part, owner, &r->blocks);
+    if (!status)
+        status = plan_gathering(r, part);
+    if (status)
+        return status;
+    keep_free(part, r->blocks.neighbour_count, r->blocks.first_in, r->blocks.in);
+    keep_free(part, r->blocks.neighbour_count, r->blocks.first_out, r->blocks.out);
+    return DRAPE_OK;
+}
+
+/* ---- Creation ---- */
+
+drape_status drape_mpi_ranks_create(drape_context *ctx, MPI_Comm comm, drape_mpi_ranks **out)
+{
+    drape_mpi_ranks *r = *out = drape_alloc(ctx, 1, sizeof *r);
+    if (!r)
+        return DRAPE_E_MEMORY;
+    r->comm = comm;
+    r->arena = drape_arena_of(ctx);
+    MPI_Comm_rank(comm, &r->base.rank);
+    MPI_Comm_size(comm, &r->base.count);
+    r->base.sum = sum;
+    r->base.largest = largest;
+    r->base.broadcast = broadcast;
+    r->base.fetch = fetch;
+    r->base.fetch_blocks = fetch_blocks;
+    r->base.gather = collect;
+    r->base.vector = vector;
+    r->base.direct = &drape_linear_mpi_direct;
+    r->base.iterative = &drape_linear_mpi_iterative;
+    r->gathered = drape_arena_take(&r->arena, (size_t)r->base.count * DRAPE_MPI_VALUES, sizeof *r->gathered);
+    if (!r->gathered)
+        drape_mpi_ranks_destroy(out);
+    return *out ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+void drape_mpi_ranks_destroy(drape_mpi_ranks **ranks)
+{
+    if (!*ranks)
+        return;
+    drape_context *ctx = (*ranks)->arena.ctx;
+    drape_arena_free(&(*ranks)->arena);
+    drape_free(ctx, *ranks);
+    *ranks = NULL;
+}

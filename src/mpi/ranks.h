@@ -1,0 +1,44 @@
+/* ranks.h: the ranks of base/ranks.h by MPI. */
+#ifndef DRAPE_MPI_RANKS_H
+#define DRAPE_MPI_RANKS_H
+
+#include "model/model.h"
+
+#include <mpi.h>
+
+/* What is exchanged with other ranks. */
+typedef struct drape_mpi_exchange {
+    int neighbour_count;
+    int *neighbour;                /* (neighbour_count) their ranks */
+    int32_t *first_out, *first_in; /* (neighbour_count + 1) what is for and from each */
+    int32_t *out, *in;             /* places in the array: sent; received */
+    double *sent, *received;       /* (3 x DRAPE_MPI_ARRAYS x places) */
+    MPI_Request *requests;         /* (2 x neighbour_count) */
+} drape_mpi_exchange;
+
+#define DRAPE_MPI_ARRAYS 2 /* in one exchange */
+
+typedef struct drape_mpi_ranks {
+    drape_ranks base;
+    MPI_Comm comm;
+    drape_arena arena;
+    drape_mpi_exchange nodes, blocks;
+    double *gathered;     /* (DRAPE_MPI_VALUES x count) */
+    double *piece;        /* of a message of drape_ranks.gather */
+    int32_t own_count;    /* nodes that this rank owns, */
+    int32_t *own;         /* (own_count) their places here */
+    int *counts, *places; /* (count) on rank 0: how many each rank owns, and where its list begins */
+    int32_t *whole;       /* on rank 0: their numbers in the whole model, those of rank 0 first */
+} drape_mpi_ranks;
+
+#define DRAPE_MPI_VALUES 64 /* in one sum */
+
+/* The ranks of a communicator, which becomes theirs. Errors: DRAPE_E_MEMORY. */
+drape_status drape_mpi_ranks_create(drape_context *ctx, MPI_Comm comm, drape_mpi_ranks **out);
+void drape_mpi_ranks_destroy(drape_mpi_ranks **ranks);
+
+/* Plans the exchange of copies for a part of a model; owner: of the nodes of the whole model. Collective.
+ * Errors: DRAPE_E_MEMORY. */
+drape_status drape_mpi_ranks_plan(drape_mpi_ranks *ranks, const drape_model *part, const int32_t *owner);
+
+#endif
