@@ -124,6 +124,44 @@ static bool check_fraction(const all_pairs *all, const double *x, const double *
     return least < 1;
 }
 
+/* The check of a step, which looks for what can pass only, finds the same as a look at all pairs. */
+static bool check_step(const all_pairs *all, drape_contact *fresh, const double *x, const double *y,
+                       const drape_collider_pose *pose)
+{
+    const drape_model *m = fresh->model;
+    const drape_straight_path path = {
+        {{.model = m, .x = x, .pose = pose}, {.model = m, .x = y, .pose = pose}}};
+    const drape_keep keep = drape_contact_keep_step(fresh);
+    drape_pair limiting;
+    double least = 1;
+    for (int32_t i = 0; i < all->list.set[0].count; i++)
+        if (drape_pair_points(&all->list.set[0].pairs[i]) > 1)
+            least = fmin(least, drape_pair_step_fraction(&all->list.set[0].pairs[i], x, y, NULL, &keep, 1));
+    ck_assert(drape_contact_free_fraction(fresh, &path, NULL, &keep, NULL, NULL, NULL, NULL, &limiting) ==
+              least);
+    return least < 1;
+}
+
+/* A displacement that is shortened at nodes, again and again, is shortened alike if all pairs are looked at each
+ * time. */
+static void check_again(drape_contact *c, drape_contact *fresh, const double *x, const double *whole,
+                        double *y, double *fraction)
+{
+    const size_t nodes = (size_t)c->model->node_count;
+    memcpy(y, whole, 3 * nodes * sizeof *y);
+    for (size_t i = 0; i < nodes; i++)
+        fraction[i] = 1;
+    for (int pass = 0; pass < 3; pass++) {
+        for (size_t i = 0; i < nodes; i++)
+            fraction[nodes + i] = 1;
+        const double least = drape_contact_step_fraction(c, x, y, 0, pass > 0, fraction);
+        ck_assert(least == drape_contact_step_fraction(fresh, x, y, 0, false, fraction + nodes));
+        ck_assert_int_eq(memcmp(fraction, fraction + nodes, nodes * sizeof *fraction), 0);
+        for (size_t i = 0; i < 3 * nodes; i++)
+            y[i] = x[i] + fraction[i / 3] * (y[i] - x[i]);
+    }
+}
+
 /* Folds the sheets about a line, moves them as a whole and shakes them; or moves only their last nodes. */
 static void move(const drape_model *m, uint64_t *seed, double *x)
 {
@@ -182,7 +220,7 @@ static void check_that_all_near_is_found(const char *text, int least_active, int
     const drape_model *m = s.model;
     const size_t n = 3 * (size_t)m->node_count;
     uint64_t seed = 3;
-    int crossing = 0, active = 0, patches = 0;
+    int crossing = 0, passing = 0, active = 0, patches = 0;
     drape_arena arena = drape_arena_of(s.ctx);
     drape_motion *motion = NULL;
     ck_assert_int_eq(drape_motion_create(&arena, m, &motion), DRAPE_OK);
@@ -203,9 +241,11 @@ static void check_that_all_near_is_found(const char *text, int least_active, int
         move(m, &seed, y);
         if (k % 5 == 0)
             ck_assert_int_eq(drape_contact_begin(c, x, NULL, 0), DRAPE_OK);
-        const double fraction = drape_contact_step_fraction(c, x, y, 0, NULL);
-        ck_assert(fraction == drape_contact_step_fraction(fresh, x, y, 0, NULL));
+        const double fraction = drape_contact_step_fraction(c, x, y, 0, false, NULL);
+        ck_assert(fraction == drape_contact_step_fraction(fresh, x, y, 0, false, NULL));
         crossing += check_fraction(&all, c->from, c->to, fraction);
+        passing += check_step(&all, open_contact(&other, motion), c->from, c->to, c->path_pose);
+        check_again(c, fresh, x, y, g, g + n);
         for (size_t i = 0; i < n; i++)
             y[i] = x[i] + fraction * (y[i] - x[i]);
         ck_assert_int_eq(drape_contact_evaluate_at(c, &at), DRAPE_OK);
@@ -224,6 +264,7 @@ static void check_that_all_near_is_found(const char *text, int least_active, int
     ck_assert_int_gt(patches, ROUNDS / 40); /* they serve where less than a tenth of the nodes leave a path */
     ck_assert_int_gt(active, least_active * ROUNDS);
     ck_assert_int_gt(crossing, ROUNDS / share_crossing);
+    ck_assert_int_gt(passing, ROUNDS / share_crossing);
     drape_arena_free(&arena);
     scene_close(&s);
 }
@@ -237,6 +278,89 @@ END_TEST
 START_TEST(all_near_a_few_features_is_found)
 {
     check_that_all_near_is_found(FEW_FEATURES, 1, 20);
+}
+END_TEST
+
+/* A capsule comes 2 cm nearer from below to a flat sheet whose rows of nodes, 6.25 cm apart, are on both sides of
+ * it. Nodes that slide on it would leave the middle of the edges between them 12 mm inside. It is put where it is
+ * half of the activation distance of 2 mm away; the nearest point of oblique edges is beside it. */
+START_TEST(edges_do_not_slide_into_bodies)
+{
+    scene s = scene_model("{'drape': 1, 'cloth': [" SHEET "], 'contact': {}, 'duration': 1, 'colliders': ["
+                          "{'type': 'capsule', 'a': [-0.3,-0.052,-0.03125], 'b': [0.6,-0.052,-0.03125],"
+                          " 'radius': 0.05, 'track': [[0,[0,0,0]], [1,[0,1,0]]]}]%s}",
+                          "");
+    const drape_model *m = s.model;
+    const size_t n = 3 * (size_t)m->node_count;
+    drape_arena arena = drape_arena_of(s.ctx);
+    drape_motion *motion = NULL;
+    ck_assert_int_eq(drape_motion_create(&arena, m, &motion), DRAPE_OK);
+    drape_contact *c = open_contact(&arena, motion);
+    double *y = drape_arena_take(&arena, n, sizeof *y), least = INFINITY;
+    ck_assert_ptr_nonnull(y);
+    memcpy(y, m->rest, n * sizeof *y);
+    drape_contact_set_step(c, 0.02);
+    ck_assert_int_eq(drape_contact_begin(c, m->rest, NULL, 0), DRAPE_OK);
+    drape_contact_sweep(c, 0.02, y);
+    drape_contact_fill(c, y, c->path_pose, c->to);
+    const drape_configuration end = {.model = m, .x = c->to, .pose = c->path_pose};
+    for (int32_t e = 0; e < m->edge_count; e++) {
+        const int32_t *k = m->edge + 2 * e;
+        const drape_pair pair = {.kind = DRAPE_PAIR_SEGMENTS,
+                                 .node = {k[0], k[1], c->broad.segment[0], c->broad.segment[1]},
+                                 .radius = 0.05};
+        least = fmin(least, drape_pair_gap_value(&pair, &end));
+    }
+    ck_assert_double_ge(least, 0.5e-3);
+    drape_arena_free(&arena);
+    scene_close(&s);
+}
+END_TEST
+
+/* Sheets 3 cm apart, the lower one 5 cm above a ball: what they meet is what their velocities bring together
+ * within the time, less the activation distance of 1.5 cm, the thickness of 2 cm or, of layers, the least gap. */
+START_TEST(what_may_be_met_is_known)
+{
+    scene s = scene_model("{'drape': 1, 'cloth': [" SHEET ", " SHEET "], 'self_contact': {'thickness': 1e-2},"
+                          "'contact': {'distance': 1.5e-2}, 'duration': 1, 'colliders': ["
+                          "{'type': 'sphere', 'center': [0,-0.55,0], 'radius': 0.5,"
+                          " 'track': [[0,[0,0,0]], [0.5,[0,0,0]], [1,[0,0.5,0]]]}]%s}",
+                          "");
+    static const struct {
+        double t, lower, upper, seconds; /* [s], [m/s] upwards, [s] */
+        bool meets;
+    } cases[] = {
+        {0, 0, 0, 0.4, false},        /* all at rest */
+        {0, -0.5, -0.5, 0.06, false}, /* 3 cm towards the ball */
+        {0, -0.5, -0.5, 0.08, true},  /* 4 cm */
+        {0, 0, -0.5, 0.05, false},    /* the upper sheet comes 2.5 cm nearer to the lower one */
+        {0, 0, -0.5, 0.07, true},     {0, -0.5, -1, 0.05, false},
+        {0.5, 0, 0, 0.03, false},                              /* the ball comes at 1 m/s */
+        {0.5, 0, 0, 0.04, true},      {0.5, 1, 1, 0.2, false}, /* and they go along */
+        {0.5, 1, 0, 0.02, false},     {0.5, 1, 0, 0.04, true},
+    };
+    const drape_model *m = s.model;
+    const size_t n = 3 * (size_t)m->node_count;
+    drape_arena arena = drape_arena_of(s.ctx);
+    drape_motion *motion = NULL;
+    ck_assert_int_eq(drape_motion_create(&arena, m, &motion), DRAPE_OK);
+    double *x = drape_arena_take(&arena, n, sizeof *x), *v = drape_arena_take(&arena, n, sizeof *v);
+    ck_assert(x && v);
+    memcpy(x, m->rest, n * sizeof *x);
+    for (size_t i = n / 2 + 1; i < n; i += 3)
+        x[i] += 0.03;
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        drape_contact *c = open_contact(&arena, motion);
+        for (size_t i = 1; i < n; i += 3)
+            v[i] = i < n / 2 ? cases[k].lower : cases[k].upper;
+        for (int begun = 0; begun < 2; begun++) {
+            ck_assert_msg(drape_contact_may_meet(c, x, v, cases[k].t, cases[k].seconds) == cases[k].meets,
+                          "case %d", (int)k);
+            ck_assert_int_eq(drape_contact_begin(c, x, v, cases[k].t), DRAPE_OK);
+        }
+    }
+    drape_arena_free(&arena);
+    scene_close(&s);
 }
 END_TEST
 
@@ -293,4 +417,4 @@ START_TEST(colliders_that_move_are_searched_alone)
 END_TEST
 
 SUITE("broad_phase", everything_near_is_found, all_near_a_few_features_is_found,
-      colliders_that_move_are_searched_alone)
+      edges_do_not_slide_into_bodies, what_may_be_met_is_known, colliders_that_move_are_searched_alone)

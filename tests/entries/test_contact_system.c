@@ -382,7 +382,7 @@ static double left_of(double gap)
     memcpy(t.x, t.at.x, 3 * (size_t)t.s.model->node_count * sizeof *t.x);
     for (int32_t i = 0; i < t.s.model->node_count; i++)
         t.x[3 * i + 1] -= 10 * gap;
-    const double left = gap - 10 * gap * drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, NULL);
+    const double left = gap - 10 * gap * drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, NULL);
     close_probe(&t);
     return left;
 }
@@ -476,14 +476,14 @@ START_TEST(a_thrown_node_is_stopped)
     ck_assert_ptr_nonnull(fraction);
     for (size_t i = 0; i < 3 * nodes; i++)
         t.x[i] = t.at.x[i] + (i % 3 == 1 ? 10 : 0);
-    ck_assert_double_eq(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, NULL), 1);
+    ck_assert_double_eq(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, NULL), 1);
     t.x[1] = t.at.x[1] + 1e6;
-    const double whole = 1e6 * drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, NULL);
+    const double whole = 1e6 * drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, NULL);
     ck_assert_double_lt(whole, 0.107 * 1.1); /* beyond the mean of all nodes, of which it is one */
     ck_assert_double_gt(whole, 0.075);
     for (size_t i = 0; i < nodes; i++)
         fraction[i] = 1;
-    drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, fraction);
+    drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, fraction);
     ck_assert_double_lt(1e6 * fraction[0], 0.107);
     ck_assert_double_gt(1e6 * fraction[0], 0.075);
     free(fraction);
@@ -502,14 +502,14 @@ START_TEST(a_cancelled_search_moves_nothing)
     for (size_t i = 0; i < 3 * nodes; i++)
         t.x[i] = t.at.x[i] - (i % 3 == 1 ? 1e-3 : 0);
     drape_system_watch(t.system, &cancel);
-    ck_assert_double_gt(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, fraction), 0);
+    ck_assert_double_gt(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, fraction), 0);
     atomic_store(&cancel, true);
-    ck_assert_double_eq(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, NULL), 0);
-    ck_assert_double_eq(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, fraction), 0);
+    ck_assert_double_eq(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, NULL), 0);
+    ck_assert_double_eq(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, fraction), 0);
     for (size_t i = 0; i < nodes; i++)
         ck_assert_double_eq(fraction[i], 0);
     atomic_store(&cancel, false);
-    ck_assert_double_gt(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, NULL), 0);
+    ck_assert_double_gt(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, NULL), 0);
     free(fraction);
     close_probe(&t);
 }
@@ -538,7 +538,7 @@ START_TEST(nan_is_forgotten)
         t.x[broken] = broken % 2 ? NAN : INFINITY;
         point.x = t.x;
         drape_system_force(t.system, &point, t.g[1]);
-        drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, NULL);
+        drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, NULL);
         drape_system_crosses(t.system, t.x, 0.01, &reason, &diagnostic);
         drape_system_check_contact(t.system, t.x, 0.01, &reason, &diagnostic);
         point.x = t.at.x;
