@@ -241,8 +241,8 @@ double drape_system_support_power(const drape_system *system, const double *g, d
 
 bool drape_system_is_driven(const drape_system *system)
 {
-    return system->motion->moved_count > 0 || system->model->collider_count > 0 ||
-           system->model->supports_move;
+    const bool pins = drape_ranks_any(system->ranks, system->motion->moved_count > 0);
+    return pins || system->model->collider_count > 0 || system->model->supports_move;
 }
 
 /* ---- Steps ---- */
@@ -1189,6 +1189,11 @@ static void archive_contact(drape_system *system, drape_archive *a)
 void drape_system_archive(drape_system *system, drape_archive *a)
 {
     drape_archive_mark(a, "system");
+    if (a->by_ranks) { /* no host moves anything there */
+        if (system->contact)
+            drape_contact_archive_press(system->contact, a);
+        return;
+    }
     drape_motion_archive(system->motion, a);
     archive_drag_springs(system, a);
     archive_push(system, a);

@@ -66,7 +66,7 @@ void drape_archive_write_to(drape_archive *a, drape_context *ctx, const char *na
     const uint32_t format = FORMAT;
     a->ctx = ctx;
     a->name = name;
-    a->reading = false;
+    a->reading = a->by_ranks = false;
     a->status = DRAPE_OK;
     a->write = write;
     a->user = user;
@@ -104,6 +104,7 @@ drape_status drape_archive_read_from(drape_archive *a, drape_context *ctx, const
     a->ctx = ctx;
     a->name = name;
     a->reading = true;
+    a->by_ranks = false;
     a->status = DRAPE_OK;
     a->from = bytes;
     a->size = HEAD;

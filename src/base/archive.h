@@ -22,6 +22,7 @@ typedef struct drape_archive {
     drape_context *ctx;
     const char *name; /* name of the file, for messages */
     bool reading;
+    bool by_ranks;       /* of a run on several ranks: without what only a rank or a solver remembers */
     drape_status status; /* the first failure */
     uint64_t size;       /* bytes written or read so far */
     drape_write *write;  /* writing: receives the bytes, through the buffer */

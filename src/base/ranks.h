@@ -37,9 +37,10 @@ struct drape_ranks {
     void (*fetch)(const drape_ranks *ranks, double *const *nodes, int arrays);
     /* The same in an array of block columns (block columns x 3). */
     void (*fetch_blocks)(const drape_ranks *ranks, double *blocks);
-    /* Gathers what each rank has at its own nodes (`width` numbers a node here) into an array of the whole
-     * model, on rank 0; all: NULL elsewhere. */
-    void (*gather)(const drape_ranks *ranks, const double *nodes, int width, double *all);
+    /* Gathers items of `width` numbers, of which this rank has `count` and counts some, into an array of the
+     * whole model on rank 0, by their numbers there; all: NULL elsewhere. */
+    void (*gather)(const drape_ranks *ranks, const double *values, int width, int32_t count,
+                   const uint8_t *counted, const int32_t *number, double *all);
     /* bytes (size) become those of a rank. */
     void (*broadcast)(const drape_ranks *ranks, int from, void *bytes, int size);
     /* A vector of SUNDIALS over all ranks (N_Vector) with these n values here; NULL: out of memory. sun: a

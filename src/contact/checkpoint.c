@@ -78,6 +78,23 @@ static drape_status restore(drape_contact *c)
     return status ? status : drape_contact_lag(c);
 }
 
+static void archive_press(drape_contact *c, drape_archive *a)
+{
+    drape_archive_double(a, &c->press.factor);
+    drape_archive_double(a, &c->press.widest);
+    drape_archive_double(a, &c->press.t);
+    drape_archive_doubles(a, c->broad.distance, (size_t)c->model->collider_count);
+}
+
+static bool is_press(const drape_contact *c, drape_archive *a)
+{
+    if (!(c->press.factor >= 1 && isfinite(c->press.factor) && isfinite(c->press.t)))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a stiffness of contact below the scene's");
+    else if (!are_distances(c))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an activation distance below the scene's");
+    return drape_archive_good(a);
+}
+
 void drape_contact_archive(drape_contact *c, drape_archive *a)
 {
     const size_t points = 3 * (size_t)c->broad.points, colliders = (size_t)c->model->collider_count;
@@ -90,10 +107,7 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
         archive_pose(&c->start_pose[i], a);
     drape_inside_archive(&c->inside, a);
     drape_relaxed_archive(&c->relaxed, a);
-    drape_archive_double(a, &c->press.factor);
-    drape_archive_double(a, &c->press.widest);
-    drape_archive_double(a, &c->press.t);
-    drape_archive_doubles(a, c->broad.distance, colliders);
+    archive_press(c, a);
     archive_couplings(c, a);
     drape_archive_double(a, &c->seconds);
     drape_archive_double(a, &c->search_seconds);
@@ -102,10 +116,17 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     if (!drape_all_finite(c->start, points) || !drape_all_finite(c->start_v, points) ||
         !are_finite(c->start_pose, c->model->collider_count))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has positions that are not finite");
-    else if (!(c->press.factor >= 1 && isfinite(c->press.factor) && isfinite(c->press.t)))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a stiffness of contact below the scene's");
-    else if (!are_distances(c))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an activation distance below the scene's");
-    else
+    else if (is_press(c, a))
         drape_archive_note(a, restore(c));
+}
+
+void drape_contact_archive_press(drape_contact *c, drape_archive *a)
+{
+    drape_archive_mark(a, "press");
+    archive_press(c, a);
+    if (!drape_archive_has_read(a) || !is_press(c, a))
+        return;
+    drape_candidates_forget(&c->step_candidates);
+    drape_candidates_forget(&c->query_candidates);
+    c->listed = false;
 }

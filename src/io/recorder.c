@@ -94,8 +94,13 @@ static void note(drape_recorder *r, drape_status status)
     snprintf(r->message, sizeof r->message, "%s", drape_context_message(r->ctx));
 }
 
+/* Where ranks share the model, all stop when one cannot write; collective. */
 static drape_status report(drape_recorder *r)
 {
+    if (drape_ranks_any(r->ranks, r->failure != DRAPE_OK) && !r->failure) {
+        r->failure = DRAPE_E_STOPPED;
+        snprintf(r->message, sizeof r->message, "another rank cannot write");
+    }
     return r->failure ? drape_fail(r->ctx, r->failure, "%s", r->message) : DRAPE_OK;
 }
 
@@ -219,7 +224,8 @@ static void gather(drape_recorder *r, int array, int width, const double **value
     double *all = r->gathered ? r->gathered + 3 * (size_t)array * (size_t)r->model->node_count : NULL;
     if (!r->ranks)
         return;
-    r->ranks->gather(r->ranks, *values, width, all);
+    const drape_model *m = r->sim->model;
+    r->ranks->gather(r->ranks, *values, width, m->node_count, m->part->own, m->part->node, all);
     *values = all;
 }
 
@@ -322,27 +328,36 @@ static drape_status sync_files(drape_recorder *r)
     return status ? status : drape_folder_sync(r->folder);
 }
 
+static drape_status put_nowhere(void *user, const void *bytes, size_t size)
+{
+    (void)user, (void)bytes, (void)size;
+    return DRAPE_OK;
+}
+
 static drape_status write_checkpoint(drape_recorder *r)
 {
     drape_archive a;
-    drape_status status = sync_files(r);
-    if (status)
+    drape_status status = r->writes ? sync_files(r) : DRAPE_OK;
+    if (drape_ranks_any(r->ranks, status != DRAPE_OK))
         return status;
     r->wall = drape_clock_seconds() - r->start;
-    drape_checkpoint_begin(&a, r->ctx, &r->checkpoint);
+    if (r->writes)
+        drape_checkpoint_begin(&a, r->ctx, &r->checkpoint);
+    else
+        drape_archive_write_to(&a, r->ctx, DRAPE_CHECKPOINT_NAME, put_nowhere, NULL);
     drape_sim_archive_identity(r->sim, &a);
     drape_sim_archive(r->sim, &a);
     archive_progress(r, &a);
-    for (size_t i = 0; i < r->output_count && !r->finished; i++)
+    for (size_t i = 0; i < r->output_count && !r->finished && r->writes; i++)
         r->outputs[i].ops->archive(r->outputs[i].state, &a);
-    return drape_checkpoint_end(&a, &r->checkpoint);
+    return r->writes ? drape_checkpoint_end(&a, &r->checkpoint) : a.status;
 }
 
 drape_status drape_recorder_checkpoint(drape_recorder *r)
 {
     if (r->failure)
         return report(r);
-    if (!r->checkpoint.path)
+    if (r->writes && !r->checkpoint.path)
         return drape_fail(r->ctx, DRAPE_E_ARGUMENT, "the recorder was made without checkpoints");
     locale_t old = drape_locale_enter();
     note(r, write_checkpoint(r));
@@ -618,6 +633,8 @@ static drape_status resume_files(drape_recorder *r, drape_archive *a)
 {
     archive_progress(r, a);
     drape_status status = a->status;
+    if (!r->writes)
+        return status;
     if (!status && r->finished)
         status = drape_archive_end(a);
     if (!status)
@@ -680,7 +697,9 @@ static drape_status set_up(drape_recorder *r, const drape_recorder_def *def, dra
         status = open_folder(r, def, a != NULL);
     if (!status && r->writes)
         status = prepare_checkpoints(r, def);
-    if (!status && r->writes)
+    if (!r->writes)
+        r->every = def->checkpoint_every;
+    if (!status && (r->writes || a))
         status = a ? resume_files(r, a) : open_files(r);
     if (drape_ranks_any(r->ranks, status != DRAPE_OK) && !status)
         status = drape_fail(r->ctx, DRAPE_E_STOPPED, "another rank cannot write");

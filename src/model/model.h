@@ -52,7 +52,9 @@ typedef struct drape_term {
     const double *damping;  /* (elements.count) its measures' own dashpots [J s/q2]; NULL: none */
     const uint8_t *counted; /* (elements.count) 1: their energies count here, 0: on another rank; NULL: all */
     const int32_t *element; /* (elements.count) their numbers in the whole model; NULL: the same */
-    int sliders;            /* of each element (slider.h) */
+    const uint8_t *part_counted; /* (parts.count) of a part of a model, likewise */
+    const int32_t *part;
+    int sliders;                             /* of each element (slider.h) */
     double *slider_stiffness, *slider_limit; /* (sliders x elements.count) [J/q2], [J/q] */
     int64_t
         first_slider; /* index in a state of how far they have slid (sliders x elements.count); -1: none */

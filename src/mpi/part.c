@@ -280,6 +280,12 @@ static drape_status build_parts(maker *k, const drape_term *from, int32_t *numbe
             number[i] = parts++;
     to->parts = (drape_parts){0};
     to->patches = (drape_patches){0};
+    uint8_t *counted = drape_arena_take(&k->m->arena, (size_t)parts, sizeof *counted);
+    int32_t *numbers = drape_arena_take(&k->m->arena, (size_t)parts, sizeof *numbers);
+    if (!counted || !numbers)
+        return DRAPE_E_MEMORY;
+    to->part = numbers;
+    to->part_counted = counted;
     drape_status status = drape_term_reserve_parts(&builder, parts, links, p->rest_count);
     if (status)
         return status;
@@ -288,8 +294,11 @@ static drape_status build_parts(maker *k, const drape_term *from, int32_t *numbe
             node[a] = k->local[p->node[(size_t)i * (size_t)p->nodes + (size_t)a]];
         for (int j = 0; number[i] >= 0 && j < p->rest_count; j++)
             rest[j] = p->rest[(size_t)j * (size_t)p->count + (size_t)i];
-        if (number[i] >= 0)
-            drape_term_set_part(&builder, number[i], node, rest);
+        if (number[i] < 0)
+            continue;
+        drape_term_set_part(&builder, number[i], node, rest);
+        numbers[number[i]] = i;
+        counted[number[i]] = k->owner[p->node[(size_t)i * (size_t)p->nodes]] == k->rank;
     }
     for (int32_t e = 0; e < to->elements.count; e++)
         for (int32_t l = p->first_link[to->element[e]]; l < p->first_link[to->element[e] + 1]; l++)

@@ -92,55 +92,48 @@ static void fetch_blocks(const drape_ranks *ranks, double *blocks)
 
 /* ---- Gathering ---- */
 
-#define CHUNK 65536 /* nodes of a rank in a message */
-
-/* In pieces, so that only one piece is in memory twice. */
-static void collect(const drape_ranks *ranks, const double *nodes, int width, double *all)
+static void place(const double *values, size_t width, int32_t count, const int32_t *number, double *all)
 {
-    drape_mpi_ranks *r = of(ranks);
-    const size_t w = (size_t)width;
-    for (int k = 0; k < ranks->count && ranks->rank == 0; k++)
-        for (int first = 0; first < r->counts[k]; first += CHUNK) {
-            const int n = r->counts[k] - first < CHUNK ? r->counts[k] - first : CHUNK;
-            const int32_t *to = r->whole + r->places[k] + first;
-            if (k > 0)
-                MPI_Recv(r->piece, n * width, MPI_DOUBLE, k, 1, r->comm, MPI_STATUS_IGNORE);
-            for (size_t i = 0; i < (size_t)n; i++)
-                memcpy(all + w * (size_t)to[i],
-                       k > 0 ? r->piece + w * i : nodes + w * (size_t)r->own[first + (int)i],
-                       w * sizeof *all);
-        }
-    for (int32_t first = 0; first < r->own_count && ranks->rank > 0; first += CHUNK) {
-        const int32_t n = r->own_count - first < CHUNK ? r->own_count - first : CHUNK;
-        for (size_t i = 0; i < (size_t)n; i++)
-            memcpy(r->piece + w * i, nodes + w * (size_t)r->own[(size_t)first + i], w * sizeof *nodes);
-        MPI_Send(r->piece, n * width, MPI_DOUBLE, 0, 1, r->comm);
-    }
+    for (size_t i = 0; i < (size_t)count; i++)
+        memcpy(all + width * (size_t)number[i], values + width * i, width * sizeof *all);
 }
 
-static drape_status plan_gathering(drape_mpi_ranks *r, const drape_model *m)
+/* Sends the next items, at most DRAPE_MPI_PIECE, from *first on; on rank 0 puts them into their places. Returns
+ * how many. */
+static int32_t send_piece(drape_mpi_ranks *r, const double *values, size_t width, int32_t *first,
+                          int32_t count, const uint8_t *counted, const int32_t *number, double *all)
 {
-    const int count = r->base.count;
-    r->own = drape_arena_take(&r->arena, (size_t)m->node_count, sizeof *r->own);
-    r->piece = drape_arena_take(&r->arena, CHUNK, 3 * sizeof *r->piece);
-    r->counts = drape_arena_take(&r->arena, 2 * (size_t)count, sizeof *r->counts);
-    r->places = r->counts ? r->counts + count : NULL;
-    int32_t *numbers = drape_arena_take(&r->arena, (size_t)m->node_count, sizeof *numbers);
-    if (r->base.rank == 0)
-        r->whole = drape_arena_take(&r->arena, (size_t)m->part->all_nodes, sizeof *r->whole);
-    if (drape_arena_status(&r->arena))
-        return DRAPE_E_MEMORY;
-    for (int32_t i = 0; i < m->node_count; i++)
-        if (m->part->own[i]) {
-            numbers[r->own_count] = m->part->node[i];
-            r->own[r->own_count++] = i;
+    int32_t n = 0;
+    for (; *first < count && n < DRAPE_MPI_PIECE / (int32_t)width; ++*first)
+        if (counted[*first]) {
+            memcpy(r->piece + width * (size_t)n, values + width * (size_t)*first, width * sizeof *values);
+            r->numbers[n++] = number[*first];
         }
-    MPI_Gather(&r->own_count, 1, MPI_INT, r->counts, 1, MPI_INT, 0, r->comm);
-    for (int k = 1; k < count; k++)
-        r->places[k] = r->places[k - 1] + r->counts[k - 1];
-    MPI_Gatherv(numbers, r->own_count, MPI_INT32_T, r->whole, r->counts, r->places, MPI_INT32_T, 0, r->comm);
-    drape_arena_release(&r->arena, numbers);
-    return DRAPE_OK;
+    if (r->base.rank == 0) {
+        place(r->piece, width, n, r->numbers, all);
+        return n;
+    }
+    MPI_Send(r->numbers, n, MPI_INT32_T, 0, 1, r->comm);
+    MPI_Send(r->piece, n * (int)width, MPI_DOUBLE, 0, 2, r->comm);
+    return n;
+}
+
+/* In pieces, so that little is in memory twice; an empty piece is the last of a rank. */
+static void collect(const drape_ranks *ranks, const double *values, int width, int32_t count,
+                    const uint8_t *counted, const int32_t *number, double *all)
+{
+    drape_mpi_ranks *r = of(ranks);
+    int32_t first = 0;
+    while (send_piece(r, values, (size_t)width, &first, count, counted, number, all) > 0)
+        ;
+    for (int k = 1; k < ranks->count && ranks->rank == 0; k++)
+        for (int n = 1; n > 0;) {
+            MPI_Status status;
+            MPI_Recv(r->numbers, DRAPE_MPI_PIECE, MPI_INT32_T, k, 1, r->comm, &status);
+            MPI_Get_count(&status, MPI_INT32_T, &n);
+            MPI_Recv(r->piece, n * width, MPI_DOUBLE, k, 2, r->comm, MPI_STATUS_IGNORE);
+            place(r->piece, (size_t)width, n, r->numbers, all);
+        }
 }
 
 /* ---- Vectors ---- */
@@ -249,8 +242,6 @@ drape_status drape_mpi_ranks_plan(drape_mpi_ranks *r, const drape_model *part, c
     drape_status status = ask(r, part, owner, &r->nodes);
     if (!status)
         status = ask(r, part, owner, &r->blocks);
-    if (!status)
-        status = plan_gathering(r, part);
     if (status)
         return status;
     keep_free(part, r->blocks.neighbour_count, r->blocks.first_in, r->blocks.in);
@@ -279,7 +270,9 @@ drape_status drape_mpi_ranks_create(drape_context *ctx, MPI_Comm comm, drape_mpi
     r->base.direct = &drape_linear_mpi_direct;
     r->base.iterative = &drape_linear_mpi_iterative;
     r->gathered = drape_arena_take(&r->arena, (size_t)r->base.count * DRAPE_MPI_VALUES, sizeof *r->gathered);
-    if (!r->gathered)
+    r->piece = drape_arena_take(&r->arena, DRAPE_MPI_PIECE, sizeof *r->piece);
+    r->numbers = drape_arena_take(&r->arena, DRAPE_MPI_PIECE, sizeof *r->numbers);
+    if (drape_arena_status(&r->arena))
         drape_mpi_ranks_destroy(out);
     return *out ? DRAPE_OK : DRAPE_E_MEMORY;
 }

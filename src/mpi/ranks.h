@@ -23,15 +23,13 @@ typedef struct drape_mpi_ranks {
     MPI_Comm comm;
     drape_arena arena;
     drape_mpi_exchange nodes, blocks;
-    double *gathered;     /* (DRAPE_MPI_VALUES x count) */
-    double *piece;        /* of a message of drape_ranks.gather */
-    int32_t own_count;    /* nodes that this rank owns, */
-    int32_t *own;         /* (own_count) their places here */
-    int *counts, *places; /* (count) on rank 0: how many each rank owns, and where its list begins */
-    int32_t *whole;       /* on rank 0: their numbers in the whole model, those of rank 0 first */
+    double *gathered; /* (DRAPE_MPI_VALUES x count) */
+    double *piece;    /* (DRAPE_MPI_PIECE) of a message of drape_ranks.gather */
+    int32_t *numbers; /* (DRAPE_MPI_PIECE) of its items */
 } drape_mpi_ranks;
 
-#define DRAPE_MPI_VALUES 64 /* in one sum */
+#define DRAPE_MPI_VALUES 64     /* in one sum */
+#define DRAPE_MPI_PIECE  196608 /* numbers in a message; a multiple of 3 */
 
 /* The ranks of a communicator, which becomes theirs. Errors: DRAPE_E_MEMORY. */
 drape_status drape_mpi_ranks_create(drape_context *ctx, MPI_Comm comm, drape_mpi_ranks **out);

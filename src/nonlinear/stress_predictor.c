@@ -5,7 +5,7 @@ drape_status drape_stress_predictor_init(drape_arena *arena, drape_system *syste
 {
     const drape_model *model = drape_system_model(system);
     *s = (drape_stress_predictor){.system = system};
-    if (model->measure_count == 0)
+    if (drape_model_whole(model)->measure_count == 0)
         return DRAPE_OK;
     s->stress = drape_arena_take(arena, (size_t)model->measure_count, sizeof *s->stress);
     s->along = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *s->along);

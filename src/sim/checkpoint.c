@@ -7,6 +7,7 @@
  * unchanged.
  */
 #include "base/finite.h"
+#include "model/archive_part.h"
 #include "sim/sim.h"
 
 #include <math.h>
@@ -25,9 +26,9 @@ static void archive_state(const drape_model *m, drape_state *state, drape_archiv
 {
     size_t n = 3 * (size_t)m->node_count;
     drape_archive_double(a, &state->t);
-    drape_archive_doubles(a, state->x, n);
-    drape_archive_doubles(a, state->v, n);
-    drape_archive_doubles(a, state->internal, (size_t)m->internal_count);
+    drape_archive_nodes(a, m, state->x);
+    drape_archive_nodes(a, m, state->v);
+    drape_archive_internal(a, m, state->internal);
     if (drape_archive_has_read(a) &&
         !(isfinite(state->t) && drape_all_finite(state->x, n) && drape_all_finite(state->v, n)))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a state that is not finite");
@@ -232,11 +233,22 @@ static void write_own(drape_sim *sim, drape_archive *a)
         drape_archive_doubles(a, sim->masses, nodes);
 }
 
+/* Of a run on several ranks, integrators are restarted, and what they have done is that of earlier ones. */
+static void archive_work(drape_sim *sim, drape_archive *a)
+{
+    drape_work work = sim->earlier;
+    if (a->by_ranks && !a->reading)
+        work = drape_work_sum(sim->chosen.integrator->work(sim->integrator), &work);
+    drape_work_archive(&work, a);
+    if (drape_archive_has_read(a))
+        sim->earlier = work;
+}
+
 void drape_sim_archive(drape_sim *sim, drape_archive *a)
 {
     if (!a->reading)
         write_own(sim, a);
-    drape_work_archive(&sim->earlier, a);
+    archive_work(sim, a);
     archive_states(sim, a);
     drape_archive_doubles(a, sim->scratch, sizeof sim->scratch / sizeof *sim->scratch);
     archive_schedule(&sim->schedule, a);
@@ -248,6 +260,8 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
     drape_events_archive(sim, a);
     drape_system_archive(sim->system, a);
     drape_archive_mark(a, "integrator");
+    if (a->by_ranks)
+        return;
     if (drape_archive_good(a))
         sim->chosen.integrator->archive(sim->integrator, a);
 }

@@ -290,6 +290,22 @@ static void archive_hash(drape_archive *a, const char *what, uint64_t hash)
                            hash);
 }
 
+/* Whether several ranks share the model, which any number of them can then read. */
+static void archive_kind(drape_archive *a, bool by_ranks)
+{
+    char kind[NAME_ROOM];
+    snprintf(kind, sizeof kind, by_ranks ? "ranks" : "identity");
+    drape_archive_text(a, kind, sizeof kind);
+    a->by_ranks = strcmp(kind, "ranks") == 0;
+    if (drape_archive_good(a) && !a->by_ranks && strcmp(kind, "identity") != 0)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has \"%s\" where \"identity\" is expected",
+                           kind);
+    if (drape_archive_good(a) && by_ranks && !a->by_ranks)
+        drape_archive_fail(
+            a, DRAPE_E_ARGUMENT,
+            "the checkpoint is of a run of one process, which remembers what several ranks cannot");
+}
+
 void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
 {
     const drape_model *m = drape_sim_base_model(sim);
@@ -298,7 +314,7 @@ void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
         sim->choices_hash = choices_hash(sim);
         sim->identity_known = true;
     }
-    drape_archive_mark(a, "identity");
+    archive_kind(a, m->part != NULL);
     archive_build(a);
     archive_name(a, "integrator", sim->chosen.integrator->entry.name);
     archive_name(a, "controller", sim->chosen.controller->entry.name);
