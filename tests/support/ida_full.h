@@ -187,7 +187,7 @@ static inline bool ida_full_configure(ida_full *f, int max_order, int ordering)
     return !SUNLinSol_KLUSetOrdering(f->solver, ordering) &&
            !IDAInit(f->ida, ida_full_residual, 0, f->y, f->rate) && !IDASetUserData(f->ida, f) &&
            !IDASVtolerances(f->ida, 0, f->tolerances) && !IDASetLinearSolver(f->ida, f->solver, f->matrix) &&
-           drape_sun_newton_create(&f->newton, f->y, f->sun) &&
+           drape_sun_newton_create(&f->newton, f->y, 2 * f->n, NULL, f->sun) &&
            !IDASetNonlinearSolver(f->ida, f->newton.solver) && drape_sun_newton_set_test(&f->newton) &&
            !IDASetJacFn(f->ida, ida_full_jacobian) && !IDASetMaxOrd(f->ida, max_order) &&
            !IDASetMaxErrTestFails(f->ida, IDA_FULL_FAILS) && !IDASetMaxConvFails(f->ida, IDA_FULL_FAILS) &&
