@@ -959,9 +959,9 @@ DRAPE_API drape_status drape_sim_push(drape_sim *sim, const double *forces);
 typedef void drape_wind_field(void *user, double t, int32_t count, const double *x, double *wind,
                               double *gradient);
 
-/* Sets the velocity of the medium for drag terms: "drag.wind" (added to its own steady wind), "drag.viscous",
- * and user-defined terms with in_medium. If field is NULL, the medium is at rest again. Errors:
- * DRAPE_E_ARGUMENT (no term of the model is in a medium). */
+/* Sets the velocity of the medium for "drag.wind" and "air.added_mass" (added to their own wind),
+ * "drag.viscous", and user-defined terms with in_medium. If field is NULL, the medium is at rest again.
+ * Errors: DRAPE_E_ARGUMENT (no term of the model is in a medium). */
 DRAPE_API drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *user);
 
 /* ---- Sim: what can be read ---- */
@@ -1165,10 +1165,11 @@ DRAPE_API bool drape_model_collider_rotation(const drape_model *model, int32_t i
 /* Energies of the last accepted state [J]. */
 typedef struct drape_energy {
     double kinetic; /* [J] of all nodes but pinned ones, whose motion is prescribed; nodes that pins hold
-                       in some directions only count with all of their velocity */
+                       in some directions only count with all of their velocity; and of terms with
+                       an energy of motion, such as air.added_mass, what is quadratic in it */
     double elastic; /* [J] of all terms that have an energy, and of drape_sim_set_drag_spring */
     double gravity; /* [J] of the weight, zero at the origin, and of loads with a potential, such as -p V of
-                          load.pressure */
+                          load.pressure, or that of steady wind on air.added_mass */
     double contact; /* [J] of pairs that are closer than their activation distance */
     double dissipated; /* [J] work taken by damping and drag terms since t = 0 or drape_sim_set_state */
     double numerical;  /* [J] the rest of the balance, after the work of moving pins and colliders and of

@@ -380,7 +380,7 @@ typedef struct drape_fault {
 #define DRAPE_LANES 4
 
 /* Where the function kinetic of a term writes T(x, v) and its derivatives, with d as below. NULL: not
- * needed. Allocated by the library alone: it may grow at its end. */
+ * needed; of the last three all or none. Allocated by the library alone: it may grow at its end. */
 typedef struct drape_kinetic {
     double *t;    /* (count) T [J] */
     double *by_x; /* (count x d) dT/dx [N] */

@@ -148,26 +148,23 @@ static void momentum_change(const flow *f, const flow *d, double out[3])
         out[k] = -f->mass / 6 * (d->q * f->m[k] + f->q * d->m[k] - f->q * f->m[k] * d->l / f->l) / f->l;
 }
 
-/* Column `column` of xx and vx, those of vv are by_velocity. */
-static void add_columns(const flow *f, int column, double *xx, double *vx, double *vv)
+/* xx, vx and vv of one triangle, from dT/dm = g. */
+static void second_derivatives(const flow *f, const double g[3], double *xx, double *vx, double *vv)
 {
-    const flow d = by_place(f, column / 3, column % 3), dv = by_velocity(f, column % 3, 1.0 / 3);
-    double g[3], dg[3], dp[3], dp_dv[3], a[3], b[3];
-    by_normal(f, g);
-    by_normal_change(f, &d, dg);
-    momentum_change(f, &d, dp);
-    momentum_change(f, &dv, dp_dv);
-    for (int i = 0; i < 3; i++) {
-        vec3_cross(d.opposite[i], g, a);
-        vec3_cross(f->opposite[i], dg, b);
-        for (int k = 0; k < 3; k++) {
-            const int at = D * (3 * i + k) + column;
-            if (xx)
+    for (int column = 0; column < D; column++) {
+        const flow d = by_place(f, column / 3, column % 3);
+        double dg[3], dp[3], a[3], b[3];
+        by_normal_change(f, &d, dg);
+        momentum_change(f, &d, dp);
+        for (int i = 0; i < 3; i++) {
+            vec3_cross(d.opposite[i], g, a);
+            vec3_cross(f->opposite[i], dg, b);
+            for (int k = 0; k < 3; k++) {
+                const int at = D * (3 * i + k) + column;
                 xx[at] = -a[k] - b[k];
-            if (vx)
                 vx[at] = dp[k];
-            if (vv)
-                vv[at] = dp_dv[k];
+                vv[at] = f->mass / 18 * f->m[k] * f->m[column % 3] / f->l;
+            }
         }
     }
 }
@@ -209,9 +206,9 @@ static void kinetic(const drape_elements *el, int32_t first, int32_t count, cons
             for (int k = 0; by_v && k < 3; k++)
                 by_v[3 * a + k] = p[k];
         }
-        for (int column = 0; (out->xx || out->vx || out->vv) && column < D; column++)
-            add_columns(&f, column, item(out->xx, i, D * D), item(out->vx, i, D * D),
-                        item(out->vv, i, D * D));
+        if (out->xx)
+            second_derivatives(&f, g, item(out->xx, i, D * D), item(out->vx, i, D * D),
+                               item(out->vv, i, D * D));
     }
 }
 

@@ -1207,10 +1207,16 @@ START_TEST(malformed_parameters_are_refused)
 }
 END_TEST
 
+static void no_motion(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                      const double *v, const drape_kinetic *out)
+{
+    (void)el, (void)first, (void)count, (void)x, (void)v, (void)out;
+}
+
 START_TEST(malformed_ops_are_refused)
 {
     drape_context *ctx = make_context();
-    for (int i = 0; i < 16; i++) {
+    for (int i = 0; i < 17; i++) {
         drape_term_ops ops = attract;
         const char *says = "not well formed";
         drape_status expected = DRAPE_E_ARGUMENT;
@@ -1266,6 +1272,9 @@ START_TEST(malformed_ops_are_refused)
             ops.in_medium = true; /* an energy does not depend on the velocity */
             break;
         case 15:
+            ops.kinetic = no_motion; /* it stands beside a dissipation */
+            break;
+        case 16:
             ops.struct_size = offsetof(drape_term_ops, in_medium) - 1;
             expected = DRAPE_E_VERSION;
             says = "an older one's";

@@ -270,6 +270,12 @@ START_TEST(wrong_requests_are_refused)
                    "'duration': 1}");
     refuse(&s, good, DRAPE_E_ARGUMENT, "all nodes are pinned");
     scene_close(&s);
+    s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 1, "
+                   "'height': 1}, 'material': {'young_modulus': 1, 'thickness': 1e-3, 'areal_density': 1}, "
+                   "'terms': ['stretch.edge', {'type': 'air.added_mass', 'span': 1}], 'pins': [{'edge': "
+                   "'top'}]}], 'duration': 1}");
+    refuse(&s, good, DRAPE_E_ARGUMENT, "the mass matrix depends on the shape");
+    scene_close(&s);
 }
 END_TEST
 
