@@ -206,6 +206,10 @@ typedef struct drape_cloth_view {
     drape_points shear_curve;             /* shear angle [degrees] and force per length [N/m] */
     const int32_t *edge_turn; /* (edge_count) for drape_term_turn_part: the turns of the pin that clamps the
                                  edge, -1: none; NULL: no edge turns */
+    const int32_t
+        *edge_image;     /* (edge_count) of periodic edges the one on the other side, which is the same by
+                                  a translation; -1: none; NULL: the cloth has no periodic edges */
+    const double *start; /* (node_count x 3) where the nodes start [m]: a period stays as it is there */
 } drape_cloth_view;
 
 /* A seam at rest: two sides, each a list of nodes of one cloth, which may be the same cloth. Nodes of equal
@@ -492,6 +496,11 @@ typedef struct drape_term_ops {
     /* The term reads the measured curves of the material. Where no term of a cloth does, a scene that gives
      * curves has the warning "unused_curve". */
     bool takes_curves;
+
+    /* Its elements on a cloth with periodic edges are those of the cloth that goes on across them, each once:
+     * build reads edge_image. A term without this is refused there if its elements reach over edges, or lie
+     * along them. */
+    bool periodic;
 } drape_term_ops;
 
 /* Registers a user-defined term, which scenes compiled with this context may then use by name. *ops is
