@@ -1227,7 +1227,7 @@ DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t 
 /* A doubt about a run: what is unusual, and which setting would help. */
 typedef struct drape_warning {
     const char *name; /* "no_terms", "unused_curve", "few_steps", "large_mesh", "starts_inside",
-                         "ends_inside", "tangled", "no_room", "numerical_dissipation",
+                         "ends_inside", "tangled", "no_room", "numerical_dissipation", "energy_gained",
                          "slow_contact", "contact_distance", "inaccurate", "held" or "time_dropped" */
     char text[400];   /* one line */
 } drape_warning;
@@ -1241,7 +1241,7 @@ typedef struct drape_warning {
  * steps so far; the text describes the first such collider. tangled: an untangling left intersections,
  * gaps below the least or triangles in colliders. no_room: bodies left cloth no room, and it was relaxed
  * there (drape_sim_relaxed). numerical_dissipation: the integrator took more than half of the energy that
- * went in. slow_contact: contact takes most of the time of the steps, and longer than the motion lasts,
+ * went in. energy_gained: it gained more than a tenth of that. slow_contact: contact takes most of the time of the steps, and longer than the motion lasts,
  * and a setting is known to help. contact_distance: a collider moved in a step by more than five
  * activation distances that the scene gives. inaccurate: by the estimate of the integrator more than half
  * of the steps, or the last one, are further from the solution of

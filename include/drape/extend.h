@@ -208,6 +208,10 @@ typedef struct drape_cloth_view {
     drape_points shear_curve;             /* shear angle [degrees] and force per length [N/m] */
     const int32_t *edge_turn; /* (edge_count) for drape_term_turn_part: the turns of the pin that clamps the
                                  edge, -1: none; NULL: no edge turns */
+    const int32_t
+        *edge_image;     /* (edge_count) of periodic edges the one on the other side, which is the same by
+                                  a translation; -1: none; NULL: the cloth has no periodic edges */
+    const double *start; /* (node_count x 3) where the nodes start [m]: a period stays as it is there */
 } drape_cloth_view;
 
 /* A seam at rest: two sides, each a list of nodes of one cloth, which may be the same cloth. Nodes of equal
@@ -513,6 +517,11 @@ typedef struct drape_term_ops {
      * by place are left out. */
     void (*kinetic)(const drape_elements *el, int32_t first, int32_t count, const double *x, const double *v,
                     const drape_kinetic *out);
+
+    /* Its elements on a cloth with periodic edges are those of the cloth that goes on across them, each once:
+     * build reads edge_image. A term without this is refused there if its elements reach over edges, or lie
+     * along them. */
+    bool periodic;
 } drape_term_ops;
 
 /* Registers a user-defined term, which scenes compiled with this context may then use by name. *ops is

@@ -185,6 +185,8 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .triangle_edge = m->triangle_edge,
                               .edge_clamped = cloth->edge_clamped,
                               .edge_turn = cloth->edge_turn,
+                              .edge_image = cloth->edge_image,
+                              .start = model->start + 3 * (size_t)cloth->first_node,
                               .node_area = m->node_area,
                               .node_mass = cloth->node_mass,
                               .rows = m->rows,

@@ -289,6 +289,45 @@ static drape_status list_sets(drape_model *m, const int32_t *parent)
     return DRAPE_OK;
 }
 
+/* The edge between two nodes of a cloth; -1: there is none. */
+static int32_t edge_between(const drape_mesh *mesh, int32_t a, int32_t b)
+{
+    const int32_t lower = a < b ? a : b, higher = a < b ? b : a;
+    int32_t low = 0, high = mesh->edge_count;
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2, *end = mesh->edge + 2 * (size_t)middle;
+        if (end[0] < lower || (end[0] == lower && end[1] < higher))
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    const int32_t *found = mesh->edge + 2 * (size_t)low;
+    return low < mesh->edge_count && found[0] == lower && found[1] == higher ? low : -1;
+}
+
+/* Notes which edges of triangles are the same one: those between paired nodes, each beside one triangle. */
+static drape_status pair_mesh_edges(const pairing *p, int32_t *image, drape_arena *scratch)
+{
+    const drape_mesh *mesh = &p->cloth->mesh;
+    int32_t *partner = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *partner);
+    if (!partner)
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < mesh->node_count; i++)
+        partner[i] = -1;
+    for (int32_t i = 0; i < p->from.count; i++)
+        partner[p->from.node[i]] = p->partner[i];
+    for (int32_t e = 0; e < mesh->edge_count; e++) {
+        const int32_t a = partner[mesh->edge[2 * (size_t)e]], b = partner[mesh->edge[2 * (size_t)e + 1]];
+        const int32_t other = a < 0 || b < 0 ? -1 : edge_between(mesh, a, b);
+        if (other < 0 || mesh->edge_triangle[2 * (size_t)e + 1] >= 0 ||
+            mesh->edge_triangle[2 * (size_t)other + 1] >= 0)
+            continue;
+        image[e] = other;
+        image[other] = e;
+    }
+    return DRAPE_OK;
+}
+
 /* parent NULL: only checks that edges which were paired later have left the period as it was. */
 static drape_status pair_edges(drape_model *model, size_t c, size_t i, const drape_periodic_def *def,
                                int32_t *parent)
@@ -304,8 +343,19 @@ static drape_status pair_edges(drape_model *model, size_t c, size_t i, const dra
         const int32_t a = root_of(parent, first + p.from.node[k]), b = root_of(parent, first + p.partner[k]);
         parent[a > b ? a : b] = a < b ? a : b;
     }
+    if (parent && !status)
+        status = pair_mesh_edges(&p, model->cloths[c].edge_image, &scratch);
     drape_arena_free(&scratch);
     return status;
+}
+
+static drape_status start_edges(drape_model *model, drape_cloth *cloth)
+{
+    const size_t edges = (size_t)cloth->mesh.edge_count;
+    cloth->edge_image = drape_arena_take(&model->arena, edges, sizeof *cloth->edge_image);
+    for (size_t e = 0; cloth->edge_image && e < edges; e++)
+        cloth->edge_image[e] = -1;
+    return cloth->edge_image ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 drape_status drape_compile_periodic(drape_model *model, const drape_scene_def *def)
@@ -321,6 +371,9 @@ drape_status drape_compile_periodic(drape_model *model, const drape_scene_def *d
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < model->node_count; i++)
         parent[i] = i;
+    for (size_t c = 0; !status && c < def->cloth_count; c++)
+        if (def->cloths[c].periodic_count > 0)
+            status = start_edges(model, &model->cloths[c]);
     for (size_t c = 0; c < def->cloth_count; c++)
         for (size_t i = 0; !status && i < def->cloths[c].periodic_count; i++)
             status = pair_edges(model, c, i, &def->cloths[c].periodic[i], parent);
@@ -380,21 +433,6 @@ static drape_status check_supports(const drape_model *m)
     return DRAPE_OK;
 }
 
-static bool is_edge(const drape_mesh *mesh, int32_t a, int32_t b)
-{
-    const int32_t lower = a < b ? a : b, higher = a < b ? b : a;
-    int32_t low = 0, high = mesh->edge_count;
-    while (low < high) {
-        const int32_t middle = low + (high - low) / 2, *end = mesh->edge + 2 * (size_t)middle;
-        if (end[0] < lower || (end[0] == lower && end[1] < higher))
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < mesh->edge_count && mesh->edge[2 * (size_t)low] == lower &&
-           mesh->edge[2 * (size_t)low + 1] == higher;
-}
-
 static bool in_one_cell(const drape_mesh *mesh, int32_t a, int32_t b)
 {
     return mesh->rows > 0 && abs(a / mesh->columns - b / mesh->columns) <= 1 &&
@@ -414,7 +452,7 @@ static bool reaches_over_edges(const drape_model *m, const drape_term *term)
                 const int32_t *node = el->node + (size_t)e * (size_t)el->nodes,
                               first = m->cloths[term->cloth].first_node, i = node[a] - first,
                               j = node[b] - first;
-                if (i != j && !is_edge(mesh, i, j) && !(el->nodes == 2 && in_one_cell(mesh, i, j)))
+                if (i != j && edge_between(mesh, i, j) < 0 && !(el->nodes == 2 && in_one_cell(mesh, i, j)))
                     return true;
             }
     return false;
@@ -464,6 +502,8 @@ static drape_status check_term(const drape_model *m, const drape_term *term)
 {
     char pointer[64];
     bool twins;
+    if (term->ops->periodic)
+        return DRAPE_OK;
     drape_status status = find_twins(m, term, &twins);
     snprintf(pointer, sizeof pointer, "/cloth/%d/periodic", (int)term->cloth);
     if (!status && twins)

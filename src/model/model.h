@@ -200,7 +200,9 @@ typedef struct drape_cloth {
     uint8_t *edge_clamped; /* (mesh.edge_count) 1: both nodes are held by pins that clamp */
     int32_t *edge_turn;    /* (mesh.edge_count) the track whose turns its clamp follows, -1: none; NULL: no
                               edge turns */
-    double velocity[3];    /* [m/s] at t = 0 */
+    int32_t *edge_image; /* (mesh.edge_count) the edge that is the same by a period, -1: none; NULL: the cloth
+                              has no periodic edges */
+    double velocity[3];  /* [m/s] at t = 0 */
     int32_t first_node, first_triangle;
     const struct drape_term **laws; /* (law_count) */
     int law_count;

@@ -49,6 +49,9 @@ static void find_neighbours(patch *p, const double flat[6])
     memcpy(out->node, p->around.node, sizeof out->node);
     memcpy(out->edge, p->around.edge, sizeof out->edge);
     memcpy(out->turned, p->around.turned, sizeof out->turned);
+    memcpy(out->shifted, p->around.shifted, sizeof out->shifted);
+    memcpy(out->at_rest, p->around.at_rest, sizeof out->at_rest);
+    memcpy(out->shift, p->around.shift, sizeof out->shift);
     for (int h = 0; h < MIDEDGE_HINGES; h++)
         p->open[h] = p->around.beyond[h] >= 0 && !p->cloth->edge_clamped[out->edge[h]];
     for (int i = 0; i < 3; i++) {

@@ -14,8 +14,10 @@ typedef struct drape_midedge {
     int32_t node[MIDEDGE_NODES];  /* local to the cloth; -1: there is none */
     int32_t edge[MIDEDGE_HINGES]; /* of each hinge, -1: there is none */
     bool turned[MIDEDGE_HINGES];  /* the inner triangle of the hinge is the second one beside its edge */
-    bool clamped[3], free[3];     /* own edges: with a fixed normal; on the boundary and not clamped */
-    int rank;                     /* number of squares in the energy: 3 less the free edges */
+    bool shifted[MIDEDGE_HINGES]; /* it has nodes that are displaced (patch.h) */
+    double at_rest[MIDEDGE_NODES][3], shift[MIDEDGE_NODES][3]; /* [m] */
+    bool clamped[3], free[3]; /* own edges: with a fixed normal; on the boundary and not clamped */
+    int rank;                 /* number of squares in the energy: 3 less the free edges */
     /* E = 1/2 sum k (q - q0)^2 [J], q = l . K = sum c theta; theta of a clamped edge is the angle to its
      * direction. */
     double k[3], l[9], c[3][MIDEDGE_HINGES];

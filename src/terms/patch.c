@@ -18,43 +18,78 @@ static int corner_of(const int32_t *nodes, int32_t node)
     return nodes[0] == node ? 0 : nodes[1] == node ? 1 : 2;
 }
 
-/* The triangle beyond the edge of `triangle` between nodes a and b, that edge, and the apex; -1: none. */
-static int32_t beyond(const drape_cloth_view *cloth, int32_t triangle, int32_t a, int32_t b, int32_t *edge,
-                      int32_t *apex)
+static int32_t edge_of(const drape_cloth_view *cloth, int32_t triangle, int32_t a, int32_t b)
 {
     const int32_t *own = cloth->triangle + 3 * (size_t)triangle;
     const int i = corner_of(own, a), j = corner_of(own, b), side = (i + 1) % 3 == j ? i : j;
-    *edge = cloth->triangle_edge[3 * (size_t)triangle + (size_t)side];
-    const int32_t *beside = cloth->edge_triangle + 2 * (size_t)*edge;
-    const int32_t other = beside[0] == triangle ? beside[1] : beside[0];
-    *apex = -1;
-    for (int k = 0; other >= 0 && k < 3; k++) {
-        const int32_t node = cloth->triangle[3 * (size_t)other + (size_t)k];
-        if (node != a && node != b)
-            *apex = node;
-    }
-    return other;
+    return cloth->triangle_edge[3 * (size_t)triangle + (size_t)side];
 }
 
-/* Adds the apex beyond hinge h: its node and its place in the plane. */
-static void add_beyond(const drape_cloth_view *cloth, int32_t triangle, int h, drape_patch *out)
+/* The image of an edge, a translation of it: which of its nodes is that of a, and the way back. */
+static void cross(const drape_cloth_view *cloth, int32_t image, drape_beyond *out)
 {
-    const int *local = drape_patch_hinge[h];
-    int32_t *node = out->node, *edge = &out->edge[h];
-    out->beyond[h] = beyond(cloth, triangle, node[local[0]], node[local[1]], edge, &node[local[3]]);
-    out->turned[h] = cloth->edge_triangle[2 * (size_t)*edge] != triangle;
-    if (out->beyond[h] < 0)
-        return;
-    const double *a = cloth->rest + 3 * (size_t)node[local[0]], *b = cloth->rest + 3 * (size_t)node[local[1]];
-    const double *from = out->flat + 2 * local[0], *to = out->flat + 2 * local[1];
+    const int32_t *end = cloth->edge + 2 * (size_t)image, a = out->a, b = out->b;
+    double along[3], other[3];
+    vec3_sub(cloth->rest + 3 * (size_t)b, cloth->rest + 3 * (size_t)a, along);
+    vec3_sub(cloth->rest + 3 * (size_t)end[1], cloth->rest + 3 * (size_t)end[0], other);
+    const int first = vec3_dot(along, other) < 0;
+    out->across = true;
+    out->a = end[first];
+    out->b = end[1 - first];
+    vec3_sub(cloth->rest + 3 * (size_t)a, cloth->rest + 3 * (size_t)out->a, out->at_rest);
+    vec3_sub(cloth->start + 3 * (size_t)a, cloth->start + 3 * (size_t)out->a, out->shift);
+}
+
+drape_beyond drape_beyond_edge(const drape_cloth_view *cloth, int32_t triangle, int32_t edge, int32_t a,
+                               int32_t b)
+{
+    const int32_t *beside = cloth->edge_triangle + 2 * (size_t)edge;
+    const int32_t image = cloth->edge_image ? cloth->edge_image[edge] : -1;
+    drape_beyond out = {
+        .triangle = beside[0] == triangle ? beside[1] : beside[0], .apex = -1, .a = a, .b = b};
+    if (image >= 0) {
+        out.triangle = cloth->edge_triangle[2 * (size_t)image];
+        cross(cloth, image, &out);
+    }
+    for (int k = 0; out.triangle >= 0 && k < 3; k++) {
+        const int32_t node = cloth->triangle[3 * (size_t)out.triangle + (size_t)k];
+        if (node != out.a && node != out.b)
+            out.apex = node;
+    }
+    return out;
+}
+
+/* Adds the apex beyond hinge h of the triangle `from`, whose nodes there are a and b: its node and its place in
+ * the plane. Returns the triangle of the apex. */
+static drape_beyond add_beyond(const drape_cloth_view *cloth, const drape_beyond *from, int h, int32_t a,
+                               int32_t b, drape_patch *out)
+{
+    const int *local = drape_patch_hinge[h], apex = local[3];
+    const int32_t edge = edge_of(cloth, from->triangle, a, b);
+    drape_beyond next = drape_beyond_edge(cloth, from->triangle, edge, a, b);
+    out->edge[h] = edge;
+    out->beyond[h] = next.triangle;
+    out->turned[h] = cloth->edge_triangle[2 * (size_t)edge] != from->triangle;
+    out->node[apex] = next.apex;
+    next.across = next.across || from->across;
+    out->shifted[h] = next.across;
+    vec3_add_scaled(1, from->at_rest, next.at_rest);
+    vec3_add_scaled(1, from->shift, next.shift);
+    memcpy(out->at_rest[apex], next.at_rest, sizeof next.at_rest);
+    memcpy(out->shift[apex], next.shift, sizeof next.shift);
+    if (next.triangle < 0)
+        return next;
+    const double *at = cloth->rest + 3 * (size_t)next.a, *start = out->flat + 2 * local[0],
+                 *end = out->flat + 2 * local[1];
     double along[3], d[3], normal[3];
-    vec3_sub(b, a, along);
-    vec3_sub(cloth->rest + 3 * (size_t)node[local[3]], a, d);
+    vec3_sub(cloth->rest + 3 * (size_t)next.b, at, along);
+    vec3_sub(cloth->rest + 3 * (size_t)next.apex, at, d);
     vec3_cross(along, d, normal);
     const double length2 = vec3_dot(along, along), s = vec3_dot(d, along) / length2;
     const double rise = vec3_norm(normal) / length2; /* altitude over length */
-    out->flat[2 * local[3]] = from[0] + s * (to[0] - from[0]) + rise * (to[1] - from[1]);
-    out->flat[2 * local[3] + 1] = from[1] + s * (to[1] - from[1]) - rise * (to[0] - from[0]);
+    out->flat[2 * apex] = start[0] + s * (end[0] - start[0]) + rise * (end[1] - start[1]);
+    out->flat[2 * apex + 1] = start[1] + s * (end[1] - start[1]) - rise * (end[0] - start[0]);
+    return next;
 }
 
 void drape_patch_around(const drape_cloth_view *cloth, int32_t triangle, const double flat[6],
@@ -67,9 +102,12 @@ void drape_patch_around(const drape_cloth_view *cloth, int32_t triangle, const d
     for (int h = 0; h < DRAPE_PATCH_HINGES; h++)
         out->edge[h] = out->beyond[h] = -1;
     for (int i = 0; i < 3; i++) {
-        add_beyond(cloth, triangle, i, out);
-        for (int k = 3 + 2 * i; k < 5 + 2 * i && out->beyond[i] >= 0; k++)
-            add_beyond(cloth, out->beyond[i], k, out);
+        const drape_beyond own = {.triangle = triangle};
+        const drape_beyond next = add_beyond(cloth, &own, i, out->node[i], out->node[(i + 1) % 3], out);
+        if (next.triangle < 0)
+            continue;
+        add_beyond(cloth, &next, 3 + 2 * i, next.a, next.apex, out);
+        add_beyond(cloth, &next, 4 + 2 * i, next.apex, next.b, out);
     }
 }
 

@@ -4,6 +4,8 @@
  * Local nodes: 0 1 2 of the triangle; 3 + i the apex beyond its edge i, which goes from node i to node i + 1;
  * 6 + 2 i and 7 + 2 i the apices beyond the two other edges of that neighbour. Hinges: 0 1 2 at its own
  * edges; 3 + 2 i and 4 + 2 i at those of neighbour i.
+ *
+ * A patch goes on across periodic edges: its nodes beyond one are those of the other side, displaced by shift.
  */
 #ifndef DRAPE_TERMS_PATCH_H
 #define DRAPE_TERMS_PATCH_H
@@ -21,7 +23,23 @@ typedef struct drape_patch {
     int32_t beyond[DRAPE_PATCH_HINGES]; /* the triangle beyond each hinge; -1: there is none */
     bool turned[DRAPE_PATCH_HINGES]; /* the inner triangle of the hinge is the second one beside its edge */
     double flat[2 * DRAPE_PATCH_NODES]; /* the nodes unfolded into the plane of the triangle [m] */
+    bool shifted[DRAPE_PATCH_HINGES];   /* the hinge is at a periodic edge, or has nodes beyond one */
+    double at_rest[DRAPE_PATCH_NODES][3],
+        shift[DRAPE_PATCH_NODES][3]; /* [m] of the nodes: at rest, and as long
+                                                                          as the period is that of the start */
 } drape_patch;
+
+/* The triangle beyond an edge, in the numbers of its own nodes. */
+typedef struct drape_beyond {
+    int32_t triangle, apex;      /* -1: there is none */
+    int32_t a, b;                /* the nodes of the edge */
+    bool across;                 /* a periodic edge */
+    double at_rest[3], shift[3]; /* [m] by which it is displaced so that it lies beside the edge */
+} drape_beyond;
+
+/* What lies beyond an edge of a triangle, from its node a to its node b. */
+drape_beyond drape_beyond_edge(const drape_cloth_view *cloth, int32_t triangle, int32_t edge, int32_t a,
+                               int32_t b);
 
 /* The patch of a triangle, from its corners in its plane, flat (3 x 2). */
 void drape_patch_around(const drape_cloth_view *cloth, int32_t triangle, const double flat[6],

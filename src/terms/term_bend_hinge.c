@@ -9,6 +9,8 @@
  * correct on
  *     equilateral meshes only.
  *
+ * At a periodic edge x3 is the apex on its other side, displaced by the period.
+ *
  * theta jumps by 2 pi where the hinge is folded onto itself. The internal variable is the angle in the last
  * accepted state; the angle is taken on the branch nearest to it, so that energy and force are smooth through
  * pi.
@@ -16,14 +18,17 @@
 #include "base/lanes.h"
 #include "base/reason.h"
 #include "terms/dihedral.h"
+#include "terms/patch.h"
 #include "terms/terms.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { PARAM_STIFFNESS, PARAM_REST, PARAM_MIN_ALTITUDE, PARAM_MAX_TURN, PARAM_COUNT };
 enum { STIFFNESS_CONSISTENT, STIFFNESS_REPORT };
 enum { REST_MESH, REST_FLAT };
 enum { REST_K, REST_THETA0, REST_ALTITUDE1, REST_ALTITUDE2, REST_COUNT };
+enum { REST_SHIFT = REST_COUNT, REST_PERIODIC = REST_SHIFT + 3 }; /* displacement of x3 */
 
 static const char *const stiffness_choices[] = {"consistent", "report", NULL};
 static const char *const rest_choices[] = {"mesh", "flat", NULL};
@@ -52,6 +57,9 @@ LANES_INLINE void measure_hinges(const drape_elements *el, const int32_t element
             node[l] = el->node[4 * (size_t)element[l] + (size_t)a];
         lanes_gather(x, node, corner[a]);
     }
+    for (int k = 0; el->rest_count == REST_PERIODIC && k < 3; k++)
+        for (int l = 0; l < LANES; l++)
+            corner[3][k][l] += drape_rest_of(el, REST_SHIFT + k, element[l]);
     drape_dihedral_measure(corner, h);
 }
 
@@ -74,17 +82,16 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
     drape_measure_range(el, first, count, x, internal, q, dq, ddq, measure_lanes);
 }
 
-static double element_stiffness(const drape_cloth_view *cloth, int32_t hinge_number, double choice)
+static double element_stiffness(const drape_cloth_view *cloth, int32_t edge, const int32_t triangle[2],
+                                double choice)
 {
     const drape_material *material = cloth->material;
     if (choice == STIFFNESS_REPORT)
         return 2 / sqrt(3.0) * material->young_modulus * material->thickness * material->thickness *
                material->thickness / 12;
-    int32_t edge = cloth->hinge_edge[hinge_number];
-    const int32_t *beside = cloth->edge_triangle + 2 * (size_t)edge;
     double length = cloth->edge_length[edge];
     return material->flexural_rigidity * length * length /
-           (cloth->triangle_area[beside[0]] + cloth->triangle_area[beside[1]]);
+           (cloth->triangle_area[triangle[0]] + cloth->triangle_area[triangle[1]]);
 }
 
 /* Altitudes and angles of LANES hinges from `first` on; lanes beyond the end repeat the last one. */
@@ -103,20 +110,50 @@ LANES_DISPATCH static void measure_shapes(const drape_elements *el, int32_t firs
     lanes_store(s->theta, h.theta);
 }
 
+static void set_hinge(const drape_cloth_view *cloth, const double *values, int32_t element, int32_t edge,
+                      const int32_t triangle[2], const int32_t node[4], const double at_rest[3],
+                      const double shift[3], drape_term_builder *builder)
+{
+    double rest[REST_PERIODIC] = {0};
+    shapes s;
+    memcpy(rest + REST_SHIFT, at_rest, 3 * sizeof *rest);
+    const drape_elements one = {
+        .count = 1, .nodes = 4, .rest_count = REST_PERIODIC, .node = node, .rest = rest};
+    measure_shapes(&one, 0, cloth->rest, &s);
+    memcpy(rest + REST_SHIFT, shift, 3 * sizeof *rest);
+    rest[REST_K] = element_stiffness(cloth, edge, triangle, values[PARAM_STIFFNESS]);
+    rest[REST_THETA0] = values[PARAM_REST] == REST_FLAT ? 0 : s.theta[0];
+    rest[REST_ALTITUDE1] = s.altitude[0][0];
+    rest[REST_ALTITUDE2] = s.altitude[1][0];
+    drape_term_set(builder, element, node, rest);
+}
+
+/* The hinges of the cloth, then one at each pair of periodic edges. */
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
-    drape_status status = drape_term_reserve(builder, cloth->hinge_count, REST_COUNT);
-    const drape_elements at_rest = {.count = cloth->hinge_count, .nodes = 4, .node = cloth->hinge};
-    shapes s;
+    const double none[3] = {0};
+    int32_t count = cloth->hinge_count;
+    for (int32_t e = 0; cloth->edge_image && e < cloth->edge_count; e++)
+        count += cloth->edge_image[e] > e;
+    const bool periodic = count > cloth->hinge_count;
+    drape_status status = drape_term_reserve(builder, count, periodic ? REST_PERIODIC : REST_COUNT);
+    if (!status && periodic)
+        drape_term_anchor(builder);
     for (int32_t i = 0; !status && i < cloth->hinge_count; i++) {
-        int l = i % LANES;
-        if (l == 0)
-            measure_shapes(&at_rest, i, cloth->rest, &s);
-        double rest[REST_COUNT] = {[REST_K] = element_stiffness(cloth, i, values[PARAM_STIFFNESS]),
-                                   [REST_THETA0] = values[PARAM_REST] == REST_FLAT ? 0 : s.theta[l],
-                                   [REST_ALTITUDE1] = s.altitude[0][l],
-                                   [REST_ALTITUDE2] = s.altitude[1][l]};
-        drape_term_set(builder, i, cloth->hinge + 4 * (size_t)i, rest);
+        const int32_t edge = cloth->hinge_edge[i];
+        set_hinge(cloth, values, i, edge, cloth->edge_triangle + 2 * (size_t)edge,
+                  cloth->hinge + 4 * (size_t)i, none, none, builder);
+    }
+    for (int32_t e = 0, i = cloth->hinge_count; !status && i < count; e++) {
+        if (cloth->edge_image[e] <= e)
+            continue;
+        const int32_t *end = cloth->edge + 2 * (size_t)e, triangle = cloth->edge_triangle[2 * (size_t)e],
+                      *corner = cloth->triangle + 3 * (size_t)triangle;
+        const drape_beyond other = drape_beyond_edge(cloth, triangle, e, end[0], end[1]);
+        const int32_t node[4] = {end[0], end[1], corner[0] + corner[1] + corner[2] - end[0] - end[1],
+                                 other.apex};
+        set_hinge(cloth, values, i++, e, (const int32_t[]){triangle, other.triangle}, node, other.at_rest,
+                  other.shift, builder);
     }
     return status;
 }
@@ -201,4 +238,5 @@ const drape_term_ops drape_term_bend_hinge = {
     .commit = commit,
     .initial = initial,
     .check = check,
+    .periodic = true,
 };

@@ -11,6 +11,9 @@
  * rest, or turned with its pin. Such a hinge belongs to one triangle, and its fourth node is a copy of the
  * first.
  *
+ * A hinge at a periodic edge, or beyond it, belongs to one triangle, too: its nodes on the other side of the edge
+ * are displaced by the period.
+ *
  * Hysteresis and creases are sliders (model/slider.h) on the squares. Friction between yarns, of KES-FB2's
  * moment HB = B friction per width: a slider of the limit HB that slips after a change of curvature by
  * friction_curvature, so that the loop of moment over curvature is 2 HB high. A crease: of the rigidity B the
@@ -62,7 +65,9 @@ enum {
     REST_ALTITUDE, /* smallest of the triangle [m] */
     REST_COUNT
 };
-enum { CLAMP_COUNT = 3 }; /* rest data of a part if some edge is clamped: r, 0 if it is not this one */
+/* Rest data of a part: r, 0 if it is not clamped, if some edge is; and the displacements of its nodes, if some
+ * edge is periodic. */
+enum { PART_R, PART_SHIFT = 3, CLAMP_COUNT = PART_SHIFT, PART_COUNT = PART_SHIFT + 12 };
 
 static const char *const rest_choices[] = {"mesh", "flat", NULL};
 
@@ -114,6 +119,14 @@ LANES_INLINE int place_clamps(const drape_elements *el, const int32_t *part, lan
     return clamped;
 }
 
+LANES_INLINE void displace(const drape_parts *parts, const int32_t *part, lanes corner[4][3])
+{
+    for (int k = 0; k < 12; k++)
+        for (int l = 0; l < LANES; l++)
+            corner[k / 3][k % 3][l] +=
+                parts->rest[(size_t)(PART_SHIFT + k) * (size_t)parts->count + (size_t)part[l]];
+}
+
 LANES_DISPATCH static void measure_angles(const drape_elements *el, const int32_t *part, const double *x,
                                           const double *internal, double *s, double *ds, double *dds)
 {
@@ -127,7 +140,9 @@ LANES_DISPATCH static void measure_angles(const drape_elements *el, const int32_
             node[l] = parts->node[4 * (size_t)part[l] + (size_t)a];
         lanes_gather(x, node, corner[a]);
     }
-    if (parts->rest_count == CLAMP_COUNT)
+    if (parts->rest_count == PART_COUNT)
+        displace(parts, part, corner);
+    if (parts->rest_count > 0)
         clamped = place_clamps(el, part, corner);
     drape_dihedral_measure(corner, &h);
     for (int l = 0; l < LANES; l++)
@@ -178,14 +193,25 @@ static int32_t hinge_at(const drape_cloth_view *cloth, int32_t edge)
     return low;
 }
 
+static bool is_clamped(const drape_midedge *patch, int h)
+{
+    return h < 3 && patch->clamped[h];
+}
+
+/* Whether a hinge of a patch is a part of that patch alone, beside those of the cloth. */
+static bool is_own(const drape_midedge *patch, int h)
+{
+    return is_clamped(patch, h) || (patch->shifted[h] && is_linked(patch, h));
+}
+
 /* The nodes of hinge h of a patch as those of a part: of a clamped one its edge, its apex and again the
  * first. Returns the sign of its angle in the patch, which depends on the orientation of the triangle. */
 static int part_nodes(const drape_cloth_view *cloth, const drape_midedge *patch, int h, int32_t node[4])
 {
     const int *local = drape_patch_hinge[h];
-    if (h < 3 && patch->clamped[h]) {
+    if (is_own(patch, h)) {
         for (int a = 0; a < 4; a++)
-            node[a] = patch->node[local[a % 3]];
+            node[a] = patch->node[local[is_clamped(patch, h) ? a % 3 : a]];
         return 1;
     }
     memcpy(node, cloth->hinge + 4 * (size_t)hinge_at(cloth, patch->edge[h]), 4 * sizeof *node);
@@ -214,12 +240,13 @@ static int gather_nodes(const drape_cloth_view *cloth, const drape_midedge *patc
     return count;
 }
 
-/* Counts, and reserves elements and parts: the hinges of the cloth, then the clamped edges of its
- * triangles. */
+/* Counts, and reserves elements and parts: the hinges of the cloth, then those of
+ * single triangles. */
 static drape_status reserve(const drape_cloth_view *cloth, const double *values, const double law[9],
                             drape_term_builder *builder)
 {
     sizes n = {.parts = cloth->hinge_count, .nodes = 3};
+    bool shifted = false;
     drape_midedge patch;
     for (int32_t t = 0; t < cloth->triangle_count; t++) {
         int32_t node[MIDEDGE_NODES];
@@ -228,7 +255,10 @@ static drape_status reserve(const drape_cloth_view *cloth, const double *values,
         const int nodes = gather_nodes(cloth, &patch, node);
         n.nodes = nodes > n.nodes ? nodes : n.nodes;
         n.squares += patch.rank;
-        n.parts += patch.clamped[0] + patch.clamped[1] + patch.clamped[2];
+        for (int h = 0; h < MIDEDGE_HINGES; h++) {
+            n.parts += is_own(&patch, h);
+            shifted = shifted || patch.shifted[h];
+        }
         for (int r = 0; r < patch.rank; r++)
             for (int h = 0; h < MIDEDGE_HINGES; h++)
                 n.links += patch.c[r][h] != 0;
@@ -236,13 +266,15 @@ static drape_status reserve(const drape_cloth_view *cloth, const double *values,
     if (n.links > INT32_MAX || n.parts > INT32_MAX)
         return drape_term_refuse(builder, "the mesh is too large: %.0f angles in elements; at most %d",
                                  (double)n.links, INT32_MAX);
-    const bool clamped = n.parts > cloth->hinge_count;
-    if (clamped)
+    const bool own = n.parts > cloth->hinge_count;
+    if (own)
         drape_term_anchor(builder);
     drape_status status = drape_term_reserve_nodes(builder, (int32_t)n.squares, n.nodes, REST_COUNT);
     return status ? status
                   : drape_term_reserve_parts(builder, (int32_t)n.parts, (int32_t)n.links,
-                                             clamped ? CLAMP_COUNT : 0);
+                                             !own      ? 0
+                                             : shifted ? PART_COUNT
+                                                       : CLAMP_COUNT);
 }
 
 static double min_altitude(const double *x0, const double *x1, const double *x2)
@@ -270,39 +302,43 @@ static void clamp_of(const drape_cloth_view *cloth, const drape_midedge *patch, 
 
 /* The angle of a part at rest, by the function that steps use, so that a cloth at rest has no force to the
  * last bit. */
-static double rest_angle(const drape_cloth_view *cloth, const int32_t node[4], const double r[3])
+static double rest_angle(const drape_cloth_view *cloth, const int32_t node[4], const double rest[PART_COUNT])
 {
     static const int32_t same[LANES] = {0};
     static const double flat = 0;
-    const drape_parts one = {.count = 1, .nodes = 4, .rest_count = CLAMP_COUNT, .node = node, .rest = r};
+    const drape_parts one = {.count = 1, .nodes = 4, .rest_count = PART_COUNT, .node = node, .rest = rest};
     const drape_elements el = {.parts = &one};
     double s[LANES];
     measure_angles(&el, same, cloth->rest, &flat, s, NULL, NULL);
     return s[0];
 }
 
-/* Sets the parts of a patch: their numbers, signs and angles at rest. clamps: the number of the next clamped
- * one. */
-static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch, int32_t *clamps,
+/* Sets the parts of a patch: their numbers, signs and angles at rest. next: the number of the next one that is
+ * its own. */
+static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch, int32_t *next,
                       drape_term_builder *builder, int32_t part[MIDEDGE_HINGES], int sign[MIDEDGE_HINGES],
                       double theta[MIDEDGE_HINGES])
 {
     for (int h = 0; h < MIDEDGE_HINGES; h++) {
-        const bool clamped = h < 3 && patch->clamped[h];
+        const bool clamped = is_clamped(patch, h);
         int32_t node[4];
-        double r[CLAMP_COUNT] = {0};
+        double rest[PART_COUNT] = {0};
         part[h] = -1;
-        if (clamped)
-            part[h] = (*clamps)++;
+        if (is_own(patch, h))
+            part[h] = (*next)++;
         if (!is_linked(patch, h))
             continue;
         sign[h] = part_nodes(cloth, patch, h, node);
         if (clamped)
-            clamp_of(cloth, patch, h, r);
-        else
+            clamp_of(cloth, patch, h, rest + PART_R);
+        else if (!patch->shifted[h])
             part[h] = hinge_at(cloth, patch->edge[h]);
-        theta[h] = rest_angle(cloth, node, r);
-        drape_term_set_part(builder, part[h], node, r);
+        for (int k = 0; !clamped && k < 4; k++)
+            memcpy(rest + PART_SHIFT + 3 * k, patch->at_rest[drape_patch_hinge[h][k]], 3 * sizeof *rest);
+        theta[h] = rest_angle(cloth, node, rest);
+        for (int k = 0; !clamped && k < 4; k++)
+            memcpy(rest + PART_SHIFT + 3 * k, patch->shift[drape_patch_hinge[h][k]], 3 * sizeof *rest);
+        drape_term_set_part(builder, part[h], node, rest);
         if (clamped && cloth->edge_turn)
             drape_term_turn_part(builder, part[h], cloth->edge_turn[patch->edge[h]]);
     }
@@ -384,7 +420,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         status = reserve(cloth, values, law, builder);
     if (!status && slides.count > 0)
         status = drape_term_reserve_sliders(builder, slides.count);
-    int32_t element = 0, clamps = cloth->hinge_count;
+    int32_t element = 0, next = cloth->hinge_count;
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
         drape_midedge patch;
         int32_t part[MIDEDGE_HINGES], node[MIDEDGE_NODES];
@@ -393,7 +429,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         if (slides.count > 0 && !has_warp(cloth, values, t))
             return drape_orthotropic_refuse(builder, t);
         drape_midedge_of(cloth, t, values, law, &patch);
-        set_parts(cloth, &patch, &clamps, builder, part, sign, theta);
+        set_parts(cloth, &patch, &next, builder, part, sign, theta);
         for (int a = gather_nodes(cloth, &patch, node); a < MIDEDGE_NODES; a++)
             node[a] = node[0];
         for (int r = 0; r < patch.rank; r++, element++) {
@@ -520,4 +556,5 @@ const drape_term_ops drape_term_bend_midedge = {
     .commit = commit,
     .initial = initial,
     .check = check,
+    .periodic = true,
 };

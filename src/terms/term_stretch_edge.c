@@ -10,6 +10,9 @@
  *     E = 1/2 k_s L q^2, too soft by a factor of the edge length, with boundary edges as stiff as the others.
  *     It is there
  *     to reproduce the trajectories of the report.
+ *
+ * A periodic edge has an element on each of its sides, each with what its own triangle gives, or half of the
+ * stiffness of the report.
  */
 #include "base/reason.h"
 #include "base/vec3.h"
@@ -36,8 +39,9 @@ static double element_stiffness(const drape_cloth_view *cloth, int32_t edge, dou
 {
     double length = cloth->edge_length[edge], membrane = cloth->material->membrane_stiffness;
     const int32_t *beside = cloth->edge_triangle + 2 * (size_t)edge;
+    const bool halved = cloth->edge_image && cloth->edge_image[edge] >= 0;
     if (choice == STIFFNESS_REPORT)
-        return sqrt(3.0) / 2 * membrane * length * length * length;
+        return (halved ? 0.5 : 1) * sqrt(3.0) / 2 * membrane * length * length * length;
     double area = cloth->triangle_area[beside[0]];
     if (beside[1] >= 0)
         area += cloth->triangle_area[beside[1]];
@@ -131,4 +135,5 @@ const drape_term_ops drape_term_stretch_edge = {
     .measure = measure,
     .pair = pair,
     .check = check,
+    .periodic = true,
 };

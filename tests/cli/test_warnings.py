@@ -61,6 +61,14 @@ def test_unused_curve():
     equal(found(["stretch.cst"], fabric="wang2011_denim"), None, "of a fabric")
 
 
+def test_energy_gained():
+    """energy out of nothing has a warning, which another integrator does without"""
+    path = SOURCES + "/examples/scenes/box_edge.json"
+    text = warnings(path, "--duration", "0.3", "--integrator", "midpoint")["energy_gained"]
+    assert re.match(r"midpoint gained 0\.\d+ J out of nothing, beside 0\.\d+ J that went in: a smaller dt, or an integrator that damps", text), text
+    assert "energy_gained" not in warnings(path, "--duration", "0.3", "--integrator", "trbdf2")
+
+
 def test_few_steps():
     """a duration of fewer than 20 steps has a warning; 20 steps have none, nor have integrators that choose their steps"""
     for steps, there in ((19, True), (20, False)):

@@ -3,8 +3,7 @@
  * force over the shear angle, what they dissipate, the fold that a crease keeps, and that every integrator
  * carries them.
  */
-#include "support/bytes.h"
-#include "support/scene.h"
+#include "support/resume.h"
 
 #define COLUMNS  21
 #define NODES    (5 * COLUMNS)
@@ -255,22 +254,8 @@ START_TEST(checkpoints_keep_sliders)
                                           "{'method': 'ida'}",
                                           "{'method': 'verlet'}",
                                           "{'method': 'static'}"};
-    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-        scene straight = falling(methods[i]), again = falling(methods[i]);
-        scene_advance(&straight, 0.06);
-        bytes saved = bytes_save(straight.sim);
-        scene_advance(&straight, 0.1);
-        ck_assert_int_eq(drape_sim_restore_from(again.sim, saved.data, saved.size), DRAPE_OK);
-        scene_advance(&again, 0.1);
-        ck_assert_msg(drape_state_hash(straight.model, drape_sim_state(straight.sim)) ==
-                          drape_state_hash(again.model, drape_sim_state(again.sim)),
-                      "%s", methods[i]);
-        ck_assert_double_eq(drape_sim_energy(straight.sim).dissipated,
-                            drape_sim_energy(again.sim).dissipated);
-        ck_assert_double_gt(drape_sim_energy(again.sim).dissipated, 0);
-        free(saved.data);
-        scene_close(&straight), scene_close(&again);
-    }
+    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++)
+        scene_resumes(falling(methods[i]), falling(methods[i]), 0.06, 0.1, methods[i]);
 }
 END_TEST
 
@@ -295,20 +280,13 @@ END_TEST
 /* Every derivative, at a random state in which most sliders slip. */
 START_TEST(derivatives_agree_with_differences)
 {
-    drape_check_result results[64];
-    int32_t count = 0;
     scene s =
         scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 5, 'rows': 5, 'width': "
                     "0.2, 'height': 0.2}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, "
                     "'areal_density': 0.2}, 'terms': [{'type': 'stretch.curve', 'shear_friction': 2, "
                     "'friction_angle': 1}, {'type': 'bend.midedge', 'poisson': 0" HYSTERESIS CREASE
                     "}]}], 'duration': 1}");
-    for (unsigned seed = 1; seed <= 3; seed++) {
-        ck_assert_int_eq(drape_model_check_derivatives(s.model, seed, results, 64, &count), DRAPE_OK);
-        for (int32_t i = 0; i < count; i++)
-            ck_assert_msg(results[i].pass, "%s of %s is off by %g", results[i].what, results[i].term,
-                          results[i].error);
-    }
+    scene_check_derivatives(&s);
     scene_close(&s);
 }
 END_TEST

@@ -3,8 +3,7 @@
  * dissipates, the relaxed limit, damped vibration, and that checkpoints and new models carry the branches.
  */
 #include "model/relaxation.h"
-#include "support/bytes.h"
-#include "support/scene.h"
+#include "support/resume.h"
 
 #define SIDE    0.1
 #define NODES   16
@@ -161,21 +160,8 @@ START_TEST(checkpoints_keep_branches)
         "{'method': 'be', 'dt': 0.01}",     "{'method': 'bdf2', 'dt': 0.01}",
         "{'method': 'trbdf2', 'dt': 0.01}", "{'method': 'newton_k', 'dt': 0.01}",
         "{'method': 'verlet', 'dt': 0.01}", "{'method': 'static'}"};
-    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-        scene straight = falling(methods[i]), again = falling(methods[i]);
-        scene_advance(&straight, 0.06);
-        bytes saved = bytes_save(straight.sim);
-        scene_advance(&straight, 0.1);
-        ck_assert_int_eq(drape_sim_restore_from(again.sim, saved.data, saved.size), DRAPE_OK);
-        scene_advance(&again, 0.1);
-        ck_assert_msg(drape_state_hash(straight.model, drape_sim_state(straight.sim)) ==
-                          drape_state_hash(again.model, drape_sim_state(again.sim)),
-                      "%s", methods[i]);
-        ck_assert_double_eq(drape_sim_energy(straight.sim).dissipated,
-                            drape_sim_energy(again.sim).dissipated);
-        free(saved.data);
-        scene_close(&straight), scene_close(&again);
-    }
+    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++)
+        scene_resumes(falling(methods[i]), falling(methods[i]), 0.06, 0.1, methods[i]);
 }
 END_TEST
 
@@ -233,19 +219,12 @@ END_TEST
 /* Every derivative, at a random state a part of a time after the last one. */
 START_TEST(derivatives_agree_with_differences)
 {
-    drape_check_result results[64];
-    int32_t count = 0;
     scene s = scene_model(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 5, 'rows': 5, 'width': 0.2, "
         "'height': 0.2}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 0.2}, "
         "'terms': ['stretch.curve', 'stretch.edge', 'bend.midedge', "
         "'bend.hinge', " MAXWELL "]}], 'duration': 1}");
-    for (unsigned seed = 1; seed <= 3; seed++) {
-        ck_assert_int_eq(drape_model_check_derivatives(s.model, seed, results, 64, &count), DRAPE_OK);
-        for (int32_t i = 0; i < count; i++)
-            ck_assert_msg(results[i].pass, "%s of %s is off by %g", results[i].what, results[i].term,
-                          results[i].error);
-    }
+    scene_check_derivatives(&s);
     scene_close(&s);
 }
 END_TEST

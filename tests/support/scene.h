@@ -123,6 +123,24 @@ static inline void scene_advance(scene *s, double t)
     ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
 }
 
+/* Every derivative of the scene's model agrees with differences at three random states, those of the whole
+ * Jacobian among them. */
+static inline void scene_check_derivatives(const scene *s)
+{
+    for (unsigned seed = 1; seed <= 3; seed++) {
+        drape_check_result results[64];
+        int32_t count = 0, assembled = 0;
+        ck_assert_int_eq(drape_model_check_derivatives(s->model, seed, results, 64, &count), DRAPE_OK);
+        ck_assert_int_le(count, 64);
+        for (int32_t i = 0; i < count; i++) {
+            ck_assert_msg(results[i].pass, "%s of %s is off by %g, limit %g", results[i].what,
+                          results[i].term, results[i].error, results[i].limit);
+            assembled += strcmp(results[i].term, "assembled") == 0;
+        }
+        ck_assert_int_gt(assembled, 0);
+    }
+}
+
 static inline double scene_min_mass(const scene *s)
 {
     double smallest = INFINITY;
