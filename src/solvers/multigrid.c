@@ -8,7 +8,7 @@
 #define LANCZOS_STEPS 5         /* for the largest eigenvalue of D^-1 A */
 #define BISECTIONS    20        /* for that of the tridiagonal matrix, to 1e-6 of it */
 #define DAMPING       (4.0 / 3) /* of the largest eigenvalue's inverse: Vanek, Mandel & Brezina 1996 */
-#define SMALLEST      0.25      /* eigenvalue of a cycle times its matrix that the next finer level counts on */
+#define SMALLEST      0.25 /* eigenvalue of a cycle times its matrix that the next finer level counts on */
 /* share of a column's length that must be left after the projection on those before it, or it counts as 0 */
 #define INDEPENDENT 1e-8
 
