@@ -23,6 +23,10 @@ enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
  * after the other, lead nowhere. A few may start the solver. */
 #define LEAST_STEP 1e-10
 #define MAX_TINY   20
+/* Relative residual of iterative linear solvers. IDA allows them 0.05 of the bound of the Newton iteration,
+ * here 0.1 of the error tolerance. With this, corrections of up to 50 tolerances are within that; a larger
+ * one does not end the iteration. */
+#define LINEAR_TOLERANCE 1e-4
 
 const char *const drape_first_order_matrices[] = {
     [MATRIX_AUTO] = "auto", [MATRIX_SYMMETRIC] = "symmetric", [MATRIX_EXACT] = "exact", NULL};
@@ -602,6 +606,7 @@ drape_status drape_first_order_create(drape_first_order *s, const drape_first_or
     if (status || s->n == 0)
         return status;
     s->linear->owner = s;
+    s->linear->tolerance = LINEAR_TOLERANCE;
     if (!drape_sun_newton_create(&s->newton, s->y, 2 * s->n, s->ranks, s->sun) || !solver->create(s))
         return drape_fail(ctx, DRAPE_E_MEMORY, "%s cannot be set up for %lld unknowns", solver->name,
                           (long long)(2 * s->n));

@@ -279,6 +279,19 @@ static drape_status factor_with_share(drape_newton *s, double share)
     return status ? status : factor_matrix(s, share < 1);
 }
 
+/* The next share of the positive parts to try after `share` did not make the matrix definite: at first half of
+ * the one that was needed last. */
+static double larger_share(const drape_newton *s, double share)
+{
+    return share > 0 ? fmin(1, SHARE_GROWTH * share) : fmax(s->repair_share / 2, MIN_SHARE);
+}
+
+static void keep_share(drape_newton *s, double share)
+{
+    s->repair_share = share;
+    s->indefinite = true;
+}
+
 /* An indefinite matrix gives useless directions. With the whole positive parts they are descent directions,
  * but convergence is slow: the smaller the share that makes the matrix definite, the nearer its direction
  * is to Newton's. The first share tried is half of the one that was needed last; after an indefinite matrix
@@ -287,16 +300,14 @@ static int factor(SUNLinearSolver solver, SUNMatrix matrix)
 {
     (void)matrix;
     drape_newton *s = ((drape_sun_linear *)solver->content)->owner;
-    const double first = s->positive_share;
-    const bool repairs = s->searches && first < 1;
+    const bool repairs = s->searches && s->positive_share < 1;
     drape_status status = factor_matrix(s, repairs);
     if (status != DRAPE_RETRY_LINEAR || !repairs)
         return return_status(s, status);
-    double share = first > 0 ? fmin(1, SHARE_GROWTH * first) : fmax(s->repair_share / 2, MIN_SHARE);
+    double share = larger_share(s, s->positive_share);
     while ((status = factor_with_share(s, share)) == DRAPE_RETRY_LINEAR && share < 1)
-        share = fmin(1, SHARE_GROWTH * share);
-    s->repair_share = share;
-    s->indefinite = true;
+        share = larger_share(s, share);
+    keep_share(s, share);
     return return_status(s, status);
 }
 
@@ -342,14 +353,24 @@ static drape_status guess_linearized(drape_newton *s, double *d)
 /* ---- Correct ---- */
 
 /* No solution or not a descent direction: the matrix is indefinite, which the factorisation did not detect.
- * The one with the whole positive parts is factored instead, and gives p. */
+ * An iterative solver notices it in the solve: shares of the positive parts are tried as in `factor`. Otherwise
+ * the matrix with the whole of them is factored, and gives p. */
 static drape_status ensure_descent(drape_newton *s, drape_status status, const double *minus_f, double *p)
 {
     const bool descends = !status && drape_step_equation_dot(s->equation, minus_f, p) > 0;
     if (status < 0 || descends || s->positive_share == 1)
         return status;
-    status = factor_with_share(s, 1);
-    return status ? status : drape_sun_linear_solve(s->linear, minus_f, p);
+    double share = status == DRAPE_RETRY_LINEAR ? larger_share(s, s->positive_share) : 1;
+    for (;; share = larger_share(s, share)) {
+        status = factor_with_share(s, share);
+        if (!status)
+            status = drape_sun_linear_solve(s->linear, minus_f, p);
+        if (status != DRAPE_RETRY_LINEAR || share == 1)
+            break;
+    }
+    if (share < 1)
+        keep_share(s, share);
+    return status;
 }
 
 /* If many corrections have not led to a solution, the sheet is buckling: then forces extrapolated along the
