@@ -105,13 +105,13 @@ struct drape_inexact_newton {
     bool unstable;                     /* the last matrix of this solve was, as far as it was tried */
     bool shortened;                    /* a correction of this solve was, by the line search */
     double length;                     /* that the line search gave the last correction */
-    double
-        friction_seconds; /* of the last solution with the matrix of friction; not archived: with a deadline
-                                alone it matters, and then results depend on the clock */
-    double rounding;      /* [N] error of forces as estimated last in this solve; INFINITY */
-    double edge;          /* [m] mean length of an edge */
-    contraction first;    /* of the first correction */
-    bool nonlinear;       /* forces are, along the correction of the last estimate */
+    bool friction;                     /* the matrices of this solve have that of friction */
+    double friction_seconds; /* of the last iteration with it; not archived: with a deadline alone it matters,
+                                and then results depend on the clock */
+    double rounding;         /* [N] error of forces as estimated last in this solve; INFINITY */
+    double edge;             /* [m] mean length of an edge */
+    contraction first;       /* of the first correction */
+    bool nonlinear;          /* forces are, along the correction of the last estimate */
     double *p, *minus_f, *trial; /* free DOFs */
     double *fraction;            /* nodes; NULL without contact */
     double *f, *g;               /* free DOFs, nodes: kept while F is evaluated elsewhere */
@@ -260,20 +260,17 @@ static bool is_in_contact(const drape_inexact_newton *s)
     return s->fraction && drape_contact_active(drape_system_contact(s->equation->system), &gap) > 0;
 }
 
-/* With a deadline, the first steps in contact have more effort than there is time for. */
-static drape_status correct(drape_inexact_newton *s, const drape_inexact_settings *settings)
+/* With a deadline, a step in contact may have more effort than there is time for: it has no matrix of friction
+ * if the iterations that are made in any case, and the estimate, are not expected to end in time with it. */
+static drape_status correct(drape_inexact_newton *s, const drape_inexact_settings *settings, int iteration)
 {
     drape_step_equation *e = s->equation;
-    const bool friction = !s->cheap && has_time(settings, MIN_IN_CONTACT * s->friction_seconds);
+    if (iteration == 0)
+        s->friction = !s->cheap && has_time(settings, (MIN_IN_CONTACT + 1) * s->friction_seconds);
     drape_status status = s->factored ? update_definite(s)
                                       : drape_approx_jacobian_update(s->approximate, &e->point,
-                                                                     e->mass_weight, friction, &e->work);
-    const double start = drape_clock_seconds();
-    if (!status)
-        status = solve(s, settings->linear_tolerance, settings->max_linear_iterations);
-    if (friction && !s->factored && is_in_contact(s))
-        s->friction_seconds = drape_clock_seconds() - start;
-    return status;
+                                                                     e->mass_weight, s->friction, &e->work);
+    return status ? status : solve(s, settings->linear_tolerance, settings->max_linear_iterations);
 }
 
 /* Predicts stress for the matrix of a next iteration. */
@@ -318,7 +315,7 @@ static drape_status guess_linearized(drape_inexact_newton *s, const drape_inexac
     drape_step_equation_pull(e, s->trial, s->f);
     memcpy(e->f, s->f, e->dofs * sizeof *e->f);
     s->share = 0;
-    drape_status status = correct(s, settings);
+    drape_status status = correct(s, settings, 0);
     if (!status && drape_all_finite(s->p, e->dofs))
         memcpy(d, s->p, e->dofs * sizeof *d);
     s->linearized = true;
@@ -679,7 +676,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
             return DRAPE_RETRY_NONLINEAR;
         }
         const double start = drape_clock_seconds();
-        status = correct(s, settings);
+        status = correct(s, settings, p.iteration);
         if (status) {
             report->reason = drape_reason_name(status < 0 ? DRAPE_REASON_MEMORY : DRAPE_REASON_SINGULAR);
             return status;
@@ -702,6 +699,8 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         p.seconds = drape_clock_seconds() - start;
         report->further_seconds += fell ? p.seconds : 0;
         p.seconds += p.estimating;
+        if (s->friction && !s->factored && is_in_contact(s))
+            s->friction_seconds = p.seconds;
         e->work.newton_iterations++;
     }
 }
