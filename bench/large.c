@@ -1,9 +1,9 @@
 /*
- * large: large sheets by one method with each of two linear solvers, pcg and multifrontal: CPU time of a step,
- * its matrices and linear iterations, peak memory. A square sheet of 1 m of 1e4 and more nodes, released
- * horizontally, dt 1/60 s: of E 1e6 Pa, h 1 mm, 0.2 kg/m2, hung by two corners, or 1 mm above a ball of 0.3 m;
- * and of a measured denim, which is stiff in bending, with two patches of pins inside. Each case runs in
- * a process of its own, with one thread.
+ * large: large sheets by one method with each of two linear solvers, pcg and multifrontal: CPU time of a
+ * step, its matrices and linear iterations, peak memory. A square sheet of 1 m of 1e4 and more nodes,
+ * released horizontally, dt 1/60 s: of E 1e6 Pa, h 1 mm, 0.2 kg/m2, hung by two corners, or 1 mm above a ball
+ * of 0.3 m; and of a measured denim, which is stiff in bending, with two patches of pins inside. Each case
+ * runs in a process of its own, with one thread.
  */
 #include "bench.h"
 

@@ -25,7 +25,8 @@
 /* of the stiffness, in parts of its largest entry: more than rounding; the signs of its pivots then say
  * nothing */
 #define MAX_ASYMMETRY 1e-10
-#define STALLED       0.5 /* of the residual before: one that falls by less may be rounding */
+#define STALLED       0.5     /* of the residual before: one that falls by less may be rounding */
+#define MAX_INERTIA   1000000 /* unknowns: the factors of a larger matrix take gigabytes */
 
 enum { PARAM_MAX_STEPS = DRAPE_NEWTON_PARAM_COUNT, PARAM_COUNT };
 
@@ -194,6 +195,12 @@ static drape_status judge_stability(static_state *s, const drape_state *out)
         return DRAPE_OK;
     drape_status status = drape_newton_matrix(s->common.newton, &point, 0, &pattern, &values);
     s->stability_known = false;
+    if (!status && pattern->n > MAX_INERTIA) {
+        drape_log(s->arena->ctx, DRAPE_LOG_INFO,
+                  "static: whether the equilibrium is stable is not determined above %d unknowns",
+                  MAX_INERTIA);
+        return DRAPE_OK;
+    }
     if (!status && drape_system_is_symmetric(e->system) &&
         drape_pattern_asymmetry(pattern, values) > MAX_ASYMMETRY)
         return DRAPE_OK;

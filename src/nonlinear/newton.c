@@ -279,8 +279,8 @@ static drape_status factor_with_share(drape_newton *s, double share)
     return status ? status : factor_matrix(s, share < 1);
 }
 
-/* The next share of the positive parts to try after `share` did not make the matrix definite: at first half of
- * the one that was needed last. */
+/* The next share of the positive parts to try after `share` did not make the matrix definite: at first half
+ * of the one that was needed last. */
 static double larger_share(const drape_newton *s, double share)
 {
     return share > 0 ? fmin(1, SHARE_GROWTH * share) : fmax(s->repair_share / 2, MIN_SHARE);
@@ -353,8 +353,8 @@ static drape_status guess_linearized(drape_newton *s, double *d)
 /* ---- Correct ---- */
 
 /* No solution or not a descent direction: the matrix is indefinite, which the factorisation did not detect.
- * An iterative solver notices it in the solve: shares of the positive parts are tried as in `factor`. Otherwise
- * the matrix with the whole of them is factored, and gives p. */
+ * An iterative solver notices it in the solve: shares of the positive parts are tried as in `factor`.
+ * Otherwise the matrix with the whole of them is factored, and gives p. */
 static drape_status ensure_descent(drape_newton *s, drape_status status, const double *minus_f, double *p)
 {
     const bool descends = !status && drape_step_equation_dot(s->equation, minus_f, p) > 0;

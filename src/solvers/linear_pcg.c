@@ -207,7 +207,7 @@ const drape_linear_ops drape_linear_pcg = {
              "conjugate gradients preconditioned by algebraic multigrid, no factors of the matrix; a "
              "matrix that is not symmetric positive definite is given to multifrontal, up to 1e6 unknowns",
          .reference = "Hestenes & Stiefel 1952; Vanek, Mandel & Brezina 1996"},
-    .best_from = 1000000, /* faster at 3e5, slower at 3e4; factors would take gigabytes */
+    .best_from = 1000000, /* faster from 3e5 on, but not where a stiff cloth buckles: bench/large */
     .borrows_heap = true, /* for the fallback */
     .create = create,
     .use_threads = use_threads,

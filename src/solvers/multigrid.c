@@ -293,9 +293,9 @@ static double divide_by_diagonal(const level *l, const double *r, double *z)
 }
 
 /* The largest eigenvalue of D^-1 A, D its diagonal blocks, from below: that of the tridiagonal matrix of
- * Lanczos' method, which the coefficients of conjugate gradients with the preconditioner D make up (Saad 2003,
- * Iterative methods for sparse linear systems, section 6.7.3). As good as three times as many steps of the
- * power iteration. */
+ * Lanczos' method, which the coefficients of conjugate gradients with the preconditioner D make up (Saad
+ * 2003, Iterative methods for sparse linear systems, section 6.7.3). The power iteration needs twice the
+ * products. */
 static double largest_eigenvalue(level *l)
 {
     const size_t n = scalars(&l->a);
