@@ -477,16 +477,17 @@ static bool is_distant(const drape_broad_phase *s, const drape_broad_query *want
     return distant;
 }
 
-/* The gap from which on nodes keep an element from features: where the square of the distance from a point or a
- * segment is at least D^2 at the corners, it is at least D^2 less a third of that of the longest edge. */
+/* The gap from which on nodes keep an element from features: where the square of the distance from a point
+ * or a segment is at least D^2 at the corners, it is nowhere less than D^2 less a third of the square of the
+ * longest edge. */
 static double gap_of_nodes(double radius, double gap, double edge)
 {
     return sqrt((radius + gap) * (radius + gap) + edge * edge / 3) - radius;
 }
 
-/* Marks and lists the nodes of elements that a collider may meet: all nodes of one are near, one is close. All of
- * them if it turns: its features move straight, which is no straight path in its coordinates. Returns their
- * number. */
+/* Marks and lists the nodes of elements that a collider may meet: all nodes of one are near, one is close.
+ * All of them if it turns: its features move straight, which is no straight path in its coordinates. Returns
+ * their number. */
 static int32_t list_near(drape_broad_phase *s, const drape_broad_query *want, int32_t collider,
                          const scanned_cloth *of)
 {

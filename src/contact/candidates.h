@@ -51,8 +51,9 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
                                      drape_candidates *out);
 
 /* Calls visit, in the order of the broad phase, for all pairs that can become active while no point is
- * farther than margin from the path; if `passing`, only those of features whose gap can fall to its least. marked: NULL for all, or (points + collider_count) those of which a pair
- * must have one. The points of a marked collider must be marked, too. */
+ * farther than margin from the path; if `passing`, only those of features whose gap can fall to its least.
+ * marked: NULL for all, or (points + collider_count) those of which a pair must have one. The points of a
+ * marked collider must be marked, too. */
 void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *path, double margin,
                            bool passing, const bool *marked, drape_broad_phase_visit *visit, void *user);
 

@@ -165,12 +165,12 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
 void drape_contact_archive_press(drape_contact *contact, drape_archive *a);
 
 /* The largest step fraction from x to y (node_count x 3) on which no two pieces pass through each other,
- * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered
- * at each node to the smallest fraction of its pairs; where a displacement is longer than a few edges, to
- * such a length without a look at pairs. One that throws nodes farther than the scene is large is
- * shortened to about an edge. again: of_node is that of the last call from x, and y what it left of the
- * displacement at each node, so that pairs which it did not shorten are not looked at again; of_node is set to
- * the fractions of y. If the watched flag is raised meanwhile: 0, also at each node. */
+ * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered at
+ * each node to the smallest fraction of its pairs; where a displacement is longer than a few edges, to such
+ * a length without a look at pairs. One that throws nodes farther than the scene is large is shortened to
+ * about an edge. again: of_node is that of the last call from x, and y what it left of the displacement at
+ * each node, so that pairs which it did not shorten are not looked at again; of_node is set to the fractions
+ * of y. If the watched flag is raised meanwhile: 0, also at each node. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
                                    bool again, double *of_node);
 
@@ -179,9 +179,9 @@ double drape_contact_step_fraction(drape_contact *contact, const double *x, cons
  * slides on it from there on. Nodes that begin inside stay. */
 void drape_contact_sweep(drape_contact *contact, double t, double *y);
 
-/* Whether cloth at x with velocities v (node_count x 3) at time t may meet a body or another piece of cloth in
- * the next so many seconds: free nodes go straight on, pins and colliders as far as their motion is known. An
- * estimate, because forces are left out. */
+/* Whether cloth at x with velocities v (node_count x 3) at time t may meet a body or another piece of cloth
+ * in the next so many seconds: free nodes go straight on, pins and colliders as far as their motion is
+ * known. An estimate, because forces are left out. */
 bool drape_contact_may_meet(drape_contact *contact, const double *x, const double *v, double t,
                             double seconds);
 

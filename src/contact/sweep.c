@@ -57,8 +57,9 @@ static bool slide(const drape_collider *collider, double distance, double roundi
     return true;
 }
 
-/* Nodes that slide round a body may leave the middle of their edge in it, where nothing would push it out
- * before the end of the step. Moves the nodes of such edges outwards alike, and marks them: the pass of each (node_count) in which it slid last. */
+/* Nodes that slide round a moving body may leave the middle of their edge in it, where nothing would push it
+ * out before the end of the step. Moves the nodes of such edges outwards alike, and marks them: the pass of
+ * each (node_count) in which it slid last. */
 static void lift_edges(const drape_contact *c, int32_t collider, int pass, uint8_t *slid, double *y)
 {
     const drape_model *m = c->model;
@@ -119,7 +120,7 @@ static bool sweep(drape_contact *c, int32_t collider, int pass, uint8_t *slid, d
         slid[node] = (uint8_t)pass;
         moved = true;
     }
-    if (moved)
+    if (moved && drape_pose_differs(from, to))
         lift_edges(c, collider, pass, slid, y);
     return moved;
 }

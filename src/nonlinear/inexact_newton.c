@@ -260,8 +260,9 @@ static bool is_in_contact(const drape_inexact_newton *s)
     return s->fraction && drape_contact_active(drape_system_contact(s->equation->system), &gap) > 0;
 }
 
-/* With a deadline, a step in contact may have more effort than there is time for: it has no matrix of friction
- * if the iterations that are made in any case, and the estimate, are not expected to end in time with it. */
+/* With a deadline, a step in contact may have more effort than there is time for: it has no matrix of
+ * friction if the iterations that are made in any case, and the estimate, are not expected to end in time
+ * with it. */
 static drape_status correct(drape_inexact_newton *s, const drape_inexact_settings *settings, int iteration)
 {
     drape_step_equation *e = s->equation;

@@ -92,7 +92,7 @@ static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *
 }
 
 /* The longest step to keep up with. Not above dt in contact, or where a longer step might lead to it: bodies
- * move farther, which costs more iterations and rejected steps than it saves (docs/realtime.md, "A budget"). */
+ * move farther, which costs more iterations and rejected steps than it saves (docs/realtime.md). */
 static double longest_step(const drape_realtime_memory *m)
 {
     return m->touches || m->meets ? m->dt : m->longest;

@@ -142,8 +142,8 @@ static bool check_step(const all_pairs *all, drape_contact *fresh, const double 
     return least < 1;
 }
 
-/* A displacement that is shortened at nodes, again and again, is shortened alike if all pairs are looked at each
- * time. */
+/* A displacement that is shortened at nodes, again and again, is shortened alike if all pairs are looked at
+ * each time. */
 static void check_again(drape_contact *c, drape_contact *fresh, const double *x, const double *whole,
                         double *y, double *fraction)
 {
@@ -281,9 +281,10 @@ START_TEST(all_near_a_few_features_is_found)
 }
 END_TEST
 
-/* A capsule comes 2 cm nearer from below to a flat sheet whose rows of nodes, 6.25 cm apart, are on both sides of
- * it. Nodes that slide on it would leave the middle of the edges between them 12 mm inside. It is put where it is
- * half of the activation distance of 2 mm away; the nearest point of oblique edges is beside it. */
+/* A capsule comes 2 cm nearer from below to a flat sheet whose rows of nodes, 6.25 cm apart, are on both
+ * sides of it. Nodes that slide on it would leave the middle of the edges between them 12 mm inside. It is
+ * put where it is half of the activation distance of 2 mm away; the nearest point of oblique edges is beside
+ * it. */
 START_TEST(edges_do_not_slide_into_bodies)
 {
     scene s = scene_model("{'drape': 1, 'cloth': [" SHEET "], 'contact': {}, 'duration': 1, 'colliders': ["
@@ -318,7 +319,7 @@ START_TEST(edges_do_not_slide_into_bodies)
 END_TEST
 
 /* Sheets 3 cm apart, the lower one 5 cm above a ball: what they meet is what their velocities bring together
- * within the time, less the activation distance of 1.5 cm, the thickness of 2 cm or, of layers, the least gap. */
+ * within the time, less the activation distance of 1.5 cm or, of layers, the least gap. */
 START_TEST(what_may_be_met_is_known)
 {
     scene s = scene_model("{'drape': 1, 'cloth': [" SHEET ", " SHEET "], 'self_contact': {'thickness': 1e-2},"
