@@ -1,5 +1,6 @@
 /*
- * test_hashes.c: every example scene, and those beside this file, with every integrator, for three attempts. The bits of the state must be
+ * test_hashes.c: every example scene, and those beside this file, with every integrator, for three
+ * attempts. The bits of the state must be
  * those of hashes.txt, on every processor and with every build of the same libraries, and the same with other
  * numbers of threads, in a sim that is stopped at each attempt or saved and restored between two, and beside
  * other sims on the same thread and on another one.
