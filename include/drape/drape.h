@@ -1241,11 +1241,11 @@ typedef struct drape_warning {
  * steps so far; the text describes the first such collider. tangled: an untangling left intersections,
  * gaps below the least or triangles in colliders. no_room: bodies left cloth no room, and it was relaxed
  * there (drape_sim_relaxed). numerical_dissipation: the integrator took more than half of the energy that
- * went in. energy_gained: it gained more than a tenth of that. slow_contact: contact takes most of the time of the steps, and longer than the motion lasts,
- * and a setting is known to help. contact_distance: a collider moved in a step by more than five
- * activation distances that the scene gives. inaccurate: by the estimate of the integrator more than half
- * of the steps, or the last one, are further from the solution of
- * their equation than its bound. Returns false past the last. */
+ * went in. energy_gained: it gained more than a tenth of that. slow_contact: contact takes most of the
+ * time of the steps, and longer than the motion lasts, and a setting is known to help. contact_distance: a
+ * collider moved in a step by more than five activation distances that the scene gives. inaccurate: by the
+ * estimate of the integrator more than half of the steps, or the last one, are further from the solution
+ * of their equation than its bound. Returns false past the last. */
 DRAPE_API bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out);
 
 /* ---- Events ---- */

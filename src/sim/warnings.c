@@ -245,8 +245,8 @@ static bool dissipates_most(drape_sim *sim, char *text, size_t size)
 }
 
 /* Energy out of nothing. The check of each step compares with all that loads could give, as they are
- * potentials; here it is what they did give. examples/scenes/airbag.json under midpoint, whose pressure rises:
- * 23 J of which only 12 J are the work of the pressure. */
+ * potentials; here it is what they did give. examples/scenes/airbag.json under midpoint, whose pressure
+ * rises: 23 J, where only 12 J are the work of the pressure. */
 static bool gains_energy(drape_sim *sim, char *text, size_t size)
 {
     const drape_integrator_ops *integrator = sim->chosen.integrator;

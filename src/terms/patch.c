@@ -25,7 +25,7 @@ static int32_t edge_of(const drape_cloth_view *cloth, int32_t triangle, int32_t 
     return cloth->triangle_edge[3 * (size_t)triangle + (size_t)side];
 }
 
-/* The image of an edge, a translation of it: which of its nodes is that of a, and the way back. */
+/* The image of an edge, a translation of it: which of its nodes is that of a, and the displacement back. */
 static void cross(const drape_cloth_view *cloth, int32_t image, drape_beyond *out)
 {
     const int32_t *end = cloth->edge + 2 * (size_t)image, a = out->a, b = out->b;
@@ -59,8 +59,8 @@ drape_beyond drape_beyond_edge(const drape_cloth_view *cloth, int32_t triangle, 
     return out;
 }
 
-/* Adds the apex beyond hinge h of the triangle `from`, whose nodes there are a and b: its node and its place in
- * the plane. Returns the triangle of the apex. */
+/* Adds the apex beyond hinge h of the triangle `from`, whose nodes there are a and b: its node and its place
+ * in the plane. Returns the triangle of the apex. */
 static drape_beyond add_beyond(const drape_cloth_view *cloth, const drape_beyond *from, int h, int32_t a,
                                int32_t b, drape_patch *out)
 {

@@ -5,7 +5,8 @@
  * 6 + 2 i and 7 + 2 i the apices beyond the two other edges of that neighbour. Hinges: 0 1 2 at its own
  * edges; 3 + 2 i and 4 + 2 i at those of neighbour i.
  *
- * A patch goes on across periodic edges: its nodes beyond one are those of the other side, displaced by shift.
+ * A patch goes on across periodic edges: its nodes beyond one are those of the other side, displaced by
+ * shift.
  */
 #ifndef DRAPE_TERMS_PATCH_H
 #define DRAPE_TERMS_PATCH_H
@@ -24,9 +25,8 @@ typedef struct drape_patch {
     bool turned[DRAPE_PATCH_HINGES]; /* the inner triangle of the hinge is the second one beside its edge */
     double flat[2 * DRAPE_PATCH_NODES]; /* the nodes unfolded into the plane of the triangle [m] */
     bool shifted[DRAPE_PATCH_HINGES];   /* the hinge is at a periodic edge, or has nodes beyond one */
-    double at_rest[DRAPE_PATCH_NODES][3],
-        shift[DRAPE_PATCH_NODES][3]; /* [m] of the nodes: at rest, and as long
-                                                                          as the period is that of the start */
+    double at_rest[DRAPE_PATCH_NODES][3]; /* [m] displacements of the nodes at rest */
+    double shift[DRAPE_PATCH_NODES][3];   /* [m] the same by the period */
 } drape_patch;
 
 /* The triangle beyond an edge, in the numbers of its own nodes. */

@@ -11,8 +11,8 @@
  * rest, or turned with its pin. Such a hinge belongs to one triangle, and its fourth node is a copy of the
  * first.
  *
- * A hinge at a periodic edge, or beyond it, belongs to one triangle, too: its nodes on the other side of the edge
- * are displaced by the period.
+ * A hinge at a periodic edge, or beyond it, belongs to one triangle, too: its nodes on the other side of the
+ * edge are displaced by the period.
  *
  * Hysteresis and creases are sliders (model/slider.h) on the squares. Friction between yarns, of KES-FB2's
  * moment HB = B friction per width: a slider of the limit HB that slips after a change of curvature by
@@ -65,8 +65,8 @@ enum {
     REST_ALTITUDE, /* smallest of the triangle [m] */
     REST_COUNT
 };
-/* Rest data of a part: r, 0 if it is not clamped, if some edge is; and the displacements of its nodes, if some
- * edge is periodic. */
+/* Rest data of a part: r, 0 if it is not clamped, if some edge is; and the displacements of its nodes, if
+ * some edge is periodic. */
 enum { PART_R, PART_SHIFT = 3, CLAMP_COUNT = PART_SHIFT, PART_COUNT = PART_SHIFT + 12 };
 
 static const char *const rest_choices[] = {"mesh", "flat", NULL};
@@ -313,8 +313,8 @@ static double rest_angle(const drape_cloth_view *cloth, const int32_t node[4], c
     return s[0];
 }
 
-/* Sets the parts of a patch: their numbers, signs and angles at rest. next: the number of the next one that is
- * its own. */
+/* Sets the parts of a patch: their numbers, signs and angles at rest. next: the number of the next one that
+ * is its own. */
 static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch, int32_t *next,
                       drape_term_builder *builder, int32_t part[MIDEDGE_HINGES], int sign[MIDEDGE_HINGES],
                       double theta[MIDEDGE_HINGES])

@@ -1,5 +1,6 @@
 /*
- * test_hashes.c: every example scene with every integrator, for three attempts. The bits of the state must be
+ * test_hashes.c: every example scene, and those beside this file, with every integrator, for three
+ * attempts. The bits of the state must be
  * those of hashes.txt, on every processor and with every build of the same libraries, and the same with other
  * numbers of threads, in a sim that is stopped at each attempt or saved and restored between two, and beside
  * other sims on the same thread and on another one.
@@ -18,6 +19,7 @@
 #include <pthread.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/hash.h"
 #include "integrators/integrator.h"
@@ -70,11 +72,22 @@ static int compare_names(const void *a, const void *b)
     return strcmp(a, b);
 }
 
-static int list_scenes(const char *folder, char names[][64])
+/* Where scenes are: those that users see, and those that have what these lack. */
+static const char *const folders[] = {"examples/scenes", "tests/golden"};
+
+static void path_of(const char *folder, const char *name, const char *ending, char path[1024])
 {
-    int count = 0;
-    DIR *dir = opendir(folder);
-    REQUIRE(dir, "there is no %s", folder);
+    const char *source = getenv("DRAPE_SOURCE");
+    snprintf(path, 1024, "%.800s/%s%s%.60s%s", source ? source : ".", folder, *name ? "/" : "", name, ending);
+}
+
+/* Adds the names of the scenes in a folder to those that there are. */
+static int list_scenes(const char *folder, int count, char names[][64])
+{
+    char path[1024];
+    path_of(folder, "", "", path);
+    DIR *dir = opendir(path);
+    REQUIRE(dir, "there is no %s", path);
     for (struct dirent *entry = readdir(dir); entry; entry = readdir(dir)) {
         const size_t length = strlen(entry->d_name);
         if (length < 6 || length > 60 || strcmp(entry->d_name + length - 5, ".json") != 0)
@@ -117,10 +130,11 @@ static bool make_coarser(drape_scene *scene, const drape_model *model)
 static drape_model *compile(drape_context *ctx, const char *name)
 {
     char path[1024];
-    const char *source = getenv("DRAPE_SOURCE");
     drape_scene *scene = NULL;
     drape_model *model = NULL;
-    snprintf(path, sizeof path, "%.800s/examples/scenes/%.60s.json", source ? source : ".", name);
+    path_of(folders[0], name, ".json", path);
+    if (access(path, R_OK) != 0)
+        path_of(folders[1], name, ".json", path);
     drape_status status = drape_scene_load(ctx, path, &scene);
     for (int32_t before = INT32_MAX, now = 0; now < before;) { /* a scene of another form keeps its size */
         before = now > 0 ? now : before;
@@ -298,10 +312,9 @@ static moment moments[MAX_SCENES]; /* made by the first call of for_all, before 
 static void for_all(void (*visit)(const ready *s, const drape_integrator_ops *method))
 {
     static char names[MAX_SCENES][64];
-    char folder[900];
-    const char *source = getenv("DRAPE_SOURCE");
-    snprintf(folder, sizeof folder, "%.800s/examples/scenes", source ? source : ".");
-    const int count = list_scenes(folder, names);
+    int count = 0;
+    for (size_t f = 0; f < sizeof folders / sizeof *folders; f++)
+        count = list_scenes(folders[f], count, names);
     for (int i = 0; i < count; i += every) {
         drape_context *ctx = NULL;
         REQUIRE(!drape_context_create(NULL, &ctx), "no context");

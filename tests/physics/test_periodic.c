@@ -143,8 +143,8 @@ END_TEST
 #define TILE 4 /* cells of a tile across */
 #define ROWS 5
 
-/* Tiles of cells with displaced nodes and with diagonals either way: bend.midedge then measures nine hinges in a
- * triangle, and two of its nodes may be images of each other's neighbours. */
+/* Tiles of cells with displaced nodes and diagonals of both directions: bend.midedge then measures nine
+ * hinges in a triangle, and two of its nodes may be images of each other's neighbours. */
 static void tiles(int count, drape_mesh_def *mesh, double *x, int32_t *triangle)
 {
     const int across = TILE * count + 1;
@@ -342,8 +342,8 @@ START_TEST(the_jacobian_is_that_of_the_shared_forces)
 }
 END_TEST
 
-/* The same with bending and springs across both pairs of edges, of a cell that is drawn out, with rates and the
- * angle of a corner's hinges; and of a cell so narrow that an element meets images of its own nodes. */
+/* The same with bending and springs across both pairs of edges, of a cell that is drawn out, with rates and
+ * the angle of a corner's hinges; and of a cell so narrow that an element meets images of its own nodes. */
 START_TEST(derivatives_across_edges_are_exact)
 {
     for (int columns = 2; columns <= 5; columns++) {

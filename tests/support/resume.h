@@ -5,8 +5,8 @@
 #include "support/bytes.h"
 #include "support/scene.h"
 
-/* Advances `straight` to the time of the checkpoint and to the end, and `again`, a sim of the same scene, from that
- * checkpoint to the end. Both are closed. what: names the case in a failure. */
+/* Advances `straight` to the time of the checkpoint and to the end, and `again`, a sim of the same scene,
+ * from that checkpoint to the end. Both are closed. what: names the case in a failure. */
 static inline void scene_resumes(scene straight, scene again, double checkpoint, double end, const char *what)
 {
     scene_advance(&straight, checkpoint);
