@@ -23,8 +23,8 @@ typedef struct drape_patch {
     int32_t edge[DRAPE_PATCH_HINGES];   /* of each hinge; -1: there is none */
     int32_t beyond[DRAPE_PATCH_HINGES]; /* the triangle beyond each hinge; -1: there is none */
     bool turned[DRAPE_PATCH_HINGES]; /* the inner triangle of the hinge is the second one beside its edge */
-    double flat[2 * DRAPE_PATCH_NODES]; /* the nodes unfolded into the plane of the triangle [m] */
-    bool shifted[DRAPE_PATCH_HINGES];   /* the hinge is at a periodic edge, or has nodes beyond one */
+    double flat[2 * DRAPE_PATCH_NODES];   /* the nodes unfolded into the plane of the triangle [m] */
+    bool shifted[DRAPE_PATCH_HINGES];     /* the hinge is at a periodic edge, or has nodes beyond one */
     double at_rest[DRAPE_PATCH_NODES][3]; /* [m] displacements of the nodes at rest */
     double shift[DRAPE_PATCH_NODES][3];   /* [m] the same by the period */
 } drape_patch;
