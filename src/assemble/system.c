@@ -658,7 +658,7 @@ bool drape_system_has_symmetric_terms(const drape_system *system)
     bool symmetric = true;
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
-        symmetric &= !term->ops->kinetic && !(term->ops->dissipation && drape_term_couples(term));
+        symmetric &= !term->ops->kinetic && !(term->ops->dissipation && term->ops->nodes > 1);
     }
     return symmetric;
 }

@@ -42,7 +42,7 @@ struct drape_factored_jacobian {
 static bool has_coupled_drag(const drape_model *m)
 {
     for (int32_t t = 0; t < m->term_count; t++)
-        if (m->terms[t].ops->in_medium && drape_term_couples(&m->terms[t]))
+        if (m->terms[t].ops->in_medium && m->terms[t].ops->nodes > 1)
             return true;
     return false;
 }
