@@ -653,6 +653,16 @@ bool drape_system_is_symmetric(const drape_system *system)
     return !system->contact || drape_contact_is_symmetric(system->contact);
 }
 
+bool drape_system_has_symmetric_terms(const drape_system *system)
+{
+    bool symmetric = true;
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        symmetric &= !term->ops->kinetic && !(term->ops->dissipation && term->ops->nodes > 1);
+    }
+    return symmetric;
+}
+
 void drape_system_symmetrize(drape_system *system, const drape_point *given, double positive_share,
                              double *values)
 {

@@ -204,6 +204,10 @@ void drape_system_predict_contact(drape_system *system, const double *p, double 
 /* Whether the Jacobian of contact is symmetric in every state. */
 bool drape_system_is_symmetric(const drape_system *system);
 
+/* Whether that of the terms is, in a step: not with drag and dashpots that couple nodes, loads that follow
+ * the cloth, and energies of motion. */
+bool drape_system_has_symmetric_terms(const drape_system *system);
+
 /* values (pattern.nonzeros) = what the exact Jacobian of contact has beyond its positive semidefinite
  * approximation, as drape_contact_add_remainder. */
 void drape_system_contact_remainder(drape_system *system, const drape_point *point, double *values);

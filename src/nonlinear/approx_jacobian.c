@@ -182,7 +182,7 @@ static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_poi
         return status;
     drape_system_remainder(s->system, point, s->remainder.values);
     list_remainder(s);
-    return friction ? drape_friction_matrix_update(&s->friction, point) : DRAPE_OK;
+    return friction ? drape_nonsymmetric_update(&s->friction, point, NULL) : DRAPE_OK;
 }
 
 static void add_upper(drape_approx_jacobian *s, int32_t node, const double upper[6])
@@ -327,7 +327,7 @@ int drape_approx_jacobian_solve(drape_approx_jacobian *s, const double *b, doubl
                                 int max_iterations)
 {
     int iterations = 1;
-    if (drape_friction_matrix_solve(&s->friction, b, x, &iterations))
+    if (drape_nonsymmetric_solve(&s->friction, b, x, &iterations))
         return iterations;
     drape_pcg_solve(&s->pcg, b, x, tolerance, max_iterations);
     return s->pcg.iterations;
@@ -351,7 +351,7 @@ drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *syst
     s->inverse = drape_arena_take(arena, 2 * n, sizeof *s->inverse);
     s->pcg = drape_pcg_of(arena, (int64_t)n, s, multiply, precondition);
     drape_status status =
-        drape_friction_matrix_init(arena, system, s, multiply, solve_symmetric, &s->friction);
+        drape_nonsymmetric_init(arena, system, false, s, multiply, solve_symmetric, &s->friction);
     if (!status)
         status = drape_approx_jacobian_build(s, spacing);
     return status ? status : drape_arena_status(arena);
@@ -364,7 +364,7 @@ void drape_approx_jacobian_destroy(drape_approx_jacobian **out)
         return;
     drape_linear_destroy(s->coarse.linear, &s->coarse.solver);
     drape_arena_free(&s->remainder.arena);
-    drape_friction_matrix_free(&s->friction);
+    drape_nonsymmetric_free(&s->friction);
     *out = NULL;
 }
 

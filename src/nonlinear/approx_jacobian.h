@@ -10,7 +10,7 @@
  *        would resist motion across the sheet, too, with thousands of times the sheet's inertia, which ten
  *        iterations do not correct.
  *     R  the remainder: energies and dissipation without a strain measure, and contact, without
- *        approximation except for friction, for which friction_matrix.h corrects solutions.
+ *        approximation except for friction, for which nonsymmetric.h corrects solutions.
  *
  * A x = b is solved by conjugate gradients with an additive preconditioner: the inverse of the diagonal
  * blocks plus the inverse of the matrix on a coarse space (solvers/prolong.h), which represents the motion
@@ -35,7 +35,7 @@ void drape_approx_jacobian_destroy(drape_approx_jacobian **jacobian);
 void drape_approx_jacobian_begin(drape_approx_jacobian *jacobian);
 
 /* Computes the matrix at a point and counts the work; with `friction`, where some acts, also what corrects
- * its solutions, by friction_matrix.h. Returns a status > 0 if it has no factors on the coarse space. Errors:
+ * its solutions, by nonsymmetric.h. Returns a status > 0 if it has no factors on the coarse space. Errors:
  * DRAPE_E_MEMORY, if contact couples new nodes. */
 drape_status drape_approx_jacobian_update(drape_approx_jacobian *jacobian, const drape_point *point,
                                           double mass_weight, bool friction, drape_work *work);

@@ -4,7 +4,7 @@
 #define DRAPE_NONLINEAR_APPROX_JACOBIAN_PARTS_H
 
 #include "nonlinear/approx_jacobian.h"
-#include "nonlinear/friction_matrix.h"
+#include "nonlinear/nonsymmetric.h"
 #include "nonlinear/scalar_stiffness.h"
 #include "solvers/linear.h"
 #include "solvers/pcg.h"
@@ -49,7 +49,7 @@ struct drape_approx_jacobian {
     remainder_matrix remainder;
     double *inverse; /* (6 x nodes) of the diagonal blocks */
     drape_pcg pcg;
-    drape_friction_matrix friction;
+    drape_nonsymmetric friction;
 };
 
 /* Everything that does not change with the state. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER. */

@@ -3,7 +3,7 @@
 
 #include "base/finite.h"
 #include "base/vec3.h"
-#include "nonlinear/friction_matrix.h"
+#include "nonlinear/nonsymmetric.h"
 #include "nonlinear/scalar_stiffness.h"
 #include "solvers/pcg.h"
 #include "solvers/sun_linear.h"
@@ -25,13 +25,13 @@
 struct drape_factored_jacobian {
     drape_system *system;
     bool *flat;        /* (terms) those that C stands for */
-    bool nonsymmetric; /* there is drag that couples nodes */
+    bool nonsymmetric; /* the Jacobian of the terms may be */
     bool lumps;        /* N is factored, in a pattern without what only C couples; else A */
     drape_scalar_stiffness scalar;
     int32_t *block;  /* (entries of C) in the pattern; -1: lumped */
     int64_t version; /* of the pattern */
     drape_pcg pcg;
-    drape_friction_matrix friction;
+    drape_nonsymmetric rest;
     SUNContext sun;
     drape_sun_linear *linear;
 };
@@ -42,7 +42,7 @@ struct drape_factored_jacobian {
 static bool has_coupled_drag(const drape_model *m)
 {
     for (int32_t t = 0; t < m->term_count; t++)
-        if (m->terms[t].ops->in_medium && drape_term_couples(&m->terms[t]))
+        if (m->terms[t].ops->in_medium && m->terms[t].ops->nodes > 1)
             return true;
     return false;
 }
@@ -158,10 +158,10 @@ static drape_status assemble(drape_factored_jacobian *s, const drape_point *at, 
     drape_sun_linear_set_positions(s->linear, point.x, drape_system_model(s->system)->node_of_free);
     drape_system_jacobian_without(s->system, &point, 0, share, s->flat, s->linear->values);
     add_scalars(s, s->linear->values);
-    if (!s->nonsymmetric)
-        drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
+    status = drape_nonsymmetric_update(&s->rest, &point, s->nonsymmetric ? s->linear->values : NULL);
+    drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
     drape_system_project_matrix(s->system, s->linear->values);
-    return drape_friction_matrix_update(&s->friction, &point);
+    return status;
 }
 
 drape_status drape_factored_jacobian_update(drape_factored_jacobian *s, const drape_point *point,
@@ -222,26 +222,6 @@ static void precondition(const void *owner, const double *r, double *z)
         memset(z, 0, (size_t)s->pcg.n * sizeof *z);
 }
 
-/* For a matrix whose drag makes it nonsymmetric, too. */
-static void multiply_any(const void *owner, const double *x, double *y)
-{
-    const drape_factored_jacobian *s = owner;
-    const drape_pattern *p = drape_system_pattern(s->system);
-    if (!s->nonsymmetric) {
-        multiply(s, x, y);
-        return;
-    }
-    memset(y, 0, (size_t)s->pcg.n * sizeof *y);
-    for (int32_t j = 0; j < p->block_count; j++)
-        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
-            int64_t stride;
-            const double *a = drape_pattern_at(p, s->linear->values, j, k, &stride);
-            for (int c = 0; c < 3; c++)
-                vec3_add_scaled(x[3 * (size_t)j + (size_t)c], a + c * stride,
-                                y + 3 * (size_t)p->block_row[k]);
-        }
-}
-
 static void solve_factored(void *factors, const double *b, double *x)
 {
     precondition(factors, b, x);
@@ -252,7 +232,7 @@ drape_status drape_factored_jacobian_solve(drape_factored_jacobian *s, const dou
 {
     *iterations = 1;
     *definite = true;
-    if (drape_friction_matrix_solve(&s->friction, b, x, iterations))
+    if (drape_nonsymmetric_solve(&s->rest, b, x, iterations))
         return DRAPE_OK;
     if (!s->lumps)
         return drape_sun_linear_solve(s->linear, b, x);
@@ -295,7 +275,7 @@ static double lumped_share(drape_factored_jacobian *s, double dt)
 static drape_status choose_pattern(drape_factored_jacobian *s, double dt)
 {
     const int64_t all = drape_system_pattern(s->system)->nonzeros;
-    drape_status status = s->nonsymmetric ? DRAPE_OK : drape_system_leave_out(s->system, s->flat);
+    drape_status status = drape_system_leave_out(s->system, s->flat);
     if (status)
         return status;
     place_scalars(s);
@@ -314,7 +294,7 @@ drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *sy
     if (!s)
         return DRAPE_E_MEMORY;
     s->system = system;
-    s->nonsymmetric = has_coupled_drag(m);
+    s->nonsymmetric = !drape_system_has_symmetric_terms(system);
     s->flat = drape_arena_take(arena, (size_t)m->term_count, sizeof *s->flat);
     drape_status status = drape_arena_status(arena);
     if (!status)
@@ -325,7 +305,7 @@ drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *sy
         return status;
     s->block = drape_arena_take(arena, (size_t)s->scalar.start[s->scalar.n], sizeof *s->block);
     s->pcg = drape_pcg_of(arena, 3 * (int64_t)m->free_count, s, multiply, precondition);
-    status = drape_friction_matrix_init(arena, system, s, multiply_any, solve_factored, &s->friction);
+    status = drape_nonsymmetric_init(arena, system, s->nonsymmetric, s, multiply, solve_factored, &s->rest);
     if (!status)
         status = drape_arena_status(arena);
     if (!status)
@@ -345,7 +325,7 @@ void drape_factored_jacobian_destroy(drape_factored_jacobian **jacobian)
     if (!s)
         return;
     drape_sun_linear_destroy(&s->linear);
-    drape_friction_matrix_free(&s->friction);
+    drape_nonsymmetric_free(&s->rest);
     if (s->sun)
         SUNContext_Free(&s->sun);
     *jacobian = NULL;

@@ -9,11 +9,11 @@
  *     J+  all other terms and contact, with the positive semidefinite parts of their elements or a share
  *         of them: 1 is positive semidefinite, and converges slowly where cloth is compressed; 0 is exact,
  *         except for contact, but may be indefinite
- * It is symmetric, except for drag, which is exact; where there is friction, solutions are corrected by the
- * exact matrix of contact (friction_matrix.h).
+ * It is symmetric; where there is friction, drag or a load that follows the cloth, solutions are corrected
+ * for what is not (nonsymmetric.h).
  *
  * C couples nodes two and three edges apart, which makes factors of A several times as expensive as those
- * of J+: for a measured fabric of 10 000 nodes nine times. So, where there is no drag, a matrix N without
+ * of J+: for a measured fabric of 10 000 nodes nine times. So a matrix N without
  * these entries is factored: each c_ij that J+ has no block for is added to the diagonal,
  *     N = A + sum of the c_ij |x_i - x_j|^2 that are left out, as quadratic forms
  * which is exact where nodes move alike, and stiffer than A otherwise, as most of the c_ij are positive. Then

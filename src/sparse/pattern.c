@@ -215,6 +215,22 @@ void drape_pattern_symmetrize(const drape_pattern *p, double *values)
         }
 }
 
+void drape_pattern_add_antisymmetric(const drape_pattern *p, const double *values, double *to)
+{
+    double *const from = (double *)(uintptr_t)values; /* only read */
+    for (int32_t j = 0; j < p->block_count; j++)
+        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
+            int64_t stride, mirror_stride;
+            const int32_t i = p->block_row[k];
+            const double *block = drape_pattern_at(p, from, j, k, &stride),
+                         *mirror = drape_pattern_at(p, from, i, drape_pattern_find(p, j, i), &mirror_stride);
+            double *sum = drape_pattern_at(p, to, j, k, &stride);
+            for (int c = 0; c < 3; c++)
+                for (int r = 0; r < 3; r++)
+                    sum[c * stride + r] += (block[c * stride + r] - mirror[r * mirror_stride + c]) / 2;
+        }
+}
+
 double drape_pattern_asymmetry(const drape_pattern *p, const double *values)
 {
     double largest = 0, difference = 0;

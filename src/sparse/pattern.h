@@ -56,6 +56,9 @@ void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_n
 /* Replaces A by (A + A')/2; a symmetric matrix keeps its bits. */
 void drape_pattern_symmetrize(const drape_pattern *pattern, double *values);
 
+/* Adds (A - A')/2 to `to` (nonzeros). */
+void drape_pattern_add_antisymmetric(const drape_pattern *pattern, const double *values, double *to);
+
 /* The largest difference of two mirrored entries, in parts of the largest entry. */
 double drape_pattern_asymmetry(const drape_pattern *pattern, const double *values);
 

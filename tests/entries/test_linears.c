@@ -863,12 +863,14 @@ START_TEST(the_best_solver_of_no_unknowns)
 }
 END_TEST
 
-/* A + B with B' = -B has A as its symmetric part, up to the rounding of the sum; A itself keeps its bits. */
+/* A + B with B' = -B has A as its symmetric part and B as its antisymmetric one, up to the rounding of the
+ * sum; A itself keeps its bits. */
 START_TEST(the_symmetric_part_is_exact)
 {
     sheet q = open_sheet(8);
     fill_sheet(&q, 1, 7);
-    double *symmetric = take((size_t)q.p.nonzeros, sizeof *symmetric);
+    double *symmetric = take((size_t)q.p.nonzeros, sizeof *symmetric),
+           *rest = take((size_t)q.p.nonzeros, sizeof *rest);
     memcpy(symmetric, q.values, (size_t)q.p.nonzeros * sizeof *symmetric);
     drape_pattern_symmetrize(&q.p, q.values);
     ck_assert(memcmp(symmetric, q.values, (size_t)q.p.nonzeros * sizeof *symmetric) == 0);
@@ -877,9 +879,17 @@ START_TEST(the_symmetric_part_is_exact)
             const int64_t r = drape_pattern_row(&q.p, c, k);
             q.values[k] += sin((double)(r * r - c * c)); /* odd in (r, c) */
         }
+    drape_pattern_add_antisymmetric(&q.p, q.values, rest);
+    for (int64_t c = 0; c < q.p.n; c++)
+        for (int64_t k = q.p.column[c]; k < q.p.column[c + 1]; k++) {
+            const int64_t r = drape_pattern_row(&q.p, c, k);
+            ck_assert_double_eq_tol(rest[k], sin((double)(r * r - c * c)),
+                                    2 * DBL_EPSILON * (fabs(symmetric[k]) + 1));
+        }
     drape_pattern_symmetrize(&q.p, q.values);
     for (int64_t k = 0; k < q.p.nonzeros; k++)
         ck_assert_double_eq_tol(q.values[k], symmetric[k], 2 * DBL_EPSILON * (fabs(symmetric[k]) + 1));
+    free(rest);
     free(symmetric);
     close_sheet(&q);
 }
