@@ -430,10 +430,10 @@ START_TEST(a_follower_pressure_has_a_path_and_no_modes)
 }
 END_TEST
 
-/* Friction slides from point to point: a strip of B = 1e6 1e-9/12 N m with HB/B = 2 1/m, from 0.5 1/m on, that
- * an end moment M = 8e-4 N bends to M/B - 2 = 7.6 1/m stays at M/B + 2 when the moment has gone back to a
- * thousandth. Its end is at (sin k L, 1 - cos k L)/k, but for that the strip is a polygon: (k h)^2/12 of it,
- * 5e-4 with edges of 0.01 m. */
+/* Friction slides from point to point: a strip of B = 1e6 1e-9/12 N m with HB/B = 2 1/m, from 0.5 1/m on,
+ * that an end moment M = 8e-4 N bends to M/B - 2 = 7.6 1/m stays at M/B + 2 when the moment has gone back to
+ * a thousandth. Its end is at (sin k L, 1 - cos k L)/k, but for that the strip is a polygon: (k h)^2/12 of
+ * it, 5e-4 with edges of 0.01 m. */
 START_TEST(friction_stays_when_the_load_goes)
 {
     static trace t;
