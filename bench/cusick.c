@@ -7,22 +7,23 @@
  * measured. With friction the state is one of many at which the sheet stays: the least energy is then only
  * that of the least of these runs.
  *
- *     cusick [--csv FILE] [--fabric NAME] [--membrane soft|fabric] [--rows N] [--columns N]
- *            [--from N] [--to N] [--onset K]
+ *     cusick [--csv FILE] [--fabric NAME] [--tester cusick|jis] [--membrane soft|fabric] [--rows N]
+ *            [--columns N] [--from N] [--to N] [--onset K] [--twist RATIO]
  *         --fabric    run only this one
+ *         --tester    cusick (default), or jis, a specimen of 25.4 cm on a disc of 12.7 cm
  *         --membrane  soft (default): stretch.cst with 100 N/m, as `drape validate cusick_measured`; fabric:
  *                     stretch.patch with the stiffnesses of the fabric, three times as expensive
  *         --rows, --columns  circles and nodes of each (default 13, 112)
  *         --from, --to  numbers of waves at the start (default 4 to 11)
  *         --onset     friction_curvature [1/m] (default 10)
+ *         --twist     torsional rigidity over that of bending, which was not measured (default 0.5, as if
+ *                     isotropic)
  */
 #include "bench.h"
 
 #include "compile/fabrics.h"
 
 #define PI        3.14159265358979323846
-#define INNER     0.09 /* [m] */
-#define OUTER     0.15
 #define AMPLITUDE 0.003 /* [m] of the waves at the start */
 #define RAMP      1.0   /* [s] in which the weight grows */
 #define STEP      0.02  /* [s] */
@@ -31,6 +32,15 @@
 #define WHILE     3     /* tenths of a second */
 #define PROMINENT 0.1   /* of the range of heights of the rim: smaller waves are no folds */
 #define MOST      32    /* waves at the start */
+
+/* Radii of the disc and of the specimen [m]: of Cusick and ISO 9073-9, and of JIS L 1096, method G, as of the
+ * tester of the Fabric Research Laboratories (Chu, Cummings & Teixeira 1950). */
+typedef struct drapemeter {
+    const char *name;
+    double inner, outer;
+} drapemeter;
+
+static const drapemeter testers[] = {{"cusick", 0.09, 0.15}, {"jis", 0.0635, 0.127}};
 
 /* Moment of friction over bending rigidity, HB/B [1/m], of the source of the drape coefficients. */
 static const struct {
@@ -43,9 +53,10 @@ static const struct {
 
 typedef struct options {
     const char *fabric;
+    const drapemeter *tester;
     bool soft;
     int rows, columns, from, to;
-    double onset;
+    double onset, twist;
 } options;
 
 typedef struct result {
@@ -56,11 +67,12 @@ typedef struct result {
     double time, cpu;   /* [s] */
 } result;
 
-static drape_model *specimen(drape_context *ctx, const options *o, const char *fabric, double friction)
+static drape_model *specimen(drape_context *ctx, const options *o, const drape_fabric *fabric,
+                             double friction)
 {
-    char bending[128] = "", membrane[128] = "'stretch.patch'", soft[64] = "";
+    char slip[64] = "", membrane[128] = "'stretch.patch'", soft[64] = "";
     if (friction > 0)
-        snprintf(bending, sizeof bending, ",'friction':%g,'friction_curvature':%g", friction, o->onset);
+        snprintf(slip, sizeof slip, ",'friction':%g,'friction_curvature':%g", friction, o->onset);
     if (o->soft) {
         snprintf(membrane, sizeof membrane, "'stretch.cst'");
         snprintf(soft, sizeof soft, ",'young_modulus':1e5,'poisson_ratio':0,'thickness':1e-3");
@@ -68,16 +80,19 @@ static drape_model *specimen(drape_context *ctx, const options *o, const char *f
     return bench_model(
         ctx,
         "{'drape':1,'cloth':[{'mesh':{'grid':'annulus','rows':%d,'columns':%d,'inner_radius':%g,"
-        "'outer_radius':%g},'material':{'fabric':'%s'%s},'terms':[%s,{'type':'bend.midedge','poisson':0%s},"
+        "'outer_radius':%g},'material':{'fabric':'%s'%s},'terms':[%s,{'type':'bend.midedge','poisson':0,'"
+        "twist':%.17g%s},"
         "{'type':'drag.viscous','coefficient':1}],'pins':[{'edge':'top','clamp':true}]}],"
         "'gravity':[0,-9.81,0],'gravity_history':'weight','histories':[{'name':'weight','times':[0,%g],"
         "'values':[0,1]}],'integrator':{'method':'be','dt':%g,'tolerance':1e-6,'globalization':'work'},"
         "'duration':%g}",
-        o->rows, o->columns, INNER, OUTER, fabric, soft, membrane, bending, RAMP, STEP, LONGEST);
+        o->rows, o->columns, o->tester->inner, o->tester->outer, fabric->name, soft, membrane,
+        o->twist * fabric->bending.warp, slip, RAMP, STEP, LONGEST);
 }
 
 /* The rim starts with waves that vanish, with their slope, where the sheet is clamped. */
-static void seed(drape_context *ctx, const drape_model *model, drape_sim *sim, int waves)
+static void seed(drape_context *ctx, const drape_model *model, drape_sim *sim, const drapemeter *tester,
+                 int waves)
 {
     const size_t nodes = (size_t)drape_model_node_count(model);
     const double *rest = drape_model_rest_positions(model);
@@ -87,7 +102,7 @@ static void seed(drape_context *ctx, const drape_model *model, drape_sim *sim, i
     memcpy(x, rest, 3 * nodes * sizeof *x);
     for (size_t i = 0; i < nodes; i++) {
         const double radius = hypot(rest[3 * i], rest[3 * i + 2]),
-                     out = fmax(0, radius - INNER) / (OUTER - INNER);
+                     out = fmax(0, radius - tester->inner) / (tester->outer - tester->inner);
         x[3 * i + 1] += AMPLITUDE * out * out * cos(waves * atan2(rest[3 * i + 2], rest[3 * i]));
     }
     if (drape_sim_set_state(sim, 0, x, x + 3 * nodes))
@@ -121,9 +136,9 @@ static int count_folds(const double *rim, int columns)
 }
 
 /* As `drape validate cusick_measured`: the area inside the shadow of the rim. */
-static double shadow_of(const double *rim, int columns)
+static double shadow_of(const drapemeter *tester, const double *rim, int columns)
 {
-    const double inner = PI * INNER * INNER, outer = PI * OUTER * OUTER;
+    const double inner = PI * tester->inner * tester->inner, outer = PI * tester->outer * tester->outer;
     double twice = 0;
     for (int i = 0; i < columns; i++) {
         const double *a = rim + 3 * i, *b = rim + 3 * ((i + 1) % columns);
@@ -142,17 +157,17 @@ static double fastest(const drape_model *model, const drape_sim *sim)
     return most;
 }
 
-static result drape(const options *o, const char *fabric, double friction, int waves)
+static result drape(const options *o, const drape_fabric *fabric, double friction, int waves)
 {
     drape_context *ctx = bench_context();
     drape_model *model = specimen(ctx, o, fabric, friction);
     drape_sim *sim = bench_sim(ctx, model, NULL, NULL, NULL, NULL);
     const double start = drape_clock_cpu_seconds();
     result r = {.seeded = waves, .speed = INFINITY};
-    seed(ctx, model, sim, waves);
+    seed(ctx, model, sim, o->tester, waves);
     for (int k = 1, quiet = 0; quiet < WHILE && k * 0.1 <= LONGEST; k++) {
         if (drape_sim_advance(sim, k * 0.1))
-            bench_fail(ctx, "%s, %d waves", fabric, waves);
+            bench_fail(ctx, "%s, %d waves", fabric->name, waves);
         r.speed = fastest(model, sim);
         quiet = k * 0.1 > RAMP && r.speed < REST ? quiet + 1 : 0;
     }
@@ -160,7 +175,7 @@ static result drape(const options *o, const char *fabric, double friction, int w
     const double *rim = drape_sim_positions(sim) + 3 * (size_t)(drape_model_node_count(model) - o->columns);
     r.energy = e.elastic + e.gravity;
     r.found = count_folds(rim, o->columns);
-    r.coefficient = shadow_of(rim, o->columns);
+    r.coefficient = shadow_of(o->tester, rim, o->columns);
     r.time = drape_sim_time(sim);
     r.cpu = drape_clock_cpu_seconds() - start;
     drape_sim_destroy(&sim);
@@ -181,7 +196,7 @@ static void test(const options *o, const drape_fabric *f, double friction, FILE 
     const int count = o->to - o->from + 1;
     result of[MOST];
     for (int i = 0; i < count; i++)
-        of[i] = drape(o, f->name, friction, o->from + i);
+        of[i] = drape(o, f, friction, o->from + i);
     qsort(of, (size_t)count, sizeof *of, by_energy);
     for (int i = 0; i < count; i++) {
         const result *r = &of[i];
@@ -191,9 +206,10 @@ static void test(const options *o, const drape_fabric *f, double friction, FILE 
         if (!csv)
             continue;
         bench_csv_row(csv);
-        fprintf(csv, "%s,%s,%s,%d,%d,%g,%d,%d,%.6f,%.4f,%.3f,%.1e,%.1f,%.1f\n", f->name, sheet,
-                o->soft ? "soft" : "fabric", o->rows, o->columns, friction > 0 ? o->onset : 0, r->seeded,
-                r->found, 1e3 * r->energy, r->coefficient, f->drape, r->speed, r->time, r->cpu);
+        fprintf(csv, "%s,%s,%s,%s,%d,%d,%g,%g,%d,%d,%.6f,%.4f,%.3f,%.1e,%.1f,%.1f\n", f->name, sheet,
+                o->tester->name, o->soft ? "soft" : "fabric", o->rows, o->columns,
+                friction > 0 ? o->onset : 0, o->twist, r->seeded, r->found, 1e3 * r->energy, r->coefficient,
+                f->drape, r->speed, r->time, r->cpu);
     }
     fflush(stdout);
     if (csv)
@@ -201,12 +217,28 @@ static void test(const options *o, const drape_fabric *f, double friction, FILE 
 }
 
 #define USAGE                                                                                                \
-    "cusick [--csv FILE] [--fabric NAME] [--membrane soft|fabric] [--rows N] [--columns N]\n"                \
-    "       [--from N] [--to N] [--onset K]\n"
+    "cusick [--csv FILE] [--fabric NAME] [--tester cusick|jis] [--membrane soft|fabric] [--rows N]\n"        \
+    "       [--columns N] [--from N] [--to N] [--onset K] [--twist RATIO]\n"
+
+static const drapemeter *tester_named(const char *name)
+{
+    const drapemeter *found = NULL;
+    for (size_t i = 0; i < sizeof testers / sizeof *testers; i++)
+        if (strcmp(testers[i].name, name) == 0)
+            found = &testers[i];
+    return found;
+}
 
 int main(int argc, char **argv)
 {
-    options o = {.soft = true, .rows = 13, .columns = 112, .from = 4, .to = 11, .onset = 10};
+    options o = {.tester = testers,
+                 .soft = true,
+                 .rows = 13,
+                 .columns = 112,
+                 .from = 4,
+                 .to = 11,
+                 .onset = 10,
+                 .twist = 0.5};
     const char *name = NULL;
     for (int i = 1; i < argc; i++) {
         const char *value = i + 1 < argc ? argv[i + 1] : "";
@@ -214,6 +246,8 @@ int main(int argc, char **argv)
             name = value;
         else if (strcmp(argv[i], "--fabric") == 0 && *value)
             o.fabric = value;
+        else if (strcmp(argv[i], "--tester") == 0 && tester_named(value))
+            o.tester = tester_named(value);
         else if (strcmp(argv[i], "--membrane") == 0 &&
                  (strcmp(value, "soft") == 0 || strcmp(value, "fabric") == 0))
             o.soft = strcmp(value, "soft") == 0;
@@ -227,14 +261,17 @@ int main(int argc, char **argv)
             o.to = atoi(value);
         else if (strcmp(argv[i], "--onset") == 0 && atof(value) > 0)
             o.onset = atof(value);
+        else if (strcmp(argv[i], "--twist") == 0 && atof(value) > 0)
+            o.twist = atof(value);
         else
             return bench_usage(argv[i], USAGE);
         i++;
     }
     if (o.to < o.from || o.to - o.from >= MOST)
         return bench_usage("", USAGE);
-    FILE *csv = bench_csv(name, "fabric,sheet,membrane,rows,columns,onset,seeded,folds,energy_mj,coefficient,"
-                                "published,speed,time_s,cpu_s");
+    FILE *csv = bench_csv(
+        name, "fabric,sheet,tester,membrane,rows,columns,onset,twist,seeded,folds,energy_mj,coefficient,"
+              "published,speed,time_s,cpu_s");
     printf("%-24s %-8s %6s %5s %12s %8s %9s %8s %8s %5s %6s\n", "fabric", "sheet", "seeded", "folds",
            "energy mJ", "drape", "published", "off", "m/s", "t s", "cpu s");
     for (size_t i = 0; i < sizeof friction_of / sizeof *friction_of; i++) {

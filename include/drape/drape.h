@@ -1226,26 +1226,28 @@ DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t 
 
 /* A doubt about a run: what is unusual, and which setting would help. */
 typedef struct drape_warning {
-    const char *name; /* "no_terms", "unused_curve", "few_steps", "large_mesh", "starts_inside",
-                         "ends_inside", "tangled", "no_room", "numerical_dissipation", "energy_gained",
-                         "slow_contact", "contact_distance", "inaccurate", "held" or "time_dropped" */
+    const char *name; /* "no_terms", "unused_curve", "unused_clamp", "unused_history", "few_steps",
+                         "large_mesh", "starts_inside", "ends_inside", "tangled", "no_room",
+                         "numerical_dissipation", "energy_gained", "slow_contact", "contact_distance",
+                         "inaccurate", "held" or "time_dropped" */
     char text[400];   /* one line */
 } drape_warning;
 
 /* The warnings about a sim and its run so far, computed at the call: index 0 is the first that applies.
  * no_terms: nothing but weight is modelled for a cloth. unused_curve: the material has a measured curve
- * that no term of the cloth reads. few_steps: the duration of the scene is fewer than 20 steps of dt,
- * unless integrator or controller choose their own steps or substeps. large_mesh: a mesh from a file is
- * more than 20 m across, as one in centimetres is. starts_inside, ends_inside: free nodes are inside a
- * collider, by more than 1e-9 m, or it pierces triangles without a pinned node, at the start, or after the
- * steps so far; the text describes the first such collider. tangled: an untangling left intersections,
- * gaps below the least or triangles in colliders. no_room: bodies left cloth no room, and it was relaxed
- * there (drape_sim_relaxed). numerical_dissipation: the integrator took more than half of the energy that
- * went in. energy_gained: it gained more than a tenth of that. slow_contact: contact takes most of the
- * time of the steps, and longer than the motion lasts, and a setting is known to help. contact_distance: a
- * collider moved in a step by more than five activation distances that the scene gives. inaccurate: by the
- * estimate of the integrator more than half of the steps, or the last one, are further from the solution
- * of their equation than its bound. Returns false past the last. */
+ * that no term of the cloth reads. unused_clamp: pins clamp a cloth, and no term of it reads that, or they
+ * clamp no edge. unused_history: no load has a history. few_steps: the duration of the scene is fewer than
+ * 20 steps of dt, unless integrator or controller choose their own steps or substeps. large_mesh: a mesh
+ * from a file is more than 20 m across, as one in centimetres is. starts_inside, ends_inside: free nodes
+ * are inside a collider, by more than 1e-9 m, or it pierces triangles without a pinned node, at the start,
+ * or after the steps so far; the text describes the first such collider. tangled: an untangling left
+ * intersections, gaps below the least or triangles in colliders. no_room: bodies left cloth no room, and
+ * it was relaxed there (drape_sim_relaxed). numerical_dissipation: the integrator took more than half of
+ * the energy that went in. energy_gained: it gained more than a tenth of that. slow_contact: contact takes
+ * most of the time of the steps, and longer than the motion lasts, and a setting is known to help.
+ * contact_distance: a collider moved in a step by more than five activation distances that the scene
+ * gives. inaccurate: by the estimate of the integrator more than half of the steps, or the last one, are
+ * further from the solution of their equation than its bound. Returns false past the last. */
 DRAPE_API bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out);
 
 /* ---- Events ---- */

@@ -510,6 +510,10 @@ typedef struct drape_term_ops {
      * curves has the warning "unused_curve". */
     bool takes_curves;
 
+    /* The term reads edge_clamped. Where no term of a cloth does, pins that clamp it have the warning
+     * "unused_clamp". */
+    bool takes_clamps;
+
     /* Optional, beside dissipation: an energy of motion T(x, v), quadratic in v, of what moves with the
      * cloth, such as the air beside it. The library adds Lagrange's d/dt dT/dv - dT/dx to the equation of
      * motion. Only integrators that step momenta take it ("be", "bdf2", "trbdf2", "newton_k"), and "static",

@@ -6,13 +6,15 @@
 #include "compile/select.h"
 #include "compile/stages.h"
 #include "model/support.h"
+#include "model/track.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define SLIP 1e-6 /* of the size of the scene: how far a node may be from where the period puts it */
+#define SLIP   1e-6  /* of the size of the scene: how far a node may be from where the period puts it */
+#define WITHIN 0.377 /* of the time between two keys of a turn: no simple part of a whole turn */
 
 /* One edge of a pair. */
 typedef struct side {
@@ -147,6 +149,26 @@ static drape_status match(pairing *p, drape_arena *scratch)
     return DRAPE_OK;
 }
 
+/* Nodes inside the mesh are not on an edge that another one continues. */
+static drape_status check_boundary(const pairing *p, drape_arena *scratch)
+{
+    const drape_mesh *mesh = &p->cloth->mesh;
+    const side *const sides[2] = {&p->from, &p->to};
+    uint8_t *outer = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *outer);
+    if (!outer)
+        return DRAPE_E_MEMORY;
+    for (size_t e = 0; e < (size_t)mesh->edge_count; e++)
+        for (size_t k = 0; mesh->edge_triangle[2 * e + 1] < 0 && k < 2; k++)
+            outer[mesh->edge[2 * e + k]] = 1;
+    for (int s = 0; s < 2; s++)
+        for (int32_t i = 0; i < sides[s]->count; i++)
+            if (!outer[sides[s]->node[i]])
+                return drape_fail_at(p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
+                                     "node %d is inside the mesh: periodic edges are of its boundary",
+                                     (int)sides[s]->node[i]);
+    return DRAPE_OK;
+}
+
 static drape_status find_pairs(pairing *p, drape_arena *scratch)
 {
     drape_status status = list_side(p, "from", &p->def->from, scratch, &p->from);
@@ -162,7 +184,8 @@ static drape_status find_pairs(pairing *p, drape_arena *scratch)
         return drape_fail_at(p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
                              "one edge has %d nodes and the other %d: they are paired one by one",
                              (int)p->from.count, (int)p->to.count);
-    return match(p, scratch);
+    status = check_boundary(p, scratch);
+    return status ? status : match(p, scratch);
 }
 
 /* ---- The start ---- */
@@ -201,6 +224,11 @@ static drape_status stretch(const pairing *p, const double now[3], double *x)
     if (!(sqrt(square) > SLIP * p->model->length))
         return drape_fail_at(p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
                              "the edges coincide at rest, so the period is 0 0 0 or that of a \"start\"");
+    if (!(vec3_norm(p->def->period) > SLIP * p->model->length))
+        return drape_fail_at(
+            p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
+            "the period 0 0 0 would leave the cloth no width; the edges of a closed tube meet "
+            "in its \"start\"");
     for (int32_t i = 0; i < mesh->node_count; i++) {
         double arm[3];
         vec3_sub(mesh->x + 3 * (size_t)i, p->from.mean, arm);
@@ -433,6 +461,85 @@ static drape_status check_supports(const drape_model *m)
     return DRAPE_OK;
 }
 
+/* Where a node with this track, or -1, is at time t. */
+static void place_at(const drape_model *m, int32_t track, int32_t node, double t, double x[3])
+{
+    memcpy(x, m->start + 3 * (size_t)node, 3 * sizeof *x);
+    if (track >= 0)
+        drape_track_point(&m->tracks[track], m->start + 3 * (size_t)node, t, x);
+}
+
+static bool keep_period(const drape_model *m, const int32_t *track_of, int32_t a, int32_t b, double t)
+{
+    double of_a[3], of_b[3], more[3];
+    place_at(m, track_of[a], a, t, of_a);
+    place_at(m, track_of[b], b, t, of_b);
+    for (size_t k = 0; k < 3; k++)
+        more[k] = of_b[k] - of_a[k] - (m->start[3 * (size_t)b + k] - m->start[3 * (size_t)a + k]);
+    return vec3_norm(more) <= SLIP * m->length;
+}
+
+/* Whether colliders carry both nodes by one translation, or neither. */
+static bool ride_alike(const drape_model *m, int32_t a, int32_t b)
+{
+    const int32_t of_a = m->ride ? m->ride[a].collider : -1, of_b = m->ride ? m->ride[b].collider : -1;
+    return of_a == of_b && (of_a < 0 || (m->colliders[of_a].turns.key_count == 0 &&
+                                         m->colliders[of_a].frames.frame_count == 0));
+}
+
+/* Whether pins move both nodes alike: at the keys and, of a turn, also between two of them. */
+static bool move_alike(const drape_model *m, const int32_t *track_of, int32_t a, int32_t b)
+{
+    bool alike = ride_alike(m, a, b);
+    for (int end = 0; alike && end < 2; end++) {
+        const int32_t number = track_of[end ? b : a];
+        const drape_track *track = number >= 0 ? &m->tracks[number] : NULL;
+        for (size_t k = 0; alike && track && k < track->key_count; k++)
+            alike = keep_period(m, track_of, a, b, track->keys[k].time);
+        for (size_t k = 0; alike && track && k < track->turns.key_count; k++) {
+            const drape_turn *key = &track->turns.keys[k];
+            const double next = k + 1 < track->turns.key_count ? key[1].time : key->time;
+            alike = keep_period(m, track_of, a, b, key->time) &&
+                    keep_period(m, track_of, a, b, key->time + WITHIN * (next - key->time));
+        }
+    }
+    return alike;
+}
+
+static drape_status check_motions(const drape_model *m)
+{
+    int32_t *track_of = drape_alloc(m->ctx, (size_t)m->node_count, sizeof *track_of);
+    drape_status status = track_of ? DRAPE_OK : DRAPE_E_MEMORY;
+    for (int32_t i = 0; track_of && i < m->node_count; i++)
+        track_of[i] = -1;
+    for (int32_t i = 0; track_of && i < m->moved_count; i++)
+        track_of[m->moved_node[i]] = m->moved_track[i];
+    for (int32_t s = 0; !status && s < m->image_set_count; s++)
+        for (int32_t k = m->image_start[s] + 1; !status && k < m->image_start[s + 1]; k++) {
+            const int32_t a = m->image[m->image_start[s]], b = m->image[k];
+            if (m->pinned[a] && !move_alike(m, track_of, a, b))
+                status = refuse_nodes(m, a, b, "pins move them differently");
+        }
+    drape_free(m->ctx, track_of);
+    return status;
+}
+
+static drape_status check_clamps(const drape_model *m)
+{
+    for (int32_t c = 0; c < m->cloth_count; c++) {
+        const drape_cloth *cloth = &m->cloths[c];
+        for (int32_t e = 0; cloth->edge_image && e < cloth->mesh.edge_count; e++) {
+            const int32_t image = cloth->edge_image[e];
+            if (image > e && (cloth->edge_clamped[e] != cloth->edge_clamped[image] ||
+                              (cloth->edge_turn && cloth->edge_turn[e] != cloth->edge_turn[image])))
+                return refuse_nodes(m, cloth->first_node + cloth->mesh.edge[2 * (size_t)e],
+                                    cloth->first_node + cloth->mesh.edge[2 * (size_t)image],
+                                    "pins clamp the edges there differently");
+        }
+    }
+    return DRAPE_OK;
+}
+
 static bool in_one_cell(const drape_mesh *mesh, int32_t a, int32_t b)
 {
     return mesh->rows > 0 && abs(a / mesh->columns - b / mesh->columns) <= 1 &&
@@ -613,6 +720,10 @@ drape_status drape_compile_images(drape_model *m, const drape_scene_def *def)
     drape_status status = drape_compile_pinned_images(m);
     if (!status)
         status = check_supports(m);
+    if (!status)
+        status = check_motions(m);
+    if (!status)
+        status = check_clamps(m);
     if (!status)
         status = check_contact(m);
     if (!status)

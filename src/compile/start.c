@@ -104,6 +104,7 @@ static drape_status fold(drape_model *model, const char *pointer, const drape_fo
         return status;
     const double *d = frame[1], *n = frame[2], sign = def->angle < 0 ? -1 : 1;
     const double rolled = def->radius * fabs(def->angle) * RADIANS; /* arc length */
+    bool beyond = false;
     drape_rotation_matrix((const double[]){0, 0, 1, def->angle}, matrix);
     for (int32_t i = 0; i < node_count; i++) {
         double *at = x + 3 * (size_t)i, from[3];
@@ -113,11 +114,17 @@ static drape_status fold(drape_model *model, const char *pointer, const drape_fo
         double sine = matrix[1][0], cosine = matrix[0][0];
         if (!(s > 0))
             continue;
+        beyond = true;
         if (s < rolled)
             drape_sin_cos(sign * s / def->radius, &sine, &cosine);
         vec3_add_scaled(further * cosine - above * sine - s, d, at);
         vec3_add_scaled(sign * def->radius + further * sine + above * cosine - z, n, at);
     }
+    if (!beyond)
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
+                             "no node of the cloth lies beyond the line, on the side (%g %g %g): nothing is "
+                             "folded",
+                             def->side[0], def->side[1], def->side[2]);
     return DRAPE_OK;
 }
 

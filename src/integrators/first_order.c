@@ -392,6 +392,8 @@ static drape_status prepare(drape_first_order *s, const drape_state *in, double 
     s->span[1] = stop;
     *t = h < end - in->t ? fmin(stop, in->t + h) : stop;
     if (s->n == 0) {
+        const double most = s->values[DRAPE_FIRST_ORDER_MAX_STEP];
+        *t = fmin(*t, in->t + (isnan(most) ? s->model->duration / DRAPE_STEPS_WITHOUT_UNKNOWNS : most));
         place_pins(s, in->t);
         measure_powers(s, in->t, s->powers);
         return DRAPE_OK;

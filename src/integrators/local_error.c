@@ -39,7 +39,7 @@ void drape_local_error_init(const drape_system *system, const double *values, in
     drape_derive_tolerances(m, values[DRAPE_LOCAL_ERROR_RTOL], &c->atol_x, &c->atol_v);
     drape_derive_tolerances(m, 1, &c->size, &c->speed);
     if (isnan(c->max_step))
-        c->max_step = INFINITY;
+        c->max_step = m->free_count > 0 ? INFINITY : m->duration / DRAPE_STEPS_WITHOUT_UNKNOWNS;
     drape_local_error_restart(c);
 }
 

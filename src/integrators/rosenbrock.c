@@ -352,21 +352,24 @@ static void add_dissipated(rosenbrock_state *s, const drape_state *in, const dra
     drape_implicit_audit_dissipation(&s->common, middle, out->x, in->t + h / 2, h / 2, info);
 }
 
-/* Adds the work of pins and colliders. */
+/* Adds the work of pins and colliders; where all nodes are pinned there are no stages, and it is that of the
+ * midpoint rule. */
 static drape_status add_moved(rosenbrock_state *s, const drape_state *in, double h, drape_step_info *info)
 {
     const drape_rosenbrock_scheme *scheme = &drape_rosenbrock_rodas;
-    double weights[DRAPE_ROSENBROCK_STAGES], ahead = 0;
+    const bool alone = s->common.equation.dofs == 0;
+    double weights[DRAPE_ROSENBROCK_STAGES] = {0}, ahead = alone ? h / 2 : 0;
     if (!drape_system_is_driven(s->common.equation.system))
         return DRAPE_OK;
-    for (int i = 0; i < scheme->stages; i++) {
+    for (int i = 0; i < scheme->stages && !alone; i++) {
         weights[i] = ALONG * scheme->b[i];
         ahead += weights[i] * scheme->gammas[i] * h;
     }
-    move_to(s, in, weights, s->common.equation.dofs > 0 ? scheme->stages : 0, in->t + ahead);
+    move_to(s, in, weights, alone ? 0 : scheme->stages, in->t + ahead);
     const drape_status status = evaluate(s, in->t + ahead, s->common.equation.g, info);
     if (!status)
-        info->pin_work += h * (s->power + (power(s, s->common.equation.g) - s->start_power) / ALONG);
+        info->pin_work += h * (alone ? power(s, s->common.equation.g)
+                                     : s->power + (power(s, s->common.equation.g) - s->start_power) / ALONG);
     return status;
 }
 
@@ -408,7 +411,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_status status = evaluate_start(s, in, attempt.stop, info);
     if (!status)
         status = drape_local_error_begin(&s->control, in, s->g0, &attempt, info);
-    s->power = e->dofs > 0 ? 0 : s->start_power; /* the sum of all b_i is 1 */
+    s->power = 0;
     if (!status && e->dofs > 0)
         status = solve(s, in, attempt.h, info);
     if (status)

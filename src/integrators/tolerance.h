@@ -21,6 +21,10 @@
                  DRAPE_DERIVED("rtol sqrt(g L), or rtol L/s without gravity, L the diagonal"),               \
                  DRAPE_ABOVE(0), 1e9, "local error of velocities")
 
+/* Where all nodes are pinned no error bounds a step, whose work by pins and colliders is yet a sum over
+ * steps: the least number of steps in the duration of the scene. */
+#define DRAPE_STEPS_WITHOUT_UNKNOWNS 200
+
 /* Replaces NaN by the derived value that the parameters describe. */
 void drape_derive_tolerances(const drape_model *model, double rtol, double *atol_x, double *atol_v);
 

@@ -70,6 +70,59 @@ static bool has_unused_curve(drape_sim *sim, char *text, size_t size)
     return false;
 }
 
+static bool takes_clamps(const drape_model *m, int32_t cloth)
+{
+    bool takes = false;
+    for (int32_t i = 0; i < m->term_count; i++)
+        takes = takes || (m->terms[i].cloth == cloth && m->terms[i].ops->takes_clamps);
+    return takes;
+}
+
+static bool clamps_edges(const drape_cloth *cloth)
+{
+    bool clamps = false;
+    for (int32_t e = 0; cloth->edge_clamped && e < cloth->mesh.edge_count; e++)
+        clamps = clamps || cloth->edge_clamped[e];
+    return clamps;
+}
+
+/* Clamps that keep no direction. */
+static bool has_unused_clamp(drape_sim *sim, char *text, size_t size)
+{
+    const drape_model *m = sim->model;
+    for (int32_t p = 0; p < m->pin_count; p++) {
+        const drape_pin *pin = &m->pins[p];
+        const drape_cloth *cloth = &m->cloths[pin->cloth];
+        const bool read = takes_clamps(m, pin->cloth);
+        if (!pin->clamps || (read && clamps_edges(cloth)))
+            continue;
+        snprintf(text, size,
+                 read ? "the pins \"%.60s\" of %s clamp no edge: both nodes of an edge must be pinned"
+                      : "the pins \"%.60s\" of %s clamp its edges, and none of its terms reads that; "
+                        "bend.midedge does",
+                 pin->name, cloth->name);
+        return true;
+    }
+    return false;
+}
+
+/* Histories that change nothing. */
+static bool has_unused_history(drape_sim *sim, char *text, size_t size)
+{
+    const drape_model *m = sim->model;
+    for (int32_t h = 0; h < m->history_count; h++) {
+        bool used = false;
+        for (int32_t i = 0; i < m->term_count; i++)
+            used = used || m->terms[i].history == &m->histories[h];
+        if (used)
+            continue;
+        snprintf(text, size, "/histories/%d: \"%.60s\" is the history of no load, and changes nothing",
+                 (int)h, m->histories[h].name);
+        return true;
+    }
+    return false;
+}
+
 /* Not where integrator or controller choose their own steps, or substeps. */
 static bool has_few_steps(drape_sim *sim, char *text, size_t size)
 {
@@ -366,6 +419,8 @@ static const struct {
     bool (*applies)(drape_sim *sim, char *text, size_t size);
 } checks[] = {{"no_terms", has_no_terms},
               {"unused_curve", has_unused_curve},
+              {"unused_clamp", has_unused_clamp},
+              {"unused_history", has_unused_history},
               {"few_steps", has_few_steps},
               {"large_mesh", has_large_file},
               {"starts_inside", starts_inside},

@@ -1,6 +1,8 @@
 /* load.c: see load.h. */
 #include "terms/load.h"
 
+#include "terms/terms.h"
+
 #include <math.h>
 
 enum { ALL, TOP, BOTTOM, LEFT, RIGHT };
@@ -33,7 +35,7 @@ bool drape_load_takes(const drape_cloth_view *cloth, const double *values, int32
 {
     const int side = (int)values[DRAPE_LOAD_EDGE];
     const int32_t *end = cloth->edge + 2 * (size_t)e;
-    if (cloth->edge_triangle[2 * (size_t)e + 1] >= 0)
+    if (!drape_on_boundary(cloth, e))
         return false;
     for (int k = 0; k < 2; k++)
         if ((side != ALL && !on_side(cloth, side, end[k])) ||
@@ -55,7 +57,10 @@ drape_status drape_load_count(const drape_cloth_view *cloth, const double *value
     for (int32_t e = 0; e < cloth->edge_count; e++)
         *count += drape_load_takes(cloth, values, e);
     if (*count == 0)
-        return drape_term_refuse(builder, "no edge of the boundary of the mesh lies in the box");
+        return drape_term_refuse(
+            builder, cloth->edge_image
+                         ? "no edge of the boundary of the mesh lies in the box; periodic edges are none"
+                         : "no edge of the boundary of the mesh lies in the box");
     return DRAPE_OK;
 }
 

@@ -62,10 +62,8 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     drape_status status = drape_term_reserve(builder, cloth->triangle_count, REST_COUNT);
     for (int32_t i = 0; !status && i < cloth->triangle_count; i++) {
         int edges = 0;
-        for (int k = 0; values[PARAM_WAKE] != 0 && k < 3; k++) {
-            const int32_t edge = cloth->triangle_edge[3 * (size_t)i + (size_t)k];
-            edges |= (cloth->edge_triangle[2 * (size_t)edge + 1] < 0) << k;
-        }
+        for (int k = 0; values[PARAM_WAKE] != 0 && k < 3; k++)
+            edges |= drape_on_boundary(cloth, cloth->triangle_edge[3 * (size_t)i + (size_t)k]) << k;
         drape_term_set(builder, i, cloth->triangle + 3 * (size_t)i,
                        (const double[REST_COUNT]){mass, wind[0], wind[1], wind[2], edges});
     }

@@ -557,4 +557,5 @@ const drape_term_ops drape_term_bend_midedge = {
     .initial = initial,
     .check = check,
     .periodic = true,
+    .takes_clamps = true,
 };

@@ -12,7 +12,10 @@
 #include "terms/load.h"
 #include "terms/terms.h"
 
+#include <math.h>
 #include <string.h>
+
+#define CLOSED 1e-3 /* of the length of an edge: how far the edges of a closed tube may be apart */
 
 enum { LIST_PRESSURE, LIST_POINT, LIST_HISTORY, LIST_RAMP, LIST_COUNT };
 enum { PARAM_PRESSURE, PARAM_POINT };
@@ -27,10 +30,32 @@ static const drape_param params[LIST_COUNT] = {
     [LIST_RAMP] = DRAPE_LOAD_RAMP,
 };
 
+/* Whether the cells of a cloth lie side by side: a periodic edge is not where its image starts, as it is in a
+ * closed tube. The cones over both then do not cancel. */
+static bool is_repeated(const drape_cloth_view *cloth)
+{
+    for (int32_t e = 0; cloth->edge_image && e < cloth->edge_count; e++) {
+        double nearest = HUGE_VAL;
+        for (int k = 0; cloth->edge_image[e] >= 0 && k < 2; k++) {
+            double apart[3];
+            vec3_sub(cloth->start + 3 * (size_t)cloth->edge[2 * (size_t)cloth->edge_image[e] + (size_t)k],
+                     cloth->start + 3 * (size_t)cloth->edge[2 * (size_t)e], apart);
+            nearest = fmin(nearest, vec3_norm(apart));
+        }
+        if (cloth->edge_image[e] >= 0 && nearest > CLOSED * cloth->edge_length[e])
+            return true;
+    }
+    return false;
+}
+
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     drape_status status = drape_load_check_faces(cloth, builder);
     (void)values;
+    if (!status && is_repeated(cloth))
+        status =
+            drape_term_refuse(builder, "its volume ends at periodic edges that are apart, where its forces "
+                                       "would be wrong: \"load.follower\" has the right ones");
     if (!status)
         status = drape_term_reserve(builder, cloth->triangle_count, 0);
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++)

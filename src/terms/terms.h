@@ -17,6 +17,13 @@ static inline double drape_rest_of(const drape_elements *el, int item, int32_t e
     return el->rest[(size_t)item * (size_t)el->count + (size_t)element];
 }
 
+/* Whether an edge is on the boundary of the cloth. A periodic edge is not: the sheet goes on beyond it. */
+static inline bool drape_on_boundary(const drape_cloth_view *cloth, int32_t edge)
+{
+    return cloth->edge_triangle[2 * (size_t)edge + 1] < 0 &&
+           !(cloth->edge_image && cloth->edge_image[edge] >= 0);
+}
+
 /* Length of an element of two nodes [m]. */
 static inline double drape_pair_length(const drape_elements *el, int32_t element, const double *x)
 {

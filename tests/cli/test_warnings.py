@@ -61,6 +61,30 @@ def test_unused_curve():
     equal(found(["stretch.cst"], fabric="wang2011_denim"), None, "of a fabric")
 
 
+def test_unused_clamp():
+    """clamps that no term reads, or that have no edge, have a warning; those of bend.midedge have none"""
+    def found(terms, pin):
+        whole = scene(**FINE)
+        write_scene(**FINE, cloth=[{**whole["cloth"][0], "mesh": {"grid": "square", "columns": 5, "rows": 3, "width": 0.4, "height": 0.2}, "terms": terms, "pins": [{**pin, "clamp": True}]}])
+        return warnings("scene.json").get("unused_clamp")
+    says = 'the pins "pin0" of sheet clamp '
+    equal(found(["stretch.cst", "bend.hinge"], {"edge": "left"}), says + "its edges, and none of its terms reads that; bend.midedge does", "hinges")
+    equal(found(["stretch.cst", "bend.midedge"], {"corner": "top-left"}), says + "no edge: both nodes of an edge must be pinned", "a corner")
+    equal(found(["stretch.cst", "bend.midedge"], {"edge": "left"}), None, "used")
+
+
+def test_unused_history():
+    """a history of no load has a warning, also if it is that of a gravity of 0; one of gravity has none"""
+    histories = [{"name": "course", "times": [0, 1], "values": [1, 2]}]
+    says = '/histories/0: "course" is the history of no load, and changes nothing'
+    write_scene(**FINE, histories=histories)
+    equal(warnings("scene.json").get("unused_history"), says, "of none")
+    write_scene(**FINE, histories=histories, gravity_history="course")
+    equal(warnings("scene.json").get("unused_history"), None, "of gravity")
+    write_scene(**FINE, histories=histories, gravity_history="course", gravity=[0, 0, 0])
+    equal(warnings("scene.json").get("unused_history"), says, "of no gravity")
+
+
 def test_energy_gained():
     """energy out of nothing has a warning, which another integrator does without"""
     path = SOURCES + "/examples/scenes/box_edge.json"

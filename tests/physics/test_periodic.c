@@ -326,6 +326,66 @@ START_TEST(sheets_repeat_in_two_directions)
 }
 END_TEST
 
+/* Loads on an endless sheet between two lines are as everywhere at its periodic edges: they are no boundary
+ * along which lines of force act, or that wind leaves. All columns are alike, to what a residual of 1e-12 N
+ * leaves over the stiffness of some N/m. Without the load the sheet would be flat. */
+START_TEST(loads_are_alike_everywhere)
+{
+    static const struct {
+        const char *load;
+        double least; /* [m] deflection of the middle */
+    } loads[] = {{"{'type': 'load.follower', 'pressure': 1}", 0.001},
+                 {"{'type': 'load.line', 'force': [0, 0.1, 0]}", 0},
+                 {"{'type': 'load.line', 'edge': 'bottom', 'force': [0, 0.1, 0]}, {'type': 'load.moment', "
+                  "'moment': 1e-3}",
+                  1e-5},
+                 {"{'type': 'drag.wind', 'wind': [3, 0.5, 0], 'friction': 0.01}", 0.001},
+                 {"{'type': 'air.added_mass', 'span': 0.3, 'wind': [2, 0.5, 0]}", 0}};
+    for (size_t i = 0; i < sizeof loads / sizeof *loads; i++) {
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'diagonals': "
+            "'parallel', 'width': 0.2, 'height': 0.2}, 'material': {'young_modulus': 1e5, 'thickness': "
+            "2e-3, 'areal_density': 0.2}, 'terms': ['stretch.cst', 'bend.midedge', %s], 'pins': [{'edge': "
+            "'top'}, {'edge': 'bottom'}], 'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': "
+            "'right'}}]}], 'gravity': [0, 0, 0], 'integrator': {'method': 'static', 'tolerance': 1e-12}, "
+            "'duration': 1}",
+            loads[i].load);
+        scene_advance(&s, 1);
+        const double *x = scene_state(&s)->x;
+        printf("# %s: %g m\n", loads[i].load, x[3 * 12 + 1]);
+        ck_assert_double_ge(fabs(x[3 * 12 + 1]), loads[i].least);
+        for (int n = 0; n < 25; n++)
+            for (int k = 0; k < 3; k++)
+                ck_assert_double_eq_tol(x[3 * n + k] - x[3 * (n - n % 5) + k], k == 0 ? 0.05 * (n % 5) : 0,
+                                        1e-10);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* In a closed tube the volume of load.pressure is closed as well: its forces are those of load.follower. */
+START_TEST(pressure_closes_in_a_tube)
+{
+    double x[2][3 * 36];
+    for (int k = 0; k < 2; k++) {
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 4, 'width': 0.4, "
+            "'height': 0.15}, 'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'areal_density': 0.2}, "
+            "'start': {'folds': [{'point': [0, 0, 0], 'axis': [0, 0, 1], 'side': [1, 0, 0], 'angle': 360, "
+            "'radius': %.17g}]}, 'terms': ['stretch.cst', 'bend.hinge', {'type': '%s', 'pressure': -100}], "
+            "'pins': [{'edge': 'top'}, {'edge': 'bottom'}], 'periodic': [{'from': {'edge': 'left'}, 'to': "
+            "{'edge': 'right'}}]}], 'gravity': [0, 0, 0], 'integrator': {'method': 'static', 'tolerance': "
+            "1e-11}, 'duration': 1}",
+            0.4 / (2 * acos(-1)), k ? "load.pressure" : "load.follower");
+        scene_advance(&s, 1);
+        memcpy(x[k], scene_state(&s)->x, sizeof x[k]);
+        scene_close(&s);
+    }
+    for (int i = 0; i < 3 * 36; i++)
+        ck_assert_double_eq_tol(x[0][i], x[1][i], 1e-10);
+}
+END_TEST
+
 START_TEST(the_jacobian_is_that_of_the_shared_forces)
 {
     scene s =
@@ -458,6 +518,28 @@ static const struct refusal {
      "{'edge': "
      "'right'}}]",
      "pins hold them along different directions"},
+    {"'columns': 4, 'rows': 3", "", "'periodic': [{'from': {'nodes': [1, 5, 9]}, 'to': {'edge': 'right'}}]",
+     "node 5 is inside the mesh: periodic edges are of its boundary"},
+    {"'columns': 4, 'rows': 3", "",
+     "'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right'}, 'period': [0, 0, 0]}]",
+     "the period 0 0 0 would leave the cloth no width"},
+    {"'columns': 4, 'rows': 3", ", {'type': 'load.pressure', 'pressure': 1}",
+     "'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right'}}]",
+     "\"load.follower\" has the right ones"},
+    {"'columns': 4, 'rows': 3", ", {'type': 'load.line', 'edge': 'left', 'force': [0, 1, 0]}",
+     "'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right'}}]", "periodic edges are none"},
+    {"'columns': 4, 'rows': 3", "",
+     "'pins': [{'edge': 'left', 'track': [[0, [0, 0, 0]], [1, [0.1, 0, 0]]]}, {'edge': 'right'}], "
+     "'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right'}}]",
+     "nodes 0 and 3 of periodic edges are the same node, but pins move them differently"},
+    {"'columns': 4, 'rows': 3", "",
+     "'pins': [{'edge': 'top', 'turns': [{'time': 0, 'rotate': [0, 1, 0, 0]}, {'time': 1, 'rotate': [0, 1, "
+     "0, 720]}]}], 'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right'}}]",
+     "pins move them differently"},
+    {"'columns': 4, 'rows': 3", "",
+     "'pins': [{'edge': 'left', 'clamp': true}, {'edge': 'right'}], "
+     "'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right'}}]",
+     "pins clamp the edges there differently"},
     {"'columns': 4, 'rows': 3", "",
      "'periodic': [{'from': {'edge': 'left'}, 'to': {'edge': 'right', 'row': 1}}]",
      "exactly one of nodes, corner, edge, row, box"},
@@ -488,7 +570,7 @@ END_TEST
 
 SUITE("periodic", a_stretched_sheet_has_even_tension, one_cell_moves_as_each_of_three,
       one_cell_bends_as_each_of_three, a_seam_bends_as_the_rest, a_closed_tube_is_bent_evenly,
-      cells_touch_a_plane_alike, an_endless_sheet_hangs_alike_everywhere, sheets_repeat_in_two_directions,
-      the_jacobian_is_that_of_the_shared_forces, derivatives_across_edges_are_exact,
-      periodic_edges_do_no_work, checkpoints_keep_the_period, hosts_keep_the_period,
-      what_does_not_repeat_is_refused)
+      cells_touch_a_plane_alike, an_endless_sheet_hangs_alike_everywhere, loads_are_alike_everywhere,
+      pressure_closes_in_a_tube, sheets_repeat_in_two_directions, the_jacobian_is_that_of_the_shared_forces,
+      derivatives_across_edges_are_exact, periodic_edges_do_no_work, checkpoints_keep_the_period,
+      hosts_keep_the_period, what_does_not_repeat_is_refused)
