@@ -13,12 +13,15 @@
 #ifndef DRAPE_BASE_RANKS_H
 #define DRAPE_BASE_RANKS_H
 
+#include "drape/drape.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 
 typedef struct drape_ranks drape_ranks;
 struct drape_linear_ops;
+struct drape_pattern;
 
 struct drape_ranks {
     int rank, count;
@@ -43,6 +46,9 @@ struct drape_ranks {
                    const uint8_t *counted, const int32_t *number, double *all);
     /* bytes (size) become those of a rank. */
     void (*broadcast)(const drape_ranks *ranks, int from, void *bytes, int size);
+    /* As drape_inertia (solvers/inertia.h), of a matrix that the ranks share. */
+    drape_status (*inertia)(drape_context *ctx, const struct drape_pattern *pattern, const double *values,
+                            int64_t *negative, bool *known);
     /* A vector of SUNDIALS over all ranks (N_Vector) with these n values here; NULL: out of memory. sun: a
      * SUNContext. */
     void *(*vector)(const drape_ranks *ranks, int64_t n, double *values, void *sun);

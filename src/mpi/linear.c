@@ -29,6 +29,7 @@ typedef struct mpi_linear {
     Vec b, x; /* without values of their own */
     KSP direct, cg;
     MatNullSpace modes;
+    bool counts;              /* the pivots by their signs; it never solves */
     bool symmetric, definite; /* of the last matrix; a definite one was asked for */
     bool by_direct;           /* its solves are by factors */
     bool factored;
@@ -210,6 +211,8 @@ static PetscErrorCode begin_direct(mpi_linear *s)
         code = PCFactorGetMatrix(pc, &factors);
     if (!code)
         code = MatMumpsSetIcntl(factors, 13, 1); /* else the last front counts no negative pivots */
+    if (!code && s->counts)
+        code = MatMumpsSetIcntl(factors, 24, 1); /* counts pivots that are zero, instead of failing */
     return code;
 }
 
@@ -395,6 +398,33 @@ static drape_status solve(void *state, const double *b, double *x)
 {
     int64_t iterations;
     return solve_inexact(state, b, x, EXACT, &iterations);
+}
+
+drape_status drape_mpi_inertia(drape_context *ctx, const drape_pattern *p, const double *values,
+                               int64_t *negative, bool *known)
+{
+    drape_arena arena = drape_arena_of(ctx);
+    void *state = NULL;
+    PC pc;
+    Mat factors;
+    PetscInt below = 0, zero = 0;
+    *negative = 0;
+    *known = false;
+    drape_status status = create_direct(&arena, p, &state);
+    mpi_linear *s = state;
+    if (!status) {
+        s->counts = true;
+        status = factor_any(s, values, false);
+    }
+    if (!status && s->symmetric && !KSPGetPC(s->direct, &pc) && !PCFactorGetMatrix(pc, &factors) &&
+        !MatMumpsGetInfog(factors, 12, &below) && !MatMumpsGetInfog(factors, 28, &zero)) {
+        *negative = below;
+        *known = zero == 0;
+    }
+    if (state)
+        destroy(&state);
+    drape_arena_free(&arena);
+    return status < 0 ? status : DRAPE_OK;
 }
 
 /* The caller makes factors anew from the values. */

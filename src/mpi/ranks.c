@@ -266,6 +266,7 @@ drape_status drape_mpi_ranks_create(drape_context *ctx, MPI_Comm comm, drape_mpi
     r->base.fetch = fetch;
     r->base.fetch_blocks = fetch_blocks;
     r->base.gather = collect;
+    r->base.inertia = drape_mpi_inertia;
     r->base.vector = vector;
     r->base.direct = &drape_linear_mpi_direct;
     r->base.iterative = &drape_linear_mpi_iterative;
