@@ -2,6 +2,7 @@
  * bits, and a run has the same bits each time. */
 #include "mpi/ranks.h"
 
+#include "mpi/file.h"
 #include "mpi/linear.h"
 
 #include <nvector/nvector_parallel.h>
@@ -266,6 +267,7 @@ drape_status drape_mpi_ranks_create(drape_context *ctx, MPI_Comm comm, drape_mpi
     r->base.fetch = fetch;
     r->base.fetch_blocks = fetch_blocks;
     r->base.gather = collect;
+    r->base.write = drape_mpi_write;
     r->base.inertia = drape_mpi_inertia;
     r->base.vector = vector;
     r->base.direct = &drape_linear_mpi_direct;
