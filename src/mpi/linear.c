@@ -256,7 +256,7 @@ static PetscErrorCode begin_cg(mpi_linear *s)
     if (!code)
         code = KSPSetType(s->cg, KSPCG);
     if (!code)
-        code = KSPSetNormType(s->cg, KSP_NORM_UNPRECONDITIONED);
+        code = KSPSetNormType(s->cg, KSP_NORM_NATURAL); /* as solvers/pcg.h measures a residual */
     if (!code)
         code = KSPGetPC(s->cg, &pc);
     if (!code)
