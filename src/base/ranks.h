@@ -44,9 +44,10 @@ struct drape_ranks {
      * whole model on rank 0, by their numbers there; all: NULL elsewhere. */
     void (*gather)(const drape_ranks *ranks, const double *values, int width, int32_t count,
                    const uint8_t *counted, const int32_t *number, double *all);
-    /* Writes such items side by side into a file that exists and that all ranks reach: an array of the whole
-     * model, little endian, from an offset on that is a multiple of 8. *sum: what it adds to the checksum of the
-     * file (base/checksum.h). durable: it is on the disk then. Returns 0 or an errno, the same on all ranks. */
+    /* Writes such items side by side into a file that exists and that all ranks reach: an array of the
+     * whole model, little endian, from an offset on that is a multiple of 8. *sum: what it adds to the
+     * checksum of the file (base/checksum.h). durable: it is on the disk then. Returns 0 or an errno, the
+     * same on all ranks. */
     int (*write)(const drape_ranks *ranks, const char *path, int64_t offset, bool durable,
                  const double *values, int width, int32_t count, const uint8_t *counted,
                  const int32_t *number, uint64_t *sum);

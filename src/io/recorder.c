@@ -229,8 +229,8 @@ static void write_outputs(drape_recorder *r, const drape_frame *frame)
     }
 }
 
-/* Where ranks share the model, *values (here) become those of the whole on rank 0, in one of its arrays, unless
- * no format needs them there. */
+/* Where ranks share the model, *values (here) become those of the whole on rank 0, in one of its arrays,
+ * unless no format needs them there. */
 static void gather(drape_recorder *r, int array, int width, const double **values)
 {
     double *all = r->gathered ? r->gathered + 3 * (size_t)array * (size_t)r->model->node_count : NULL;

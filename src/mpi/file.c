@@ -1,6 +1,6 @@
 /*
- * file.c: see file.h. By MPI-IO: the view of the file that each rank has is the places of its items, so that one
- * collective call writes all of them, and the library merges them into large requests.
+ * file.c: see file.h. By MPI-IO: the view of the file that each rank has is the places of its items, so
+ * that one collective call writes all of them, and the library merges them into large requests.
  */
 #include "mpi/file.h"
 

@@ -1,11 +1,12 @@
 /*
- * linear.c: see linear.h. The rows of a rank's own nodes are complete in its values, and go into a matrix of
- * PETSc of block size 3.
+ * linear.c: see linear.h. The rows of a rank's own nodes are complete in its values, and go into a matrix
+ * of PETSc of block size 3.
  *
  * Direct: MUMPS, LDL' of a symmetric matrix, whose inertia says whether it is definite, else LU.
- * Iterative: conjugate gradients preconditioned by algebraic multigrid (GAMG: smoothed aggregation) with the
- * rigid motions of the nodes as near null space. A matrix that is not symmetric, that the iteration finds
- * indefinite, or that takes more than MAX_ITERATIONS goes to MUMPS, unless the caller asked for a definite one.
+ * Iterative: conjugate gradients preconditioned by algebraic multigrid (GAMG: smoothed aggregation) with
+ * the rigid motions of the nodes as near null space. A matrix that is not symmetric, that the iteration
+ * finds indefinite, or that takes more than MAX_ITERATIONS goes to MUMPS, unless the caller asked for a
+ * definite one.
  */
 #include "mpi/linear.h"
 
@@ -40,7 +41,8 @@ typedef struct mpi_linear {
 
 /* ---- The matrix ---- */
 
-/* The mirrored entries of blocks of which a row or column is of this rank, both of which are complete here. */
+/* The mirrored entries of blocks of which a row or column is of this rank, both of which are complete
+ * here. */
 static bool is_symmetric_here(const drape_pattern *p, double *values)
 {
     for (int32_t j = 0; j < p->ranks->own_blocks; j++)
