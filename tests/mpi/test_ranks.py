@@ -12,9 +12,9 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)) + "/../cli")
 # pylint: disable=wrong-import-position
 from program import LIMIT, PROGRAM, SOURCES, claim, equal, good, read_json, read_npy, run_tests, write_scene
 
-# Open MPI: as root in a container, more ranks than cores, which yield while they wait, and no shell on other hosts.
+# Open MPI: as root in a container, more ranks than cores, which yield while they wait; no shell on other hosts, no network.
 ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1",
-                   OMPI_MCA_hwloc_base_binding_policy="none", OMPI_MCA_mpi_yield_when_idle="1", OMPI_MCA_plm="isolated",
+                   OMPI_MCA_hwloc_base_binding_policy="none", OMPI_MCA_mpi_yield_when_idle="1", OMPI_MCA_plm="isolated", OMPI_MCA_pml="ob1", OMPI_MCA_btl="self,vader",
                    OMPI_MCA_btl_vader_single_copy_mechanism="none", OMP_NUM_THREADS="1")
 SIDE, H, TOLERANCE = 0.4, 0.01, 1e-9  # [m], [s], [N]
 COLUMNS, DENSITY = 9, 0.2
