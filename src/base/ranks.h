@@ -13,12 +13,15 @@
 #ifndef DRAPE_BASE_RANKS_H
 #define DRAPE_BASE_RANKS_H
 
+#include "drape/drape.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 
 typedef struct drape_ranks drape_ranks;
 struct drape_linear_ops;
+struct drape_pattern;
 
 struct drape_ranks {
     int rank, count;
@@ -41,8 +44,18 @@ struct drape_ranks {
      * whole model on rank 0, by their numbers there; all: NULL elsewhere. */
     void (*gather)(const drape_ranks *ranks, const double *values, int width, int32_t count,
                    const uint8_t *counted, const int32_t *number, double *all);
+    /* Writes such items side by side into a file that exists and that all ranks reach: an array of the
+     * whole model, little endian, from an offset on that is a multiple of 8. *sum: what it adds to the
+     * checksum of the file (base/checksum.h). durable: it is on the disk then. Returns 0 or an errno, the
+     * same on all ranks. */
+    int (*write)(const drape_ranks *ranks, const char *path, int64_t offset, bool durable,
+                 const double *values, int width, int32_t count, const uint8_t *counted,
+                 const int32_t *number, uint64_t *sum);
     /* bytes (size) become those of a rank. */
     void (*broadcast)(const drape_ranks *ranks, int from, void *bytes, int size);
+    /* As drape_inertia (solvers/inertia.h), of a matrix that the ranks share. */
+    drape_status (*inertia)(drape_context *ctx, const struct drape_pattern *pattern, const double *values,
+                            int64_t *negative, bool *known);
     /* A vector of SUNDIALS over all ranks (N_Vector) with these n values here; NULL: out of memory. sun: a
      * SUNContext. */
     void *(*vector)(const drape_ranks *ranks, int64_t n, double *values, void *sun);

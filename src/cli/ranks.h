@@ -13,12 +13,12 @@ int cli_ranks_end(int code);
 
 int cli_ranks_count(void);
 
-/* CLI_GO_ON if that is the code of all ranks, else the code of the lowest with another one; it prints the message
- * of its context if that is not rank 0, which has printed it. Collective. */
+/* CLI_GO_ON if that is the code of all ranks, else the code of the lowest with another one; it prints the
+ * message of its context if that is not rank 0, which has printed it. Collective. */
 int cli_ranks_agree(const cli_command *command, int code);
 
-/* Replaces the compiled model of a scene by the part of this rank. status: whether the scene was compiled here.
- * Collective. Returns the status of all ranks. */
+/* Replaces the compiled model of a scene by the part of this rank. status: whether the scene was compiled
+ * here. Collective. Returns the status of all ranks. */
 drape_status cli_ranks_share(drape_status status, cli_scene *scene);
 
 #endif

@@ -160,8 +160,8 @@ drape_status drape_contact_continue(drape_contact *contact, const drape_contact 
 /* Archives the beginning of the step, from which everything else follows, and the couplings. */
 void drape_contact_archive(drape_contact *contact, drape_archive *a);
 
-/* The part of it that is the same on all ranks: the stiffness and the activation distances. What was read is of
- * a step that has not begun. */
+/* The part of it that is the same on all ranks: the stiffness and the activation distances. What was read
+ * is of a step that has not begun. */
 void drape_contact_archive_press(drape_contact *contact, drape_archive *a);
 
 /* The largest step fraction from x to y (node_count x 3) on which no two pieces pass through each other,

@@ -195,7 +195,7 @@ static drape_status judge_stability(static_state *s, const drape_state *out)
         return DRAPE_OK;
     drape_status status = drape_newton_matrix(s->common.newton, &point, 0, &pattern, &values);
     s->stability_known = false;
-    if (!status && pattern->n > MAX_INERTIA) {
+    if (!status && e->all_dofs > MAX_INERTIA) {
         drape_log(s->arena->ctx, DRAPE_LOG_INFO,
                   "static: whether the equilibrium is stable is not determined above %d unknowns",
                   MAX_INERTIA);
@@ -260,6 +260,7 @@ const drape_integrator_ops drape_integrator_static = {
     .momenta = true,
     .own_steps = true,
     .steady_state = true,
+    .by_ranks = true,
     .step = step,
     .restart = drape_implicit_restart,
     .tolerance = drape_implicit_tolerance,

@@ -51,8 +51,8 @@ typedef struct drape_sun_newton {
     void *user;
 } drape_sun_newton;
 
-/* Creates newton->solver. like: any vector of the unknowns (x, v), of which n are here; ranks: that share them.
- * False: out of memory. */
+/* Creates newton->solver. like: any vector of the unknowns (x, v), of which n are here; ranks: that share
+ * them. False: out of memory. */
 bool drape_sun_newton_create(drape_sun_newton *newton, N_Vector like, int64_t n, const drape_ranks *ranks,
                              SUNContext sun);
 

@@ -94,6 +94,28 @@ static drape_status npy_write(drape_context *ctx, void *state, const drape_frame
     return status;
 }
 
+static drape_file *npy_shared(void *state)
+{
+    return &((npy_state *)state)->array[0].file;
+}
+
+static drape_status npy_settle(void *state, bool written, uint64_t sum)
+{
+    npy_state *npy = state;
+    npy_array *a = &npy->array[0];
+    const off_t before = a->file.kept;
+    drape_status status = DRAPE_OK;
+    if (written)
+        status = drape_file_accept(&a->file, (off_t)(3 * sizeof(double)) * a->count, sum);
+    if (written && !status)
+        status = write_count(a, npy->frames + 1);
+    if (status || !written)
+        drape_file_cut(&a->file, before);
+    else
+        npy->frames++;
+    return status;
+}
+
 static void npy_archive(void *state, drape_archive *a)
 {
     npy_state *npy = state;
@@ -165,6 +187,8 @@ const drape_exporter_ops drape_exporter_npy = {
     .open = npy_open,
     .names = npy_names,
     .write = npy_write,
+    .shared = npy_shared,
+    .settle = npy_settle,
     .archive = npy_archive,
     .resume = npy_resume,
     .cut = npy_cut,

@@ -362,6 +362,18 @@ drape_status drape_file_keep(drape_file *file)
     return fail(file, "write", error);
 }
 
+drape_status drape_file_accept(drape_file *file, off_t size, uint64_t sum)
+{
+    const off_t end = file->kept + size;
+    if (lseek(file->fd, end, SEEK_SET) != end)
+        return fail(file, "write", errno);
+    file->sum.sum += sum;
+    file->sum.size += (uint64_t)size;
+    file->size = file->kept = end;
+    file->kept_sum = file->sum;
+    return DRAPE_OK;
+}
+
 /* Accounts for at most PATCHED bytes that are about to be overwritten; 0 or errno. */
 static int patch(drape_file *file, off_t offset, const void *data, size_t size)
 {

@@ -82,6 +82,10 @@ drape_status drape_file_publish(drape_file *file);
  * cut back to its last complete record and stays open. Errors: DRAPE_E_FILE. */
 drape_status drape_file_keep(drape_file *file);
 
+/* Ends a record that other processes have written behind the last one, of a size that is a multiple of 8,
+ * as that of the file must be; sum: what it adds to the checksum. Errors: DRAPE_E_FILE. */
+drape_status drape_file_accept(drape_file *file, off_t size, uint64_t sum);
+
 /* Overwrites bytes that are already kept. Errors: DRAPE_E_FILE. */
 drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size);
 

@@ -1,6 +1,7 @@
 /* recorder.c: see recorder.h. */
 #include "io/recorder.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -19,6 +20,7 @@
 #define SAME_TIME 1e-12
 
 #define MAX_FRAMES INT64_C(1000000000000000)
+#define MAX_PATH   4096
 
 typedef struct output {
     const drape_exporter_ops *ops;
@@ -33,7 +35,8 @@ struct drape_recorder {
     const drape_model *model; /* whole */
     const drape_ranks *ranks; /* that share the model; NULL: none. Rank 0 writes all files */
     bool writes;              /* this process does */
-    double *gathered;         /* (node_count x 3, three times) of the whole model, on rank 0 */
+    double *gathered; /* (node_count x 3, three times if fields are wanted, else once) of the whole model,
+                                 on rank 0; NULL if all formats are written by the ranks together */
     drape_folder *folder;
     const char *const *also; /* of the def, until the recorder is made */
     size_t also_count;
@@ -58,6 +61,7 @@ struct drape_recorder {
     double last_time; /* [s] of the last frame */
     bool moved;       /* a step was accepted after the last frame */
     bool wants_fields;
+    bool gathers; /* ranks share the model, and a format is written by rank 0 */
     bool counted; /* the def says how many frames come */
     bool finished;
     double seconds;
@@ -209,20 +213,28 @@ static drape_frame rotated_frame(const drape_recorder *r, const drape_frame *fra
     return rotated;
 }
 
+/* Whether the ranks write the frames of a format together. */
+static bool is_shared(const drape_recorder *r, const output *o)
+{
+    return r->ranks && o->ops->shared && !r->model->surface.bound;
+}
+
 static void write_outputs(drape_recorder *r, const drape_frame *frame)
 {
     const drape_frame rotated = r->rotated ? rotated_frame(r, frame) : *frame;
     for (size_t i = 0; i < r->output_count && !r->failure; i++) {
         const output *o = &r->outputs[i];
-        note(r, o->ops->write(r->ctx, o->state, o->ops->y_up ? frame : &rotated));
+        if (!is_shared(r, o))
+            note(r, o->ops->write(r->ctx, o->state, o->ops->y_up ? frame : &rotated));
     }
 }
 
-/* Where ranks share the model, *values (here) become those of the whole on rank 0, in one of its arrays. */
+/* Where ranks share the model, *values (here) become those of the whole on rank 0, in one of its arrays,
+ * unless no format needs them there. */
 static void gather(drape_recorder *r, int array, int width, const double **values)
 {
     double *all = r->gathered ? r->gathered + 3 * (size_t)array * (size_t)r->model->node_count : NULL;
-    if (!r->ranks)
+    if (!r->ranks || !r->gathers)
         return;
     const drape_model *m = r->sim->model;
     r->ranks->gather(r->ranks, *values, width, m->node_count, m->part->own, m->part->node, all);
@@ -256,9 +268,49 @@ static void write_all(drape_recorder *r, double time, const double *positions, c
         note(r, drape_energy_write(&r->energies, &row));
 }
 
+/* Where rank 0 wants the nodes of a frame. */
+typedef struct place {
+    bool good, durable;
+    int64_t offset;
+    char path[MAX_PATH];
+} place;
+
+static void find_place(drape_recorder *r, const output *o, place *p)
+{
+    const drape_file *file = o->ops->shared(o->state);
+    const int length = snprintf(p->path, sizeof p->path, "%s/%s", drape_folder_path(r->folder), file->path);
+    p->good = length > 0 && length < MAX_PATH;
+    p->durable = r->def.durable;
+    p->offset = (int64_t)file->kept;
+    if (!p->good)
+        note(r, drape_file_fail(r->ctx, "write", p->path, ENAMETOOLONG));
+}
+
+/* Each rank writes the nodes that it owns. */
+static void write_shared(drape_recorder *r, const output *o, const double *positions)
+{
+    const drape_model *m = r->sim->model;
+    place p = {0};
+    uint64_t sum = 0;
+    if (r->writes && !r->failure)
+        find_place(r, o, &p);
+    r->ranks->broadcast(r->ranks, 0, &p, sizeof p);
+    if (!p.good)
+        return;
+    const int error = r->ranks->write(r->ranks, p.path, p.offset, p.durable, positions, 3, m->node_count,
+                                      m->part->own, m->part->node, &sum);
+    if (error)
+        note(r, drape_file_fail(r->ctx, "write", p.path, error));
+    if (r->writes)
+        note(r, o->ops->settle(o->state, error == 0, sum));
+}
+
 static void write_frame(drape_recorder *r, double time, const double *positions, const double *velocities)
 {
     const drape_energy energy = drape_sim_energy(r->sim);
+    for (size_t i = 0; i < r->output_count; i++)
+        if (is_shared(r, &r->outputs[i]))
+            write_shared(r, &r->outputs[i], positions);
     find_density(r);
     gather(r, 0, 3, &positions);
     if (r->wants_fields)
@@ -482,10 +534,11 @@ static drape_status allocate_arrays(drape_recorder *r)
     for (size_t i = 0; i < r->output_count; i++) {
         fields = fields || r->outputs[i].ops->wants_fields;
         rotates = rotates || (model->z_up && !r->outputs[i].ops->y_up);
+        r->gathers = r->gathers || (r->ranks && !is_shared(r, &r->outputs[i]));
     }
     r->wants_fields = fields;
-    if (r->ranks && r->writes)
-        r->gathered = drape_arena_take(&r->arena, 3 * nodes, 3 * sizeof *r->gathered);
+    if (r->gathers && r->writes)
+        r->gathered = drape_arena_take(&r->arena, nodes, (fields ? 9 : 3) * sizeof *r->gathered);
     if (fields)
         r->fields = drape_arena_take(&r->arena, nodes + 2 * triangles, sizeof *r->fields);
     if (rotates)

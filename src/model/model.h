@@ -355,11 +355,11 @@ typedef struct drape_model_event {
     bool once; /* it is over after the first root */
 } drape_model_event;
 
-/* What a rank has of a model that several share (base/ranks.h). Its nodes, elements and so on are those of the
- * whole model in the same order, without the rest. */
+/* What a rank has of a model that several share (base/ranks.h). Its nodes, elements and so on are those of
+ * the whole model in the same order, without the rest. */
 typedef struct drape_part {
     const drape_ranks *ranks;
-    const drape_model *whole;    /* without its large arrays, except on rank 0 */
+    const drape_model *whole;
     uint8_t *own;                /* (node_count) 1: this rank computes the node; 0: it is a copy */
     int32_t *node;               /* (node_count) its number in the whole model */
     int32_t *cloth;              /* (cloth_count) the first node of each cloth there */

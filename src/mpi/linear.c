@@ -1,11 +1,12 @@
 /*
- * linear.c: see linear.h. The rows of a rank's own nodes are complete in its values, and go into a matrix of
- * PETSc of block size 3.
+ * linear.c: see linear.h. The rows of a rank's own nodes are complete in its values, and go into a matrix
+ * of PETSc of block size 3.
  *
  * Direct: MUMPS, LDL' of a symmetric matrix, whose inertia says whether it is definite, else LU.
- * Iterative: conjugate gradients preconditioned by algebraic multigrid (GAMG: smoothed aggregation) with the
- * rigid motions of the nodes as near null space. A matrix that is not symmetric, that the iteration finds
- * indefinite, or that takes more than MAX_ITERATIONS goes to MUMPS, unless the caller asked for a definite one.
+ * Iterative: conjugate gradients preconditioned by algebraic multigrid (GAMG: smoothed aggregation) with
+ * the rigid motions of the nodes as near null space. A matrix that is not symmetric, that the iteration
+ * finds indefinite, or that takes more than MAX_ITERATIONS goes to MUMPS, unless the caller asked for a
+ * definite one.
  */
 #include "mpi/linear.h"
 
@@ -29,6 +30,7 @@ typedef struct mpi_linear {
     Vec b, x; /* without values of their own */
     KSP direct, cg;
     MatNullSpace modes;
+    bool counts;              /* the pivots by their signs; it never solves */
     bool symmetric, definite; /* of the last matrix; a definite one was asked for */
     bool by_direct;           /* its solves are by factors */
     bool factored;
@@ -39,7 +41,8 @@ typedef struct mpi_linear {
 
 /* ---- The matrix ---- */
 
-/* The mirrored entries of blocks of which a row or column is of this rank, both of which are complete here. */
+/* The mirrored entries of blocks of which a row or column is of this rank, both of which are complete
+ * here. */
 static bool is_symmetric_here(const drape_pattern *p, double *values)
 {
     for (int32_t j = 0; j < p->ranks->own_blocks; j++)
@@ -210,6 +213,8 @@ static PetscErrorCode begin_direct(mpi_linear *s)
         code = PCFactorGetMatrix(pc, &factors);
     if (!code)
         code = MatMumpsSetIcntl(factors, 13, 1); /* else the last front counts no negative pivots */
+    if (!code && s->counts)
+        code = MatMumpsSetIcntl(factors, 24, 1); /* counts pivots that are zero, instead of failing */
     return code;
 }
 
@@ -253,7 +258,7 @@ static PetscErrorCode begin_cg(mpi_linear *s)
     if (!code)
         code = KSPSetType(s->cg, KSPCG);
     if (!code)
-        code = KSPSetNormType(s->cg, KSP_NORM_UNPRECONDITIONED);
+        code = KSPSetNormType(s->cg, KSP_NORM_NATURAL); /* as solvers/pcg.h measures a residual */
     if (!code)
         code = KSPGetPC(s->cg, &pc);
     if (!code)
@@ -395,6 +400,33 @@ static drape_status solve(void *state, const double *b, double *x)
 {
     int64_t iterations;
     return solve_inexact(state, b, x, EXACT, &iterations);
+}
+
+drape_status drape_mpi_inertia(drape_context *ctx, const drape_pattern *p, const double *values,
+                               int64_t *negative, bool *known)
+{
+    drape_arena arena = drape_arena_of(ctx);
+    void *state = NULL;
+    PC pc;
+    Mat factors;
+    PetscInt below = 0, zero = 0;
+    *negative = 0;
+    *known = false;
+    drape_status status = create_direct(&arena, p, &state);
+    mpi_linear *s = state;
+    if (!status) {
+        s->counts = true;
+        status = factor_any(s, values, false);
+    }
+    if (!status && s->symmetric && !KSPGetPC(s->direct, &pc) && !PCFactorGetMatrix(pc, &factors) &&
+        !MatMumpsGetInfog(factors, 12, &below) && !MatMumpsGetInfog(factors, 28, &zero)) {
+        *negative = below;
+        *known = zero == 0;
+    }
+    if (state)
+        destroy(&state);
+    drape_arena_free(&arena);
+    return status < 0 ? status : DRAPE_OK;
 }
 
 /* The caller makes factors anew from the values. */

@@ -9,4 +9,9 @@
 extern const drape_linear_ops drape_linear_mpi_direct;    /* MUMPS */
 extern const drape_linear_ops drape_linear_mpi_iterative; /* conjugate gradients with GAMG */
 
+/* drape_ranks.inertia: the signs of the pivots of MUMPS. *known: also false if the matrix is not
+ * symmetric. */
+drape_status drape_mpi_inertia(drape_context *ctx, const drape_pattern *pattern, const double *values,
+                               int64_t *negative, bool *known);
+
 #endif

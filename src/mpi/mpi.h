@@ -1,6 +1,7 @@
 /*
- * mpi.h: a run on several ranks, as the program drives it. Each rank compiles the scene, keeps its part of the
- * model (part.h), and steps it with the code of one process; base/ranks.h has what that code exchanges.
+ * mpi.h: a run on several ranks, as the program drives it. Each rank compiles the scene, keeps its part of
+ * the model (part.h), and steps it with the code of one process; base/ranks.h has what that code
+ * exchanges.
  */
 #ifndef DRAPE_MPI_MPI_H
 #define DRAPE_MPI_MPI_H
@@ -9,7 +10,8 @@
 
 typedef struct drape_mpi drape_mpi;
 
-/* Whether the environment says that a launcher started this process with others; MPI is not touched if not. */
+/* Whether the environment says that a launcher started this process with others; MPI is not touched if
+ * not. */
 bool drape_mpi_is_launched(void);
 
 /* Starts MPI and PETSc. *out is NULL if there is only one rank. It must be ended before the process is.
@@ -26,8 +28,9 @@ int drape_mpi_count(const drape_mpi *mpi);
 /* The lowest rank for which `here` is true, whose value all get; -1: it is true for none. Collective. */
 int drape_mpi_agree(const drape_mpi *mpi, bool here, int *value);
 
-/* The part of a compiled model of this rank, which lasts no longer than the model and mpi. Collective. Errors:
- * DRAPE_E_ARGUMENT (the model has what a part cannot have, with its place in the scene), DRAPE_E_MEMORY. */
+/* The part of a compiled model of this rank, which lasts no longer than the model and mpi. Collective.
+ * Errors: DRAPE_E_ARGUMENT (the model has what a part cannot have, with its place in the scene),
+ * DRAPE_E_MEMORY. */
 drape_status drape_mpi_share(drape_mpi *mpi, const drape_model *whole, drape_model **part);
 
 #endif

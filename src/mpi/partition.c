@@ -13,7 +13,7 @@ typedef struct graph {
     PetscInt *start, *to; /* of PETSc */
 } graph;
 
-/* Pairs of nodes that share an edge or a seam, each both ways. */
+/* Pairs of nodes that share an edge or a seam, each in both directions. */
 static void visit(const drape_model *m, void (*see)(graph *, int32_t, int32_t), graph *g)
 {
     for (int32_t e = 0; e < m->edge_count; e++)

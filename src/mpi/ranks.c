@@ -1,7 +1,8 @@
-/* ranks.c: see ranks.h. Sums are of gathered numbers in the order of the ranks, so that all ranks have the same
- * bits, and a run has the same bits each time. */
+/* ranks.c: see ranks.h. Sums are of gathered numbers in the order of the ranks, so that all ranks have the
+ * same bits, and a run has the same bits each time. */
 #include "mpi/ranks.h"
 
+#include "mpi/file.h"
 #include "mpi/linear.h"
 
 #include <nvector/nvector_parallel.h>
@@ -98,8 +99,8 @@ static void place(const double *values, size_t width, int32_t count, const int32
         memcpy(all + width * (size_t)number[i], values + width * i, width * sizeof *all);
 }
 
-/* Sends the next items, at most DRAPE_MPI_PIECE, from *first on; on rank 0 puts them into their places. Returns
- * how many. */
+/* Sends the next items, at most DRAPE_MPI_PIECE, from *first on; on rank 0 puts them into their places.
+ * Returns how many. */
 static int32_t send_piece(drape_mpi_ranks *r, const double *values, size_t width, int32_t *first,
                           int32_t count, const uint8_t *counted, const int32_t *number, double *all)
 {
@@ -266,6 +267,8 @@ drape_status drape_mpi_ranks_create(drape_context *ctx, MPI_Comm comm, drape_mpi
     r->base.fetch = fetch;
     r->base.fetch_blocks = fetch_blocks;
     r->base.gather = collect;
+    r->base.write = drape_mpi_write;
+    r->base.inertia = drape_mpi_inertia;
     r->base.vector = vector;
     r->base.direct = &drape_linear_mpi_direct;
     r->base.iterative = &drape_linear_mpi_iterative;

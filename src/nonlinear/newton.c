@@ -28,11 +28,11 @@
  * J is unsymmetric with friction, which changes with the normal force, and with drag and loads that follow
  * the cloth. Then the matrix that is factored is symmetric, the symmetric part of J with the normal forces
  * held fixed, and p solves J p = -F to a part of F by a few iterations of GMRES with these factors
- * (solvers/refine.h). A factorisation of J would cost two to four times as much, and could not tell whether
- * J is indefinite: flags drawn at random took 0.27 to 1 of the CPU. Where the matrix is repaired by a share of the positive
- * parts, the rest of the coupling of friction with normal forces is in J, and not in what is factored. With
- * all of them there is none in contact: corrections that are short because it is missing would be made by such matrices
- * for ever, so that after a short one the exact matrix is tried again.
+ * (solvers/refine.h). A factorisation of J would cost two to four times as much, and could not tell whether J
+ * is indefinite: ten flags drawn at random take 0.27 to 1.03 of its CPU time. Where the matrix is repaired by
+ * a share of the positive parts, the rest of the coupling of friction with normal forces is in J, and not in
+ * what is factored. With all of them there is none: corrections that are short because it is missing would be
+ * made by such matrices for ever, so that after a short one the exact matrix is tried again.
  *
  * A sheet that buckles crosses many states with an indefinite J. Once J was indefinite, the next matrices of
  * the solve are repaired without trying J, until a correction is short.

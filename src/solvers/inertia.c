@@ -7,6 +7,8 @@
 drape_status drape_inertia(drape_context *ctx, const drape_pattern *p, const double *values,
                            const atomic_bool *const *cancel, int64_t *negative, bool *known)
 {
+    if (p->ranks)
+        return p->ranks->inertia(ctx, p, values, negative, known);
     drape_arena arena = drape_arena_of(ctx);
     drape_fronts fronts;
     const bool finite = drape_all_finite(values, (size_t)p->nonzeros);

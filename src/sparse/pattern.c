@@ -231,10 +231,12 @@ void drape_pattern_add_antisymmetric(const drape_pattern *p, const double *value
         }
 }
 
+/* Of copies only the blocks that couple them with a node of this rank are complete; these have its column or
+ * an own one before it. */
 double drape_pattern_asymmetry(const drape_pattern *p, const double *values)
 {
     double largest = 0, difference = 0;
-    for (int32_t j = 0; j < p->block_count; j++)
+    for (int32_t j = 0; j < (p->ranks ? p->ranks->own_blocks : p->block_count); j++)
         for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
             int64_t stride, mirror_stride;
             const int32_t i = p->block_row[k];
@@ -248,5 +250,7 @@ double drape_pattern_asymmetry(const drape_pattern *p, const double *values)
                     difference = fmax(difference, fabs(one - other));
                 }
         }
+    largest = drape_ranks_largest(p->ranks, largest);
+    difference = drape_ranks_largest(p->ranks, difference);
     return largest > 0 ? difference / largest : 0;
 }

@@ -334,7 +334,7 @@ START_TEST(test_elbow)
         forearm);
     record seen = run(&s, true, 168);
     ck_assert(seen.named[0]);
-    ck_assert_int_ge(seen.most, 1); /* how many have no room depends on how the sheet lies when it is caught */
+    ck_assert_int_ge(seen.most, 1); /* how many have no room depends on how the sheet is caught */
     ck_assert_double_lt(seen.strain, 0.1);
     ck_assert_double_lt(seen.last_inside, 2.3 + 0.5); /* the arm is straight again at 2.3 s */
     ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);

@@ -1,0 +1,247 @@
+#!/usr/bin/env python3
+"""test_ranks.py: `drape run` on several ranks of MPI: the results are those of one process within the tolerance of the solver, whatever the number
+of ranks; what it cannot do is refused in one line; a rank that is killed ends the run, which any number of ranks resumes."""
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)) + "/../cli")
+# pylint: disable=wrong-import-position
+from program import LIMIT, PROGRAM, SOURCES, claim, equal, good, read_json, read_npy, run_tests, write_scene
+
+# Open MPI: as root in a container, more ranks than cores, which yield while they wait; no shell on other hosts, no network.
+ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1",
+                   OMPI_MCA_hwloc_base_binding_policy="none", OMPI_MCA_mpi_yield_when_idle="1", OMPI_MCA_plm="isolated", OMPI_MCA_pml="ob1", OMPI_MCA_btl="self,vader",
+                   OMPI_MCA_btl_vader_single_copy_mechanism="none", OMP_NUM_THREADS="1")
+SIDE, H, TOLERANCE = 0.4, 0.01, 1e-9  # [m], [s], [N]
+COLUMNS, DENSITY = 9, 0.2
+LEAST_MASS = DENSITY * (SIDE / (COLUMNS - 1))**2 / 6  # [kg] of a corner with one triangle
+DROP = {"mesh": {"grid": "square", "columns": COLUMNS, "rows": COLUMNS, "width": SIDE, "height": SIDE},
+        "material": {"young_modulus": 1e5, "thickness": 1e-3, "areal_density": DENSITY},
+        "terms": ["stretch.cst", "bend.hinge", {"type": "damp.kelvin_voigt", "beta": 0.002}]}
+HUNG = dict(DROP, pins=[{"corner": "top-left"}, {"corner": "top-right"}])
+CUBE = [(x, y, z) for x in (0.1, 0.3) for y in (-0.202, -0.002) for z in (-0.3, -0.1)]
+FACES = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
+
+
+def launch(count, *args):
+    return ["mpirun", "-n", str(count), PROGRAM, *args]
+
+
+def ranks(count, *args):
+    """The same as `good`, on that many ranks; 1: no launcher."""
+    if count == 1:
+        return good(*args)
+    result = subprocess.run(launch(count, *args), capture_output=True, text=True, timeout=LIMIT, env=ENVIRONMENT, check=False)
+    equal(result.returncode, 0, f"{count} ranks: {args}: {result.stdout} {result.stderr}")
+    equal(result.stdout.count("status    ok"), 1, f"{count} ranks: {args}: what is printed: {result.stdout}")
+    return result.stdout
+
+
+def difference(one, other):
+    """The largest between the positions of two runs [m]."""
+    shape, a = read_npy(one + "/positions.npy")
+    other_shape, b = read_npy(other + "/positions.npy")
+    equal(other_shape, shape, "frames, nodes")
+    return max(abs(x - y) for x, y in zip(a, b))
+
+
+def compare(bound, *counts, args=()):
+    """Runs scene.json on each number of ranks, and on one."""
+    for count in (1, *counts):
+        ranks(count, "run", "scene.json", "--out", f"out{count}", "--format", "npy", *args)
+        if count == 1:
+            continue
+        equal(read_json(f"out{count}/summary.json")["ranks"], count, "ranks in summary.json")
+        found = difference("out1", f"out{count}")
+        print(f"# {count} ranks: {found:.3g} m, bound {bound:.3g} m")
+        assert found <= bound, f"{count} ranks: {found} m from one; the bound is {bound} m"
+        one, other = (read_json(f"out{number}/summary.json")["energy"] for number in (1, count))
+        equal(one.keys(), other.keys(), "energies")
+        for name in one:  # forces and momenta of the small sheets add up to less than 10 N and 10 kg/s m
+            assert abs(one[name] - other[name]) <= 10 * bound, f"{count} ranks: {name}: {one[name]}, {other[name]}"
+
+
+def bound_of_steps(steps):
+    """Both runs leave a residual of at most TOLERANCE in each step of backward Euler, so a displacement differs by at most
+    delta = 2 TOLERANCE h^2 / m, as the matrix is at least M / h^2, and a velocity by delta / h, which the next steps carry on: after k steps
+    delta (1 + 2 + ... + k). Ten times that, because motions that differ may part."""
+    return 10 * 2 * TOLERANCE * H**2 / LEAST_MASS * steps * (steps + 1) / 2
+
+
+def be(**more):
+    return dict({"method": "be", "dt": H, "tolerance": TOLERANCE, "norm": "max"}, **more)
+
+
+def test_be():
+    """be: a hung sheet, of which one pin moves, on 2 and 3 ranks, by the direct and by the iterative solver"""
+    pins = [{"corner": "top-left", "track": [[0, [0, 0, 0]], [0.1, [0.05, 0.02, 0]]]}, {"corner": "top-right"}]
+    for solver in ("multifrontal", "pcg"):
+        write_scene(cloth=[dict(HUNG, pins=pins)], integrator=be(linear_solver=solver), duration=0.1, frame_rate=50)
+        for folder in ("out1", "out2", "out3"):
+            shutil.rmtree(folder, ignore_errors=True)
+        compare(bound_of_steps(10), 2, 3)
+
+
+def colliders():
+    with open("cube.obj", "w", encoding="utf-8") as file:
+        print(*("v %g %g %g" % point for point in CUBE), *("f %d %d %d %d" % face for face in FACES), sep="\n", file=file)
+    top, middle = -0.002, [SIDE / 2, -0.102, -SIDE / 2]
+    limb = SOURCES + "/examples/scenes/limb"
+    return {
+        "plane": {"point": [0, top, 0], "normal": [0.1, 1, 0]},
+        "sphere": {"center": middle, "radius": 0.1, "track": [[0, [0, 0, 0]], [0.15, [0.03, 0, 0]]]},
+        "capsule": {"a": [0.1, -0.052, -0.2], "b": [0.3, -0.052, -0.2], "radius": 0.05},
+        "box": {"center": middle, "size": 0.2},
+        "cylinder": {"a": [0.2, top, -0.2], "b": [0.2, -0.2, -0.2], "radius": 0.1},
+        "mesh": {"file": "cube.obj"},
+        "animated_mesh": {"file": limb + ".npy", "mesh": limb + ".obj", "frame_rate": 8, "track": [[0, [0.2, -0.06, -0.2]]]}}
+
+
+def test_colliders():
+    """be: a sheet falls on a collider of each kind, which has friction; the sphere moves"""
+    for kind, values in colliders().items():
+        write_scene(cloth=[DROP], integrator=be(), duration=0.1, frame_rate=50,
+                    colliders=[dict(values, type=kind, friction=0.3)], contact={"distance": 0.004})
+        for folder in ("out1", "out2", "out3"):
+            shutil.rmtree(folder, ignore_errors=True)
+        print("# " + kind)
+        compare(bound_of_steps(10), *((2, 3) if kind == "sphere" else (2,)))
+        assert read_json("out2/summary.json")["energy"]["contact"] > 0, kind + ": nothing touches it"
+
+
+def test_static():
+    """static: the equilibrium of a hung sheet and whether it is stable; one that stands on its pins is not, in as many modes"""
+    # The softest motion is the swing of the lightest node, of stiffness m g / L; both runs leave a residual of TOLERANCE.
+    bound = 2 * TOLERANCE * SIDE / (LEAST_MASS * 9.81)
+    for gravity, stable in (([0, -9.81, 0], True), ([0, 0, 9.81], False)):
+        write_scene(cloth=[HUNG], integrator={"method": "static", "tolerance": TOLERANCE, "norm": "max"}, gravity=gravity, duration=1)
+        for folder in ("out1", "out2", "out3"):
+            shutil.rmtree(folder, ignore_errors=True)
+        compare(bound, 2, 3)
+        equal([read_json(f"out{count}/summary.json")["equilibrium"] for count in (1, 2, 3)], 3 * [read_json("out1/summary.json")["equilibrium"]])
+        equal(read_json("out1/summary.json")["equilibrium"]["stable"], stable, f"gravity {gravity}")
+
+
+def test_ida():
+    """ida: a hung sheet, and one that falls on a sphere"""
+    rtol = 1e-6
+    for cloth, more in ((HUNG, {}), (DROP, {"colliders": [dict(colliders()["sphere"], type="sphere")], "contact": {"distance": 0.004}})):
+        write_scene(cloth=[cloth], integrator={"method": "ida", "rtol": rtol, "atol_x": rtol, "atol_v": rtol}, duration=0.05, frame_rate=50, **more)
+        for folder in ("out1", "out2", "out3"):
+            shutil.rmtree(folder, ignore_errors=True)
+        ranks(1, "run", "scene.json", "--out", "out1", "--format", "npy")
+        # The error of a step is at most rtol |x| + atol; those of all steps, of both runs, may add up.
+        steps = read_json("out1/summary.json")["steps"]["accepted"]
+        shutil.rmtree("out1")
+        compare(2 * steps * rtol * (1 + SIDE), 2, 3)
+
+
+def test_frames():
+    """frames of all formats are those of one process; the checksum of the one that ranks write together is in the manifest"""
+    write_scene(cloth=[HUNG], integrator=be(), duration=0.05, frame_rate=50)
+    for count in (1, 2):
+        ranks(count, "run", "scene.json", "--out", f"out{count}", "--format", "npy,obj,vtp")
+    assert difference("out1", "out2") <= bound_of_steps(5)
+    equal(sorted(set(os.listdir("out2")) ^ set(os.listdir("out1"))), [], "files")
+    with open("out2/manifest.jsonl", encoding="ascii") as file:
+        line = [line for line in file if '"positions.npy"' in line and "checksum" in line][-1]
+    claim("out2", "positions.npy")
+    with open("out2/manifest.jsonl", encoding="ascii") as file:
+        equal(line.replace(" ", ""), file.readlines()[-1].replace(" ", ""), "checksum of positions.npy")
+
+
+def refused(count, *args, says):
+    """Exit code 2 and one line of drape, besides what the launcher says of that code; no file is written."""
+    before = sorted(os.listdir("."))
+    result = subprocess.run(launch(count, *args), capture_output=True, text=True, timeout=LIMIT, env=ENVIRONMENT, check=False)
+    equal(result.returncode, 2, f"{args}: {result.stderr}")
+    equal(result.stdout.strip(), "", f"{args}: standard output")
+    own = result.stderr.split("-----")[0].splitlines()
+    equal(len(own), 1, f"{args}: lines in {result.stderr}")
+    assert says in own[0], f"{args}: {says!r} is not in {own[0]!r}"
+    equal(sorted(os.listdir(".")), before, f"files after {args}")
+
+
+def test_refusals():
+    """what a run on several ranks cannot have is refused in one line"""
+    cases = (({"self_contact": {"thickness": 0.002}}, "/self_contact: a run on several ranks cannot have self-contact"),
+             ({"integrator": {"method": "verlet"}}, 'a run on several ranks cannot use "verlet"'),
+             ({"integrator": {"method": "newton_k"}}, 'a run on several ranks cannot use "newton_k"'),
+             ({"controller": {"type": "strain"}}, 'a run on several ranks cannot use "strain"'),
+             ({"events": [{"type": "energy", "bound": 1e-9}]}, "/events: a run on several ranks cannot have events"),
+             ({"duration": -1}, "/duration"))
+    for changes, says in cases:
+        write_scene(**changes)
+        refused(2, "run", "scene.json", "--out", "out", says=says)
+    write_scene()
+    refused(2, "run", "scene.json", "--realtime", says="a run on several ranks has no time budget")
+    refused(17, "run", "scene.json", says="there are 14 free nodes for 17 ranks")
+
+
+def runs(process):
+    """Whether it is there; not what is left of it until its parent, or that of an orphan, asks for its exit code."""
+    try:
+        with open(f"/proc/{process}/stat", encoding="ascii") as file:
+            return file.read().rpartition(")")[2].split()[0] not in "ZX"
+    except FileNotFoundError:
+        return False
+
+
+def started(count, *args):
+    """A run of several ranks that is killed after its first checkpoint: one rank, by SIGKILL. Returns the launcher's exit code and words."""
+    with subprocess.Popen(launch(count, "run", "scene.json", "--checkpoint-every", "1", *args), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                          text=True, env=ENVIRONMENT) as process:
+        end = time.monotonic() + LIMIT
+        while not os.path.exists("out/checkpoint.drape") and time.monotonic() < end and process.poll() is None:
+            time.sleep(0.01)
+        with open(f"/proc/{process.pid}/task/{process.pid}/children", encoding="ascii") as file:
+            children = [int(child) for child in file.read().split()]
+        equal(len(children), count, "processes of the launcher")
+        os.kill(children[-1], signal.SIGKILL)
+        _, words = process.communicate(timeout=LIMIT)
+    while any(runs(child) for child in children): # the launcher does not wait for those that it ends
+        assert time.monotonic() < end, f"of {children} some are still there"
+        time.sleep(0.01)
+    return process.returncode, words
+
+
+def test_killed():
+    """a rank that is killed ends the run, which other numbers of ranks resume; one process, too"""
+    duration, steps = 0.6, 60
+    write_scene(cloth=[DROP], integrator=be(), duration=duration, frame_rate=100,
+                colliders=[dict(colliders()["sphere"], type="sphere", friction=0.3)], contact={"distance": 0.004})
+    code, words = started(2, "--out", "out", "--format", "npy")
+    assert code != 0 and "signal 9" in words, f"exit code {code}: {words}"
+    assert not os.path.exists("out/summary.json"), "a killed run has a summary"
+    frames, _ = read_npy("out/positions.npy")
+    assert 1 <= frames[0] < steps, frames
+    shutil.copytree("out", "alone")
+    ranks(1, "run", "scene.json", "--out", "whole", "--format", "npy")
+    ranks(3, "run", "scene.json", "--out", "out", "--format", "npy", "--resume")
+    ranks(1, "run", "scene.json", "--out", "alone", "--format", "npy", "--resume")
+    for folder in ("out", "alone"):
+        found = difference("whole", folder)
+        print(f"# {folder}, resumed at {frames[0]} of {steps} frames: {found:.3g} m")
+        assert found <= bound_of_steps(steps), f"{folder}: {found} m from a run of one process"
+        equal(read_json(folder + "/summary.json")["time"], duration, "time")
+
+
+def test_one_process():
+    """a checkpoint of one process is refused by several ranks"""
+    write_scene(cloth=[HUNG], integrator=be(), duration=0.1, frame_rate=50)
+    ranks(1, "run", "scene.json", "--out", "out", "--checkpoint-every", "1")
+    refused(2, "run", "scene.json", "--out", "out", "--resume", says="checkpoint")
+
+
+if __name__ == "__main__":
+    if os.environ.get("DRAPE_MPI") != "1":
+        print("1..0 # SKIP this build has no MPI (-Dmpi=enabled)")
+        sys.exit(0)
+    if not shutil.which("mpirun"):
+        print("1..0 # SKIP mpirun is missing")
+        sys.exit(0)
+    sys.exit(run_tests(dict(globals())))
