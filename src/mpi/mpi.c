@@ -102,7 +102,7 @@ int drape_mpi_agree(const drape_mpi *mpi, bool here, int *value)
     return from;
 }
 
-drape_status drape_mpi_share(drape_mpi *mpi, const drape_model *whole, drape_model **part)
+drape_status drape_mpi_share(drape_mpi *mpi, drape_model *whole, drape_model **part)
 {
     *part = NULL;
     drape_status status = drape_part_check(whole);
@@ -113,6 +113,8 @@ drape_status drape_mpi_share(drape_mpi *mpi, const drape_model *whole, drape_mod
         status = drape_partition(mpi->ranks, whole, owner);
     if (!status)
         status = drape_part_create(whole, owner, mpi->ranks, part);
+    if (!status)
+        drape_part_shed(whole);
     drape_free(mpi->ctx, owner);
     return status;
 }

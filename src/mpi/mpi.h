@@ -31,6 +31,6 @@ int drape_mpi_agree(const drape_mpi *mpi, bool here, int *value);
 /* The part of a compiled model of this rank, which lasts no longer than the model and mpi. Collective.
  * Errors: DRAPE_E_ARGUMENT (the model has what a part cannot have, with its place in the scene),
  * DRAPE_E_MEMORY. */
-drape_status drape_mpi_share(drape_mpi *mpi, const drape_model *whole, drape_model **part);
+drape_status drape_mpi_share(drape_mpi *mpi, drape_model *whole, drape_model **part);
 
 #endif

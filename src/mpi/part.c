@@ -401,6 +401,33 @@ static drape_status make(maker *k, drape_mpi_ranks *ranks)
     return status;
 }
 
+static void shed_terms(drape_model *whole)
+{
+    for (int32_t i = 0; i < whole->term_count; i++) {
+        drape_term *term = &whole->terms[i];
+        if (term->ops->law || term->elements.parts) /* these are of the parts, too */
+            continue;
+        drape_arena_release(&whole->arena, term->block);
+        drape_arena_release(&whole->arena, (void *)(uintptr_t)term->elements.node);
+        drape_arena_release(&whole->arena, (void *)(uintptr_t)term->elements.rest);
+        term->block = NULL;
+        term->elements.node = NULL;
+        term->elements.rest = NULL;
+    }
+}
+
+void drape_part_shed(drape_model *whole)
+{
+    drape_pattern *p = &whole->pattern;
+    shed_terms(whole);
+    drape_arena_release(&whole->arena, p->block_start);
+    drape_arena_release(&whole->arena, p->block_row);
+    drape_arena_release(&whole->arena, p->diagonal);
+    drape_arena_release(&whole->arena, p->column);
+    p->block_start = p->block_row = p->diagonal = NULL;
+    p->column = NULL;
+}
+
 drape_status drape_part_create(const drape_model *whole, const int32_t *owner, drape_mpi_ranks *ranks,
                                drape_model **out)
 {

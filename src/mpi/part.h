@@ -18,4 +18,7 @@ drape_status drape_part_check(const drape_model *whole);
 drape_status drape_part_create(const drape_model *whole, const int32_t *owner, drape_mpi_ranks *ranks,
                                drape_model **out);
 
+/* Frees elements and pattern of a model, which nothing needs besides its part. */
+void drape_part_shed(drape_model *whole);
+
 #endif

@@ -1,5 +1,5 @@
 /* ranks.c: see ranks.h. Sums are of gathered numbers in the order of the ranks, so that all ranks have the
- * same bits, and a run has the same bits each time. */
+ * same bits. */
 #include "mpi/ranks.h"
 
 #include "mpi/file.h"

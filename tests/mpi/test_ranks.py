@@ -191,12 +191,19 @@ def runs(process):
         return False
 
 
+def has_frames(count):
+    try:
+        return os.path.getsize("out/positions.npy") >= 128 + count * 24 * COLUMNS**2  # after the header
+    except FileNotFoundError:
+        return False
+
+
 def started(count, *args):
-    """A run of several ranks that is killed after its first checkpoint: one rank, by SIGKILL. Returns the launcher's exit code and words."""
+    """A run of several ranks of which one is killed by SIGKILL after ten frames. Returns the launcher's exit code and words."""
     with subprocess.Popen(launch(count, "run", "scene.json", "--checkpoint-every", "1", *args), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                           text=True, env=ENVIRONMENT) as process:
         end = time.monotonic() + LIMIT
-        while not os.path.exists("out/checkpoint.drape") and time.monotonic() < end and process.poll() is None:
+        while not (has_frames(10) and os.path.exists("out/checkpoint.drape")) and time.monotonic() < end and process.poll() is None:
             time.sleep(0.01)
         with open(f"/proc/{process.pid}/task/{process.pid}/children", encoding="ascii") as file:
             children = [int(child) for child in file.read().split()]
@@ -218,7 +225,7 @@ def test_killed():
     assert code != 0 and "signal 9" in words, f"exit code {code}: {words}"
     assert not os.path.exists("out/summary.json"), "a killed run has a summary"
     frames, _ = read_npy("out/positions.npy")
-    assert 1 <= frames[0] < steps, frames
+    assert 9 <= frames[0] < steps, frames
     shutil.copytree("out", "alone")
     ranks(1, "run", "scene.json", "--out", "whole", "--format", "npy")
     ranks(3, "run", "scene.json", "--out", "out", "--format", "npy", "--resume")
