@@ -17,8 +17,9 @@ typedef struct builder {
 
 static int32_t count_of(const drape_model *m, int kind)
 {
-    return kind == DRAPE_ELEMENT_NODE ? m->node_count : kind == DRAPE_ELEMENT_EDGE ? m->edge_count
-                                                                                   : m->triangle_count;
+    return kind == DRAPE_ELEMENT_NODE   ? m->node_count
+           : kind == DRAPE_ELEMENT_EDGE ? m->edge_count
+                                        : m->triangle_count;
 }
 
 /* ---- The tree ---- */

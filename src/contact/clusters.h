@@ -1,6 +1,6 @@
 /*
- * clusters.h: the faces of the cloths in clusters of a few neighbours, each with nodes and edges of its own, and
- * a binary tree over them. Which elements they have follows from the rest shape and does not change.
+ * clusters.h: the faces of the cloths in clusters of a few neighbours, each with nodes and edges of its own,
+ * and a binary tree over them. Which elements they have follows from the rest shape and does not change.
  */
 #ifndef DRAPE_CONTACT_CLUSTERS_H
 #define DRAPE_CONTACT_CLUSTERS_H
@@ -40,6 +40,24 @@ typedef struct drape_clusters {
     int32_t branch_count;
     int32_t *faces_of_edge; /* (edge_count) how many faces have it */
 } drape_clusters;
+
+/* The pairs of branches that follow a pair, the first not later than the second, and neither within the
+ * other unless they are the same: up to four, so that from the root with itself on each pair of leaves is
+ * reached once. Returns their number, 0 for two leaves. */
+static inline int drape_clusters_descend(const drape_clusters *clusters, int32_t a, int32_t b,
+                                         int32_t pair[4][2])
+{
+    const int32_t of_a[2] = {a + 1, clusters->branches[a].second},
+                  of_b[2] = {b + 1, clusters->branches[b].second};
+    const int first = of_a[1] > 0 ? 2 : 1, second = of_b[1] > 0 ? 2 : 1;
+    int count = 0;
+    for (int i = 0; first * second > 1 && i < first; i++)
+        for (int k = a == b ? i : 0; k < second; k++) {
+            pair[count][0] = first > 1 ? of_a[i] : a;
+            pair[count++][1] = second > 1 ? of_b[k] : b;
+        }
+    return count;
+}
 
 /* rest: (node_count x 3). Errors: DRAPE_E_MEMORY. */
 drape_status drape_clusters_create(drape_arena *arena, const drape_model *model, const double *rest,

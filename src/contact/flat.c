@@ -2,28 +2,23 @@
 #include "contact/flat.h"
 
 #include "base/vec3.h"
-#include "contact/list.h"
+#include "geometry/bvh.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #define FLAT     1e-9 /* of the length of the sheet: how far from a plane, and from convex, it may be */
 #define TOUCHING 1e-9 /* of the model's length: clusters at rest that are no farther apart touch */
 #define HALF     0.5  /* least c of pieces that may come as near as half of their distance at rest */
 
-/* A rectangle in the plane of a sheet. */
-typedef struct rectangle {
-    double low[2], high[2];
-} rectangle;
-
 typedef struct builder {
     const drape_clusters *clusters;
     const drape_model *model;
-    drape_arena *arena, *temporary;
-    double *plane;   /* (node_count x 2) [m] in the plane of its sheet; sheets lie side by side */
-    bool *flat;      /* (cloth_count) */
-    rectangle *area; /* (branches) at rest */
+    drape_arena *temporary;
+    double *plane; /* (node_count x 2) [m] in the plane of its sheet; sheets lie side by side */
+    bool *flat;    /* (cloth_count) */
     drape_flat *out;
-    int32_t pair_room, window_room, pairs;
+    int64_t windows; /* numbers in the lists so far */
 } builder;
 
 /* ---- The plane of a sheet ---- */
@@ -193,11 +188,13 @@ static void set_faces(builder *b)
     }
 }
 
-/* ---- Pairs of clusters ---- */
+/* ---- Branches at rest ---- */
 
-static rectangle cover(const rectangle *a, const rectangle *b)
+static const drape_flat_area nothing = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+
+static drape_flat_area cover(const drape_flat_area *a, const drape_flat_area *b)
 {
-    rectangle both;
+    drape_flat_area both;
     for (int k = 0; k < 2; k++) {
         both.low[k] = fmin(a->low[k], b->low[k]);
         both.high[k] = fmax(a->high[k], b->high[k]);
@@ -205,95 +202,111 @@ static rectangle cover(const rectangle *a, const rectangle *b)
     return both;
 }
 
-static bool touch(const rectangle *a, const rectangle *b, double within)
+static bool touch(const drape_flat_area *a, const drape_flat_area *b, double within)
 {
-    bool meet = true;
-    for (int k = 0; k < 2; k++)
-        meet = meet && a->low[k] <= b->high[k] + within && b->low[k] <= a->high[k] + within;
-    return meet;
+    return a->low[0] <= b->high[0] + within && b->low[0] <= a->high[0] + within &&
+           a->low[1] <= b->high[1] + within && b->low[1] <= a->high[1] + within;
 }
 
-static void find_areas(builder *b)
+static void set_leaf(builder *b, int32_t branch)
 {
     const drape_clusters *c = b->clusters;
-    for (int32_t i = c->branch_count - 1; i >= 0; i--) {
-        const drape_cluster_branch *branch = &c->branches[i];
-        const drape_cluster *cluster = &c->cluster[branch->cluster];
-        rectangle area = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
-        for (int32_t p = 0; branch->second == 0 && p < cluster->points; p++) {
-            const double *at = b->plane + 2 * (size_t)c->point[cluster->first_point + p];
-            area = cover(&area, &(rectangle){{at[0], at[1]}, {at[0], at[1]}});
-        }
-        b->area[i] = branch->second > 0 ? cover(&b->area[i + 1], &b->area[branch->second]) : area;
+    const drape_cluster *cluster = &c->cluster[c->branches[branch].cluster];
+    const bool flat = b->flat[cluster->cloth];
+    drape_flat_area area = nothing;
+    for (int32_t p = 0; flat && p < cluster->points; p++) {
+        const double *at = b->plane + 2 * (size_t)c->point[cluster->first_point + p];
+        area = cover(&area, &(drape_flat_area){{at[0], at[1]}, {at[0], at[1]}});
     }
+    b->out->area[branch] = area;
+    b->out->cloth[branch] = flat ? cluster->cloth : -1;
+    b->out->leaves[branch] = 1;
 }
 
-typedef void visit_branch(builder *b, int32_t branch, const rectangle *within);
-
-/* Visits the leaves of flat sheets that touch a rectangle. */
-static void visit_leaves(builder *b, int32_t branch, const rectangle *within, visit_branch *visit)
-{
-    const drape_cluster_branch *self = &b->clusters->branches[branch];
-    if (!touch(&b->area[branch], within, TOUCHING * b->model->length))
-        return;
-    if (self->second > 0) {
-        visit_leaves(b, branch + 1, within, visit);
-        visit_leaves(b, self->second, within, visit);
-    } else if (b->flat[b->clusters->cluster[self->cluster].cloth]) {
-        visit(b, branch, within);
-    }
-}
-
-static bool push(builder *b, int32_t **list, int32_t count, int32_t *room, int32_t value)
-{
-    int32_t *longer = drape_list_grow(b->arena, *list, count, room, sizeof *longer);
-    if (!longer)
-        return false;
-    *list = longer;
-    longer[count] = value;
-    return true;
-}
-
-static void add_to_window(builder *b, int32_t branch, const rectangle *within)
+static void set_branches(builder *b)
 {
     drape_flat *s = b->out;
-    (void)within;
-    if (push(b, &s->window, s->first_window[b->pairs + 1], &b->window_room,
-             b->clusters->branches[branch].cluster))
-        s->first_window[b->pairs + 1]++;
-}
-
-/* A pair of the leaf with the first rectangle, which is one of b->area, and a later leaf or itself. */
-static void add_pair(builder *b, int32_t branch, const rectangle *first)
-{
-    drape_flat *s = b->out;
-    const int32_t other = b->clusters->branches[branch].cluster, room = b->pair_room;
-    const rectangle both = cover(first, &b->area[branch]);
-    if (first > &b->area[branch] || !push(b, &s->other, b->pairs, &b->pair_room, other))
-        return;
-    if (b->pair_room != room)
-        s->first_window =
-            drape_arena_resize(b->arena, s->first_window, (size_t)b->pair_room + 1, sizeof *s->first_window);
-    if (!s->first_window)
-        return;
-    s->first_window[b->pairs + 1] = s->first_window[b->pairs];
-    visit_leaves(b, 0, &both, add_to_window);
-    b->pairs++;
-}
-
-static void find_pairs(builder *b)
-{
-    const drape_clusters *c = b->clusters;
-    for (int32_t i = 0; i < c->branch_count; i++) {
-        const int32_t cluster = c->branches[i].cluster;
-        if (c->branches[i].second > 0)
+    for (int32_t i = b->clusters->branch_count - 1; i >= 0; i--) {
+        const int32_t first = i + 1, second = b->clusters->branches[i].second;
+        if (second == 0) {
+            set_leaf(b, i);
             continue;
-        if (b->flat[c->cluster[cluster].cloth])
-            visit_leaves(b, 0, &b->area[i], add_pair);
-        if (drape_arena_status(b->arena))
-            return;
-        b->out->first_pair[cluster + 1] = b->pairs;
+        }
+        s->area[i] = cover(&s->area[first], &s->area[second]);
+        s->cloth[i] = s->cloth[first] == s->cloth[second] ? s->cloth[first] : -1;
+        s->leaves[i] = s->leaves[first] + s->leaves[second];
     }
+}
+
+/* ---- Pairs of branches ---- */
+
+/* Lists the clusters that touch a rectangle; 0: they are too many. */
+static int32_t list_window(const drape_flat *s, const drape_flat_area *within, int32_t *window)
+{
+    const drape_clusters *c = s->clusters;
+    int32_t waiting[DRAPE_BVH_DEPTH], count = 0, left = 0;
+    waiting[left++] = 0;
+    while (left > 0) {
+        const int32_t branch = waiting[--left], second = c->branches[branch].second;
+        if (!touch(&s->area[branch], within, TOUCHING * c->model->length))
+            continue;
+        if (second > 0) {
+            waiting[left++] = second;
+            waiting[left++] = branch + 1;
+        } else if (count == DRAPE_FLAT_WINDOW) {
+            return 0;
+        } else {
+            window[count++] = c->branches[branch].cluster;
+        }
+    }
+    return count;
+}
+
+/* The pairs from two branches on. The lists are NULL while their lengths are counted, in first_pair[a +
+ * 2]. */
+static void find_pairs(builder *b, int32_t first, int32_t second)
+{
+    drape_flat *s = b->out;
+    int32_t window[DRAPE_FLAT_WINDOW], next[4][2];
+    if (!touch(&s->area[first], &s->area[second], TOUCHING * b->model->length))
+        return;
+    const drape_flat_area both = cover(&s->area[first], &s->area[second]);
+    const bool same = s->cloth[first] >= 0 && s->cloth[first] == s->cloth[second];
+    const int32_t count = same && s->leaves[first] + s->leaves[second] <= 2 * DRAPE_FLAT_WINDOW
+                              ? list_window(s, &both, window)
+                              : 0;
+    if (count > 0 && !s->other) {
+        s->first_pair[first + 2]++;
+        b->windows += 1 + count;
+    } else if (count > 0) {
+        const int32_t pair = s->first_pair[first + 1]++;
+        s->other[pair] = second;
+        s->at[pair] = b->windows;
+        s->window[b->windows++] = count;
+        memcpy(s->window + b->windows, window, (size_t)count * sizeof *window);
+        b->windows += count;
+    }
+    const int descended = drape_clusters_descend(b->clusters, first, second, next);
+    for (int i = 0; i < descended; i++)
+        find_pairs(b, next[i][0], next[i][1]);
+}
+
+static void list_pairs(drape_arena *arena, builder *b)
+{
+    drape_flat *s = b->out;
+    const int32_t branches = b->clusters->branch_count;
+    s->first_pair = drape_arena_take(arena, (size_t)branches + 2, sizeof *s->first_pair);
+    if (!s->first_pair || branches == 0)
+        return;
+    find_pairs(b, 0, 0);
+    for (int32_t i = 0; i < branches; i++)
+        s->first_pair[i + 2] += s->first_pair[i + 1];
+    s->at = drape_arena_take(arena, (size_t)s->first_pair[branches + 1] + 1, sizeof *s->at);
+    s->window = drape_arena_take(arena, (size_t)b->windows + 1, sizeof *s->window);
+    s->other = drape_arena_take(arena, (size_t)s->first_pair[branches + 1] + 1, sizeof *s->other);
+    b->windows = 0;
+    if (s->at && s->window && s->other)
+        find_pairs(b, 0, 0);
 }
 
 drape_status drape_flat_create(drape_arena *arena, const drape_clusters *clusters, const double *rest,
@@ -302,15 +315,16 @@ drape_status drape_flat_create(drape_arena *arena, const drape_clusters *cluster
     const drape_model *m = clusters->model;
     const size_t count = (size_t)clusters->count, groups = (size_t)clusters->groups[DRAPE_ELEMENT_FACE];
     drape_arena temporary = drape_arena_of(arena->ctx);
-    builder b = {.clusters = clusters, .model = m, .arena = arena, .temporary = &temporary, .out = out};
+    builder b = {.clusters = clusters, .model = m, .temporary = &temporary, .out = out};
     double beside = 0;
     *out = (drape_flat){.clusters = clusters};
     b.plane = drape_arena_take(&temporary, (size_t)m->node_count, 2 * sizeof *b.plane);
     b.flat = drape_arena_take(&temporary, (size_t)m->cloth_count, sizeof *b.flat);
-    b.area = drape_arena_take(&temporary, (size_t)clusters->branch_count, sizeof *b.area);
     out->inverse = drape_arena_take(arena, groups, 4 * LANES * sizeof *out->inverse);
     out->height = drape_arena_take(arena, count, sizeof *out->height);
-    out->first_pair = drape_arena_take(arena, count + 1, sizeof *out->first_pair);
+    out->area = drape_arena_take(arena, (size_t)clusters->branch_count, sizeof *out->area);
+    out->cloth = drape_arena_take(arena, (size_t)clusters->branch_count, sizeof *out->cloth);
+    out->leaves = drape_arena_take(arena, (size_t)clusters->branch_count, sizeof *out->leaves);
     out->gradients = drape_arena_take(arena, groups, sizeof *out->gradients);
     out->sum = drape_arena_take(arena, count, sizeof *out->sum);
     out->fitted = drape_arena_take(arena, count, sizeof *out->fitted);
@@ -319,8 +333,8 @@ drape_status drape_flat_create(drape_arena *arena, const drape_clusters *cluster
         lay_flat(&b, i, rest, &beside);
     if (complete) {
         set_faces(&b);
-        find_areas(&b);
-        find_pairs(&b);
+        set_branches(&b);
+        list_pairs(arena, &b);
     }
     const drape_status status = drape_arena_status(&temporary);
     drape_arena_free(&temporary);
@@ -380,8 +394,8 @@ static bool find_frame(double sum[2][3], double frame[2][3])
 }
 
 /* Whether the symmetric part of A^T F has no eigenvalue below c on some groups of faces. */
-LANES_DISPATCH static bool is_stretched(const drape_gradients *gradients, int32_t groups,
-                                        double frame[2][3], double c)
+LANES_DISPATCH static bool is_stretched(const drape_gradients *gradients, int32_t groups, double frame[2][3],
+                                        double c)
 {
     for (int32_t g = 0; g < groups; g++)
         for (int end = 0; end < 2; end++) {
@@ -422,13 +436,11 @@ static double wanted_share(const drape_flat_query *want, double height)
 
 bool drape_flat_keeps_apart(drape_flat *s, int32_t a, int32_t b, const drape_flat_query *want)
 {
-    const drape_clusters *clusters = s->clusters;
     const int32_t pair = find_pair(s, a, b);
     double sum[2][3] = {{0}}, frame[2][3], height = INFINITY;
     if (pair < 0)
         return false;
-    const int32_t *window = s->window + s->first_window[pair],
-                  count = s->first_window[pair + 1] - s->first_window[pair];
+    const int32_t count = s->window[s->at[pair]], *window = s->window + s->at[pair] + 1;
     for (int32_t i = 0; i < count; i++) {
         const int32_t which = window[i];
         if (s->fitted[which] != want->search)
@@ -441,7 +453,7 @@ bool drape_flat_keeps_apart(drape_flat *s, int32_t a, int32_t b, const drape_fla
     const double share = wanted_share(want, height);
     bool apart = find_frame(sum, frame);
     for (int32_t i = 0; apart && i < count; i++) {
-        const drape_cluster *cluster = &clusters->cluster[window[i]];
+        const drape_cluster *cluster = &s->clusters->cluster[window[i]];
         apart = is_stretched(s->gradients + cluster->first_group[DRAPE_ELEMENT_FACE],
                              cluster->groups[DRAPE_ELEMENT_FACE], frame, share);
     }

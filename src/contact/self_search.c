@@ -100,9 +100,8 @@ static void fit_elements(drape_self_search *s, int32_t which, const drape_self_q
         for (int32_t i = 0; i < LANES * cluster->groups[kind]; i++) {
             const int32_t group = cluster->first_group[kind] + i / LANES,
                           *element = &c->element[kind][LANES * (size_t)group + (size_t)(i % LANES)], *node;
-            const int nodes = *element >= 0 ? drape_element_nodes(c->model, (drape_element_kind)kind, element,
-                                                                  &node)
-                                            : 0;
+            const int nodes =
+                *element >= 0 ? drape_element_nodes(c->model, (drape_element_kind)kind, element, &node) : 0;
             for (int end = 0; end < 2 && ends[end]; end++) {
                 if (nodes > 0)
                     set_box(&s->boxes[kind][group], i % LANES, end, node, nodes, ends[end]);
@@ -119,30 +118,56 @@ typedef struct members {
     const drape_path_boxes *boxes;
     const int32_t *element;
     int32_t groups;
+    const double (*low)[3], (*high)[3]; /* the box of the cluster, by end */
 } members;
 
-static members members_of(const drape_self_search *s, int32_t which, drape_element_kind kind)
+static members members_of(const drape_self_search *s, int32_t leaf, drape_element_kind kind)
 {
-    const drape_cluster *cluster = &s->clusters.cluster[which];
+    const drape_cluster *cluster = &s->clusters.cluster[s->clusters.branches[leaf].cluster];
     const size_t first = (size_t)cluster->first_group[kind];
-    return (members){s->boxes[kind] + first, s->clusters.element[kind] + LANES * first,
-                     cluster->groups[kind]};
+    return (members){.boxes = s->boxes[kind] + first,
+                     .element = s->clusters.element[kind] + LANES * first,
+                     .groups = cluster->groups[kind],
+                     .low = (const double(*)[3])s->low[leaf],
+                     .high = (const double(*)[3])s->high[leaf]};
+}
+
+/* Which of four elements an axis separates, by more than reach, from a whole cluster. */
+LANES_INLINE lanes_mask apart_from_cluster(const drape_path_boxes *boxes, const members *from, double reach,
+                                           int ends)
+{
+    drape_path_box box;
+    for (int end = 0; end < ends; end++)
+        for (int k = 0; k < 3; k++) {
+            box.low[end][k] = from->low[end][k] - reach - (lanes){0};
+            box.high[end][k] = from->high[end][k] + reach - (lanes){0};
+        }
+    return drape_path_boxes_apart(boxes, &box, ends);
+}
+
+LANES_INLINE void meet_one(const members *a, int32_t i, const members *b, bool same, double reach, int ends,
+                           drape_self_meet *visit, void *user)
+{
+    drape_path_box box;
+    drape_path_box_of(&a->boxes[i / LANES], i % LANES, reach, ends, &box);
+    for (int32_t g = same ? i / LANES : 0; g < b->groups; g++) {
+        const lanes_mask apart = drape_path_boxes_apart(&b->boxes[g], &box, ends);
+        if (apart[0] & apart[1] & apart[2] & apart[3])
+            continue;
+        for (int l = 0; l < LANES; l++)
+            if (apart[l] == 0 && (!same || LANES * g + l > i))
+                visit(user, a->element[i], b->element[LANES * g + l]);
+    }
 }
 
 LANES_INLINE void meet_members(const members *a, const members *b, bool same, double reach, int ends,
                                drape_self_meet *visit, void *user)
 {
-    for (int32_t i = 0; i < LANES * a->groups && a->element[i] >= 0; i++) {
-        drape_path_box box;
-        drape_path_box_of(&a->boxes[i / LANES], i % LANES, reach, ends, &box);
-        for (int32_t g = same ? i / LANES : 0; g < b->groups; g++) {
-            const lanes_mask apart = drape_path_boxes_apart(&b->boxes[g], &box, ends);
-            if (apart[0] & apart[1] & apart[2] & apart[3])
-                continue;
-            for (int l = 0; l < LANES; l++)
-                if (apart[l] == 0 && (!same || LANES * g + l > i))
-                    visit(user, a->element[i], b->element[LANES * g + l]);
-        }
+    for (int32_t g = 0; g < a->groups; g++) {
+        const lanes_mask apart = apart_from_cluster(&a->boxes[g], b, reach, ends);
+        for (int l = 0; l < LANES; l++)
+            if (apart[l] == 0)
+                meet_one(a, LANES * g + l, b, same, reach, ends, visit, user);
     }
 }
 
@@ -179,12 +204,12 @@ static void meet_kinds(const traversal *t, int32_t a, drape_element_kind first, 
         meet_at(&of_a, &of_b, same, t->want->reach, visit, t->user);
 }
 
+/* Two leaves. */
 static void meet_clusters(const traversal *t, int32_t a, int32_t b)
 {
-    if (drape_flat_keeps_apart(&t->search->flat, a, b, &t->flat))
-        return;
-    fit_elements(t->search, a, t->want);
-    fit_elements(t->search, b, t->want);
+    const drape_cluster_branch *branches = t->search->clusters.branches;
+    fit_elements(t->search, branches[a].cluster, t->want);
+    fit_elements(t->search, branches[b].cluster, t->want);
     meet_kinds(t, a, DRAPE_ELEMENT_NODE, b, DRAPE_ELEMENT_FACE, t->face);
     if (a != b)
         meet_kinds(t, b, DRAPE_ELEMENT_NODE, a, DRAPE_ELEMENT_FACE, t->face);
@@ -207,26 +232,17 @@ static bool are_apart(const traversal *t, int32_t a, int32_t b)
     return apart;
 }
 
-/* Two branches, the first not later than the second, and neither within the other unless they are the same. */
 static void meet(const traversal *t, int32_t a, int32_t b)
 {
-    const drape_cluster_branch *first = &t->search->clusters.branches[a],
-                               *second = &t->search->clusters.branches[b];
-    if (!(t->search->marked[a] || t->search->marked[b]) || (a != b && are_apart(t, a, b)))
+    int32_t next[4][2];
+    if (!(t->search->marked[a] || t->search->marked[b]) || (a != b && are_apart(t, a, b)) ||
+        drape_flat_keeps_apart(&t->search->flat, a, b, &t->flat))
         return;
-    if (first->second == 0 && second->second == 0) {
-        meet_clusters(t, first->cluster, second->cluster);
-    } else if (a == b) {
-        meet(t, a + 1, a + 1);
-        meet(t, a + 1, first->second);
-        meet(t, first->second, first->second);
-    } else {
-        const int32_t of_a[2] = {first->second > 0 ? a + 1 : a, first->second},
-                      of_b[2] = {second->second > 0 ? b + 1 : b, second->second};
-        for (int i = 0; i < (first->second > 0 ? 2 : 1); i++)
-            for (int k = 0; k < (second->second > 0 ? 2 : 1); k++)
-                meet(t, of_a[i], of_b[k]);
-    }
+    const int count = drape_clusters_descend(&t->search->clusters, a, b, next);
+    if (count == 0)
+        meet_clusters(t, a, b);
+    for (int i = 0; i < count; i++)
+        meet(t, next[i][0], next[i][1]);
 }
 
 void drape_self_search_pairs(drape_self_search *s, const drape_self_query *want, drape_self_meet *face,

@@ -1,7 +1,8 @@
 /*
- * path_box.h: boxes around elements at both ends of their straight paths, four at once. Two convex pieces stay
- * apart on their paths if one axis separates them at both ends with the same piece in front: the difference
- * of any two of their points along that axis is then linear in the step fraction and positive at both ends.
+ * path_box.h: boxes around elements at both ends of their straight paths, four at once. Two convex pieces
+ * stay apart on their paths if one axis separates them at both ends with the same piece in front: the
+ * difference of any two of their points along that axis is then linear in the step fraction and positive at
+ * both ends.
  */
 #ifndef DRAPE_GEOMETRY_PATH_BOX_H
 #define DRAPE_GEOMETRY_PATH_BOX_H

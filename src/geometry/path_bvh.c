@@ -113,7 +113,8 @@ static drape_box child_box(const drape_path_bvh *bvh, int32_t child, int end, co
         box.high[k] = from->boxes.high[end][k][0];
         for (int32_t l = 1; l < from->count; l++) {
             box.low[k] = from->boxes.low[end][k][l] < box.low[k] ? from->boxes.low[end][k][l] : box.low[k];
-            box.high[k] = from->boxes.high[end][k][l] > box.high[k] ? from->boxes.high[end][k][l] : box.high[k];
+            box.high[k] =
+                from->boxes.high[end][k][l] > box.high[k] ? from->boxes.high[end][k][l] : box.high[k];
         }
     }
     return box;

@@ -11,9 +11,9 @@
 
 typedef struct drape_path_branch {
     drape_path_boxes boxes; /* of the children */
-    int32_t child[LANES];                       /* a later branch; -1 - e: the element e */
-    int32_t marked[LANES];                      /* whether an element in it is marked */
-    int32_t count;                              /* of children */
+    int32_t child[LANES];   /* a later branch; -1 - e: the element e */
+    int32_t marked[LANES];  /* whether an element in it is marked */
+    int32_t count;          /* of children */
 } drape_path_branch;
 
 typedef struct drape_path_bvh {
