@@ -35,6 +35,11 @@ static double twice_area(const double *a, const double *b, const double *c)
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
+static double length_of(double x, double y)
+{
+    return sqrt(x * x + y * y);
+}
+
 /* Axes of the plane, from the sum of the normals of faces. False: it has none. */
 static bool find_axes(const drape_model *m, int32_t cloth, const double *rest, double axis[3][3])
 {
@@ -94,7 +99,7 @@ static void measure_hull(place *places, int32_t count, place *hull, double *area
     for (int32_t i = 0; i < size; i++) {
         const double *a = hull[i].x, *b = hull[(i + 1) % size].x;
         *area += 0.5 * twice_area(hull[0].x, a, b);
-        *perimeter += hypot(b[0] - a[0], b[1] - a[1]);
+        *perimeter += length_of(b[0] - a[0], b[1] - a[1]);
     }
 }
 
@@ -124,7 +129,7 @@ static bool is_convex(builder *b, int32_t cloth, double length)
         const int32_t *n = m->edge + 2 * (size_t)e;
         const double *p = b->plane + 2 * (size_t)n[0], *q = b->plane + 2 * (size_t)n[1];
         if (drape_model_cloth_of(m, n[0]) == cloth && b->clusters->faces_of_edge[e] != 2)
-            perimeter += hypot(q[0] - p[0], q[1] - p[1]);
+            perimeter += length_of(q[0] - p[0], q[1] - p[1]);
     }
     return fabs(area - hull_area) <= FLAT * length * length &&
            fabs(perimeter - hull_perimeter) <= FLAT * length;
@@ -148,7 +153,7 @@ static void lay_flat(builder *b, int32_t cloth, const double *rest, double *besi
                 b->plane[2 * (size_t)i + (size_t)k] = at;
         }
     }
-    const double length = hypot(high[0] - low[0], high[1] - low[1]);
+    const double length = length_of(high[0] - low[0], high[1] - low[1]);
     b->flat[cloth] = high[2] - low[2] <= FLAT * length && is_convex(b, cloth, length);
     for (int32_t i = first; i < end; i++)
         b->plane[2 * (size_t)i] += *beside - low[0];
@@ -173,7 +178,7 @@ static void set_group(builder *b, int32_t which, int32_t group)
             s->inverse[(4 * (size_t)group + (size_t)i) * LANES + (size_t)l] = inverse[i];
         for (int a = 0; a < 3; a++) {
             const double *q = p[(a + 1) % 3], *r = p[(a + 2) % 3];
-            s->height[which] = fmin(s->height[which], twice / hypot(r[0] - q[0], r[1] - q[1]));
+            s->height[which] = fmin(s->height[which], twice / length_of(r[0] - q[0], r[1] - q[1]));
         }
     }
 }
