@@ -150,9 +150,10 @@ static void search_all(const char *mesh, bool flat)
         f.count = 0;
         drape_self_search_pairs(&search, &want, find_face, find_edge, &f);
         wanted += check_all(&want, &f);
-        /* Pieces without a common node are at least 14 mm apart at rest, and 0.95 times that on the path: more
-         * than the 7 + 3 mm that are asked for. So clusters that touch are left out with all of their pairs, of
-         * which there are more than ten to each edge; what remains is where the boxes of others are near. */
+        /* Pieces without a common node are at least 14 mm apart at rest, and 0.95 times that on the path:
+         * more than the 7 + 3 mm that are asked for. So clusters that touch are left out with all of
+         * their pairs, of which there are more than ten to each edge; what remains is where the boxes of
+         * others are near. */
         if (flat && first == 0 && half)
             ck_assert_int_lt(f.count, m->edge_count / 2);
     }
