@@ -182,7 +182,10 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
             s->obstacle_radius = fmax(s->obstacle_radius, m->colliders[i].shape.radius);
     share_areas(s);
     list_features(s);
-    return build_trees(arena, s, points, triangles);
+    drape_status status = build_trees(arena, s, points, triangles);
+    if (!status && m->contact.self)
+        status = drape_self_search_create(arena, m, s->rest, &s->layers);
+    return status;
 }
 
 /* ---- Constants of a pair ---- */
@@ -231,6 +234,14 @@ static bool is_free(const drape_broad_phase *s, int32_t point)
     return point < s->model->node_count && s->model->free_of_node[point] >= 0;
 }
 
+static bool is_marked(const bool *marked, const int32_t *node, int nodes)
+{
+    for (int a = 0; marked && a < nodes; a++)
+        if (marked[node[a]])
+            return true;
+    return !marked;
+}
+
 /* The other piece of a pair of cloths has its last node; at a collider one piece has nodes of cloth alone. */
 static bool is_ignored(const drape_broad_phase *s, const drape_pair *pair)
 {
@@ -252,21 +263,27 @@ static void report(query *q, int32_t piece, const drape_path_bvh *tree, int32_t 
         q->visit(q->user, &q->pair);
 }
 
+/* Both of cloth with cloth, which have stages of their own. */
+typedef struct self_query {
+    query face, edge;
+} self_query;
+
 static void meet_own_face(void *user, int32_t node, int32_t face)
 {
-    query *q = user;
+    query *q = &((self_query *)user)->face;
     const drape_broad_phase *s = q->broad;
     const int32_t *t = s->model->triangle + 3 * (size_t)face;
     if (drape_model_share_node(s->model, &node, 1, t, 3))
         return;
     q->pair.area = s->node_area[node];
     set_nodes(&q->pair, node, t[0], t[1], t[2]);
-    report(q, node, &s->faces, face);
+    if (is_marked(q->want->marked, q->pair.node, 4))
+        report(q, node, &s->faces, face);
 }
 
 static void meet_own_edge(void *user, int32_t a, int32_t b)
 {
-    query *q = user;
+    query *q = &((self_query *)user)->edge;
     const drape_broad_phase *s = q->broad;
     const int32_t first = a < b ? a : b, second = a < b ? b : a, *f = s->model->edge + 2 * (size_t)first,
                   *e = s->model->edge + 2 * (size_t)second;
@@ -274,7 +291,8 @@ static void meet_own_edge(void *user, int32_t a, int32_t b)
         return;
     q->pair.area = 0.5 * (s->edge_area[second] + s->edge_area[first]);
     set_nodes(&q->pair, f[0], f[1], e[0], e[1]);
-    report(q, first, &s->edges, second);
+    if (is_marked(q->want->marked, q->pair.node, 4))
+        report(q, first, &s->edges, second);
 }
 
 static void meet_face(void *user, int32_t corner, int32_t face)
@@ -354,17 +372,25 @@ static void fit(drape_broad_phase *s, const drape_broad_query *want)
         drape_path_bvh_fit(of[i].tree, want->x, want->y, want->marked, of[i].reach);
 }
 
+/* Neighbours at rest have an activation distance of at most half of their distance there
+ * (drape_pair_activation_distance), unless the start is untangled. */
 static void search_self(query *q)
 {
     drape_broad_phase *s = q->broad;
-    const double distance = 2 * s->model->contact.self_thickness,
-                 reach = drape_broad_phase_wanted(s, q->want->passing, distance) + q->want->reach;
-    begin_stage(q, OWN_FACES, DRAPE_PAIR_TRIANGLE);
-    q->pair.distance = distance;
-    drape_path_bvh_join(&s->nodes, &s->faces, q->want->y, reach, meet_own_face, q);
-    begin_stage(q, OWN_EDGES, DRAPE_PAIR_SEGMENTS);
-    q->pair.distance = distance;
-    drape_path_bvh_join(&s->edges, &s->edges, q->want->y, reach, meet_own_edge, q);
+    const drape_broad_query *want = q->want;
+    const double distance = 2 * s->model->contact.self_thickness;
+    const drape_self_query layers = {
+        .x = want->x,
+        .y = want->y,
+        .reach = drape_broad_phase_wanted(s, want->passing, distance) + want->reach,
+        .slack = want->passing || s->model->untangle.given ? INFINITY : want->reach,
+        .rounding = s->rounding,
+        .marked = want->marked};
+    self_query both = {*q, *q};
+    begin_stage(&both.face, OWN_FACES, DRAPE_PAIR_TRIANGLE);
+    begin_stage(&both.edge, OWN_EDGES, DRAPE_PAIR_SEGMENTS);
+    both.face.pair.distance = both.edge.pair.distance = distance;
+    drape_self_search_pairs(&s->layers, &layers, meet_own_face, meet_own_edge, &both);
 }
 
 static void search_features(query *q)
@@ -389,14 +415,6 @@ static void scanned(void *user, int32_t element)
 {
     const scan *of = user;
     of->meet(of->query, of->feature, element);
-}
-
-static bool is_marked(const bool *marked, const int32_t *node, int nodes)
-{
-    for (int a = 0; marked && a < nodes; a++)
-        if (marked[node[a]])
-            return true;
-    return !marked;
 }
 
 /* What is scanned: all of the cloth, or only its marked elements. */
@@ -574,12 +592,12 @@ void drape_broad_phase_pairs(drape_broad_phase *s, const drape_broad_query *want
                              drape_broad_phase_visit *visit, void *user)
 {
     query q = {.broad = s, .want = want, .visit = visit, .user = user};
-    if (s->corners.count + s->segments <= FEW && s->obstacles.count == 0 && !s->model->contact.self) {
+    if (s->model->contact.self)
+        search_self(&q);
+    if (s->corners.count + s->segments <= FEW && s->obstacles.count == 0) {
         scan_features(&q);
         return;
     }
     fit(s, want);
-    if (s->model->contact.self)
-        search_self(&q);
     search_features(&q);
 }

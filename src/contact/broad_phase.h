@@ -8,6 +8,7 @@
 
 #include "contact/distant.h"
 #include "contact/pair.h"
+#include "contact/self_search.h"
 #include "geometry/path_bvh.h"
 
 typedef struct drape_broad_phase {
@@ -18,6 +19,7 @@ typedef struct drape_broad_phase {
     double *rest;                         /* (points x 3): nodes at rest, points of undisplaced colliders */
     int32_t *point;                       /* (points) their numbers: the elements of trees of points */
     drape_path_bvh nodes, faces, edges;   /* of the cloths */
+    drape_self_search layers;             /* of cloth with cloth */
     drape_path_bvh corners, segment_tree; /* points and segments of colliders; */
     drape_path_bvh obstacles; /* their triangles, of those without a smooth distance: their boxes are
                                  enlarged by how far from them contact begins */

@@ -27,7 +27,7 @@
 #include <float.h>
 #include <string.h>
 
-#define MARGIN  0.12 /* by which points may leave the path of a search before a new one, in mean edges */
+#define MARGIN  0.06 /* by which points may leave the path of a search before a new one, in mean edges */
 #define LONGEST 8.0  /* in mean edges: for a path that is longer, candidates are searched at its end alone */
 /* A gap below this share of the largest coordinate is rounding: closest points and their distance have
  * errors of some hundred units in the last place. */

@@ -16,13 +16,29 @@ static int32_t room_for(int32_t count, int32_t room)
     return count <= room ? room : count <= INT32_MAX / 2 ? 2 * count : count;
 }
 
+/* The smallest and the largest of one of the ranks. */
+typedef struct span {
+    int32_t low, high;
+} span;
+
+static span span_of(const drape_pair *pairs, int32_t count, int which)
+{
+    span of = {pairs[0].rank[which], pairs[0].rank[which]};
+    for (int32_t i = 1; i < count; i++) {
+        of.low = pairs[i].rank[which] < of.low ? pairs[i].rank[which] : of.low;
+        of.high = pairs[i].rank[which] > of.high ? pairs[i].rank[which] : of.high;
+    }
+    return of;
+}
+
 static drape_status reserve(drape_pair_sorter *s, const drape_pair *pairs, int32_t count)
 {
-    int32_t last = 0;
-    for (int32_t i = 0; i < count; i++)
-        for (int k = 1; k < 3; k++)
-            last = pairs[i].rank[k] > last ? pairs[i].rank[k] : last;
-    const int32_t room = room_for(count, s->room), first_room = room_for(last + 2, s->first_room);
+    int32_t widest = 0;
+    for (int k = 0; k < 3; k++) {
+        const span of = span_of(pairs, count, k);
+        widest = of.high - of.low > widest ? of.high - of.low : widest;
+    }
+    const int32_t room = room_for(count, s->room), first_room = room_for(widest + 2, s->first_room);
     if (room > s->room) {
         drape_pair *to = drape_arena_resize(s->arena, s->pairs, (size_t)room, sizeof *to);
         s->pairs = to ? to : s->pairs;
@@ -46,17 +62,15 @@ static drape_status reserve(drape_pair_sorter *s, const drape_pair *pairs, int32
 static void order_by(const drape_pair_sorter *s, int which, const drape_pair *pairs, int32_t count,
                      const int32_t *from, int32_t *to)
 {
-    int32_t last = 0;
+    const span of = span_of(pairs, count, which);
+    memset(s->first, 0, ((size_t)(of.high - of.low) + 2) * sizeof *s->first);
     for (int32_t i = 0; i < count; i++)
-        last = pairs[i].rank[which] > last ? pairs[i].rank[which] : last;
-    memset(s->first, 0, ((size_t)last + 2) * sizeof *s->first);
-    for (int32_t i = 0; i < count; i++)
-        s->first[pairs[i].rank[which] + 1]++;
-    for (int32_t k = 0; k < last; k++)
+        s->first[pairs[i].rank[which] - of.low + 1]++;
+    for (int32_t k = 0; k < of.high - of.low; k++)
         s->first[k + 1] += s->first[k];
     for (int32_t i = 0; i < count; i++) {
         const int32_t pair = from ? from[i] : i;
-        to[s->first[pairs[pair].rank[which]]++] = pair;
+        to[s->first[pairs[pair].rank[which] - of.low]++] = pair;
     }
 }
 
@@ -66,14 +80,11 @@ drape_status drape_sort_pairs(drape_pair_sorter *s, drape_pair *pairs, int32_t c
         return DRAPE_OK;
     if (reserve(s, pairs, count))
         return DRAPE_E_MEMORY;
-    for (int32_t i = 0, end; i < count; i = end) { /* a stage; those of surfaces are sorted */
-        for (end = i + 1; end < count && pairs[end].rank[0] == pairs[i].rank[0]; end++)
-            ;
-        order_by(s, 2, pairs + i, end - i, NULL, s->order[0]);
-        order_by(s, 1, pairs + i, end - i, s->order[0], s->order[1]);
-        for (int32_t k = i; k < end; k++)
-            s->pairs[k] = pairs[i + s->order[1][k - i]];
-    }
+    order_by(s, 2, pairs, count, NULL, s->order[0]);
+    order_by(s, 1, pairs, count, s->order[0], s->order[1]);
+    order_by(s, 0, pairs, count, s->order[1], s->order[0]);
+    for (int32_t i = 0; i < count; i++)
+        s->pairs[i] = pairs[s->order[0][i]];
     memcpy(pairs, s->pairs, (size_t)count * sizeof *pairs);
     return DRAPE_OK;
 }

@@ -1,6 +1,6 @@
 /*
- * sort_pairs.h: pairs by rank (pair.h), in time proportional to their number: those of a search come by
- * stage, but within a stage in the order of trees of boxes.
+ * sort_pairs.h: pairs by rank (pair.h), in time proportional to their number: those of a search come in the
+ * order of trees of boxes.
  */
 #ifndef DRAPE_CONTACT_SORT_PAIRS_H
 #define DRAPE_CONTACT_SORT_PAIRS_H
@@ -21,11 +21,11 @@ typedef struct drape_pair_sorter {
     drape_arena *arena;
     drape_pair *pairs; /* (room) */
     int32_t *order[2]; /* (room) */
-    int32_t *first;    /* (first_room) of the pairs with each piece */
+    int32_t *first;    /* (first_room) of the pairs with each rank */
     int32_t room, first_room;
 } drape_pair_sorter;
 
-/* Sorts `count` pairs, whose stages ascend already. Errors: DRAPE_E_MEMORY, the pairs stay as they are. */
+/* Sorts `count` pairs. Errors: DRAPE_E_MEMORY, the pairs stay as they are. */
 drape_status drape_sort_pairs(drape_pair_sorter *sorter, drape_pair *pairs, int32_t count);
 
 #endif

@@ -163,7 +163,7 @@ drape_status drape_untangle_gaps(drape_untangler *u)
     gathering g = {.u = u,
                    .rest = {.model = u->model, .x = u->broad.rest, .pose = u->pose},
                    .reach = REACH * drape_untangle_stride(u)};
-    const drape_broad_query want = {.x = u->x, .reach = g.reach};
+    const drape_broad_query want = {.x = u->x, .pose = {u->pose, u->pose}, .reach = g.reach};
     u->near_count = 0;
     drape_broad_phase_pairs(&u->broad, &want, gather, u);
     if (u->out_of_memory || drape_sort_pairs(&u->sorter, u->near, u->near_count))

@@ -109,11 +109,12 @@ static drape_box child_box(const drape_path_bvh *bvh, int32_t child, int end, co
     const drape_path_branch *from = &bvh->branches[child];
     drape_box box;
     for (int k = 0; k < 3; k++) {
-        box.low[k] = from->low[end][k][0];
-        box.high[k] = from->high[end][k][0];
+        box.low[k] = from->boxes.low[end][k][0];
+        box.high[k] = from->boxes.high[end][k][0];
         for (int32_t l = 1; l < from->count; l++) {
-            box.low[k] = from->low[end][k][l] < box.low[k] ? from->low[end][k][l] : box.low[k];
-            box.high[k] = from->high[end][k][l] > box.high[k] ? from->high[end][k][l] : box.high[k];
+            box.low[k] = from->boxes.low[end][k][l] < box.low[k] ? from->boxes.low[end][k][l] : box.low[k];
+            box.high[k] =
+                from->boxes.high[end][k][l] > box.high[k] ? from->boxes.high[end][k][l] : box.high[k];
         }
     }
     return box;
@@ -144,8 +145,8 @@ void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, c
             for (int32_t l = 0; l < branch->count; l++) {
                 const drape_box box = child_box(bvh, branch->child[l], end, ends[end], grow);
                 for (int k = 0; k < 3; k++) {
-                    branch->low[end][k][l] = box.low[k];
-                    branch->high[end][k][l] = box.high[k];
+                    branch->boxes.low[end][k][l] = box.low[k];
+                    branch->boxes.high[end][k][l] = box.high[k];
                 }
             }
     }
@@ -154,25 +155,9 @@ void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, c
 /* ---- Queries ---- */
 
 typedef struct query {
-    lanes low[2][3], high[2][3]; /* the same number in all lanes */
-    int32_t marked;              /* the least value of marked */
+    drape_path_box box;
+    int32_t marked; /* the least value of marked */
 } query;
-
-/* Which children an axis separates from the query: -1 in their lanes. */
-LANES_INLINE lanes_mask find_apart(const drape_path_branch *branch, const query *q, int ends)
-{
-    lanes_mask apart = {0};
-    for (int k = 0; k < 3; k++) {
-        lanes_mask above = lanes_load(branch->low[0][k]) > q->high[0][k],
-                   below = lanes_load(branch->high[0][k]) < q->low[0][k];
-        if (ends > 1) {
-            above &= lanes_load(branch->low[1][k]) > q->high[1][k];
-            below &= lanes_load(branch->high[1][k]) < q->low[1][k];
-        }
-        apart |= above | below;
-    }
-    return apart;
-}
 
 LANES_INLINE void traverse(const drape_path_bvh *bvh, const query *q, int ends, drape_bvh_visit *visit,
                            void *user)
@@ -188,7 +173,7 @@ LANES_INLINE void traverse(const drape_path_bvh *bvh, const query *q, int ends, 
             continue;
         }
         const drape_path_branch *branch = &bvh->branches[self];
-        const lanes_mask apart = find_apart(branch, q, ends);
+        const lanes_mask apart = drape_path_boxes_apart(&branch->boxes, &q->box, ends);
         for (int l = LANES - 1; l >= 0; l--) { /* writes always, without a branch to mispredict */
             waiting[count] = branch->child[l];
             count += (apart[l] == 0) & (l < branch->count) & (branch->marked[l] >= q->marked);
@@ -216,8 +201,8 @@ void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *fro
     for (int end = 0; end < 2 && ends[end]; end++) {
         const drape_box box = box_of(from->node, from->nodes, ends[end]);
         for (int k = 0; k < 3; k++) {
-            q.low[end][k] = box.low[k] - from->reach - (lanes){0};
-            q.high[end][k] = box.high[k] + from->reach - (lanes){0};
+            q.box.low[end][k] = box.low[k] - from->reach - (lanes){0};
+            q.box.high[end][k] = box.high[k] + from->reach - (lanes){0};
         }
     }
     if (from->y)
@@ -275,16 +260,6 @@ typedef struct meeting {
 /* Each meeting leaves at most LANES^2 others, one level deeper in one tree. */
 #define MEETINGS (LANES * LANES * DRAPE_BVH_DEPTH)
 
-/* The boxes of a child, enlarged by reach. */
-LANES_INLINE void boxes_of(const drape_path_branch *branch, int32_t lane, double reach, int ends, query *q)
-{
-    for (int end = 0; end < ends; end++)
-        for (int k = 0; k < 3; k++) {
-            q->low[end][k] = branch->low[end][k][lane] - reach - (lanes){0};
-            q->high[end][k] = branch->high[end][k][lane] + reach - (lanes){0};
-        }
-}
-
 /* Tests one child, or all, of a branch against all children of the other branch. A branch that meets
  * itself has each pair of its children once. */
 LANES_INLINE int32_t meet(const drape_path_bvh *const tree[2], const meeting *at, double reach, int ends,
@@ -296,9 +271,9 @@ LANES_INLINE int32_t meet(const drape_path_bvh *const tree[2], const meeting *at
     const int32_t first = at->lane < 0 ? 0 : at->lane, last = at->lane < 0 ? from->count - 1 : at->lane;
     int32_t count = 0;
     for (int32_t i = first; i <= last; i++) {
-        query q;
-        boxes_of(from, i, reach, ends, &q);
-        const lanes_mask apart = find_apart(to, &q, ends);
+        drape_path_box box;
+        drape_path_box_of(&from->boxes, i, reach, ends, &box);
+        const lanes_mask apart = drape_path_boxes_apart(&to->boxes, &box, ends);
         if (apart[0] & apart[1] & apart[2] & apart[3])
             continue;
         for (int32_t l = itself ? i : 0; l < to->count; l++) {

@@ -1,22 +1,19 @@
 /*
  * path_bvh.h: a tree of boxes over edges or triangles that move straight from one configuration to
  * another. Each branch has four children, which are tested at once, and each child has two boxes, one
- * around each end of the path. Two convex pieces stay apart on their straight paths if one axis separates
- * them at both ends with the same piece in front: the difference of any two of their points along that
- * axis is then linear in the step fraction and positive at both ends. So a motion that pieces have in
- * common brings no pair together.
+ * around each end of the path (path_box.h). So a motion that pieces have in common brings no pair together.
  */
 #ifndef DRAPE_GEOMETRY_PATH_BVH_H
 #define DRAPE_GEOMETRY_PATH_BVH_H
 
-#include "base/lanes.h"
 #include "geometry/bvh.h"
+#include "geometry/path_box.h"
 
 typedef struct drape_path_branch {
-    double low[2][3][LANES], high[2][3][LANES]; /* by end, axis and child */
-    int32_t child[LANES];                       /* a later branch; -1 - e: the element e */
-    int32_t marked[LANES];                      /* whether an element in it is marked */
-    int32_t count;                              /* of children */
+    drape_path_boxes boxes; /* of the children */
+    int32_t child[LANES];   /* a later branch; -1 - e: the element e */
+    int32_t marked[LANES];  /* whether an element in it is marked */
+    int32_t count;          /* of children */
 } drape_path_branch;
 
 typedef struct drape_path_bvh {

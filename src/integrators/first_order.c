@@ -486,6 +486,9 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     info->h = t - in->t;
     info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
     audit(s, in, out, info);
+    status = drape_system_status(s->system);
+    if (status)
+        return status;
     s->from = in->t;
     s->reached = t;
     s->steps -= t == end;

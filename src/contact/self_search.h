@@ -1,0 +1,43 @@
+/*
+ * self_search.h: finds the pairs of cloth with cloth whose pieces may be near each other, on a straight path
+ * of all nodes. Clusters of a few faces are compared first: boxes keep apart those that are far from each
+ * other, and those of a flat sheet that are neighbours are kept apart by how little the sheet is deformed
+ * (flat.h). So only the elements where cloth is folded, or where layers are near each other, are looked at
+ * one by one.
+ */
+#ifndef DRAPE_CONTACT_SELF_SEARCH_H
+#define DRAPE_CONTACT_SELF_SEARCH_H
+
+#include "contact/flat.h"
+#include "geometry/path_box.h"
+
+typedef struct drape_self_search {
+    drape_clusters clusters;
+    drape_flat flat;
+    drape_path_boxes *boxes[DRAPE_ELEMENT_KINDS]; /* (groups) */
+    int64_t *fitted;                              /* (clusters) the search that these are of */
+    double (*low)[2][3], (*high)[2][3];           /* (branches) by end and axis */
+    bool *marked;                                 /* (branches) */
+    int64_t search;                               /* the number of searches so far */
+} drape_self_search;
+
+/* rest: (node_count x 3). Errors: DRAPE_E_MEMORY. */
+drape_status drape_self_search_create(drape_arena *arena, const drape_model *model, const double *rest,
+                                      drape_self_search *out);
+
+/* Pairs that may be nearer than `reach` on the path from x to y (y NULL: at x), without those whose
+ * pieces are surely at least half of their distance at rest plus `slack` apart, which may be visited or
+ * not. marked (node_count): only clusters of which one has a marked node; NULL: all. */
+typedef struct drape_self_query {
+    const double *x, *y;
+    double reach, slack, rounding; /* [m] */
+    const bool *marked;
+} drape_self_query;
+
+/* Calls the functions for all such pairs, also of elements that share a node, in an order that does not
+ * depend on positions: of a node and a face, and of two edges. */
+typedef void drape_self_meet(void *user, int32_t a, int32_t b);
+void drape_self_search_pairs(drape_self_search *search, const drape_self_query *want, drape_self_meet *face,
+                             drape_self_meet *edge, void *user);
+
+#endif
