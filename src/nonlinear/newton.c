@@ -89,6 +89,16 @@
 #define EASY       10
 #define EASY_SHARE 0.4
 
+/* Forcing terms of Eisenstat & Walker 1996, "Choosing the forcing terms in an inexact Newton method", SIAM
+ * J. Sci. Comput. 17, choice 2 with its safeguard, by the constants of KINSOL:
+ *     eta = gamma (|F| / |F before|)^2,
+ * at least gamma (eta before)^2 where that is above a bound. */
+#define FORCING_FIRST     0.5
+#define FORCING_GAMMA     0.9
+#define FORCING_SAFEGUARD 0.1
+#define FORCING_MIN       1e-4
+#define FORCING_MAX       0.9
+
 struct drape_newton {
     drape_step_equation *equation;
     double values[DRAPE_NEWTON_PARAM_COUNT];
@@ -114,6 +124,7 @@ struct drape_newton {
     int corrections;
     double rounding;       /* of F in its norm, as last estimated; INFINITY: it was not */
     double residual;       /* weighted, largest component, at the last iterate that KINSOL evaluated */
+    double forcing_norm;   /* |F| where the last correction was made; NAN: none was */
     double positive_share; /* of the positive parts, requested for the present matrix; after a line search,
                               for the next one; with `project` every matrix has all of them */
     bool indefinite;       /* the exact matrix was at the last iterate where it was tried */
@@ -146,6 +157,7 @@ static void begin(drape_newton *s)
     drape_step_equation_begin(e);
     s->corrections = 0;
     s->residual = s->rounding = INFINITY;
+    s->forcing_norm = NAN;
     s->positive_share = 0;
     s->indefinite = false;
     s->trial_evaluated = s->near_enough = false;
@@ -503,12 +515,27 @@ static double next_share(const drape_newton *s, double a)
     return a < SHORT_STEP && !lacks_coupling ? 1 : 0;
 }
 
+/* How much of the residual iterative linear solvers leave in the next correction. */
+static void choose_forcing(drape_newton *s, const double *minus_f)
+{
+    const double before = s->forcing_norm, last = s->linear->tolerance;
+    if (s->values[DRAPE_NEWTON_FORCING] == DRAPE_NEWTON_FORCING_CONSTANT)
+        return;
+    s->forcing_norm = sqrt(drape_step_equation_dot(s->equation, minus_f, minus_f));
+    const double ratio = s->forcing_norm / before, least = FORCING_GAMMA * last * last;
+    double forcing = isnan(ratio) ? FORCING_FIRST : FORCING_GAMMA * ratio * ratio;
+    if (!isnan(ratio) && least > FORCING_SAFEGUARD)
+        forcing = fmax(forcing, least);
+    s->linear->tolerance = fmin(fmax(forcing, FORCING_MIN), FORCING_MAX);
+}
+
 /* Turns p into the step that is taken from the present iterate d. A p that is not finite is left to KINSOL,
  * whose evaluation then fails. */
 static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
 {
     drape_step_equation *e = s->equation;
     const double *d = N_VGetArrayPointer(s->unknown);
+    choose_forcing(s, minus_f);
     drape_status status = drape_sun_linear_solve(s->linear, minus_f, p);
     if (s->searches)
         status = ensure_descent(s, status, minus_f, p);

@@ -23,6 +23,7 @@ enum {
     DRAPE_NEWTON_PROJECT,
     DRAPE_NEWTON_LINEAR_SOLVER,
     DRAPE_NEWTON_LINEAR_TOLERANCE,
+    DRAPE_NEWTON_FORCING,
     DRAPE_NEWTON_CORRECTION_TOLERANCE,
     DRAPE_NEWTON_PARAM_COUNT
 };
@@ -33,6 +34,7 @@ extern const char *const drape_newton_failures[];
 extern const char *const drape_newton_methods[];
 extern const char *const drape_newton_globalizations[];
 extern const char *const drape_newton_predictors[];
+extern const char *const drape_newton_forcings[];
 
 /* The list of an integrator without parameters of its own. */
 extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
@@ -78,6 +80,11 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
     [DRAPE_NEWTON_LINEAR_TOLERANCE] =                                                                        \
         DRAPE_NUMBER("linear_tolerance", "1", 1e-2, 1e-14, DRAPE_BELOW(1),                                   \
                      "relative residual that iterative linear solvers leave in a correction"),               \
+    [DRAPE_NEWTON_FORCING] =                                                                                 \
+        DRAPE_CHOICE("forcing", DRAPE_NEWTON_FORCING_CONSTANT, drape_newton_forcings,                        \
+                     "constant: iterative linear solvers leave linear_tolerance; eisenstat_walker: 0.5 at "  \
+                     "first, then 0.9 times the square of the factor by which the last iteration lowered "   \
+                     "the residual, 1e-4 to 0.9"),                                                           \
     [DRAPE_NEWTON_CORRECTION_TOLERANCE] = DRAPE_NUMBER(                                                      \
         "correction_tolerance", "m", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1,                               \
         "a solve also ends, whatever its residual, after a whole correction and a chord step by the same "   \
@@ -94,6 +101,7 @@ enum {
     DRAPE_NEWTON_GLOBAL_AUTO
 };
 enum { DRAPE_NEWTON_PREDICTOR_INERTIAL, DRAPE_NEWTON_PREDICTOR_REST };
+enum { DRAPE_NEWTON_FORCING_CONSTANT, DRAPE_NEWTON_FORCING_EISENSTAT_WALKER };
 
 typedef struct drape_newton drape_newton;
 
