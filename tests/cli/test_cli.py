@@ -813,7 +813,7 @@ def test_info_of_pins():
             {"nodes": [6, 7], "name": "wheel", "track": [[0, [0, 0, 0]], [1, [0, 0, 1]]],
              "turns": [{"time": 0, "rotate": [0, 1, 0, 0]}, {"time": 1, "quaternion": [0.8, 0, 0.6, 0]}]}]
     masses = [{"corner": "top-left", "add": 0.01}, {"box": [[-9, -9, -9], [9, 9, 9]], "mass": 0.5}, {"nodes": [15], "add": 1}]
-    start = {"folds": [{"point": [9, 0, 0], "axis": [0, 0, 1], "side": [1, 0, 0], "radius": 0.02}], "spin": [0, 1, 0]}
+    start = {"folds": [{"point": [0.2, 0, 0], "axis": [0, 0, 1], "side": [1, 0, 0], "radius": 0.02}], "spin": [0, 1, 0]}
     rest = [[0, -5, 0], [1, -5, 0], [0, -5, 1], [0, -6, 0]]
     faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
     with open("soft.obj", "w", encoding="utf-8") as file:
