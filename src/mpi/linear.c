@@ -265,6 +265,8 @@ static PetscErrorCode begin_cg(mpi_linear *s)
         code = PCSetType(pc, PCGAMG);
     if (!code)
         code = PCGAMGSetReuseInterpolation(pc, PETSC_TRUE);
+    if (!code) /* or the smoothers keep the largest eigenvalues of the first matrix, and amplify with others */
+        code = PCGAMGSetUseSAEstEig(pc, PETSC_FALSE);
     if (!code)
         code = KSPSetOptionsPrefix(s->cg, "drape_");
     if (!code)
@@ -349,8 +351,8 @@ static drape_status factor_definite(void *state, const double *values)
     return factor_any(state, values, true);
 }
 
-/* By KSP; whether it converged. */
-static bool apply(mpi_linear *s, KSP ksp, const double *b, double *x)
+/* By KSP; whether it converged, and why it ended. */
+static bool apply(mpi_linear *s, KSP ksp, const double *b, double *x, KSPConvergedReason *why)
 {
     KSPConvergedReason reason = 0;
     PetscErrorCode code = VecPlaceArray(s->b, b);
@@ -362,7 +364,25 @@ static bool apply(mpi_linear *s, KSP ksp, const double *b, double *x)
         code = KSPGetConvergedReason(ksp, &reason);
     VecResetArray(s->b);
     VecResetArray(s->x);
+    *why = reason;
     return !code && reason > 0;
+}
+
+/* By conjugate gradients. A preconditioner that is not definite says nothing of the matrix: with new
+ * aggregates it is tried once more. */
+static bool apply_cg(mpi_linear *s, double tolerance, const double *b, double *x)
+{
+    KSPConvergedReason reason = 0;
+    bool solved = !KSPSetTolerances(s->cg, tolerance, 0, PETSC_DEFAULT, MAX_ITERATIONS) &&
+                  apply(s, s->cg, b, x, &reason);
+    if (reason == KSP_DIVERGED_INDEFINITE_PC) {
+        s->first = -1;
+        solved = factor_cg(s) && !KSPSetTolerances(s->cg, tolerance, 0, PETSC_DEFAULT, MAX_ITERATIONS) &&
+                 apply(s, s->cg, b, x, &reason);
+    }
+    KSPGetIterationNumber(s->cg, &s->last);
+    s->first = s->first < 0 ? s->last : s->first;
+    return solved;
 }
 
 static drape_status finish(const mpi_linear *s, const double *x, bool solved)
@@ -377,23 +397,20 @@ static drape_status solve_inexact(void *state, const double *b, double *x, doubl
                                   int64_t *iterations)
 {
     mpi_linear *s = state;
+    KSPConvergedReason reason;
     *iterations = 1;
     if (!s->factored)
         return DRAPE_RETRY_LINEAR;
     if (!s->by_direct) {
-        if (KSPSetTolerances(s->cg, tolerance, 0, PETSC_DEFAULT, MAX_ITERATIONS))
-            return DRAPE_E_SOLVER;
-        const bool solved = apply(s, s->cg, b, x);
-        KSPGetIterationNumber(s->cg, &s->last);
+        const bool solved = apply_cg(s, tolerance, b, x);
         *iterations = s->last;
-        s->first = s->first < 0 ? s->last : s->first;
         if (solved && finish(s, x, true) == DRAPE_OK)
             return DRAPE_OK;
         const drape_status status = s->definite ? DRAPE_RETRY_LINEAR : fall_back(s);
         if (status)
             return status;
     }
-    return finish(s, x, apply(s, s->direct, b, x));
+    return finish(s, x, apply(s, s->direct, b, x, &reason));
 }
 
 static drape_status solve(void *state, const double *b, double *x)
