@@ -265,7 +265,7 @@ static PetscErrorCode begin_cg(mpi_linear *s)
         code = PCSetType(pc, PCGAMG);
     if (!code)
         code = PCGAMGSetReuseInterpolation(pc, PETSC_TRUE);
-    if (!code) /* or the smoothers keep the largest eigenvalues of the first matrix, and amplify with others */
+    if (!code) /* or the smoothers keep the largest eigenvalues of the first matrix, and amplify others */
         code = PCGAMGSetUseSAEstEig(pc, PETSC_FALSE);
     if (!code)
         code = KSPSetOptionsPrefix(s->cg, "drape_");
