@@ -820,6 +820,13 @@ const double *drape_newton_values(const drape_newton *s)
     return s->values;
 }
 
+void drape_newton_set_tolerance(drape_newton *s, double tolerance)
+{
+    s->values[DRAPE_NEWTON_TOLERANCE] = tolerance;
+    if (s->equation->dofs > 0)
+        KINSetFuncNormTol(s->kin, max_norm_bound(s));
+}
+
 void drape_newton_forget_factors(drape_newton *s)
 {
     s->factored = false;

@@ -125,6 +125,9 @@ drape_status drape_newton_matrix(drape_newton *newton, const drape_point *point,
 /* The parameter values it was made with, in the order of drape_newton_params; the tolerance as it is used. */
 const double *drape_newton_values(const drape_newton *newton);
 
+/* The bound on the residual of the next solves [N]. */
+void drape_newton_set_tolerance(drape_newton *newton, double tolerance);
+
 /* From now on the factors belong to another equation, so modified Newton must not reuse them. */
 void drape_newton_forget_factors(drape_newton *newton);
 
