@@ -199,6 +199,26 @@ def test_slow_contact():
     assert "slow_contact" not in warnings("scene.json")
 
 
+def test_many_iterations():
+    """steps that take more than ten Newton iterations on average have a warning, unless a controller makes them smaller for that"""
+    def found(*args):
+        return warnings("scene.json", *args).get("many_iterations")
+    ball = {"type": "sphere", "center": [0.5, -0.35, -0.5], "radius": 0.3}
+    cloth = {"mesh": {"grid": "square", "columns": 12, "rows": 12, "width": 1, "height": 1}, "terms": ["stretch.edge", "bend.hinge"],
+             "material": {"young_modulus": 1e8, "thickness": 2e-4, "areal_density": 0.1}}
+    write_scene(cloth=[cloth], colliders=[ball], duration=0.5, integrator={"method": "be", "dt": 1 / 60})
+    text = found()
+    summary = read_json("s.json")
+    a_step = summary["newton"]["iterations"] / (summary["steps"]["accepted"] + summary["steps"]["rejected"])
+    assert a_step > 10, f"the scene of this test takes {a_step} iterations an attempt"
+    equal(text, f"be took {a_step:.3g} Newton iterations an attempt, as where cloth buckles: a smaller dt, or the controller \"iterations\", "
+          "is more accurate there and often takes hardly longer", "text")
+    equal(found("--set", "/controller/type=iterations"), None, "the controller that is advised")
+    equal(found("--integrator", "newton_k"), None, "a method that does not converge its steps")
+    write_scene(cloth=[cloth], duration=0.5, integrator={"method": "be", "dt": 1 / 60})
+    equal(found(), None, "cloth that falls freely")
+
+
 def test_report():
     """the report of a run has its warnings"""
     write_scene()
