@@ -5,9 +5,9 @@
  *     m M d + grad E(x + d) = 0,   x <- x + d,
  * each of them a Newton solve. The weight m falls with the residual, and at least by half in each step, so
  * that the last steps are Newton steps; it stays where a step took many iterations and the residual has
- * hardly fallen. Nobody sees where these steps end, so each is solved to a part of the residual only. One that
- * fails, or ends in a degenerate element, is discarded and retried with a larger m. Damping and velocities have
- * no effect.
+ * hardly fallen. Nobody sees where these steps end, so each is solved to a part of the residual only. One
+ * that fails, or ends in a degenerate element, is discarded and retried with a larger m. Damping and
+ * velocities have no effect.
  *
  * The signs of D in K = L D L' show whether the equilibrium is stable: it is if none is negative. Of a load
  * without a potential K is not symmetric, and that is not known.
@@ -25,8 +25,9 @@
 #define MAX_FACTOR  0.5
 #define FAIL_FACTOR 4.0 /* of m after a failure */
 /* Of the static residual, that a step may leave in its own equation; and the iterations after which m stays
- * if the static residual has not halved. 29 drawn sheets that have an equilibrium took 11738 iterations with
- * these, and 27286 with steps solved to the tolerance, m that always falls, and ten times m after a failure. */
+ * if the static residual has not halved. 29 drawn sheets that have an equilibrium took 11738 iterations
+ * with these, and 27286 with steps solved to the tolerance, m that always falls, and ten times m after a
+ * failure. */
 #define LEFT 0.1
 #define MANY 16
 /* of the stiffness, in parts of its largest entry: more than rounding; the signs of its pivots then say
