@@ -73,8 +73,8 @@ static void unpack(const char *from, const int32_t *place, int32_t n, size_t siz
 }
 
 /* Sends items to the neighbours and receives others of the same size. */
-static void send(const drape_mpi_ranks *r, const drape_exchange *x, const char *sent, const int32_t *first_sent,
-                 char *received, const int32_t *first_received, size_t size)
+static void send(const drape_mpi_ranks *r, const drape_exchange *x, const char *sent,
+                 const int32_t *first_sent, char *received, const int32_t *first_received, size_t size)
 {
     for (int k = 0; k < x->neighbour_count; k++)
         MPI_Irecv(received + size * (size_t)first_received[k],
@@ -95,12 +95,14 @@ static void exchange(const drape_mpi_ranks *r, const drape_exchange *x, const ch
     unpack(x->inside, x->in, x->first_in[x->neighbour_count], size, count, copies);
 }
 
-static void copy(const drape_ranks *ranks, const drape_exchange *x, const void *own, void *copies, size_t size)
+static void copy(const drape_ranks *ranks, const drape_exchange *x, const void *own, void *copies,
+                 size_t size)
 {
     exchange(of(ranks), x, &(const char *){own}, &(char *){copies}, 1, size);
 }
 
-static void add(const drape_ranks *ranks, const drape_exchange *x, double *own, const double *copies, int width)
+static void add(const drape_ranks *ranks, const drape_exchange *x, double *own, const double *copies,
+                int width)
 {
     const size_t n = (size_t)width, size = n * sizeof *own;
     pack(&(const char *){(const char *)copies}, 1, x->in, x->first_in[x->neighbour_count], size, x->inside);
@@ -207,7 +209,8 @@ static int32_t find(const int32_t *sorted, int32_t count, int32_t value)
 }
 
 /* wanted (ranks): how many items of each rank have copies here; asked (ranks): of this one there. */
-static drape_exchange *take(drape_arena *arena, int ranks, const int *wanted, const int *asked, size_t largest)
+static drape_exchange *take(drape_arena *arena, int ranks, const int *wanted, const int *asked,
+                            size_t largest)
 {
     drape_exchange *x = drape_arena_take(arena, 1, sizeof *x);
     int32_t in = 0, out = 0;
@@ -277,8 +280,8 @@ static drape_exchange *plan(const drape_ranks *ranks, drape_arena *arena, int32_
 
 /* The copies of nodes, which their owners know by their numbers in the whole model only. copy (nodes),
  * rank (nodes), number (nodes): scratch. */
-static drape_exchange *plan_nodes(drape_mpi_ranks *r, const drape_model *m, const int32_t *owner, int32_t *copy,
-                                  int32_t *rank, int32_t *number)
+static drape_exchange *plan_nodes(drape_mpi_ranks *r, const drape_model *m, const int32_t *owner,
+                                  int32_t *copy, int32_t *rank, int32_t *number)
 {
     const int32_t *node = m->part->node;
     int32_t count = 0;
@@ -288,8 +291,7 @@ static drape_exchange *plan_nodes(drape_mpi_ranks *r, const drape_model *m, cons
             rank[count] = owner[node[i]];
             number[count++] = node[i];
         }
-    drape_exchange *x =
-        plan(&r->base, &r->arena, count, rank, number, 3 * DRAPE_MPI_ARRAYS * sizeof(double));
+    drape_exchange *x = plan(&r->base, &r->arena, count, rank, number, 3 * DRAPE_MPI_ARRAYS * sizeof(double));
     for (int32_t i = 0; x && i < x->first_in[x->neighbour_count]; i++)
         x->in[i] = copy[x->in[i]];
     for (int32_t i = 0; x && i < x->first_out[x->neighbour_count]; i++)

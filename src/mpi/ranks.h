@@ -25,9 +25,9 @@ typedef struct drape_mpi_ranks {
     drape_arena arena;
     drape_exchange *nodes, *blocks;
     int *bytes, *places; /* (count) of what each rank shares */
-    double *gathered; /* (DRAPE_MPI_VALUES x count) */
-    double *piece;    /* (DRAPE_MPI_PIECE) of a message of drape_ranks.gather */
-    int32_t *numbers; /* (DRAPE_MPI_PIECE) of its items */
+    double *gathered;    /* (DRAPE_MPI_VALUES x count) */
+    double *piece;       /* (DRAPE_MPI_PIECE) of a message of drape_ranks.gather */
+    int32_t *numbers;    /* (DRAPE_MPI_PIECE) of its items */
 } drape_mpi_ranks;
 
 /* The ranks of a communicator, which becomes theirs. Errors: DRAPE_E_MEMORY. */

@@ -177,7 +177,8 @@ LANES_INLINE void couple(const level *l, const int size, double spread, const do
         for (int32_t k = b->outside[n]; k < a->start[i + 1]; k++, row += size)
             for (int c = 0; c < size; c++)
                 for (int r = 0; r < size; r++)
-                    y[at + c] -= row[c * stride + r] * b->copies[(int64_t)size * (a->column[k] - a->count) + r];
+                    y[at + c] -=
+                        row[c * stride + r] * b->copies[(int64_t)size * (a->column[k] - a->count) + r];
         for (int c = 0; c < size; c++)
             y[at + c] += spread * b->spread[(int64_t)size * n + c] * x[at + c];
     }
@@ -210,11 +211,11 @@ static const drape_ranks *ranks_of(const level *l)
 /* ---- Prolongation ---- */
 
 /*
- * What is added to the diagonal of rows at a border, which a sweep of Gauss and Seidel leaves out of account.
- * M is the lower triangle of the blocks that each rank has, with the diagonal D + S. The cycle is definite if
- * M + M' - A = D + 2 S - B is, B being the blocks between ranks: S has half the sum of each row of B, scaled by
- * D, so that 2 S - B is diagonally dominant (Baker, Falgout, Kolev & Yang 2011, Multigrid smoothers for
- * ultraparallel computing, add the whole sum).
+ * What is added to the diagonal of rows at a border, of which a sweep of Gauss and Seidel leaves out the
+ * blocks between ranks, B. M is the lower triangle of the other blocks, with the diagonal D + S. The cycle is
+ * definite if M + M' - A = D + 2 S - B is: S has half the sum of each row of B, scaled by the diagonal of A,
+ * so that 2 S - B is diagonally dominant once scaled. Baker, Falgout, Kolev & Yang 2011, Multigrid smoothers
+ * for ultraparallel computing, add the whole sum.
  */
 static void spread_border(level *l)
 {
@@ -377,8 +378,8 @@ static double divide_by_diagonal(const level *l, const double *r, double *z)
  * products. */
 static double largest_eigenvalue(level *l)
 {
-    const size_t n = scalars(&l->a),
-                 first = l->border ? (size_t)(l->a.size * l->border->first[l->border->ranks->rank]) : 0;
+    const size_t n = scalars(&l->a), row = l->border ? (size_t)l->border->first[l->border->ranks->rank] : 0,
+                 first = row * (size_t)l->a.size;
     double diagonal[LANCZOS_STEPS], off[LANCZOS_STEPS], *r = l->r, *p = l->x, *q = l->b, last = 0;
     for (size_t i = 0; i < n; i++)
         r[i] = (double)((first + i + 1) * 2654435761U % 65536) / 32768 - 1;
@@ -489,8 +490,8 @@ LANES_INLINE int32_t multiply_prolongation(drape_multigrid *m, const level *l, c
 
 /* Adds the product of block q of the prolongation and the row in m->product to these blocks of a coarse
  * row. */
-LANES_INLINE void add_products(const drape_multigrid *m, const level *l, level *next, const int size, int32_t q,
-                               int32_t first, int32_t end)
+LANES_INLINE void add_products(const drape_multigrid *m, const level *l, level *next, const int size,
+                               int32_t q, int32_t first, int32_t end)
 {
     const matrix *to = &next->a;
     const int32_t I = l->p_column[q];

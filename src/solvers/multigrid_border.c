@@ -1,8 +1,9 @@
 /*
- * multigrid_border.c: what ranks exchange of the levels that they share: see multigrid_parts.h. Aggregates are
- * formed by each rank from its own rows, so that their functions reach into the rows of other ranks by one
- * smoothing only. A row of the next matrix belongs to the rank of its aggregate, and is the sum of products
- * P' A P of the rows of A of several ranks: each adds what its own give, and sends what belongs to others.
+ * multigrid_border.c: what ranks exchange of the levels that they share: see multigrid_parts.h. Aggregates
+ * are formed by each rank from its own rows, so that their functions reach into the rows of other ranks by
+ * one smoothing only. A row of the next matrix belongs to the rank of its aggregate, and is the sum of
+ * products P' A P of the rows of A of several ranks: each adds what its own give, and sends what belongs to
+ * others.
  *
  * Rows, and lists of columns, have their numbers in the matrix of all ranks while they are exchanged.
  */

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #define DENSE      64  /* largest number of block rows that are factored as one dense matrix */
-#define GATHERED   512 /* largest number of block rows that each rank has as a whole, where ranks share others */
+#define FEW        2   /* block rows for each rank: no more are shared */
 #define STAGNATION 0.7 /* of the rows of a level: with more on the next one, that is not made */
 /* of the largest weight of a row: neighbours with less are in no aggregate of its, among nodes and among
  * aggregates */
@@ -367,9 +367,16 @@ static drape_status build_levels(drape_arena *arena, drape_arena *scratch, drape
 /* What each rank has as a whole. */
 static drape_status gather(drape_arena *arena, drape_arena *scratch, drape_multigrid *m, graph *g)
 {
-    const drape_status status =
-        drape_border_gather(arena, scratch, &m->level[m->count - 1], g, &m->whole);
+    const drape_status status = drape_border_gather(arena, scratch, &m->level[m->count - 1], g, &m->whole);
     return status ? status : build_levels(arena, scratch, m->whole.multigrid, g);
+}
+
+/* Whether each rank has the level as a whole: the work on it is then done by all, which its exchanges cost no
+ * less than if it is small. */
+static bool is_small(const level *l)
+{
+    const int64_t few = FEW * (int64_t)l->border->ranks->count;
+    return all_rows(l) <= (few > DENSE ? few : DENSE);
 }
 
 /* Makes the levels from the finest on, until one is small enough for a dense matrix or cannot be
@@ -380,7 +387,7 @@ static drape_status build_levels(drape_arena *arena, drape_arena *scratch, drape
     for (m->count = 1; more; m->count += more) {
         level *l = &m->level[m->count - 1];
         drape_status status = take_vectors(arena, l);
-        if (!status && l->border && m->count > 1 && all_rows(l) <= GATHERED)
+        if (!status && l->border && m->count > 1 && is_small(l))
             status = gather(arena, scratch, m, g);
         more = !m->whole.multigrid && (l->border || l->a.count > DENSE) && m->count < MAX_LEVELS;
         if (!status && more)
@@ -406,8 +413,7 @@ drape_status drape_multigrid_create(drape_arena *arena, const drape_pattern *pat
                              .column = pattern->block_row,
                              .diagonal = pattern->diagonal};
     drape_arena scratch = drape_arena_of(arena->ctx);
-    drape_status status =
-        pattern->ranks ? drape_border_create(arena, pattern, &m->level[0]) : DRAPE_OK;
+    drape_status status = pattern->ranks ? drape_border_create(arena, pattern, &m->level[0]) : DRAPE_OK;
     if (!status)
         status = make_graph(&scratch, &m->level[0], &g);
     if (!status)

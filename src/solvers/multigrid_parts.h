@@ -26,9 +26,9 @@ typedef struct matrix {
  * the rows of other ranks that are among these columns. */
 typedef struct border {
     const drape_ranks *ranks;
-    int32_t *first;  /* (ranks + 1) number of the first row of each in the matrix of all */
-    int32_t *number; /* (columns - count) of the copies */
-    int32_t count;   /* rows with copies among their columns */
+    int32_t *first;               /* (ranks + 1) number of the first row of each in the matrix of all */
+    int32_t *number;              /* (columns - count) of the copies */
+    int32_t count;                /* rows with copies among their columns */
     int32_t *row, *outside;       /* (count) these; the first block of each in the column of a copy */
     double *spread;               /* (count x size) what the smoother adds to their diagonal */
     double *copies;               /* (columns - count, size) scratch */
