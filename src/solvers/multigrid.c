@@ -8,6 +8,7 @@
 #define LANCZOS_STEPS 5         /* for the largest eigenvalue of D^-1 A */
 #define BISECTIONS    20        /* for that of the tridiagonal matrix, to 1e-6 of it */
 #define DAMPING       (4.0 / 3) /* of the largest eigenvalue's inverse: Vanek, Mandel & Brezina 1996 */
+#define DOMINANT      0.9       /* share of a diagonal block that blocks between ranks may have */
 #define SMALLEST      0.25 /* eigenvalue of a cycle times its matrix that the next finer level counts on */
 /* share of a column's length that must be left after the projection on those before it, or it counts as 0 */
 #define INDEPENDENT 1e-8
@@ -161,7 +162,7 @@ LANES_INLINE void multiply_rows(const matrix *a, const int size, const double *x
 }
 
 /* y -= the blocks in columns of copies, times what their owners have in x; += spread x, of 0 or 1 times what
- * the smoother adds to the diagonal. */
+ * the smoother adds to the diagonal blocks. */
 LANES_INLINE void couple(const level *l, const int size, double spread, const double *x, double *y)
 {
     const matrix *a = &l->a;
@@ -179,8 +180,10 @@ LANES_INLINE void couple(const level *l, const int size, double spread, const do
                 for (int r = 0; r < size; r++)
                     y[at + c] -=
                         row[c * stride + r] * b->copies[(int64_t)size * (a->column[k] - a->count) + r];
+        row = a->values + (int64_t)size * size * a->start[i] + (int64_t)size * (a->diagonal[i] - a->start[i]);
         for (int c = 0; c < size; c++)
-            y[at + c] += spread * b->spread[(int64_t)size * n + c] * x[at + c];
+            for (int r = 0; r < size; r++)
+                y[at + c] += spread * b->spread[n] * row[c * stride + r] * x[at + r];
     }
 }
 
@@ -210,65 +213,78 @@ static const drape_ranks *ranks_of(const level *l)
 
 /* ---- Prolongation ---- */
 
-/*
- * What is added to the diagonal of rows at a border, of which a sweep of Gauss and Seidel leaves out the
- * blocks between ranks, B. M is the lower triangle of the other blocks, with the diagonal D + S. The cycle is
- * definite if M + M' - A = D + 2 S - B is: S has half the sum of each row of B, scaled by the diagonal of A,
- * so that 2 S - B is diagonally dominant once scaled. Baker, Falgout, Kolev & Yang 2011, Multigrid smoothers
- * for ultraparallel computing, add the whole sum.
- */
-static void spread_border(level *l)
-{
-    const matrix *a = &l->a;
-    const border *b = l->border;
-    const size_t size = (size_t)a->size;
-    double *diagonal = l->r; /* scratch */
-    for (int32_t i = 0; i < a->count; i++) {
-        const size_t stride = size * (size_t)length(a, i);
-        const double *block =
-            a->values + size * (size * (size_t)a->start[i] + (size_t)(a->diagonal[i] - a->start[i]));
-        for (size_t c = 0; c < size; c++)
-            diagonal[size * (size_t)i + c] = block[stride * c + c];
-    }
-    b->ranks->copy(b->ranks, b->rows, diagonal, b->copies, size * sizeof *diagonal);
-    for (int32_t n = 0; n < b->count; n++) {
-        const int32_t i = b->row[n];
-        const size_t stride = size * (size_t)length(a, i);
-        for (size_t c = 0; c < size; c++) {
-            const double *row = a->values + size * (size_t)a->start[i] * size + stride * c +
-                                size * (size_t)(b->outside[n] - a->start[i]);
-            double sum = 0;
-            for (int32_t k = b->outside[n]; k < a->start[i + 1]; k++)
-                for (size_t r = 0; r < size; r++, row++)
-                    sum += fabs(*row) / sqrt(b->copies[size * (size_t)(a->column[k] - a->count) + r]);
-            b->spread[size * (size_t)n + c] = sum * sqrt(diagonal[size * (size_t)i + c]) / 2;
-        }
-    }
-}
-
-/* D + S. */
 static bool invert_diagonal(level *l)
 {
     const matrix *a = &l->a;
     const int b = a->size;
-    if (l->border)
-        spread_border(l);
-    for (int32_t i = 0, n = 0; i < a->count; i++) {
+    for (int32_t i = 0; i < a->count; i++) {
         const double *row =
             a->values + (int64_t)b * b * a->start[i] + (int64_t)b * (a->diagonal[i] - a->start[i]);
         double *to = l->inverse + (int64_t)b * b * i;
         for (int c = 0; c < b; c++)
             for (int r = 0; r < b; r++)
                 to[b * c + r] = row[c * b * length(a, i) + r];
-        if (l->border && n < l->border->count && l->border->row[n] == i) {
-            for (int c = 0; c < b; c++)
-                to[b * c + c] += l->border->spread[(int64_t)b * n + c];
-            n++;
-        }
         if (!invert(b, to))
             return false;
     }
     return true;
+}
+
+/* to = a b, or a b'; of size x size, the rows of b are `stride` apart. */
+static void multiply_blocks(int size, const double *a, const double *b, int64_t stride, bool transposed,
+                            double *to)
+{
+    for (int r = 0; r < size; r++)
+        for (int c = 0; c < size; c++) {
+            double sum = 0;
+            for (int k = 0; k < size; k++)
+                sum += a[size * r + k] * b[transposed ? c * stride + k : k * stride + c];
+            to[size * r + c] = sum;
+        }
+}
+
+/* A bound on the largest singular value of C = L^-1 B M^-T, B a block (its rows are `stride` apart), L L' and
+ * M M' what the inverses are of: the eighth root of the trace of (C C')^4, at most 6^(1/8) = 1.25 times it. */
+static double coupling(int size, const double *block, int64_t stride, const double *inverse,
+                       const double *other)
+{
+    double product[MODES * MODES], square[MODES * MODES], trace = 0;
+    multiply_blocks(size, inverse, block, stride, false, product);
+    multiply_blocks(size, product, other, size, false, square);
+    multiply_blocks(size, square, block, stride, true, product);
+    multiply_blocks(size, product, product, size, false, square);
+    for (int r = 0; r < size; r++)
+        for (int c = 0; c < size; c++)
+            trace += square[size * r + c] * square[size * c + r];
+    return sqrt(sqrt(sqrt(fmax(trace, 0))));
+}
+
+/*
+ * Of rows at a border a sweep of Gauss and Seidel leaves out the blocks between ranks, B. M is the lower
+ * triangle of the other blocks, with the diagonal (1 + s) D. The cycle is definite if M + M' - A =
+ * (1 + 2 s) D - B is, which s of each row makes diagonally dominant by blocks, in the measure of D (Baker,
+ * Falgout, Kolev & Yang 2011, Multigrid smoothers for ultraparallel computing, with sums of absolute values).
+ * D is left with a share of 1 - DOMINANT of it, where M + M' - A is D without borders.
+ */
+static void spread_border(level *l)
+{
+    const matrix *a = &l->a;
+    const border *b = l->border;
+    const int size = a->size, square = size * size;
+    b->ranks->copy(b->ranks, b->rows, l->inverse, l->inverse + (int64_t)square * a->count,
+                   (size_t)square * sizeof *l->inverse);
+    for (int32_t n = 0; n < b->count; n++) {
+        const int32_t i = b->row[n];
+        const double *block =
+            a->values + (int64_t)square * a->start[i] + (int64_t)size * (b->outside[n] - a->start[i]);
+        double *inverse = l->inverse + (int64_t)square * i, sum = 0;
+        for (int32_t k = b->outside[n]; k < a->start[i + 1]; k++, block += size)
+            sum += coupling(size, block, size * length(a, i), inverse,
+                            l->inverse + (int64_t)square * a->column[k]);
+        b->spread[n] = fmax(0, (sum - DOMINANT) / 2);
+        for (int e = 0; e < square; e++)
+            inverse[e] /= 1 + b->spread[n];
+    }
 }
 
 /* The rigid motions of nodes at x: translations, and rotations about their mean, in units of their extent. */
@@ -615,6 +631,8 @@ static bool factor_levels(drape_multigrid *m)
         }
         if (!drape_ranks_all(ranks_of(l), invert_diagonal(l)))
             return false;
+        if (l->border)
+            spread_border(l);
         if (k + 1 == m->count)
             break;
         orthonormalize(l, m->level[k + 1].modes);

@@ -108,7 +108,7 @@ static drape_status list_border(drape_arena *arena, border *b, const matrix *a)
             break;
         b->row = drape_arena_take(arena, (size_t)b->count, sizeof *b->row);
         b->outside = drape_arena_take(arena, (size_t)b->count, sizeof *b->outside);
-        b->spread = drape_arena_take(arena, (size_t)b->count * (size_t)a->size, sizeof *b->spread);
+        b->spread = drape_arena_take(arena, (size_t)b->count, sizeof *b->spread);
         if (!b->row || !b->outside || !b->spread)
             return DRAPE_E_MEMORY;
     }

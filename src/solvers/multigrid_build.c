@@ -257,7 +257,7 @@ static drape_status build_coarse(drape_arena *arena, drape_arena *scratch, const
 static drape_status take_vectors(drape_arena *arena, level *l)
 {
     const size_t n = scalars(&l->a), all = (size_t)l->a.columns * (size_t)l->a.size;
-    l->inverse = drape_arena_take(arena, n * (size_t)l->a.size, sizeof *l->inverse);
+    l->inverse = drape_arena_take(arena, all * (size_t)l->a.size, sizeof *l->inverse);
     l->modes = drape_arena_take(arena, all * MODES, sizeof *l->modes);
     l->r = drape_arena_take(arena, n, sizeof *l->r);
     l->x = drape_arena_take(arena, all, sizeof *l->x);

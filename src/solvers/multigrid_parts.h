@@ -26,13 +26,13 @@ typedef struct matrix {
  * the rows of other ranks that are among these columns. */
 typedef struct border {
     const drape_ranks *ranks;
-    int32_t *first;               /* (ranks + 1) number of the first row of each in the matrix of all */
-    int32_t *number;              /* (columns - count) of the copies */
-    int32_t count;                /* rows with copies among their columns */
-    int32_t *row, *outside;       /* (count) these; the first block of each in the column of a copy */
-    double *spread;               /* (count x size) what the smoother adds to their diagonal */
-    double *copies;               /* (columns - count, size) scratch */
-    drape_exchange *rows;         /* items of up to size x MODES numbers: a row each */
+    int32_t *first;         /* (ranks + 1) number of the first row of each in the matrix of all */
+    int32_t *number;        /* (columns - count) of the copies */
+    int32_t count;          /* rows with copies among their columns */
+    int32_t *row, *outside; /* (count) these; the first block of each in the column of a copy */
+    double *spread;         /* (count) what the smoother adds to their diagonal blocks, in parts of these */
+    double *copies;         /* (columns - count, size) scratch */
+    drape_exchange *rows;   /* items of up to size x MODES numbers: a row each */
     drape_exchange *prolongation; /* items of size x MODES: blocks of P in rows of copies */
     drape_exchange *products; /* items of MODES: rows of blocks of the next matrix in its rows of copies */
 } border;
