@@ -244,7 +244,8 @@ static void multiply_blocks(int size, const double *a, const double *b, int64_t 
 }
 
 /* A bound on the largest singular value of C = L^-1 B M^-T, B a block (its rows are `stride` apart), L L' and
- * M M' what the inverses are of: the eighth root of the trace of (C C')^4, at most 6^(1/8) = 1.25 times it. */
+ * M M' what the inverses are of: the eighth root of the trace of (C C')^4, at most 6^(1/8) = 1.25 times as
+ * large. */
 static double coupling(int size, const double *block, int64_t stride, const double *inverse,
                        const double *other)
 {
