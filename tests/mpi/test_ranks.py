@@ -122,13 +122,14 @@ def colliders():
 
 
 def test_colliders():
-    """be: a sheet falls on a collider of each kind, which has friction; the sphere moves"""
-    for kind, values in colliders().items():
-        write_scene(cloth=[DROP], integrator=be(), duration=0.1, frame_rate=50,
+    """be: a sheet falls on a collider of each kind, which has friction; the sphere moves; by the iterative solver, too"""
+    for kind, values in [*colliders().items(), ("sphere", dict(colliders()["sphere"], linear_solver="pcg"))]:
+        solver = values.pop("linear_solver", "auto")
+        write_scene(cloth=[DROP], integrator=be(linear_solver=solver), duration=0.1, frame_rate=50,
                     colliders=[dict(values, type=kind, friction=0.3)], contact={"distance": 0.004})
         for folder in ("out1", "out2", "out3"):
             shutil.rmtree(folder, ignore_errors=True)
-        print("# " + kind)
+        print(f"# {kind}, {solver}")
         compare(bound_of_steps(10), *((2, 3) if kind == "sphere" else (2,)))
         assert read_json("out2/summary.json")["energy"]["contact"] > 0, kind + ": nothing touches it"
 
@@ -147,10 +148,12 @@ def test_static():
 
 
 def test_ida():
-    """ida: a hung sheet, and one that falls on a sphere"""
+    """ida: a hung sheet, and one that falls on a sphere; by pcg, which hands the matrices with friction to the direct solver of the ranks"""
     rtol = 1e-6
-    for cloth, more in ((HUNG, {}), (DROP, {"colliders": [dict(colliders()["sphere"], type="sphere")], "contact": {"distance": 0.004}})):
-        write_scene(cloth=[cloth], integrator={"method": "ida", "rtol": rtol, "atol_x": rtol, "atol_v": rtol}, duration=0.05, frame_rate=50, **more)
+    sphere = dict(colliders()["sphere"], type="sphere")
+    for cloth, solver, balls in ((HUNG, "auto", []), (DROP, "auto", [sphere]), (DROP, "pcg", [dict(sphere, friction=0.3)])):
+        write_scene(cloth=[cloth], integrator={"method": "ida", "rtol": rtol, "atol_x": rtol, "atol_v": rtol, "linear_solver": solver}, duration=0.05,
+                    frame_rate=50, colliders=balls, contact={"distance": 0.004})
         for folder in ("out1", "out2", "out3"):
             shutil.rmtree(folder, ignore_errors=True)
         ranks(1, "run", "scene.json", "--out", "out1", "--format", "npy")
