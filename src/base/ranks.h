@@ -20,6 +20,8 @@
 #include <stdint.h>
 
 typedef struct drape_ranks drape_ranks;
+typedef struct drape_exchange drape_exchange; /* which items of an array have copies on other ranks */
+struct drape_arena;
 struct drape_linear_ops;
 struct drape_pattern;
 
@@ -29,8 +31,7 @@ struct drape_ranks {
                                 copies */
     const int64_t *block; /* (block columns) the number of each in the matrix of all ranks */
     int64_t all_blocks;   /* in that matrix */
-    /* In place of those of one process: a direct solver, and an iterative one for large matrices. */
-    const struct drape_linear_ops *direct, *iterative;
+    const struct drape_linear_ops *direct; /* in place of the direct solvers of one process */
 
     /* values (n) become their sums over the ranks, in the order of the ranks; their largest, of which NaN is
      * larger than any number. */
@@ -40,6 +41,21 @@ struct drape_ranks {
     void (*fetch)(const drape_ranks *ranks, double *const *nodes, int arrays);
     /* The same in an array of block columns (block columns x 3). */
     void (*fetch_blocks)(const drape_ranks *ranks, double *blocks);
+    /* Plans copies here of `count` items of arrays of other ranks: place[i] on rank[i]. An item has `largest`
+     * bytes or less. It lives as long as the arena. NULL: out of memory. */
+    drape_exchange *(*plan)(const drape_ranks *ranks, struct drape_arena *arena, int32_t count,
+                            const int32_t *rank, const int32_t *place, size_t largest);
+    /* copies (count), in the order of the plan, become what their owners have in `own`, items of `size`
+     * bytes. */
+    void (*copy)(const drape_ranks *ranks, const drape_exchange *exchange, const void *own, void *copies,
+                 size_t size);
+    /* The reverse: adds copies, items of `width` numbers, to what their owners have in `own`, in the order of
+     * the ranks. */
+    void (*add)(const drape_ranks *ranks, const drape_exchange *exchange, double *own, const double *copies,
+                int width);
+    /* Each rank has the items first[rank] ... first[rank + 1] - 1, of `size` bytes, of `all`, which then all
+     * have. */
+    void (*share)(const drape_ranks *ranks, void *all, const int32_t *first, size_t size);
     /* Gathers items of `width` numbers, of which this rank has `count` and counts some, into an array of the
      * whole model on rank 0, by their numbers there; all: NULL elsewhere. */
     void (*gather)(const drape_ranks *ranks, const double *values, int width, int32_t count,

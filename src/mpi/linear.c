@@ -2,11 +2,7 @@
  * linear.c: see linear.h. The rows of a rank's own nodes are complete in its values, and go into a matrix
  * of PETSc of block size 3.
  *
- * Direct: MUMPS, LDL' of a symmetric matrix, whose inertia says whether it is definite, else LU.
- * Iterative: conjugate gradients preconditioned by algebraic multigrid (GAMG: smoothed aggregation) with
- * the rigid motions of the nodes as near null space. A matrix that is not symmetric, that the iteration
- * finds indefinite, or that takes more than MAX_ITERATIONS goes to MUMPS, unless the caller asked for a
- * definite one.
+ * MUMPS has LDL' of a symmetric matrix, whose inertia says whether it is definite, else LU.
  */
 #include "mpi/linear.h"
 
@@ -16,27 +12,17 @@
 #include <petscksp.h>
 #include <string.h>
 
-#define EXACT          1e-12 /* relative residual for callers that want all digits */
-#define MAX_ITERATIONS 500
-#define SYMMETRY       1e-13 /* as in solvers/linear_pcg.c */
-#define MORE           2 /* times the iterations after which the aggregates were made: they are made anew */
+#define SYMMETRY 1e-13 /* as in solvers/linear_pcg.c */
 
 typedef struct mpi_linear {
     const drape_pattern *pattern;
     const drape_mpi_ranks *ranks;
-    bool iterative;
-    double *positions; /* (pattern->n) of the nodes at the next matrix [m]; direct: NULL */
     Mat matrix;
     Vec b, x; /* without values of their own */
-    KSP direct, cg;
-    MatNullSpace modes;
+    KSP direct;
     bool counts;              /* the pivots by their signs; it never solves */
     bool symmetric, definite; /* of the last matrix; a definite one was asked for */
-    bool by_direct;           /* its solves are by factors */
     bool factored;
-    PetscInt first; /* iterations with the present aggregates in their first solve; -1: there are none */
-    PetscInt last;
-    int64_t fallbacks;
 } mpi_linear;
 
 /* ---- The matrix ---- */
@@ -85,7 +71,7 @@ static PetscErrorCode create_matrix(mpi_linear *s, drape_context *ctx)
     if (!code)
         code = MatSetSizes(s->matrix, n, n, PETSC_DETERMINE, PETSC_DETERMINE);
     if (!code)
-        code = MatSetType(s->matrix, MATAIJ); /* GAMG takes no BAIJ */
+        code = MatSetType(s->matrix, MATAIJ);
     if (!code)
         code = MatSetBlockSize(s->matrix, 3);
     if (!code)
@@ -136,27 +122,18 @@ static void destroy(void **state)
 {
     mpi_linear *s = *state;
     KSPDestroy(&s->direct);
-    KSPDestroy(&s->cg);
-    MatNullSpaceDestroy(&s->modes);
     VecDestroy(&s->b);
     VecDestroy(&s->x);
     MatDestroy(&s->matrix);
 }
 
-static drape_status create(drape_arena *arena, const drape_pattern *pattern, bool iterative, void **state)
+static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
 {
     mpi_linear *s = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
     s->pattern = pattern;
     s->ranks = (const drape_mpi_ranks *)pattern->ranks; /* base is its first member */
-    s->iterative = iterative;
-    s->first = -1;
-    if (iterative) {
-        s->positions = drape_arena_take(arena, (size_t)pattern->n, sizeof *s->positions);
-        if (!s->positions)
-            return DRAPE_E_MEMORY;
-    }
     const PetscInt n = 3 * pattern->ranks->own_blocks;
     PetscErrorCode code = create_matrix(s, arena->ctx);
     if (!code)
@@ -172,23 +149,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, boo
                       (long long)(3 * pattern->ranks->all_blocks), (int)code);
 }
 
-static drape_status create_direct(drape_arena *arena, const drape_pattern *pattern, void **state)
-{
-    return create(arena, pattern, false, state);
-}
-
-static drape_status create_iterative(drape_arena *arena, const drape_pattern *pattern, void **state)
-{
-    return create(arena, pattern, true, state);
-}
-
-static void set_positions(void *state, const double *x)
-{
-    mpi_linear *s = state;
-    memcpy(s->positions, x, (size_t)s->pattern->n * sizeof *x);
-}
-
-/* ---- MUMPS ---- */
+/* ---- Factors ---- */
 
 static PetscErrorCode begin_direct(mpi_linear *s)
 {
@@ -247,63 +208,6 @@ static bool factor_direct(mpi_linear *s)
     return drape_ranks_all(s->pattern->ranks, !code && !failed && negative == 0);
 }
 
-/* ---- Conjugate gradients ---- */
-
-static PetscErrorCode begin_cg(mpi_linear *s)
-{
-    PC pc;
-    PetscErrorCode code = KSPDestroy(&s->cg);
-    if (!code)
-        code = KSPCreate(s->ranks->comm, &s->cg);
-    if (!code)
-        code = KSPSetType(s->cg, KSPCG);
-    if (!code)
-        code = KSPSetNormType(s->cg, KSP_NORM_NATURAL); /* as solvers/pcg.h measures a residual */
-    if (!code)
-        code = KSPGetPC(s->cg, &pc);
-    if (!code)
-        code = PCSetType(pc, PCGAMG);
-    if (!code)
-        code = PCGAMGSetReuseInterpolation(pc, PETSC_TRUE);
-    if (!code) /* or the smoothers keep the largest eigenvalues of the first matrix, and amplify others */
-        code = PCGAMGSetUseSAEstEig(pc, PETSC_FALSE);
-    if (!code)
-        code = KSPSetOptionsPrefix(s->cg, "drape_");
-    if (!code)
-        code = KSPSetFromOptions(s->cg);
-    return code;
-}
-
-/* The six rigid motions of the nodes where they are. */
-static PetscErrorCode set_modes(mpi_linear *s)
-{
-    Vec at;
-    MatNullSpaceDestroy(&s->modes);
-    PetscErrorCode code = VecCreateMPIWithArray(s->ranks->comm, 3, 3 * s->pattern->ranks->own_blocks,
-                                                PETSC_DETERMINE, s->positions, &at);
-    if (!code)
-        code = MatNullSpaceCreateRigidBody(at, &s->modes);
-    if (!code)
-        code = MatSetNearNullSpace(s->matrix, s->modes);
-    VecDestroy(&at);
-    return code;
-}
-
-static bool factor_cg(mpi_linear *s)
-{
-    const bool anew = s->first < 0 || s->last > MORE * s->first + 10;
-    PetscErrorCode code = anew ? set_modes(s) : 0;
-    if (!code && anew)
-        code = begin_cg(s);
-    if (anew)
-        s->first = -1;
-    if (!code)
-        code = KSPSetOperators(s->cg, s->matrix, s->matrix);
-    if (!code)
-        code = KSPSetUp(s->cg);
-    return drape_ranks_all(s->pattern->ranks, !code);
-}
-
 /* ---- Factor and solve ---- */
 
 static bool is_finite(const drape_pattern *p, const double *values)
@@ -314,16 +218,9 @@ static bool is_finite(const drape_pattern *p, const double *values)
     return drape_ranks_all(p->ranks, finite);
 }
 
-static drape_status fall_back(mpi_linear *s)
-{
-    s->fallbacks++;
-    s->by_direct = s->factored = factor_direct(s);
-    return s->factored ? DRAPE_OK : DRAPE_RETRY_LINEAR;
-}
-
 static drape_status factor_any(mpi_linear *s, const double *values, bool definite)
 {
-    s->factored = s->by_direct = false;
+    s->factored = false;
     if (!is_finite(s->pattern, values))
         return DRAPE_RETRY_LINEAR;
     s->symmetric =
@@ -331,14 +228,8 @@ static drape_status factor_any(mpi_linear *s, const double *values, bool definit
     s->definite = definite && s->symmetric;
     if (fill_matrix(s, values))
         return DRAPE_E_SOLVER;
-    if (!s->iterative) {
-        s->by_direct = s->factored = factor_direct(s);
-        return s->factored ? DRAPE_OK : DRAPE_RETRY_LINEAR;
-    }
-    s->factored = s->symmetric && factor_cg(s);
-    if (s->factored)
-        return DRAPE_OK;
-    return s->definite ? DRAPE_RETRY_LINEAR : fall_back(s);
+    s->factored = factor_direct(s);
+    return s->factored ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
 static drape_status factor(void *state, const double *values)
@@ -351,72 +242,31 @@ static drape_status factor_definite(void *state, const double *values)
     return factor_any(state, values, true);
 }
 
-/* By KSP; whether it converged, and why it ended. */
-static bool apply(mpi_linear *s, KSP ksp, const double *b, double *x, KSPConvergedReason *why)
+/* Whether that succeeded here. */
+static bool apply(mpi_linear *s, const double *b, double *x)
 {
     KSPConvergedReason reason = 0;
     PetscErrorCode code = VecPlaceArray(s->b, b);
     if (!code)
         code = VecPlaceArray(s->x, x);
     if (!code)
-        code = KSPSolve(ksp, s->b, s->x);
+        code = KSPSolve(s->direct, s->b, s->x);
     if (!code)
-        code = KSPGetConvergedReason(ksp, &reason);
+        code = KSPGetConvergedReason(s->direct, &reason);
     VecResetArray(s->b);
     VecResetArray(s->x);
-    *why = reason;
     return !code && reason > 0;
-}
-
-/* By conjugate gradients. A preconditioner that is not definite says nothing of the matrix: with new
- * aggregates it is tried once more. */
-static bool apply_cg(mpi_linear *s, double tolerance, const double *b, double *x)
-{
-    KSPConvergedReason reason = 0;
-    bool solved = !KSPSetTolerances(s->cg, tolerance, 0, PETSC_DEFAULT, MAX_ITERATIONS) &&
-                  apply(s, s->cg, b, x, &reason);
-    if (reason == KSP_DIVERGED_INDEFINITE_PC) {
-        s->first = -1;
-        solved = factor_cg(s) && !KSPSetTolerances(s->cg, tolerance, 0, PETSC_DEFAULT, MAX_ITERATIONS) &&
-                 apply(s, s->cg, b, x, &reason);
-    }
-    KSPGetIterationNumber(s->cg, &s->last);
-    s->first = s->first < 0 ? s->last : s->first;
-    return solved;
-}
-
-static drape_status finish(const mpi_linear *s, const double *x, bool solved)
-{
-    bool finite = solved;
-    for (int64_t i = 0; i < 3 * (int64_t)s->pattern->ranks->own_blocks && finite; i++)
-        finite = isfinite(x[i]);
-    return drape_ranks_all(s->pattern->ranks, finite) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
-}
-
-static drape_status solve_inexact(void *state, const double *b, double *x, double tolerance,
-                                  int64_t *iterations)
-{
-    mpi_linear *s = state;
-    KSPConvergedReason reason;
-    *iterations = 1;
-    if (!s->factored)
-        return DRAPE_RETRY_LINEAR;
-    if (!s->by_direct) {
-        const bool solved = apply_cg(s, tolerance, b, x);
-        *iterations = s->last;
-        if (solved && finish(s, x, true) == DRAPE_OK)
-            return DRAPE_OK;
-        const drape_status status = s->definite ? DRAPE_RETRY_LINEAR : fall_back(s);
-        if (status)
-            return status;
-    }
-    return finish(s, x, apply(s, s->direct, b, x, &reason));
 }
 
 static drape_status solve(void *state, const double *b, double *x)
 {
-    int64_t iterations;
-    return solve_inexact(state, b, x, EXACT, &iterations);
+    mpi_linear *s = state;
+    if (!s->factored)
+        return DRAPE_RETRY_LINEAR;
+    bool finite = apply(s, b, x);
+    for (int64_t i = 0; i < 3 * (int64_t)s->pattern->ranks->own_blocks && finite; i++)
+        finite = isfinite(x[i]);
+    return drape_ranks_all(s->pattern->ranks, finite) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
 drape_status drape_mpi_inertia(drape_context *ctx, const drape_pattern *p, const double *values,
@@ -429,7 +279,7 @@ drape_status drape_mpi_inertia(drape_context *ctx, const drape_pattern *p, const
     PetscInt below = 0, zero = 0;
     *negative = 0;
     *known = false;
-    drape_status status = create_direct(&arena, p, &state);
+    drape_status status = create(&arena, p, &state);
     mpi_linear *s = state;
     if (!status) {
         s->counts = true;
@@ -456,25 +306,10 @@ static void archive(void *state, drape_archive *a, const double *values)
 const drape_linear_ops drape_linear_mpi_direct = {
     .entry = {.name = "mpi_direct", .summary = "MUMPS by PETSc", .reference = "Amestoy et al. 2001, MUMPS"},
     .borrows_heap = true,
-    .create = create_direct,
+    .create = create,
     .factor = factor,
     .factor_definite = factor_definite,
     .solve = solve,
-    .archive = archive,
-    .destroy = destroy,
-};
-
-const drape_linear_ops drape_linear_mpi_iterative = {
-    .entry = {.name = "mpi_iterative",
-              .summary = "conjugate gradients preconditioned by GAMG, both of PETSc",
-              .reference = "Balay et al., PETSc; Vanek, Mandel & Brezina 1996"},
-    .borrows_heap = true,
-    .create = create_iterative,
-    .set_positions = set_positions,
-    .factor = factor,
-    .factor_definite = factor_definite,
-    .solve = solve,
-    .solve_inexact = solve_inexact,
     .archive = archive,
     .destroy = destroy,
 };

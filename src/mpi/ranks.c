@@ -56,39 +56,89 @@ static void broadcast(const drape_ranks *ranks, int from, void *bytes, int size)
 
 /* ---- Copies ---- */
 
-static void exchange(const drape_mpi_ranks *r, const drape_mpi_exchange *x, double *const *arrays, int count)
+/* Items of `size` bytes at these places of each array, side by side. */
+static void pack(const char *const *arrays, int count, const int32_t *place, int32_t n, size_t size, char *to)
 {
-    const size_t each = 3 * (size_t)count;
+    for (int32_t i = 0; i < n; i++)
+        for (int a = 0; a < count; a++, to += size)
+            memcpy(to, arrays[a] + size * (size_t)place[i], size);
+}
+
+static void unpack(const char *from, const int32_t *place, int32_t n, size_t size, int count,
+                   char *const *arrays)
+{
+    for (int32_t i = 0; i < n; i++)
+        for (int a = 0; a < count; a++, from += size)
+            memcpy(arrays[a] + size * (size_t)place[i], from, size);
+}
+
+/* Sends items to the neighbours and receives others of the same size. */
+static void send(const drape_mpi_ranks *r, const drape_exchange *x, const char *sent,
+                 const int32_t *first_sent, char *received, const int32_t *first_received, size_t size)
+{
     for (int k = 0; k < x->neighbour_count; k++)
-        MPI_Irecv(x->received + each * (size_t)x->first_in[k],
-                  (int)each * (x->first_in[k + 1] - x->first_in[k]), MPI_DOUBLE, x->neighbour[k], 0, r->comm,
-                  &x->requests[k]);
-    for (int k = 0; k < x->neighbour_count; k++) {
-        for (int32_t i = x->first_out[k]; i < x->first_out[k + 1]; i++)
-            for (size_t a = 0; a < (size_t)count; a++)
-                memcpy(x->sent + each * (size_t)i + 3 * a, arrays[a] + 3 * (size_t)x->out[i],
-                       3 * sizeof **arrays);
-        MPI_Isend(x->sent + each * (size_t)x->first_out[k],
-                  (int)each * (x->first_out[k + 1] - x->first_out[k]), MPI_DOUBLE, x->neighbour[k], 0,
-                  r->comm, &x->requests[x->neighbour_count + k]);
-    }
+        MPI_Irecv(received + size * (size_t)first_received[k],
+                  (int)size * (first_received[k + 1] - first_received[k]), MPI_BYTE, x->neighbour[k], 0,
+                  r->comm, &x->requests[k]);
+    for (int k = 0; k < x->neighbour_count; k++)
+        MPI_Isend(sent + size * (size_t)first_sent[k], (int)size * (first_sent[k + 1] - first_sent[k]),
+                  MPI_BYTE, x->neighbour[k], 0, r->comm, &x->requests[x->neighbour_count + k]);
     MPI_Waitall(2 * x->neighbour_count, x->requests, MPI_STATUSES_IGNORE);
-    for (int32_t i = 0; i < x->first_in[x->neighbour_count]; i++)
-        for (size_t a = 0; a < (size_t)count; a++)
-            memcpy(arrays[a] + 3 * (size_t)x->in[i], x->received + each * (size_t)i + 3 * a,
-                   3 * sizeof **arrays);
+}
+
+/* The copies in some arrays become what the owners have in theirs. */
+static void exchange(const drape_mpi_ranks *r, const drape_exchange *x, const char *const *own,
+                     char *const *copies, int count, size_t size)
+{
+    pack(own, count, x->out, x->first_out[x->neighbour_count], size, x->outside);
+    send(r, x, x->outside, x->first_out, x->inside, x->first_in, size * (size_t)count);
+    unpack(x->inside, x->in, x->first_in[x->neighbour_count], size, count, copies);
+}
+
+static void copy(const drape_ranks *ranks, const drape_exchange *x, const void *own, void *copies,
+                 size_t size)
+{
+    exchange(of(ranks), x, &(const char *){own}, &(char *){copies}, 1, size);
+}
+
+static void add(const drape_ranks *ranks, const drape_exchange *x, double *own, const double *copies,
+                int width)
+{
+    const size_t n = (size_t)width, size = n * sizeof *own;
+    pack(&(const char *){(const char *)copies}, 1, x->in, x->first_in[x->neighbour_count], size, x->inside);
+    send(of(ranks), x, x->inside, x->first_in, x->outside, x->first_out, size);
+    for (int32_t i = 0; i < x->first_out[x->neighbour_count]; i++) {
+        const double *from = (const double *)(const void *)x->outside + n * (size_t)i;
+        double *to = own + n * (size_t)x->out[i];
+        for (size_t c = 0; c < n; c++)
+            to[c] += from[c];
+    }
 }
 
 static void fetch(const drape_ranks *ranks, double *const *nodes, int arrays)
 {
-    for (int first = 0; first < arrays; first += DRAPE_MPI_ARRAYS)
-        exchange(of(ranks), &of(ranks)->nodes, nodes + first,
-                 arrays - first < DRAPE_MPI_ARRAYS ? arrays - first : DRAPE_MPI_ARRAYS);
+    char *bytes[DRAPE_MPI_ARRAYS];
+    for (int first = 0; first < arrays; first += DRAPE_MPI_ARRAYS) {
+        const int count = arrays - first < DRAPE_MPI_ARRAYS ? arrays - first : DRAPE_MPI_ARRAYS;
+        for (int a = 0; a < count; a++)
+            bytes[a] = (char *)nodes[first + a];
+        exchange(of(ranks), of(ranks)->nodes, (const char *const *)bytes, bytes, count, 3 * sizeof **nodes);
+    }
 }
 
 static void fetch_blocks(const drape_ranks *ranks, double *blocks)
 {
-    exchange(of(ranks), &of(ranks)->blocks, &blocks, 1);
+    copy(ranks, of(ranks)->blocks, blocks, blocks, 3 * sizeof *blocks);
+}
+
+static void share(const drape_ranks *ranks, void *all, const int32_t *first, size_t size)
+{
+    drape_mpi_ranks *r = of(ranks);
+    for (int k = 0; k < ranks->count; k++) {
+        r->places[k] = (int)size * first[k];
+        r->bytes[k] = (int)size * (first[k + 1] - first[k]);
+    }
+    MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, all, r->bytes, r->places, MPI_BYTE, r->comm);
 }
 
 /* ---- Gathering ---- */
@@ -158,72 +208,95 @@ static int32_t find(const int32_t *sorted, int32_t count, int32_t value)
     return low;
 }
 
-/* wanted (ranks): how many nodes of each rank have copies here; asked (ranks): of this one there. */
-static drape_status take(drape_mpi_ranks *r, const int *wanted, const int *asked, drape_mpi_exchange *x)
+/* wanted (ranks): how many items of each rank have copies here; asked (ranks): of this one there. */
+static drape_exchange *take(drape_arena *arena, int ranks, const int *wanted, const int *asked,
+                            size_t largest)
 {
+    drape_exchange *x = drape_arena_take(arena, 1, sizeof *x);
     int32_t in = 0, out = 0;
-    int n = 0;
-    for (int k = 0; k < r->base.count; k++) {
+    size_t n = 0;
+    for (int k = 0; k < ranks; k++) {
         n += wanted[k] > 0 || asked[k] > 0;
         in += wanted[k];
         out += asked[k];
     }
-    *x = (drape_mpi_exchange){0};
-    x->neighbour = drape_arena_take(&r->arena, (size_t)n, sizeof *x->neighbour);
-    x->requests = drape_arena_take(&r->arena, 2 * (size_t)n, sizeof *x->requests);
-    x->first_in = drape_arena_take(&r->arena, (size_t)n + 1, sizeof *x->first_in);
-    x->first_out = drape_arena_take(&r->arena, (size_t)n + 1, sizeof *x->first_out);
-    x->in = drape_arena_take(&r->arena, (size_t)in, sizeof *x->in);
-    x->out = drape_arena_take(&r->arena, (size_t)out, sizeof *x->out);
-    x->sent = drape_arena_take(&r->arena, (size_t)out, 3 * DRAPE_MPI_ARRAYS * sizeof *x->sent);
-    x->received = drape_arena_take(&r->arena, (size_t)in, 3 * DRAPE_MPI_ARRAYS * sizeof *x->received);
-    if (drape_arena_status(&r->arena))
-        return DRAPE_E_MEMORY;
-    for (int k = 0; k < r->base.count; k++)
+    if (!x)
+        return NULL;
+    x->neighbour = drape_arena_take(arena, n, sizeof *x->neighbour);
+    x->requests = drape_arena_take(arena, 2 * n, sizeof(MPI_Request));
+    x->first_in = drape_arena_take(arena, n + 1, sizeof *x->first_in);
+    x->first_out = drape_arena_take(arena, n + 1, sizeof *x->first_out);
+    x->in = drape_arena_take(arena, (size_t)in, sizeof *x->in);
+    x->out = drape_arena_take(arena, (size_t)out, sizeof *x->out);
+    x->inside = drape_arena_take(arena, (size_t)in, largest);
+    x->outside = drape_arena_take(arena, (size_t)out, largest);
+    if (drape_arena_status(arena))
+        return NULL;
+    for (int k = 0; k < ranks; k++)
         if (wanted[k] > 0 || asked[k] > 0) {
             const int i = x->neighbour_count++;
             x->neighbour[i] = k;
             x->first_in[i + 1] = x->first_in[i] + wanted[k];
             x->first_out[i + 1] = x->first_out[i] + asked[k];
         }
-    return DRAPE_OK;
+    return x;
 }
 
-/* Asks the owners of the copies for them, by their numbers in the whole model, in ascending order. */
-static drape_status ask(drape_mpi_ranks *r, const drape_model *m, const int32_t *owner, drape_mpi_exchange *x)
+/* Asks the owners of the copies for them, whose places they get. */
+static void ask(const drape_mpi_ranks *r, drape_exchange *x, int32_t count, const int32_t *rank,
+                const int32_t *place, int32_t *asked)
 {
-    drape_arena scratch = drape_arena_of(r->arena.ctx);
-    const int32_t *node = m->part->node;
-    int *wanted = drape_arena_take(&scratch, (size_t)r->base.count, sizeof *wanted),
-        *asked = drape_arena_take(&scratch, (size_t)r->base.count, sizeof *asked);
-    drape_status status = drape_arena_status(&scratch);
-    for (int32_t i = 0; !status && i < m->node_count; i++)
-        if (!m->part->own[i])
-            wanted[owner[node[i]]]++;
-    if (!status) {
-        MPI_Alltoall(wanted, 1, MPI_INT, asked, 1, MPI_INT, r->comm);
-        status = take(r, wanted, asked, x);
-    }
-    for (int k = 0; !status && k < x->neighbour_count; k++) {
+    for (int k = 0; k < x->neighbour_count; k++) {
         int32_t to = x->first_in[k];
-        for (int32_t i = 0; i < m->node_count; i++)
-            if (!m->part->own[i] && owner[node[i]] == x->neighbour[k])
-                x->in[to++] = node[i];
+        for (int32_t i = 0; i < count; i++)
+            if (rank[i] == x->neighbour[k]) {
+                x->in[to] = i;
+                asked[to++] = place[i];
+            }
     }
-    for (int k = 0; !status && k < x->neighbour_count; k++) {
-        MPI_Irecv(x->out + x->first_out[k], x->first_out[k + 1] - x->first_out[k], MPI_INT32_T,
-                  x->neighbour[k], 0, r->comm, &x->requests[k]);
-        MPI_Isend(x->in + x->first_in[k], x->first_in[k + 1] - x->first_in[k], MPI_INT32_T, x->neighbour[k],
-                  0, r->comm, &x->requests[x->neighbour_count + k]);
+    send(r, x, (const char *)asked, x->first_in, (char *)x->out, x->first_out, sizeof *asked);
+}
+
+static drape_exchange *plan(const drape_ranks *ranks, drape_arena *arena, int32_t count, const int32_t *rank,
+                            const int32_t *place, size_t largest)
+{
+    const drape_mpi_ranks *r = of(ranks);
+    drape_arena scratch = drape_arena_of(arena->ctx);
+    drape_exchange *x = NULL;
+    int *wanted = drape_arena_take(&scratch, (size_t)ranks->count, sizeof *wanted),
+        *asked = drape_arena_take(&scratch, (size_t)ranks->count, sizeof *asked);
+    int32_t *places = drape_arena_take(&scratch, (size_t)count, sizeof *places);
+    if (!drape_arena_status(&scratch)) {
+        for (int32_t i = 0; i < count; i++)
+            wanted[rank[i]]++;
+        MPI_Alltoall(wanted, 1, MPI_INT, asked, 1, MPI_INT, r->comm);
+        x = take(arena, ranks->count, wanted, asked, largest);
     }
-    if (!status)
-        MPI_Waitall(2 * x->neighbour_count, x->requests, MPI_STATUSES_IGNORE);
-    for (int32_t i = 0; !status && i < x->first_in[x->neighbour_count]; i++)
-        x->in[i] = find(node, m->node_count, x->in[i]);
-    for (int32_t i = 0; !status && i < x->first_out[x->neighbour_count]; i++)
-        x->out[i] = find(node, m->node_count, x->out[i]);
+    if (x)
+        ask(r, x, count, rank, place, places);
     drape_arena_free(&scratch);
-    return status;
+    return x;
+}
+
+/* The copies of nodes, which their owners know by their numbers in the whole model only. copy (nodes),
+ * rank (nodes), number (nodes): scratch. */
+static drape_exchange *plan_nodes(drape_mpi_ranks *r, const drape_model *m, const int32_t *owner,
+                                  int32_t *copy, int32_t *rank, int32_t *number)
+{
+    const int32_t *node = m->part->node;
+    int32_t count = 0;
+    for (int32_t i = 0; i < m->node_count; i++)
+        if (!m->part->own[i]) {
+            copy[count] = i;
+            rank[count] = owner[node[i]];
+            number[count++] = node[i];
+        }
+    drape_exchange *x = plan(&r->base, &r->arena, count, rank, number, 3 * DRAPE_MPI_ARRAYS * sizeof(double));
+    for (int32_t i = 0; x && i < x->first_in[x->neighbour_count]; i++)
+        x->in[i] = copy[x->in[i]];
+    for (int32_t i = 0; x && i < x->first_out[x->neighbour_count]; i++)
+        x->out[i] = find(node, m->node_count, x->out[i]);
+    return x;
 }
 
 /* The same exchange for block columns: without pinned nodes, which are so on both sides. */
@@ -240,13 +313,20 @@ static void keep_free(const drape_model *m, int neighbours, int32_t *first, int3
 
 drape_status drape_mpi_ranks_plan(drape_mpi_ranks *r, const drape_model *part, const int32_t *owner)
 {
-    drape_status status = ask(r, part, owner, &r->nodes);
-    if (!status)
-        status = ask(r, part, owner, &r->blocks);
-    if (status)
-        return status;
-    keep_free(part, r->blocks.neighbour_count, r->blocks.first_in, r->blocks.in);
-    keep_free(part, r->blocks.neighbour_count, r->blocks.first_out, r->blocks.out);
+    const size_t nodes = (size_t)part->node_count;
+    drape_arena scratch = drape_arena_of(r->arena.ctx);
+    int32_t *copy = drape_arena_take(&scratch, nodes, sizeof *copy),
+            *rank = drape_arena_take(&scratch, nodes, sizeof *rank),
+            *number = drape_arena_take(&scratch, nodes, sizeof *number);
+    if (!drape_arena_status(&scratch)) {
+        r->nodes = plan_nodes(r, part, owner, copy, rank, number);
+        r->blocks = r->nodes ? plan_nodes(r, part, owner, copy, rank, number) : NULL;
+    }
+    drape_arena_free(&scratch);
+    if (!r->blocks)
+        return DRAPE_E_MEMORY;
+    keep_free(part, r->blocks->neighbour_count, r->blocks->first_in, r->blocks->in);
+    keep_free(part, r->blocks->neighbour_count, r->blocks->first_out, r->blocks->out);
     return DRAPE_OK;
 }
 
@@ -266,12 +346,17 @@ drape_status drape_mpi_ranks_create(drape_context *ctx, MPI_Comm comm, drape_mpi
     r->base.broadcast = broadcast;
     r->base.fetch = fetch;
     r->base.fetch_blocks = fetch_blocks;
+    r->base.plan = plan;
+    r->base.copy = copy;
+    r->base.add = add;
+    r->base.share = share;
     r->base.gather = collect;
     r->base.write = drape_mpi_write;
     r->base.inertia = drape_mpi_inertia;
     r->base.vector = vector;
     r->base.direct = &drape_linear_mpi_direct;
-    r->base.iterative = &drape_linear_mpi_iterative;
+    r->bytes = drape_arena_take(&r->arena, (size_t)r->base.count, sizeof *r->bytes);
+    r->places = drape_arena_take(&r->arena, (size_t)r->base.count, sizeof *r->places);
     r->gathered = drape_arena_take(&r->arena, (size_t)r->base.count * DRAPE_MPI_VALUES, sizeof *r->gathered);
     r->piece = drape_arena_take(&r->arena, DRAPE_MPI_PIECE, sizeof *r->piece);
     r->numbers = drape_arena_take(&r->arena, DRAPE_MPI_PIECE, sizeof *r->numbers);

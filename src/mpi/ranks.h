@@ -6,30 +6,29 @@
 
 #include <mpi.h>
 
-/* What is exchanged with other ranks. */
-typedef struct drape_mpi_exchange {
-    int neighbour_count;
-    int *neighbour;                /* (neighbour_count) their ranks */
-    int32_t *first_out, *first_in; /* (neighbour_count + 1) what is for and from each */
-    int32_t *out, *in;             /* places in the array: sent; received */
-    double *sent, *received;       /* (3 x DRAPE_MPI_ARRAYS x places) */
-    MPI_Request *requests;         /* (2 x neighbour_count) */
-} drape_mpi_exchange;
+#define DRAPE_MPI_ARRAYS 2      /* of nodes, in one exchange */
+#define DRAPE_MPI_VALUES 64     /* in one sum */
+#define DRAPE_MPI_PIECE  196608 /* numbers in a message; a multiple of 3 */
 
-#define DRAPE_MPI_ARRAYS 2 /* in one exchange */
+struct drape_exchange {
+    int neighbour_count;
+    int *neighbour;                /* (neighbour_count) their ranks, ascending */
+    int32_t *first_out, *first_in; /* (neighbour_count + 1) what is for and from each */
+    int32_t *out, *in;             /* places in the owner's array; among the copies */
+    char *outside, *inside;        /* messages of items of the largest size: for `out`, for `in` */
+    MPI_Request *requests;         /* (2 x neighbour_count) */
+};
 
 typedef struct drape_mpi_ranks {
     drape_ranks base;
     MPI_Comm comm;
     drape_arena arena;
-    drape_mpi_exchange nodes, blocks;
-    double *gathered; /* (DRAPE_MPI_VALUES x count) */
-    double *piece;    /* (DRAPE_MPI_PIECE) of a message of drape_ranks.gather */
-    int32_t *numbers; /* (DRAPE_MPI_PIECE) of its items */
+    drape_exchange *nodes, *blocks;
+    int *bytes, *places; /* (count) of what each rank shares */
+    double *gathered;    /* (DRAPE_MPI_VALUES x count) */
+    double *piece;       /* (DRAPE_MPI_PIECE) of a message of drape_ranks.gather */
+    int32_t *numbers;    /* (DRAPE_MPI_PIECE) of its items */
 } drape_mpi_ranks;
-
-#define DRAPE_MPI_VALUES 64     /* in one sum */
-#define DRAPE_MPI_PIECE  196608 /* numbers in a message; a multiple of 3 */
 
 /* The ranks of a communicator, which becomes theirs. Errors: DRAPE_E_MEMORY. */
 drape_status drape_mpi_ranks_create(drape_context *ctx, MPI_Comm comm, drape_mpi_ranks **out);

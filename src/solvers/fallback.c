@@ -5,8 +5,9 @@ extern const drape_linear_ops drape_linear_multifrontal;
 
 drape_fallback drape_fallback_of(drape_arena *arena, const drape_pattern *pattern)
 {
-    return (drape_fallback){
-        .ops = &drape_linear_multifrontal, .pattern = pattern, .arena = drape_arena_within(arena)};
+    return (drape_fallback){.ops = pattern->ranks ? pattern->ranks->direct : &drape_linear_multifrontal,
+                            .pattern = pattern,
+                            .arena = drape_arena_within(arena)};
 }
 
 void drape_fallback_destroy(drape_fallback *f)
@@ -18,14 +19,14 @@ void drape_fallback_destroy(drape_fallback *f)
 void drape_fallback_use_threads(drape_fallback *f, drape_pool *pool)
 {
     f->pool = pool;
-    if (f->solver)
+    if (f->solver && f->ops->use_threads)
         f->ops->use_threads(f->solver, pool);
 }
 
 void drape_fallback_watch(drape_fallback *f, const atomic_bool *const *cancel)
 {
     f->cancel = cancel;
-    if (f->solver)
+    if (f->solver && f->ops->watch)
         f->ops->watch(f->solver, cancel);
 }
 
@@ -36,8 +37,8 @@ static drape_status create(drape_fallback *f)
         drape_fallback_destroy(f);
         return status;
     }
-    f->ops->use_threads(f->solver, f->pool);
-    f->ops->watch(f->solver, f->cancel);
+    drape_fallback_use_threads(f, f->pool);
+    drape_fallback_watch(f, f->cancel);
     return status;
 }
 

@@ -1,6 +1,7 @@
 /*
- * fallback.h: the direct solver `multifrontal`, to which an iterative solver passes the matrices that it
- * cannot solve, unchanged. It is created for the first such matrix, because most scenes have none.
+ * fallback.h: the direct solver `multifrontal`, or that of the ranks that share the matrix, to which an
+ * iterative solver passes the matrices that it cannot solve, unchanged. It is created for the first such
+ * matrix, because most scenes have none.
  */
 #ifndef DRAPE_SOLVERS_FALLBACK_H
 #define DRAPE_SOLVERS_FALLBACK_H

@@ -90,8 +90,8 @@ void drape_linear_archive(const drape_linear_ops *ops, void *state, drape_archiv
 void drape_linear_destroy(const drape_linear_ops *ops, void **state);
 size_t drape_linear_bytes(const drape_linear_ops *ops, const void *state);
 
-/* The solver of that number in the table or, where ranks share the matrix (pattern->ranks), theirs: the
- * direct one in place of direct ones, else the iterative one. */
+/* The solver of that number in the table; where ranks share the matrix (pattern->ranks), theirs in place of
+ * direct ones. */
 const drape_linear_ops *drape_linear_of(const drape_ranks *ranks, int number);
 
 /* The solver with the largest best_from that is at most n; if none is, the one with the smallest. */

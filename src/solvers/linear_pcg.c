@@ -5,7 +5,7 @@
  * tolerance.
  *
  * A matrix that is not symmetric, or not positive definite, which the iteration notices at the latest, goes
- * to the fallback (fallback.h), unless it is too large for that.
+ * to the fallback (fallback.h), unless it is too large for that in one process.
  */
 #include "base/finite.h"
 #include "solvers/fallback.h"
@@ -28,6 +28,7 @@ typedef struct pcg_state {
     const drape_pattern *pattern;
     const double *values; /* (nonzeros) of the last factor call: the caller's */
     double *positions;    /* (n) of the nodes at the next factor call [m] */
+    double *diagonal;     /* (n) entries of the matrix */
     drape_multigrid *multigrid;
     drape_pcg pcg;
     drape_fallback fallback;
@@ -55,7 +56,9 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     s->pattern = pattern;
     s->fallback = drape_fallback_of(arena, pattern);
     s->positions = drape_arena_take(arena, n, sizeof *s->positions);
-    s->pcg = drape_pcg_of(arena, pattern->n, s, multiply, precondition);
+    s->diagonal = drape_arena_take(arena, n, sizeof *s->diagonal);
+    s->pcg = drape_pcg_of(arena, drape_pattern_own(pattern), s, multiply, precondition);
+    s->pcg.ranks = pattern->ranks;
     drape_status status = drape_arena_status(arena);
     if (!status)
         status = drape_multigrid_create(arena, pattern, &s->multigrid);
@@ -71,22 +74,35 @@ static void destroy(void **state)
 
 /* ---- Values ---- */
 
-static bool is_symmetric(const pcg_state *s)
+/* Of copies, their owners have the whole columns. */
+static void list_diagonal(pcg_state *s)
+{
+    const drape_pattern *p = s->pattern;
+    for (int32_t j = 0; j < p->block_count; j++) {
+        int64_t stride;
+        const double *d = drape_pattern_at(p, (double *)(uintptr_t)s->values, j, p->diagonal[j], &stride);
+        for (int c = 0; c < 3; c++)
+            s->diagonal[3 * (int64_t)j + c] = d[c * stride + c];
+    }
+    if (p->ranks)
+        p->ranks->fetch_blocks(p->ranks, s->diagonal);
+}
+
+static bool is_symmetric_here(const pcg_state *s)
 {
     const drape_pattern *p = s->pattern;
     double *const values = (double *)(uintptr_t)s->values; /* only read */
-    for (int32_t j = 0; j < p->block_count; j++)
+    for (int32_t j = 0; j < drape_pattern_own(p) / 3; j++)
         for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
-            int64_t stride, mirrored, own, other;
+            int64_t stride, mirrored;
             int32_t i = p->block_row[k];
             const double *a = drape_pattern_at(p, values, j, k, &stride),
                          *b = drape_pattern_at(p, values, i, drape_pattern_find(p, j, i), &mirrored),
-                         *d = drape_pattern_at(p, values, j, p->diagonal[j], &own),
-                         *e = drape_pattern_at(p, values, i, p->diagonal[i], &other);
+                         *d = s->diagonal + 3 * (int64_t)j, *e = s->diagonal + 3 * (int64_t)i;
             for (int c = 0; c < 3; c++)
                 for (int r = 0; r < 3; r++) {
                     double difference = a[c * stride + r] - b[r * mirrored + c];
-                    double size = fabs(d[c * own + c] * e[r * other + r]);
+                    double size = fabs(d[c] * e[r]);
                     if (difference * difference > SYMMETRY * SYMMETRY * size)
                         return false;
                 }
@@ -94,10 +110,21 @@ static bool is_symmetric(const pcg_state *s)
     return true;
 }
 
+static bool is_symmetric(pcg_state *s)
+{
+    list_diagonal(s);
+    return drape_ranks_all(s->pattern->ranks, is_symmetric_here(s));
+}
+
+static bool is_finite(const pcg_state *s, const double *values, int64_t n)
+{
+    return drape_ranks_all(s->pattern->ranks, drape_all_finite(values, (size_t)n));
+}
+
 static drape_status factor_general(pcg_state *s)
 {
     s->factored = false;
-    if (s->pattern->n > MAX_FALLBACK) {
+    if (!s->pattern->ranks && s->pattern->n > MAX_FALLBACK) {
         drape_log(s->arena->ctx, DRAPE_LOG_WARNING,
                   "pcg: the matrix of %" PRId64
                   " unknowns is not symmetric positive definite, and too large for "
@@ -129,7 +156,7 @@ static void set_positions(void *state, const double *x)
 static drape_status factor_any(pcg_state *s, const double *values, bool definite)
 {
     s->fallback.active = s->factored = false;
-    if (!drape_all_finite(values, (size_t)s->pattern->nonzeros))
+    if (!is_finite(s, values, s->pattern->nonzeros))
         return DRAPE_RETRY_LINEAR;
     s->values = values;
     const bool symmetric = is_symmetric(s);
@@ -160,7 +187,7 @@ static drape_status solve_inexact(void *state, const double *b, double *x, doubl
     if (!s->fallback.active) {
         drape_pcg_solve(&s->pcg, b, x, tolerance, MAX_ITERATIONS);
         *iterations = s->pcg.iterations;
-        if (s->pcg.definite && s->pcg.converged && drape_all_finite(x, (size_t)s->pattern->n))
+        if (s->pcg.definite && s->pcg.converged && is_finite(s, x, s->pcg.n))
             return DRAPE_OK;
         drape_status status = s->definite ? DRAPE_RETRY_LINEAR : factor_general(s);
         if (status)

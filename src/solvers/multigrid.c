@@ -8,6 +8,7 @@
 #define LANCZOS_STEPS 5         /* for the largest eigenvalue of D^-1 A */
 #define BISECTIONS    20        /* for that of the tridiagonal matrix, to 1e-6 of it */
 #define DAMPING       (4.0 / 3) /* of the largest eigenvalue's inverse: Vanek, Mandel & Brezina 1996 */
+#define DOMINANT      0.9       /* share of a diagonal block that blocks between ranks may have */
 #define SMALLEST      0.25 /* eigenvalue of a cycle times its matrix that the next finer level counts on */
 /* share of a column's length that must be left after the projection on those before it, or it counts as 0 */
 #define INDEPENDENT 1e-8
@@ -160,20 +161,54 @@ LANES_INLINE void multiply_rows(const matrix *a, const int size, const double *x
     }
 }
 
-LANES_DISPATCH static void multiply(const matrix *a, const double *x, double *y)
+/* y -= the blocks in columns of copies, times what their owners have in x; += spread x, of 0 or 1 times what
+ * the smoother adds to the diagonal blocks. */
+LANES_INLINE void couple(const level *l, const int size, double spread, const double *x, double *y)
 {
-    const size_t n = scalars(a);
-    if (a->size == 3)
-        multiply_rows(a, 3, x, y);
-    else
-        multiply_rows(a, MODES, x, y);
+    const matrix *a = &l->a;
+    const border *b = l->border;
+    if (!b)
+        return;
+    b->ranks->copy(b->ranks, b->rows, x, b->copies, (size_t)size * sizeof *x);
+    for (int32_t n = 0; n < b->count; n++) {
+        const int32_t i = b->row[n];
+        const int64_t stride = size * length(a, i), at = (int64_t)size * i;
+        const double *row =
+            a->values + (int64_t)size * size * a->start[i] + (int64_t)size * (b->outside[n] - a->start[i]);
+        for (int32_t k = b->outside[n]; k < a->start[i + 1]; k++, row += size)
+            for (int c = 0; c < size; c++)
+                for (int r = 0; r < size; r++)
+                    y[at + c] -=
+                        row[c * stride + r] * b->copies[(int64_t)size * (a->column[k] - a->count) + r];
+        row = a->values + (int64_t)size * size * a->start[i] + (int64_t)size * (a->diagonal[i] - a->start[i]);
+        for (int c = 0; c < size; c++)
+            for (int r = 0; r < size; r++)
+                y[at + c] += spread * b->spread[n] * row[c * stride + r] * x[at + r];
+    }
+}
+
+LANES_DISPATCH static void multiply(const level *l, const double *x, double *y)
+{
+    const size_t n = scalars(&l->a);
+    if (l->a.size == 3) {
+        multiply_rows(&l->a, 3, x, y);
+        couple(l, 3, 0, x, y);
+    } else {
+        multiply_rows(&l->a, MODES, x, y);
+        couple(l, MODES, 0, x, y);
+    }
     for (size_t i = 0; i < n; i++)
         y[i] = -y[i];
 }
 
 void drape_multigrid_multiply(const drape_multigrid *m, const double *x, double *y)
 {
-    multiply(&m->level[0].a, x, y);
+    multiply(&m->level[0], x, y);
+}
+
+static const drape_ranks *ranks_of(const level *l)
+{
+    return l->border ? l->border->ranks : NULL;
 }
 
 /* ---- Prolongation ---- */
@@ -195,15 +230,77 @@ static bool invert_diagonal(level *l)
     return true;
 }
 
+/* to = a b, or a b'; of size x size, the rows of b are `stride` apart. */
+static void multiply_blocks(int size, const double *a, const double *b, int64_t stride, bool transposed,
+                            double *to)
+{
+    for (int r = 0; r < size; r++)
+        for (int c = 0; c < size; c++) {
+            double sum = 0;
+            for (int k = 0; k < size; k++)
+                sum += a[size * r + k] * b[transposed ? c * stride + k : k * stride + c];
+            to[size * r + c] = sum;
+        }
+}
+
+/* A bound on the largest singular value of C = L^-1 B M^-T, B a block (its rows are `stride` apart), L L' and
+ * M M' what the inverses are of: the eighth root of the trace of (C C')^4, at most 6^(1/8) = 1.25 times as
+ * large. */
+static double coupling(int size, const double *block, int64_t stride, const double *inverse,
+                       const double *other)
+{
+    double product[MODES * MODES], square[MODES * MODES], trace = 0;
+    multiply_blocks(size, inverse, block, stride, false, product);
+    multiply_blocks(size, product, other, size, false, square);
+    multiply_blocks(size, square, block, stride, true, product);
+    multiply_blocks(size, product, product, size, false, square);
+    for (int r = 0; r < size; r++)
+        for (int c = 0; c < size; c++)
+            trace += square[size * r + c] * square[size * c + r];
+    return sqrt(sqrt(sqrt(fmax(trace, 0))));
+}
+
+/*
+ * Of rows at a border a sweep of Gauss and Seidel leaves out the blocks between ranks, B. M is the lower
+ * triangle of the other blocks, with the diagonal (1 + s) D. The cycle is definite if M + M' - A =
+ * (1 + 2 s) D - B is, which s of each row makes diagonally dominant by blocks, in the measure of D (Baker,
+ * Falgout, Kolev & Yang 2011, Multigrid smoothers for ultraparallel computing, with sums of absolute values).
+ * D is left with a share of 1 - DOMINANT of it, where M + M' - A is D without borders.
+ */
+static void spread_border(level *l)
+{
+    const matrix *a = &l->a;
+    const border *b = l->border;
+    const int size = a->size, square = size * size;
+    b->ranks->copy(b->ranks, b->rows, l->inverse, l->inverse + (int64_t)square * a->count,
+                   (size_t)square * sizeof *l->inverse);
+    for (int32_t n = 0; n < b->count; n++) {
+        const int32_t i = b->row[n];
+        const double *block =
+            a->values + (int64_t)square * a->start[i] + (int64_t)size * (b->outside[n] - a->start[i]);
+        double *inverse = l->inverse + (int64_t)square * i, sum = 0;
+        for (int32_t k = b->outside[n]; k < a->start[i + 1]; k++, block += size)
+            sum += coupling(size, block, size * length(a, i), inverse,
+                            l->inverse + (int64_t)square * a->column[k]);
+        b->spread[n] = fmax(0, (sum - DOMINANT) / 2);
+        for (int e = 0; e < square; e++)
+            inverse[e] /= 1 + b->spread[n];
+    }
+}
+
 /* The rigid motions of nodes at x: translations, and rotations about their mean, in units of their extent. */
 static void make_modes(level *l, const double *x)
 {
     const size_t count = (size_t)l->a.count;
+    const double all = (double)all_rows(l);
     double mean[3] = {0}, extent = 0;
     for (size_t i = 0; i < 3 * count; i++)
-        mean[i % 3] += x[i] / (double)count;
+        mean[i % 3] += x[i] / all;
+    if (l->border)
+        l->border->ranks->sum(l->border->ranks, mean, 3);
     for (size_t i = 0; i < 3 * count; i++)
         extent = fmax(extent, fabs(x[i] - mean[i % 3]));
+    extent = drape_ranks_largest(ranks_of(l), extent);
     const double scale = extent > 0 ? 1 / extent : 0;
     memset(l->modes, 0, 3 * count * MODES * sizeof *l->modes);
     for (size_t i = 0; i < count; i++)
@@ -289,7 +386,7 @@ static double divide_by_diagonal(const level *l, const double *r, double *z)
         multiply_block(l->a.size, l->inverse + size * i, r + i, z + i);
     for (size_t i = 0; i < n; i++)
         product += r[i] * z[i];
-    return product;
+    return drape_ranks_sum(ranks_of(l), product);
 }
 
 /* The largest eigenvalue of D^-1 A, D its diagonal blocks, from below: that of the tridiagonal matrix of
@@ -298,17 +395,19 @@ static double divide_by_diagonal(const level *l, const double *r, double *z)
  * products. */
 static double largest_eigenvalue(level *l)
 {
-    const size_t n = scalars(&l->a);
+    const size_t n = scalars(&l->a), row = l->border ? (size_t)l->border->first[l->border->ranks->rank] : 0,
+                 first = row * (size_t)l->a.size;
     double diagonal[LANCZOS_STEPS], off[LANCZOS_STEPS], *r = l->r, *p = l->x, *q = l->b, last = 0;
     for (size_t i = 0; i < n; i++)
-        r[i] = (double)((i + 1) * 2654435761U % 65536) / 32768 - 1;
+        r[i] = (double)((first + i + 1) * 2654435761U % 65536) / 32768 - 1;
     double size = divide_by_diagonal(l, r, p);
     int k = 0;
     while (k < LANCZOS_STEPS) {
         double curvature = 0;
-        multiply(&l->a, p, q);
+        multiply(l, p, q);
         for (size_t i = 0; i < n; i++)
             curvature += p[i] * q[i];
+        curvature = drape_ranks_sum(ranks_of(l), curvature);
         if (!(curvature > 0)) /* it is exact already, or A is not positive definite */
             break;
         const double a = size / curvature, before = size;
@@ -360,14 +459,26 @@ LANES_INLINE void smooth_row(level *l, const int size, int32_t i, double w)
     }
 }
 
+/* Of copies, their owners have the modes, and the smoothed rows. */
+static void fetch_rows(level *l, drape_exchange *x, int32_t items, double *values)
+{
+    const size_t block = (size_t)l->a.size * MODES;
+    l->border->ranks->copy(l->border->ranks, x, values, values + block * (size_t)items,
+                           block * sizeof *values);
+}
+
 LANES_DISPATCH static void smooth_prolongation(level *l)
 {
+    if (l->border)
+        fetch_rows(l, l->border->rows, l->a.count, l->modes);
     const double w = DAMPING / largest_eigenvalue(l);
     for (int32_t i = 0; i < l->a.count; i++)
         if (l->a.size == 3)
             smooth_row(l, 3, i, w);
         else
             smooth_row(l, MODES, i, w);
+    if (l->border)
+        fetch_rows(l, l->border->prolongation, l->p_start[l->a.count], l->p);
 }
 
 /* ---- The coarse matrix P' A P ---- */
@@ -394,30 +505,47 @@ LANES_INLINE int32_t multiply_prolongation(drape_multigrid *m, const level *l, c
     return count;
 }
 
-/* Adds row i's part P_i' (A P)_i to the lower triangle of the coarse matrix. */
+/* Adds the product of block q of the prolongation and the row in m->product to these blocks of a coarse
+ * row. */
+LANES_INLINE void add_products(const drape_multigrid *m, const level *l, level *next, const int size,
+                               int32_t q, int32_t first, int32_t end)
+{
+    const matrix *to = &next->a;
+    const int32_t I = l->p_column[q];
+    const int64_t block = (int64_t)size * MODES, stride = MODES * length(to, I);
+    const double *p = l->p + block * q;
+    for (int32_t k = first; k < end; k++) {
+        const int32_t at = m->where[to->column[k]];
+        if (at < 0)
+            continue;
+        const double *restrict product = m->product + block * at;
+        double *restrict sum =
+            next->own + (int64_t)MODES * MODES * to->start[I] + MODES * (int64_t)(k - to->start[I]);
+        for (int c = 0; c < MODES; c++)
+#pragma GCC unroll 6
+            for (int r = 0; r < size; r++)
+#pragma GCC unroll 6
+                for (int u = 0; u < MODES; u++)
+                    sum[c * stride + u] += p[MODES * r + c] * product[MODES * r + u];
+    }
+}
+
+/* Adds row i's part P_i' (A P)_i to the lower triangle of the coarse matrix, and to what other ranks have a
+ * part in. */
 LANES_INLINE void add_row(drape_multigrid *m, const level *l, level *next, const int size, int32_t i)
 {
-    const int64_t block = (int64_t)size * MODES;
     const matrix *to = &next->a;
     const int32_t count = multiply_prolongation(m, l, size, i);
     for (int32_t q = l->p_start[i]; q < l->p_start[i + 1]; q++) {
         const int32_t I = l->p_column[q];
-        const int64_t stride = MODES * length(to, I);
-        const double *p = l->p + block * q;
-        for (int32_t k = to->start[I]; k <= to->diagonal[I]; k++) {
-            const int32_t at = m->where[to->column[k]];
-            if (at < 0)
-                continue;
-            const double *restrict product = m->product + block * at;
-            double *restrict sum =
-                next->own + (int64_t)MODES * MODES * to->start[I] + MODES * (int64_t)(k - to->start[I]);
-            for (int c = 0; c < MODES; c++)
-#pragma GCC unroll 6
-                for (int r = 0; r < size; r++)
-#pragma GCC unroll 6
-                    for (int u = 0; u < MODES; u++)
-                        sum[c * stride + u] += p[MODES * r + c] * product[MODES * r + u];
-        }
+        const bool here = I < to->count;
+        int32_t outside = to->start[I + 1];
+        add_products(m, l, next, size, q, to->start[I], here ? to->diagonal[I] + 1 : to->start[I + 1]);
+        if (!l->border || !here)
+            continue;
+        while (to->column[outside - 1] >= to->count)
+            outside--;
+        add_products(m, l, next, size, q, outside, to->start[I + 1]);
     }
     for (int32_t k = 0; k < count; k++)
         m->where[m->hit[k]] = -1;
@@ -459,30 +587,67 @@ static void complete(level *l)
 LANES_DISPATCH static void make_coarse(drape_multigrid *m, const level *l, level *next)
 {
     memset(next->own, 0, nonzeros(&next->a) * sizeof *next->own);
-    memset(m->where, -1, (size_t)next->a.count * sizeof *m->where);
+    memset(m->where, -1, (size_t)next->a.columns * sizeof *m->where);
     for (int32_t i = 0; i < l->a.count; i++)
         if (l->a.size == 3)
             add_row(m, l, next, 3, i);
         else
             add_row(m, l, next, MODES, i);
+    if (l->border)
+        l->border->ranks->add(l->border->ranks, l->border->products, next->own,
+                              next->own + MODES * MODES * (size_t)next->a.start[next->a.count], MODES);
     complete(next);
 }
 
-drape_status drape_multigrid_factor(drape_multigrid *m, const double *values, const double *x)
+/* Matrix and modes of the coarsest level that ranks share, for each of them. */
+static void gather_matrix(const gathered *whole, const level *l)
 {
-    m->level[0].a.values = values;
-    make_modes(&m->level[0], x);
+    const drape_ranks *ranks = l->border->ranks;
+    const int32_t *block = whole->first_block, *row = l->border->first;
+    level *to = &whole->multigrid->level[0];
+    const size_t size = MODES * MODES;
+    memcpy(whole->shared + size * (size_t)block[ranks->rank], l->own,
+           size * (size_t)l->a.start[l->a.count] * sizeof *l->own);
+    ranks->share(ranks, whole->shared, block, size * sizeof *l->own);
+    for (int32_t i = 0; i < to->a.count; i++)
+        for (int c = 0; c < MODES; c++)
+            for (int32_t k = to->a.start[i]; k < to->a.start[i + 1]; k++) {
+                const size_t at = size * (size_t)to->a.start[i] + (size_t)(MODES * length(&to->a, i) * c);
+                memcpy(to->own + at + MODES * (size_t)whole->place[k],
+                       whole->shared + at + MODES * (size_t)(k - to->a.start[i]), MODES * sizeof *to->own);
+            }
+    memcpy(to->modes + size * (size_t)row[ranks->rank], l->modes,
+           size * (size_t)l->a.count * sizeof *l->modes);
+    ranks->share(ranks, to->modes, row, size * sizeof *l->modes);
+}
+
+/* From the matrix and the modes of the first level. */
+static bool factor_levels(drape_multigrid *m)
+{
     for (int k = 0; k < m->count; k++) {
         level *l = &m->level[k];
-        if (!invert_diagonal(l))
-            return DRAPE_RETRY_LINEAR;
+        if (k + 1 == m->count && m->whole.multigrid) {
+            gather_matrix(&m->whole, l);
+            return drape_ranks_all(ranks_of(l), factor_levels(m->whole.multigrid));
+        }
+        if (!drape_ranks_all(ranks_of(l), invert_diagonal(l)))
+            return false;
+        if (l->border)
+            spread_border(l);
         if (k + 1 == m->count)
             break;
         orthonormalize(l, m->level[k + 1].modes);
         smooth_prolongation(l);
         make_coarse(m, l, &m->level[k + 1]);
     }
-    return !m->dense || factor_dense(m) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
+    return !m->dense || factor_dense(m);
+}
+
+drape_status drape_multigrid_factor(drape_multigrid *m, const double *values, const double *x)
+{
+    m->level[0].a.values = values;
+    make_modes(&m->level[0], x);
+    return factor_levels(m) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
 /* ---- The cycle ---- */
@@ -501,6 +666,7 @@ LANES_INLINE void sweep_forwards(const level *l, const int size, const double *b
         scatter(a, size, i, own, r);
         memcpy(x + (int64_t)size * i, own, (size_t)size * sizeof *x);
     }
+    couple(l, size, 1, x, r);
 }
 
 /* rest is scratch: b less the product of the blocks right of the diagonal and the new x. */
@@ -508,6 +674,7 @@ LANES_INLINE void sweep_backwards(const level *l, const int size, const double *
 {
     const matrix *a = &l->a;
     memcpy(rest, b, scalars(a) * sizeof *rest);
+    couple(l, size, 1, x, rest);
     for (int32_t i = a->count; i-- > 0;) {
         double sum[MODES], own[MODES];
         memcpy(sum, rest + (int64_t)size * i, (size_t)size * sizeof *sum);
@@ -518,9 +685,10 @@ LANES_INLINE void sweep_backwards(const level *l, const int size, const double *
     }
 }
 
-LANES_INLINE void restrict_residual(const level *l, const int size, const double *r, double *b)
+LANES_INLINE void restrict_residual(const level *l, const int size, const double *r, const level *next)
 {
-    memset(b, 0, (size_t)l->coarse * MODES * sizeof *b);
+    double *b = next->b;
+    memset(b, 0, (size_t)next->a.columns * MODES * sizeof *b);
     for (int32_t i = 0; i < l->a.count; i++)
         for (int32_t q = l->p_start[i]; q < l->p_start[i + 1]; q++) {
             const double *p = l->p + (int64_t)size * MODES * q, *from = r + (int64_t)size * i;
@@ -531,6 +699,8 @@ LANES_INLINE void restrict_residual(const level *l, const int size, const double
                 for (int u = 0; u < MODES; u++)
                     to[u] += p[MODES * c + u] * from[c];
         }
+    if (l->border)
+        l->border->ranks->add(l->border->ranks, next->border->rows, b, b + scalars(&next->a), MODES);
 }
 
 LANES_INLINE void add_correction(const level *l, const int size, const double *coarse, double *x)
@@ -548,6 +718,22 @@ LANES_INLINE void add_correction(const level *l, const int size, const double *c
 }
 
 static void cycle(drape_multigrid *m, int k, const double *b, double *x);
+static void cycle_twice(drape_multigrid *m, int k);
+
+/* The cycles on the levels that each rank has as a whole. */
+static void cycle_whole(const gathered *whole, level *l)
+{
+    const drape_ranks *ranks = l->border->ranks;
+    const int32_t *first = l->border->first;
+    level *to = &whole->multigrid->level[0];
+    const size_t row = MODES * sizeof *l->b;
+    memcpy(to->b + MODES * (size_t)first[ranks->rank], l->b, row * (size_t)l->a.count);
+    ranks->share(ranks, to->b, first, row);
+    cycle_twice(whole->multigrid, 0);
+    memcpy(l->x, to->x + MODES * (size_t)first[ranks->rank], row * (size_t)l->a.count);
+    for (int32_t i = l->a.count; i < l->a.columns; i++)
+        memcpy(l->x + MODES * (size_t)i, to->x + MODES * (size_t)l->border->number[i - l->a.count], row);
+}
 
 /* Two cycles on level k for its own b. With s an eigenvalue of a cycle times A, at most 1, they are the
  * polynomial (1 - T(s)) / (1 + e) / s of the cycle, T that of Chebyshev of degree 2 with T(0) = 1 and
@@ -557,7 +743,10 @@ static void cycle_twice(drape_multigrid *m, int k)
 {
     level *l = &m->level[k];
     if (k + 1 == m->count) {
-        cycle(m, k, l->b, l->x);
+        if (m->whole.multigrid)
+            cycle_whole(&m->whole, l);
+        else
+            cycle(m, k, l->b, l->x);
         return;
     }
     const size_t n = scalars(&l->a);
@@ -567,10 +756,16 @@ static void cycle_twice(drape_multigrid *m, int k)
     cycle(m, k, l->b, l->x);
     for (size_t i = 0; i < n; i++)
         l->sum[i] = 2 * middle * factor * l->x[i];
-    multiply(&l->a, l->x, l->b);
+    multiply(l, l->x, l->b);
     cycle(m, k, l->b, l->x);
     for (size_t i = 0; i < n; i++)
         l->x[i] = l->sum[i] - factor * l->x[i];
+}
+
+static void fetch_copies(level *l)
+{
+    const border *b = l->border;
+    b->ranks->copy(b->ranks, b->rows, l->x, l->x + scalars(&l->a), (size_t)l->a.size * sizeof *l->x);
 }
 
 LANES_INLINE void cycle_rows(drape_multigrid *m, int k, const int size, const double *b, double *x)
@@ -578,8 +773,10 @@ LANES_INLINE void cycle_rows(drape_multigrid *m, int k, const int size, const do
     const level *l = &m->level[k];
     sweep_forwards(l, size, b, x, l->r);
     if (k + 1 < m->count) {
-        restrict_residual(l, size, l->r, m->level[k + 1].b);
+        restrict_residual(l, size, l->r, &m->level[k + 1]);
         cycle_twice(m, k + 1);
+        if (l->border && !(k + 2 == m->count && m->whole.multigrid))
+            fetch_copies(&m->level[k + 1]);
         add_correction(l, size, m->level[k + 1].x, x);
     }
     sweep_backwards(l, size, b, x, l->r);

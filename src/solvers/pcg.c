@@ -16,12 +16,12 @@ drape_pcg drape_pcg_of(drape_arena *arena, int64_t n, const void *owner, drape_p
                        .q = drape_arena_take(arena, (size_t)n, sizeof(double))};
 }
 
-static double dot(const double *a, const double *b, int64_t n)
+static double dot(const drape_pcg *s, const double *a, const double *b)
 {
     double sum = 0;
-    for (int64_t i = 0; i < n; i++)
+    for (int64_t i = 0; i < s->n; i++)
         sum += a[i] * b[i];
-    return sum;
+    return drape_ranks_sum(s->ranks, sum);
 }
 
 /* A direction without positive curvature. Before the first step x becomes the preconditioned residual
@@ -57,11 +57,11 @@ void drape_pcg_solve(drape_pcg *s, const double *b, double *x, double tolerance,
     memcpy(s->r, b, bytes);
     s->precondition(s->owner, s->r, s->z);
     memcpy(s->p, s->z, bytes);
-    double size = dot(s->r, s->z, s->n), goal = tolerance * tolerance * size;
+    double size = dot(s, s->r, s->z), goal = tolerance * tolerance * size;
     s->converged = size == 0;
     while (!s->converged && s->iterations < max_iterations) {
         s->multiply(s->owner, s->p, s->q);
-        double curvature = dot(s->p, s->q, s->n);
+        double curvature = dot(s, s->p, s->q);
         if (!(curvature > 0)) {
             stop_indefinite(s, x);
             return;
@@ -71,7 +71,7 @@ void drape_pcg_solve(drape_pcg *s, const double *b, double *x, double tolerance,
             return;
         s->precondition(s->owner, s->r, s->z);
         double before = size;
-        size = dot(s->r, s->z, s->n);
+        size = dot(s, s->r, s->z);
         s->converged = size <= goal;
         turn(s, size / before);
     }

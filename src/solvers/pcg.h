@@ -7,6 +7,7 @@
 #define DRAPE_SOLVERS_PCG_H
 
 #include "base/arena.h"
+#include "base/ranks.h"
 
 typedef void drape_pcg_map(const void *owner, const double *from, double *to); /* (n) each */
 
@@ -15,6 +16,7 @@ typedef struct drape_pcg {
     const void *owner;
     drape_pcg_map *multiply;     /* A x */
     drape_pcg_map *precondition; /* P^-1 r */
+    const drape_ranks *ranks;    /* that share vectors, of which n numbers are here; NULL: they are here */
     double *r, *z, *p, *q;       /* (n) workspace */
     int iterations;              /* of the last solve */
     bool definite;               /* no direction without positive curvature was met */

@@ -32,7 +32,7 @@ const drape_linear_ops *drape_linear_of(const drape_ranks *ranks, int number)
         return ops;
     if (ops->pick)
         ops = ops->pick(3 * ranks->all_blocks);
-    return ops->solve_inexact ? ranks->iterative : ranks->direct;
+    return ops->solve_inexact ? ops : ranks->direct;
 }
 
 void drape_linear_archive(const drape_linear_ops *ops, void *state, drape_archive *a, const double *values)
