@@ -10,9 +10,11 @@
 #include "geometry/intersect.h"
 #include "sim/inside.h"
 #include "support/crossings.h"
+#include "support/sample.h"
 #include "support/scene.h"
 
-#define STATES 1500 /* accepted states of a run, after which it ends: ida makes thousands */
+/* Accepted states of a run, after which it ends: ida makes thousands. */
+#define STATES (complete_sweep() ? 1500 : 300)
 
 static const char *const methods[] = {"'method': 'be', 'dt': %g",
                                       "'method': 'bdf2', 'dt': %g",
