@@ -240,6 +240,8 @@ END_TEST
 START_TEST(blown)
 {
     for (size_t k = 0; k < METHODS; k++) {
+        if (!in_sample(0, k, 2)) /* the tip and the strips have all methods */
+            continue;
         char what[100];
         scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.3, "
@@ -252,7 +254,7 @@ START_TEST(blown)
             "'frame_rate': 60}",
             1e6, 1e6, method_of(methods[k], 0.005));
         snprintf(what, sizeof what, "blown, %s", methods[k]);
-        press(&s, complete_sweep() ? 0.15 : 0.1, what);
+        press(&s, 0.15, what);
         scene_close(&s);
     }
 }
