@@ -136,8 +136,8 @@ static drape_status watch(void *user, const drape_event *event)
     return status ? status : p->accepted < STATES ? DRAPE_OK : DRAPE_E_STOPPED;
 }
 
-/* Runs a scene, up to the members of its integrator, by all methods, of which the sample depends on the scene's
- * number; dt [s] is for those of fixed steps. */
+/* Runs a scene, up to the members of its integrator, by all methods, or by a sample of them, which depends on
+ * the scene's number; dt [s] is for those of fixed steps. */
 static void run_all(size_t number, const char *name, const char *text, double dt)
 {
     int crossed = 0, unnamed = 0;
