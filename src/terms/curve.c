@@ -41,12 +41,9 @@ static double middle_slope(double h0, double h1, double chord0, double chord1)
     return (w0 + w1) / (w0 / chord0 + w1 / chord1);
 }
 
-/* Point number i, counted from the origin, which is point 0. */
+/* Point number i > 0, counted from the origin, which is point 0. */
 static void point_at(const drape_points *points, double (*strain_of)(double), int32_t i, double *s, double *f)
 {
-    *s = *f = 0;
-    if (i == 0)
-        return;
     *s = strain_of ? strain_of(points->point[2 * i - 2]) : points->point[2 * i - 2];
     *f = points->point[2 * i - 1];
 }
@@ -54,12 +51,11 @@ static void point_at(const drape_points *points, double (*strain_of)(double), in
 void drape_curve_make(const drape_points *points, double (*strain_of)(double), double *table)
 {
     const int32_t count = points->count;
-    double s0, f0, s1, f1, s2, f2, before = 0; /* the slope at the beginning of the piece */
-    double h0 = 0, chord0 = 0;                 /* of the chord before */
+    double s0 = 0, f0 = 0, s1, f1, s2, f2; /* at the beginning of the piece, its end, the end of the next */
+    double before = 0, h0 = 0, chord0 = 0; /* slope at the beginning; of the chord before */
     double *p = table + 1;
     table[0] = count + 1;
     for (int32_t i = 0; i < count; i++, p += PIECE) {
-        point_at(points, strain_of, i, &s0, &f0);
         point_at(points, strain_of, i + 1, &s1, &f1);
         const double h = s1 - s0, chord = (f1 - f0) / h;
         double after = chord; /* of a single point */
@@ -80,11 +76,11 @@ void drape_curve_make(const drape_points *points, double (*strain_of)(double), d
         p[C1] = before;
         p[C2] = (3 * chord - 2 * before - after) / h;
         p[C3] = (before + after - 2 * chord) / (h * h);
-        before = after, h0 = h, chord0 = chord;
+        before = after, h0 = h, chord0 = chord, s0 = s1, f0 = f1;
     }
-    p[START] = s1;
-    p[ENERGY] = energy_in(p - PIECE, s1 - s0);
-    p[C0] = f1;
+    p[START] = s0;
+    p[ENERGY] = energy_in(p - PIECE, s0 - p[START - PIECE]);
+    p[C0] = f0;
     p[C1] = before;
     p[C2] = p[C3] = 0;
 }

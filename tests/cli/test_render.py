@@ -4,6 +4,7 @@
 DRAPE_BUILD is the build folder; or: test_render.py PROGRAM. A test is a function test_*; its docstring is its name. Tests are skipped if
 the machine lacks what they need (an OpenGL driver, ffmpeg, Xvfb, numpy). With GOLDEN=write the golden pictures are written anew.
 """
+import functools
 import glob
 import json
 import os
@@ -122,11 +123,19 @@ def need_pictures():
     need_driver()
 
 
-def need_driver():
+@functools.cache
+def without_driver():
+    """Why this build or machine draws nothing, or ""."""
     probe = drape("render", write_scene("probe.json", duration=0.01), "--out", "probe.png", "--size", "64x64")
     if probe.returncode == 2 and ("without drawing" in probe.stderr or "draw without a display" in probe.stderr):
-        raise Skip(probe.stderr.strip())
+        return probe.stderr.strip()
     equal(probe.returncode, 0, probe.stderr)
+    return ""
+
+
+def need_driver():
+    if without_driver():
+        raise Skip(without_driver())
 
 
 def need(program):

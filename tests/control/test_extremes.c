@@ -7,6 +7,7 @@
  * corners, undamped, so that only the integrator removes the energy that an extreme adds. It runs for 1 s
  * or for the time in the table, for 3 s if DRAPE_SLOW is set.
  */
+#include "support/sample.h"
 #include "support/scene.h"
 
 #define SIDE      8
@@ -485,10 +486,16 @@ static bool run(const extreme *c, const char *method, unsigned bit)
 
 static void run_all(const char *method, unsigned bit)
 {
-    int good = 0;
+    size_t number = 0; /* of the method */
+    int runs = 0, good = 0;
+    while (1U << number < bit)
+        number++;
     for (size_t i = 0; i < EXTREMES; i++)
-        good += run(&extremes[i], method, bit);
-    ck_assert_msg(good == EXTREMES, "%d of %d: see above", (int)EXTREMES - good, (int)EXTREMES);
+        if (in_sample(i, number, 2)) {
+            good += run(&extremes[i], method, bit);
+            runs++;
+        }
+    ck_assert_msg(good == runs, "%d of %d: see above", runs - good, runs);
 }
 
 START_TEST(be_ends_whatever_the_scene_is)

@@ -10,6 +10,7 @@ and statements of one with a context ctx, a model and a sim. `python` runs. `tex
     <!-- printed by: COMMAND -->    the text is exactly what this command prints
     <!-- from: FILE -->             the block is an excerpt of this file
 """
+import functools
 import glob
 import json
 import os
@@ -82,6 +83,15 @@ def done(command, place, **options):
     return result.stdout
 
 
+@functools.cache
+def without_drawing():
+    """Why this build or machine draws nothing, or ""."""
+    tried = drape("render", "SCENE", "--size", "16x16", "--out", "tried.png")
+    if tried.returncode != 2:
+        os.remove("tried.png")
+    return tried.stderr.strip() if tried.returncode == 2 else ""
+
+
 def need_programs(text):
     """Skips a block that needs a program or a feature that this build or machine does not have."""
     verbs = good("help")
@@ -90,11 +100,8 @@ def need_programs(text):
             raise Skip(f"no {verb} in this build")
     if re.search(r"\.(mp4|webm|gif)\b", text) and not shutil.which("ffmpeg"):
         raise Skip("no ffmpeg")
-    if "drape render" in text:
-        tried = drape("render", "SCENE", "--size", "16x16", "--out", "tried.png")
-        if tried.returncode == 2:
-            raise Skip(tried.stderr.strip())
-        os.remove("tried.png")
+    if "drape render" in text and without_drawing():
+        raise Skip(without_drawing())
 
 
 def run_sh(block):

@@ -470,7 +470,7 @@ static void check_smooth(const drape_collider *c, const struct variant *v)
 {
     if (!c->ops->smooth)
         return;
-    for (int i = 0; i < 200000; i++) {
+    for (int i = 0; i < 50000; i++) {
         double x[3], n[2][3], turn[3];
         for (int k = 0; k < 3; k++)
             x[k] = between(-1.2, 1.2);

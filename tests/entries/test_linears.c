@@ -531,13 +531,14 @@ static void check_fallback(const drape_linear_report *report, int64_t count)
         ck_assert_str_eq(report->fallback->entry.name, falls ? "multifrontal" : "klu");
 }
 
-/* Definite and indefinite matrices in turn; a second solver with the same input gives the same bits. */
+/* Definite and indefinite matrices in turn; a second solver with the same input gives the same bits. A dense
+ * matrix has no supernodes, and takes n^3: a small sheet does for it. */
 START_TEST(a_sheet_of_many_supernodes)
 {
     static const double shifts[] = {1.01, 0.15, 1.5, 0.2, 1.01};
-    sheet q = open_sheet(24);
     for (int i = 0; drape_linears[i]; i++) {
         const drape_linear_ops *ops = drape_linears[i];
+        sheet q = open_sheet(strcmp(ops->entry.name, "dense") == 0 ? 8 : 24);
         void *solver = NULL, *other = NULL;
         ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
         ck_assert_int_eq(ops->create(q.arena, &q.p, &other), DRAPE_OK);
@@ -554,8 +555,8 @@ START_TEST(a_sheet_of_many_supernodes)
         check_fallback(&report, 2);
         drape_linear_destroy(ops, &solver);
         drape_linear_destroy(ops, &other);
+        close_sheet(&q);
     }
-    close_sheet(&q);
 }
 END_TEST
 

@@ -4,6 +4,7 @@
 #include "compile/fabrics.h"
 #include "lab/rod.h"
 #include "lab/validate.h"
+#include "support/sample.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -104,7 +105,8 @@ START_TEST(quick_references_pass)
 }
 END_TEST
 
-/* All fabrics of the table, so that a new one is checked as well. */
+/* All fabrics of the table, so that a new one is checked as well: in the sample, each by one or two of the
+ * tests. */
 START_TEST(every_fabric_gives_back_its_published_values)
 {
     static const char *const tests[] = {"fabric", "fabric_weft", "fabric_tension", "fabric_shear", "hanging"};
@@ -115,7 +117,8 @@ START_TEST(every_fabric_gives_back_its_published_values)
         ck_assert_int_eq(find(tests[t])->case_count, fabrics);
         for (int i = 0; i < fabrics; i++) {
             ck_assert_double_eq(find(tests[t])->parameters[i], i + 1);
-            check(tests[t], i, DRAPE_OUTCOME_PASS);
+            if (in_sample(t, (size_t)i, 3))
+                check(tests[t], i, DRAPE_OUTCOME_PASS);
         }
     }
     const drape_reference *draped = find("cusick_measured");

@@ -1,6 +1,7 @@
 /* test_events.c: when events occur: against free fall, which is known, and against the numerical solution
  * itself, under every integrator; what they leave unchanged; and checkpoints between. */
 #include "support/bytes.h"
+#include "support/sample.h"
 #include "support/scene.h"
 
 #define GRAVITY 9.81
@@ -265,25 +266,31 @@ static drape_status clock_of(void *user, double t, const double *x, const double
 START_TEST(an_event_may_follow_a_step_closely)
 {
     static const double after[] = {1e-6, 1e-8, 1e-9, 1e-10, 3e-11, 5e-12};
-    for (int i = 0; method(i); i++)
+    for (int i = 0; method(i); i++) {
+        const char *name = method(i)->entry.name;
+        scene before = swing(name, "");
+        scene_advance(&before, 0.4);
+        bytes saved = bytes_save(before.sim);
+        scene_close(&before);
         for (size_t k = 0; k < sizeof after / sizeof *after; k++) {
-            const char *name = method(i)->entry.name;
             scene s = swing(name, "");
             drape_event_def def;
             drape_event_def_init(&def, sizeof def);
             def.name = "clock";
             def.action = "stop";
-            scene_advance(&s, 0.4);
+            ck_assert_int_eq(drape_sim_restore_from(s.sim, saved.data, saved.size), DRAPE_OK);
             double at = drape_sim_time(s.sim) + after[k];
             ck_assert_int_eq(drape_sim_add_event(s.sim, &def, clock_of, &at), DRAPE_OK);
             ck_assert_msg(drape_sim_advance(s.sim, 0.5) == DRAPE_E_STOPPED, "%s %g: %s", name, after[k],
                           drape_context_message(s.ctx));
             ck_assert_msg(fabs(drape_sim_time(s.sim) - at) <= 1e-11, "%s %g: %g", name, after[k],
                           drape_sim_time(s.sim) - at);
-            ck_assert_msg(drape_sim_advance(s.sim, 0.5) == DRAPE_OK, "%s %g: %s", name, after[k],
+            ck_assert_msg(drape_sim_advance(s.sim, 0.45) == DRAPE_OK, "%s %g: %s", name, after[k],
                           drape_context_message(s.ctx));
             scene_close(&s);
         }
+        free(saved.data);
+    }
 }
 END_TEST
 
@@ -546,6 +553,8 @@ START_TEST(a_release_is_in_checkpoints)
         ck_assert_msg(drape_sim_model(s.sim)->free_count == s.model->free_count + 1, "%s", name);
         scene_advance(&s, 0.6);
         for (int k = 0; k < 4; k++) {
+            if (!in_sample((size_t)i, (size_t)k, 2))
+                continue;
             scene other = swing(name, falls);
             ck_assert_msg(drape_sim_restore_from(other.sim, saved[k].data, saved[k].size) == DRAPE_OK, "%s",
                           drape_context_message(other.ctx));

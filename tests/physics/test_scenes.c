@@ -8,6 +8,7 @@
 
 #include "model/scene.h"
 #include "support/audit.h"
+#include "support/sample.h"
 #include "support/scene.h"
 
 #define MAX_SETTINGS 8
@@ -177,7 +178,8 @@ END_TEST
     "[0.65,[-0.78,0.022,0]]]"
 
 /* A square sheet that is folded onto itself and one that crumples, 20 points a side, at CS184's thickness
- * and a tenth of it. bench/results/folds.csv has 50 points, and the fold at 80. */
+ * and a tenth of it: in the sample, each at one of the two. bench/results/folds.csv has 50 points, and the
+ * fold at 80. */
 START_TEST(no_edge_passes_a_triangle)
 {
     static const beginning folds[] = {
@@ -187,7 +189,8 @@ START_TEST(no_edge_passes_a_triangle)
         {"crumple", 0.35, {SQUARE, {THICKNESS, "0.00095"}}, .touches = true},
     };
     for (size_t i = 0; i < sizeof folds / sizeof *folds; i++)
-        run(&folds[i]);
+        if (in_sample(i / 2, i % 2, 2))
+            run(&folds[i]);
 }
 END_TEST
 
