@@ -6,6 +6,9 @@
  * the coarse matrix, until a dense one is left that is factored. An application is a W-cycle, accelerated by
  * Chebyshev polynomials, with one symmetric sweep of block Gauss-Seidel on each level: a symmetric positive
  * definite map, by the same operations in the same order for any number of threads.
+ *
+ * Where ranks share the matrix (pattern->ranks), they share the levels, too, and the functions are
+ * collective. Each forms aggregates of its own nodes, and sweeps take what others have from before the sweep.
  */
 #ifndef DRAPE_SOLVERS_MULTIGRID_H
 #define DRAPE_SOLVERS_MULTIGRID_H
@@ -23,7 +26,7 @@ drape_status drape_multigrid_create(drape_arena *arena, const drape_pattern *pat
  * translations only. DRAPE_RETRY_LINEAR if a matrix is noticed not to be positive definite. */
 drape_status drape_multigrid_factor(drape_multigrid *m, const double *values, const double *x);
 
-/* z = an approximation of A^-1 r. r and z are of pattern->n and differ. */
+/* z = an approximation of A^-1 r. r and z are of drape_pattern_own(pattern) numbers and differ. */
 void drape_multigrid_apply(drape_multigrid *m, const double *r, double *z);
 
 /* y = A x. */

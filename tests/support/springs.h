@@ -100,6 +100,27 @@ static inline sheet open_sheet(int32_t side)
     return q;
 }
 
+/* Turns it in space: by a rotation whose matrix has no zeros. */
+static inline void turn_sheet(sheet *q)
+{
+    static const double R[3][3] = {
+        {2. / 3, -1. / 3, 2. / 3}, {2. / 3, 2. / 3, -1. / 3}, {-1. / 3, 2. / 3, 2. / 3}};
+    for (int32_t j = 0; j < q->p.block_count; j++) {
+        const double *x = q->x + 3 * (size_t)j, at[3] = {x[0], x[1], x[2]};
+        for (int c = 0; c < 3; c++)
+            q->x[3 * j + c] = R[c][0] * at[0] + R[c][1] * at[1] + R[c][2] * at[2];
+        for (int32_t k = q->p.block_start[j]; k < q->p.block_start[j + 1]; k++) {
+            int64_t stride;
+            double *a = drape_pattern_at(&q->p, q->values, j, k, &stride), turned[3][3] = {{0}};
+            for (int c = 0; c < 9; c++)
+                for (int r = 0; r < 9; r++)
+                    turned[c / 3][r / 3] += R[c / 3][c % 3] * a[c % 3 * stride + r % 3] * R[r / 3][r % 3];
+            for (int c = 0; c < 3; c++)
+                memcpy(a + c * stride, turned[c], sizeof turned[c]);
+        }
+    }
+}
+
 static inline void close_sheet(sheet *q)
 {
     free(q->values);
