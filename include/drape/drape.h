@@ -610,11 +610,15 @@ typedef struct drape_realtime {
     double error; /* [m] largest drape_attempt.error of the accepted steps; NaN: the integrator estimates
                         none, or no step was accepted */
     double error_bound; /* [m] see drape_statistics; NaN: the integrator estimates no error */
-    bool accurate;      /* whether it made a step, held no cloth, and `error` is at most that, as far as the
-                                 integrator estimates one */
+    bool accurate; /* whether it made a step, held no cloth, nothing passes through the cloth, and `error`
+                                 is at most that, as far as the integrator estimates one */
     int64_t inaccurate_total; /* calls since the sim was created that were not accurate */
-    int held; /* steps in which the cloth was held where it was, without velocity, because none could be made
-                 otherwise */
+    int held; /* steps in which the cloth was held where it was, or went with its pins, because none could be
+                 made otherwise */
+    double behind; /* [s] after time was dropped: bodies are, relative to the pins, about so long before where
+                      the host sent them */
+    int64_t crossings; /* edges of the cloth that pass through its triangles, with self-contact, where steps
+                          were let pass or began so: drape_sim_intersections; 0 where none were */
 } drape_realtime;
 
 /* Advances by one frame within a wall-clock budget, for games, previews and anything else that must show a
@@ -889,6 +893,8 @@ DRAPE_API void drape_sim_cancel(drape_sim *sim);
  * has it, at rest.
  *
  * Before drape_sim_advance_realtime, seconds is the frame plus what is owed: frame_dt + drape_realtime.debt.
+ * After simulated time was dropped, the path is made faster than it was sent by no more than half, and pins
+ * that go in much the same direction take the cloth along for that time: drape_realtime.behind.
  *
  * The integrator knows the whole path: within any step, and in any frame, pins are exactly on it. A jump in
  * velocity is a kink, at which "ida" starts anew. A node that is listed twice is not detected.
@@ -1229,7 +1235,7 @@ typedef struct drape_warning {
     const char *name; /* "no_terms", "unused_curve", "unused_clamp", "unused_history", "few_steps",
                          "large_mesh", "starts_inside", "ends_inside", "tangled", "no_room",
                          "numerical_dissipation", "energy_gained", "slow_contact", "contact_distance",
-                         "inaccurate", "held" or "time_dropped" */
+                         "inaccurate", "held", "crossings" or "time_dropped" */
     char text[400];   /* one line */
 } drape_warning;
 

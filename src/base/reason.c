@@ -19,7 +19,8 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
                "accepted after the given number of iterations, with a residual above `tolerance`"),
     [DRAPE_REASON_HELD] =
         REASON("held", "time budget",
-               "accepted: the step failed again and again, and the cloth was held where it was"),
+               "accepted: the step failed again and again, and the cloth was held where it was, or went "
+               "with its pins"),
     [DRAPE_REASON_RESIDUAL] =
         REASON("residual", "Newton, newton_k", "the residual is too large after all iterations"),
     [DRAPE_REASON_STAGNATION] = REASON(

@@ -142,6 +142,7 @@ static void count(drape_summary_realtime *s, const drape_realtime *frame)
     s->fewer += fewer;
     s->larger += !full && !fewer;
     s->inaccurate += frame->error > frame->error_bound;
+    s->crossings = frame->crossings > s->crossings ? frame->crossings : s->crossings;
     s->still += !(frame->h > 0);
     s->debt = frame->debt;
     s->dropped = frame->dropped_total;

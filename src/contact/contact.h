@@ -43,8 +43,9 @@ void drape_contact_expect(drape_contact *contact, double t1, bool may_relax);
 /* What is relaxed after a step that failed, if no cloth is found that has no room. */
 typedef enum drape_relax_extent {
     DRAPE_RELAX_NONE,
-    DRAPE_RELAX_PAIR, /* the pair that refused the step */
-    DRAPE_RELAX_NEAR  /* also those whose gaps are hardly above the least */
+    DRAPE_RELAX_PAIR, /* the pair that refused the step, if it is one with a body */
+    DRAPE_RELAX_NEAR  /* also those whose gaps are hardly above the least; if none of them is one with a body,
+                         those of cloth and pinned cloth */
 } drape_relax_extent;
 
 /* After a step to t1 that failed: relaxes cloth that has no room, or, if there is none, what extent says.

@@ -333,15 +333,30 @@ static drape_status relax_pair(drape_contact *c, const drape_pair *pair, double 
     return status;
 }
 
-/* The pair that refused the step, and those that are as near as it before the step. */
-static drape_status relax_blockers(drape_contact *c, drape_relax_extent extent, int32_t *added)
+/* The pairs with bodies, or those of cloth and pinned cloth, among the one that refused the step and those
+ * that are as near as it before the step. */
+static drape_status relax_blockers_of(drape_contact *c, drape_relax_extent extent, bool bodies,
+                                      int32_t *added)
 {
-    drape_status status = go_to(c, c->start, c->start_t);
-    if (!status && c->refused)
+    drape_status status = DRAPE_OK;
+    if (c->refused && bodies == (c->refusing.collider >= 0))
         status = relax_pair(c, &c->refusing, c->start_t, added);
     const int32_t near_count = extent == DRAPE_RELAX_NEAR ? c->active.near_count : 0;
     for (int32_t i = 0; !status && i < near_count; i++)
-        status = relax_pair(c, &c->active.near[i].pair, c->start_t, added);
+        if (bodies == (c->active.near[i].pair.collider >= 0))
+            status = relax_pair(c, &c->active.near[i].pair, c->start_t, added);
+    return status;
+}
+
+/* Bodies that are let in come out again. Cloth that passes through pinned cloth stays on its other side, so
+ * it is relaxed last. */
+static drape_status relax_blockers(drape_contact *c, drape_relax_extent extent, int32_t *added)
+{
+    drape_status status = go_to(c, c->start, c->start_t);
+    if (!status)
+        status = relax_blockers_of(c, extent, true, added);
+    if (!status && *added == 0 && extent == DRAPE_RELAX_NEAR)
+        status = relax_blockers_of(c, extent, false, added);
     return status;
 }
 
@@ -390,8 +405,11 @@ drape_status drape_contact_let_in(drape_contact *c, const double *x, double t1)
     const double before = status ? 0 : drape_contact_potential(c);
     if (!status)
         status = go_to(c, x, t1);
-    for (int32_t i = 0; !status && i < c->active.near_count; i++)
-        status = relax_pair(c, &c->active.near[i].pair, c->start_t, &added);
+    for (int32_t i = 0; !status && i < c->active.near_count; i++) {
+        const drape_near_pair *near = &c->active.near[i];
+        if (near->gap < drape_pair_least_gap(&near->pair, c->broad.rounding))
+            status = relax_pair(c, &near->pair, c->start_t, &added);
+    }
     while (!status && added > 0) {
         added = 0;
         c->listed = false;

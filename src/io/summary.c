@@ -114,9 +114,10 @@ static json_t *strain(const drape_statistics *s)
 
 static json_t *realtime(const drape_summary_realtime *r)
 {
-    const count_item counts[] = {{"frames", r->frames},        {"missed", r->missed}, {"full", r->full},
-                                 {"fewer", r->fewer},          {"larger", r->larger}, {"still", r->still},
-                                 {"inaccurate", r->inaccurate}};
+    const count_item counts[] = {
+        {"frames", r->frames},         {"missed", r->missed},      {"full", r->full},
+        {"fewer", r->fewer},           {"larger", r->larger},      {"still", r->still},
+        {"inaccurate", r->inaccurate}, {"crossings", r->crossings}};
     const real_item times[] = {{"budget", r->budget},  {"p50", r->p50},     {"p95", r->p95},
                                {"p99", r->p99},        {"worst", r->worst}, {"debt", r->debt},
                                {"dropped", r->dropped}};

@@ -10,6 +10,7 @@
 typedef struct drape_summary_realtime {
     int64_t frames, missed, full, fewer, larger;
     int64_t inaccurate; /* frames with a step whose estimated error was above its bound */
+    int64_t crossings;  /* the largest number of edges through triangles of the cloth after a frame */
     int64_t still;      /* frames without a new state: they took no time, and show the state before */
     double budget, p50, p95, p99, worst; /* [s] wall time per frame */
     double debt, dropped; /* [s] simulated time still owed after the last frame; dropped in total */

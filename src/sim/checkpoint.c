@@ -175,7 +175,8 @@ static void archive_relaxed_logged(drape_sim *sim, drape_archive *a)
 static void archive_realtime(drape_sim *sim, drape_archive *a)
 {
     drape_realtime_memory *m = &sim->realtime;
-    double *const numbers[] = {&m->dt, &m->longest, &m->debt, &m->dropped, &m->cap};
+    double *const numbers[] = {&m->dt,          &m->longest, &m->debt,     &m->dropped,   &m->behind,
+                               &m->pins_behind, &m->cap,     &m->apart_at, &m->apart_wait};
     int efforts = sim->chosen.integrator->efforts < 1 ? 1 : sim->chosen.integrator->efforts;
     drape_archive_mark(a, "realtime");
     drape_archive_bool(a, &m->active);
@@ -186,12 +187,15 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
     drape_archive_doubles(a, m->cost, DRAPE_MAX_EFFORTS);
     drape_archive_double(a, &m->ending);
     drape_archive_int64(a, &m->inaccurate);
+    drape_archive_int64(a, &m->crossings);
+    drape_archive_int64(a, &m->most_crossings);
+    drape_archive_int64(a, &m->crossed);
     drape_archive_int(a, &m->effort);
     if (drape_archive_good(a) && !is_place(m->effort, 0, efforts))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an effort %d of %d", m->effort, efforts);
     if (drape_archive_good(a) && m->active &&
         !(m->dt > 0 && m->longest >= m->dt && m->longest <= MAX_SECONDS && m->debt >= 0 &&
-          m->debt <= m->longest && m->cap > 0))
+          m->debt <= m->longest && m->behind >= 0 && m->pins_behind >= 0 && m->cap > 0))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step for a budget");
     if (drape_archive_has_read(a) && sim->chosen.integrator->set_effort)
         sim->chosen.integrator->set_effort(sim->integrator, m->effort);

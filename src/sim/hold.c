@@ -3,6 +3,8 @@
 
 #include "base/finite.h"
 #include "base/reason.h"
+#include "base/vec3.h"
+#include "model/sent.h"
 #include "model/support.h"
 
 #include <math.h>
@@ -27,7 +29,29 @@ static double end_of_hold(const drape_sim *sim)
     return fmin(s->now + sim->realtime.dt, s->cut ? s->cut_end : s->end);
 }
 
-/* Pins and colliders do all the work: the free nodes, and with them inertia and damping, rest. */
+/* Free nodes go where the pins of their cloth go as one: otherwise these would be torn from them, and pass
+ * through the cloth beside them. */
+static void carry(const drape_motion *motion, const drape_state *now, drape_state *next)
+{
+    const drape_model *m = motion->model;
+    const double h = next->t - now->t;
+    for (int32_t c = 0; c < m->cloth_count; c++) {
+        const drape_cloth *cloth = &m->cloths[c];
+        double path[3];
+        if (!drape_motion_moves_as_one(motion, cloth->first_node, cloth->mesh.node_count, now->x, next->t,
+                                       path))
+            continue;
+        for (int32_t i = 0; i < cloth->mesh.node_count; i++) {
+            const size_t node = (size_t)(cloth->first_node + i);
+            if (m->pinned[node])
+                continue;
+            vec3_add_scaled(1, path, next->x + 3 * node);
+            vec3_add_scaled(1 / h, path, next->v + 3 * node);
+        }
+    }
+}
+
+/* Pins and colliders do all the work: the free nodes go along, and with them inertia and damping. */
 static double potential(const drape_energy *e)
 {
     return e->elastic + e->gravity + e->contact;
@@ -51,9 +75,10 @@ drape_status drape_sim_hold(drape_sim *sim, drape_state *next, drape_step_info *
     memcpy(next->x, now->x, n * sizeof *next->x);
     memset(next->v, 0, n * sizeof *next->v);
     next->t = t1;
+    carry(drape_system_motion(sim->system), now, next);
     drape_motion_place_pins(drape_system_motion(sim->system), t1, next->x);
     for (size_t i = 0; i < n; i++)
-        next->v[i] = m->pinned[i / 3] ? (next->x[i] - now->x[i]) / h : 0;
+        next->v[i] = m->pinned[i / 3] ? (next->x[i] - now->x[i]) / h : next->v[i];
     drape_supports_hold(drape_system_motion(sim->system), now->t, now->x, t1, next->x);
     drape_supports_hold_velocity(drape_system_motion(sim->system), (const double[]){now->t, t1}, false,
                                  next->v);
@@ -73,6 +98,6 @@ drape_status drape_sim_hold(drape_sim *sim, drape_state *next, drape_step_info *
     if (status)
         return status;
     const drape_energy after = drape_sim_energy_of(sim, t1, next->x, next->v);
-    info->pin_work = potential(&after) - potential(&before);
+    info->pin_work = potential(&after) - potential(&before) + fmax(0, after.kinetic - before.kinetic);
     return DRAPE_OK;
 }

@@ -1,9 +1,10 @@
 /*
  * hold.h: the last resort of advances with a time budget. Where a step fails again and again, whatever its
- * size, the free nodes are held where they are until the end of the nominal step, and lose their velocities;
- * pins and colliders move on, and bodies are let into the cloth that they reach (contact/relaxed.h). The next
- * step begins from rest. So a call makes headway, and no call fails for good. Held steps are counted and
- * reported. Not with contact/no_room "stop", nor with integrators that choose their own steps.
+ * size, the free nodes go where the pins of their cloth go as one, or are held where they are, until the end
+ * of the nominal step, and lose all other velocity; pins and colliders move on, and bodies are let into the
+ * cloth that they reach (contact/relaxed.h). So a call makes headway, and no call fails for good. Held steps
+ * are counted and reported. Not with contact/no_room "stop", nor with integrators that choose their own
+ * steps.
  */
 #ifndef DRAPE_SIM_HOLD_H
 #define DRAPE_SIM_HOLD_H

@@ -14,17 +14,22 @@
 #include "base/clock.h"
 #include "base/elementary.h"
 #include "base/reason.h"
+#include "base/vec3.h"
+#include "contact/relaxed.h"
+#include "sim/catch_up.h"
 #include "sim/relaxed.h"
 #include "sim/sim.h"
 #include "sim/untangle.h"
 
 #include <math.h>
+#include <string.h>
 
 #define KEEP    0.9 /* fraction of the budget: a level of effort that is expected to take more is abandoned */
 #define RECOVER 0.6 /* fraction of the budget: a better level that is expected to take less is resumed */
 #define LEARN   0.3 /* weight of the last attempt in the expected cost */
 #define CHEAPER 0.7 /* assumed cost relative to the next better level, until it is measured */
 #define STRETCH 4   /* longest step, in dt, unless the def sets it */
+#define SWEEPS  8   /* of untangling, in a call */
 #define SAME    1e-9 /* fraction of dt: allowance for rounding in the host's sum of frames */
 
 static int effort_count(const drape_sim *sim)
@@ -161,6 +166,29 @@ static void set_deadline(drape_sim *sim, const plan *p, const drape_realtime *re
             sim->integrator, until - sim->realtime.ending - after * expected(sim, sim->realtime.effort));
 }
 
+/* Whether pins have moved relative to each other in the last step: pairs of pinned pieces alone are not
+ * checked either. */
+static bool pins_move_apart(const drape_sim *sim)
+{
+    const drape_model *m = sim->model;
+    if (!m->contact.self || sim->before < 0)
+        return false;
+    const double *from = sim->states[sim->before].x, *to = drape_sim_state(sim)->x, *first = NULL;
+    double path[3], other[3], apart = 0;
+    for (int32_t i = 0; i < m->node_count; i++) {
+        const size_t at = 3 * (size_t)i;
+        if (!m->pinned[i])
+            continue;
+        vec3_sub(to + at, from + at, other);
+        if (!first)
+            memcpy(path, other, sizeof path);
+        first = to + at;
+        vec3_sub(other, path, other);
+        apart = fmax(apart, vec3_norm(other));
+    }
+    return apart > SAME * m->length;
+}
+
 static drape_status take_steps(drape_sim *sim, const plan *p, double begun, double budget,
                                drape_realtime *report)
 {
@@ -187,6 +215,7 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
         learn(sim, end - start - sim->further_seconds);
         learn_ending(&sim->realtime, end - sim->solved_at);
         sim->realtime.touches = is_in_contact(sim);
+        sim->realtime.unchecked |= attempt.accepted && pins_move_apart(sim);
         report->attempts++;
         report->rejected += !attempt.accepted;
         report->held += attempt.accepted && attempt.reason == drape_reason_name(DRAPE_REASON_HELD);
@@ -209,8 +238,48 @@ static void bound_steps(drape_realtime_memory *m, const drape_realtime *report)
         m->cap = report->h;
 }
 
+/* ---- Cloth that passes through itself ---- */
+
+/* Whether steps may pass through pinned cloth, and that is why they are not checked there. */
+static bool lets_cloth_pass(const drape_sim *sim)
+{
+    const drape_contact *contact = drape_system_contact(sim->system);
+    return contact && drape_relaxed_count(drape_contact_relaxed(contact), -1) > 0;
+}
+
+/* Counted where a step may have let some pass, or begun with some: all others are checked. */
+static void count_crossings(drape_sim *sim, bool unchecked)
+{
+    drape_realtime_memory *m = &sim->realtime;
+    if (!sim->model->contact.self || (m->crossings == 0 && !unchecked))
+        return;
+    m->crossings = drape_sim_intersections(sim, -1);
+    m->most_crossings = m->crossings > m->most_crossings ? m->crossings : m->most_crossings;
+}
+
+/* What passes through the cloth stays there, because contact keeps each side where it is. Once bodies and
+ * pins leave it room, it is taken apart, as far as possible. Where that does not help, it is tried again
+ * after twice as long. */
+static drape_status take_apart(drape_sim *sim)
+{
+    drape_realtime_memory *m = &sim->realtime;
+    const int64_t before = m->crossings;
+    const double now = drape_sim_time(sim);
+    if (before == 0 || lets_cloth_pass(sim) || now < m->apart_at)
+        return DRAPE_OK;
+    const drape_status status = drape_sim_untangle_some(sim, SWEEPS);
+    if (status)
+        return status;
+    count_crossings(sim, false);
+    m->apart_wait = m->crossings < before ? 0 : fmax(m->dt, 2 * m->apart_wait);
+    m->apart_at = now + m->apart_wait;
+    return DRAPE_OK;
+}
+
+/* ---- The end of a call ---- */
+
 /* Time that was not covered is owed to the next call, or dropped. */
-static void settle(drape_sim *sim, double goal, drape_realtime *report)
+static void settle(drape_sim *sim, double goal, const drape_catch_up *rates, drape_realtime *report)
 {
     drape_realtime_memory *m = &sim->realtime;
     double left = goal - drape_sim_state(sim)->t;
@@ -218,12 +287,18 @@ static void settle(drape_sim *sim, double goal, drape_realtime *report)
     m->debt = left > SAME * m->dt ? fmin(left, most) : 0;
     report->dropped = left > most ? left - most : 0;
     m->dropped += report->dropped;
+    drape_sim_fall_behind(sim, rates, left, report->dropped);
     m->stretched = report->h > (1 + SAME) * m->dt || m->debt > 0;
     bound_steps(m, report);
     report->time = drape_sim_state(sim)->t;
     report->debt = m->debt;
     report->error_bound = drape_sim_error_bound(sim);
-    report->accurate = report->h > 0 && report->held == 0 && !(report->error > report->error_bound);
+    count_crossings(sim, m->unchecked || lets_cloth_pass(sim));
+    m->crossed += m->crossings > 0;
+    report->behind = m->behind;
+    report->crossings = m->crossings;
+    report->accurate = report->h > 0 && report->held == 0 && report->crossings == 0 &&
+                       !(report->error > report->error_bound);
     m->inaccurate += !report->accurate;
     report->inaccurate_total = m->inaccurate;
     report->dropped_total = m->dropped;
@@ -258,6 +333,7 @@ static void enter(drape_sim *sim)
         return;
     m->active = true;
     m->cap = INFINITY;
+    m->crossings = sim->model->contact.self ? drape_sim_intersections(sim, -1) : 0;
     m->dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1 / sim->frame_rate);
     m->longest = m->longest_asked > 0 ? fmax(m->longest_asked, m->dt) : STRETCH * m->dt;
 }
@@ -274,16 +350,24 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
     sim->advancing = true;
     if (!status)
         status = drape_sim_untangle_start(sim);
+    const double owed = sim->realtime.debt + frame_dt;
+    drape_catch_up rates = {false, 1, 1};
     if (!status) {
         enter(sim);
-        double owed = sim->realtime.debt + frame_dt, goal = drape_sim_state(sim)->t + owed;
+        status = drape_sim_catch_up(sim, owed, &rates);
+    }
+    if (!status)
+        status = take_apart(sim);
+    if (!status) {
+        const double goal = drape_sim_state(sim)->t + owed;
+        sim->realtime.unchecked = false;
         const plan p = make_plan(sim, owed, frame_dt, budget);
         set_effort(sim, p.effort);
         if (p.steps > 0) {
             aim(sim, &p, goal);
             status = take_steps(sim, &p, start, budget, &report);
         }
-        settle(sim, goal, &report);
+        settle(sim, goal, &rates, &report);
         report.level = level_name(sim);
         report.effort = sim->realtime.effort;
         report.relaxed = drape_sim_relaxed_now(sim, &report.deepest_relaxed);
@@ -302,7 +386,7 @@ void drape_sim_leave_realtime(drape_sim *sim)
     if (!m->active)
         return;
     m->active = m->stretched = false;
-    m->debt = 0;
+    m->debt = m->behind = m->pins_behind = 0;
     set_effort(sim, 0);
     if (sim->chosen.integrator->set_deadline)
         sim->chosen.integrator->set_deadline(sim->integrator, INFINITY);

@@ -45,6 +45,8 @@ typedef struct drape_realtime_memory {
     double dt, longest;             /* [s] nominal step; longest step to keep up with */
     double longest_asked;           /* [s] the longest step set by the def; 0: not set */
     double debt, dropped;           /* [s] time left over for the next call; total time dropped */
+    double behind, pins_behind;     /* [s] of motion that a host sends beyond the time simulated (catch_up.h):
+                                       of bodies relative to the pins, and of what all pins have in common */
     double cost[DRAPE_MAX_EFFORTS]; /* [s] expected for an attempt, by level of effort; 0: unknown */
     double ending;                  /* [s] expected from the end of the integrator's work in an attempt on */
     int effort;                     /* the integrator's level of effort; 0 is the best */
@@ -53,6 +55,11 @@ typedef struct drape_realtime_memory {
     bool meets;                     /* a longer step of this call might meet something */
     double cap;                     /* [s] longer steps were rejected recently; INFINITY: no limit */
     int64_t inaccurate;             /* calls that were not accurate */
+    bool unchecked;                 /* pins have moved apart in this call; not archived: it is read in it */
+    int64_t crossings;              /* edges through triangles of the cloth after the last call, */
+    double apart_at, apart_wait;    /* [s] they are taken apart from then on, after having waited so long */
+    int64_t most_crossings;         /* the largest number of them so far, */
+    int64_t crossed;                /* and the calls with any */
 } drape_realtime_memory;
 
 struct drape_sim {

@@ -254,6 +254,24 @@ bool drape_sim_untangling(const drape_sim *sim, drape_untangling *out, double *m
     return true;
 }
 
+drape_status drape_sim_untangle_some(drape_sim *sim, int sweeps)
+{
+    const drape_untangle_limits limits = {.sweeps = sweeps, .gap = DRAPE_UNTANGLE_DEFAULT_GAP};
+    double *x = sim->states[sim->next].x;
+    drape_untangle_outcome outcome;
+    finding before, after;
+    memcpy(x, drape_sim_positions(sim), 3 * (size_t)sim->model->node_count * sizeof *x);
+    drape_status status = find(sim, x, &before);
+    if (!status)
+        status = drape_untangle(sim->ctx, drape_system_motion(sim->system), drape_sim_time(sim), &limits,
+                                &sim->cancel, x, &outcome);
+    if (!status)
+        status = find(sim, x, &after);
+    if (!status && after.pairs < before.pairs && is_worth_keeping(sim, x, &before, &after))
+        commit(sim);
+    return status;
+}
+
 static void log_untangling(const drape_sim *sim, const drape_untangling *u)
 {
     drape_log(sim->ctx, u->clear ? DRAPE_LOG_INFO : DRAPE_LOG_WARNING,

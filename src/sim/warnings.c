@@ -399,8 +399,22 @@ static bool was_held(drape_sim *sim, char *text, size_t size)
         return false;
     snprintf(text, size,
              "in %lld of %lld steps no size of the step could be made, and the cloth was held where it was, "
-             "without velocity: the log says when and why",
+             "or went with its pins: the log says when and why",
              (long long)s->steps_held, (long long)s->steps_accepted);
+    return true;
+}
+
+/* Steps that let cloth pass through pinned cloth, or began with cloth that passed through itself. */
+static bool passed_through(drape_sim *sim, char *text, size_t size)
+{
+    const drape_realtime_memory *m = &sim->realtime;
+    if (m->crossed == 0)
+        return false;
+    snprintf(
+        text, size,
+        "after %lld calls with a time budget edges of the cloth passed through its triangles, up to %lld of "
+        "them: pins leave the cloth no room, or it began so",
+        (long long)m->crossed, (long long)m->most_crossings);
     return true;
 }
 
@@ -454,6 +468,7 @@ static const struct {
               {"contact_distance", is_contact_thin},
               {"inaccurate", is_inaccurate},
               {"held", was_held},
+              {"crossings", passed_through},
               {"time_dropped", drops_time}};
 
 bool drape_sim_take_warning_failure(drape_sim *sim)

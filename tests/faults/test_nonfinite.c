@@ -103,6 +103,36 @@ START_TEST(a_budget_holds_the_cloth)
 }
 END_TEST
 
+/* Pins that a host moves meanwhile take the cloth with them: at the end of each of these steps it has the
+ * shape that it had, and the velocity of the pins. */
+START_TEST(cloth_that_is_held_goes_with_its_pins)
+{
+    host_sim s = host_open("", "'type': 'halving'", true);
+    const int32_t pins[2] = {0, 2}, nodes = drape_model_node_count(s.model);
+    double start[96], before[96];
+    drape_realtime report;
+    ck_assert_int_le(3 * nodes, 96);
+    memcpy(start, drape_sim_positions(s.sim), 3 * (size_t)nodes * sizeof *start);
+    for (int k = 1; k <= 20; k++) {
+        double at[6];
+        if (k == 11)
+            host_break(HOST_NAN_FORCE, 1, true);
+        for (int i = 0; i < 6; i++)
+            at[i] = start[3 * pins[i / 3] + i % 3] + (i % 3 == 0 ? k * HOST_DT : 0);
+        memcpy(before, drape_sim_positions(s.sim), 3 * (size_t)nodes * sizeof *before);
+        ck_assert_int_eq(drape_sim_move_pins(s.sim, 2, pins, HOST_DT, at, NULL), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_advance_realtime(s.sim, HOST_DT, 1e9, &report), DRAPE_OK);
+        ck_assert_int_eq(report.held, k > 10);
+        for (int32_t i = 0; k > 10 && i < 3 * nodes; i++) {
+            const double v = i % 3 == 0; /* [m/s] */
+            ck_assert_double_eq_tol(drape_sim_positions(s.sim)[i] - before[i], v * HOST_DT, 1e-15);
+            ck_assert_double_eq_tol(drape_sim_velocities(s.sim)[i], v, 1e-12);
+        }
+    }
+    host_close(&s);
+}
+END_TEST
+
 START_TEST(halving_recovers)
 {
     static const host_fault kinds[] = {HOST_NAN_FORCE, HOST_INFINITE_FORCE, HOST_NAN_HESSIAN,
@@ -190,4 +220,5 @@ END_TEST
 
 SUITE("nonfinite", a_nan_force_stops_fixed_steps, an_infinite_force_stops_fixed_steps,
       a_nan_hessian_stops_fixed_steps, an_infinite_hessian_stops_fixed_steps, halving_recovers,
-      a_budget_holds_the_cloth, a_fault_that_stays_ends_the_run, accept_takes_no_nan, a_tiny_dt_min_ends_too)
+      a_budget_holds_the_cloth, cloth_that_is_held_goes_with_its_pins, a_fault_that_stays_ends_the_run,
+      accept_takes_no_nan, a_tiny_dt_min_ends_too)
