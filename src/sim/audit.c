@@ -338,7 +338,7 @@ void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
     audit->residual_work += info->residual_work;
     audit->offered += fabs(info->pin_work) + fabs(info->dissipated);
     /* with internal variables, committing the step changes the energy */
-    sim->energy_known = sim->attempted_known && sim->model->internal_count == 0;
+    sim->energy_known = sim->attempted_known && drape_model_whole(sim->model)->internal_count == 0;
     if (!sim->attempted_known)
         return;
     sim->energy = sim->attempted;
