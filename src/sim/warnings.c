@@ -317,6 +317,12 @@ static bool gains_energy(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
+/* Newton iterations an attempt; NaN before the first one. */
+static double iterations(const drape_statistics *s)
+{
+    return (double)s->newton_iterations / (double)(s->steps_accepted + s->steps_rejected);
+}
+
 /* Steps too large for Newton's method, where half a step takes about half of the iterations. In 19 drawn
  * scenes in which be at 1/60 s took more than ten iterations a step, all of cloth that buckles, a quarter of
  * the step took 0.4 to 4.4 times the CPU time, the median 1.2. */
@@ -324,15 +330,13 @@ static bool iterates_long(drape_sim *sim, char *text, size_t size)
 {
     const drape_integrator_ops *integrator = sim->chosen.integrator;
     const drape_statistics s = drape_sim_statistics(sim);
-    const double attempts = (double)(s.steps_accepted + s.steps_rejected);
     if (integrator->order != 1 || isnan(drape_chosen_integrator_value(&sim->chosen, "max_iterations", NAN)) ||
-        integrator->steady_state || sim->chosen.controller->own_steps ||
-        !((double)s.newton_iterations > TOO_MANY * attempts))
+        integrator->steady_state || sim->chosen.controller->own_steps || !(iterations(&s) > TOO_MANY))
         return false;
     snprintf(text, size,
              "%s took %.3g Newton iterations an attempt, as where cloth buckles: a smaller dt, or the "
              "controller \"iterations\", is more accurate there and often takes hardly longer",
-             integrator->entry.name, (double)s.newton_iterations / attempts);
+             integrator->entry.name, iterations(&s));
     return true;
 }
 
@@ -343,9 +347,8 @@ static bool iterates_long(drape_sim *sim, char *text, size_t size)
 static bool is_contact_slow(drape_sim *sim, char *text, size_t size)
 {
     const drape_statistics s = drape_sim_statistics(sim);
-    const double attempts = (double)(s.steps_accepted + s.steps_rejected), motion = drape_sim_time(sim);
-    const bool iterates = (double)s.newton_iterations > MANY * attempts;
-    if (!(s.wall_contact > MOST * s.wall_steps) || !(s.wall_contact > motion) || !iterates)
+    const double motion = drape_sim_time(sim);
+    if (!(s.wall_contact > MOST * s.wall_steps) || !(s.wall_contact > motion) || !(iterations(&s) > MANY))
         return false;
     snprintf(text, size,
              "contact takes %.0f %% of the time of the steps, %.3g s for %.3g s of motion: it takes less "
