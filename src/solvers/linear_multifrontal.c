@@ -86,14 +86,9 @@ static bool copy_diagonal(multifrontal *s, const double *values)
 {
     const drape_pattern *p = s->fronts.pattern;
     bool positive = true;
-    for (int32_t j = 0; j < p->block_count; j++) {
-        int64_t stride;
-        const double *at = drape_pattern_at(p, (double *)(uintptr_t)values, j, p->diagonal[j], &stride);
-        for (int c = 0; c < 3; c++) {
-            s->diagonal[3 * j + c] = at[c * stride + c];
-            positive &= s->diagonal[3 * j + c] > 0;
-        }
-    }
+    drape_pattern_list_diagonal(p, values, s->diagonal);
+    for (int64_t i = 0; i < p->n; i++)
+        positive &= s->diagonal[i] > 0;
     return positive;
 }
 

@@ -74,20 +74,6 @@ static void destroy(void **state)
 
 /* ---- Values ---- */
 
-/* Of copies, their owners have the whole columns. */
-static void list_diagonal(pcg_state *s)
-{
-    const drape_pattern *p = s->pattern;
-    for (int32_t j = 0; j < p->block_count; j++) {
-        int64_t stride;
-        const double *d = drape_pattern_at(p, (double *)(uintptr_t)s->values, j, p->diagonal[j], &stride);
-        for (int c = 0; c < 3; c++)
-            s->diagonal[3 * (int64_t)j + c] = d[c * stride + c];
-    }
-    if (p->ranks)
-        p->ranks->fetch_blocks(p->ranks, s->diagonal);
-}
-
 static bool is_symmetric_here(const pcg_state *s)
 {
     const drape_pattern *p = s->pattern;
@@ -112,8 +98,11 @@ static bool is_symmetric_here(const pcg_state *s)
 
 static bool is_symmetric(pcg_state *s)
 {
-    list_diagonal(s);
-    return drape_ranks_all(s->pattern->ranks, is_symmetric_here(s));
+    const drape_pattern *p = s->pattern;
+    drape_pattern_list_diagonal(p, s->values, s->diagonal);
+    if (p->ranks) /* of copies, their owners have the whole columns */
+        p->ranks->fetch_blocks(p->ranks, s->diagonal);
+    return drape_ranks_all(p->ranks, is_symmetric_here(s));
 }
 
 static bool is_finite(const pcg_state *s, const double *values, int64_t n)

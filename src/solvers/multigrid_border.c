@@ -18,16 +18,6 @@ static int32_t first_here(const border *b)
     return b->first[b->ranks->rank];
 }
 
-static int32_t rank_of(const border *b, int32_t number)
-{
-    int low = 0, high = b->ranks->count;
-    while (high - low > 1) {
-        const int middle = (low + high) / 2;
-        *(b->first[middle] <= number ? &low : &high) = middle;
-    }
-    return low;
-}
-
 static int32_t number_of(const border *b, int32_t count, int32_t here)
 {
     return here < count ? first_here(b) + here : b->number[here - count];

@@ -165,10 +165,7 @@ static bool counts(const border *b, int32_t count, int32_t I, int32_t J)
     if (J < count)
         return true;
     const int32_t row = b->number[I - count], column = b->number[J - count];
-    int k = 0;
-    while (b->first[k + 1] <= row)
-        k++;
-    return column <= row || column >= b->first[k + 1];
+    return column <= row || column >= b->first[rank_of(b, row) + 1];
 }
 
 /* The columns of the coarse row I: those of the prolongation at the neighbours of all rows where function I

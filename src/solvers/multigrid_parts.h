@@ -100,6 +100,17 @@ drape_status drape_border_finish(drape_arena *arena, drape_arena *scratch, level
 drape_status drape_border_gather(drape_arena *arena, drape_arena *scratch, const level *l, graph *g,
                                  gathered *out);
 
+/* The rank that has the row of a number in the matrix of all ranks. */
+static inline int rank_of(const border *b, int32_t number)
+{
+    int low = 0, high = b->ranks->count;
+    while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        *(b->first[middle] <= number ? &low : &high) = middle;
+    }
+    return low;
+}
+
 /* Adds a number to an ascending list that does not have it. */
 static inline int32_t insert(int32_t *list, int32_t count, int32_t value)
 {

@@ -162,6 +162,16 @@ int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t co
     return block;
 }
 
+void drape_pattern_list_diagonal(const drape_pattern *p, const double *values, double *diagonal)
+{
+    for (int32_t j = 0; j < p->block_count; j++) {
+        int64_t stride;
+        const double *at = drape_pattern_at(p, (double *)(uintptr_t)values, j, p->diagonal[j], &stride);
+        for (int c = 0; c < 3; c++)
+            diagonal[3 * (int64_t)j + c] = at[c * stride + c];
+    }
+}
+
 void drape_pattern_list_rows(const drape_pattern *pattern, int64_t *row)
 {
     for (int64_t j = 0; j < pattern->n; j++)

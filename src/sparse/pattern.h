@@ -62,6 +62,9 @@ void drape_pattern_add_antisymmetric(const drape_pattern *pattern, const double 
 /* The largest difference of two mirrored entries, in parts of the largest entry. */
 double drape_pattern_asymmetry(const drape_pattern *pattern, const double *values);
 
+/* Writes the entries on the diagonal: diagonal (n). */
+void drape_pattern_list_diagonal(const drape_pattern *pattern, const double *values, double *diagonal);
+
 /* Writes the CSC row indices: row (nonzeros). */
 void drape_pattern_list_rows(const drape_pattern *pattern, int64_t *row);
 
