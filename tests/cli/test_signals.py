@@ -153,7 +153,7 @@ def test_static():
 
 def test_long_step():
     """a long step is cancelled by a signal; the run ends with the last accepted state"""
-    write_scene(mesh={"grid": "square", "columns": 101, "rows": 101, "width": 1, "height": 1}, duration=10,
+    write_scene(mesh={"grid": "square", "columns": 201, "rows": 201, "width": 1, "height": 1}, duration=10,
                 integrator={"method": "be", "dt": 0.05})
     start, begun = time.monotonic(), busy()
     good("run", "scene.json", "--duration", "0.05")
