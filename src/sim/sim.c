@@ -417,9 +417,7 @@ drape_status drape_sim_notify(drape_sim *sim, const drape_event *event)
         sim->notifying = true;
         drape_status status = sim->observers[i](sim->observer_users[i], event);
         sim->notifying = false;
-        if (drape_ranks_any(drape_model_ranks(sim->model), status != 0) && !status)
-            return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: another rank stopped the run",
-                              drape_sim_state(sim)->t);
+        status = drape_ranks_agree(drape_model_ranks(sim->model), sim->ctx, status);
         if (status > 0)
             return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: an observer asked to stop",
                               drape_sim_state(sim)->t);
