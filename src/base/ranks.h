@@ -51,7 +51,7 @@ struct drape_ranks {
     /* The same in an array of block columns (block columns x 3). */
     void (*fetch_blocks)(const drape_ranks *ranks, double *blocks);
     /* Plans copies here of `count` items of arrays of other ranks: place[i] on rank[i]. An item has `largest`
-     * bytes or less. It lives as long as the arena. NULL: out of memory. */
+     * bytes or less. It lives as long as the arena. NULL, on all ranks: one is out of memory. */
     drape_exchange *(*plan)(const drape_ranks *ranks, struct drape_arena *arena, int32_t count,
                             const int32_t *rank, const int32_t *place, size_t largest);
     /* copies (count), in the order of the plan, become what their owners have in `own`, items of `size`

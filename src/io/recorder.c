@@ -752,8 +752,10 @@ static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recor
     if (status)
         return status;
     drape_recorder *r = drape_alloc(ctx, 1, sizeof *r);
-    if (!r)
+    if (drape_ranks_agree(drape_model_ranks(sim->model), ctx, r ? DRAPE_OK : DRAPE_E_MEMORY)) {
+        drape_free(ctx, r);
         return DRAPE_E_MEMORY;
+    }
     r->ctx = ctx;
     r->arena = drape_arena_of(ctx);
     r->sim = sim;

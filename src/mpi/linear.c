@@ -49,15 +49,11 @@ static bool is_symmetric_here(const drape_pattern *p, double *values)
     return true;
 }
 
-static PetscErrorCode create_matrix(mpi_linear *s, drape_context *ctx)
+/* inside, outside (3 own blocks): the nonzeros of each row in columns here, and in those of other ranks. */
+static void count_nonzeros(const drape_pattern *p, PetscInt *inside, PetscInt *outside)
 {
-    const drape_pattern *p = s->pattern;
-    const drape_ranks *ranks = p->ranks;
-    const PetscInt own = ranks->own_blocks, n = 3 * own;
-    PetscInt *inside = drape_alloc(ctx, (size_t)n, sizeof *inside),
-             *outside = drape_alloc(ctx, (size_t)n, sizeof *outside);
-    PetscErrorCode code = inside && outside ? 0 : PETSC_ERR_MEM;
-    for (PetscInt i = 0; !code && i < own; i++) { /* the pattern is symmetric: columns are rows */
+    const PetscInt own = p->ranks->own_blocks;
+    for (PetscInt i = 0; i < own; i++) { /* the pattern is symmetric: columns are rows */
         PetscInt blocks = 0;
         for (int32_t k = p->block_start[i]; k < p->block_start[i + 1]; k++)
             blocks += p->block_row[k] < own;
@@ -66,8 +62,12 @@ static PetscErrorCode create_matrix(mpi_linear *s, drape_context *ctx)
             outside[r] = 3 * (p->block_start[i + 1] - p->block_start[i] - blocks);
         }
     }
-    if (!code)
-        code = MatCreate(s->ranks->comm, &s->matrix);
+}
+
+static PetscErrorCode create_matrix(mpi_linear *s, const PetscInt *inside, const PetscInt *outside)
+{
+    const PetscInt n = 3 * s->pattern->ranks->own_blocks;
+    PetscErrorCode code = MatCreate(s->ranks->comm, &s->matrix);
     if (!code)
         code = MatSetSizes(s->matrix, n, n, PETSC_DETERMINE, PETSC_DETERMINE);
     if (!code)
@@ -82,8 +82,6 @@ static PetscErrorCode create_matrix(mpi_linear *s, drape_context *ctx)
         code = MatSetOption(s->matrix, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_TRUE);
     if (!code)
         code = MatSetOption(s->matrix, MAT_ROW_ORIENTED, PETSC_FALSE);
-    drape_free(ctx, inside);
-    drape_free(ctx, outside);
     return code;
 }
 
@@ -129,13 +127,16 @@ static void destroy(void **state)
 
 static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
 {
+    const PetscInt n = 3 * pattern->ranks->own_blocks;
     mpi_linear *s = drape_arena_take(arena, 1, sizeof *s);
-    if (!s)
+    PetscInt *nonzeros = drape_arena_take(arena, 2 * (size_t)n, sizeof *nonzeros);
+    if (drape_ranks_agree(pattern->ranks, arena->ctx, s && nonzeros ? DRAPE_OK : DRAPE_E_MEMORY))
         return DRAPE_E_MEMORY;
     s->pattern = pattern;
     s->ranks = (const drape_mpi_ranks *)pattern->ranks; /* base is its first member */
-    const PetscInt n = 3 * pattern->ranks->own_blocks;
-    PetscErrorCode code = create_matrix(s, arena->ctx);
+    count_nonzeros(pattern, nonzeros, nonzeros + n);
+    PetscErrorCode code = create_matrix(s, nonzeros, nonzeros + n);
+    drape_arena_release(arena, nonzeros);
     if (!code)
         code = VecCreateMPIWithArray(s->ranks->comm, 3, n, PETSC_DETERMINE, NULL, &s->b);
     if (!code)

@@ -265,16 +265,18 @@ static drape_exchange *plan(const drape_ranks *ranks, drape_arena *arena, int32_
     int *wanted = drape_arena_take(&scratch, (size_t)ranks->count, sizeof *wanted),
         *asked = drape_arena_take(&scratch, (size_t)ranks->count, sizeof *asked);
     int32_t *places = drape_arena_take(&scratch, (size_t)count, sizeof *places);
-    if (!drape_arena_status(&scratch)) {
+    drape_status status = drape_ranks_agree(ranks, arena->ctx, drape_arena_status(&scratch));
+    if (!status) {
         for (int32_t i = 0; i < count; i++)
             wanted[rank[i]]++;
         MPI_Alltoall(wanted, 1, MPI_INT, asked, 1, MPI_INT, r->comm);
         x = take(arena, ranks->count, wanted, asked, largest);
+        status = drape_ranks_agree(ranks, arena->ctx, x ? DRAPE_OK : DRAPE_E_MEMORY);
     }
-    if (x)
+    if (!status)
         ask(r, x, count, rank, place, places);
     drape_arena_free(&scratch);
-    return x;
+    return status ? NULL : x;
 }
 
 /* The copies of nodes, which their owners know by their numbers in the whole model only. copy (nodes),
@@ -317,7 +319,7 @@ drape_status drape_mpi_ranks_plan(drape_mpi_ranks *r, const drape_model *part, c
     int32_t *copy = drape_arena_take(&scratch, nodes, sizeof *copy),
             *rank = drape_arena_take(&scratch, nodes, sizeof *rank),
             *number = drape_arena_take(&scratch, nodes, sizeof *number);
-    if (!drape_arena_status(&scratch)) {
+    if (!drape_ranks_agree(&r->base, r->arena.ctx, drape_arena_status(&scratch))) {
         r->nodes = plan_nodes(r, part, owner, copy, rank, number);
         r->blocks = r->nodes ? plan_nodes(r, part, owner, copy, rank, number) : NULL;
     }

@@ -50,7 +50,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
 {
     const size_t n = (size_t)pattern->n;
     pcg_state *s = drape_arena_take(arena, 1, sizeof *s);
-    if (!s)
+    if (drape_ranks_agree(pattern->ranks, arena->ctx, s ? DRAPE_OK : DRAPE_E_MEMORY))
         return DRAPE_E_MEMORY;
     s->arena = arena;
     s->pattern = pattern;
@@ -59,7 +59,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     s->diagonal = drape_arena_take(arena, n, sizeof *s->diagonal);
     s->pcg = drape_pcg_of(arena, drape_pattern_own(pattern), s, multiply, precondition);
     s->pcg.ranks = pattern->ranks;
-    drape_status status = drape_arena_status(arena);
+    drape_status status = drape_ranks_agree(pattern->ranks, arena->ctx, drape_arena_status(arena));
     if (!status)
         status = drape_multigrid_create(arena, pattern, &s->multigrid);
     if (!status)

@@ -409,6 +409,25 @@ def test_disk_full():
     ranks(2, "run", "scene.json", "--out", "out", "--checkpoint-every", "10", "--resume")
 
 
+def test_memory():
+    """each allocation of a part, a sim and some steps fails on one rank: all end with that status, and none waits for ever"""
+    sphere = dict(colliders()["sphere"], type="sphere", friction=0.3)
+    falls = {"cloth": [DROP], "duration": 0.04, "frame_rate": 50, "colliders": [sphere], "contact": {"distance": 0.004}}
+    cases = (("pcg", dict(falls, integrator=be(linear_solver="pcg"))), ("multifrontal", dict(falls, integrator=be())),
+             ("ida", dict(falls, integrator={"method": "ida", "rtol": 1e-4, "linear_solver": "pcg"})),
+             ("static", {"cloth": [HUNG], "integrator": {"method": "static"}, "duration": 1}))
+    program = os.path.join(os.path.dirname(PROGRAM), "tests", "test_mpi_shortage")
+    for name, case in cases:
+        write_scene(**case)
+        for count, rank in ((2, 1), (3, 0)):
+            result = subprocess.run(["mpirun", "-n", str(count), program, "scene.json", str(rank), "1", "1"], capture_output=True, text=True, timeout=LIMIT, env=ENVIRONMENT,
+                                    check=False)
+            equal(result.returncode, 0, f"{name}, rank {rank} of {count}: {result.stdout} {result.stderr}")
+            failures = int(re.search(r"(\d+) failures", result.stdout).group(1))
+            print(f"# {name}, rank {rank} of {count}: {failures} failures")
+            assert failures >= 100, f"{name}: {result.stdout}"
+
+
 if __name__ == "__main__":
     if os.environ.get("DRAPE_MPI") != "1":
         print("1..0 # SKIP this build has no MPI (-Dmpi=enabled)")

@@ -1,5 +1,6 @@
 /* test_multigrid_ranks.c: the preconditioner of large sheets where ranks share the matrix: threads here, each
  * with the rows of its own nodes. */
+#include "support/failing_allocator.h"
 #include "support/springs.h"
 #include "support/suite.h"
 #include "support/threads_as_ranks.h"
@@ -363,6 +364,60 @@ START_TEST(a_matrix_that_is_not_positive_definite_is_noticed_by_all)
 }
 END_TEST
 
+/* ---- Memory ---- */
+
+typedef struct shortage {
+    shared *shared;
+    int rank;     /* it alone is out of memory */
+    long fail_at; /* at this allocation of the preconditioner */
+    int failures; /* ranks that noticed */
+    bool reached; /* there was such an allocation */
+} shortage;
+
+static void create_piece(const drape_ranks *ranks, void *user)
+{
+    shortage *s = user;
+    failing_allocator memory = {0};
+    piece q = open_piece(ranks, s->shared);
+    drape_ranks *own = (drape_ranks *)(uintptr_t)ranks;
+    drape_context *ctx = failing_context(&memory);
+    drape_arena *arena = drape_arena_create(ctx);
+    own->own_blocks = q.ranks.own_blocks;
+    own->block = q.block;
+    q.p.ranks = own;
+    memory.fail_at = ranks->rank == s->rank ? memory.calls + s->fail_at : 0;
+    const drape_status status = drape_multigrid_create(arena, &q.p, &q.m);
+    const double failures = drape_ranks_sum(ranks, status == DRAPE_E_MEMORY),
+                 said = drape_ranks_sum(ranks, *drape_context_message(ctx) != 0);
+    if (ranks->rank == s->rank) {
+        s->failures = failures == said ? (int)failures : -1;
+        s->reached = memory.calls >= memory.fail_at;
+    }
+    drape_arena_destroy(&arena);
+    drape_context_destroy(&ctx);
+    close_piece(&q);
+}
+
+/* Each allocation fails on one rank, first or not: all return the failure, with a message, and none waits for
+ * ever. There are four levels here, of which ranks share three. */
+START_TEST(a_rank_that_alone_is_out_of_memory_leaves_none_waiting)
+{
+    shared split = share_sheet(40, 3, false);
+    for (int rank = 0; rank < 3; rank += 2) {
+        shortage s = {.shared = &split, .rank = rank, .fail_at = 1};
+        for (bool more = true; more; s.fail_at++) {
+            ck_assert(run_ranks(3, create_piece, &s));
+            more = s.reached;
+            ck_assert_msg(s.failures == (more ? 3 : 0), "allocation %ld: %d ranks", s.fail_at, s.failures);
+        }
+        printf("# rank %d: %ld allocations\n", rank, s.fail_at - 2);
+        ck_assert_int_gt(s.fail_at, 100);
+    }
+    close_shared(&split);
+}
+END_TEST
+
 SUITE("multigrid_ranks", the_product_is_that_of_the_whole_matrix,
       the_preconditioner_is_symmetric_and_positive_definite, iterations_are_those_of_one_process,
-      scattered_nodes, a_matrix_that_is_not_positive_definite_is_noticed_by_all)
+      scattered_nodes, a_matrix_that_is_not_positive_definite_is_noticed_by_all,
+      a_rank_that_alone_is_out_of_memory_leaves_none_waiting)
