@@ -12,42 +12,19 @@
 #include <petscksp.h>
 #include <string.h>
 
-#define SYMMETRY 1e-13 /* as in solvers/linear_pcg.c */
-
 typedef struct mpi_linear {
     const drape_pattern *pattern;
     const drape_mpi_ranks *ranks;
     Mat matrix;
     Vec b, x; /* without values of their own */
     KSP direct;
-    bool counts;              /* the pivots by their signs; it never solves */
+    double *diagonal;         /* (n) of the matrix */
+    bool counts;              /* the pivots by their signs, as if it were symmetric; it never solves */
     bool symmetric, definite; /* of the last matrix; a definite one was asked for */
     bool factored;
 } mpi_linear;
 
 /* ---- The matrix ---- */
-
-/* The mirrored entries of blocks of which a row or column is of this rank, both of which are complete
- * here. */
-static bool is_symmetric_here(const drape_pattern *p, double *values)
-{
-    for (int32_t j = 0; j < p->ranks->own_blocks; j++)
-        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
-            int64_t stride, mirrored;
-            const int32_t i = p->block_row[k];
-            const double *a = drape_pattern_at(p, values, j, k, &stride),
-                         *b = drape_pattern_at(p, values, i, drape_pattern_find(p, j, i), &mirrored);
-            const double size = fmax(drape_pattern_largest(a, stride), drape_pattern_largest(b, mirrored));
-            int64_t own;
-            const double *d = drape_pattern_at(p, values, j, p->diagonal[j], &own);
-            const double bound = SYMMETRY * fmax(size, drape_pattern_largest(d, own));
-            for (int c = 0; c < 3; c++)
-                for (int r = 0; r < 3; r++)
-                    if (!(fabs(a[c * stride + r] - b[r * mirrored + c]) <= bound))
-                        return false;
-        }
-    return true;
-}
 
 /* inside, outside (3 own blocks): the nonzeros of each row in columns here, and in those of other ranks. */
 static void count_nonzeros(const drape_pattern *p, PetscInt *inside, PetscInt *outside)
@@ -130,9 +107,12 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     const PetscInt n = 3 * pattern->ranks->own_blocks;
     mpi_linear *s = drape_arena_take(arena, 1, sizeof *s);
     PetscInt *nonzeros = drape_arena_take(arena, 2 * (size_t)n, sizeof *nonzeros);
-    if (drape_ranks_agree(pattern->ranks, arena->ctx, s && nonzeros ? DRAPE_OK : DRAPE_E_MEMORY))
+    double *diagonal = drape_arena_take(arena, (size_t)pattern->n, sizeof *diagonal);
+    const bool good = s && nonzeros && diagonal;
+    if (drape_ranks_agree(pattern->ranks, arena->ctx, good ? DRAPE_OK : DRAPE_E_MEMORY))
         return DRAPE_E_MEMORY;
     s->pattern = pattern;
+    s->diagonal = diagonal;
     s->ranks = (const drape_mpi_ranks *)pattern->ranks; /* base is its first member */
     count_nonzeros(pattern, nonzeros, nonzeros + n);
     PetscErrorCode code = create_matrix(s, nonzeros, nonzeros + n);
@@ -224,8 +204,7 @@ static drape_status factor_any(mpi_linear *s, const double *values, bool definit
     s->factored = false;
     if (!is_finite(s->pattern, values))
         return DRAPE_RETRY_LINEAR;
-    s->symmetric =
-        drape_ranks_all(s->pattern->ranks, is_symmetric_here(s->pattern, (double *)(uintptr_t)values));
+    s->symmetric = s->counts || drape_pattern_is_symmetric(s->pattern, values, s->diagonal);
     s->definite = definite && s->symmetric;
     if (fill_matrix(s, values))
         return DRAPE_E_SOLVER;
@@ -286,7 +265,7 @@ drape_status drape_mpi_inertia(drape_context *ctx, const drape_pattern *p, const
         s->counts = true;
         status = factor_any(s, values, false);
     }
-    if (!status && s->symmetric && !KSPGetPC(s->direct, &pc) && !PCFactorGetMatrix(pc, &factors) &&
+    if (!status && !KSPGetPC(s->direct, &pc) && !PCFactorGetMatrix(pc, &factors) &&
         !MatMumpsGetInfog(factors, 12, &below) && !MatMumpsGetInfog(factors, 28, &zero)) {
         *negative = below;
         *known = zero == 0;
