@@ -15,7 +15,7 @@
 
 #define MAX_PATH 4096
 
-static drape_mpi_ranks *of(const drape_ranks *ranks)
+static drape_mpi_ranks *ranks_of(const drape_ranks *ranks)
 {
     return (drape_mpi_ranks *)(uintptr_t)ranks; /* base is its first member */
 }
@@ -33,7 +33,7 @@ static int open_here(drape_mpi_ranks *r, const char *path)
 
 int drape_mpi_open(const drape_ranks *ranks, const char *path)
 {
-    drape_mpi_ranks *r = of(ranks);
+    drape_mpi_ranks *r = ranks_of(ranks);
     char there[MAX_PATH] = "";
     const size_t length = path && ranks->rank == 0 ? strlen(path) : 0;
     int error = length == 0 ? ECANCELED : length < MAX_PATH ? 0 : ENAMETOOLONG;
@@ -49,7 +49,7 @@ int drape_mpi_open(const drape_ranks *ranks, const char *path)
 /* After EINTR the descriptor is closed, too. */
 int drape_mpi_close(const drape_ranks *ranks, bool durable)
 {
-    drape_mpi_ranks *r = of(ranks);
+    drape_mpi_ranks *r = ranks_of(ranks);
     MPI_Bcast(&durable, sizeof durable, MPI_BYTE, 0, r->comm);
     int syncing = 0;
     do
@@ -75,7 +75,7 @@ static int32_t first_of(const drape_rows *rows, int ranks, int rank)
     return (int32_t)((int64_t)rows->all * rank / ranks);
 }
 
-/* Takes what is sent, and learns how much is received. */
+/* Packs what is sent, which is in the order of the ranks that it is for. */
 static drape_status pack(const drape_mpi_ranks *r, const drape_rows *rows, items *of)
 {
     const size_t w = (size_t)rows->width, ranks = (size_t)r->base.count, count = (size_t)rows->count;
@@ -100,6 +100,7 @@ static drape_status pack(const drape_mpi_ranks *r, const drape_rows *rows, items
     return DRAPE_OK;
 }
 
+/* Learns how much is received, and takes memory for that and for the block. */
 static drape_status take_block(const drape_mpi_ranks *r, const drape_rows *rows, items *of)
 {
     const size_t w = (size_t)rows->width;
@@ -183,7 +184,7 @@ static int put_block(const drape_mpi_ranks *r, int64_t offset, const drape_rows 
 int drape_mpi_write(const drape_ranks *ranks, int64_t offset, bool little_endian, const drape_rows *rows,
                     uint64_t *sum)
 {
-    const drape_mpi_ranks *r = of(ranks);
+    const drape_mpi_ranks *r = ranks_of(ranks);
     items sent = {.arena = drape_arena_of(r->arena.ctx)};
     uint64_t here = 0;
     MPI_Bcast(&offset, 1, MPI_INT64_T, 0, r->comm);
