@@ -291,6 +291,21 @@ drape_status drape_system_status(const drape_system *system)
     return system->status;
 }
 
+drape_status drape_system_agree(drape_system *system)
+{
+    system->status = drape_ranks_agree(system->ranks, system->model->ctx, system->status);
+    return system->status;
+}
+
+bool drape_system_agree_finite(drape_system *system, const double *f, size_t count)
+{
+    const bool finite = drape_all_finite(f, count);
+    if (drape_ranks_all(system->ranks, finite && !system->status))
+        return true;
+    drape_system_agree(system);
+    return drape_ranks_all(system->ranks, finite);
+}
+
 /* ---- Contact ---- */
 
 drape_status drape_system_add_contact(drape_system *system)
@@ -985,7 +1000,10 @@ void drape_system_node_energy(drape_system *system, const drape_point *point, do
 
 double drape_system_contact_energy(drape_system *system, const drape_point *point)
 {
-    return evaluate_contact(system, point) ? drape_contact_potential(system->contact) : 0;
+    if (!system->contact)
+        return 0;
+    const bool found = evaluate_contact(system, point);
+    return drape_ranks_all(system->ranks, found) ? drape_contact_potential(system->contact) : 0;
 }
 
 /* ---- One part alone ---- */

@@ -164,6 +164,13 @@ drape_status drape_system_leave_out(drape_system *system, const bool *terms);
  * contacts, or cancelled. */
 drape_status drape_system_status(const drape_system *system);
 
+/* Where ranks share the model: that of the lowest rank that has one, for all. Collective. */
+drape_status drape_system_agree(drape_system *system);
+
+/* Whether these numbers, of which each rank has some, are all finite. Unless they are and no rank has a
+ * status, that is agreed on, too: with one exchange while all is well. Collective. */
+bool drape_system_agree_finite(drape_system *system, const double *f, size_t count);
+
 /* g (node_count x 3) of all nodes, including pinned ones; without what lies along the directions in which
  * supports hold nodes (model/support.h). */
 void drape_system_force(drape_system *system, const drape_point *point, double *g);

@@ -1,14 +1,13 @@
 /* archive.c: see archive.h. */
 #include "base/archive.h"
 
-#include "base/hash.h"
-
 #include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-#define FORMAT     1
+#define FORMAT     2
+#define OLD_FORMAT 1               /* its checksum was another one */
 #define MAGIC      "DRAPE\r\n\x1a" /* its line ends make text-mode transfers break it at once */
 #define MAGIC_SIZE 8
 #define HEAD       (MAGIC_SIZE + sizeof(uint32_t))
@@ -39,7 +38,7 @@ void drape_archive_note(drape_archive *a, drape_status status)
 static void flush(drape_archive *a)
 {
     if (!a->status && a->used > 0) {
-        a->hash = drape_hash_bytes(a->hash, a->buffer, a->used);
+        drape_checksum_add(&a->sum, a->buffer, a->used);
         drape_archive_note(a, a->write(a->user, a->buffer, a->used));
     }
     a->used = 0;
@@ -61,7 +60,7 @@ static void put(drape_archive *a, const void *data, size_t size)
 }
 
 void drape_archive_write_to(drape_archive *a, drape_context *ctx, const char *name, drape_write *write,
-                            void *user)
+                            drape_write_rows *write_rows, void *user)
 {
     const uint32_t format = FORMAT;
     a->ctx = ctx;
@@ -69,8 +68,9 @@ void drape_archive_write_to(drape_archive *a, drape_context *ctx, const char *na
     a->reading = a->by_ranks = false;
     a->status = DRAPE_OK;
     a->write = write;
+    a->write_rows = write_rows;
     a->user = user;
-    a->hash = DRAPE_HASH_START;
+    a->sum = (drape_checksum){0};
     a->used = 0;
     a->size = 0;
     put(a, MAGIC, MAGIC_SIZE);
@@ -79,23 +79,28 @@ void drape_archive_write_to(drape_archive *a, drape_context *ctx, const char *na
 
 /* ---- Reading ---- */
 
+static drape_status refuse_format(drape_archive *a, uint32_t format)
+{
+    return drape_archive_fail(a, DRAPE_E_VERSION,
+                              "the checkpoint has format %" PRIu32 "; this build reads format %d", format,
+                              FORMAT);
+}
+
 /* Checks magic, length, checksum and version of the format. */
 static drape_status check_whole(drape_archive *a, size_t size)
 {
-    uint64_t length, hash;
+    uint64_t length, sum;
     uint32_t format;
     if (size < HEAD + TAIL || memcmp(a->from, MAGIC, MAGIC_SIZE) != 0)
         return drape_archive_fail(a, DRAPE_E_PARSE, "it is not a Drape checkpoint");
-    memcpy(&length, a->from + size - TAIL, sizeof length);
-    memcpy(&hash, a->from + size - sizeof hash, sizeof hash);
-    if (length != size - TAIL || drape_hash_bytes(DRAPE_HASH_START, a->from, size - sizeof hash) != hash)
-        return drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint is damaged: its checksum is wrong");
     memcpy(&format, a->from + MAGIC_SIZE, sizeof format);
-    if (format != FORMAT)
-        return drape_archive_fail(a, DRAPE_E_VERSION,
-                                  "the checkpoint has format %" PRIu32 "; this build reads format %d", format,
-                                  FORMAT);
-    return DRAPE_OK;
+    memcpy(&length, a->from + size - TAIL, sizeof length);
+    memcpy(&sum, a->from + size - sizeof sum, sizeof sum);
+    if (format == OLD_FORMAT)
+        return refuse_format(a, format);
+    if (length != size - TAIL || drape_checksum_bytes(0, a->from, size - sizeof sum) != sum)
+        return drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint is damaged: its checksum is wrong");
+    return format == FORMAT ? DRAPE_OK : refuse_format(a, format);
 }
 
 drape_status drape_archive_read_from(drape_archive *a, drape_context *ctx, const char *name,
@@ -114,29 +119,54 @@ drape_status drape_archive_read_from(drape_archive *a, drape_context *ctx, const
     return a->status;
 }
 
+const unsigned char *drape_archive_next(drape_archive *a, size_t size)
+{
+    if (!a->status && size > a->end - a->size)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint is truncated");
+    if (a->status)
+        return NULL;
+    a->size += size;
+    return a->from + a->size - size;
+}
+
 static void get(drape_archive *a, void *data, size_t size)
 {
-    if (size > a->end - a->size) {
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint is truncated");
+    const unsigned char *from = drape_archive_next(a, size);
+    if (from)
+        memcpy(data, from, size);
+    else
         memset(data, 0, size);
-        return;
-    }
-    memcpy(data, a->from + a->size, size);
-    a->size += size;
 }
 
 /* ---- Parts ---- */
 
 void drape_archive_bytes(drape_archive *a, void *data, size_t size)
 {
-    if (a->status && a->reading)
-        memset(data, 0, size);
-    else if (a->status || size == 0)
+    if (size == 0)
         return;
-    else if (a->reading)
+    if (a->reading)
         get(a, data, size);
-    else
+    else if (!a->status)
         put(a, data, size);
+}
+
+void drape_archive_align(drape_archive *a)
+{
+    static const unsigned char zeros[8] = {0};
+    unsigned char padding[sizeof zeros] = {0};
+    drape_archive_bytes(a, padding, (sizeof zeros - a->size % sizeof zeros) % sizeof zeros);
+    if (drape_archive_good(a) && memcmp(padding, zeros, sizeof zeros) != 0)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no array where one is expected");
+}
+
+void drape_archive_rows(drape_archive *a, const struct drape_rows *rows, size_t size)
+{
+    uint64_t sum = 0;
+    flush(a);
+    a->write_rows(a->user, a->size, size, rows, &sum);
+    a->sum.sum += sum;
+    a->sum.size += size;
+    a->size += size;
 }
 
 void drape_archive_doubles(drape_archive *a, double *values, size_t count)
@@ -211,8 +241,8 @@ static void put_tail(drape_archive *a)
     const uint64_t length = a->size;
     put(a, &length, sizeof length);
     flush(a);
-    const uint64_t hash = a->hash;
-    put(a, &hash, sizeof hash);
+    const uint64_t sum = a->sum.sum;
+    put(a, &sum, sizeof sum);
     flush(a);
 }
 

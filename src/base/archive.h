@@ -6,17 +6,29 @@
  *     the parts                        in the byte order of the machine, which the reader must share
  *     length of all before, checksum   16 bytes
  *
- * The checksum is FNV-1a. Each of its steps is a bijection, so a change of one byte always changes the
- * checksum. It is compared before any part is read; readers therefore need not guard against damage, only
- * against archives of other objects. After a failure nothing more is read or written and the first status is
- * kept, so callers need to check the status only at the end. Nothing is allocated.
+ * The checksum is that of base/checksum.h, of all before it, which bytes can be added to in any order: where
+ * ranks share a model, each of them writes its own rows of an array. A change within one of its words of 8
+ * bytes, so of any one byte, is always detected, and any other, such as words that change places, but with a
+ * probability of 2^-64; the length detects a cut. Both are compared before any part is read; readers
+ * therefore need not guard against damage, only against archives of other objects. After a failure nothing
+ * more is read or written and the first status is kept, so callers need to check the status only at the end.
+ * Nothing is allocated.
  */
 #ifndef DRAPE_BASE_ARCHIVE_H
 #define DRAPE_BASE_ARCHIVE_H
 
+#include "base/checksum.h"
 #include "base/context.h"
 
 #define DRAPE_ARCHIVE_BUFFER 4096
+
+struct drape_rows;
+
+/* Writes the rows of all ranks (base/ranks.h) from this offset on, where the next bytes would be. `size`: of
+ * the whole array; *sum: what it adds to the checksum. Collective. The file reports a failure when it
+ * ends. */
+typedef void drape_write_rows(void *user, uint64_t offset, uint64_t size, const struct drape_rows *rows,
+                              uint64_t *sum);
 
 typedef struct drape_archive {
     drape_context *ctx;
@@ -26,17 +38,18 @@ typedef struct drape_archive {
     drape_status status; /* the first failure */
     uint64_t size;       /* bytes written or read so far */
     drape_write *write;  /* writing: receives the bytes, through the buffer */
+    drape_write_rows *write_rows; /* the same for rows; NULL: one process has all of them */
     void *user;
-    uint64_t hash;             /* of the bytes that have left the buffer */
+    drape_checksum sum;        /* of the bytes that have left the buffer */
     const unsigned char *from; /* reading: all bytes; the parts end at `end` */
     size_t end;
     size_t used; /* bytes in the buffer */
     unsigned char buffer[DRAPE_ARCHIVE_BUFFER];
 } drape_archive;
 
-/* name must outlive the archive. */
+/* name must outlive the archive. write_rows: NULL if no ranks share what is archived. */
 void drape_archive_write_to(drape_archive *a, drape_context *ctx, const char *name, drape_write *write,
-                            void *user);
+                            drape_write_rows *write_rows, void *user);
 
 /* Checks length, checksum and version of the format. bytes must outlive the archive. The status is returned
  * and kept in a->status. Errors: DRAPE_E_PARSE, DRAPE_E_VERSION. */
@@ -54,6 +67,17 @@ void drape_archive_int64(drape_archive *a, int64_t *value);
 void drape_archive_int32(drape_archive *a, int32_t *value);
 void drape_archive_int(drape_archive *a, int *value);
 void drape_archive_bool(drape_archive *a, bool *value);
+
+/* Zeros, to a multiple of 8 bytes from the beginning, as rows need it. */
+void drape_archive_align(drape_archive *a);
+
+/* Writes an array of `size` bytes of which each rank has some rows; the archive must be aligned. Collective:
+ * after a failure, too. */
+void drape_archive_rows(drape_archive *a, const struct drape_rows *rows, size_t size);
+
+/* Reads bytes where they are; NULL after a failure. They live as long as those of the archive, and have no
+ * alignment. */
+const unsigned char *drape_archive_next(drape_archive *a, size_t size);
 
 /* A text shorter than size bytes. */
 void drape_archive_text(drape_archive *a, char *text, size_t size);

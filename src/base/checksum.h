@@ -16,10 +16,10 @@
 #include <string.h>
 
 /* The contribution of a word, little endian, at an offset that is a multiple of 8. */
-static inline uint64_t drape_checksum_word(uint64_t offset, const unsigned char bytes[8])
+static inline uint64_t drape_checksum_word(uint64_t offset, const unsigned char word[8])
 {
     uint64_t z;
-    memcpy(&z, bytes, sizeof z);
+    memcpy(&z, word, sizeof z);
 #if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
     z = __builtin_bswap64(z);
 #endif

@@ -25,6 +25,15 @@ struct drape_arena;
 struct drape_linear_ops;
 struct drape_pattern;
 
+/* Items of `width` numbers of an array of the whole model, of which each rank has some. */
+typedef struct drape_rows {
+    const double *values; /* (count x width) of the items here */
+    int width;
+    int32_t count, all;     /* items here, and in the whole model */
+    const uint8_t *counted; /* (count) 1: here, and on no other rank */
+    const int32_t *number;  /* (count) in the whole model, ascending */
+} drape_rows;
+
 struct drape_ranks {
     int rank, count;
     int32_t own_blocks;   /* block columns of matrices that this rank owns: the first ones; the others are
@@ -42,7 +51,7 @@ struct drape_ranks {
     /* The same in an array of block columns (block columns x 3). */
     void (*fetch_blocks)(const drape_ranks *ranks, double *blocks);
     /* Plans copies here of `count` items of arrays of other ranks: place[i] on rank[i]. An item has `largest`
-     * bytes or less. It lives as long as the arena. NULL: out of memory. */
+     * bytes or less. It lives as long as the arena. NULL, on all ranks: one is out of memory. */
     drape_exchange *(*plan)(const drape_ranks *ranks, struct drape_arena *arena, int32_t count,
                             const int32_t *rank, const int32_t *place, size_t largest);
     /* copies (count), in the order of the plan, become what their owners have in `own`, items of `size`
@@ -56,17 +65,18 @@ struct drape_ranks {
     /* Each rank has the items first[rank] ... first[rank + 1] - 1, of `size` bytes, of `all`, which then all
      * have. */
     void (*share)(const drape_ranks *ranks, void *all, const int32_t *first, size_t size);
-    /* Gathers items of `width` numbers, of which this rank has `count` and counts some, into an array of the
-     * whole model on rank 0, by their numbers there; all: NULL elsewhere. */
-    void (*gather)(const drape_ranks *ranks, const double *values, int width, int32_t count,
-                   const uint8_t *counted, const int32_t *number, double *all);
-    /* Writes such items side by side into a file that exists and that all ranks reach: an array of the
-     * whole model, little endian, from an offset on that is a multiple of 8. *sum: what it adds to the
-     * checksum of the file (base/checksum.h). durable: it is on the disk then. Returns 0 or an errno, the
-     * same on all ranks. */
-    int (*write)(const drape_ranks *ranks, const char *path, int64_t offset, bool durable,
-                 const double *values, int width, int32_t count, const uint8_t *counted,
-                 const int32_t *number, uint64_t *sum);
+    /* Gathers rows into the array of the whole model on rank 0; all: NULL elsewhere. */
+    void (*gather)(const drape_ranks *ranks, const drape_rows *rows, double *all);
+    /* All ranks write into one file, which exists and which all of them reach, one file at a time. path,
+     * offset, durable: those of rank 0; a path NULL there opens nothing. write: puts the array of the whole
+     * model, in the byte order of the machine or little endian, from an offset on that is a multiple of 8.
+     * *sum: what it adds to the checksum of the file (base/checksum.h). close: must follow an open that
+     * succeeded; durable: what was written is on the disk then. They return 0 or an errno, the same on all
+     * ranks. */
+    int (*open)(const drape_ranks *ranks, const char *path);
+    int (*write)(const drape_ranks *ranks, int64_t offset, bool little_endian, const drape_rows *rows,
+                 uint64_t *sum);
+    int (*close)(const drape_ranks *ranks, bool durable);
     /* bytes (size) become those of a rank. */
     void (*broadcast)(const drape_ranks *ranks, int from, void *bytes, int size);
     /* As drape_inertia (solvers/inertia.h), of a matrix that the ranks share. */
@@ -111,6 +121,11 @@ static inline void drape_ranks_fetch(const drape_ranks *ranks, double *nodes)
     if (ranks)
         ranks->fetch(ranks, &nodes, 1);
 }
+
+/* The status of the lowest rank that has one other than DRAPE_OK, for all, with its message in ctx. Where
+ * ranks would wait for one that has failed, for instance because it alone has no more memory, they agree
+ * first. */
+drape_status drape_ranks_agree(const drape_ranks *ranks, drape_context *ctx, drape_status status);
 
 /* Which rank has the largest value, the lowest of several. */
 static inline int drape_ranks_find(const drape_ranks *ranks, double value)

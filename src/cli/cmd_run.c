@@ -112,21 +112,25 @@ static drape_status begin_output(run *r)
  * anew. */
 static drape_status restore(run *r)
 {
-    bool there;
+    const drape_ranks *ranks = drape_model_ranks(r->in.model);
+    drape_context *ctx = r->in.ctx;
+    bool there = false;
     size_t size;
-    char *path = drape_record_path(r->in.ctx, r->request->out, DRAPE_CHECKPOINT_NAME);
-    if (!path)
-        return DRAPE_E_MEMORY;
-    drape_status status = drape_checkpoint_read(r->in.ctx, path, &there, &r->checkpoint, &size);
+    char *path = drape_record_path(ctx, r->request->out, DRAPE_CHECKPOINT_NAME);
+    drape_status status =
+        path ? drape_checkpoint_read(ctx, path, &there, &r->checkpoint, &size) : DRAPE_E_MEMORY;
     if (!status && there)
-        status = drape_archive_read_from(&r->archive, r->in.ctx, path, r->checkpoint, size);
+        status = drape_archive_read_from(&r->archive, ctx, path, r->checkpoint, size);
+    if (drape_ranks_any(ranks, there) && !there && !status)
+        status = drape_fail(ctx, DRAPE_E_FILE, "cannot read \"%.500s\", which another rank can", path);
+    status = drape_ranks_agree(ranks, ctx, status);
     if (!status && there)
-        status = drape_sim_read(r->in.sim, &r->archive);
+        status = drape_ranks_agree(ranks, ctx, drape_sim_read(r->in.sim, &r->archive));
     const drape_recorder_def def = recorder_def(r);
     if (!status && there)
-        status = drape_recorder_resume(r->in.ctx, r->in.sim, &def, &r->archive, &r->recorder);
+        status = drape_recorder_resume(ctx, r->in.sim, &def, &r->archive, &r->recorder);
     r->start -= drape_recorder_wall(r->recorder);
-    drape_free(r->in.ctx, path);
+    drape_free(ctx, path);
     return status;
 }
 

@@ -95,12 +95,13 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
     *out = NULL;
     if (model->collider_count == 0 && !model->contact.self)
         return DRAPE_OK;
+    const drape_ranks *ranks = drape_model_ranks(model);
     drape_contact *c = drape_arena_take(arena, 1, sizeof *c);
-    if (!c)
+    if (drape_ranks_agree(ranks, arena->ctx, c ? DRAPE_OK : DRAPE_E_MEMORY))
         return DRAPE_E_MEMORY;
     *c = (drape_contact){.arena = arena,
                          .model = model,
-                         .ranks = drape_model_ranks(model),
+                         .ranks = ranks,
                          .motion = motion,
                          .mean_edge = drape_model_mean_edge(model)};
     c->active.arena = c->inside.arena = arena;
@@ -121,6 +122,7 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
         status = drape_predictions_init(arena, c->broad.points, &c->predicted);
     if (!status)
         status = drape_predictions_init(arena, c->broad.points, &c->predicting);
+    status = drape_ranks_agree(ranks, arena->ctx, status);
     if (!status)
         drape_contact_set_rounding(c, c->broad.rest);
     *out = status ? NULL : c;
@@ -696,12 +698,18 @@ const drape_relaxed_set *drape_contact_relaxed(const drape_contact *c)
 /* What changes between steps are the laws of contacts: which cloth is relaxed and how hard it is pushed,
  * activation distances, which pairs are inside, the stiffness. What that adds to the energy of the present
  * contacts, or takes from it, is the work of whoever presses. */
+/* A rank that alone is out of memory must not leave the others waiting. */
+static drape_status agree(const drape_contact *c, drape_status status)
+{
+    return drape_ranks_agree(c->ranks, c->model->ctx, status);
+}
+
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
     const double start = drape_clock_seconds();
     c->between_steps = false;
     const drape_contact_at at = {.x = x, .v = v, .t = t, .span = {t, t}};
-    drape_status status = drape_contact_update(c, &at);
+    drape_status status = agree(c, drape_contact_update(c, &at));
     const double before = status ? 0 : drape_contact_potential(c);
     if (!status)
         status = update_relaxed(c, &at);
@@ -711,13 +719,13 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     drape_distant_update(&c->broad.distant, c->x, c->pose, c->broad.rounding);
     const bool retry = is_retry(c);
     if (!status)
-        status = adapt_distances(c, t, retry);
+        status = agree(c, adapt_distances(c, t, retry));
     if (!status)
-        status = update_inside(c);
+        status = agree(c, update_inside(c));
     if (!status) {
         adapt_stiffness(c, t, retry);
         c->press.work += drape_contact_potential(c) - before;
-        status = lag_at(c, v, t);
+        status = agree(c, lag_at(c, v, t));
     }
     drape_predictions_clear(&c->predicted);
     if (!status) {

@@ -69,7 +69,7 @@ void drape_first_order_force(drape_first_order *s, double t, const double *y)
 
 int drape_first_order_judge(drape_first_order *s, double t, const double *out, double start)
 {
-    s->nonfinite = !drape_ranks_all(s->ranks, drape_all_finite(out, 2 * (size_t)s->n));
+    s->nonfinite = !drape_system_agree_finite(s->system, out, 2 * (size_t)s->n);
     s->crossing =
         !s->nonfinite && drape_system_crosses(s->system, s->x, t, &s->crossing_reason, &s->crossing_pair);
     s->crossed |= s->crossing;
@@ -438,7 +438,7 @@ static drape_status solve(drape_first_order *s, double end, double h, double *t,
     drape_status status = status_of(outcome, s->nonfinite, &info->reason);
     if (status > 0 && s->crossing)
         info->reason = s->crossing_reason;
-    if (drape_system_status(s->system))
+    if (drape_system_agree(s->system))
         status = drape_system_status(s->system);
     if (s->failure < 0 || s->linear->status < 0)
         status = s->failure < 0 ? s->failure : s->linear->status;
@@ -486,7 +486,7 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     info->h = t - in->t;
     info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
     audit(s, in, out, info);
-    status = drape_system_status(s->system);
+    status = drape_system_agree(s->system);
     if (status)
         return status;
     s->from = in->t;
@@ -599,8 +599,10 @@ drape_status drape_first_order_create(drape_first_order *s, const drape_first_or
     drape_status status = drape_arena_status(arena);
     if (!status && drape_sundials_context(&s->sun))
         status = drape_fail_memory(ctx, sizeof(void *));
+    status = drape_ranks_agree(s->ranks, ctx, status);
     if (!status && s->n > 0)
         status = create_vectors(s);
+    status = drape_ranks_agree(s->ranks, ctx, status);
     if (!status && s->n > 0)
         set_tolerances(s, loose_order, tight_order);
     if (!status && s->n > 0)
@@ -612,7 +614,9 @@ drape_status drape_first_order_create(drape_first_order *s, const drape_first_or
         return status;
     s->linear->owner = s;
     s->linear->tolerance = LINEAR_TOLERANCE;
-    if (!drape_sun_newton_create(&s->newton, s->y, 2 * s->n, s->ranks, s->sun) || !solver->create(s))
+    bool created = drape_sun_newton_create(&s->newton, s->y, 2 * s->n, s->ranks, s->sun);
+    created = drape_ranks_all(s->ranks, created) && solver->create(s);
+    if (!created)
         return drape_fail(ctx, DRAPE_E_MEMORY, "%s cannot be set up for %lld unknowns", solver->name,
                           (long long)(2 * s->n));
     return DRAPE_OK;

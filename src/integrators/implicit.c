@@ -23,7 +23,8 @@ drape_status drape_implicit_init(drape_arena *arena, drape_system *system, drape
 drape_status drape_implicit_init_newton(drape_arena *arena, drape_system *system, const double *values,
                                         drape_implicit *s)
 {
-    drape_status status = drape_implicit_init(arena, system, s);
+    drape_status status = drape_ranks_agree(drape_model_ranks(drape_system_model(system)), arena->ctx,
+                                            drape_implicit_init(arena, system, s));
     s->inertial_guess = values[DRAPE_NEWTON_PREDICTOR] == DRAPE_NEWTON_PREDICTOR_INERTIAL;
     return status ? status : drape_newton_create(arena, &s->equation, values, &s->newton);
 }
@@ -32,7 +33,9 @@ drape_status drape_implicit_create(drape_arena *arena, drape_system *system, con
                                    void **state)
 {
     drape_implicit *s = *state = drape_arena_take(arena, 1, sizeof *s);
-    return s ? drape_implicit_init_newton(arena, system, values, s) : DRAPE_E_MEMORY;
+    const drape_status status = drape_ranks_agree(drape_model_ranks(drape_system_model(system)), arena->ctx,
+                                                  s ? DRAPE_OK : DRAPE_E_MEMORY);
+    return status ? status : drape_implicit_init_newton(arena, system, values, s);
 }
 
 void drape_implicit_destroy(void **state)

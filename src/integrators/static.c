@@ -58,12 +58,12 @@ typedef struct static_state {
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
     static_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
-    if (!s)
+    const drape_model *m = drape_system_model(system);
+    if (drape_ranks_agree(drape_model_ranks(m), arena->ctx, s ? DRAPE_OK : DRAPE_E_MEMORY))
         return DRAPE_E_MEMORY;
     s->arena = arena;
     s->max_steps = (int)values[PARAM_MAX_STEPS];
     drape_status status = drape_implicit_init_newton(arena, system, values, &s->common);
-    const drape_model *m = drape_system_model(system);
     s->internal = drape_arena_take(arena, (size_t)m->internal_count, sizeof *s->internal);
     s->best_internal = drape_arena_take(arena, (size_t)m->internal_count, sizeof *s->best_internal);
     s->best_x = drape_arena_take(arena, 3 * (size_t)m->node_count, sizeof *s->best_x);

@@ -9,6 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#define MAX_PATH 4096
+
 /* ---- Reading ---- */
 
 static drape_status read_all(drape_context *ctx, int fd, const char *path, char *to, size_t size)
@@ -65,32 +67,83 @@ drape_status drape_checkpoint_read(drape_context *ctx, const char *path, bool *t
 /* A failure of the file is reported when the file is finished. */
 static drape_status put(void *user, const void *bytes, size_t size)
 {
-    drape_file_put(user, bytes, size);
+    drape_file *file = ((drape_checkpoint *)user)->file;
+    if (file)
+        drape_file_put(file, bytes, size);
     return DRAPE_OK;
 }
 
-void drape_checkpoint_begin(drape_archive *a, drape_context *ctx, drape_file *file)
+static void put_rows(void *user, uint64_t offset, uint64_t size, const drape_rows *rows, uint64_t *sum)
 {
-    file->durable = true;
-    drape_archive_write_to(a, ctx, file->path, put, file);
-    drape_archive_note(a, drape_file_begin(file));
+    const drape_checkpoint *c = user;
+    if (!c->together)
+        return;
+    const int error = c->ranks->write(c->ranks, (int64_t)offset, false, rows, sum);
+    if (c->file)
+        drape_file_put_written(c->file, size, *sum, error);
 }
 
-drape_status drape_checkpoint_end(drape_archive *a, drape_file *file)
+/* Where rank 0 could not begin the file, none opens it. */
+static void open_together(drape_checkpoint *c)
 {
-    drape_status status = drape_archive_end(a);
+    char path[MAX_PATH];
+    const bool begun = c->file && c->file->open;
+    const bool reached = begun && drape_file_reach(c->file, path, sizeof path);
+    const int error = c->ranks->open(c->ranks, reached ? path : NULL);
+    c->together = error == 0;
+    if (begun)
+        drape_file_put_written(c->file, 0, 0, reached ? error : ENAMETOOLONG);
+}
+
+void drape_checkpoint_begin(drape_checkpoint *c, drape_context *ctx, const drape_ranks *ranks,
+                            drape_file *file)
+{
+    drape_archive *a = &c->archive;
+    c->file = file;
+    c->ranks = ranks;
+    c->together = false;
+    drape_archive_write_to(a, ctx, file ? file->path : DRAPE_CHECKPOINT_NAME, put, ranks ? put_rows : NULL,
+                           c);
+    if (file) {
+        file->durable = true;
+        drape_archive_note(a, drape_file_begin(file));
+    }
+    if (ranks)
+        open_together(c);
+}
+
+/* What the ranks wrote is on the disk before rank 0 gives the file its name. */
+static void close_together(drape_checkpoint *c)
+{
+    const int error = c->together ? c->ranks->close(c->ranks, true) : 0;
+    if (c->file && c->file->open)
+        drape_file_put_written(c->file, 0, 0, error);
+}
+
+static drape_status finish(drape_checkpoint *c, drape_status status)
+{
+    if (!c->file)
+        return status;
     if (status)
-        drape_file_abandon(file);
+        drape_file_abandon(c->file);
     else
-        status = drape_file_finish(file);
-    return status ? status : drape_file_sync_names(file);
+        status = drape_file_finish(c->file);
+    return status ? status : drape_file_sync_names(c->file);
+}
+
+drape_status drape_checkpoint_end(drape_checkpoint *c)
+{
+    drape_status status = drape_archive_end(&c->archive);
+    if (c->ranks)
+        close_together(c);
+    return finish(c, drape_ranks_agree(c->ranks, c->archive.ctx, status));
 }
 
 /* ---- For hosts ---- */
 
 drape_status drape_sim_save(drape_sim *sim, const char *path)
 {
-    drape_archive a;
+    drape_checkpoint c;
     drape_file file = {0};
     if (!sim)
         return DRAPE_E_ARGUMENT;
@@ -100,10 +153,10 @@ drape_status drape_sim_save(drape_sim *sim, const char *path)
     if (status)
         return status;
     drape_file_name(&file, "%s", path);
-    drape_checkpoint_begin(&a, sim->ctx, &file);
-    drape_sim_archive_identity(sim, &a);
-    drape_sim_archive(sim, &a);
-    status = drape_checkpoint_end(&a, &file);
+    drape_checkpoint_begin(&c, sim->ctx, NULL, &file);
+    drape_sim_archive_identity(sim, &c.archive);
+    drape_sim_archive(sim, &c.archive);
+    status = drape_checkpoint_end(&c);
     drape_file_destroy(&file);
     return status;
 }

@@ -61,10 +61,10 @@ typedef struct drape_exporter_ops {
     drape_status (*write)(drape_context *ctx, void *state, const drape_frame *frame);
 
     /* Optional, in place of write where ranks share the model (base/ranks.h) and frames show its nodes:
-     * they append the positions of the nodes to this file together. settle, called then: whether they did;
-     * sum: what that adds to the checksum of the file. Errors: DRAPE_E_FILE. */
+     * they append the positions of the nodes to this file together. settle, called then: the errno with
+     * which they failed, 0: none; sum: what that adds to the checksum of the file. Errors: DRAPE_E_FILE. */
     drape_file *(*shared)(void *state);
-    drape_status (*settle)(void *state, bool written, uint64_t sum);
+    drape_status (*settle)(void *state, int error, uint64_t sum);
 
     /* For checkpoints. archive, called between frames: archives what the format needs to know of the frames
      * so far. resume, called instead of open to continue a run: takes the memory, reads what archive wrote

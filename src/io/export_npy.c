@@ -67,10 +67,10 @@ static drape_status write_count(npy_array *a, int64_t frames)
     return drape_file_overwrite(&a->file, 0, header, sizeof header);
 }
 
-static drape_status write_array(npy_array *a, const double *x, int64_t frames)
+/* Ends a frame, whose points were put. */
+static drape_status end_frame(npy_array *a, int64_t frames)
 {
     const off_t before = a->file.kept;
-    drape_file_put_doubles(&a->file, x, 3 * (size_t)a->count);
     drape_status status = drape_file_keep(&a->file);
     if (status)
         return status;
@@ -78,6 +78,12 @@ static drape_status write_array(npy_array *a, const double *x, int64_t frames)
     if (status)
         drape_file_cut(&a->file, before);
     return status;
+}
+
+static drape_status write_array(npy_array *a, const double *x, int64_t frames)
+{
+    drape_file_put_doubles(&a->file, x, 3 * (size_t)a->count);
+    return end_frame(a, frames);
 }
 
 /* The nodes come last, as their number of frames is what readers of the run go by: if they fail, the other
@@ -99,19 +105,13 @@ static drape_file *npy_shared(void *state)
     return &((npy_state *)state)->array[0].file;
 }
 
-static drape_status npy_settle(void *state, bool written, uint64_t sum)
+static drape_status npy_settle(void *state, int error, uint64_t sum)
 {
     npy_state *npy = state;
     npy_array *a = &npy->array[0];
-    const off_t before = a->file.kept;
-    drape_status status = DRAPE_OK;
-    if (written)
-        status = drape_file_accept(&a->file, (off_t)(3 * sizeof(double)) * a->count, sum);
-    if (written && !status)
-        status = write_count(a, npy->frames + 1);
-    if (status || !written)
-        drape_file_cut(&a->file, before);
-    else
+    drape_file_put_written(&a->file, 3 * sizeof(double) * (uint64_t)a->count, sum, error);
+    drape_status status = end_frame(a, npy->frames + 1);
+    if (!status)
         npy->frames++;
     return status;
 }

@@ -208,6 +208,30 @@ void drape_file_put(drape_file *file, const void *data, size_t size)
     }
 }
 
+void drape_file_put_written(drape_file *file, uint64_t size, uint64_t sum, int error)
+{
+    flush(file);
+    const off_t end = file->size + (off_t)size;
+    if (!file->error)
+        file->error = error;
+    if (file->error)
+        return;
+    if (lseek(file->fd, end, SEEK_SET) != end) {
+        file->error = errno;
+        return;
+    }
+    file->sum.sum += sum;
+    file->sum.size += size;
+    file->size = end;
+}
+
+bool drape_file_reach(const drape_file *file, char *path, size_t size)
+{
+    const int length =
+        snprintf(path, size, "%s/%s", drape_folder_path(file->folder), *file->part ? file->part : file->path);
+    return length > 0 && (size_t)length < size;
+}
+
 void drape_file_put_word(drape_file *file, uint32_t word)
 {
     unsigned char bytes[4];
@@ -360,18 +384,6 @@ drape_status drape_file_keep(drape_file *file)
     }
     drape_file_cut(file, file->kept);
     return fail(file, "write", error);
-}
-
-drape_status drape_file_accept(drape_file *file, off_t size, uint64_t sum)
-{
-    const off_t end = file->kept + size;
-    if (lseek(file->fd, end, SEEK_SET) != end)
-        return fail(file, "write", errno);
-    file->sum.sum += sum;
-    file->sum.size += (uint64_t)size;
-    file->size = file->kept = end;
-    file->kept_sum = file->sum;
-    return DRAPE_OK;
 }
 
 /* Accounts for at most PATCHED bytes that are about to be overwritten; 0 or errno. */

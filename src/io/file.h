@@ -62,12 +62,19 @@ void drape_file_name(drape_file *file, const char *format, ...) DRAPE_PRINTF(2, 
  * user named is written through. Errors: DRAPE_E_FILE. */
 drape_status drape_file_begin(drape_file *file);
 
+/* The path by which other processes reach the open file of a folder, by its temporary name until it is
+ * published. Returns whether it fits. */
+bool drape_file_reach(const drape_file *file, char *path, size_t size);
+
 /* These add to the end. A failure is reported by the next call that returns a status. */
 void drape_file_put(drape_file *file, const void *data, size_t size);
 void drape_file_put_text(drape_file *file, const char *text);
 void drape_file_put_word(drape_file *file, uint32_t word); /* little endian, like the next two */
 void drape_file_put_float(drape_file *file, float value);
 void drape_file_put_doubles(drape_file *file, const double *values, size_t count);
+/* What other processes wrote there, where what was put before ends at a multiple of 8; sum: what it adds to
+ * the checksum; error: the errno with which they failed, 0: none. */
+void drape_file_put_written(drape_file *file, uint64_t size, uint64_t sum, int error);
 /* Text below 1 KiB, in the locale of the thread. */
 void drape_file_print(drape_file *file, const char *format, ...) DRAPE_PRINTF(2, 3);
 
@@ -81,10 +88,6 @@ drape_status drape_file_publish(drape_file *file);
 /* Ends a record of a published file: all its bytes are passed to the system. After a failure the file is
  * cut back to its last complete record and stays open. Errors: DRAPE_E_FILE. */
 drape_status drape_file_keep(drape_file *file);
-
-/* Ends a record that other processes have written behind the last one, of a size that is a multiple of 8,
- * as that of the file must be; sum: what it adds to the checksum. Errors: DRAPE_E_FILE. */
-drape_status drape_file_accept(drape_file *file, off_t size, uint64_t sum);
 
 /* Overwrites bytes that are already kept. Errors: DRAPE_E_FILE. */
 drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size);

@@ -101,11 +101,10 @@ static void note(drape_recorder *r, drape_status status)
 /* Where ranks share the model, all stop when one cannot write; collective. */
 static drape_status report(drape_recorder *r)
 {
-    if (drape_ranks_any(r->ranks, r->failure != DRAPE_OK) && !r->failure) {
-        r->failure = DRAPE_E_STOPPED;
-        snprintf(r->message, sizeof r->message, "another rank cannot write");
-    }
-    return r->failure ? drape_fail(r->ctx, r->failure, "%s", r->message) : DRAPE_OK;
+    drape_status status = r->failure ? drape_fail(r->ctx, r->failure, "%s", r->message) : DRAPE_OK;
+    status = drape_ranks_agree(r->ranks, r->ctx, status);
+    note(r, status);
+    return status;
 }
 
 /* ---- Frames ---- */
@@ -229,6 +228,12 @@ static void write_outputs(drape_recorder *r, const drape_frame *frame)
     }
 }
 
+/* What this rank has of an array of nodes. */
+static drape_rows rows_of(const drape_model *m, const double *values, int width)
+{
+    return (drape_rows){values, width, m->node_count, m->part->all_nodes, m->part->own, m->part->node};
+}
+
 /* Where ranks share the model, *values (here) become those of the whole on rank 0, in one of its arrays,
  * unless no format needs them there. */
 static void gather(drape_recorder *r, int array, int width, const double **values)
@@ -236,8 +241,8 @@ static void gather(drape_recorder *r, int array, int width, const double **value
     double *all = r->gathered ? r->gathered + 3 * (size_t)array * (size_t)r->model->node_count : NULL;
     if (!r->ranks || !r->gathers)
         return;
-    const drape_model *m = r->sim->model;
-    r->ranks->gather(r->ranks, *values, width, m->node_count, m->part->own, m->part->node, all);
+    const drape_rows rows = rows_of(r->sim->model, *values, width);
+    r->ranks->gather(r->ranks, &rows, all);
     *values = all;
 }
 
@@ -268,41 +273,25 @@ static void write_all(drape_recorder *r, double time, const double *positions, c
         note(r, drape_energy_write(&r->energies, &row));
 }
 
-/* Where rank 0 wants the nodes of a frame. */
-typedef struct place {
-    bool good, durable;
-    int64_t offset;
-    char path[MAX_PATH];
-} place;
-
-static void find_place(drape_recorder *r, const output *o, place *p)
-{
-    const drape_file *file = o->ops->shared(o->state);
-    const int length = snprintf(p->path, sizeof p->path, "%s/%s", drape_folder_path(r->folder), file->path);
-    p->good = length > 0 && length < MAX_PATH;
-    p->durable = r->def.durable;
-    p->offset = (int64_t)file->kept;
-    if (!p->good)
-        note(r, drape_file_fail(r->ctx, "write", p->path, ENAMETOOLONG));
-}
-
-/* Each rank writes the nodes that it owns. */
+/* Each rank writes the nodes that it owns behind what rank 0 has in the file. */
 static void write_shared(drape_recorder *r, const output *o, const double *positions)
 {
-    const drape_model *m = r->sim->model;
-    place p = {0};
+    const drape_rows rows = rows_of(r->sim->model, positions, 3);
+    const drape_ranks *ranks = r->ranks;
+    char path[MAX_PATH];
+    drape_file *file = r->writes && !r->failure ? o->ops->shared(o->state) : NULL;
+    const bool reached = file && drape_file_reach(file, path, sizeof path);
     uint64_t sum = 0;
-    if (r->writes && !r->failure)
-        find_place(r, o, &p);
-    r->ranks->broadcast(r->ranks, 0, &p, sizeof p);
-    if (!p.good)
-        return;
-    const int error = r->ranks->write(r->ranks, p.path, p.offset, p.durable, positions, 3, m->node_count,
-                                      m->part->own, m->part->node, &sum);
-    if (error)
-        note(r, drape_file_fail(r->ctx, "write", p.path, error));
-    if (r->writes)
-        note(r, o->ops->settle(o->state, error == 0, sum));
+    int error = ranks->open(ranks, reached ? path : NULL);
+    if (!error) {
+        const int writing = ranks->write(ranks, file ? (int64_t)file->kept : 0, true, &rows, &sum),
+                  closing = ranks->close(ranks, r->def.durable);
+        error = writing ? writing : closing;
+    }
+    if (file)
+        note(r, o->ops->settle(o->state, error, sum));
+    else if (error) /* rank 0 has the message */
+        note(r, drape_fail(r->ctx, DRAPE_E_FILE, "another rank cannot write"));
 }
 
 static void write_frame(drape_recorder *r, double time, const double *positions, const double *velocities)
@@ -380,29 +369,20 @@ static drape_status sync_files(drape_recorder *r)
     return status ? status : drape_folder_sync(r->folder);
 }
 
-static drape_status put_nowhere(void *user, const void *bytes, size_t size)
-{
-    (void)user, (void)bytes, (void)size;
-    return DRAPE_OK;
-}
-
 static drape_status write_checkpoint(drape_recorder *r)
 {
-    drape_archive a;
+    drape_checkpoint c;
     drape_status status = r->writes ? sync_files(r) : DRAPE_OK;
     if (drape_ranks_any(r->ranks, status != DRAPE_OK))
         return status;
     r->wall = drape_clock_seconds() - r->start;
-    if (r->writes)
-        drape_checkpoint_begin(&a, r->ctx, &r->checkpoint);
-    else
-        drape_archive_write_to(&a, r->ctx, DRAPE_CHECKPOINT_NAME, put_nowhere, NULL);
-    drape_sim_archive_identity(r->sim, &a);
-    drape_sim_archive(r->sim, &a);
-    archive_progress(r, &a);
+    drape_checkpoint_begin(&c, r->ctx, r->ranks, r->writes ? &r->checkpoint : NULL);
+    drape_sim_archive_identity(r->sim, &c.archive);
+    drape_sim_archive(r->sim, &c.archive);
+    archive_progress(r, &c.archive);
     for (size_t i = 0; i < r->output_count && !r->finished && r->writes; i++)
-        r->outputs[i].ops->archive(r->outputs[i].state, &a);
-    return r->writes ? drape_checkpoint_end(&a, &r->checkpoint) : a.status;
+        r->outputs[i].ops->archive(r->outputs[i].state, &c.archive);
+    return drape_checkpoint_end(&c);
 }
 
 drape_status drape_recorder_checkpoint(drape_recorder *r)
@@ -427,9 +407,10 @@ static void write_attempt(drape_recorder *r, const drape_attempt *attempt)
         note(r, drape_steps_write(&r->steps, attempt, &energy, &r->sim->events));
 }
 
+/* A rank that could not write the frame has not counted it. */
 static void write_due_checkpoint(drape_recorder *r)
 {
-    if (!r->failure && r->every > 0 && r->frames % r->every == 0)
+    if (r->every > 0 && !report(r) && r->frames % r->every == 0)
         note(r, write_checkpoint(r));
 }
 
@@ -754,8 +735,7 @@ static drape_status set_up(drape_recorder *r, const drape_recorder_def *def, dra
         r->every = def->checkpoint_every;
     if (!status && (r->writes || a))
         status = a ? resume_files(r, a) : open_files(r);
-    if (drape_ranks_any(r->ranks, status != DRAPE_OK) && !status)
-        status = drape_fail(r->ctx, DRAPE_E_STOPPED, "another rank cannot write");
+    status = drape_ranks_agree(r->ranks, r->ctx, status);
     r->start -= r->wall;
     if (!status) /* the last stage, because an observer cannot be removed from a sim */
         status = drape_sim_observe(r->sim, observe, r);
@@ -772,8 +752,10 @@ static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recor
     if (status)
         return status;
     drape_recorder *r = drape_alloc(ctx, 1, sizeof *r);
-    if (!r)
+    if (drape_ranks_agree(drape_model_ranks(sim->model), ctx, r ? DRAPE_OK : DRAPE_E_MEMORY)) {
+        drape_free(ctx, r);
         return DRAPE_E_MEMORY;
+    }
     r->ctx = ctx;
     r->arena = drape_arena_of(ctx);
     r->sim = sim;

@@ -3,56 +3,43 @@
 
 #include <string.h>
 
-/* Numbers of items of which each rank has some: `width` numbers an item, all of item i together. */
-typedef struct items {
-    double *values;
-    int32_t count, all;     /* items here, and in the whole model */
-    const uint8_t *counted; /* (count) 1: this rank writes it */
-    const int32_t *number;  /* (count) in the whole model */
-} items;
-
-static void archive_items(drape_archive *a, const drape_model *m, const items *of, int width)
+/* values: of the rows, which are written or read. */
+static void archive_rows(drape_archive *a, const drape_rows *rows, double *values)
 {
-    const drape_ranks *ranks = drape_model_ranks(m);
-    const size_t size = (size_t)of->all * (size_t)width, w = (size_t)width;
-    const bool needs = a->reading || ranks->rank == 0;
-    double *whole = needs ? drape_alloc(a->ctx, size, sizeof *whole) : NULL;
-    if (drape_ranks_any(ranks, needs && !whole)) {
-        drape_archive_note(a, DRAPE_E_MEMORY);
-        drape_free(a->ctx, whole);
+    const size_t width = (size_t)rows->width, item = width * sizeof *values;
+    if (!a->reading) {
+        drape_archive_rows(a, rows, item * (size_t)rows->all);
         return;
     }
-    if (!a->reading)
-        ranks->gather(ranks, of->values, width, of->count, of->counted, of->number, whole);
-    if (needs)
-        drape_archive_doubles(a, whole, size);
-    for (int32_t i = 0; drape_archive_has_read(a) && i < of->count; i++)
-        memcpy(of->values + w * (size_t)i, whole + w * (size_t)of->number[i], w * sizeof *whole);
-    drape_free(a->ctx, whole);
+    const unsigned char *whole = drape_archive_next(a, item * (size_t)rows->all);
+    for (int32_t i = 0; whole && i < rows->count; i++)
+        memcpy(values + width * (size_t)i, whole + item * (size_t)rows->number[i], item);
 }
 
 void drape_archive_nodes(drape_archive *a, const drape_model *m, double *nodes)
 {
     const drape_part *part = m->part;
+    drape_archive_align(a);
     if (!part) {
         drape_archive_doubles(a, nodes, 3 * (size_t)m->node_count);
         return;
     }
-    archive_items(a, m, &(items){nodes, m->node_count, part->all_nodes, part->own, part->node}, 3);
+    archive_rows(a, &(drape_rows){nodes, 3, m->node_count, part->all_nodes, part->own, part->node}, nodes);
 }
 
-/* `of` of each element, component by component; moves on. */
+/* `count` numbers of each element, component by component. */
 static void archive_elements(drape_archive *a, const drape_model *m, const drape_term *term, int64_t count,
                              double *values)
 {
     const int32_t elements = term->elements.count,
                   all = drape_model_whole(m)->terms[term - m->terms].elements.count;
-    for (int64_t k = 0; k < count; k++)
-        archive_items(a, m, &(items){values + k * elements, elements, all, term->counted, term->element}, 1);
+    for (int64_t k = 0; k < count; k++, values += elements)
+        archive_rows(a, &(drape_rows){values, 1, elements, all, term->counted, term->element}, values);
 }
 
 void drape_archive_internal(drape_archive *a, const drape_model *m, double *internal)
 {
+    drape_archive_align(a);
     if (!m->part) {
         drape_archive_doubles(a, internal, (size_t)m->internal_count);
         return;
@@ -62,10 +49,15 @@ void drape_archive_internal(drape_archive *a, const drape_model *m, double *inte
         const bool parts = term->elements.parts;
         const int32_t pieces = drape_term_pieces(term).count,
                       all = drape_term_pieces(&m->part->whole->terms[i]).count;
-        const items of = {internal + term->first_internal, pieces, all,
-                          parts ? term->part_counted : term->counted, parts ? term->part : term->element};
-        if (term->first_internal >= 0 && pieces + all > 0)
-            archive_items(a, m, &of, term->ops->internal_count > 0 ? term->ops->internal_count : 1);
+        double *values = term->first_internal >= 0 ? internal + term->first_internal : NULL;
+        const drape_rows rows = {values,
+                                 term->ops->internal_count > 0 ? term->ops->internal_count : 1,
+                                 pieces,
+                                 all,
+                                 parts ? term->part_counted : term->counted,
+                                 parts ? term->part : term->element};
+        if (values && all > 0)
+            archive_rows(a, &rows, values);
         if (term->sliders > 0)
             archive_elements(a, m, term, term->sliders, internal + term->first_slider);
         if (term->branch_count > 0) {

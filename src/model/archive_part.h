@@ -1,5 +1,5 @@
 /* archive_part.h: archives arrays of a model of which each rank has a part (base/ranks.h): the bytes are
- * those of the whole model, whatever the number of ranks. Rank 0 writes them, all read them. Collective. */
+ * those of the whole model, whatever the number of ranks, each of which writes its rows. Collective. */
 #ifndef DRAPE_MODEL_ARCHIVE_PART_H
 #define DRAPE_MODEL_ARCHIVE_PART_H
 

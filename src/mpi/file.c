@@ -1,21 +1,122 @@
 /*
- * file.c: see file.h. By MPI-IO: the view of the file that each rank has is the places of its items, so
- * that one collective call writes all of them, and the library merges them into large requests.
+ * file.c: see file.h. Each rank has items here and there in an array, and writes one block of it: the ranks
+ * first send each other the items of their blocks. So every file system gets large requests, which do not
+ * overlap, and a rank that cannot write, for instance because the disk is full, leaves no other waiting:
+ * collective writes of MPI-IO do, in Open MPI 4.
  */
 #include "mpi/file.h"
 
 #include "base/checksum.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <string.h>
 #include <unistd.h>
 
+#define MAX_PATH 4096
+
+static drape_mpi_ranks *ranks_of(const drape_ranks *ranks)
+{
+    return (drape_mpi_ranks *)(uintptr_t)ranks; /* base is its first member */
+}
+
+/* ---- Opening and closing ---- */
+
+static int open_here(drape_mpi_ranks *r, const char *path)
+{
+    r->file = open(path, O_WRONLY | O_NOFOLLOW | O_CLOEXEC);
+    const int error = (int)drape_ranks_largest(&r->base, r->file < 0 ? errno : 0);
+    if (error && r->file >= 0)
+        close(r->file);
+    return error;
+}
+
+int drape_mpi_open(const drape_ranks *ranks, const char *path)
+{
+    drape_mpi_ranks *r = ranks_of(ranks);
+    char there[MAX_PATH] = "";
+    const size_t length = path && ranks->rank == 0 ? strlen(path) : 0;
+    int error = length == 0 ? ECANCELED : length < MAX_PATH ? 0 : ENAMETOOLONG;
+    if (ranks->rank == 0 && !error)
+        memcpy(there, path, length);
+    MPI_Bcast(&error, 1, MPI_INT, 0, r->comm);
+    if (error)
+        return error;
+    MPI_Bcast(there, MAX_PATH, MPI_BYTE, 0, r->comm);
+    return open_here(r, there);
+}
+
+/* After EINTR the descriptor is closed, too. */
+int drape_mpi_close(const drape_ranks *ranks, bool durable)
+{
+    drape_mpi_ranks *r = ranks_of(ranks);
+    MPI_Bcast(&durable, sizeof durable, MPI_BYTE, 0, r->comm);
+    int syncing = 0;
+    do
+        syncing = durable && fsync(r->file) ? errno : 0;
+    while (syncing == EINTR);
+    const int closing = close(r->file) && errno != EINTR ? errno : 0;
+    return (int)drape_ranks_largest(ranks, syncing ? syncing : closing);
+}
+
+/* ---- Blocks ---- */
+
+/* Items that are sent: the values and numbers of those that this rank has, and of those of its block. */
 typedef struct items {
-    double *values; /* (width x count) of those that this rank writes, little endian */
-    int32_t *number;
-    int32_t count;
-    uint64_t sum;
+    double *sent, *received, *block; /* in ascending order; by rank; in the order of the file */
+    int32_t *sent_number, *received_number;
+    int *to, *from, *first_to, *first_from; /* (ranks) items for and from each, and where they begin */
+    drape_arena arena;
 } items;
+
+/* The first item of the block of a rank. */
+static int32_t first_of(const drape_rows *rows, int ranks, int rank)
+{
+    return (int32_t)((int64_t)rows->all * rank / ranks);
+}
+
+/* Packs what is sent, which is in the order of the ranks that it is for. */
+static drape_status pack(const drape_mpi_ranks *r, const drape_rows *rows, items *of)
+{
+    const size_t w = (size_t)rows->width, ranks = (size_t)r->base.count, count = (size_t)rows->count;
+    int *counts = drape_arena_take(&of->arena, 4 * ranks, sizeof *counts), n = 0, rank = 0;
+    of->sent = drape_arena_take(&of->arena, w * count, sizeof *of->sent);
+    of->sent_number = drape_arena_take(&of->arena, count, sizeof *of->sent_number);
+    if (drape_arena_status(&of->arena))
+        return DRAPE_E_MEMORY;
+    of->to = counts;
+    of->from = counts + ranks;
+    of->first_to = counts + 2 * ranks;
+    of->first_from = counts + 3 * ranks;
+    for (int32_t i = 0; i < rows->count; i++) {
+        if (!rows->counted[i])
+            continue;
+        while (rows->number[i] >= first_of(rows, r->base.count, rank + 1))
+            rank++;
+        memcpy(of->sent + w * (size_t)n, rows->values + w * (size_t)i, w * sizeof *of->sent);
+        of->sent_number[n++] = rows->number[i];
+        of->to[rank]++;
+    }
+    return DRAPE_OK;
+}
+
+/* Learns how much is received, and takes memory for that and for the block. */
+static drape_status take_block(const drape_mpi_ranks *r, const drape_rows *rows, items *of)
+{
+    const size_t w = (size_t)rows->width;
+    const int32_t first = first_of(rows, r->base.count, r->base.rank),
+                  end = first_of(rows, r->base.count, r->base.rank + 1);
+    MPI_Alltoall(of->to, 1, MPI_INT, of->from, 1, MPI_INT, r->comm);
+    for (int k = 0; k + 1 < r->base.count; k++) {
+        of->first_to[k + 1] = of->first_to[k] + of->to[k];
+        of->first_from[k + 1] = of->first_from[k] + of->from[k];
+    }
+    const size_t received = (size_t)(of->first_from[r->base.count - 1] + of->from[r->base.count - 1]);
+    of->received = drape_arena_take(&of->arena, w * received, sizeof *of->received);
+    of->received_number = drape_arena_take(&of->arena, received, sizeof *of->received_number);
+    of->block = drape_arena_take(&of->arena, w * (size_t)(end - first), sizeof *of->block);
+    return drape_arena_status(&of->arena);
+}
 
 static void put_little(double *value)
 {
@@ -29,106 +130,73 @@ static void put_little(double *value)
 #endif
 }
 
-static bool pack(drape_context *ctx, int64_t offset, const double *values, int width, int32_t count,
-                 const uint8_t *counted, const int32_t *number, items *of)
+/* Sends the items to the ranks of their blocks, and puts those of this rank in their order. */
+static void exchange(const drape_mpi_ranks *r, const drape_rows *rows, bool little_endian, items *of)
 {
-    const size_t w = (size_t)width;
-    *of = (items){.values = drape_alloc(ctx, w * (size_t)count + 1, sizeof *of->values),
-                  .number = drape_alloc(ctx, (size_t)count + 1, sizeof *of->number)};
-    if (!of->values || !of->number)
-        return false;
-    for (int32_t i = 0; i < count; i++) {
-        if (!counted[i])
-            continue;
-        double *to = of->values + w * (size_t)of->count;
-        memcpy(to, values + w * (size_t)i, w * sizeof *to);
-        for (size_t k = 0; k < w; k++)
-            put_little(to + k);
-        of->number[of->count++] = number[i];
-        of->sum +=
-            drape_checksum_bytes((uint64_t)offset + w * sizeof *to * (uint64_t)number[i], to, w * sizeof *to);
-    }
-    return true;
-}
-
-static int set_view(MPI_File file, int64_t offset, int width, const items *of)
-{
-    MPI_Datatype item, places;
-    int code = MPI_Type_contiguous(width, MPI_DOUBLE, &item);
-    if (code)
-        return code;
-    code = MPI_Type_create_indexed_block(of->count, 1, of->number, item, &places);
-    if (!code) {
-        code = MPI_Type_commit(&places);
-        if (!code)
-            code = MPI_File_set_view(file, offset, MPI_DOUBLE, places, "native", MPI_INFO_NULL);
-        MPI_Type_free(&places);
-    }
+    const size_t w = (size_t)rows->width;
+    const int last = r->base.count - 1;
+    const int32_t first = first_of(rows, r->base.count, r->base.rank);
+    MPI_Datatype item;
+    MPI_Type_contiguous(rows->width, MPI_DOUBLE, &item);
+    MPI_Type_commit(&item);
+    MPI_Alltoallv(of->sent, of->to, of->first_to, item, of->received, of->from, of->first_from, item,
+                  r->comm);
+    MPI_Alltoallv(of->sent_number, of->to, of->first_to, MPI_INT32_T, of->received_number, of->from,
+                  of->first_from, MPI_INT32_T, r->comm);
     MPI_Type_free(&item);
-    return code;
+    for (int i = 0; i < of->first_from[last] + of->from[last]; i++) {
+        double *to = of->block + w * (size_t)(of->received_number[i] - first);
+        memcpy(to, of->received + w * (size_t)i, w * sizeof *to);
+        for (size_t k = 0; k < w && little_endian; k++)
+            put_little(to + k);
+    }
 }
 
-static int error_of(int code)
+/* 0 or errno. */
+static int put(int file, off_t offset, const void *data, size_t size)
 {
-    int class = MPI_SUCCESS;
-    if (code)
-        MPI_Error_class(code, &class);
-    return !code                           ? 0
-           : class == MPI_ERR_NO_SPACE     ? ENOSPC
-           : class == MPI_ERR_QUOTA        ? EDQUOT
-           : class == MPI_ERR_ACCESS       ? EACCES
-           : class == MPI_ERR_NO_SUCH_FILE ? ENOENT
-           : class == MPI_ERR_READ_ONLY    ? EROFS
-                                           : EIO;
+    const char *from = data;
+    while (size > 0) {
+        const ssize_t n = pwrite(file, from, size, offset);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            return n < 0 ? errno : ENOSPC;
+        from += n;
+        offset += n;
+        size -= (size_t)n;
+    }
+    return 0;
 }
 
-static int write_items(const drape_ranks *ranks, MPI_File file, int64_t offset, bool durable, int width,
-                       const items *of)
+/* Writes the block of this rank; *sum: what it adds to the checksum. */
+static int put_block(const drape_mpi_ranks *r, int64_t offset, const drape_rows *rows, const items *of,
+                     uint64_t *sum)
 {
-    MPI_Status done;
-    int written = 0, error = error_of(set_view(file, offset, width, of));
-    if (drape_ranks_any(ranks, error != 0))
-        return error;
-    error = error_of(MPI_File_write_all(file, of->values, width * of->count, MPI_DOUBLE, &done));
+    const int32_t first = first_of(rows, r->base.count, r->base.rank),
+                  end = first_of(rows, r->base.count, r->base.rank + 1);
+    const size_t item = (size_t)rows->width * sizeof(double), size = item * (size_t)(end - first);
+    const int64_t at = offset + (int64_t)item * first;
+    *sum = drape_checksum_bytes((uint64_t)at, of->block, size);
+    return put(r->file, (off_t)at, of->block, size);
+}
+
+int drape_mpi_write(const drape_ranks *ranks, int64_t offset, bool little_endian, const drape_rows *rows,
+                    uint64_t *sum)
+{
+    const drape_mpi_ranks *r = ranks_of(ranks);
+    items sent = {.arena = drape_arena_of(r->arena.ctx)};
+    uint64_t here = 0;
+    MPI_Bcast(&offset, 1, MPI_INT64_T, 0, r->comm);
+    int error = pack(r, rows, &sent) ? ENOMEM : 0;
+    if (!drape_ranks_any(ranks, error))
+        error = take_block(r, rows, &sent) ? ENOMEM : 0;
+    error = (int)drape_ranks_largest(ranks, error);
     if (!error) {
-        MPI_Get_count(&done, MPI_DOUBLE, &written);
-        error = written == width * of->count ? 0 : ENOSPC;
+        exchange(r, rows, little_endian, &sent);
+        error = put_block(r, offset, rows, &sent, &here);
     }
-    if (durable) { /* collective, whatever the write returned here */
-        const int synced = error_of(MPI_File_sync(file));
-        error = error ? error : synced;
-    }
-    return error;
-}
-
-/* A file that is not there on some ranks would leave the others waiting in MPI_File_open. */
-static int open_and_write(const drape_mpi_ranks *r, const char *path, int64_t offset, bool durable, int width,
-                          const items *of)
-{
-    MPI_File file;
-    int error = access(path, W_OK) ? errno : 0;
-    if (drape_ranks_any(&r->base, error != 0))
-        return error;
-    error = error_of(MPI_File_open(r->comm, path, MPI_MODE_WRONLY, MPI_INFO_NULL, &file));
-    if (drape_ranks_any(&r->base, error != 0))
-        return error;
-    error = write_items(&r->base, file, offset, durable, width, of);
-    const int closing = error_of(MPI_File_close(&file));
-    return error ? error : closing;
-}
-
-int drape_mpi_write(const drape_ranks *ranks, const char *path, int64_t offset, bool durable,
-                    const double *values, int width, int32_t count, const uint8_t *counted,
-                    const int32_t *number, uint64_t *sum)
-{
-    const drape_mpi_ranks *r = (const drape_mpi_ranks *)ranks; /* base is its first member */
-    drape_context *ctx = r->arena.ctx;
-    items of;
-    int error = pack(ctx, offset, values, width, count, counted, number, &of) ? 0 : ENOMEM;
-    if (!drape_ranks_any(ranks, error != 0))
-        error = open_and_write(r, path, offset, durable, width, &of);
-    MPI_Allreduce(&of.sum, sum, 1, MPI_UINT64_T, MPI_SUM, r->comm);
-    drape_free(ctx, of.values);
-    drape_free(ctx, of.number);
+    drape_arena_free(&sent.arena);
+    MPI_Allreduce(&here, sum, 1, MPI_UINT64_T, MPI_SUM, r->comm);
     return (int)drape_ranks_largest(ranks, error);
 }

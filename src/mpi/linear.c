@@ -12,52 +12,25 @@
 #include <petscksp.h>
 #include <string.h>
 
-#define SYMMETRY 1e-13 /* as in solvers/linear_pcg.c */
-
 typedef struct mpi_linear {
     const drape_pattern *pattern;
     const drape_mpi_ranks *ranks;
     Mat matrix;
     Vec b, x; /* without values of their own */
     KSP direct;
-    bool counts;              /* the pivots by their signs; it never solves */
+    double *diagonal;         /* (n) of the matrix */
+    bool counts;              /* the pivots by their signs, as if it were symmetric; it never solves */
     bool symmetric, definite; /* of the last matrix; a definite one was asked for */
     bool factored;
 } mpi_linear;
 
 /* ---- The matrix ---- */
 
-/* The mirrored entries of blocks of which a row or column is of this rank, both of which are complete
- * here. */
-static bool is_symmetric_here(const drape_pattern *p, double *values)
+/* inside, outside (3 own blocks): the nonzeros of each row in columns here, and in those of other ranks. */
+static void count_nonzeros(const drape_pattern *p, PetscInt *inside, PetscInt *outside)
 {
-    for (int32_t j = 0; j < p->ranks->own_blocks; j++)
-        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
-            int64_t stride, mirrored;
-            const int32_t i = p->block_row[k];
-            const double *a = drape_pattern_at(p, values, j, k, &stride),
-                         *b = drape_pattern_at(p, values, i, drape_pattern_find(p, j, i), &mirrored);
-            const double size = fmax(drape_pattern_largest(a, stride), drape_pattern_largest(b, mirrored));
-            int64_t own;
-            const double *d = drape_pattern_at(p, values, j, p->diagonal[j], &own);
-            const double bound = SYMMETRY * fmax(size, drape_pattern_largest(d, own));
-            for (int c = 0; c < 3; c++)
-                for (int r = 0; r < 3; r++)
-                    if (!(fabs(a[c * stride + r] - b[r * mirrored + c]) <= bound))
-                        return false;
-        }
-    return true;
-}
-
-static PetscErrorCode create_matrix(mpi_linear *s, drape_context *ctx)
-{
-    const drape_pattern *p = s->pattern;
-    const drape_ranks *ranks = p->ranks;
-    const PetscInt own = ranks->own_blocks, n = 3 * own;
-    PetscInt *inside = drape_alloc(ctx, (size_t)n, sizeof *inside),
-             *outside = drape_alloc(ctx, (size_t)n, sizeof *outside);
-    PetscErrorCode code = inside && outside ? 0 : PETSC_ERR_MEM;
-    for (PetscInt i = 0; !code && i < own; i++) { /* the pattern is symmetric: columns are rows */
+    const PetscInt own = p->ranks->own_blocks;
+    for (PetscInt i = 0; i < own; i++) { /* the pattern is symmetric: columns are rows */
         PetscInt blocks = 0;
         for (int32_t k = p->block_start[i]; k < p->block_start[i + 1]; k++)
             blocks += p->block_row[k] < own;
@@ -66,8 +39,12 @@ static PetscErrorCode create_matrix(mpi_linear *s, drape_context *ctx)
             outside[r] = 3 * (p->block_start[i + 1] - p->block_start[i] - blocks);
         }
     }
-    if (!code)
-        code = MatCreate(s->ranks->comm, &s->matrix);
+}
+
+static PetscErrorCode create_matrix(mpi_linear *s, const PetscInt *inside, const PetscInt *outside)
+{
+    const PetscInt n = 3 * s->pattern->ranks->own_blocks;
+    PetscErrorCode code = MatCreate(s->ranks->comm, &s->matrix);
     if (!code)
         code = MatSetSizes(s->matrix, n, n, PETSC_DETERMINE, PETSC_DETERMINE);
     if (!code)
@@ -82,8 +59,6 @@ static PetscErrorCode create_matrix(mpi_linear *s, drape_context *ctx)
         code = MatSetOption(s->matrix, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_TRUE);
     if (!code)
         code = MatSetOption(s->matrix, MAT_ROW_ORIENTED, PETSC_FALSE);
-    drape_free(ctx, inside);
-    drape_free(ctx, outside);
     return code;
 }
 
@@ -129,13 +104,19 @@ static void destroy(void **state)
 
 static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
 {
+    const PetscInt n = 3 * pattern->ranks->own_blocks;
     mpi_linear *s = drape_arena_take(arena, 1, sizeof *s);
-    if (!s)
+    PetscInt *nonzeros = drape_arena_take(arena, 2 * (size_t)n, sizeof *nonzeros);
+    double *diagonal = drape_arena_take(arena, (size_t)pattern->n, sizeof *diagonal);
+    const bool good = s && nonzeros && diagonal;
+    if (drape_ranks_agree(pattern->ranks, arena->ctx, good ? DRAPE_OK : DRAPE_E_MEMORY))
         return DRAPE_E_MEMORY;
     s->pattern = pattern;
+    s->diagonal = diagonal;
     s->ranks = (const drape_mpi_ranks *)pattern->ranks; /* base is its first member */
-    const PetscInt n = 3 * pattern->ranks->own_blocks;
-    PetscErrorCode code = create_matrix(s, arena->ctx);
+    count_nonzeros(pattern, nonzeros, nonzeros + n);
+    PetscErrorCode code = create_matrix(s, nonzeros, nonzeros + n);
+    drape_arena_release(arena, nonzeros);
     if (!code)
         code = VecCreateMPIWithArray(s->ranks->comm, 3, n, PETSC_DETERMINE, NULL, &s->b);
     if (!code)
@@ -223,8 +204,7 @@ static drape_status factor_any(mpi_linear *s, const double *values, bool definit
     s->factored = false;
     if (!is_finite(s->pattern, values))
         return DRAPE_RETRY_LINEAR;
-    s->symmetric =
-        drape_ranks_all(s->pattern->ranks, is_symmetric_here(s->pattern, (double *)(uintptr_t)values));
+    s->symmetric = s->counts || drape_pattern_is_symmetric(s->pattern, values, s->diagonal);
     s->definite = definite && s->symmetric;
     if (fill_matrix(s, values))
         return DRAPE_E_SOLVER;
@@ -285,7 +265,7 @@ drape_status drape_mpi_inertia(drape_context *ctx, const drape_pattern *p, const
         s->counts = true;
         status = factor_any(s, values, false);
     }
-    if (!status && s->symmetric && !KSPGetPC(s->direct, &pc) && !PCFactorGetMatrix(pc, &factors) &&
+    if (!status && !KSPGetPC(s->direct, &pc) && !PCFactorGetMatrix(pc, &factors) &&
         !MatMumpsGetInfog(factors, 12, &below) && !MatMumpsGetInfog(factors, 28, &zero)) {
         *negative = below;
         *known = zero == 0;

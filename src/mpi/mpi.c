@@ -113,8 +113,13 @@ drape_status drape_mpi_share(drape_mpi *mpi, drape_model *whole, drape_model **p
         status = drape_partition(mpi->ranks, whole, owner);
     if (!status)
         status = drape_part_create(whole, owner, mpi->ranks, part);
+    status = drape_ranks_agree(&mpi->ranks->base, whole->ctx, status);
+    if (!status)
+        status = drape_mpi_ranks_plan(mpi->ranks, *part, owner);
     if (!status)
         drape_part_shed(whole);
+    else
+        drape_model_destroy(part);
     drape_free(mpi->ctx, owner);
     return status;
 }

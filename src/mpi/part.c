@@ -394,11 +394,7 @@ static drape_status make(maker *k, drape_mpi_ranks *ranks)
     m->part = k->part;
     if (!status)
         status = drape_compile_pattern(m);
-    if (!status)
-        status = number_blocks(k, ranks);
-    if (!status)
-        status = drape_mpi_ranks_plan(ranks, m, k->owner);
-    return status;
+    return status ? status : number_blocks(k, ranks);
 }
 
 static void shed_terms(drape_model *whole)

@@ -149,41 +149,40 @@ static void place(const double *values, size_t width, int32_t count, const int32
         memcpy(all + width * (size_t)number[i], values + width * i, width * sizeof *all);
 }
 
-/* Sends the next items, at most DRAPE_MPI_PIECE, from *first on; on rank 0 puts them into their places.
- * Returns how many. */
-static int32_t send_piece(drape_mpi_ranks *r, const double *values, size_t width, int32_t *first,
-                          int32_t count, const uint8_t *counted, const int32_t *number, double *all)
+/* Sends the next items, at most DRAPE_MPI_PIECE numbers, from *first on; on rank 0 puts them into their
+ * places. Returns how many. */
+static int32_t send_piece(drape_mpi_ranks *r, const drape_rows *rows, int32_t *first, double *all)
 {
+    const size_t width = (size_t)rows->width;
     int32_t n = 0;
-    for (; *first < count && n < DRAPE_MPI_PIECE / (int32_t)width; ++*first)
-        if (counted[*first]) {
-            memcpy(r->piece + width * (size_t)n, values + width * (size_t)*first, width * sizeof *values);
-            r->numbers[n++] = number[*first];
+    for (; *first < rows->count && n < DRAPE_MPI_PIECE / rows->width; ++*first)
+        if (rows->counted[*first]) {
+            memcpy(r->piece + width * (size_t)n, rows->values + width * (size_t)*first, width * sizeof *all);
+            r->numbers[n++] = rows->number[*first];
         }
     if (r->base.rank == 0) {
         place(r->piece, width, n, r->numbers, all);
         return n;
     }
     MPI_Send(r->numbers, n, MPI_INT32_T, 0, 1, r->comm);
-    MPI_Send(r->piece, n * (int)width, MPI_DOUBLE, 0, 2, r->comm);
+    MPI_Send(r->piece, n * rows->width, MPI_DOUBLE, 0, 2, r->comm);
     return n;
 }
 
 /* In pieces, so that little is in memory twice; an empty piece is the last of a rank. */
-static void collect(const drape_ranks *ranks, const double *values, int width, int32_t count,
-                    const uint8_t *counted, const int32_t *number, double *all)
+static void collect(const drape_ranks *ranks, const drape_rows *rows, double *all)
 {
     drape_mpi_ranks *r = of(ranks);
     int32_t first = 0;
-    while (send_piece(r, values, (size_t)width, &first, count, counted, number, all) > 0)
+    while (send_piece(r, rows, &first, all) > 0)
         ;
     for (int k = 1; k < ranks->count && ranks->rank == 0; k++)
         for (int n = 1; n > 0;) {
             MPI_Status status;
             MPI_Recv(r->numbers, DRAPE_MPI_PIECE, MPI_INT32_T, k, 1, r->comm, &status);
             MPI_Get_count(&status, MPI_INT32_T, &n);
-            MPI_Recv(r->piece, n * width, MPI_DOUBLE, k, 2, r->comm, MPI_STATUS_IGNORE);
-            place(r->piece, (size_t)width, n, r->numbers, all);
+            MPI_Recv(r->piece, n * rows->width, MPI_DOUBLE, k, 2, r->comm, MPI_STATUS_IGNORE);
+            place(r->piece, (size_t)rows->width, n, r->numbers, all);
         }
 }
 
@@ -266,16 +265,18 @@ static drape_exchange *plan(const drape_ranks *ranks, drape_arena *arena, int32_
     int *wanted = drape_arena_take(&scratch, (size_t)ranks->count, sizeof *wanted),
         *asked = drape_arena_take(&scratch, (size_t)ranks->count, sizeof *asked);
     int32_t *places = drape_arena_take(&scratch, (size_t)count, sizeof *places);
-    if (!drape_arena_status(&scratch)) {
+    drape_status status = drape_ranks_agree(ranks, arena->ctx, drape_arena_status(&scratch));
+    if (!status) {
         for (int32_t i = 0; i < count; i++)
             wanted[rank[i]]++;
         MPI_Alltoall(wanted, 1, MPI_INT, asked, 1, MPI_INT, r->comm);
         x = take(arena, ranks->count, wanted, asked, largest);
+        status = drape_ranks_agree(ranks, arena->ctx, x ? DRAPE_OK : DRAPE_E_MEMORY);
     }
-    if (x)
+    if (!status)
         ask(r, x, count, rank, place, places);
     drape_arena_free(&scratch);
-    return x;
+    return status ? NULL : x;
 }
 
 /* The copies of nodes, which their owners know by their numbers in the whole model only. copy (nodes),
@@ -318,7 +319,7 @@ drape_status drape_mpi_ranks_plan(drape_mpi_ranks *r, const drape_model *part, c
     int32_t *copy = drape_arena_take(&scratch, nodes, sizeof *copy),
             *rank = drape_arena_take(&scratch, nodes, sizeof *rank),
             *number = drape_arena_take(&scratch, nodes, sizeof *number);
-    if (!drape_arena_status(&scratch)) {
+    if (!drape_ranks_agree(&r->base, r->arena.ctx, drape_arena_status(&scratch))) {
         r->nodes = plan_nodes(r, part, owner, copy, rank, number);
         r->blocks = r->nodes ? plan_nodes(r, part, owner, copy, rank, number) : NULL;
     }
@@ -351,7 +352,9 @@ drape_status drape_mpi_ranks_create(drape_context *ctx, MPI_Comm comm, drape_mpi
     r->base.add = add;
     r->base.share = share;
     r->base.gather = collect;
+    r->base.open = drape_mpi_open;
     r->base.write = drape_mpi_write;
+    r->base.close = drape_mpi_close;
     r->base.inertia = drape_mpi_inertia;
     r->base.vector = vector;
     r->base.direct = &drape_linear_mpi_direct;

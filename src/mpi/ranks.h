@@ -24,6 +24,7 @@ typedef struct drape_mpi_ranks {
     MPI_Comm comm;
     drape_arena arena;
     drape_exchange *nodes, *blocks;
+    int file;            /* descriptor, between drape_ranks.open and close */
     int *bytes, *places; /* (count) of what each rank shares */
     double *gathered;    /* (DRAPE_MPI_VALUES x count) */
     double *piece;       /* (DRAPE_MPI_PIECE) of a message of drape_ranks.gather */

@@ -650,7 +650,7 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     report->iterations = (int)iterations;
     report->laborious = (double)iterations > fmax(EASY, EASY_SHARE * s->values[DRAPE_NEWTON_MAX_ITERATIONS]);
     e->work.newton_iterations += iterations;
-    if (drape_system_status(e->system))
+    if (drape_system_agree(e->system))
         return drape_system_status(e->system);
     if (s->failure) {
         report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
@@ -677,7 +677,7 @@ drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *
         return DRAPE_OK;
     }
     drape_status status = guess_linearized(s, d);
-    if (drape_system_status(e->system))
+    if (drape_system_agree(e->system))
         return drape_system_status(e->system);
     if (status) {
         report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
@@ -721,20 +721,24 @@ static drape_status create_search(drape_arena *arena, drape_newton *s)
     return status ? status : drape_arena_status(arena);
 }
 
-static drape_status create_solver(drape_arena *arena, drape_newton *s)
+/* Making a vector of ranks is collective, and copying it is not. */
+static drape_status create_vectors(drape_arena *arena, drape_newton *s)
 {
-    drape_context *ctx = arena->ctx;
-    drape_system *system = s->equation->system;
     const int64_t n = (int64_t)s->equation->dofs;
-    if (drape_sundials_context(&s->sun) || !(s->kin = KINCreate(s->sun)) ||
+    const bool begun = !drape_sundials_context(&s->sun) && (s->kin = KINCreate(s->sun));
+    if (!drape_ranks_all(s->equation->ranks, begun) ||
         !(s->unknown = drape_vector_make(s->equation->ranks, n, s->equation->f, s->sun)) ||
         !(s->ones = N_VClone(s->unknown)) || !(s->weights = N_VClone(s->unknown)))
-        return drape_fail_memory(ctx, (size_t)n * sizeof(double));
+        return drape_fail_memory(arena->ctx, (size_t)n * sizeof(double));
     N_VConst(1, s->ones);
     for (int64_t i = 0; i < n; i++)
         N_VGetArrayPointer(s->weights)[i] = s->equation->weight[i / 3];
-    if (n == 0)
-        return DRAPE_OK;
+    return DRAPE_OK;
+}
+
+static drape_status create_solver(drape_arena *arena, drape_newton *s)
+{
+    drape_system *system = s->equation->system;
     drape_status status = drape_sun_linear_create(
         arena, s->sun, drape_linear_of(s->equation->ranks, (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]),
         drape_system_pattern(system), drape_system_pool(system), drape_system_cancel_flag(system),
@@ -749,16 +753,16 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s)
     s->linear->owner = s;
     s->linear->solver->ops->setup = factor;
     s->linear->solver->ops->solve = correct;
-    return configure(s)
-               ? DRAPE_OK
-               : drape_fail(ctx, DRAPE_E_MEMORY, "KINSOL cannot be set up for %lld unknowns", (long long)n);
+    return configure(s) ? DRAPE_OK
+                        : drape_fail(arena->ctx, DRAPE_E_MEMORY, "KINSOL cannot be set up for %lld unknowns",
+                                     (long long)s->equation->dofs);
 }
 
 drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equation, const double *values,
                                  drape_newton **out)
 {
     drape_newton *s = *out = drape_arena_take(arena, 1, sizeof *s);
-    if (!s)
+    if (drape_ranks_agree(equation->ranks, arena->ctx, s ? DRAPE_OK : DRAPE_E_MEMORY))
         return DRAPE_E_MEMORY;
     s->equation = equation;
     s->repair_share = 1;
@@ -778,7 +782,10 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
         status = drape_arena_status(arena);
     if (!status && s->searches)
         status = create_search(arena, s);
-    return status ? status : create_solver(arena, s);
+    status = drape_ranks_agree(equation->ranks, arena->ctx, status);
+    if (!status)
+        status = drape_ranks_agree(equation->ranks, arena->ctx, create_vectors(arena, s));
+    return status || equation->dofs == 0 ? status : create_solver(arena, s);
 }
 
 void drape_newton_destroy(drape_newton **newton)

@@ -37,6 +37,7 @@ static drape_status measure_start(drape_system *system, start *out)
     drape_status status = drape_state_create(&arena, m, &state);
     if (!status)
         status = drape_arena_status(&arena);
+    status = drape_ranks_agree(drape_model_ranks(m), m->ctx, status);
     *out = (start){0};
     if (!status) {
         add_terms(system, &state, g);

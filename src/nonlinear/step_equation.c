@@ -81,7 +81,7 @@ bool drape_step_equation_evaluate(drape_step_equation *s, const double *d)
     }
     s->work.residuals++;
     s->work.residual_seconds += drape_system_clock(s->system) - start;
-    return drape_step_equation_is_finite(s, s->f);
+    return drape_system_agree_finite(s->system, s->f, s->dofs);
 }
 
 bool drape_step_equation_try(drape_step_equation *s, const double *d, double a, const double *p,

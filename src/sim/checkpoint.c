@@ -348,7 +348,7 @@ drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user)
     if (!write)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_save_to: the function is NULL");
     sim->ctx->message[0] = 0;
-    drape_archive_write_to(&a, sim->ctx, MEMORY_NAME, write, user);
+    drape_archive_write_to(&a, sim->ctx, MEMORY_NAME, write, NULL, user);
     drape_sim_archive_identity(sim, &a);
     drape_sim_archive(sim, &a);
     const drape_status status = drape_archive_end(&a);

@@ -65,9 +65,15 @@ static drape_status create_states(drape_sim *sim)
     return drape_arena_status(sim->arena);
 }
 
+/* Where ranks share the model, a stage of the creation begins only if all have ended the one before. */
+static drape_status agree(const drape_sim *sim, drape_status status)
+{
+    return drape_ranks_agree(drape_model_ranks(sim->model), sim->ctx, status);
+}
+
 static drape_status create_system(drape_sim *sim, int threads)
 {
-    drape_status status = drape_system_create(sim->arena, sim->model, threads, &sim->system);
+    drape_status status = agree(sim, drape_system_create(sim->arena, sim->model, threads, &sim->system));
     if (status)
         return status;
     drape_system_watch(sim->system, &sim->cancel);
@@ -167,18 +173,21 @@ static drape_status start_sim(drape_sim *sim, int threads)
         status = create_states(sim);
     if (!status)
         status = drape_check_cancel(sim->ctx);
+    status = agree(sim, status);
     if (!status)
         status = create_system(sim, threads);
     if (!status)
         start_pins(sim);
     if (!status)
         status = drape_check_cancel(sim->ctx);
+    status = agree(sim, status);
     if (!status)
         status = create_integrator(sim);
     if (!status)
         status = drape_check_cancel(sim->ctx);
     if (!status)
         status = drape_events_create(sim);
+    status = agree(sim, status);
     if (status)
         return status;
     note_tolerance(sim);
@@ -220,6 +229,7 @@ drape_status drape_sim_create_like(const drape_sim *like, const drape_model *mod
     drape_status status = open_sim(like->ctx, model, &def, out);
     if (!status && (pinned || masses))
         status = change_nodes(*out, pinned, masses);
+    status = drape_ranks_agree(drape_model_ranks(model), like->ctx, status);
     if (!status) {
         (*out)->chosen = like->chosen;
         status = start_sim(*out, drape_pool_threads(drape_system_pool(like->system)));
@@ -264,6 +274,7 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
         status = drape_choose(ctx, model, &def, &(*out)->chosen);
     if (!status && model->part)
         status = check_ranks(*out);
+    status = drape_ranks_agree(drape_model_ranks(model), ctx, status);
     if (!status)
         status = start_sim(*out, def.threads);
     if (status) {
@@ -417,9 +428,7 @@ drape_status drape_sim_notify(drape_sim *sim, const drape_event *event)
         sim->notifying = true;
         drape_status status = sim->observers[i](sim->observer_users[i], event);
         sim->notifying = false;
-        if (drape_ranks_any(drape_model_ranks(sim->model), status != 0) && !status)
-            return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: another rank stopped the run",
-                              drape_sim_state(sim)->t);
+        status = drape_ranks_agree(drape_model_ranks(sim->model), sim->ctx, status);
         if (status > 0)
             return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: an observer asked to stop",
                               drape_sim_state(sim)->t);

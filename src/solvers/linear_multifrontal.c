@@ -10,12 +10,6 @@
 #include "solvers/general.h"
 #include "solvers/linear.h"
 
-#include <math.h>
-
-/* Relative rounding error in a_ij, to which elements contribute at most about sqrt(a_ii a_jj) each. A
- * smaller difference between mirrored entries moves the solution no more than rounding the entries does. */
-#define SYMMETRY 1e-13
-
 extern const drape_linear_ops drape_linear_klu, drape_linear_multifrontal;
 
 typedef enum factors { NONE, CHOLESKY, GENERAL } factors;
@@ -92,27 +86,6 @@ static bool copy_diagonal(multifrontal *s, const double *values)
     return positive;
 }
 
-/* Whether block k of column j is the transpose of the block `mirrored`, up to rounding errors. */
-static bool is_mirrored(const multifrontal *s, double *values, int32_t j, int32_t k, int32_t mirrored)
-{
-    const drape_pattern *p = s->fronts.pattern;
-    const int32_t i = p->block_row[k];
-    int64_t stride, mirror_stride;
-    const double *block = drape_pattern_at(p, values, j, k, &stride),
-                 *mirror = drape_pattern_at(p, values, i, mirrored, &mirror_stride);
-    bool same = true, symmetric = true;
-    for (int c = 0; c < 3; c++)
-        for (int r = 0; r < 3; r++)
-            same &= block[c * stride + r] == mirror[r * mirror_stride + c];
-    for (int e = 0; !same && e < 9; e++) {
-        const int c = e / 3, r = e % 3;
-        const double difference = block[c * stride + r] - mirror[r * mirror_stride + c];
-        symmetric &= difference * difference <=
-                     SYMMETRY * SYMMETRY * fabs(s->diagonal[3 * i + r] * s->diagonal[3 * j + c]);
-    }
-    return symmetric;
-}
-
 /* Visits the matrix column by column, as it is stored: in a well-numbered mesh a mirrored block is never
  * far from its block. */
 static properties inspect(multifrontal *s, const double *values)
@@ -123,7 +96,8 @@ static properties inspect(multifrontal *s, const double *values)
     of.positive = of.finite && copy_diagonal(s, values);
     for (int32_t j = 0; of.finite && of.symmetric && j < p->block_count; j++)
         for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
-            of.symmetric &= is_mirrored(s, (double *)(uintptr_t)values, j, k, *mirror++);
+            of.symmetric &=
+                drape_pattern_is_mirrored(p, (double *)(uintptr_t)values, j, k, *mirror++, s->diagonal);
     return of;
 }
 

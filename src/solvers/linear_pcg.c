@@ -13,12 +13,10 @@
 #include "solvers/pcg.h"
 
 #include <inttypes.h>
-#include <math.h>
 #include <string.h>
 
 #define EXACT          1e-14   /* relative residual for callers that want all digits */
 #define MAX_ITERATIONS 2000    /* a matrix that needs more goes to the fallback */
-#define SYMMETRY       1e-13   /* as in linear_multifrontal.c: rounding error in mirrored entries */
 #define MAX_FALLBACK   1000000 /* unknowns: at a third of these, factors take 1.6 GB */
 
 extern const drape_linear_ops drape_linear_pcg;
@@ -50,7 +48,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
 {
     const size_t n = (size_t)pattern->n;
     pcg_state *s = drape_arena_take(arena, 1, sizeof *s);
-    if (!s)
+    if (drape_ranks_agree(pattern->ranks, arena->ctx, s ? DRAPE_OK : DRAPE_E_MEMORY))
         return DRAPE_E_MEMORY;
     s->arena = arena;
     s->pattern = pattern;
@@ -59,7 +57,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     s->diagonal = drape_arena_take(arena, n, sizeof *s->diagonal);
     s->pcg = drape_pcg_of(arena, drape_pattern_own(pattern), s, multiply, precondition);
     s->pcg.ranks = pattern->ranks;
-    drape_status status = drape_arena_status(arena);
+    drape_status status = drape_ranks_agree(pattern->ranks, arena->ctx, drape_arena_status(arena));
     if (!status)
         status = drape_multigrid_create(arena, pattern, &s->multigrid);
     if (!status)
@@ -73,37 +71,6 @@ static void destroy(void **state)
 }
 
 /* ---- Values ---- */
-
-static bool is_symmetric_here(const pcg_state *s)
-{
-    const drape_pattern *p = s->pattern;
-    double *const values = (double *)(uintptr_t)s->values; /* only read */
-    for (int32_t j = 0; j < drape_pattern_own(p) / 3; j++)
-        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
-            int64_t stride, mirrored;
-            int32_t i = p->block_row[k];
-            const double *a = drape_pattern_at(p, values, j, k, &stride),
-                         *b = drape_pattern_at(p, values, i, drape_pattern_find(p, j, i), &mirrored),
-                         *d = s->diagonal + 3 * (int64_t)j, *e = s->diagonal + 3 * (int64_t)i;
-            for (int c = 0; c < 3; c++)
-                for (int r = 0; r < 3; r++) {
-                    double difference = a[c * stride + r] - b[r * mirrored + c];
-                    double size = fabs(d[c] * e[r]);
-                    if (difference * difference > SYMMETRY * SYMMETRY * size)
-                        return false;
-                }
-        }
-    return true;
-}
-
-static bool is_symmetric(pcg_state *s)
-{
-    const drape_pattern *p = s->pattern;
-    drape_pattern_list_diagonal(p, s->values, s->diagonal);
-    if (p->ranks) /* of copies, their owners have the whole columns */
-        p->ranks->fetch_blocks(p->ranks, s->diagonal);
-    return drape_ranks_all(p->ranks, is_symmetric_here(s));
-}
 
 static bool is_finite(const pcg_state *s, const double *values, int64_t n)
 {
@@ -148,7 +115,7 @@ static drape_status factor_any(pcg_state *s, const double *values, bool definite
     if (!is_finite(s, values, s->pattern->nonzeros))
         return DRAPE_RETRY_LINEAR;
     s->values = values;
-    const bool symmetric = is_symmetric(s);
+    const bool symmetric = drape_pattern_is_symmetric(s->pattern, values, s->diagonal);
     s->definite = definite && symmetric;
     s->factored = symmetric && !drape_multigrid_factor(s->multigrid, s->values, s->positions);
     if (s->factored)

@@ -206,11 +206,6 @@ void drape_multigrid_multiply(const drape_multigrid *m, const double *x, double 
     multiply(&m->level[0], x, y);
 }
 
-static const drape_ranks *ranks_of(const level *l)
-{
-    return l->border ? l->border->ranks : NULL;
-}
-
 /* ---- Prolongation ---- */
 
 static bool invert_diagonal(level *l)

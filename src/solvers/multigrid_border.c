@@ -46,11 +46,12 @@ static void number_items(const drape_ranks *ranks, int32_t count, int32_t *first
     }
 }
 
+/* NULL: out of memory, on all ranks. */
 static border *take_border(drape_arena *arena, const drape_ranks *ranks)
 {
     border *b = drape_arena_take(arena, 1, sizeof *b);
     int32_t *first = drape_arena_take(arena, (size_t)ranks->count + 1, sizeof *first);
-    if (!b || !first)
+    if (agree(ranks, arena, b && first))
         return NULL;
     b->ranks = ranks;
     b->first = first;
@@ -66,7 +67,7 @@ static drape_status plan_rows(drape_arena *arena, drape_arena *scratch, border *
     int32_t *rank = drape_arena_take(scratch, copies, sizeof *rank),
             *place = drape_arena_take(scratch, copies, sizeof *place);
     b->copies = drape_arena_take(arena, copies * (size_t)a->size, sizeof *b->copies);
-    if (!rank || !place || !b->copies)
+    if (agree(b->ranks, arena, b->number && rank && place && b->copies))
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < copies; i++) {
         rank[i] = rank_of(b, b->number[i]);
@@ -105,21 +106,23 @@ static drape_status list_border(drape_arena *arena, border *b, const matrix *a)
     return DRAPE_OK;
 }
 
-/* Appends the lists of copies to those of the rows here. list->start is of columns + 1. items: the plan
+/* Appends the lists of copies to those of the rows here. list->start is of columns + 1, NULL if there is no
+ * memory here, like list->column. items: the plan
  * for what else there is of each column, of at most `largest` bytes; NULL: nothing is. */
 static drape_status append_lists(drape_arena *arena, drape_arena *scratch, const level *l, lists *list,
                                  drape_exchange **items, size_t largest)
 {
     const border *b = l->border;
     const int32_t count = l->a.count, columns = l->a.columns;
-    int32_t(*span)[2] = drape_arena_take(scratch, (size_t)columns, sizeof *span), total = list->start[count];
-    if (!span)
+    int32_t(*span)[2] = drape_arena_take(scratch, (size_t)columns, sizeof *span);
+    if (agree(b->ranks, arena, list->start && list->column && span))
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < count; i++) {
         span[i][0] = list->start[i];
         span[i][1] = list->start[i + 1];
     }
     b->ranks->copy(b->ranks, b->rows, span, span + count, sizeof *span);
+    int32_t total = list->start[count];
     for (int32_t i = count; i < columns; i++) {
         total += span[i][1] - span[i][0];
         list->start[i + 1] = total;
@@ -128,7 +131,7 @@ static drape_status append_lists(drape_arena *arena, drape_arena *scratch, const
     int32_t *rank = drape_arena_take(scratch, (size_t)more, sizeof *rank),
             *place = drape_arena_take(scratch, (size_t)more, sizeof *place),
             *column = drape_arena_resize(arena, list->column, (size_t)total, sizeof *column), at = 0;
-    if (!rank || !place || !column)
+    if (agree(b->ranks, arena, rank && place && column))
         return DRAPE_E_MEMORY;
     list->column = column;
     for (int32_t i = count; i < columns; i++)
@@ -155,9 +158,7 @@ drape_status drape_border_create(drape_arena *arena, const drape_pattern *patter
         return DRAPE_E_MEMORY;
     number_items(b->ranks, l->a.count, b->first);
     b->number = drape_arena_take(arena, (size_t)copies, sizeof *b->number);
-    if (!b->number)
-        return DRAPE_E_MEMORY;
-    for (int32_t i = 0; i < copies; i++)
+    for (int32_t i = 0; b->number && i < copies; i++)
         b->number[i] = (int32_t)b->ranks->block[l->a.count + i];
     drape_arena scratch = drape_arena_of(arena->ctx);
     drape_status status = plan_rows(arena, &scratch, b, &l->a);
@@ -195,9 +196,7 @@ static drape_status reach_of_copies(drape_arena *scratch, const level *l, lists 
     }
     reach->start = drape_arena_take(scratch, (size_t)a->columns + 1, sizeof *reach->start);
     reach->column = drape_arena_take(scratch, (size_t)(total + widest), sizeof *reach->column);
-    if (!reach->start || !reach->column)
-        return DRAPE_E_MEMORY;
-    for (int32_t i = 0, n = 0; i < a->count; i++) {
+    for (int32_t i = 0, n = 0; reach->start && reach->column && i < a->count; i++) {
         int32_t count = 0;
         if (n < l->border->count && l->border->row[n] == i) {
             for (int32_t k = a->start[i]; k < a->start[i + 1]; k++)
@@ -216,29 +215,27 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The copies that the next level has: all aggregates of other ranks in these lists. */
-static drape_status number_copies(drape_arena *arena, const level *l, const lists *p, const lists *reach,
-                                  level *next)
+/* The copies that the next level has: all aggregates of other ranks in these lists. Their numbers are NULL if
+ * there is no memory here. */
+static void number_copies(drape_arena *arena, const level *l, const lists *p, const lists *reach, level *next)
 {
     border *b = next->border;
     const int32_t inside = l->p_start[l->a.columns], outside = reach->start[l->a.columns];
     int32_t *number = drape_arena_take(arena, (size_t)inside + (size_t)outside, sizeof *number), count = 0,
             unique = 0;
-    if (!number)
-        return DRAPE_E_MEMORY;
-    for (int list = 0; list < 2; list++)
+    for (int list = 0; number && list < 2; list++)
         for (int32_t q = 0; q < (list ? outside : inside); q++) {
             const int32_t column = list ? reach->column[q] : p->column[q];
             if (rank_of(b, column) != b->ranks->rank)
                 number[count++] = column;
         }
-    qsort(number, (size_t)count, sizeof *number, compare);
+    if (number)
+        qsort(number, (size_t)count, sizeof *number, compare);
     for (int32_t i = 0; i < count; i++)
         if (i == 0 || number[i] != number[unique - 1])
             number[unique++] = number[i];
-    b->number = drape_arena_resize(arena, number, (size_t)unique, sizeof *number);
+    b->number = number ? drape_arena_resize(arena, number, (size_t)unique, sizeof *number) : NULL;
     next->a.columns = next->a.count + unique;
-    return b->number ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 drape_status drape_border_prolong(drape_arena *arena, drape_arena *scratch, level *l, level *next,
@@ -250,10 +247,10 @@ drape_status drape_border_prolong(drape_arena *arena, drape_arena *scratch, leve
     l->p_column = p.column;
     if (!status)
         status = reach_of_copies(scratch, l, reach);
-    if (!status)
-        status = number_copies(arena, l, &p, reach, next);
-    if (!status)
-        status = plan_rows(arena, scratch, next->border, &next->a);
+    if (status)
+        return status;
+    number_copies(arena, l, &p, reach, next);
+    status = plan_rows(arena, scratch, next->border, &next->a);
     if (status)
         return status;
     for (int32_t i = 0; i < l->a.columns; i++)
@@ -275,7 +272,7 @@ static drape_status plan_products(drape_arena *arena, drape_arena *scratch, bord
     const int32_t items = MODES * (a->start[a->columns] - a->start[a->count]);
     int32_t *rank = drape_arena_take(scratch, (size_t)items, sizeof *rank),
             *place = drape_arena_take(scratch, (size_t)items, sizeof *place), at = 0;
-    if (!rank || !place)
+    if (agree(b->ranks, arena, rank && place))
         return DRAPE_E_MEMORY;
     for (int32_t I = a->count; I < a->columns; I++)
         for (int32_t c = 0; c < MODES; c++)
@@ -298,7 +295,7 @@ drape_status drape_border_finish(drape_arena *arena, drape_arena *scratch, level
     lists rows = {.start = drape_arena_take(scratch, (size_t)a->columns + 1, sizeof *rows.start),
                   .column = drape_arena_take(scratch, (size_t)a->start[a->count], sizeof *rows.column)};
     int32_t *start = drape_arena_take(scratch, (size_t)a->columns, sizeof *start);
-    if (!rows.start || !rows.column || !start)
+    if (agree(b->ranks, arena, rows.start && rows.column && start))
         return DRAPE_E_MEMORY;
     memcpy(rows.start, a->start, ((size_t)a->count + 1) * sizeof *rows.start);
     memcpy(start, a->start, (size_t)a->count * sizeof *start);
@@ -314,13 +311,13 @@ drape_status drape_border_finish(drape_arena *arena, drape_arena *scratch, level
 /* ---- The levels that each rank has as a whole ---- */
 
 /* Where the lists of the rows of all ranks begin, and memory for them; first (ranks + 1): where those of each
- * rank do. */
+ * rank do; NULL: there is no memory here. The status is that of all ranks. */
 static drape_status share_lengths(drape_arena *arena, const border *b, const int32_t *start, int32_t count,
                                   int32_t **all, int32_t *first, int32_t **column)
 {
     const int32_t rows = b->first[b->ranks->count];
     int32_t *sum = *all = drape_arena_take(arena, (size_t)rows + 1, sizeof *sum);
-    if (!sum)
+    if (agree(b->ranks, arena, first && sum))
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < count; i++)
         sum[first_here(b) + i + 1] = start[i + 1] - start[i];
@@ -330,7 +327,7 @@ static drape_status share_lengths(drape_arena *arena, const border *b, const int
     for (int k = 0; k <= b->ranks->count; k++)
         first[k] = sum[b->first[k]];
     *column = drape_arena_take(arena, (size_t)sum[rows], sizeof **column);
-    return *column ? DRAPE_OK : DRAPE_E_MEMORY;
+    return agree(b->ranks, arena, *column);
 }
 
 static void share_columns(const border *b, int32_t count, const int32_t *column, const int32_t *first,
@@ -364,14 +361,13 @@ static drape_status gather_matrix(drape_arena *arena, drape_arena *scratch, cons
     *a = (matrix){.size = MODES, .count = (int32_t)all_rows(l), .columns = (int32_t)all_rows(l)};
     a->diagonal = drape_arena_take(arena, (size_t)a->count, sizeof *a->diagonal);
     out->first_block = drape_arena_take(arena, (size_t)b->ranks->count + 1, sizeof *out->first_block);
-    if (!a->diagonal || !out->first_block ||
-        share_lengths(arena, b, l->a.start, l->a.count, &a->start, out->first_block, &a->column))
+    if (share_lengths(arena, b, l->a.start, l->a.count, &a->start, out->first_block, &a->column))
         return DRAPE_E_MEMORY;
     const size_t blocks = (size_t)a->start[a->count];
     column = drape_arena_take(scratch, blocks, sizeof *column);
     out->place = drape_arena_take(arena, blocks, sizeof *out->place);
     out->shared = drape_arena_take(arena, blocks * MODES * MODES, sizeof *out->shared);
-    if (!column || !out->place || !out->shared)
+    if (agree(b->ranks, arena, a->diagonal && column && out->place && out->shared))
         return DRAPE_E_MEMORY;
     share_columns(b, l->a.count, l->a.column, out->first_block, column);
     sort_columns(a, column, out->place);
@@ -384,7 +380,7 @@ static drape_status gather_graph(drape_arena *scratch, const level *l, graph *g)
     const border *b = l->border;
     graph all = {.count = (int32_t)all_rows(l)};
     int32_t *first = drape_arena_take(scratch, (size_t)b->ranks->count + 1, sizeof *first);
-    if (!first || share_lengths(scratch, b, g->start, g->count, &all.start, first, &all.neighbor))
+    if (share_lengths(scratch, b, g->start, g->count, &all.start, first, &all.neighbor))
         return DRAPE_E_MEMORY;
     share_columns(b, g->count, g->neighbor, first, all.neighbor);
     *g = all;
@@ -395,7 +391,7 @@ drape_status drape_border_gather(drape_arena *arena, drape_arena *scratch, const
                                  gathered *out)
 {
     out->multigrid = drape_arena_take(arena, 1, sizeof *out->multigrid);
-    if (!out->multigrid)
+    if (agree(l->border->ranks, arena, out->multigrid))
         return DRAPE_E_MEMORY;
     const drape_status status = gather_matrix(arena, scratch, l, out);
     return status ? status : gather_graph(scratch, l, g);

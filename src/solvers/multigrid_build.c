@@ -274,18 +274,16 @@ static drape_status aggregate(drape_arena *arena, drape_arena *scratch, level *l
     int32_t *joined = drape_arena_take(scratch, columns, sizeof *joined);
     l->aggregate = drape_arena_take(arena, columns, sizeof *l->aggregate);
     l->member = drape_arena_take(arena, (size_t)l->a.count, sizeof *l->member);
-    if (!joined || !l->aggregate || !l->member)
+    if (agree(ranks_of(l), arena, joined && l->aggregate && l->member))
         return DRAPE_E_MEMORY;
     l->coarse = form_aggregates(g, l->aggregate, joined);
-    const double all = drape_ranks_sum(l->border ? l->border->ranks : NULL, l->coarse);
+    const double all = drape_ranks_sum(ranks_of(l), l->coarse);
     *made = all > 0 && all <= STAGNATION * (double)all_rows(l);
     l->coarse = *made ? l->coarse : 0;
     l->member_start = drape_arena_take(arena, (size_t)l->coarse + 2, sizeof *l->member_start);
-    if (!l->member_start)
-        return DRAPE_E_MEMORY;
-    if (*made)
+    if (l->member_start && *made)
         list_members(l);
-    return DRAPE_OK;
+    return agree(ranks_of(l), arena, l->member_start);
 }
 
 /* The prolongation, and which rows and columns the next matrix has. */
@@ -293,7 +291,7 @@ static drape_status prolong(drape_arena *arena, drape_arena *scratch, level *l, 
 {
     drape_status status = l->border ? drape_border_number(arena, l, next) : DRAPE_OK;
     if (!status)
-        status = build_prolongation(arena, l);
+        status = agree(ranks_of(l), arena, !build_prolongation(arena, l));
     next->a = (matrix){.size = MODES, .count = l->coarse, .columns = l->coarse};
     if (!status && l->border)
         status = drape_border_prolong(arena, scratch, l, next, reach);
@@ -313,11 +311,11 @@ static drape_status coarsen(drape_arena *arena, drape_arena *scratch, level *l, 
     int32_t *largest = status ? NULL : drape_arena_take(scratch, (size_t)next->a.columns, sizeof *largest);
     if (!status)
         status = largest ? shrink(scratch, l, g, next->a.columns, &smaller) : DRAPE_E_MEMORY;
-    if (status)
-        return status;
+    if (agree(ranks_of(l), arena, !status))
+        return DRAPE_E_MEMORY;
     *g = smaller;
     drop_distant(g, CLOSE_AGGREGATES, largest, next->border);
-    status = build_coarse(arena, scratch, l, &reach, next);
+    status = agree(ranks_of(l), arena, !build_coarse(arena, scratch, l, &reach, next));
     return status || !l->border ? status : drape_border_finish(arena, scratch, l, next);
 }
 
@@ -331,7 +329,7 @@ static drape_status make_graph(drape_arena *scratch, const level *l, graph *out)
                    .start = drape_arena_take(scratch, count + 1, sizeof *out->start),
                    .neighbor = drape_arena_take(scratch, entries, sizeof *out->neighbor),
                    .weight = drape_arena_take(scratch, entries, sizeof *out->weight)};
-    if (drape_arena_status(scratch))
+    if (agree(ranks_of(l), scratch, !drape_arena_status(scratch)))
         return DRAPE_E_MEMORY;
     memcpy(out->start, a->start, (count + 1) * sizeof *out->start);
     memcpy(out->neighbor, a->column, entries * sizeof *out->neighbor);
@@ -383,7 +381,7 @@ static drape_status build_levels(drape_arena *arena, drape_arena *scratch, drape
     bool more = true;
     for (m->count = 1; more; m->count += more) {
         level *l = &m->level[m->count - 1];
-        drape_status status = take_vectors(arena, l);
+        drape_status status = agree(ranks_of(l), arena, !take_vectors(arena, l));
         if (!status && l->border && m->count > 1 && is_small(l))
             status = gather(arena, scratch, m, g);
         more = !m->whole.multigrid && (l->border || l->a.count > DENSE) && m->count < MAX_LEVELS;
@@ -391,8 +389,8 @@ static drape_status build_levels(drape_arena *arena, drape_arena *scratch, drape
             status = aggregate(arena, scratch, l, g, &more);
         if (!status && more)
             status = coarsen(arena, scratch, l, g, &l[1]);
-        if (status)
-            return status;
+        if (agree(ranks_of(l), arena, !status))
+            return DRAPE_E_MEMORY;
     }
     return take_shared(arena, m);
 }
@@ -401,7 +399,7 @@ drape_status drape_multigrid_create(drape_arena *arena, const drape_pattern *pat
 {
     drape_multigrid *m = drape_arena_take(arena, 1, sizeof *m);
     graph g;
-    if (!m)
+    if (agree(pattern->ranks, arena, m))
         return DRAPE_E_MEMORY;
     m->level[0].a = (matrix){.size = 3,
                              .count = (int32_t)(drape_pattern_own(pattern) / 3),
@@ -411,10 +409,11 @@ drape_status drape_multigrid_create(drape_arena *arena, const drape_pattern *pat
                              .diagonal = pattern->diagonal};
     drape_arena scratch = drape_arena_of(arena->ctx);
     drape_status status = pattern->ranks ? drape_border_create(arena, pattern, &m->level[0]) : DRAPE_OK;
+    status = agree(pattern->ranks, arena, !status);
     if (!status)
         status = make_graph(&scratch, &m->level[0], &g);
     if (!status)
-        status = build_levels(arena, &scratch, m, &g);
+        status = agree(pattern->ranks, arena, !build_levels(arena, &scratch, m, &g));
     drape_arena_free(&scratch);
     if (!status)
         *out = m;

@@ -80,7 +80,15 @@ typedef struct lists {
     int32_t *start, *column;
 } lists;
 
-/* The border of the level that a pattern describes, which ranks share. Errors: DRAPE_E_MEMORY, as below. */
+/* A rank that alone is out of memory must not leave the others waiting: before they exchange anything, the
+ * ranks agree on whether all are `good`. Collective. */
+static inline drape_status agree(const drape_ranks *ranks, const drape_arena *arena, bool good)
+{
+    return drape_ranks_agree(ranks, arena->ctx, good ? DRAPE_OK : DRAPE_E_MEMORY);
+}
+
+/* The border of the level that a pattern describes, which ranks share. Errors: DRAPE_E_MEMORY, as below.
+ * These functions are collective; the status may be of this rank only. */
 drape_status drape_border_create(drape_arena *arena, const drape_pattern *pattern, level *l);
 
 /* After the aggregates were formed: numbers them over all ranks, also those of copies, and begins the border
@@ -99,6 +107,12 @@ drape_status drape_border_finish(drape_arena *arena, drape_arena *scratch, level
 /* The matrix of all ranks as one, and its graph, which has the memory of *g. */
 drape_status drape_border_gather(drape_arena *arena, drape_arena *scratch, const level *l, graph *g,
                                  gathered *out);
+
+/* NULL: one process has the level. */
+static inline const drape_ranks *ranks_of(const level *l)
+{
+    return l->border ? l->border->ranks : NULL;
+}
 
 /* The rank that has the row of a number in the matrix of all ranks. */
 static inline int rank_of(const border *b, int32_t number)

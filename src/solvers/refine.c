@@ -7,7 +7,7 @@
 /* A sum of about a hundred terms of size 1, as in a row of the matrix of a cloth, is off by 1e-14 at most,
  * and typically by 1e-15. */
 #define TARGET 1e-14
-/* The two triangles of a matrix that counts as symmetric may differ by this part (linear_multifrontal.c). */
+/* The two triangles of a matrix that counts as symmetric may differ by this part (sparse/pattern.h). */
 #define BOUND   1e-13
 #define CYCLES  6
 #define VECTORS 10 /* of a cycle */

@@ -113,9 +113,11 @@ static drape_status create_state(drape_sun_linear *linear, const drape_pattern *
     linear->positions = NULL;
     if (linear->ops->set_positions)
         linear->positions = drape_arena_take(&linear->arena, (size_t)pattern->n, sizeof *linear->positions);
-    if (!linear->values || (linear->ops->set_positions && !linear->positions))
-        return DRAPE_E_MEMORY;
-    drape_status status = linear->near ? take_near(linear) : DRAPE_OK;
+    drape_status status =
+        linear->values && (linear->positions || !linear->ops->set_positions) ? DRAPE_OK : DRAPE_E_MEMORY;
+    if (!status && linear->near)
+        status = take_near(linear);
+    status = drape_ranks_agree(pattern->ranks, linear->arena.ctx, status);
     if (!status)
         status = linear->ops->create(&linear->arena, pattern, &linear->state);
     if (!status && linear->ops->use_threads)
@@ -125,22 +127,28 @@ static drape_status create_state(drape_sun_linear *linear, const drape_pattern *
     return status;
 }
 
+static drape_status begin(drape_sun_linear *linear, drape_arena *arena, SUNContext sun)
+{
+    linear->arena = drape_arena_within(arena);
+    linear->solver = SUNLinSolNewEmpty(sun);
+    linear->matrix = SUNMatNewEmpty(sun);
+    return linear->solver && linear->matrix ? DRAPE_OK
+                                            : drape_fail_memory(arena->ctx, sizeof *linear->solver);
+}
+
 drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const drape_linear_ops *ops,
                                      const drape_pattern *pattern, drape_pool *pool,
                                      const atomic_bool *const *cancel, drape_sun_linear **out)
 {
     drape_sun_linear *linear = *out = drape_arena_take(arena, 1, sizeof *linear);
-    if (!linear)
-        return DRAPE_E_MEMORY;
-    linear->arena = drape_arena_within(arena);
-    linear->ops = ops;
-    linear->pool = pool;
-    linear->cancel = cancel;
-    linear->solver = SUNLinSolNewEmpty(sun);
-    linear->matrix = SUNMatNewEmpty(sun);
-    drape_status status = linear->solver && linear->matrix
-                              ? create_state(linear, pattern)
-                              : drape_fail_memory(arena->ctx, sizeof *linear->solver);
+    drape_status status = linear ? begin(linear, arena, sun) : DRAPE_E_MEMORY;
+    status = drape_ranks_agree(pattern->ranks, arena->ctx, status);
+    if (!status) {
+        linear->ops = ops;
+        linear->pool = pool;
+        linear->cancel = cancel;
+        status = create_state(linear, pattern);
+    }
     if (status) {
         drape_sun_linear_destroy(out);
         return status;

@@ -172,6 +172,21 @@ void drape_pattern_list_diagonal(const drape_pattern *p, const double *values, d
     }
 }
 
+/* Copies have their diagonal from their owners, which have their whole columns. */
+bool drape_pattern_is_symmetric(const drape_pattern *p, const double *values, double *diagonal)
+{
+    double *const from = (double *)(uintptr_t)values; /* only read */
+    bool symmetric = true;
+    drape_pattern_list_diagonal(p, values, diagonal);
+    if (p->ranks)
+        p->ranks->fetch_blocks(p->ranks, diagonal);
+    for (int32_t j = 0; symmetric && j < drape_pattern_own(p) / 3; j++)
+        for (int32_t k = p->diagonal[j]; symmetric && k < p->block_start[j + 1]; k++)
+            symmetric =
+                drape_pattern_is_mirrored(p, from, j, k, drape_pattern_find(p, j, p->block_row[k]), diagonal);
+    return drape_ranks_all(p->ranks, symmetric);
+}
+
 void drape_pattern_list_rows(const drape_pattern *pattern, int64_t *row)
 {
     for (int64_t j = 0; j < pattern->n; j++)

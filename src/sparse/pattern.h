@@ -39,6 +39,10 @@ typedef struct drape_coupling {
     const int32_t *node;
 } drape_coupling;
 
+/* Relative rounding error in a_ij, to which elements contribute at most about sqrt(a_ii a_jj) each. A
+ * smaller difference between mirrored entries moves the solution no more than rounding the entries does. */
+#define DRAPE_PATTERN_ROUNDING 1e-13
+
 /* Builds the union of the diagonal and all couplings. Errors: DRAPE_E_MEMORY, DRAPE_E_ARGUMENT (more than
  * 2^31 - 1 blocks). */
 drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const int32_t *block_of_node,
@@ -64,6 +68,10 @@ double drape_pattern_asymmetry(const drape_pattern *pattern, const double *value
 
 /* Writes the entries on the diagonal: diagonal (n). */
 void drape_pattern_list_diagonal(const drape_pattern *pattern, const double *values, double *diagonal);
+
+/* Whether the matrix is symmetric up to rounding errors (drape_pattern_is_mirrored). diagonal (n) becomes the
+ * entries on its diagonal. Where ranks share it, whether all of it is; collective. */
+bool drape_pattern_is_symmetric(const drape_pattern *pattern, const double *values, double *diagonal);
 
 /* Writes the CSC row indices: row (nonzeros). */
 void drape_pattern_list_rows(const drape_pattern *pattern, int64_t *row);
@@ -92,6 +100,29 @@ static inline double drape_pattern_largest(const double *block, int64_t stride)
         for (int r = 0; r < 3; r++)
             largest = fmax(largest, fabs(block[c * stride + r]));
     return largest;
+}
+
+/* Whether the block `block` of a column is the transpose of the block `mirrored`, up to rounding errors.
+ * diagonal (n): the entries on the diagonal of the matrix. */
+static inline bool drape_pattern_is_mirrored(const drape_pattern *p, double *values, int32_t column,
+                                             int32_t block, int32_t mirrored, const double *diagonal)
+{
+    const int32_t row = p->block_row[block];
+    const double *d = diagonal + 3 * (int64_t)column, *e = diagonal + 3 * (int64_t)row;
+    int64_t stride, mirror_stride;
+    const double *a = drape_pattern_at(p, values, column, block, &stride),
+                 *b = drape_pattern_at(p, values, row, mirrored, &mirror_stride);
+    bool same = true, symmetric = true;
+    for (int c = 0; c < 3; c++)
+        for (int r = 0; r < 3; r++)
+            same &= a[c * stride + r] == b[r * mirror_stride + c];
+    for (int i = 0; !same && i < 9; i++) {
+        const int c = i / 3, r = i % 3;
+        const double difference = a[c * stride + r] - b[r * mirror_stride + c];
+        symmetric &=
+            difference * difference <= DRAPE_PATTERN_ROUNDING * DRAPE_PATTERN_ROUNDING * fabs(e[r] * d[c]);
+    }
+    return symmetric;
 }
 
 #endif

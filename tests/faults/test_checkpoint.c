@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/hash.h"
+#include "base/checksum.h"
 #include "support/bytes.h"
 #include "support/failing_allocator.h"
 #include "support/scene.h"
@@ -128,8 +128,8 @@ END_TEST
 
 static void seal(unsigned char *data, size_t size)
 {
-    uint64_t hash = drape_hash_bytes(DRAPE_HASH_START, data, size - sizeof hash);
-    memcpy(data + size - sizeof hash, &hash, sizeof hash);
+    uint64_t sum = drape_checksum_bytes(0, data, size - sizeof sum);
+    memcpy(data + size - sizeof sum, &sum, sizeof sum);
 }
 
 static drape_status stop_soon(void *user, const drape_event *event)

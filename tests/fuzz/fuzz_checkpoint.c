@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/hash.h"
+#include "base/checksum.h"
 #include "fuzz/fuzz.h"
 #include "integrators/integrator.h"
 
@@ -75,8 +75,8 @@ static void make_right(bytes *b)
 {
     const uint64_t length = b->size - TAIL;
     memcpy(b->data + b->size - TAIL, &length, sizeof length);
-    const uint64_t hash = drape_hash_bytes(DRAPE_HASH_START, b->data, b->size - sizeof hash);
-    memcpy(b->data + b->size - sizeof hash, &hash, sizeof hash);
+    const uint64_t sum = drape_checksum_bytes(0, b->data, b->size - sizeof sum);
+    memcpy(b->data + b->size - sizeof sum, &sum, sizeof sum);
 }
 
 static void restore(drape_context *ctx, drape_sim *sim, const bytes *b)

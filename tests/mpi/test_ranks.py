@@ -3,6 +3,7 @@
 of ranks; what it cannot do is refused in one line; a rank that is killed ends the run, which any number of ranks resumes."""
 import os
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -187,14 +188,18 @@ def test_frames():
         equal(line.replace(" ", ""), file.readlines()[-1].replace(" ", ""), "checksum of positions.npy")
 
 
+def own_lines(words):
+    """Those of drape, besides what the launcher says of an exit code, and lines "[library] ..." of it, as in a container without /sys."""
+    return [line for line in words.split("-----")[0].splitlines() if line and not line.startswith("[")]
+
+
 def refused(count, *args, says):
-    """Exit code 2 and one line of drape, besides what the launcher says of that code, and lines "[library] ..." of it, as in a container without
-    /sys; no file is written."""
+    """Exit code 2 and one line of drape; no file is written."""
     before = sorted(os.listdir("."))
     result = subprocess.run(launch(count, *args), capture_output=True, text=True, timeout=LIMIT, env=ENVIRONMENT, check=False)
     equal(result.returncode, 2, f"{args}: {result.stderr}")
     equal(result.stdout.strip(), "", f"{args}: standard output")
-    own = [line for line in result.stderr.split("-----")[0].splitlines() if not line.startswith("[")]
+    own = own_lines(result.stderr)
     equal(len(own), 1, f"{args}: lines in {result.stderr}")
     assert says in own[0], f"{args}: {says!r} is not in {own[0]!r}"
     equal(sorted(os.listdir(".")), before, f"files after {args}")
@@ -279,6 +284,148 @@ def test_one_process():
     write_scene(cloth=[HUNG], integrator=be(), duration=0.1, frame_rate=50)
     ranks(1, "run", "scene.json", "--out", "out", "--checkpoint-every", "1")
     refused(2, "run", "scene.json", "--out", "out", "--resume", says="checkpoint")
+
+
+def checkpoint(folder):
+    with open(folder + "/checkpoint.drape", "rb") as file:
+        return file.read()
+
+
+def temporary(folder):
+    return {name for name in os.listdir(folder) if name.endswith(".part")}
+
+
+def test_bytes():
+    """checkpoints of 1, 2, 3 and 4 ranks have the same states, bit for bit; those of several ranks are the same files but for sums and wall times"""
+    fold = {"folds": [{"point": [0.2, 0, -0.2], "axis": [1, 0, 0.3], "side": [0, 0, -1], "angle": 70}], "spin": [1, 2, 3]}
+    relaxes = {"type": "relax.maxwell", "fraction_1": 0.3, "time_1": 0.1, "fraction_2": 0.2, "time_2": 1}
+    far = dict(HUNG["mesh"], transform={"translate": [3, 0, 0]})
+    cloths = [dict(HUNG, terms=["stretch.cst", "bend.midedge", relaxes], start=fold), dict(HUNG, terms=["stretch.edge", "bend.hinge"], mesh=far, start=fold)]
+    # The first step fails, as it takes more than one iteration, so the checkpoint is that of the start, which ranks do not round.
+    write_scene(cloth=cloths, integrator=be(max_iterations=1), controller={"type": "fixed"}, duration=0.1, frame_rate=50)
+    found = {}
+    for count in 1, 2, 3, 4:
+        args = ("run", "scene.json", "--out", f"out{count}", "--format", "npy", "--checkpoint-every", "1")
+        result = subprocess.run(launch(count, *args) if count > 1 else [PROGRAM, *args], capture_output=True, text=True, timeout=LIMIT, env=ENVIRONMENT, check=False)
+        equal(result.returncode, 1, f"{count} ranks: {result.stderr}")
+        found[count] = checkpoint(f"out{count}")
+    with open("out1/positions.npy", "rb") as file:
+        positions = file.read()[128:]
+    equal(len(positions), 24 * 2 * COLUMNS**2, "bytes of a frame")
+    states = {}
+    for count, data in found.items():
+        begin, end = data.index(positions), data.index(b"schedule")
+        equal(begin % 8, 0, f"{count} ranks: the place of the positions")
+        states[count] = data[begin:end]
+        equal(states[count], states[1], f"{count} ranks: states")
+        if count > 2:
+            equal(len(data), len(found[2]), f"{count} ranks: bytes")
+            differing = sum(data[i:i + 8] != found[2][i:i + 8] for i in range(0, len(data), 8))
+            # The energies at the start and the error of their sum, and what wall times there are, which are not aligned and so have up to two words
+            # each; the checksum of energy.csv, of which the last digits may differ; that of the checkpoint.
+            assert differing <= 2 * 20, f"{count} ranks: {differing} words differ"
+    assert len(states[1]) > 2 * len(positions) + 8 * 500, f"{len(states[1])} bytes of states: where are the internal variables?"
+
+
+def test_bad_checkpoints():
+    """a checkpoint that was cut or changed, also in the rows of a single rank, or is of an older format, is refused, in one line, and stays as it is"""
+    write_scene(cloth=[DROP], integrator=be(), duration=0.1, frame_rate=50)
+    ranks(2, "run", "scene.json", "--out", "out", "--checkpoint-every", "1")
+    good_one = checkpoint("out")
+    begin, end = good_one.index(b"states") + 64, good_one.index(b"schedule")
+    rows = [begin + k * (end - begin) // 5 for k in range(5)]
+    first, second = (8 * (place // 8) for place in rows[1:3])
+    changed = [bytes([*good_one[:place], good_one[place] ^ 16, *good_one[place + 1:]]) for place in rows]
+    changed.append(good_one[:first] + good_one[second:second + 8] + good_one[first + 8:second] + good_one[first:first + 8] + good_one[second + 8:])
+    changed += [good_one[:len(good_one) // 2], good_one[:-8]]
+    for data, says in [*((data, "the checkpoint is damaged: its checksum is wrong") for data in changed),
+                       (good_one[:8] + bytes([1]) + good_one[9:], "the checkpoint has format 1; this build reads format 2")]:
+        assert data != good_one
+        with open("out/checkpoint.drape", "wb") as file:
+            file.write(data)
+        refused(3, "run", "scene.json", "--out", "out", "--resume", says=says)
+        equal(checkpoint("out"), data, "the checkpoint")
+
+
+def fails(command, says, code=1):
+    """A run of several ranks that ends with that exit code, one line of drape, the checkpoint that was there before and no temporary file."""
+    before, parts = checkpoint("out"), temporary("out")  # the latter of a run that was killed
+    result = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, env=ENVIRONMENT, check=False)
+    equal(result.returncode, code, result.stderr)
+    own = own_lines(result.stderr)
+    equal(len(own), 1, f"lines in {result.stderr}")
+    assert says in own[0], f"{says!r} is not in {own[0]!r}"
+    equal(checkpoint("out"), before, "the checkpoint")
+    assert temporary("out") <= parts, f"temporary files: {temporary('out')}"
+
+
+def test_one_rank_cannot_write():
+    """a rank that does not reach the new checkpoint, which others do: all end with one line, and the checkpoint before stays"""
+    write_scene(cloth=[DROP], integrator=be(), duration=0.6, frame_rate=100)
+    started(2, "--out", "out", "--format", "npy,obj")
+    os.mkdir("elsewhere")
+    shutil.copy("scene.json", "elsewhere")
+    args = [PROGRAM, "run", "scene.json", "--out", "out", "--format", "npy,obj", "--resume", "--checkpoint-every", "1"]
+    fails(["mpirun", "-n", "1", *args, ":", "-n", "1", "-wdir", os.path.abspath("elsewhere"), *args], 'cannot read "out/checkpoint.drape", which another rank can', 2)
+    shutil.copytree("out", "elsewhere/out")
+    for alone in (1, 2):  # the last rank of 2, the middle one of 3
+        there = [":", "-n", "1", *args] if alone == 2 else []
+        fails(["mpirun", "-n", "1", *args, ":", "-n", "1", "-wdir", os.path.abspath("elsewhere"), *args, *there], 'cannot write "out/checkpoint.drape": No such file or directory')
+    ranks(3, *args[1:])
+    equal(read_json("out/summary.json")["time"], 0.6, "time")
+
+
+def fill_disk(count, limited, limit):
+    """Runs on that many ranks, of which some may not write beyond that many bytes of a file any more when the first checkpoint is there. Returns the exit
+    code and the words of the program."""
+    shutil.rmtree("out", ignore_errors=True)
+    with subprocess.Popen(launch(count, "run", "scene.json", "--out", "out", "--checkpoint-every", "1"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          env=ENVIRONMENT) as process:
+        end = time.monotonic() + LIMIT
+        while not os.path.exists("out/checkpoint.drape") and time.monotonic() < end and process.poll() is None:
+            time.sleep(0.01)
+        with open(f"/proc/{process.pid}/task/{process.pid}/children", encoding="ascii") as file:
+            children = [int(child) for child in file.read().split()]
+        equal(len(children), count, "processes of the launcher")
+        for child in limited:
+            resource.prlimit(children[child], resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+        _, words = process.communicate(timeout=LIMIT)
+    return process.returncode, own_lines(words)
+
+
+def test_disk_full():
+    """the disk is full for one rank or all, at a frame or a checkpoint: the run ends with one line, and the checkpoint before is whole and resumed"""
+    relaxes = {"type": "relax.maxwell", "fraction_1": 0.3, "time_1": 0.1, "fraction_2": 0.2, "time_2": 1}
+    sheet = dict(HUNG, mesh=dict(DROP["mesh"], columns=30, rows=30), terms=["stretch.edge", "bend.hinge", relaxes])
+    write_scene(cloth=[sheet], integrator=be(tolerance=1e-6), duration=0.5, frame_rate=100)
+    # A frame has 22 kB, so there is room for four, and a checkpoint has 185 kB; or there is room for one frame.
+    for limited, limit, name in (([0], 100000, "checkpoint.drape"), ([2], 100000, "checkpoint.drape"), ([0, 1, 2], 100000, "checkpoint.drape"), ([1], 30000, "positions.npy")):
+        code, words = fill_disk(3, limited, limit)
+        equal(code, 1, f"{limited}: {words}")
+        equal(len(words), 1, f"{limited}: lines")
+        assert f'cannot write "out/{name}": File too large' in words[0], words[0]
+        equal(temporary("out"), set(), "temporary files")
+        assert len(checkpoint("out")) > 150000, "the checkpoint is not larger than the limit"
+    ranks(2, "run", "scene.json", "--out", "out", "--checkpoint-every", "10", "--resume")
+
+
+def test_memory():
+    """each allocation of a part, a sim and some steps fails on one rank: all end with that status, and none waits for ever"""
+    sphere = dict(colliders()["sphere"], type="sphere", friction=0.3)
+    falls = {"cloth": [DROP], "duration": 0.04, "frame_rate": 50, "colliders": [sphere], "contact": {"distance": 0.004}}
+    cases = (("pcg", dict(falls, integrator=be(linear_solver="pcg"))), ("multifrontal", dict(falls, integrator=be())),
+             ("ida", dict(falls, integrator={"method": "ida", "rtol": 1e-4, "linear_solver": "pcg"})),
+             ("static", {"cloth": [HUNG], "integrator": {"method": "static"}, "duration": 1}))
+    program = os.path.join(os.path.dirname(PROGRAM), "tests", "test_mpi_shortage")
+    for name, case in cases:
+        write_scene(**case)
+        for count, rank in ((2, 1), (3, 0)):
+            result = subprocess.run(["mpirun", "-n", str(count), program, "scene.json", str(rank), "1", "1"], capture_output=True, text=True, timeout=LIMIT, env=ENVIRONMENT,
+                                    check=False)
+            equal(result.returncode, 0, f"{name}, rank {rank} of {count}: {result.stdout} {result.stderr}")
+            failures = int(re.search(r"(\d+) failures", result.stdout).group(1))
+            print(f"# {name}, rank {rank} of {count}: {failures} failures")
+            assert failures >= 100, f"{name}: {result.stdout}"
 
 
 if __name__ == "__main__":

@@ -77,14 +77,13 @@ static inline drape_exchange *team_plan(const drape_ranks *ranks, drape_arena *a
 {
     drape_exchange *x = drape_arena_take(arena, 1, sizeof *x);
     const size_t size = (size_t)count * sizeof *rank;
-    (void)ranks, (void)largest;
-    if (!x)
+    int32_t *copied = drape_arena_take(arena, 2, size);
+    (void)largest;
+    if (drape_ranks_agree(ranks, arena->ctx, x && copied ? DRAPE_OK : DRAPE_E_MEMORY))
         return NULL;
     x->count = count;
-    x->rank = drape_arena_take(arena, 1, size);
-    x->place = drape_arena_take(arena, 1, size);
-    if (!x->rank || !x->place)
-        return NULL;
+    x->rank = copied;
+    x->place = copied + count;
     memcpy(x->rank, rank, size);
     memcpy(x->place, place, size);
     return x;

@@ -1,5 +1,6 @@
 /* test_multigrid_ranks.c: the preconditioner of large sheets where ranks share the matrix: threads here, each
  * with the rows of its own nodes. */
+#include "support/failing_allocator.h"
 #include "support/springs.h"
 #include "support/suite.h"
 #include "support/threads_as_ranks.h"
@@ -363,6 +364,140 @@ START_TEST(a_matrix_that_is_not_positive_definite_is_noticed_by_all)
 }
 END_TEST
 
+/* ---- Symmetry ---- */
+
+static _Thread_local drape_exchange *columns;
+
+static void fetch_columns(const drape_ranks *ranks, double *blocks)
+{
+    team_copy(ranks, columns, blocks, blocks + 3 * (size_t)ranks->own_blocks, 3 * sizeof *blocks);
+}
+
+static void judge_piece(const drape_ranks *ranks, void *user)
+{
+    shared *s = user;
+    piece q = open_piece(ranks, s);
+    const int32_t own = q.ranks.own_blocks, copies = q.p.block_count - own;
+    drape_ranks *here = (drape_ranks *)(uintptr_t)ranks;
+    int32_t *rank = drape_arena_take(q.arena, (size_t)copies, sizeof *rank),
+            *place = drape_arena_take(q.arena, (size_t)copies, sizeof *place);
+    ck_assert(rank && place);
+    for (int32_t i = 0; i < copies; i++) {
+        const int32_t node = q.node[own + i];
+        rank[i] = s->owner[node];
+        for (int32_t k = 0; k < node; k++)
+            place[i] += s->owner[k] == rank[i];
+    }
+    here->own_blocks = own;
+    here->fetch_blocks = fetch_columns;
+    q.p.ranks = here;
+    columns = team_plan(ranks, q.arena, copies, rank, place, 3 * sizeof(double));
+    double *diagonal = take(q.p.n);
+    const double symmetric = drape_ranks_sum(ranks, drape_pattern_is_symmetric(&q.p, q.values, diagonal));
+    if (ranks->rank == 0)
+        s->failures = ranks->count - (int)symmetric;
+    free(diagonal);
+    close_piece(&q);
+}
+
+/* Multiplies the scalar row and column of a component of a node; the sheet must be symmetric. */
+static void scale_component(sheet *q, int32_t node, int component, double by)
+{
+    for (int32_t k = q->p.block_start[node]; k < q->p.block_start[node + 1]; k++) {
+        const int32_t other = q->p.block_row[k];
+        int64_t stride, mirrored;
+        double *a = drape_pattern_at(&q->p, q->values, node, k, &stride),
+               *b = drape_pattern_at(&q->p, q->values, other, drape_pattern_find(&q->p, node, other),
+                                     &mirrored);
+        for (int i = 0; i < 3; i++) {
+            a[component * stride + i] *= by;
+            b[i * mirrored + component] *= by;
+        }
+    }
+}
+
+/* A component of a node of which row and column are 1e-6 of the others', and one entry 1 + 1e-8 times its
+ * mirror image: a fault of symmetry, though it is 1e-14 of the largest entries of its block. Between two
+ * nodes of a rank, and between nodes of two. */
+START_TEST(a_small_part_that_is_not_symmetric_is_found_by_all)
+{
+    const int32_t side = 12;
+    for (int32_t column = 4; column < 8; column += 3) {
+        shared s = share_sheet(side, 3, false);
+        sheet *q = &s.whole;
+        const int32_t node = 5 * side + column, other = node + 1;
+        int64_t stride;
+        ck_assert(column == 4 || s.owner[node] != s.owner[other]);
+        drape_pattern_symmetrize(&q->p, q->values);
+        scale_component(q, node, 2, 1e-6);
+        ck_assert(run_ranks(3, judge_piece, &s));
+        ck_assert_int_eq(s.failures, 0);
+        double *block =
+            drape_pattern_at(&q->p, q->values, node, drape_pattern_find(&q->p, other, node), &stride);
+        ck_assert_double_gt(fabs(block[2 * stride]), 0);
+        block[2 * stride] *= 1 + 1e-8;
+        ck_assert(run_ranks(3, judge_piece, &s));
+        ck_assert_int_eq(s.failures, 3);
+        close_shared(&s);
+    }
+}
+END_TEST
+
+/* ---- Memory ---- */
+
+typedef struct shortage {
+    shared *shared;
+    int rank;     /* it alone is out of memory */
+    long fail_at; /* at this allocation of the preconditioner */
+    int failures; /* ranks that noticed */
+    bool reached; /* there was such an allocation */
+} shortage;
+
+static void create_piece(const drape_ranks *ranks, void *user)
+{
+    shortage *s = user;
+    failing_allocator memory = {0};
+    piece q = open_piece(ranks, s->shared);
+    drape_ranks *own = (drape_ranks *)(uintptr_t)ranks;
+    drape_context *ctx = failing_context(&memory);
+    drape_arena *arena = drape_arena_create(ctx);
+    own->own_blocks = q.ranks.own_blocks;
+    own->block = q.block;
+    q.p.ranks = own;
+    memory.fail_at = ranks->rank == s->rank ? memory.calls + s->fail_at : 0;
+    const drape_status status = drape_multigrid_create(arena, &q.p, &q.m);
+    const double failures = drape_ranks_sum(ranks, status == DRAPE_E_MEMORY),
+                 said = drape_ranks_sum(ranks, *drape_context_message(ctx) != 0);
+    if (ranks->rank == s->rank) {
+        s->failures = failures == said ? (int)failures : -1;
+        s->reached = memory.calls >= memory.fail_at;
+    }
+    drape_arena_destroy(&arena);
+    drape_context_destroy(&ctx);
+    close_piece(&q);
+}
+
+/* Each allocation fails on one rank, first or not: all return the failure, with a message, and none waits for
+ * ever. There are four levels here, of which ranks share three. */
+START_TEST(a_rank_that_alone_is_out_of_memory_leaves_none_waiting)
+{
+    shared split = share_sheet(40, 3, false);
+    for (int rank = 0; rank < 3; rank += 2) {
+        shortage s = {.shared = &split, .rank = rank, .fail_at = 1};
+        for (bool more = true; more; s.fail_at++) {
+            ck_assert(run_ranks(3, create_piece, &s));
+            more = s.reached;
+            ck_assert_msg(s.failures == (more ? 3 : 0), "allocation %ld: %d ranks", s.fail_at, s.failures);
+        }
+        printf("# rank %d: %ld allocations\n", rank, s.fail_at - 2);
+        ck_assert_int_gt(s.fail_at, 100);
+    }
+    close_shared(&split);
+}
+END_TEST
+
 SUITE("multigrid_ranks", the_product_is_that_of_the_whole_matrix,
       the_preconditioner_is_symmetric_and_positive_definite, iterations_are_those_of_one_process,
-      scattered_nodes, a_matrix_that_is_not_positive_definite_is_noticed_by_all)
+      scattered_nodes, a_matrix_that_is_not_positive_definite_is_noticed_by_all,
+      a_small_part_that_is_not_symmetric_is_found_by_all,
+      a_rank_that_alone_is_out_of_memory_leaves_none_waiting)
