@@ -294,14 +294,14 @@ typedef void change_positions(drape_system *system, double t, double *x);
 static void change(drape_inexact_newton *s, change_positions *how, double *d)
 {
     drape_step_equation *e = s->equation;
-    memcpy(e->x_ahead, e->x, e->nodes * sizeof *e->x_ahead);
+    memcpy(e->x_ahead, e->x_base, e->nodes * sizeof *e->x_ahead);
     for (size_t i = 0; i < e->dofs; i++)
         e->x_ahead[drape_step_equation_at(e, i)] += d[i];
     how(e->system, e->point.t, e->x_ahead);
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
-        if (e->x_ahead[at] != e->x[at] + d[i])
-            d[i] = e->x_ahead[at] - e->x[at];
+        if (e->x_ahead[at] != e->x_base[at] + d[i])
+            d[i] = e->x_ahead[at] - e->x_base[at];
     }
     drape_system_project_free(e->system, d);
 }
