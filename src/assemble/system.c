@@ -379,6 +379,12 @@ void drape_system_sweep(drape_system *system, double t, double *y)
         drape_contact_sweep(system->contact, t, y);
 }
 
+void drape_system_carry_layers(drape_system *system, double t, double *y)
+{
+    if (system->contact)
+        drape_contact_carry_layers(system->contact, t, y);
+}
+
 bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,
                           drape_diagnostic *diagnostic)
 {

@@ -277,8 +277,9 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
 bool drape_system_may_meet(drape_system *system, const double *x, const double *v, double t, double seconds);
 void drape_system_set_contact_step(drape_system *system, double dt);
 
-/* drape_contact_sweep. */
+/* drape_contact_sweep and drape_contact_carry_layers. */
 void drape_system_sweep(drape_system *system, double t, double *y);
+void drape_system_carry_layers(drape_system *system, double t, double *y);
 
 /* q of all measures (measure_count). */
 void drape_system_measures(drape_system *system, const drape_point *point, double *q);

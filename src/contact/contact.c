@@ -67,6 +67,8 @@ static drape_status take_arrays(drape_arena *arena, drape_contact *c)
                                    3 * sizeof *c->on_point);
     c->swing = drape_arena_take(arena, colliders, sizeof *c->swing);
     c->before = drape_arena_take(arena, (size_t)c->model->node_count, sizeof *c->before);
+    c->moved = drape_arena_take(arena, points + colliders, sizeof *c->moved);
+    c->carried = drape_arena_take(arena, (size_t)c->model->node_count, sizeof *c->carried);
     return drape_arena_status(arena);
 }
 

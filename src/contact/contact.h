@@ -180,6 +180,11 @@ double drape_contact_step_fraction(drape_contact *contact, const double *x, cons
  * slides on it from there on. Nodes that begin inside stay. */
 void drape_contact_sweep(drape_contact *contact, double t, double *y);
 
+/* Where cloth would pass through cloth on the straight path from the beginning of the step to y, which is
+ * that beginning after drape_contact_sweep: takes it along with the rigid collider that is nearest. y is as
+ * before if that does not keep all of it apart. */
+void drape_contact_carry_layers(drape_contact *contact, double t, double *y);
+
 /* Whether cloth at x with velocities v (node_count x 3) at time t may meet a body or another piece of cloth
  * in the next so many seconds: free nodes go straight on, pins and colliders as far as their motion is
  * known. An estimate, because forces are left out. */

@@ -1,4 +1,5 @@
-/* sweep.c: what a moving collider would sweep over in a step, moved along with it: see contact.h. */
+/* sweep.c: what a moving collider would sweep over in a step, and the cloth that this would pass through,
+ * moved along with it: see contact.h. */
 #include "contact/parts.h"
 
 #include "base/clock.h"
@@ -15,6 +16,7 @@
 #define CLOSE      0.05 /* of the activation distance: how far above that a march along the path may end */
 #define MAX_STEPS  50   /* of a march: where it ends the path is free */
 #define MAX_PASSES 2    /* over all colliders: one may push a node towards another */
+#define MAX_LAYERS 10   /* of cloth that lie on each other and are carried along */
 
 static double distance_from(const drape_collider *collider, const double *x, double *normal)
 {
@@ -138,12 +140,10 @@ static bool sweep_meshes(drape_contact *c, double *y)
     return moved;
 }
 
-void drape_contact_sweep(drape_contact *c, double t, double *y)
+static void sweep_all(drape_contact *c, double *y)
 {
-    const double start = drape_clock_seconds();
     uint8_t *slid = c->broad.side;
     bool moved = true;
-    drape_contact_poses(c, t, c->path_pose);
     memset(slid, 0, (size_t)c->model->node_count * sizeof *slid);
     for (int pass = 1; pass <= MAX_PASSES && moved; pass++) {
         moved = false;
@@ -154,5 +154,106 @@ void drape_contact_sweep(drape_contact *c, double t, double *y)
             moved = true;
         }
     }
+}
+
+void drape_contact_sweep(drape_contact *c, double t, double *y)
+{
+    const double start = drape_clock_seconds();
+    drape_contact_poses(c, t, c->path_pose);
+    sweep_all(c, y);
+    c->seconds += drape_clock_seconds() - start;
+}
+
+/* ---- Layers ---- */
+
+/* Marks the nodes that are not where the step began. Returns whether there are any. */
+static bool mark_moved(const drape_contact *c, const double *y, bool *marked)
+{
+    bool any = false;
+    memset(marked, 0, (size_t)(c->broad.points + c->model->collider_count) * sizeof *marked);
+    for (int32_t i = 0; i < c->model->free_count; i++) {
+        const size_t node = (size_t)c->model->node_of_free[i];
+        marked[node] = memcmp(y + 3 * node, c->start + 3 * node, 3 * sizeof *y) != 0;
+        any = any || marked[node];
+    }
+    return any;
+}
+
+typedef struct layers {
+    drape_contact *contact;
+    bool meet; /* pieces of cloth pass through each other */
+} layers;
+
+/* A pair on the straight path from the beginning of the step to c->to. */
+static void meet(void *user, const drape_pair *pair)
+{
+    layers *of = user;
+    drape_contact *c = of->contact;
+    const drape_keep keep = drape_contact_keep_step(c);
+    if (pair->collider >= 0 || drape_pair_step_fraction(pair, c->start, c->to, NULL, &keep, 1) == 1)
+        return;
+    of->meet = true;
+    for (int a = 0; a < 4; a++)
+        c->carried[pair->node[a]] = true;
+}
+
+/* Whether cloth passes through cloth on its path to y; what does is added to what is carried. */
+static bool layers_meet(drape_contact *c, const double *y)
+{
+    layers of = {.contact = c};
+    drape_contact_fill(c, y, c->path_pose, c->to);
+    const drape_straight_path path = {{{.model = c->model, .x = c->start, .pose = c->start_pose},
+                                       {.model = c->model, .x = c->to, .pose = c->path_pose}}};
+    if (mark_moved(c, y, c->moved))
+        drape_candidates_find(&c->broad, &path, 0, true, c->moved, meet, &of);
+    return of.meet;
+}
+
+/* The rigid collider that moves and is nearest to a node at the beginning of the step; -1: there is none. */
+static int32_t find_carrier(const drape_contact *c, int32_t node)
+{
+    int32_t carrier = -1;
+    double least = INFINITY, own[3];
+    for (int32_t k = 0; k < c->model->collider_count; k++) {
+        if (c->deformed[k] || !drape_pose_differs(&c->start_pose[k], &c->path_pose[k]) ||
+            drape_contact_lets_in(c, k, &node, 1))
+            continue;
+        drape_pose_own(&c->start_pose[k], c->start + 3 * (size_t)node, own);
+        const double gap = distance_from(&c->model->colliders[k], own, NULL);
+        carrier = gap < least ? k : carrier;
+        least = gap < least ? gap : least;
+    }
+    return carrier;
+}
+
+/* Cloth that moves rigidly with a collider meets neither that nor other cloth which does. */
+static void carry(drape_contact *c, double *y)
+{
+    for (int32_t i = 0; i < c->model->free_count; i++) {
+        const int32_t node = c->model->node_of_free[i];
+        const int32_t carrier = c->carried[node] ? find_carrier(c, node) : -1;
+        double own[3];
+        if (carrier < 0)
+            continue;
+        drape_pose_own(&c->start_pose[carrier], c->start + 3 * (size_t)node, own);
+        drape_pose_point(&c->path_pose[carrier], own, y + 3 * (size_t)node);
+    }
+}
+
+void drape_contact_carry_layers(drape_contact *c, double t, double *y)
+{
+    const double start = drape_clock_seconds();
+    const size_t size = 3 * (size_t)c->model->node_count * sizeof *y;
+    drape_contact_poses(c, t, c->path_pose);
+    memcpy(c->from, y, size);
+    memset(c->carried, 0, (size_t)c->model->node_count * sizeof *c->carried);
+    bool apart = !layers_meet(c, y);
+    for (int i = 0; i < MAX_LAYERS && !apart; i++) {
+        carry(c, y);
+        sweep_all(c, y);
+        apart = !layers_meet(c, y);
+    }
+    if (!apart)
+        memcpy(y, c->from, size);
     c->seconds += drape_clock_seconds() - start;
 }

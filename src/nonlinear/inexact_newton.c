@@ -288,20 +288,28 @@ static void predict_stress(drape_inexact_newton *s, bool next)
 
 /* ---- Feasible ---- */
 
+typedef void change_positions(drape_system *system, double t, double *x);
+
+/* Changes the positions at d. */
+static void change(drape_inexact_newton *s, change_positions *how, double *d)
+{
+    drape_step_equation *e = s->equation;
+    memcpy(e->x_ahead, e->x_base, e->nodes * sizeof *e->x_ahead);
+    for (size_t i = 0; i < e->dofs; i++)
+        e->x_ahead[drape_step_equation_at(e, i)] += d[i];
+    how(e->system, e->point.t, e->x_ahead);
+    for (size_t i = 0; i < e->dofs; i++) {
+        const size_t at = drape_step_equation_at(e, i);
+        if (e->x_ahead[at] != e->x_base[at] + d[i])
+            d[i] = e->x_ahead[at] - e->x_base[at];
+    }
+    drape_system_project_free(e->system, d);
+}
+
 /* Lets the nodes that moving colliders reach slide on these. */
 static void clear_colliders(drape_inexact_newton *s, double *d)
 {
-    drape_step_equation *e = s->equation;
-    memcpy(e->x_ahead, e->x, e->nodes * sizeof *e->x_ahead);
-    for (size_t i = 0; i < e->dofs; i++)
-        e->x_ahead[drape_step_equation_at(e, i)] += d[i];
-    drape_system_sweep(e->system, e->point.t, e->x_ahead);
-    for (size_t i = 0; i < e->dofs; i++) {
-        const size_t at = drape_step_equation_at(e, i);
-        if (e->x_ahead[at] != e->x[at] + d[i])
-            d[i] = e->x_ahead[at] - e->x[at];
-    }
-    drape_system_project_free(e->system, d);
+    change(s, drape_system_sweep, d);
 }
 
 /* Where a pin takes a sheet along, nodes that keep their motion stay behind, and it takes many corrections
@@ -336,7 +344,8 @@ static bool crosses(drape_inexact_newton *s, const double *d)
     return drape_system_crosses(e->system, e->x, e->point.t, &reason, &diagnostic);
 }
 
-/* Where the path of the guess begins: at the start of the step, aside from moving colliders.
+/* Where the path of the guess begins: at the start of the step, aside from moving colliders, with the layers
+ * that lie on what these push.
  *
  * Pins are at the end of the step already. Where they have gone through cloth by then, all of it goes
  * along with their mean displacement, or it would end on their wrong side. */
@@ -345,14 +354,17 @@ static void start_aside(drape_inexact_newton *s, double *aside)
     drape_step_equation *e = s->equation;
     memset(aside, 0, e->dofs * sizeof *aside);
     clear_colliders(s, aside);
-    if (!e->model->contact.self || !drape_step_equation_pins_move(e) || !crosses(s, aside))
+    if (!e->model->contact.self)
         return;
-    drape_step_equation_follow_pins(e, aside);
-    clear_colliders(s, aside);
-    if (!crosses(s, aside))
-        return;
-    memset(aside, 0, e->dofs * sizeof *aside);
-    clear_colliders(s, aside);
+    if (drape_step_equation_pins_move(e) && crosses(s, aside)) {
+        drape_step_equation_follow_pins(e, aside);
+        clear_colliders(s, aside);
+        if (!crosses(s, aside))
+            return;
+        memset(aside, 0, e->dofs * sizeof *aside);
+        clear_colliders(s, aside);
+    }
+    change(s, drape_system_carry_layers, aside);
 }
 
 /* A guess that is shortened at some nodes has kinks, which become wrinkles that take many iterations to

@@ -40,6 +40,7 @@ static void fall(const drape_integrator_ops *method, double size, double density
         "'terms': ['stretch.edge', 'bend.hinge']}], 'gravity': [0, %.17g, 0],"
         "'integrator': {'method': '%s', 'dt': %.17g}, 'duration': %.17g}",
         size / 4, 1e3 * density * G * size / thickness, thickness, density, -G, method->entry.name, h, t);
+    scene_watch(&s);
     scene_advance(&s, t);
     const double fallen = mean_fall(&s), exact = size / 2;
     const double discrete = method->order == 1 ? exact * (1 + 1 / steps) : exact;
@@ -145,6 +146,7 @@ static void sag(const drape_integrator_ops *method, double size, double density)
     const double unit = sqrt(size / G);
     snprintf(integrator, sizeof integrator, "'method': '%s', 'dt': %.17g", method->entry.name, unit / 5);
     scene s = open_strip(size, density, 0.05, DRAG / unit, integrator);
+    scene_watch(&s);
     scene_advance(&s, REST * unit);
     const double found = strip_sag(&s, size);
     ck_assert_msg(s.unconverged == 0 && fabs(found / SAG - 1) < 0.01,
