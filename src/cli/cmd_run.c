@@ -1,4 +1,5 @@
 /* cmd_run.c: `drape run`: simulates a scene and writes frames, step log and summary into a folder. */
+#include "base/hash.h"
 #include "cli/cli.h"
 #include "cli/progress.h"
 #include "cli/ranks.h"
@@ -6,6 +7,7 @@
 #include "cli/signals.h"
 
 #include "base/clock.h"
+#include "base/hash.h"
 #include "io/checkpoint.h"
 #include "io/file.h"
 #include "io/record.h"
@@ -482,10 +484,20 @@ static int check_checkpoints(const run_request *request)
     return CLI_GO_ON;
 }
 
+static uint64_t hash_text(uint64_t hash, const char *text)
+{
+    return text ? drape_hash_bytes(hash, text, strlen(text) + 1) : drape_hash_bytes(hash, &hash, 1);
+}
+
+/* Options that change the scene are compared with that. */
 static int check_ranks(const run_request *request)
 {
-    if (cli_ranks_count() == 1 || !request->realtime)
-        return CLI_GO_ON;
+    const int32_t numbers[] = {request->resume, request->realtime, request->checkpoint_every};
+    uint64_t options = hash_text(hash_text(DRAPE_HASH_START, request->out), request->summary);
+    options = drape_hash_bytes(options, numbers, sizeof numbers);
+    const int code = cli_ranks_compare(&request->command, options);
+    if (code != CLI_GO_ON || cli_ranks_count() == 1 || !request->realtime)
+        return code;
     return cli_misuse(request->command.verb, "--realtime: a run on several ranks has no time budget");
 }
 
@@ -510,9 +522,9 @@ static int check_integrator(const run *r)
 static int load_and_run(const run_request *request)
 {
     run r = {.request = request, .start = drape_clock_seconds(), .realtime = {.command = &request->command}};
-    int code = check_checkpoints(request);
+    int code = check_ranks(request);
     if (code == CLI_GO_ON)
-        code = check_ranks(request);
+        code = check_checkpoints(request);
     if (code != CLI_GO_ON)
         return code;
     code = cli_scene_load_with(&request->command, request->command.operand,

@@ -23,6 +23,13 @@ int cli_ranks_agree(const cli_command *command, int code)
     return code;
 }
 
+int cli_ranks_compare(const cli_command *command, uint64_t options)
+{
+    (void)command;
+    (void)options;
+    return CLI_GO_ON;
+}
+
 drape_status cli_ranks_share(drape_status status, cli_scene *scene)
 {
     (void)scene;

@@ -1,7 +1,10 @@
 /* ranks.c: see ranks.h. */
 #include "cli/ranks.h"
 
+#include "base/hash.h"
+#include "model/scene.h"
 #include "mpi/mpi.h"
+#include "sim/identity.h"
 
 #include <fcntl.h>
 #include <stdio.h>
@@ -62,6 +65,28 @@ int cli_ranks_agree(const cli_command *command, int code)
     return from < 0 ? CLI_GO_ON : agreed;
 }
 
+int cli_ranks_compare(const cli_command *command, uint64_t options)
+{
+    return drape_mpi_is_same(ranks, options)
+               ? CLI_GO_ON
+               : cli_misuse(command->verb, "the ranks do not have the same options on their command lines");
+}
+
+static void add_text(void *user, const char *text, size_t size)
+{
+    uint64_t *hash = user;
+    *hash = drape_hash_bytes(*hash, text, size);
+}
+
+/* All that a scene says, with the meshes that it names. */
+static uint64_t hash_of(const cli_scene *s)
+{
+    uint64_t hash = DRAPE_HASH_START;
+    drape_scene_print(s->scene, add_text, &hash);
+    const uint64_t model = drape_model_identity(s->model);
+    return drape_hash_bytes(hash, &model, sizeof model);
+}
+
 drape_status cli_ranks_share(drape_status status, cli_scene *s)
 {
     if (!ranks)
@@ -70,8 +95,15 @@ drape_status cli_ranks_share(drape_status status, cli_scene *s)
     const int from = drape_mpi_agree(ranks, status != DRAPE_OK, &agreed);
     if (from > 0 && from == drape_mpi_rank(ranks))
         speak(); /* the caller prints its message */
+    else if (from > 0 && drape_mpi_rank(ranks) == 0)
+        be_silent();
     if (from >= 0)
         return (drape_status)agreed;
+    if (!drape_mpi_is_same(ranks, hash_of(s)))
+        return drape_fail(
+            s->ctx, DRAPE_E_ARGUMENT,
+            "the ranks do not have the same scene: each reads it, and the meshes that it names, "
+            "from its own folder");
     s->whole = s->model;
     s->model = NULL;
     return drape_mpi_share(ranks, s->whole, &s->model);

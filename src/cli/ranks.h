@@ -17,6 +17,9 @@ int cli_ranks_count(void);
  * message of its context if that is not rank 0, which has printed it. Collective. */
 int cli_ranks_agree(const cli_command *command, int code);
 
+/* CLI_GO_ON if all ranks have the same options, by a hash of them; else prints a line. Collective. */
+int cli_ranks_compare(const cli_command *command, uint64_t options);
+
 /* Replaces the compiled model of a scene by the part of this rank. status: whether the scene was compiled
  * here. Collective. Returns the status of all ranks. */
 drape_status cli_ranks_share(drape_status status, cli_scene *scene);

@@ -11,6 +11,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #define MAX_PATH 4096
@@ -22,10 +23,18 @@ static drape_mpi_ranks *ranks_of(const drape_ranks *ranks)
 
 /* ---- Opening and closing ---- */
 
+/* Where ranks do not share the file system, another file may have the same path. Numbers of devices differ
+ * between machines, those of files do not. */
 static int open_here(drape_mpi_ranks *r, const char *path)
 {
+    struct stat here;
     r->file = open(path, O_WRONLY | O_NOFOLLOW | O_CLOEXEC);
-    const int error = (int)drape_ranks_largest(&r->base, r->file < 0 ? errno : 0);
+    int error = r->file < 0 || fstat(r->file, &here) ? errno : 0;
+    uint64_t number = error ? 0 : (uint64_t)here.st_ino;
+    MPI_Bcast(&number, 1, MPI_UINT64_T, 0, r->comm);
+    if (!error && number != 0 && number != (uint64_t)here.st_ino)
+        error = ESTALE;
+    error = (int)drape_ranks_largest(&r->base, error);
     if (error && r->file >= 0)
         close(r->file);
     return error;

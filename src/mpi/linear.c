@@ -22,7 +22,13 @@ typedef struct mpi_linear {
     bool counts;              /* the pivots by their signs, as if it were symmetric; it never solves */
     bool symmetric, definite; /* of the last matrix; a definite one was asked for */
     bool factored;
+    PetscInt workspace; /* [%] beyond what MUMPS expects to need */
 } mpi_linear;
+
+/* Pivots that are moved for accuracy need more of it than MUMPS expects, and more on more ranks. */
+#define LEAST_WORKSPACE 50
+#define MOST_WORKSPACE  1600
+#define INERTIA_ERROR   1e-8 /* as in solvers/general.c */
 
 /* ---- The matrix ---- */
 
@@ -114,6 +120,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     s->pattern = pattern;
     s->diagonal = diagonal;
     s->ranks = (const drape_mpi_ranks *)pattern->ranks; /* base is its first member */
+    s->workspace = LEAST_WORKSPACE;
     count_nonzeros(pattern, nonzeros, nonzeros + n);
     PetscErrorCode code = create_matrix(s, nonzeros, nonzeros + n);
     drape_arena_release(arena, nonzeros);
@@ -155,13 +162,24 @@ static PetscErrorCode begin_direct(mpi_linear *s)
         code = PCFactorGetMatrix(pc, &factors);
     if (!code)
         code = MatMumpsSetIcntl(factors, 13, 1); /* else the last front counts no negative pivots */
+    if (!code)
+        code = MatMumpsSetIcntl(factors, 14, s->workspace);
     if (!code && s->counts)
         code = MatMumpsSetIcntl(factors, 24, 1); /* counts pivots that are zero, instead of failing */
     return code;
 }
 
-/* Whether there are factors and, if a definite matrix is asked for, no negative pivot. */
-static bool factor_direct(mpi_linear *s)
+/* Whether the workspace or a buffer was too small, by the errors of MUMPS. */
+static bool lacks_workspace(Mat factors)
+{
+    PetscInt error = 0;
+    return !MatMumpsGetInfog(factors, 1, &error) &&
+           (error == -8 || error == -9 || error == -15 || error == -17 || error == -20);
+}
+
+/* Whether there are factors and, if a definite matrix is asked for, no negative pivot. *lacks: there is not
+ * enough workspace. */
+static bool factor_once(mpi_linear *s, bool *lacks)
 {
     PCType type = NULL;
     PC pc = NULL;
@@ -181,12 +199,23 @@ static bool factor_direct(mpi_linear *s)
         code = KSPSetUp(s->direct);
     if (!code)
         code = PCGetFailedReason(pc, &failed);
-    if (!code && !failed && s->definite) {
+    if (!code)
         code = PCFactorGetMatrix(pc, &factors);
-        if (!code)
-            code = MatMumpsGetInfog(factors, 12, &negative);
-    }
+    *lacks = drape_ranks_any(s->pattern->ranks, !code && failed && lacks_workspace(factors));
+    if (!code && !failed && s->definite)
+        code = MatMumpsGetInfog(factors, 12, &negative);
     return drape_ranks_all(s->pattern->ranks, !code && !failed && negative == 0);
+}
+
+static bool factor_direct(mpi_linear *s)
+{
+    bool lacks = false, good = factor_once(s, &lacks);
+    while (lacks && s->workspace < MOST_WORKSPACE) {
+        s->workspace *= 2;
+        KSPDestroy(&s->direct);
+        good = factor_once(s, &lacks);
+    }
+    return good;
 }
 
 /* ---- Factor and solve ---- */
@@ -249,6 +278,37 @@ static drape_status solve(void *state, const double *b, double *x)
     return drape_ranks_all(s->pattern->ranks, finite) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
+/* Whether the factors are those of the matrix, which need not be symmetric: the residual of a solution, over
+ * |A| |x| + |b|, is small. */
+static bool solves(mpi_linear *s)
+{
+    Vec b = NULL, x = NULL, left = NULL;
+    PetscReal a = 0, length = 0, right = 0, error = INFINITY;
+    PetscErrorCode code = MatCreateVecs(s->matrix, &x, &b);
+    if (!code)
+        code = VecDuplicate(b, &left);
+    if (!code)
+        code = VecSetRandom(b, NULL);
+    if (!code)
+        code = KSPSolve(s->direct, b, x);
+    if (!code)
+        code = MatMult(s->matrix, x, left);
+    if (!code)
+        code = VecAXPY(left, -1, b);
+    if (!code)
+        code = VecNorm(left, NORM_INFINITY, &error);
+    if (!code)
+        code = VecNorm(x, NORM_INFINITY, &length);
+    if (!code)
+        code = VecNorm(b, NORM_INFINITY, &right);
+    if (!code)
+        code = MatNorm(s->matrix, NORM_INFINITY, &a);
+    VecDestroy(&b);
+    VecDestroy(&x);
+    VecDestroy(&left);
+    return drape_ranks_all(s->pattern->ranks, !code && error < INERTIA_ERROR * (a * length + right));
+}
+
 drape_status drape_mpi_inertia(drape_context *ctx, const drape_pattern *p, const double *values,
                                int64_t *negative, bool *known)
 {
@@ -268,7 +328,7 @@ drape_status drape_mpi_inertia(drape_context *ctx, const drape_pattern *p, const
     if (!status && !KSPGetPC(s->direct, &pc) && !PCFactorGetMatrix(pc, &factors) &&
         !MatMumpsGetInfog(factors, 12, &below) && !MatMumpsGetInfog(factors, 28, &zero)) {
         *negative = below;
-        *known = zero == 0;
+        *known = zero == 0 && solves(s);
     }
     if (state)
         destroy(&state);

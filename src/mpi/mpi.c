@@ -102,6 +102,15 @@ int drape_mpi_agree(const drape_mpi *mpi, bool here, int *value)
     return from;
 }
 
+bool drape_mpi_is_same(const drape_mpi *mpi, uint64_t value)
+{
+    uint64_t first = value;
+    if (!mpi)
+        return true;
+    mpi->ranks->base.broadcast(&mpi->ranks->base, 0, &first, sizeof first);
+    return drape_ranks_all(&mpi->ranks->base, first == value);
+}
+
 drape_status drape_mpi_share(drape_mpi *mpi, drape_model *whole, drape_model **part)
 {
     *part = NULL;

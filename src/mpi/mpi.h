@@ -28,6 +28,9 @@ int drape_mpi_count(const drape_mpi *mpi);
 /* The lowest rank for which `here` is true, whose value all get; -1: it is true for none. Collective. */
 int drape_mpi_agree(const drape_mpi *mpi, bool here, int *value);
 
+/* Whether all ranks have the same value. Collective. */
+bool drape_mpi_is_same(const drape_mpi *mpi, uint64_t value);
+
 /* The part of a compiled model of this rank, which lasts no longer than the model and mpi. Collective.
  * Errors: DRAPE_E_ARGUMENT (the model has what a part cannot have, with its place in the scene),
  * DRAPE_E_MEMORY. */

@@ -16,6 +16,10 @@ void drape_work_archive(drape_work *work, drape_archive *a)
 
 drape_work drape_work_sum(drape_work work, const drape_work *other)
 {
+    if (work.residuals == 0) { /* it has made no step since */
+        work.stability_known = other->stability_known;
+        work.unstable_modes = other->unstable_modes;
+    }
     work.newton_iterations += other->newton_iterations;
     work.jacobians += other->jacobians;
     work.factorizations += other->factorizations;

@@ -221,6 +221,63 @@ def test_refusals():
     refused(17, "run", "scene.json", says="there are 14 free nodes for 17 ranks")
 
 
+def apart(*commands, says, code):
+    """Each command, of arguments and a folder, is a rank of one run, which ends with one line that says this."""
+    words = ["mpirun"]
+    for number, (folder, args) in enumerate(commands):
+        words += ([":"] if number else []) + ["-n", "1", "-wdir", os.path.abspath(folder), PROGRAM, *args]
+    result = subprocess.run(words, capture_output=True, text=True, timeout=LIMIT, env=ENVIRONMENT, check=False)
+    equal(result.returncode, code, f"exit code: {result.stdout} {result.stderr}")
+    lines = own_lines(result.stderr)
+    equal(len(lines), 1, f"lines: {result.stderr}")
+    assert says in lines[0], lines[0]
+
+
+def test_other_input():
+    """ranks whose scenes or options differ, or of which one has no scene, end with one line, and do not wait for each other"""
+    os.makedirs("other")
+    write_scene(cloth=[HUNG], integrator=be(), duration=0.1, frame_rate=100)
+    shutil.copy("scene.json", "other")
+    run = ("run", "scene.json")
+    apart((".", run), (".", (*run, "--out", "out")), says="the same options", code=2)
+    for option, value in (("dt", "0.005"), ("tolerance", "1e-6"), ("integrator", "ida"), ("linear-solver", "pcg")):
+        apart((".", run), (".", (*run, "--" + option, value)), says="the same scene", code=2)
+    for change in ({"duration": 0.2}, {"cloth": [DROP]}, {"cloth": [dict(HUNG, mesh=dict(DROP["mesh"], columns=7))]}):
+        os.chdir("other")
+        write_scene(**{"cloth": [HUNG], "integrator": be(), "duration": 0.1, "frame_rate": 100, **change})
+        os.chdir("..")
+        apart((".", run), ("other", run), says="the same scene", code=2)
+    os.remove("other/scene.json")
+    apart((".", run), ("other", run), says="cannot read the scene", code=2)
+
+
+def test_other_files():
+    """a rank that finds another file at the path of the frames, as on a machine with a file system of its own, neither writes to it nor calls the run ok"""
+    os.makedirs("other")
+    write_scene(cloth=[HUNG], integrator=be(), duration=0.1, frame_rate=100)
+    shutil.copy("scene.json", "other")
+    run = ("run", "scene.json", "--out", "out", "--format", "npy")
+    os.chdir("other")
+    good(*run)
+    os.chdir("..")
+    before = open("other/out/positions.npy", "rb").read()
+    apart((".", run), ("other", run), says='cannot write "out/positions.npy"', code=1)
+    equal(open("other/out/positions.npy", "rb").read(), before, "the other file")
+
+
+def test_stability():
+    """`static` tells whether an equilibrium is stable where one process does, also after it is resumed, and not where friction and wind may act"""
+    wind = dict(HUNG, terms=["stretch.cst", "bend.hinge", {"type": "drag.wind", "wind": [1, 0, -1.5]}])
+    plane = {"type": "plane", "point": [0, -9, 0], "normal": [0, 1, 0], "friction": 0.3}
+    for cloth, colliders_there, known in ((HUNG, [], True), (wind, [plane], False)):
+        write_scene(cloth=[cloth], colliders=colliders_there, integrator={"method": "static", "tolerance": 1e-8, "norm": "max"}, duration=1, frame_rate=1)
+        for count in (1, 2, 3):
+            run = ("run", "scene.json", "--out", f"out{known}{count}", "--checkpoint-every", "1")
+            for more in ((), ("--resume",)):
+                ranks(count, *run, *more)
+                equal("equilibrium" in read_json(f"out{known}{count}/summary.json"), known, f"{count} ranks {more}: whether the stability is known")
+
+
 def runs(process):
     """Whether it is there; not what is left of it until its parent, or that of an orphan, asks for its exit code."""
     try:
@@ -368,6 +425,8 @@ def test_one_rank_cannot_write():
     args = [PROGRAM, "run", "scene.json", "--out", "out", "--format", "npy,obj", "--resume", "--checkpoint-every", "1"]
     fails(["mpirun", "-n", "1", *args, ":", "-n", "1", "-wdir", os.path.abspath("elsewhere"), *args], 'cannot read "out/checkpoint.drape", which another rank can', 2)
     shutil.copytree("out", "elsewhere/out")
+    os.remove("elsewhere/out/positions.npy")
+    os.link("out/positions.npy", "elsewhere/out/positions.npy") # the frames are those of the run
     for alone in (1, 2):  # the last rank of 2, the middle one of 3
         there = [":", "-n", "1", *args] if alone == 2 else []
         fails(["mpirun", "-n", "1", *args, ":", "-n", "1", "-wdir", os.path.abspath("elsewhere"), *args, *there], 'cannot write "out/checkpoint.drape": No such file or directory')
