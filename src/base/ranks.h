@@ -34,6 +34,8 @@ typedef struct drape_rows {
     const int32_t *number;  /* (count) in the whole model, ascending */
 } drape_rows;
 
+#define DRAPE_RANKS_PATH 4096
+
 struct drape_ranks {
     int rank, count;
     int32_t own_blocks;   /* block columns of matrices that this rank owns: the first ones; the others are
@@ -68,11 +70,11 @@ struct drape_ranks {
     /* Gathers rows into the array of the whole model on rank 0; all: NULL elsewhere. */
     void (*gather)(const drape_ranks *ranks, const drape_rows *rows, double *all);
     /* All ranks write into one file, which exists and which all of them reach, one file at a time. path,
-     * offset, durable: those of rank 0; a path NULL there opens nothing. write: puts the array of the whole
-     * model, in the byte order of the machine or little endian, from an offset on that is a multiple of 8.
-     * *sum: what it adds to the checksum of the file (base/checksum.h). close: must follow an open that
-     * succeeded; durable: what was written is on the disk then. They return 0 or an errno, the same on all
-     * ranks. */
+     * offset, durable: those of rank 0; a path NULL there opens nothing, others are shorter than
+     * DRAPE_RANKS_PATH. write: puts the array of the whole model, in the byte order of the machine or little
+     * endian, from an offset on that is a multiple of 8. *sum: what it adds to the checksum of the file
+     * (base/checksum.h). close: must follow an open that succeeded; durable: what was written is on the disk
+     * then. They return 0 or an errno, the same on all ranks. */
     int (*open)(const drape_ranks *ranks, const char *path);
     int (*write)(const drape_ranks *ranks, int64_t offset, bool little_endian, const drape_rows *rows,
                  uint64_t *sum);
@@ -126,6 +128,12 @@ static inline void drape_ranks_fetch(const drape_ranks *ranks, double *nodes)
  * ranks would wait for one that has failed, for instance because it alone has no more memory, they agree
  * first. */
 drape_status drape_ranks_agree(const drape_ranks *ranks, drape_context *ctx, drape_status status);
+
+/* The same of a rank that has the memory that it needs, or has not: DRAPE_E_MEMORY. */
+static inline drape_status drape_ranks_agree_memory(const drape_ranks *ranks, drape_context *ctx, bool good)
+{
+    return drape_ranks_agree(ranks, ctx, good ? DRAPE_OK : DRAPE_E_MEMORY);
+}
 
 /* Which rank has the largest value, the lowest of several. */
 static inline int drape_ranks_find(const drape_ranks *ranks, double value)

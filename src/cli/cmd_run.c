@@ -1,5 +1,4 @@
 /* cmd_run.c: `drape run`: simulates a scene and writes frames, step log and summary into a folder. */
-#include "base/hash.h"
 #include "cli/cli.h"
 #include "cli/progress.h"
 #include "cli/ranks.h"
@@ -486,13 +485,14 @@ static int check_checkpoints(const run_request *request)
 
 static uint64_t hash_text(uint64_t hash, const char *text)
 {
-    return text ? drape_hash_bytes(hash, text, strlen(text) + 1) : drape_hash_bytes(hash, &hash, 1);
+    return text ? drape_hash_bytes(hash, text, strlen(text) + 1) : hash;
 }
 
 /* Options that change the scene are compared with that. */
 static int check_ranks(const run_request *request)
 {
-    const int32_t numbers[] = {request->resume, request->realtime, request->checkpoint_every};
+    const int32_t numbers[] = {request->resume, request->realtime, request->checkpoint_every,
+                               request->out != NULL, request->summary != NULL};
     uint64_t options = hash_text(hash_text(DRAPE_HASH_START, request->out), request->summary);
     options = drape_hash_bytes(options, numbers, sizeof numbers);
     const int code = cli_ranks_compare(&request->command, options);

@@ -175,7 +175,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->edge_area = drape_arena_take(arena, (size_t)m->edge_count, sizeof *s->edge_area);
     s->face_area = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->face_area);
     const bool good = !drape_arena_status(arena) && !drape_distant_create(arena, m, &s->distant);
-    if (drape_ranks_agree(drape_model_ranks(m), arena->ctx, good ? DRAPE_OK : DRAPE_E_MEMORY))
+    if (drape_ranks_agree_memory(drape_model_ranks(m), arena->ctx, good))
         return DRAPE_E_MEMORY;
     bound_features(s);
     for (int32_t i = 0; i < m->collider_count; i++)

@@ -99,7 +99,7 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
         return DRAPE_OK;
     const drape_ranks *ranks = drape_model_ranks(model);
     drape_contact *c = drape_arena_take(arena, 1, sizeof *c);
-    if (drape_ranks_agree(ranks, arena->ctx, c ? DRAPE_OK : DRAPE_E_MEMORY))
+    if (drape_ranks_agree_memory(ranks, arena->ctx, c))
         return DRAPE_E_MEMORY;
     *c = (drape_contact){.arena = arena,
                          .model = model,
@@ -697,15 +697,15 @@ const drape_relaxed_set *drape_contact_relaxed(const drape_contact *c)
     return &c->relaxed;
 }
 
-/* What changes between steps are the laws of contacts: which cloth is relaxed and how hard it is pushed,
- * activation distances, which pairs are inside, the stiffness. What that adds to the energy of the present
- * contacts, or takes from it, is the work of whoever presses. */
 /* A rank that alone is out of memory must not leave the others waiting. */
 static drape_status agree(const drape_contact *c, drape_status status)
 {
     return drape_ranks_agree(c->ranks, c->model->ctx, status);
 }
 
+/* What changes between steps are the laws of contacts: which cloth is relaxed and how hard it is pushed,
+ * activation distances, which pairs are inside, the stiffness. What that adds to the energy of the present
+ * contacts, or takes from it, is the work of whoever presses. */
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
     const double start = drape_clock_seconds();

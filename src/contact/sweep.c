@@ -201,11 +201,12 @@ static void meet(void *user, const drape_pair *pair)
 static bool layers_meet(drape_contact *c, const double *y)
 {
     layers of = {.contact = c};
+    if (!mark_moved(c, y, c->moved))
+        return false;
     drape_contact_fill(c, y, c->path_pose, c->to);
     const drape_straight_path path = {{{.model = c->model, .x = c->start, .pose = c->start_pose},
                                        {.model = c->model, .x = c->to, .pose = c->path_pose}}};
-    if (mark_moved(c, y, c->moved))
-        drape_candidates_find(&c->broad, &path, 0, true, c->moved, meet, &of);
+    drape_candidates_find(&c->broad, &path, 0, true, c->moved, meet, &of);
     return of.meet;
 }
 

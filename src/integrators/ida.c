@@ -157,8 +157,8 @@ static const drape_first_order_solver solver = {
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
     drape_first_order *s = *state = drape_arena_take(arena, 1, sizeof *s);
-    const drape_status status = drape_ranks_agree(drape_model_ranks(drape_system_model(system)), arena->ctx,
-                                                  s ? DRAPE_OK : DRAPE_E_MEMORY);
+    const drape_status status =
+        drape_ranks_agree_memory(drape_model_ranks(drape_system_model(system)), arena->ctx, s);
     return status ? status
                   : drape_first_order_create(s, &solver, arena, system, values, DRAPE_FIRST_ORDER_OWN,
                                              LOOSE_ORDER, TIGHT_ORDER);

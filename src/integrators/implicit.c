@@ -33,8 +33,8 @@ drape_status drape_implicit_create(drape_arena *arena, drape_system *system, con
                                    void **state)
 {
     drape_implicit *s = *state = drape_arena_take(arena, 1, sizeof *s);
-    const drape_status status = drape_ranks_agree(drape_model_ranks(drape_system_model(system)), arena->ctx,
-                                                  s ? DRAPE_OK : DRAPE_E_MEMORY);
+    const drape_status status =
+        drape_ranks_agree_memory(drape_model_ranks(drape_system_model(system)), arena->ctx, s);
     return status ? status : drape_implicit_init_newton(arena, system, values, s);
 }
 

@@ -59,7 +59,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
 {
     static_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
     const drape_model *m = drape_system_model(system);
-    if (drape_ranks_agree(drape_model_ranks(m), arena->ctx, s ? DRAPE_OK : DRAPE_E_MEMORY))
+    if (drape_ranks_agree_memory(drape_model_ranks(m), arena->ctx, s))
         return DRAPE_E_MEMORY;
     s->arena = arena;
     s->max_steps = (int)values[PARAM_MAX_STEPS];

@@ -9,8 +9,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define MAX_PATH 4096
-
 /* ---- Reading ---- */
 
 static drape_status read_all(drape_context *ctx, int fd, const char *path, char *to, size_t size)
@@ -86,7 +84,7 @@ static void put_rows(void *user, uint64_t offset, uint64_t size, const drape_row
 /* Where rank 0 could not begin the file, none opens it. */
 static void open_together(drape_checkpoint *c)
 {
-    char path[MAX_PATH];
+    char path[DRAPE_RANKS_PATH];
     const bool begun = c->file && c->file->open;
     const bool reached = begun && drape_file_reach(c->file, path, sizeof path);
     const int error = c->ranks->open(c->ranks, reached ? path : NULL);

@@ -23,8 +23,8 @@ typedef struct drape_checkpoint {
 
 /* Begins a checkpoint in a file that has been named, of a folder if ranks share the model; the caller then
  * archives, and ends the checkpoint. Neither takes memory in one process, as drape_file_create has. Both are
- * collective. Errors of the end: DRAPE_E_FILE, those of the archive;
- * then a file that had the name before is unchanged. */
+ * collective. Errors of the end: DRAPE_E_FILE, those of the archive; then a file that had the name
+ * before is unchanged. */
 void drape_checkpoint_begin(drape_checkpoint *c, drape_context *ctx, const drape_ranks *ranks,
                             drape_file *file);
 drape_status drape_checkpoint_end(drape_checkpoint *c);

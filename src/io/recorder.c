@@ -20,7 +20,6 @@
 #define SAME_TIME 1e-12
 
 #define MAX_FRAMES INT64_C(1000000000000000)
-#define MAX_PATH   4096
 
 typedef struct output {
     const drape_exporter_ops *ops;
@@ -278,7 +277,7 @@ static void write_shared(drape_recorder *r, const output *o, const double *posit
 {
     const drape_rows rows = rows_of(r->sim->model, positions, 3);
     const drape_ranks *ranks = r->ranks;
-    char path[MAX_PATH];
+    char path[DRAPE_RANKS_PATH];
     drape_file *file = r->writes && !r->failure ? o->ops->shared(o->state) : NULL;
     const bool reached = file && drape_file_reach(file, path, sizeof path);
     uint64_t sum = 0;
@@ -752,7 +751,7 @@ static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recor
     if (status)
         return status;
     drape_recorder *r = drape_alloc(ctx, 1, sizeof *r);
-    if (drape_ranks_agree(drape_model_ranks(sim->model), ctx, r ? DRAPE_OK : DRAPE_E_MEMORY)) {
+    if (drape_ranks_agree_memory(drape_model_ranks(sim->model), ctx, r)) {
         drape_free(ctx, r);
         return DRAPE_E_MEMORY;
     }

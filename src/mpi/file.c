@@ -14,8 +14,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define MAX_PATH 4096
-
 static drape_mpi_ranks *ranks_of(const drape_ranks *ranks)
 {
     return (drape_mpi_ranks *)(uintptr_t)ranks; /* base is its first member */
@@ -43,15 +41,15 @@ static int open_here(drape_mpi_ranks *r, const char *path)
 int drape_mpi_open(const drape_ranks *ranks, const char *path)
 {
     drape_mpi_ranks *r = ranks_of(ranks);
-    char there[MAX_PATH] = "";
+    char there[DRAPE_RANKS_PATH] = "";
     const size_t length = path && ranks->rank == 0 ? strlen(path) : 0;
-    int error = length == 0 ? ECANCELED : length < MAX_PATH ? 0 : ENAMETOOLONG;
+    int error = length == 0 ? ECANCELED : length < DRAPE_RANKS_PATH ? 0 : ENAMETOOLONG;
     if (ranks->rank == 0 && !error)
         memcpy(there, path, length);
     MPI_Bcast(&error, 1, MPI_INT, 0, r->comm);
     if (error)
         return error;
-    MPI_Bcast(there, MAX_PATH, MPI_BYTE, 0, r->comm);
+    MPI_Bcast(there, DRAPE_RANKS_PATH, MPI_BYTE, 0, r->comm);
     return open_here(r, there);
 }
 

@@ -12,6 +12,12 @@
 #include <petscksp.h>
 #include <string.h>
 
+/* [%] beyond what MUMPS expects to need: pivots that are moved for accuracy need more, and more on more
+ * ranks. */
+#define LEAST_WORKSPACE 50
+#define MOST_WORKSPACE  1600
+#define INERTIA_ERROR   1e-8 /* as in solvers/general.c */
+
 typedef struct mpi_linear {
     const drape_pattern *pattern;
     const drape_mpi_ranks *ranks;
@@ -22,13 +28,8 @@ typedef struct mpi_linear {
     bool counts;              /* the pivots by their signs, as if it were symmetric; it never solves */
     bool symmetric, definite; /* of the last matrix; a definite one was asked for */
     bool factored;
-    PetscInt workspace; /* [%] beyond what MUMPS expects to need */
+    PetscInt workspace; /* from LEAST_WORKSPACE to MOST_WORKSPACE */
 } mpi_linear;
-
-/* Pivots that are moved for accuracy need more of it than MUMPS expects, and more on more ranks. */
-#define LEAST_WORKSPACE 50
-#define MOST_WORKSPACE  1600
-#define INERTIA_ERROR   1e-8 /* as in solvers/general.c */
 
 /* ---- The matrix ---- */
 
@@ -115,7 +116,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     PetscInt *nonzeros = drape_arena_take(arena, 2 * (size_t)n, sizeof *nonzeros);
     double *diagonal = drape_arena_take(arena, (size_t)pattern->n, sizeof *diagonal);
     const bool good = s && nonzeros && diagonal;
-    if (drape_ranks_agree(pattern->ranks, arena->ctx, good ? DRAPE_OK : DRAPE_E_MEMORY))
+    if (drape_ranks_agree_memory(pattern->ranks, arena->ctx, good))
         return DRAPE_E_MEMORY;
     s->pattern = pattern;
     s->diagonal = diagonal;

@@ -271,7 +271,7 @@ static drape_exchange *plan(const drape_ranks *ranks, drape_arena *arena, int32_
             wanted[rank[i]]++;
         MPI_Alltoall(wanted, 1, MPI_INT, asked, 1, MPI_INT, r->comm);
         x = take(arena, ranks->count, wanted, asked, largest);
-        status = drape_ranks_agree(ranks, arena->ctx, x ? DRAPE_OK : DRAPE_E_MEMORY);
+        status = drape_ranks_agree_memory(ranks, arena->ctx, x);
     }
     if (!status)
         ask(r, x, count, rank, place, places);

@@ -630,6 +630,33 @@ static double expected_error(const drape_inexact_newton *s, const progress *p)
     return c->share * p->first * fmax(1, p->first / c->along);
 }
 
+/* A correction, and what it tells of the convergence. */
+static drape_status make_iteration(drape_inexact_newton *s, const drape_inexact_settings *settings,
+                                   progress *p, double *d, drape_solve_report *report)
+{
+    const drape_status status = correct(s, settings, p->iteration);
+    if (status) {
+        report->reason = drape_reason_name(status < 0 ? DRAPE_REASON_MEMORY : DRAPE_REASON_SINGULAR);
+        return status;
+    }
+    const double now = rms(s->equation, s->p);
+    if (p->iteration == 0)
+        p->first = now;
+    if (p->iteration == 1)
+        measure_contraction(s, now, p->first);
+    s->indefinite &= !goes_by_error(s) || now > SMALL_STEP * s->edge;
+    p->ratio = p->iteration > 0 ? now / p->last : 1;
+    p->last = now;
+    drape_step_equation_predict_contact(s->equation, s->p);
+    make_correction_feasible(s);
+    predict_stress(s, p->iteration < MAX_PREDICTION);
+    if (!advance(s, d))
+        return DRAPE_RETRY_NONFINITE;
+    memmove(p->step + 1, p->step, (STEPS_KEPT - 1) * sizeof *p->step);
+    p->step[0] = s->length * now;
+    return DRAPE_OK;
+}
+
 static drape_status iterate(drape_inexact_newton *s, const drape_inexact_settings *settings, double *d,
                             drape_solve_report *report)
 {
@@ -689,26 +716,9 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
             return DRAPE_RETRY_NONLINEAR;
         }
         const double start = drape_clock_seconds();
-        status = correct(s, settings, p.iteration);
-        if (status) {
-            report->reason = drape_reason_name(status < 0 ? DRAPE_REASON_MEMORY : DRAPE_REASON_SINGULAR);
+        status = make_iteration(s, settings, &p, d, report);
+        if (status)
             return status;
-        }
-        const double now = rms(e, s->p);
-        if (p.iteration == 0)
-            p.first = now;
-        if (p.iteration == 1)
-            measure_contraction(s, now, p.first);
-        s->indefinite &= !goes_by_error(s) || now > SMALL_STEP * s->edge;
-        p.ratio = p.iteration > 0 ? now / p.last : 1;
-        p.last = now;
-        drape_step_equation_predict_contact(e, s->p);
-        make_correction_feasible(s);
-        predict_stress(s, p.iteration < MAX_PREDICTION);
-        if (!advance(s, d))
-            return DRAPE_RETRY_NONFINITE;
-        memmove(p.step + 1, p.step, (STEPS_KEPT - 1) * sizeof *p.step);
-        p.step[0] = s->length * now;
         p.seconds = drape_clock_seconds() - start;
         report->further_seconds += fell ? p.seconds : 0;
         p.seconds += p.estimating;

@@ -762,7 +762,7 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
                                  drape_newton **out)
 {
     drape_newton *s = *out = drape_arena_take(arena, 1, sizeof *s);
-    if (drape_ranks_agree(equation->ranks, arena->ctx, s ? DRAPE_OK : DRAPE_E_MEMORY))
+    if (drape_ranks_agree_memory(equation->ranks, arena->ctx, s))
         return DRAPE_E_MEMORY;
     s->equation = equation;
     s->repair_share = 1;

@@ -48,7 +48,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
 {
     const size_t n = (size_t)pattern->n;
     pcg_state *s = drape_arena_take(arena, 1, sizeof *s);
-    if (drape_ranks_agree(pattern->ranks, arena->ctx, s ? DRAPE_OK : DRAPE_E_MEMORY))
+    if (drape_ranks_agree_memory(pattern->ranks, arena->ctx, s))
         return DRAPE_E_MEMORY;
     s->arena = arena;
     s->pattern = pattern;

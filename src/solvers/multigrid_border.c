@@ -107,8 +107,8 @@ static drape_status list_border(drape_arena *arena, border *b, const matrix *a)
 }
 
 /* Appends the lists of copies to those of the rows here. list->start is of columns + 1, NULL if there is no
- * memory here, like list->column. items: the plan
- * for what else there is of each column, of at most `largest` bytes; NULL: nothing is. */
+ * memory here, like list->column. items: the plan for what else there is of each column, of at most `largest`
+ * bytes; NULL: nothing is. */
 static drape_status append_lists(drape_arena *arena, drape_arena *scratch, const level *l, lists *list,
                                  drape_exchange **items, size_t largest)
 {

@@ -84,7 +84,7 @@ typedef struct lists {
  * ranks agree on whether all are `good`. Collective. */
 static inline drape_status agree(const drape_ranks *ranks, const drape_arena *arena, bool good)
 {
-    return drape_ranks_agree(ranks, arena->ctx, good ? DRAPE_OK : DRAPE_E_MEMORY);
+    return drape_ranks_agree_memory(ranks, arena->ctx, good);
 }
 
 /* The border of the level that a pattern describes, which ranks share. Errors: DRAPE_E_MEMORY, as below.
