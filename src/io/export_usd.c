@@ -11,9 +11,9 @@
  *     0: [(x, y, z), ...],
  *     TAIL                     closes all braces
  *
- * A frame is written after the tail, as a comment, and followed by a tail of its own; then the first tail
+ * A frame is written after the tail, as a comment; then, after that, a tail of its own; then the first tail
  * and the sign of the comment become blanks. The file is complete up to a frame at any moment but between
- * these two writes, when it has a tail too many. The end of the time and the extents, which bound all frames
+ * the last two of these writes, when it has a tail too many. The end of the time and the extents, which bound all frames
  * so far, are numbers of a fixed width at the beginning.
  *
  * Format: Pixar, OpenUSD 24, UsdGeom and UsdShade schemas, and the grammar of .usda files.
@@ -427,7 +427,6 @@ static void put_sample(usd_state *usd, object *o, const drape_frame *frame, doub
         drape_file_put_text(file, "]");
     }
     drape_file_put_text(file, ",\n");
-    drape_file_put_text(file, tails[o->number > 0]);
 }
 
 /* Where the samples begin; before it the extent of what deforms. */
@@ -446,6 +445,7 @@ static void put_samples(usd_state *usd, object *o, const drape_frame *frame)
         drape_file_put_text(&o->file, "matrix4d xformOp:transform.timeSamples = {\n");
     }
     put_sample(usd, o, frame, usd->code);
+    drape_file_put_text(&o->file, tails[o->number > 0]);
 }
 
 static void put_metadata(usd_state *usd, object *o, const char *prim)
@@ -547,18 +547,23 @@ static drape_status write_bounds(usd_state *usd, object *o)
 static drape_status write_next(usd_state *usd, object *o, const drape_frame *frame)
 {
     static const char blanks[] = "                ";
-    const size_t tail = strlen(tails[o->number > 0]);
+    const char *tail = tails[o->number > 0];
+    const size_t length = strlen(tail);
     const off_t before = o->file.kept;
-    drape_file_put_text(&o->file, "#");
-    put_sample(usd, o, frame, usd->code);
-    drape_status status = drape_file_keep(&o->file);
-    if (status)
-        return status;
     for (int32_t i = 0; deforms(usd, o) && i < point_count(usd, o); i++)
         include(o, point_at(usd, o, frame, i));
-    status = write_bounds(usd, o);
+    drape_status status = write_bounds(usd, o);
+    if (status)
+        return status;
+    drape_file_put_text(&o->file, "#");
+    put_sample(usd, o, frame, usd->code);
+    status = drape_file_keep(&o->file);
+    if (status)
+        return status;
+    drape_file_put_text(&o->file, tail);
+    status = drape_file_keep(&o->file);
     if (!status)
-        status = drape_file_overwrite(&o->file, before - (off_t)tail, blanks, tail + 1);
+        status = drape_file_overwrite(&o->file, before - (off_t)length, blanks, length + 1);
     if (status)
         drape_file_cut(&o->file, before);
     return status;
