@@ -142,6 +142,23 @@ static drape_status build_trees(drape_arena *arena, drape_broad_phase *s, int32_
     return status;
 }
 
+/* Lists the elements of each node, if there is memory. */
+static void take_elements(drape_arena *arena, int32_t count, int size, const int32_t *node, int32_t nodes,
+                          drape_elements_of *out)
+{
+    const size_t entries = (size_t)count * (size_t)size;
+    out->first = drape_arena_take(arena, (size_t)nodes + 2, sizeof *out->first);
+    out->element = drape_arena_take(arena, entries, sizeof *out->element);
+    if (drape_arena_status(arena))
+        return;
+    for (size_t i = 0; i < entries; i++)
+        out->first[node[i] + 2]++;
+    for (int32_t i = 0; i < nodes; i++)
+        out->first[i + 2] += out->first[i + 1];
+    for (size_t i = 0; i < entries; i++)
+        out->element[out->first[node[i] + 1]++] = (int32_t)(i / (size_t)size);
+}
+
 drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, drape_broad_phase *s)
 {
     int32_t points, triangles;
@@ -162,11 +179,11 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->close = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->close);
     s->near_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near_node);
     s->near_element = drape_arena_take(
-        arena, (size_t)(m->edge_count > m->triangle_count ? m->edge_count : m->triangle_count),
+        arena, (size_t)(m->edge_count > m->triangle_count ? m->edge_count : m->triangle_count) + 1,
         sizeof *s->near_element);
-    s->marked_node = drape_arena_take(arena, (size_t)m->node_count + 1, sizeof *s->marked_node);
-    s->marked_face = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->marked_face);
-    s->marked_edge = drape_arena_take(arena, (size_t)m->edge_count, sizeof *s->marked_edge);
+    s->marked_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->marked_node);
+    take_elements(arena, m->triangle_count, 3, m->triangle, m->node_count, &s->faces_of);
+    take_elements(arena, m->edge_count, 2, m->edge, m->node_count, &s->edges_of);
     s->point = drape_arena_take(arena, (size_t)s->points, sizeof *s->point);
     s->corner_reach = drape_arena_take(arena, (size_t)points, sizeof *s->corner_reach);
     s->segment_reach = drape_arena_take(arena, (size_t)s->segments, sizeof *s->segment_reach);
@@ -174,8 +191,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->node_area = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->node_area);
     s->edge_area = drape_arena_take(arena, (size_t)m->edge_count, sizeof *s->edge_area);
     s->face_area = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->face_area);
-    const bool good = !drape_arena_status(arena) && !drape_distant_create(arena, m, &s->distant);
-    if (drape_ranks_agree_memory(drape_model_ranks(m), arena->ctx, good))
+    if (drape_ranks_agree_memory(drape_model_ranks(m), arena->ctx, !drape_arena_status(arena)))
         return DRAPE_E_MEMORY;
     bound_features(s);
     for (int32_t i = 0; i < m->collider_count; i++)
@@ -184,6 +200,8 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     share_areas(s);
     list_features(s);
     drape_status status = build_trees(arena, s, points, triangles);
+    if (!status)
+        status = drape_distant_create(arena, m, &s->faces, &s->distant);
     if (!status && m->contact.self)
         status = drape_self_search_create(arena, m, s->rest, &s->layers);
     return status;
@@ -418,66 +436,68 @@ static void scanned(void *user, int32_t element)
     of->meet(of->query, of->feature, element);
 }
 
-/* What is scanned: all of the cloth, or only its marked elements. */
+/* What is scanned: all of the cloth, or the elements that have a marked node. */
 typedef struct scanned_cloth {
-    drape_path_elements faces, edges; /* with the same points */
-    double edge;                      /* [m] no edge of these is longer on the path */
+    const int32_t *node; /* that these have; NULL: all */
+    int32_t nodes;
+    double edge; /* [m] no edge of these is longer on the path */
 } scanned_cloth;
 
-/* The longest of some edges on the path. */
-static double longest_edge(const drape_model *m, const drape_broad_query *want,
-                           const drape_path_elements *edges)
+static double square_of_edge(const drape_model *m, const drape_broad_query *want, int32_t edge)
 {
     const double *const ends[2] = {want->x, want->y};
+    const int32_t *n = m->edge + 2 * (size_t)edge;
     double largest = 0, d[3];
-    for (int end = 0; end < 2 && ends[end]; end++)
-        for (int32_t i = 0; i < edges->elements; i++) {
-            const int32_t *n = m->edge + 2 * (size_t)edges->element[i];
-            vec3_sub(ends[end] + 3 * (size_t)n[1], ends[end] + 3 * (size_t)n[0], d);
-            const double square = vec3_dot(d, d);
-            largest = square > largest ? square : largest;
-        }
-    return sqrt(largest);
+    for (int end = 0; end < 2 && ends[end]; end++) {
+        vec3_sub(ends[end] + 3 * (size_t)n[1], ends[end] + 3 * (size_t)n[0], d);
+        const double square = vec3_dot(d, d);
+        largest = square > largest ? square : largest;
+    }
+    return largest;
 }
 
 static scanned_cloth all_cloth(const drape_broad_phase *s, const drape_broad_query *want)
 {
-    const int32_t nodes = s->model->node_count;
-    scanned_cloth all = {.faces = {s->faces.order, s->point, s->faces.count, nodes},
-                         .edges = {s->edges.order, s->point, s->edges.count, nodes}};
-    all.edge = longest_edge(s->model, want, &all.edges);
-    return all;
+    double largest = 0;
+    for (int32_t e = 0; e < s->model->edge_count; e++) {
+        const double square = square_of_edge(s->model, want, e);
+        largest = square > largest ? square : largest;
+    }
+    return (scanned_cloth){.nodes = s->model->node_count, .edge = sqrt(largest)};
 }
 
-/* Lists the marked elements of a tree, and adds those of their nodes that are not listed yet. */
-static int32_t list_marked(drape_broad_phase *s, const drape_path_bvh *tree, const bool *marked,
-                           int32_t *element, int32_t *points)
+/* Adds those nodes of some elements that are not listed yet. */
+static void list_nodes(drape_broad_phase *s, const drape_path_bvh *tree, const int32_t *element,
+                       int32_t elements, scanned_cloth *to)
 {
-    int32_t count = 0;
-    for (int32_t place = 0; place < tree->count; place++) {
-        const int32_t e = tree->order[place], *node = tree->node + (size_t)e * (size_t)tree->nodes;
-        if (!is_marked(marked, node, tree->nodes))
-            continue;
-        element[count++] = e;
+    for (int32_t i = 0; i < elements; i++) {
+        const int32_t *node = tree->node + (size_t)element[i] * (size_t)tree->nodes;
         for (int a = 0; a < tree->nodes; a++) {
-            s->marked_node[*points] = node[a];
-            *points += !s->near[node[a]];
+            if (!s->near[node[a]])
+                s->marked_node[to->nodes++] = node[a];
             s->near[node[a]] = true;
         }
     }
-    return count;
 }
 
 /* A face with a marked node may have one edge without, which is not longer than the other two together. */
 static scanned_cloth marked_cloth(drape_broad_phase *s, const drape_broad_query *want)
 {
-    int32_t points = 0;
+    const int32_t *face = s->faces_of.first, *edge = s->edges_of.first;
+    scanned_cloth some = {.node = s->marked_node};
+    double largest = 0;
     memset(s->near, 0, (size_t)s->model->node_count * sizeof *s->near);
-    const int32_t faces = list_marked(s, &s->faces, want->marked, s->marked_face, &points),
-                  edges = list_marked(s, &s->edges, want->marked, s->marked_edge, &points);
-    scanned_cloth some = {.faces = {s->marked_face, s->marked_node, faces, points},
-                          .edges = {s->marked_edge, s->marked_node, edges, points}};
-    some.edge = 2 * longest_edge(s->model, want, &some.edges);
+    for (int32_t i = 0; i < s->model->node_count; i++) {
+        if (!want->marked[i])
+            continue;
+        list_nodes(s, &s->faces, s->faces_of.element + face[i], face[i + 1] - face[i], &some);
+        list_nodes(s, &s->edges, s->edges_of.element + edge[i], edge[i + 1] - edge[i], &some);
+        for (int32_t e = edge[i]; e < edge[i + 1]; e++) {
+            const double square = square_of_edge(s->model, want, s->edges_of.element[e]);
+            largest = square > largest ? square : largest;
+        }
+    }
+    some.edge = 2 * sqrt(largest);
     return some;
 }
 
@@ -510,14 +530,21 @@ static double gap_of_nodes(double radius, double gap, double edge)
 static int32_t list_near(drape_broad_phase *s, const drape_broad_query *want, int32_t collider,
                          const scanned_cloth *of)
 {
-    const drape_collider_pose *pose[2] = {&want->pose[0][collider], &want->pose[want->y ? 1 : 0][collider]};
+    const drape_collider_pose *const pose[2] = {&want->pose[0][collider],
+                                                &want->pose[want->y ? 1 : 0][collider]};
     const bool turns = (pose[0]->turned || pose[1]->turned) &&
                        memcmp(pose[0]->turn, pose[1]->turn, sizeof pose[0]->turn) != 0;
     const double gap = feature_reach(s, collider, want->passing) + want->reach, reach = gap + of->edge,
                  close = gap_of_nodes(s->model->colliders[collider].shape.radius, gap, of->edge);
     int32_t count = 0;
-    for (int32_t i = 0; i < of->edges.points; i++) {
-        const int32_t node = of->edges.point[i];
+    if (of->node || turns)
+        memset(s->near, of->node ? 0 : 1, (size_t)s->model->node_count * sizeof *s->near);
+    else
+        drape_distant_mark(&s->distant, collider, pose, reach, s->near);
+    for (int32_t i = 0; i < of->nodes; i++) {
+        const int32_t node = of->node ? of->node[i] : i;
+        if (!of->node && !s->near[node])
+            continue;
         s->near[node] = turns || !is_distant(s, want, collider, node, reach);
         s->close[node] = turns || (s->near[node] && !is_distant(s, want, collider, node, close));
         s->near_node[count] = node;
@@ -526,20 +553,25 @@ static int32_t list_near(drape_broad_phase *s, const drape_broad_query *want, in
     return count;
 }
 
-/* Lists those elements of a tree all of whose nodes are near, and one is close. */
+/* Lists those elements of a tree all of whose nodes are near, and one is close: each at the first node that
+ * is. */
 static drape_path_elements list_elements(drape_broad_phase *s, const drape_path_bvh *tree,
-                                         const drape_path_elements *of, int32_t points)
+                                         const drape_elements_of *of, int32_t points)
 {
     drape_path_elements among = {.element = s->near_element, .point = s->near_node, .points = points};
-    for (int32_t i = 0; points > 0 && i < of->elements; i++) {
-        const int32_t e = of->element[i], *node = tree->node + (size_t)e * (size_t)tree->nodes;
-        bool near = s->near[node[0]], close = s->close[node[0]];
-        for (int a = 1; a < tree->nodes; a++) {
-            near = near & s->near[node[a]];
-            close = close | s->close[node[a]];
+    for (int32_t i = 0; i < points; i++) {
+        const int32_t from = s->near_node[i];
+        for (int32_t k = of->first[from]; s->close[from] && k < of->first[from + 1]; k++) {
+            const int32_t e = of->element[k], *node = tree->node + (size_t)e * (size_t)tree->nodes;
+            bool near = true, first = true, before = true;
+            for (int a = 0; a < tree->nodes; a++) {
+                near = near && s->near[node[a]];
+                before = before && node[a] != from;
+                first = first && !(before && s->near[node[a]] && s->close[node[a]]);
+            }
+            s->near_element[among.elements] = e;
+            among.elements += near && first;
         }
-        s->near_element[among.elements] = e;
-        among.elements += near & close;
     }
     return among;
 }
@@ -567,6 +599,7 @@ static void scan_features(query *q)
     scanned_cloth all = {.edge = -1}, some = {.edge = -1}; /* listed where they are needed first */
     int32_t segment = 0;
     set_reaches(s, q->want->passing);
+    drape_distant_fit(&s->distant, q->want->x, q->want->y);
     for (int32_t k = 0; k < m->collider_count; k++) {
         const drape_collider_shape *shape = &m->colliders[k].shape;
         const int32_t corner = s->first_point[k] - m->node_count, last = segment + shape->segment_count;
@@ -578,11 +611,11 @@ static void scan_features(query *q)
             *of = only_marked ? marked_cloth(s, q->want) : all_cloth(s, q->want);
         const int32_t points = list_near(s, q->want, k, of);
         begin_stage(q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
-        drape_path_elements among = list_elements(s, &s->faces, &of->faces, points);
+        drape_path_elements among = list_elements(s, &s->faces, &s->faces_of, points);
         for (int32_t i = corner; among.elements > 0 && i < corner + shape->point_count; i++)
             scan_tree(q, &s->corners, i, s->corner_reach, &s->faces, &among, meet_face);
         begin_stage(q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS);
-        among = list_elements(s, &s->edges, &of->edges, shape->segment_count > 0 ? points : 0);
+        among = list_elements(s, &s->edges, &s->edges_of, shape->segment_count > 0 ? points : 0);
         for (; segment < last; segment++)
             if (among.elements > 0)
                 scan_tree(q, &s->segment_tree, segment, s->segment_reach, &s->edges, &among, meet_edge);

@@ -11,6 +11,12 @@
 #include "contact/self_search.h"
 #include "geometry/path_bvh.h"
 
+/* The elements that have each node. */
+typedef struct drape_elements_of {
+    int32_t *first; /* (node_count + 1) where those of a node begin */
+    int32_t *element;
+} drape_elements_of;
+
 typedef struct drape_broad_phase {
     const drape_model *model;
     int32_t points;                       /* nodes, and points of colliders */
@@ -29,12 +35,13 @@ typedef struct drape_broad_phase {
     int32_t segments;
     int32_t *triangle; /* (obstacles.count x 3) of colliders */
     int32_t *triangle_collider;
-    drape_distant distant;             /* nodes far from smooth colliders */
-    uint8_t *side;                     /* (node_count) scratch of drape_path_bvh_scan, and of a sweep */
-    bool *near, *close;                /* (node_count) scratch: nodes that a collider may meet, */
-    int32_t *near_node, *near_element; /* (node_count), (edges or triangles) and lists of what it may */
-    int32_t *marked_node, *marked_face, *marked_edge; /* scratch: lists of what is marked */
-    double *node_area, *edge_area, *face_area;        /* area of the sheet that belongs to each [m2] */
+    drape_distant distant;                /* nodes far from smooth colliders */
+    uint8_t *side;                        /* (node_count) scratch of drape_path_bvh_scan, and of a sweep */
+    bool *near, *close;                   /* (node_count) scratch: nodes that a collider may meet, */
+    int32_t *near_node, *near_element;    /* (node_count), (edges or triangles) and lists of what it may */
+    int32_t *marked_node;                 /* (node_count) scratch: the nodes of marked elements */
+    drape_elements_of faces_of, edges_of; /* of each node, by feature scans */
+    double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
     double *distance;       /* (collider_count) activation distance of cloth and each collider [m] */
     double *feature_most;   /* (collider_count) that of its features is no more than this [m] */
     double rounding;        /* what rounding can change in a gap, set by who moves the points [m] */

@@ -40,7 +40,7 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
 
 /* A search in progress. */
 typedef struct search {
-    const drape_broad_phase *broad;
+    drape_broad_phase *broad;
     const drape_straight_path *path;
     drape_configuration rest;
     bool moves;   /* the ends differ */
@@ -117,6 +117,32 @@ static void consider(void *user, const drape_pair *found)
         s->visit(s->user, &pair);
 }
 
+/* Pairs of nodes and smooth colliders. */
+static void find_surfaces(search *s, const bool *marked)
+{
+    drape_broad_phase *broad = s->broad;
+    const drape_model *m = broad->model;
+    const drape_configuration *end = s->path->end;
+    drape_distant_fit(&broad->distant, end[0].x, s->moves ? end[1].x : NULL);
+    for (int32_t k = 0; k < m->collider_count; k++) {
+        if (!m->colliders[k].ops->smooth)
+            continue;
+        const drape_collider_pose *const pose[2] = {&end[0].pose[k], &end[s->moves].pose[k]};
+        const bool *wanted = marked && !marked[broad->points + k] ? marked : broad->near;
+        const double gap = drape_broad_phase_wanted(broad, s->passing, broad->distance[k]) + s->reach;
+        if (wanted == broad->near)
+            drape_distant_mark(&broad->distant, k, pose, gap, broad->near);
+        for (int32_t i = 0; i < m->free_count; i++) {
+            const int32_t node = m->node_of_free[i];
+            if (!wanted[node] || drape_model_ignores(m, k, node))
+                continue;
+            const drape_pair pair = drape_broad_phase_surface(broad, node, k);
+            if (!stays_beyond(s, &pair))
+                consider(s, &pair);
+        }
+    }
+}
+
 static bool differ(const drape_broad_phase *broad, const drape_configuration end[2])
 {
     for (int32_t i = 0; i < broad->model->collider_count; i++)
@@ -137,16 +163,8 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
                 .reach = 2 * margin + ROUNDING * m->length,
                 .visit = visit,
                 .user = user};
-    for (int32_t k = 0; k < m->collider_count; k++) {
-        if (!m->colliders[k].ops->smooth || passing)
-            continue;
-        for (int32_t i = 0; i < m->free_count; i++) {
-            const drape_pair pair = drape_broad_phase_surface(broad, m->node_of_free[i], k);
-            if (!drape_model_ignores(m, k, pair.node[0]) &&
-                (!marked || marked[broad->points + k] || marked[pair.node[0]]) && !stays_beyond(&s, &pair))
-                consider(&s, &pair);
-        }
-    }
+    if (!passing)
+        find_surfaces(&s, marked);
     const drape_broad_query want = {.x = path->end[0].x,
                                     .y = s.moves ? path->end[1].x : NULL,
                                     .pose = {path->end[0].pose, path->end[1].pose},

@@ -5,22 +5,117 @@
 #include "colliders/colliders.h"
 
 #include <math.h>
+#include <string.h>
 
-#define STALE 0.25 /* of its gap: a node that has moved by more is looked at again */
+#define STALE   0.25 /* of its gap: a node that has moved by more is looked at again */
+#define CLUSTER 8    /* nodes of one */
 
-drape_status drape_distant_create(drape_arena *arena, const drape_model *model, drape_distant *out)
+static int32_t cluster_count(const drape_model *model)
 {
-    const size_t count = (size_t)model->collider_count * (size_t)model->node_count;
-    *out = (drape_distant){.model = model, .seen = drape_arena_take(arena, count, sizeof *out->seen)};
-    for (size_t i = 0; out->seen && i < count; i++)
-        out->seen[i].gap = -INFINITY;
-    return drape_arena_status(arena);
+    return (model->node_count + CLUSTER - 1) / CLUSTER;
 }
+
+/* Nodes in the order in which faces have them first, then those that no face has. */
+static void order_nodes(const drape_path_bvh *faces, drape_distant *d, bool *listed)
+{
+    const int32_t nodes = d->model->node_count;
+    int32_t count = 0;
+    for (int32_t f = 0; f < faces->count; f++)
+        for (int a = 0; a < faces->nodes; a++) {
+            const int32_t node = faces->node[(size_t)faces->order[f] * (size_t)faces->nodes + (size_t)a];
+            if (!listed[node])
+                d->order[count++] = node;
+            listed[node] = true;
+        }
+    for (int32_t i = 0; i < nodes; i++)
+        if (!listed[i])
+            d->order[count++] = i;
+}
+
+drape_status drape_distant_create(drape_arena *arena, const drape_model *model, const drape_path_bvh *faces,
+                                  drape_distant *out)
+{
+    const size_t nodes = (size_t)model->node_count, count = (size_t)model->collider_count * nodes;
+    *out =
+        (drape_distant){.model = model,
+                        .seen = drape_arena_take(arena, count, sizeof *out->seen),
+                        .order = drape_arena_take(arena, nodes, sizeof *out->order),
+                        .balls = drape_arena_take(arena, (size_t)cluster_count(model), sizeof *out->balls)};
+    bool *listed = drape_arena_take(arena, nodes, sizeof *listed);
+    if (drape_arena_status(arena))
+        return drape_arena_status(arena);
+    for (size_t i = 0; i < count; i++)
+        out->seen[i].gap = -INFINITY;
+    order_nodes(faces, out, listed);
+    return DRAPE_OK;
+}
+
+/* ---- Clusters ---- */
+
+void drape_distant_fit(drape_distant *distant, const double *x, const double *y)
+{
+    const double *const ends[2] = {x, y ? y : x};
+    const int32_t nodes = distant->model->node_count;
+    for (int32_t first = 0; first < nodes; first += CLUSTER) {
+        drape_node_ball *ball = &distant->balls[first / CLUSTER];
+        ball->radius = 0;
+        for (int end = 0; end < 2; end++) {
+            double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+            double half[3], sum = 0; /* not finite where a position is not: no such ball is beyond */
+            for (int32_t i = first; i < first + CLUSTER && i < nodes; i++)
+                for (int k = 0; k < 3; k++) {
+                    const double at = ends[end][3 * (size_t)distant->order[i] + (size_t)k];
+                    low[k] = at < low[k] ? at : low[k];
+                    high[k] = at > high[k] ? at : high[k];
+                    sum += at;
+                }
+            for (int k = 0; k < 3; k++) {
+                ball->centre[end][k] = 0.5 * (low[k] + high[k]);
+                half[k] = 0.5 * (high[k] - low[k]);
+            }
+            const double radius = vec3_norm(half) + 0 * sum;
+            ball->radius = radius > ball->radius || isnan(radius) ? radius : ball->radius;
+        }
+    }
+}
+
+/* Whether a ball that contains those of both ends, and so the paths of all nodes, is beyond. */
+static bool is_beyond(const drape_distant *d, const drape_node_ball *ball, int32_t collider,
+                      const drape_collider_pose *const pose[2], double gap)
+{
+    const drape_collider *of = &d->model->colliders[collider];
+    double own[2][3], middle[3], half[3];
+    for (int end = 0; end < 2; end++)
+        drape_pose_own(pose[end], ball->centre[end], own[end]);
+    for (int k = 0; k < 3; k++) {
+        middle[k] = 0.5 * (own[0][k] + own[1][k]);
+        half[k] = 0.5 * (own[1][k] - own[0][k]);
+    }
+    const double reach = gap + ball->radius + vec3_norm(half) + d->rounding;
+    return of->ops->distance(of->values, &of->shape, middle, NULL, NULL) > reach;
+}
+
+void drape_distant_mark(const drape_distant *distant, int32_t collider,
+                        const drape_collider_pose *const pose[2], double gap, bool *marked)
+{
+    const drape_collider *of = &distant->model->colliders[collider];
+    const bool looks = of->ops->smooth && of->frames.frame_count == 0;
+    const int32_t nodes = distant->model->node_count;
+    for (int32_t first = 0; first < nodes; first += CLUSTER) {
+        const bool beyond =
+            looks && is_beyond(distant, &distant->balls[first / CLUSTER], collider, pose, gap);
+        for (int32_t i = first; i < first + CLUSTER && i < nodes; i++)
+            marked[distant->order[i]] = !beyond;
+    }
+}
+
+/* ---- Single nodes ---- */
 
 void drape_distant_update(drape_distant *distant, const double *x, const drape_collider_pose *pose,
                           double rounding)
 {
     const drape_model *m = distant->model;
+    distant->rounding = rounding;
     for (int32_t k = 0; k < m->collider_count; k++) {
         const drape_collider *collider = &m->colliders[k];
         if (!collider->ops->smooth || collider->frames.frame_count > 0)

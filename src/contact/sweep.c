@@ -102,14 +102,17 @@ static bool sweep(drape_contact *c, int32_t collider, int pass, uint8_t *slid, d
     const drape_collider *k = &c->model->colliders[collider];
     const drape_collider_pose *from = &c->start_pose[collider], *to = &c->path_pose[collider];
     const double reach = c->broad.distance[collider];
-    bool moved = false;
+    bool moved = false, *near = c->broad.near;
     if (c->deformed[collider])
         return false;
+    drape_distant_mark(&c->broad.distant, collider, (const drape_collider_pose *const[]){from, to}, reach,
+                       near);
     for (int32_t i = 0; i < c->model->free_count; i++) {
         const int32_t node = c->model->node_of_free[i];
         const size_t at = 3 * (size_t)node;
         double a[3], b[3];
-        if (slid[node] < pass - 1 || drape_contact_lets_in(c, collider, &node, 1))
+        if ((!near[node] && slid[node] == 0) || slid[node] < pass - 1 ||
+            drape_contact_lets_in(c, collider, &node, 1))
             continue;
         drape_pose_own(from, c->start + at, a);
         drape_pose_own(to, y + at, b);
@@ -145,6 +148,7 @@ static void sweep_all(drape_contact *c, double *y)
     uint8_t *slid = c->broad.side;
     bool moved = true;
     memset(slid, 0, (size_t)c->model->node_count * sizeof *slid);
+    drape_distant_fit(&c->broad.distant, c->start, y);
     for (int pass = 1; pass <= MAX_PASSES && moved; pass++) {
         moved = false;
         for (int32_t k = 0; k < c->model->collider_count; k++)

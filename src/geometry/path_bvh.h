@@ -50,7 +50,7 @@ typedef struct drape_path_query {
 void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *query, drape_bvh_visit *visit,
                           void *user);
 
-/* Elements of a tree by increasing place, and the points that they have. */
+/* Elements of a tree, and the points that they have. */
 typedef struct drape_path_elements {
     const int32_t *element, *point;
     int32_t elements, points;
