@@ -13,8 +13,8 @@
  *
  * A frame is written after the tail, as a comment; then, after that, a tail of its own; then the first tail
  * and the sign of the comment become blanks. The file is complete up to a frame at any moment but between
- * the last two of these writes, when it has a tail too many. The end of the time and the extents, which bound all frames
- * so far, are numbers of a fixed width at the beginning.
+ * the last two of these writes, when it has a tail too many. The end of the time and the extents, which bound
+ * all frames so far, are numbers of a fixed width at the beginning.
  *
  * Format: Pixar, OpenUSD 24, UsdGeom and UsdShade schemas, and the grammar of .usda files.
  */
