@@ -382,6 +382,7 @@ static double fill_shape(const problem *p, const double *u, double *shape)
     return scale;
 }
 
+/* DRAPE_E_SOLVER: it has not converged; its kind is filled in nevertheless. */
 static drape_status fill_mode(problem *p, const eigenpair *pair, double *shape, drape_mode *mode)
 {
     const double *u = p->vector + (int64_t)pair->vector * p->n;
@@ -390,11 +391,6 @@ static drape_status fill_mode(problem *p, const eigenpair *pair, double *shape, 
     drape_status status = inverse_error(p, pair, &inverse);
     if (status)
         return status;
-    if (!(inverse <= MAX_ERROR))
-        return drape_fail(p->ctx, DRAPE_E_SOLVER,
-                          "a mode with the value %.9g did not converge: the residual of the inverted problem "
-                          "is %.3g of it",
-                          mode->value, inverse);
     for (int64_t i = 0; i < p->n; i++)
         mass += p->tangent.mass[i] * u[i] * u[i];
     const double scale = fill_shape(p, u, shape);
@@ -413,7 +409,12 @@ static drape_status fill_mode(problem *p, const eigenpair *pair, double *shape, 
                                                  : DRAPE_MODE_UNSTABLE;
     mode->error = mode->kind == DRAPE_MODE_ZERO ? INFINITY : mode->error;
     mode->frequency = mode->kind == DRAPE_MODE_VIBRATION ? sqrt(mode->value) / (2 * PI) : 0;
-    return DRAPE_OK;
+    return inverse <= MAX_ERROR
+               ? DRAPE_OK
+               : drape_fail(p->ctx, DRAPE_E_SOLVER,
+                            "a mode with the value %.9g did not converge: the residual of the inverted "
+                            "problem is %.3g of it",
+                            mode->value, inverse);
 }
 
 /* If more motions than those of a rigid body have no stiffness within rounding, and there are others beside
