@@ -610,8 +610,8 @@ typedef struct drape_realtime {
     double error; /* [m] largest drape_attempt.error of the accepted steps; NaN: the integrator estimates
                         none, or no step was accepted */
     double error_bound; /* [m] see drape_statistics; NaN: the integrator estimates no error */
-    bool accurate; /* whether it made a step, held no cloth, nothing passes through the cloth, and `error`
-                                 is at most that, as far as the integrator estimates one */
+    bool accurate; /* whether it made a step, held no cloth, no cloth passes through cloth, and `error` is at
+                      most that, as far as the integrator estimates one; `relaxed` nodes do not count */
     int64_t inaccurate_total; /* calls since the sim was created that were not accurate */
     int held; /* steps in which the cloth was held where it was, or went with its pins, because none could be
                  made otherwise */
@@ -626,7 +626,8 @@ typedef struct drape_realtime {
  * longer than dt. If, judging by the time that recent steps took, that will not fit into budget_seconds of
  * wall-clock time, the integrator first reduces its effort (if it supports that, as "newton_k" does); then
  * steps become longer, up to realtime_step of the def; then simulated time is left over. The level is chosen
- * anew in each call and rises again as soon as a better one fits.
+ * anew in each call and rises again as soon as a better one fits. The method is that of the scene: by default
+ * "be", whose single steps may take far longer than a frame.
  *
  * The work of a call is bounded: after its first attempt at a step, accepted or rejected, no other is begun
  * that is not expected to end in time: a rejected step is then retried, at half its size, by the next call.
