@@ -194,6 +194,18 @@ def test_reading():
             os.close(writer)
 
 
+def wait_until_idle(child):
+    """Until a second passes in which the process takes no CPU time."""
+    end, before = time.monotonic() + LIMIT, None
+    while child.poll() is None and time.monotonic() < end:
+        with open(f"/proc/{child.pid}/stat", encoding="utf-8") as file:
+            now = file.read().rsplit(")", 1)[1].split()[11:13]
+        if now == before:
+            return
+        before = now
+        time.sleep(1)
+
+
 def test_waiting():
     """a pipe that nobody reads or writes is left: results that wait for a reader, a run whose files are pipes"""
     write_scene(mesh={"grid": "square", "columns": 20, "rows": 20, "width": 1, "height": 1})
@@ -209,7 +221,7 @@ def test_waiting():
         os.set_blocking(writing, True)
         os.write(writing, bytes(3996))
         with subprocess.Popen([PROGRAM, *verb], stdin=subprocess.DEVNULL, stdout=writing, stderr=subprocess.PIPE, text=True) as child:
-            time.sleep(1)  # it has its results and waits
+            wait_until_idle(child)  # it has its results and waits
             equal(child.poll(), None, " ".join(verb) + " did not wait")
             child.send_signal(signal.SIGTERM)
             _, err = child.communicate(timeout=LIMIT)
