@@ -142,23 +142,6 @@ static drape_status build_trees(drape_arena *arena, drape_broad_phase *s, int32_
     return status;
 }
 
-/* Lists the elements of each node, if there is memory. */
-static void take_elements(drape_arena *arena, int32_t count, int size, const int32_t *node, int32_t nodes,
-                          drape_elements_of *out)
-{
-    const size_t entries = (size_t)count * (size_t)size;
-    out->first = drape_arena_take(arena, (size_t)nodes + 2, sizeof *out->first);
-    out->element = drape_arena_take(arena, entries, sizeof *out->element);
-    if (drape_arena_status(arena))
-        return;
-    for (size_t i = 0; i < entries; i++)
-        out->first[node[i] + 2]++;
-    for (int32_t i = 0; i < nodes; i++)
-        out->first[i + 2] += out->first[i + 1];
-    for (size_t i = 0; i < entries; i++)
-        out->element[out->first[node[i] + 1]++] = (int32_t)(i / (size_t)size);
-}
-
 drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, drape_broad_phase *s)
 {
     int32_t points, triangles;
@@ -182,8 +165,8 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
         arena, (size_t)(m->edge_count > m->triangle_count ? m->edge_count : m->triangle_count) + 1,
         sizeof *s->near_element);
     s->marked_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->marked_node);
-    take_elements(arena, m->triangle_count, 3, m->triangle, m->node_count, &s->faces_of);
-    take_elements(arena, m->edge_count, 2, m->edge, m->node_count, &s->edges_of);
+    drape_elements_of_create(arena, m->triangle_count, 3, m->triangle, m->node_count, &s->faces_of);
+    drape_elements_of_create(arena, m->edge_count, 2, m->edge, m->node_count, &s->edges_of);
     s->point = drape_arena_take(arena, (size_t)s->points, sizeof *s->point);
     s->corner_reach = drape_arena_take(arena, (size_t)points, sizeof *s->corner_reach);
     s->segment_reach = drape_arena_take(arena, (size_t)s->segments, sizeof *s->segment_reach);
@@ -456,9 +439,10 @@ static double square_of_edge(const drape_model *m, const drape_broad_query *want
     return largest;
 }
 
-static scanned_cloth all_cloth(const drape_broad_phase *s, const drape_broad_query *want)
+static scanned_cloth all_cloth(drape_broad_phase *s, const drape_broad_query *want)
 {
     double largest = 0;
+    drape_distant_fit(&s->distant, want->x, want->y);
     for (int32_t e = 0; e < s->model->edge_count; e++) {
         const double square = square_of_edge(s->model, want, e);
         largest = square > largest ? square : largest;
@@ -599,7 +583,6 @@ static void scan_features(query *q)
     scanned_cloth all = {.edge = -1}, some = {.edge = -1}; /* listed where they are needed first */
     int32_t segment = 0;
     set_reaches(s, q->want->passing);
-    drape_distant_fit(&s->distant, q->want->x, q->want->y);
     for (int32_t k = 0; k < m->collider_count; k++) {
         const drape_collider_shape *shape = &m->colliders[k].shape;
         const int32_t corner = s->first_point[k] - m->node_count, last = segment + shape->segment_count;

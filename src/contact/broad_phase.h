@@ -7,15 +7,10 @@
 #define DRAPE_CONTACT_BROAD_PHASE_H
 
 #include "contact/distant.h"
+#include "contact/elements_of.h"
 #include "contact/pair.h"
 #include "contact/self_search.h"
 #include "geometry/path_bvh.h"
-
-/* The elements that have each node. */
-typedef struct drape_elements_of {
-    int32_t *first; /* (node_count + 1) where those of a node begin */
-    int32_t *element;
-} drape_elements_of;
 
 typedef struct drape_broad_phase {
     const drape_model *model;

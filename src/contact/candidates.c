@@ -123,15 +123,19 @@ static void find_surfaces(search *s, const bool *marked)
     drape_broad_phase *broad = s->broad;
     const drape_model *m = broad->model;
     const drape_configuration *end = s->path->end;
-    drape_distant_fit(&broad->distant, end[0].x, s->moves ? end[1].x : NULL);
+    bool fitted = false;
     for (int32_t k = 0; k < m->collider_count; k++) {
         if (!m->colliders[k].ops->smooth)
             continue;
         const drape_collider_pose *const pose[2] = {&end[0].pose[k], &end[s->moves].pose[k]};
         const bool *wanted = marked && !marked[broad->points + k] ? marked : broad->near;
         const double gap = drape_broad_phase_wanted(broad, s->passing, broad->distance[k]) + s->reach;
-        if (wanted == broad->near)
+        if (wanted == broad->near) {
+            if (!fitted)
+                drape_distant_fit(&broad->distant, end[0].x, s->moves ? end[1].x : NULL);
+            fitted = true;
             drape_distant_mark(&broad->distant, k, pose, gap, broad->near);
+        }
         for (int32_t i = 0; i < m->free_count; i++) {
             const int32_t node = m->node_of_free[i];
             if (!wanted[node] || drape_model_ignores(m, k, node))

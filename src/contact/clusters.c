@@ -1,6 +1,7 @@
 /* clusters.c: see clusters.h. */
 #include "contact/clusters.h"
 
+#include "contact/elements_of.h"
 #include "geometry/bvh.h"
 
 #include <string.h>
@@ -11,7 +12,7 @@ typedef struct builder {
     const drape_model *model;
     const drape_bvh *faces;
     int32_t *owner[DRAPE_ELEMENT_KINDS]; /* the cluster of each element; -1 */
-    int32_t *first_edge, *edge_of_node;  /* the edges of each node, by its lower number */
+    drape_elements_of edges;             /* at each node */
     int32_t *seen;                       /* (node_count) the last cluster that has this point, plus 1 */
 } builder;
 
@@ -58,33 +59,6 @@ static void cut(builder *b, int32_t from)
 
 /* ---- Owners ---- */
 
-static void list_edges_of_nodes(builder *b)
-{
-    const drape_model *m = b->model;
-    int32_t *first = b->first_edge;
-    for (int32_t e = 0; e < m->edge_count; e++) {
-        const int32_t *n = m->edge + 2 * (size_t)e;
-        first[(n[0] < n[1] ? n[0] : n[1]) + 2]++;
-    }
-    for (int32_t i = 0; i < m->node_count; i++)
-        first[i + 2] += first[i + 1];
-    for (int32_t e = 0; e < m->edge_count; e++) {
-        const int32_t *n = m->edge + 2 * (size_t)e;
-        b->edge_of_node[first[(n[0] < n[1] ? n[0] : n[1]) + 1]++] = e;
-    }
-}
-
-static int32_t find_edge(const builder *b, int32_t p, int32_t q)
-{
-    const int32_t low = p < q ? p : q, high = p < q ? q : p;
-    for (int32_t i = b->first_edge[low]; i < b->first_edge[low + 1]; i++) {
-        const int32_t *n = b->model->edge + 2 * (size_t)b->edge_of_node[i];
-        if (n[0] == high || n[1] == high)
-            return b->edge_of_node[i];
-    }
-    return -1;
-}
-
 static void claim(builder *b, drape_element_kind kind, int32_t element, int32_t cluster)
 {
     if (b->owner[kind][element] < 0)
@@ -100,7 +74,7 @@ static void find_owners(builder *b)
         const int32_t face = b->faces->order[i], *n = m->triangle + 3 * (size_t)face,
                       cluster = b->owner[DRAPE_ELEMENT_FACE][face];
         for (int a = 0; a < 3; a++) {
-            const int32_t edge = find_edge(b, n[a], n[(a + 1) % 3]);
+            const int32_t edge = drape_elements_of_edge(&b->edges, m->edge, n[a], n[(a + 1) % 3]);
             claim(b, DRAPE_ELEMENT_NODE, n[a], cluster);
             if (edge < 0)
                 continue;
@@ -189,8 +163,7 @@ static drape_status build(drape_arena *arena, drape_arena *temporary, const doub
         for (int32_t i = 0; b.owner[kind] && i < count_of(m, kind); i++)
             b.owner[kind][i] = -1;
     }
-    b.first_edge = drape_arena_take(temporary, (size_t)m->node_count + 2, sizeof *b.first_edge);
-    b.edge_of_node = drape_arena_take(temporary, (size_t)m->edge_count, sizeof *b.edge_of_node);
+    drape_elements_of_create(temporary, m->edge_count, 2, m->edge, m->node_count, &b.edges);
     b.seen = drape_arena_take(temporary, (size_t)m->node_count, sizeof *b.seen);
     s->cluster = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->cluster);
     s->branches = drape_arena_take(arena, 2 * (size_t)m->triangle_count, sizeof *s->branches);
@@ -202,7 +175,6 @@ static drape_status build(drape_arena *arena, drape_arena *temporary, const doub
     s->branches = drape_arena_resize(arena, s->branches, (size_t)s->branch_count, sizeof *s->branches);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    list_edges_of_nodes(&b);
     find_owners(&b);
     for (int kind = 0; !status && kind < DRAPE_ELEMENT_KINDS; kind++)
         status = list_elements(arena, &b, kind);

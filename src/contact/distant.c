@@ -47,6 +47,7 @@ drape_status drape_distant_create(drape_arena *arena, const drape_model *model, 
     for (size_t i = 0; i < count; i++)
         out->seen[i].gap = -INFINITY;
     order_nodes(faces, out, listed);
+    drape_arena_release(arena, listed);
     return DRAPE_OK;
 }
 

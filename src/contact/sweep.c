@@ -105,8 +105,9 @@ static bool sweep(drape_contact *c, int32_t collider, int pass, uint8_t *slid, d
     bool moved = false, *near = c->broad.near;
     if (c->deformed[collider])
         return false;
-    drape_distant_mark(&c->broad.distant, collider, (const drape_collider_pose *const[]){from, to}, reach,
-                       near);
+    if (pass == 1)
+        drape_distant_mark(&c->broad.distant, collider, (const drape_collider_pose *const[]){from, to}, reach,
+                           near);
     for (int32_t i = 0; i < c->model->free_count; i++) {
         const int32_t node = c->model->node_of_free[i];
         const size_t at = 3 * (size_t)node;

@@ -39,8 +39,6 @@ static drape_status take_sheets(drape_untangler *u)
     s->edge = drape_arena_take(u->arena, edges, 2 * sizeof *s->edge);
     s->triangle = drape_arena_take(u->arena, triangles, 3 * sizeof *s->triangle);
     s->edge_triangle = drape_arena_take(u->arena, edges, 2 * sizeof *s->edge_triangle);
-    s->first = drape_arena_take(u->arena, points + 1, sizeof *s->first);
-    s->around = drape_arena_take(u->arena, edges, 2 * sizeof *s->around);
     s->of_point = drape_arena_take(u->arena, points, sizeof *s->of_point);
     u->block = drape_arena_take(u->arena, edges, sizeof *u->block);
     u->hinge = drape_arena_take(u->arena, edges, 2 * sizeof *u->hinge);
@@ -61,30 +59,6 @@ static void copy_open(drape_untangler *u, int32_t collider)
     s->triangle_count += shape->triangle_count;
 }
 
-static void list_around(drape_untangler *u)
-{
-    drape_sheets *s = &u->sheets;
-    for (int32_t i = 0; i < 2 * s->edge_count; i++)
-        s->first[s->edge[i] + 1]++;
-    for (int32_t i = 0; i < u->broad.points; i++)
-        s->first[i + 1] += s->first[i];
-    for (int32_t i = 0; i < 2 * s->edge_count; i++)
-        s->around[s->first[s->edge[i]]++] = i / 2;
-    for (int32_t i = u->broad.points; i > 0; i--)
-        s->first[i] = s->first[i - 1];
-    s->first[0] = 0;
-}
-
-static int32_t edge_between(const drape_sheets *s, int32_t a, int32_t b)
-{
-    for (int32_t k = s->first[a]; k < s->first[a + 1]; k++) {
-        const int32_t *ends = s->edge + 2 * (size_t)s->around[k];
-        if (ends[0] == b || ends[1] == b)
-            return s->around[k];
-    }
-    return -1;
-}
-
 /* The triangles at each edge, and the nodes opposite of it: their distance is how the sheet bends there. */
 static void list_hinges(drape_untangler *u)
 {
@@ -92,7 +66,8 @@ static void list_hinges(drape_untangler *u)
     memset(s->edge_triangle, -1, 2 * (size_t)s->edge_count * sizeof *s->edge_triangle);
     for (int32_t f = 0; f < s->triangle_count; f++)
         for (int a = 0; a < 3; a++) {
-            const int32_t *t = s->triangle + 3 * (size_t)f, e = edge_between(s, t[a], t[(a + 1) % 3]);
+            const int32_t *t = s->triangle + 3 * (size_t)f,
+                          e = drape_elements_of_edge(&s->edges, s->edge, t[a], t[(a + 1) % 3]);
             if (e >= 0)
                 s->edge_triangle[2 * (size_t)e + (s->edge_triangle[2 * (size_t)e] >= 0)] = f;
         }
@@ -128,7 +103,7 @@ static double area_of(const drape_untangler *u, int32_t face)
     return vec3_norm(n) / 2;
 }
 
-static void list_sheets(drape_untangler *u)
+static drape_status list_sheets(drape_untangler *u)
 {
     const drape_model *m = u->model;
     drape_sheets *s = &u->sheets;
@@ -142,7 +117,10 @@ static void list_sheets(drape_untangler *u)
     for (int32_t i = 0; i < u->broad.points; i++)
         s->of_point[i] = i < m->node_count ? drape_model_cloth_of(m, i)
                                            : m->cloth_count + u->broad.point_collider[i - m->node_count];
-    list_around(u);
+    const drape_status status =
+        drape_elements_of_create(u->arena, s->edge_count, 2, s->edge, u->broad.points, &s->edges);
+    if (status)
+        return status;
     list_hinges(u);
     for (int32_t e = 0; e < m->edge_count; e++) {
         u->length[e] = between(u->x, m->edge + 2 * (size_t)e);
@@ -152,6 +130,7 @@ static void list_sheets(drape_untangler *u)
         u->hinge_length[h] = between(u->x, u->hinge + 2 * (size_t)h);
     for (int32_t f = 0; f < m->triangle_count; f++)
         u->face_area[f] = area_of(u, f);
+    return DRAPE_OK;
 }
 
 /* Numbers the pieces of cloth that hang together. */
@@ -168,9 +147,9 @@ static void list_pieces(drape_untangler *u)
         u->piece[i] = u->piece_count++;
         u->queue[listed++] = i;
         for (int32_t next = 0; next < listed; next++)
-            for (int32_t a = s->first[u->queue[next]]; a < s->first[u->queue[next] + 1]; a++)
+            for (int32_t a = s->edges.first[u->queue[next]]; a < s->edges.first[u->queue[next] + 1]; a++)
                 for (int k = 0; k < 2; k++) {
-                    const int32_t other = s->edge[2 * (size_t)s->around[a] + (size_t)k];
+                    const int32_t other = s->edge[2 * (size_t)s->edges.element[a] + (size_t)k];
                     if (u->piece[other] >= 0)
                         continue;
                     u->piece[other] = u->piece[i];
@@ -285,9 +264,10 @@ static drape_status set_up(drape_untangler *u, const drape_motion *motion, doubl
     status = place_bodies(u, motion, t);
     if (!status)
         status = take_sheets(u);
+    if (!status)
+        status = list_sheets(u);
     if (status)
         return status;
-    list_sheets(u);
     list_pieces(u);
     u->exit = drape_arena_take(u->arena, (size_t)u->piece_count, sizeof *u->exit);
     set_rounding(u);

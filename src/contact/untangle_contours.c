@@ -218,8 +218,8 @@ static bool spread(drape_untangler *u, int32_t count, bool through, double price
         const int32_t node = u->queue[i];
         const int8_t own = u->colour[node];
         price[own] += price_of(u, node);
-        for (int32_t a = s->first[node]; agree && a < s->first[node + 1]; a++) {
-            const int32_t e = s->around[a], *ends = s->edge + 2 * (size_t)e,
+        for (int32_t a = s->edges.first[node]; agree && a < s->edges.first[node + 1]; a++) {
+            const int32_t e = s->edges.element[a], *ends = s->edge + 2 * (size_t)e,
                           other = ends[0] == node ? ends[1] : ends[0];
             const bool blocked = u->block[e] & 1;
             if (u->colour[other] < 0 && (through || !blocked)) {
@@ -343,12 +343,8 @@ static int pass(drape_untangler *u, int32_t triangle, int32_t other, int8_t wron
 
 static bool is_boundary(const drape_sheets *s, int32_t a, int32_t b)
 {
-    for (int32_t k = s->first[a]; k < s->first[a + 1]; k++) {
-        const int32_t *ends = s->edge + 2 * (size_t)s->around[k];
-        if (ends[0] == b || ends[1] == b)
-            return s->edge_triangle[2 * (size_t)s->around[k] + 1] < 0;
-    }
-    return false;
+    const int32_t edge = drape_elements_of_edge(&s->edges, s->edge, a, b);
+    return edge >= 0 && s->edge_triangle[2 * (size_t)edge + 1] < 0;
 }
 
 /* Whether a place on a triangle is on the boundary of its sheet. */
@@ -413,8 +409,9 @@ static void let_pass(drape_untangler *u, const curve *k, int trace, int8_t wrong
         drape_untangle_add_passage(u, node, sheet);
         if (!itself && side != 0)
             follow_part(u, node, sheet, side);
-        for (int32_t a = s->first[node]; !(itself && ring + 1 >= RINGS) && a < s->first[node + 1]; a++) {
-            const int32_t *ends = s->edge + 2 * (size_t)s->around[a],
+        for (int32_t a = s->edges.first[node]; !(itself && ring + 1 >= RINGS) && a < s->edges.first[node + 1];
+             a++) {
+            const int32_t *ends = s->edge + 2 * (size_t)s->edges.element[a],
                           other = ends[0] == node ? ends[1] : ends[0];
             if (u->colour[other] != wrong)
                 continue;

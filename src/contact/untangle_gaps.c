@@ -78,9 +78,9 @@ static void normal_at(const drape_untangler *u, int32_t node, double n[3])
 {
     const drape_sheets *s = &u->sheets;
     memset(n, 0, 3 * sizeof *n);
-    for (int32_t a = s->first[node]; a < s->first[node + 1]; a++)
+    for (int32_t a = s->edges.first[node]; a < s->edges.first[node + 1]; a++)
         for (int k = 0; k < 2; k++) {
-            const int32_t face = s->edge_triangle[2 * (size_t)s->around[a] + (size_t)k];
+            const int32_t face = s->edge_triangle[2 * (size_t)s->edges.element[a] + (size_t)k];
             double v[3], w[3], own[3];
             if (face < 0)
                 continue;

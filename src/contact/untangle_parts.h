@@ -18,7 +18,7 @@ typedef struct drape_sheets {
     int32_t edge_count, triangle_count;
     int32_t *edge, *triangle; /* (edge_count x 2), (triangle_count x 3): those of the cloths first */
     int32_t *edge_triangle;   /* (edge_count x 2) at the edge; -1: none, it is on a boundary */
-    int32_t *first, *around;  /* (points + 1); the edges at point i are around[first[i]] ... */
+    drape_elements_of edges;  /* at each point */
     int32_t *of_point;        /* (points) number of the cloth or, after these, of the collider */
 } drape_sheets;
 
