@@ -657,6 +657,33 @@ static drape_status make_iteration(drape_inexact_newton *s, const drape_inexact_
     return DRAPE_OK;
 }
 
+/* An iteration, and how long the next one is expected to take, with the estimate of its error; fell: it is
+ * one that only the error asks for. */
+static drape_status make_timed_iteration(drape_inexact_newton *s, const drape_inexact_settings *settings,
+                                         progress *p, bool fell, double *d, drape_solve_report *report)
+{
+    const double start = drape_clock_seconds();
+    const drape_status status = make_iteration(s, settings, p, d, report);
+    if (status)
+        return status;
+    p->seconds = drape_clock_seconds() - start;
+    report->further_seconds += fell ? p->seconds : 0;
+    p->seconds += p->estimating;
+    if (s->friction && !s->factored && is_in_contact(s))
+        s->friction_seconds = p->seconds;
+    return DRAPE_OK;
+}
+
+static void update_estimate(drape_inexact_newton *s, double *d, progress *p, drape_solve_report *report)
+{
+    const double start = drape_clock_seconds();
+    p->near = estimate_error(s, d, p->iteration > 0);
+    report->error = fmax(p->near, slow_error(s, p));
+    const double took = drape_clock_seconds() - start;
+    p->seconds += took - p->estimating;
+    p->estimating = took;
+}
+
 static drape_status iterate(drape_inexact_newton *s, const drape_inexact_settings *settings, double *d,
                             drape_solve_report *report)
 {
@@ -692,14 +719,8 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
             s->first.steps++;
             return DRAPE_OK;
         }
-        if (fell || most) {
-            const double start = drape_clock_seconds();
-            p.near = estimate_error(s, d, p.iteration > 0);
-            report->error = fmax(p.near, slow_error(s, &p));
-            const double took = drape_clock_seconds() - start;
-            p.seconds += took - p.estimating;
-            p.estimating = took;
-        }
+        if (fell || most)
+            update_estimate(s, d, &p, report);
         if (p.iteration == 1 && fell)
             measure_contraction(s, report->error, p.first);
         const bool lost = report->error > e->model->length; /* nowhere near the solution */
@@ -715,15 +736,9 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
             report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
             return DRAPE_RETRY_NONLINEAR;
         }
-        const double start = drape_clock_seconds();
-        status = make_iteration(s, settings, &p, d, report);
+        status = make_timed_iteration(s, settings, &p, fell, d, report);
         if (status)
             return status;
-        p.seconds = drape_clock_seconds() - start;
-        report->further_seconds += fell ? p.seconds : 0;
-        p.seconds += p.estimating;
-        if (s->friction && !s->factored && is_in_contact(s))
-            s->friction_seconds = p.seconds;
         e->work.newton_iterations++;
     }
 }
