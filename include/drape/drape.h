@@ -557,7 +557,8 @@ typedef struct drape_sim_def {
     double frame_rate;                        /* rate of frame events [1/s]; 0: the scene's */
     int threads; /* threads that evaluate elements, 1 to 256; default 1; results do not depend on it */
     double realtime_step;  /* [s] longest step that drape_sim_advance_realtime takes to keep up, and the most
-                             time that may be owed; default 0: four times dt */
+                             time that may be owed; default 0: four times dt; both are dt where cloth touches
+                             or may touch something */
     double teleport_speed; /* [m/s] pins and colliders that drape_sim_move_pins and drape_sim_move_collider
                               send faster are placed where they are sent to, pins with their cloth; default
                               0: never */
@@ -604,8 +605,8 @@ typedef struct drape_realtime {
     int attempts, rejected; /* steps attempted in this call, and how many of them were rejected */
     double h;               /* [s] largest accepted step; 0: none was accepted */
     double residual; /* [N] largest residual of the accepted steps, in the norm of the integrator; NaN: the
-                        integrator reports none */
-    int32_t relaxed; /* nodes that bodies leave no room: drape_sim_relaxed; 0: all cloth is held */
+                        integrator reports none, or no step was accepted */
+    int32_t relaxed; /* nodes that bodies were let into, as they leave them no room: drape_sim_relaxed */
     double deepest_relaxed; /* [m] the deepest of them: how far inside its collider */
     double error; /* [m] largest drape_attempt.error of the accepted steps; NaN: the integrator estimates
                         none, or no step was accepted */
@@ -624,22 +625,27 @@ typedef struct drape_realtime {
 /* Advances by one frame within a wall-clock budget, for games, previews and anything else that must show a
  * state when it is due. It simulates frame_dt [s], plus what earlier calls left over, in equal steps no
  * longer than dt. If, judging by the time that recent steps took, that will not fit into budget_seconds of
- * wall-clock time, the integrator first reduces its effort (if it supports that, as "newton_k" does); then
- * steps become longer, up to realtime_step of the def; then simulated time is left over. The level is chosen
- * anew in each call and rises again as soon as a better one fits. The method is that of the scene: by default
- * "be", whose single steps may take far longer than a frame.
+ * wall-clock time, the integrator first reduces its effort (if it supports that, as "newton_k" does); then,
+ * unless cloth touches or may touch something, steps become longer, up to realtime_step of the def; then
+ * simulated time is left to the next call. A level is given up where it is expected to take more than 0.9 of
+ * the budget, and a better one is resumed, one a call, where that is expected to take less than 0.6. The
+ * method is that of the def, or else of the scene: by default "be", whose single steps may take far longer
+ * than a frame.
  *
  * The work of a call is bounded: after its first attempt at a step, accepted or rejected, no other is begun
  * that is not expected to end in time: a rejected step is then retried, at half its size, by the next call.
- * The time owed never exceeds one longest step. Anything beyond that is dropped: simulated time then stays
- * behind the clock for good, but late frames do not delay later ones. Steps follow the frames, so at
- * another frame rate the state differs only by the integrator's error in h. A later drape_sim_advance
- * continues with the scene's own steps. The level depends on the clock, so two runs may differ; they do not
- * if the budget is never reached.
+ * The time owed never exceeds one longest step, in contact dt. Anything beyond that is dropped: simulated
+ * time then stays behind the clock for good, but late frames do not delay later ones. Steps follow the
+ * frames, so at another frame rate the state differs only by the integrator's error in h. A later
+ * drape_sim_advance continues with the scene's own steps. The level depends on the clock, so two runs may
+ * differ; they do not if the budget is never reached.
  *
  * *report, unless NULL, is filled whatever the status. Integrators and controllers that choose their own
- * steps continue to do so, within the bound. Errors: as drape_sim_advance; DRAPE_E_ARGUMENT (frame_dt not in
- * (0, 1e6], budget not in [0, 1e9], or an integrator that does not integrate in time). */
+ * steps continue to do so, within the bound. A step that cannot be made is no error: the cloth is held
+ * instead (drape_realtime.held), unless the scene's no_room is "stop", the integrator chooses its own steps,
+ * a pin makes an element degenerate, or the controller allows fewer than 24 attempts within one dt. Errors:
+ * as drape_sim_advance; DRAPE_E_ARGUMENT (frame_dt not in (0, 1e6], budget not in [0, 1e9], or an integrator
+ * that does not integrate in time). */
 DRAPE_API drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double budget_seconds,
                                                   drape_realtime *report);
 

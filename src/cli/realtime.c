@@ -207,7 +207,7 @@ void cli_realtime_print(const cli_realtime *r)
            (long long)s->frames, 1e3 * s->budget, 1e3 * s->p50, 1e3 * s->p95, 1e3 * s->p99, 1e3 * s->worst,
            (long long)s->missed);
     printf("levels    %lld frames with all iterations, %lld with fewer, %lld with longer steps; "
-           "%lld frames without a new state; %.4g s of simulated time dropped; %.4g s behind at the last "
+           "%lld frames without a new state; %.4g s of simulated time dropped; %.4g s owed at the last "
            "frame\n",
            (long long)s->full, (long long)s->fewer, (long long)s->larger, (long long)s->still, s->dropped,
            s->debt);

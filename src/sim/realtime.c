@@ -343,7 +343,7 @@ static void enter(drape_sim *sim)
 
 drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double budget, drape_realtime *out)
 {
-    drape_realtime report = {.level = "full", .error = NAN, .error_bound = NAN};
+    drape_realtime report = {.level = "full", .residual = NAN, .error = NAN, .error_bound = NAN};
     double start = drape_clock_seconds();
     drape_status guarded = drape_sim_guard(sim, "drape_sim_advance_realtime");
     if (guarded)
