@@ -605,11 +605,11 @@ typedef struct drape_realtime {
     int attempts, rejected; /* steps attempted in this call, and how many of them were rejected */
     double h;               /* [s] largest accepted step; 0: none was accepted */
     double residual; /* [N] largest residual of the accepted steps, in the norm of the integrator; NaN: the
-                        integrator reports none, or no step was accepted */
+                        integrator reports none, no step was accepted, or they were held */
     int32_t relaxed; /* nodes that bodies were let into, as they leave them no room: drape_sim_relaxed */
     double deepest_relaxed; /* [m] the deepest of them: how far inside its collider */
     double error; /* [m] largest drape_attempt.error of the accepted steps; NaN: the integrator estimates
-                        none, or no step was accepted */
+                        none, no step was accepted, or they were held */
     double error_bound; /* [m] see drape_statistics; NaN: the integrator estimates no error */
     bool accurate; /* whether it made a step, held no cloth, no cloth passes through cloth, and `error` is at
                       most that, as far as the integrator estimates one; `relaxed` nodes do not count */
@@ -637,8 +637,8 @@ typedef struct drape_realtime {
  * The time owed never exceeds one longest step, in contact dt. Anything beyond that is dropped: simulated
  * time then stays behind the clock for good, but late frames do not delay later ones. Steps follow the
  * frames, so at another frame rate the state differs only by the integrator's error in h. A later
- * drape_sim_advance continues with the scene's own steps. The level depends on the clock, so two runs may
- * differ; they do not if the budget is never reached.
+ * drape_sim_advance continues with the scene's own steps. Levels and further iterations depend on the clock,
+ * so two runs may differ; they do not if the budget is so large that it never cuts an iteration.
  *
  * *report, unless NULL, is filled whatever the status. Integrators and controllers that choose their own
  * steps continue to do so, within the bound. A step that cannot be made is no error: the cloth is held

@@ -1501,10 +1501,11 @@ static drape_status meddle(void *user, const drape_event *event)
     const meddler *m = user;
     drape_sim *sim = m->sim;
     const double x[3 * MAX_NODES] = {0};
+    drape_realtime report = {.level = NULL, .attempts = 3};
     if (event->kind != DRAPE_EVENT_FRAME)
         return DRAPE_OK;
     const drape_status all[] = {drape_sim_advance(sim, 1),
-                                drape_sim_advance_realtime(sim, 0.1, 1, NULL),
+                                drape_sim_advance_realtime(sim, 0.1, 1, &report),
                                 drape_sim_set_state(sim, 0, x, x),
                                 drape_sim_restore(sim, "nowhere"),
                                 drape_sim_restore_from(sim, x, sizeof x),
@@ -1515,6 +1516,7 @@ static drape_status meddle(void *user, const drape_event *event)
                                 drape_sim_move_collider(sim, 0, 1, x, NULL)};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         ck_assert_int_eq(all[i], DRAPE_E_ARGUMENT);
+    ck_assert(report.level && report.attempts == 0);
     check_message(m->ctx, "drape_sim_move_collider: an observer must not call it while the sim advances");
     return DRAPE_OK;
 }
