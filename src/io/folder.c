@@ -20,6 +20,9 @@
 
 #define PART_PREFIX  ".drape-%016" PRIx64 "-"
 #define PREFIX_SIZE  (sizeof ".drape--" - 1 + 16)
+#define HEAD_START   "{\"manifest\":1,"
+#define HEAD_TOKEN   "\"token\":\"%016" PRIx64 "\"}"
+#define HEAD_SIZE    200
 #define MAX_MANIFEST ((off_t)1 << 30)
 #define ADVICE       "name another folder, or move the file away"
 
@@ -427,11 +430,30 @@ static bool is_part(const drape_folder *f, const char *name)
     return false;
 }
 
+/* Whether it is a manifest that a run which was killed had not put into its place yet, so that its token
+ * stands nowhere else: empty, or its head has the token of its name. */
+static bool is_lost_manifest(const drape_folder *f, const char *name)
+{
+    uint64_t token;
+    char part[DRAPE_PART_SIZE], head[HEAD_SIZE], end[64];
+    if (sscanf(name, ".drape-%16" SCNx64, &token) != 1)
+        return false;
+    snprintf(part, sizeof part, PART_PREFIX "0" DRAPE_FILE_PART, token);
+    const int fd = strcmp(name, part) == 0 ? drape_folder_open_file(f, name, O_RDONLY) : -1;
+    if (fd < 0)
+        return false;
+    const ssize_t count = read(fd, head, sizeof head - 1);
+    close(fd);
+    head[count > 0 ? count : 0] = 0;
+    snprintf(end, sizeof end, HEAD_TOKEN "\n", token);
+    return count == 0 || (strncmp(head, HEAD_START, strlen(HEAD_START)) == 0 && strstr(head, end));
+}
+
 static drape_status remove_one(drape_folder *f, const char *name, const void *user)
 {
     const claims *c = user;
     struct stat info;
-    const bool part = c->writes == NULL && !f->shared && is_part(f, name);
+    const bool part = c->writes == NULL && !f->shared && (is_part(f, name) || is_lost_manifest(f, name));
     if (!part && !(c->clears && c->clears(c->user, name)))
         return DRAPE_OK;
     if (!part && (why_not_ours(f, name, &info) || is_input(f, &info)))
@@ -494,9 +516,8 @@ drape_status drape_folder_note_growing(drape_folder *f, const char *name, int fd
 
 static drape_status put_head(drape_folder *f)
 {
-    char line[200];
-    snprintf(line, sizeof line, "{\"manifest\":1,\"drape\":\"%.100s\",\"token\":\"%016" PRIx64 "\"}",
-             drape_version(), f->token);
+    char line[HEAD_SIZE];
+    snprintf(line, sizeof line, HEAD_START "\"drape\":\"%.100s\"," HEAD_TOKEN, drape_version(), f->token);
     return add_line(f, line, false);
 }
 

@@ -158,6 +158,20 @@ def test_kill():
     equal([name for name in os.listdir("out") if name.startswith(".") or name.endswith(".obj")], [])
 
 
+def test_lost_manifest():
+    """the manifest that a killed run had not put into its place is removed, in a new folder, too; what only has its name stays"""
+    names = [f".drape-{digit * 16}-0.part" for digit in "1234"]
+    texts = ["", f'{{"manifest":1,"drape":"0.1.0","token":"{"2" * 16}"}}\n', f'{{"manifest":1,"drape":"0.1.0","token":"{"2" * 16}"}}\n', "of the user"]
+    write_scene()
+    for again in False, True:
+        if not again:
+            os.makedirs("out")
+        for name, text in zip(names, texts):
+            put(os.path.join("out", name), text)
+        good(*RUN, "npy")
+        equal(sorted(name for name in os.listdir("out") if name.startswith(".")), names[2:])
+
+
 def test_lock():
     """a second run into a folder is refused while the first one writes; a killed run leaves no lock"""
     write_scene(duration=1e5)
