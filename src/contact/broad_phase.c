@@ -439,6 +439,7 @@ static double square_of_edge(const drape_model *m, const drape_broad_query *want
     return largest;
 }
 
+/* All nodes, and the clusters by which list_near passes over most of them. */
 static scanned_cloth all_cloth(drape_broad_phase *s, const drape_broad_query *want)
 {
     double largest = 0;

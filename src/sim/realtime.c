@@ -345,12 +345,11 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
 {
     drape_realtime report = {.level = "full", .residual = NAN, .error = NAN, .error_bound = NAN};
     double start = drape_clock_seconds();
+    if (out)
+        *out = report; /* of a call that is refused */
     drape_status guarded = drape_sim_guard(sim, "drape_sim_advance_realtime");
-    if (guarded) {
-        if (out)
-            *out = report;
+    if (guarded)
         return guarded;
-    }
     sim->ctx->message[0] = 0;
     drape_status status = check_arguments(sim, frame_dt, budget);
     sim->advancing = true;
