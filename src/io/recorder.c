@@ -31,7 +31,7 @@ struct drape_recorder {
     drape_context *ctx;
     drape_arena arena;
     drape_sim *sim;
-    const drape_model *model; /* whole */
+    const drape_model *model; /* whole, with the pins of the start: one with others does not outlive them */
     const drape_ranks *ranks; /* that share the model; NULL: none. Rank 0 writes all files */
     bool writes;              /* this process does */
     double *gathered; /* (node_count x 3, three times if fields are wanted, else once) of the whole model,
@@ -122,7 +122,7 @@ static const double *rotate(const double *from, size_t count, double *to)
 /* The fields at the nodes and triangles of the surface. */
 static void show_fields(drape_recorder *r, drape_frame *frame)
 {
-    const drape_model *model = r->model;
+    const drape_model *model = drape_model_whole(r->sim->model);
     const size_t nodes = (size_t)model->surface.node_count, triangles = (size_t)model->surface.triangle_count;
     double *velocities = r->shown, *density = velocities + 3 * nodes, *strain = density + nodes;
     drape_render_values(model, frame->velocities, 3, velocities);
@@ -132,13 +132,14 @@ static void show_fields(drape_recorder *r, drape_frame *frame)
     frame->velocities = velocities;
     frame->strain = strain;
     frame->energy_density = density;
+    drape_render_pinned(model, r->pinned);
     frame->pinned = r->pinned;
 }
 
 /* Adds the fields to the frame, if a format wants any; their density of energy is there already. */
 static void add_fields(drape_recorder *r, const double *velocities, drape_frame *frame)
 {
-    const drape_model *model = r->model;
+    const drape_model *model = drape_model_whole(r->sim->model);
     if (!r->fields)
         return;
     double *density = r->fields, *strain = density + model->node_count;
@@ -442,7 +443,7 @@ static drape_status observe(void *user, const drape_event *event)
 static drape_export_def def_of(const drape_sim *sim)
 {
     const double counted = drape_model_duration(sim->model) * sim->frame_rate;
-    return (drape_export_def){.model = drape_model_whole(sim->model),
+    return (drape_export_def){.model = drape_model_whole(drape_sim_base_model(sim)),
                               .frame_rate = sim->frame_rate,
                               .most_frames = counted < MAX_FRAMES ? (int64_t)counted + 3 : MAX_FRAMES};
 }
@@ -502,7 +503,6 @@ static drape_status allocate_surface(drape_recorder *r)
     if (drape_arena_status(&r->arena) || !r->fields)
         return drape_arena_status(&r->arena);
     drape_render_triangles(model, r->shown_triangle);
-    drape_render_pinned(model, r->pinned);
     return DRAPE_OK;
 }
 
@@ -758,7 +758,7 @@ static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recor
     r->ctx = ctx;
     r->arena = drape_arena_of(ctx);
     r->sim = sim;
-    r->model = drape_model_whole(sim->model);
+    r->model = drape_model_whole(drape_sim_base_model(sim));
     r->ranks = drape_model_ranks(sim->model);
     r->writes = !r->ranks || r->ranks->rank == 0;
     scope s = scope_enter();

@@ -7,10 +7,12 @@ import csv
 import json
 import os
 import re
+import shutil
 import struct
 import subprocess
 import sys
 import tempfile
+import time
 import traceback
 
 SOURCES = sys.argv[2] if len(sys.argv) > 2 else os.environ.get("DRAPE_SOURCE", os.path.dirname(__file__) + "/../..")
@@ -73,6 +75,22 @@ def refused(*args, says="", **options):
     assert says in result.stderr, f"{args}: {says!r} is not in {result.stderr!r}"
     equal(sorted(os.listdir(".")), before, "files after " + " ".join(args))
     return result.stderr
+
+
+def signalled(one, path, *args):
+    """A run of scene.json into the folder out that receives a signal once a file is there. Returns the exit code. A run that was complete by then
+    is repeated: on a busy machine this process may sleep for longer than the run takes."""
+    for _ in range(20):
+        shutil.rmtree("out", ignore_errors=True)
+        with subprocess.Popen([PROGRAM, "run", "scene.json", "--out", "out", *args], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            end = time.monotonic() + LIMIT
+            while not os.path.exists(path) and process.poll() is None and time.monotonic() < end:
+                time.sleep(0.002)
+            process.send_signal(one)
+            process.wait(timeout=LIMIT)
+        if process.returncode:
+            break
+    return process.returncode
 
 
 def read_json(path):

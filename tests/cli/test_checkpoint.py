@@ -4,13 +4,13 @@ with the files of an undisturbed run; a checkpoint of another run is refused, an
 import hashlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
-import time
 
-from program import LIMIT, PROGRAM, SOURCES, drape, equal, good, read_json, read_npy, refused, run_tests, write_scene
+from program import LIMIT, PROGRAM, SOURCES, drape, equal, good, read_json, read_npy, refused, run_tests, signalled, write_scene
 
 ALL = "npy,obj,ply,vtp,pc2,glb,usd"
 
@@ -36,16 +36,9 @@ def same(one, other):
     assert not different, f"{one} and {other} differ in {different}"
 
 
-def stopped(kind, *args):
-    """A run that receives a signal after its first checkpoint."""
-    with subprocess.Popen([PROGRAM, "run", "scene.json", "--checkpoint-every", "1", *args], stdout=subprocess.PIPE,
-                          stderr=subprocess.PIPE, text=True) as process:
-        end = time.monotonic() + LIMIT
-        while not os.path.exists("out/checkpoint.drape") and time.monotonic() < end:
-            time.sleep(0.005)
-        process.send_signal(kind)
-        process.communicate(timeout=LIMIT)
-    return process.returncode
+def stopped(kind):
+    """A run with all formats that receives a signal after its first checkpoint. Returns the exit code."""
+    return signalled(kind, "out/checkpoint.drape", "--format", ALL, "--checkpoint-every", "1")
 
 
 def test_kills():
@@ -61,7 +54,7 @@ def test_interrupted():
     """Ctrl-C leaves a checkpoint of the moment; the last frame of an interrupted run is not in the resumed one"""
     write_scene(duration=2, frame_rate=50, integrator={"dt": 0.0005})
     good("run", "scene.json", "--out", "whole", "--format", ALL)
-    equal(stopped(signal.SIGINT, "--out", "out", "--format", ALL), 130)
+    equal(stopped(signal.SIGINT), 130)
     part = read_json("out/summary.json")
     assert part["status"] == "e_stopped" and part["time"] < 2, part
     good("run", "scene.json", "--out", "out", "--format", ALL, "--resume", "--threads", "2")
@@ -82,7 +75,7 @@ def test_bodies():
             {"type": "plane", "point": [0, -9, 0], "normal": [0, 1, 0]},
             {"type": "animated_mesh", "file": scenes + "limb.npy", "mesh": scenes + "limb.obj", "frame_rate": 8, "track": [[0, [9, -5, 0]]]}])
     good("run", "scene.json", "--out", "whole", "--format", ALL)
-    equal(stopped(signal.SIGINT, "--out", "out", "--format", ALL), 130)
+    equal(stopped(signal.SIGINT), 130)
     assert read_json("out/summary.json")["time"] < 2
     good("run", "scene.json", "--out", "out", "--format", ALL, "--resume")
     same("whole", "out")
@@ -115,10 +108,41 @@ def test_events():
     good("run", "scene.json", "--out", "whole", "--format", ALL)
     message = read_json("whole/summary.json")["message"]
     assert "stopped by event" in message, message
-    equal(stopped(signal.SIGINT, "--out", "out", "--format", ALL), 130)
+    equal(stopped(signal.SIGINT), 130)
     for _ in range(2):
         good("run", "scene.json", "--out", "out", "--format", ALL, "--resume")
         same("whole", "out")
+
+
+def pinned_nodes(path):
+    """The nodes that a .vtp file says are pinned."""
+    with open(path, "rb") as file:
+        data = file.read()
+    offset = int(re.search(rb'Name="pinned" NumberOfComponents="1" format="appended" offset="(\d+)"', data).group(1))
+    begin = data.index(b"\n_") + 2 + offset
+    size = int.from_bytes(data[begin:begin + 8], "little")
+    return [node for node, pinned in enumerate(data[begin + 8:begin + 8 + size]) if pinned]
+
+
+def test_two_releases():
+    """a run that was interrupted between two releases of pins has, when resumed, the same files, and frames say which nodes are pinned at their time"""
+    write_scene(duration=0.6, frame_rate=50, integrator={"dt": 0.0005}, pins=[{"name": name, "corner": f"top-{name}"} for name in ("left", "right")],
+                events=[{"type": "height", "height": height, "action": "release", "pins": name} for name, height in (("right", -0.2605), ("left", -0.27))])
+    good("run", "scene.json", "--out", "whole", "--format", ALL)
+    first, second = (event["occurrences"][0]["time"] for event in read_json("whole/summary.json")["events"])
+    assert 0.2 < first < 0.3 < second < 0.5, (first, second)
+    nodes = pinned_nodes("whole/frame_000000.vtp")
+    equal(len(nodes), 2)
+    for frame in range(31):
+        equal(pinned_nodes(f"whole/frame_{frame:06}.vtp"), nodes[:(frame / 50 <= first) + (frame / 50 <= second)], f"frame {frame}")
+    for _ in range(20):  # this process may be late
+        equal(signalled(signal.SIGINT, f"out/frame_{int(50 * first) + 1:06}.vtp", "--format", ALL, "--checkpoint-every", "1"), 130)
+        if first < read_json("out/summary.json")["time"] < second:
+            break
+    else:
+        raise AssertionError("no run was interrupted between the events")
+    good("run", "scene.json", "--out", "out", "--format", ALL, "--resume")
+    same("whole", "out")
 
 
 def test_without_output_formats():
@@ -155,7 +179,7 @@ def test_damaged_when_finished():
 def test_refused():
     """a checkpoint of another scene, damaged, or beside other files: exit 2, one line, and nothing is touched"""
     write_scene(duration=1, integrator={"dt": 0.0005})
-    equal(stopped(signal.SIGKILL, "--out", "out", "--format", ALL), -signal.SIGKILL)
+    equal(stopped(signal.SIGKILL), -signal.SIGKILL)
     shutil.copytree("out", "kept")
     run = ["run", "scene.json", "--out", "out", "--resume"]
 

@@ -6,11 +6,12 @@ import hashlib
 import os
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import time
 
-from program import PROGRAM, SOURCES, Skip, drape, equal, good, read_json, refused, run_tests, write_scene
+from program import PROGRAM, SOURCES, Skip, drape, equal, good, read_json, refused, run_tests, signalled, write_scene
 
 LIMIT = 60  # [s]
 MESH = SOURCES + "/tests/bad/good.obj"
@@ -215,12 +216,9 @@ def test_summary():
 def test_resume():
     """--resume names the file that was damaged since the checkpoint, and changes nothing"""
     write_scene(duration=2)
-    command = [*RUN, "npy,obj,vtp,pc2,glb,ply,usd", "--checkpoint-every", "1"]
-    with subprocess.Popen([PROGRAM, *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as child:
-        end = time.monotonic() + LIMIT
-        while not os.path.exists("out/frame_000009.obj") and time.monotonic() < end:
-            time.sleep(0.002)
-        child.kill()
+    options = ["--format", "npy,obj,vtp,pc2,glb,ply,usd", "--checkpoint-every", "1"]
+    command = ["run", "scene.json", "--out", "out", *options]
+    equal(signalled(signal.SIGKILL, "out/frame_000009.obj", *options), -signal.SIGKILL)
     shutil.copytree("out", "kept", symlinks=True)
     for name in ("frame_000001.obj", "frame_000002.vtp", "frame_000003.ply", "positions.obj", "positions.npy", "positions.pc2",
                  "positions.glb", "frames.pvd", "steps.csv", "energy.csv"):
@@ -235,9 +233,9 @@ def test_resume():
     os.rename("out/frame_000004.obj", "away")
     keeps("out", *command, "--resume", says='cannot continue "out/frame_000004.obj"')
     os.rename("away", "out/frame_000004.obj")
-    put("out/frame_000050.obj")
-    keeps("out", *command, "--resume", says='"out/frame_000050.obj" would be replaced')
-    os.remove("out/frame_000050.obj")
+    put("out/frame_000999.obj")
+    keeps("out", *command, "--resume", says='"out/frame_000999.obj" would be replaced')
+    os.remove("out/frame_000999.obj")
     good(*command, "--resume")
     good("run", "scene.json", "--out", "whole", "--format", "npy,obj,vtp,pc2,glb,ply,usd")
     resumed, whole = contents("out"), contents("whole")
@@ -254,8 +252,11 @@ def test_planted():
         end = time.monotonic() + LIMIT
         while not os.path.exists("out/frame_000002.obj") and time.monotonic() < end:
             time.sleep(0.002)
-        later = max(int(name[6:12]) for name in os.listdir("out") if name.startswith("frame_")) + 200
+        child.send_signal(signal.SIGSTOP)
+        os.waitpid(child.pid, os.WUNTRACED)
+        later = max(int(name[6:12]) for name in os.listdir("out") if name.startswith("frame_")) + 2
         put(f"out/frame_{later:06}.obj")
+        child.send_signal(signal.SIGCONT)
         _, errors = child.communicate(timeout=LIMIT)
     equal(child.returncode, 1, errors)
     assert re.fullmatch(rf'drape run: cannot write "out/frame_{later:06}.obj": a file of that name has appeared that Drape did not write\n', errors), errors
