@@ -537,7 +537,7 @@ drape_status drape_system_extend_pattern(drape_system *system, const drape_point
 static void evaluate_wind(drape_system *system, drape_request *want)
 {
     const drape_point *point = want->point;
-    if (!system->wind.field)
+    if (!drape_system_has_wind(system))
         return;
     drape_wind_evaluate(&system->wind, system->model->node_count, point->t, point->x, point->v,
                         want->hessian && !want->velocity);
@@ -943,7 +943,7 @@ static double gust_work(drape_system *system, const drape_term *term, const drap
         drape_point point = *nodes;
         drape_request want = {.point = &point, .momentum = true};
         point.t = wind->t;
-        if (system->wind.field) {
+        if (drape_system_has_wind(system)) {
             drape_wind_evaluate(&system->wind, system->model->node_count, wind->t, wind->x, nodes->v, false);
             want.against = system->wind.against;
         }
@@ -965,7 +965,7 @@ static double timed_work_here(drape_system *system, const drape_state *before, c
             work += timed_work(system, term, &from, &to);
         if (term->history && has_energy(system, term))
             work += history_work(system, term, &from, &to, open);
-        if (term->ops->kinetic && (term->history || system->wind.field))
+        if (term->ops->kinetic && (term->history || drape_system_has_wind(system)))
             work += gust_work(system, term, &from, &to);
         if (drape_term_turns(term)) {
             const double loss = dissipated ? turning_dissipation(system, term, &from, &to) : 0;

@@ -507,6 +507,43 @@ START_TEST(the_rest_goes_on)
 }
 END_TEST
 
+static void blow(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
+{
+    (void)user, (void)t, (void)x, (void)gradient;
+    for (int32_t i = 0; i < count; i++)
+        wind[3 * i + 2] = 5;
+}
+
+/* A sim in the wind goes through a model that does not feel it; again tells what is set after that. */
+static uint64_t through_calm(drape_wind_field *first, bool again, drape_wind_field *then)
+{
+    failing_allocator memory = {0};
+    changing c = open_changing(&memory, "be", hanging);
+    set(&c, "/cloth/0/terms/-", "\"drag.wind\"");
+    good(&c.h, drape_sim_change(c.h.sim, c.scene));
+    good(&c.h, drape_sim_set_wind(c.h.sim, first, NULL));
+    set(&c, "/cloth/0/terms/2", NULL);
+    good(&c.h, drape_sim_change(c.h.sim, c.scene));
+    advance(&c, 4 * FRAME);
+    set(&c, "/cloth/0/terms/-", "\"drag.wind\"");
+    good(&c.h, drape_sim_change(c.h.sim, c.scene));
+    if (again)
+        good(&c.h, drape_sim_set_wind(c.h.sim, then, NULL));
+    advance(&c, 4 * FRAME);
+    const uint64_t hash = drape_sim_hash(c.h.sim);
+    close_changing(&c, &memory);
+    return hash;
+}
+
+/* The wind goes on, also through a model without a term in it, where it does nothing. */
+START_TEST(wind_goes_on_through_a_model_without_it)
+{
+    const uint64_t kept = through_calm(blow, false, NULL);
+    ck_assert_uint_eq(kept, through_calm(NULL, true, blow));
+    ck_assert_uint_ne(kept, through_calm(blow, true, NULL));
+}
+END_TEST
+
 /* ---- Refusals ---- */
 
 static drape_status change_within(void *user, const drape_event *event)
@@ -592,4 +629,4 @@ SUITE("change", same_model_changes_nothing, supports_keep_their_velocities, with
       a_stiffer_cloth_has_the_energy_of_its_strain, goes_on_as_with_the_value_from_the_start,
       floors_come_and_go, a_moved_collider_stays_where_it_is, pins_come_and_go,
       made_pins_stay_through_a_change, checkpoint_after_a_change, the_rest_goes_on,
-      refusals_leave_the_sim_as_it_was, a_change_without_memory)
+      wind_goes_on_through_a_model_without_it, refusals_leave_the_sim_as_it_was, a_change_without_memory)
