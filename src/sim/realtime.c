@@ -282,6 +282,18 @@ static drape_status take_apart(drape_sim *sim)
 /* ---- The end of a call ---- */
 
 /* Time that was not covered is owed to the next call, or dropped. */
+/* What is so whether or not the call made a step. */
+static void report_present(const drape_sim *sim, drape_realtime *report)
+{
+    const drape_realtime_memory *m = &sim->realtime;
+    report->time = drape_sim_state(sim)->t;
+    report->debt = m->debt;
+    report->behind = m->behind;
+    report->error_bound = drape_sim_error_bound(sim);
+    report->inaccurate_total = m->inaccurate;
+    report->dropped_total = m->dropped;
+}
+
 static void settle(drape_sim *sim, double goal, const drape_catch_up *rates, drape_realtime *report)
 {
     drape_realtime_memory *m = &sim->realtime;
@@ -293,18 +305,13 @@ static void settle(drape_sim *sim, double goal, const drape_catch_up *rates, dra
     drape_sim_fall_behind(sim, rates, left, report->dropped);
     m->stretched = report->h > (1 + SAME) * m->dt || m->debt > 0;
     bound_steps(m, report);
-    report->time = drape_sim_state(sim)->t;
-    report->debt = m->debt;
-    report->error_bound = drape_sim_error_bound(sim);
     count_crossings(sim, m->unchecked || lets_cloth_pass(sim));
     m->crossed += m->crossings > 0;
-    report->behind = m->behind;
     report->crossings = m->crossings;
     report->accurate = report->h > 0 && report->held == 0 && report->crossings == 0 &&
                        !(report->error > report->error_bound);
     m->inaccurate += !report->accurate;
-    report->inaccurate_total = m->inaccurate;
-    report->dropped_total = m->dropped;
+    report_present(sim, report);
 }
 
 static const char *level_name(const drape_sim *sim)
@@ -345,6 +352,8 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
 {
     drape_realtime report = {.level = "full", .residual = NAN, .error = NAN, .error_bound = NAN};
     double start = drape_clock_seconds();
+    if (sim)
+        report_present(sim, &report);
     if (out)
         *out = report; /* of a call that is refused */
     drape_status guarded = drape_sim_guard(sim, "drape_sim_advance_realtime");
