@@ -705,14 +705,16 @@ static drape_status agree(const drape_contact *c, drape_status status)
 
 /* What changes between steps are the laws of contacts: which cloth is relaxed and how hard it is pushed,
  * activation distances, which pairs are inside, the stiffness. What that adds to the energy of the present
- * contacts, or takes from it, is the work of whoever presses. */
+ * contacts, or takes from it, is the work of whoever presses. That energy is the one between steps, in which
+ * cloth that was placed into a body is not a barrier that has been passed. */
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
     const double start = drape_clock_seconds();
-    c->between_steps = false;
     const drape_contact_at at = {.x = x, .v = v, .t = t, .span = {t, t}};
+    c->between_steps = c->begun && !drape_contact_has_begun(c, x, t);
     drape_status status = agree(c, drape_contact_update(c, &at));
     const double before = status ? 0 : drape_contact_potential(c);
+    c->between_steps = false;
     if (!status)
         status = update_relaxed(c, &at);
     c->ahead_t = NAN;

@@ -20,7 +20,7 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
         return DRAPE_OK;
     drape_status status =
         /* otherwise the last step has begun there */
-        sim->before < 0 ? drape_system_begin_reading(sim->system, s) : DRAPE_OK;
+        sim->before < 0 ? drape_sim_begin_reading(sim) : DRAPE_OK;
     if (status)
         return status;
     double *g = drape_alloc(sim->ctx, (size_t)m->node_count, 3 * sizeof *g);

@@ -330,6 +330,13 @@ void drape_sim_add_contact_work(drape_sim *sim)
     sim->energy.contact += work;
 }
 
+drape_status drape_sim_begin_reading(drape_sim *sim)
+{
+    const drape_status status = drape_system_begin_reading(sim->system, drape_sim_state(sim));
+    drape_sim_add_contact_work(sim);
+    return status;
+}
+
 void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
 {
     drape_audit *audit = &sim->audit;

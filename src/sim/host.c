@@ -346,7 +346,7 @@ static drape_status place(drape_sim *sim, drape_point *point)
                            .span = {before, now->t},
                            .instant = !sim->chosen.integrator->mean_velocities};
     /* otherwise the last step has begun there */
-    return sim->before < 0 ? drape_system_begin_reading(sim->system, now) : DRAPE_OK;
+    return sim->before < 0 ? drape_sim_begin_reading(sim) : DRAPE_OK;
 }
 
 /* A pending request to cancel the next advance is not an error of reading. */

@@ -84,6 +84,7 @@ static drape_status integrate(drape_sim *sim, drape_state *next, double h, drape
     const bool instant = !integrator->mean_velocities && integrator->own_steps;
     const drape_state *from = integrator->in_space ? now : drape_system_to_frame(sim->system, now);
     const drape_status status = integrator->step(sim->integrator, from, next, h, info);
+    info->pin_work += drape_system_take_contact_work(sim->system); /* of steps that it has begun within */
     drape_system_from_frame(sim->system, status && !info->usable ? NULL : next);
     if (status && !info->usable)
         return status;
