@@ -31,7 +31,7 @@ struct drape_recorder {
     drape_context *ctx;
     drape_arena arena;
     drape_sim *sim;
-    const drape_model *model; /* whole, with the pins of the start: one with others does not outlive them */
+    const drape_model *model; /* whole, with the pins of the start; the sim's own is freed when pins change */
     const drape_ranks *ranks; /* that share the model; NULL: none. Rank 0 writes all files */
     bool writes;              /* this process does */
     double *gathered; /* (node_count x 3, three times if fields are wanted, else once) of the whole model,

@@ -281,7 +281,6 @@ static drape_status take_apart(drape_sim *sim)
 
 /* ---- The end of a call ---- */
 
-/* Time that was not covered is owed to the next call, or dropped. */
 /* What is so whether or not the call made a step. */
 static void report_present(const drape_sim *sim, drape_realtime *report)
 {
@@ -294,6 +293,7 @@ static void report_present(const drape_sim *sim, drape_realtime *report)
     report->dropped_total = m->dropped;
 }
 
+/* Time that was not covered is owed to the next call, or dropped. */
 static void settle(drape_sim *sim, double goal, const drape_catch_up *rates, drape_realtime *report)
 {
     drape_realtime_memory *m = &sim->realtime;
