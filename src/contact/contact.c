@@ -645,8 +645,13 @@ static bool is_retry(const drape_contact *c)
 
 bool drape_contact_has_begun(const drape_contact *c, const double *x, double t)
 {
-    const bool same =
+    bool same =
         c->begun && c->start_t == t && memcmp(c->start, x, 3 * (size_t)c->model->node_count * sizeof *x) == 0;
+    for (int32_t i = 0; same && i < c->model->collider_count; i++) {
+        drape_collider_pose pose;
+        drape_motion_pose(c->motion, i, t, t, &pose);
+        same = !drape_pose_differs(&c->start_pose[i], &pose);
+    }
     return drape_ranks_all(c->ranks, same);
 }
 

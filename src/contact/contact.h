@@ -74,7 +74,8 @@ double drape_contact_longest_path(const drape_contact *contact);
  * the step is compared with it. The arrays are copied. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_begin(drape_contact *contact, const double *x, const double *v, double t);
 
-/* Whether the last step has begun with the nodes at x (node_count x 3) at time t. */
+/* Whether the last step has begun with the nodes at x (node_count x 3) at time t, and with the colliders
+ * where they are then. */
 bool drape_contact_has_begun(const drape_contact *contact, const double *x, double t);
 
 /* The relaxed nodes, and what became of the cloth so far at each collider (contact/relaxed.h). */

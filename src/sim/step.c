@@ -84,7 +84,8 @@ static drape_status integrate(drape_sim *sim, drape_state *next, double h, drape
     const bool instant = !integrator->mean_velocities && integrator->own_steps;
     const drape_state *from = integrator->in_space ? now : drape_system_to_frame(sim->system, now);
     const drape_status status = integrator->step(sim->integrator, from, next, h, info);
-    info->pin_work += drape_system_take_contact_work(sim->system); /* of steps that it has begun within */
+    info->law_work = drape_system_take_contact_work(sim->system);
+    info->pin_work += info->law_work;
     drape_system_from_frame(sim->system, status && !info->usable ? NULL : next);
     if (status && !info->usable)
         return status;
@@ -105,8 +106,9 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     drape_system_expect(sim->system, t1, may_relax(sim));
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
     drape_sim_add_contact_work(sim);
-    if (drape_system_contact(sim->system) && !sim->chosen.integrator->own_steps)
-        drape_sim_energy(sim); /* for the check, while contact is where the step begins */
+    if (drape_system_contact(sim->system) &&
+        (sim->chosen.integrator->steady_state || !sim->chosen.integrator->own_steps))
+        drape_sim_energy(sim); /* for the check, or a rejection, while contact is where the step begins */
     if (!status)
         status = integrate(sim, next, h, info);
     sim->solved_at = drape_clock_seconds();
@@ -254,6 +256,9 @@ static void count_reason(drape_sim *sim, const char *reason)
  * which there are no more frames. */
 static void reject(drape_sim *sim, const drape_step_info *info)
 {
+    const drape_energy before = sim->energy;
+    if (info->law_work != 0) /* the laws stay, and give the present state another energy */
+        drape_sim_shift_energy(sim, &before);
     if (sim->before == sim->next && !sim->chosen.integrator->steady_state)
         sim->before = -1;
     sim->statistics.steps_rejected++;

@@ -224,7 +224,7 @@ static drape_status place(host *h, drape_sim *sim, const args *a)
     const int32_t first = 0;
     if (a->choice & 1) {
         def.cloths = &first;
-        def.cloth_count = 1;
+        def.cloth_count = a->choice & 8 ? 0 : 1;
     }
     if (a->choice & 2)
         def.collider_count = 0;
