@@ -18,9 +18,7 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
             sim->chosen.integrator->entry.name);
     if (!drape_system_contact(sim->system))
         return DRAPE_OK;
-    drape_status status =
-        /* otherwise the last step has begun there */
-        sim->before < 0 ? drape_sim_begin_reading(sim) : DRAPE_OK;
+    const drape_status status = drape_sim_begin_reading(sim);
     if (status)
         return status;
     double *g = drape_alloc(sim->ctx, (size_t)m->node_count, 3 * sizeof *g);

@@ -332,6 +332,8 @@ void drape_sim_add_contact_work(drape_sim *sim)
 
 drape_status drape_sim_begin_reading(drape_sim *sim)
 {
+    if (sim->before >= 0)
+        return DRAPE_OK;
     const drape_status status = drape_system_begin_reading(sim->system, drape_sim_state(sim));
     drape_sim_add_contact_work(sim);
     return status;

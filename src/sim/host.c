@@ -345,8 +345,7 @@ static drape_status place(drape_sim *sim, drape_point *point)
                            .t = now->t,
                            .span = {before, now->t},
                            .instant = !sim->chosen.integrator->mean_velocities};
-    /* otherwise the last step has begun there */
-    return sim->before < 0 ? drape_sim_begin_reading(sim) : DRAPE_OK;
+    return drape_sim_begin_reading(sim);
 }
 
 /* A pending request to cancel the next advance is not an error of reading. */

@@ -211,8 +211,9 @@ void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *densit
  * or not the step is accepted. */
 void drape_sim_add_contact_work(drape_sim *sim);
 
-/* For forces in the present state, where no step has led to it: drape_system_begin_reading, with the work of
- * the laws of contact that it changes in the account. Errors: DRAPE_E_MEMORY. */
+/* For forces in the present state: where no step has led to it, drape_system_begin_reading, with the work of
+ * the laws of contact that it changes in the account; otherwise the last step has begun for them already.
+ * Errors: DRAPE_E_MEMORY. */
 drape_status drape_sim_begin_reading(drape_sim *sim);
 
 /* Adds the work of an accepted step to the energy account. */
