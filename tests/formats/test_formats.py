@@ -11,11 +11,10 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, os.path.join(HERE, "..", "cli"))
-from program import LIMIT, PROGRAM, Skip, run_tests  # noqa: E402  pylint: disable=wrong-import-position
+from program import LIMIT, PROGRAM, Skip, equal, run_tests, signalled  # noqa: E402  pylint: disable=wrong-import-position
 
 PYTHON = "/usr/bin/python3"  # Debian's python3, for which its packages are made
 FORMATS = "npy,obj,ply,vtp,pc2,glb,usd"
@@ -182,22 +181,11 @@ def test_z_up():
         pass
 
 
-def kill_after(frames, *args):
-    """A run that is killed after a number of frames."""
-    with open("scene.json", "w", encoding="utf-8") as file:
-        json.dump(SCENE, file)
-    with subprocess.Popen([PROGRAM, "run", "scene.json", "--out", "out", "--format", FORMATS, "--duration", "200", *args],
-                          stdout=subprocess.DEVNULL) as process:
-        end = time.monotonic() + LIMIT
-        while not os.path.exists(f"out/frame_{frames:06d}.vtp") and process.poll() is None and time.monotonic() < end:
-            time.sleep(0.002)
-        process.send_signal(signal.SIGKILL)
-    assert process.returncode == -signal.SIGKILL, process.returncode
-
-
 def test_killed():
     """a killed run leaves readable files with all frames so far"""
-    kill_after(12)
+    with open("scene.json", "w", encoding="utf-8") as file:
+        json.dump(SCENE, file)
+    equal(signalled(signal.SIGKILL, "out/frame_000012.vtp", "--format", FORMATS, "--duration", "200"), -signal.SIGKILL)
     done = 0
     for check in (lambda: read_numpy("out", "y", "killed"), lambda: read_vtk("out", "y", "killed"), lambda: validate_gltf("out")):
         try:

@@ -127,7 +127,7 @@ typedef struct watch {
     int attempts, max_attempts;
 } watch;
 
-static void check_finite(const drape_sim *sim, const char *when)
+void fuzz_check_finite(const drape_sim *sim, const char *when)
 {
     const size_t n = 3 * (size_t)drape_model_node_count(drape_sim_model(sim));
     FUZZ_REQUIRE(isfinite(drape_sim_time(sim)) && drape_all_finite(drape_sim_positions(sim), n) &&
@@ -142,7 +142,7 @@ static void check_attempt(watch *w, const drape_event *event)
     FUZZ_REQUIRE(a->reason && *a->reason, "attempt %lld", (long long)a->index);
     FUZZ_REQUIRE(a->accepted || hash == w->accepted, "attempt %lld was rejected (%s)", (long long)a->index,
                  a->reason);
-    check_finite(event->sim, a->reason);
+    fuzz_check_finite(event->sim, a->reason);
     w->accepted = hash;
     w->attempts++;
 }
@@ -187,7 +187,7 @@ static void allow(drape_sim *sim, double seconds)
 drape_status fuzz_advance(drape_context *ctx, drape_sim *sim, double t, int attempts, double seconds)
 {
     watch w = {.accepted = drape_sim_hash(sim), .max_attempts = attempts};
-    check_finite(sim, "before");
+    fuzz_check_finite(sim, "before");
     FUZZ_REQUIRE(drape_sim_observe(sim, look, &w) == DRAPE_OK, "%s", drape_context_message(ctx));
     allow(sim, seconds);
     const drape_status status = drape_sim_advance(sim, t);
@@ -195,10 +195,23 @@ drape_status fuzz_advance(drape_context *ctx, drape_sim *sim, double t, int atte
     allow(NULL, 0);
     FUZZ_REQUIRE(delay <= SOON, "a cancelled advance continued for %g s of CPU", delay);
     fuzz_check(ctx, status, "drape_sim_advance");
-    check_finite(sim, drape_status_name(status));
+    fuzz_check_finite(sim, drape_status_name(status));
     FUZZ_REQUIRE(drape_sim_hash(sim) == w.accepted, "after %d attempts: %s: %s", w.attempts,
                  drape_status_name(status), drape_context_message(ctx));
     return status;
+}
+
+drape_status fuzz_keep(void *user, const void *piece, size_t size)
+{
+    fuzz_saved *s = user;
+    if (s->size + size > s->room) {
+        s->room = 2 * (s->size + size);
+        s->data = realloc(s->data, s->room);
+        FUZZ_REQUIRE(s->data, "no memory for %zu bytes", s->room);
+    }
+    memcpy(s->data + s->size, piece, size);
+    s->size += size;
+    return DRAPE_OK;
 }
 
 /* ---- Scenes ---- */

@@ -57,6 +57,18 @@ double fuzz_magnitude(fuzz_bytes *bytes, double low, double high); /* the same i
  * for each sim. */
 drape_status fuzz_advance(drape_context *ctx, drape_sim *sim, double t, int attempts, double seconds);
 
+/* Checks that the time, the positions and the velocities of a sim are finite; when: for the message. */
+void fuzz_check_finite(const drape_sim *sim, const char *when);
+
+/* A checkpoint in memory; data is to be freed. */
+typedef struct fuzz_saved {
+    uint8_t *data;
+    size_t size, room;
+} fuzz_saved;
+
+/* For drape_sim_save_to: adds to the fuzz_saved that user is. */
+drape_status fuzz_keep(void *user, const void *piece, size_t size);
+
 /* Parses and compiles a text; NULL if it was refused. Checks that the printed scene compiles too. */
 drape_model *fuzz_scene(drape_context *ctx, const uint8_t *data, size_t size);
 

@@ -32,22 +32,7 @@ static const char sheet[] =
     "\"integrator\": {\"method\": \"be\", \"dt\": 0.01}, \"controller\": {\"type\": \"halving\"},"
     "\"duration\": 1, \"frame_rate\": 60}";
 
-typedef struct bytes {
-    uint8_t *data;
-    size_t size;
-} bytes;
-
-static drape_status keep(void *user, const void *piece, size_t size)
-{
-    bytes *b = user;
-    b->data = realloc(b->data, b->size + size);
-    FUZZ_REQUIRE(b->data, "no memory for %zu bytes", b->size + size);
-    memcpy(b->data + b->size, piece, size);
-    b->size += size;
-    return DRAPE_OK;
-}
-
-static void change(bytes *b, fuzz_bytes *in)
+static void change(fuzz_saved *b, fuzz_bytes *in)
 {
     static const double odd[] = {NAN, INFINITY, -1, 0, 1e300, 1e-300, -1e9, 0.5};
     static const int64_t whole[] = {-1, 0, 1, INT32_MAX, INT32_MIN, INT64_MAX, INT64_MIN, 64};
@@ -71,7 +56,7 @@ static void change(bytes *b, fuzz_bytes *in)
         b->size = at + TAIL;
 }
 
-static void make_right(bytes *b)
+static void make_right(fuzz_saved *b)
 {
     const uint64_t length = b->size - TAIL;
     memcpy(b->data + b->size - TAIL, &length, sizeof length);
@@ -79,7 +64,7 @@ static void make_right(bytes *b)
     memcpy(b->data + b->size - sizeof sum, &sum, sizeof sum);
 }
 
-static void restore(drape_context *ctx, drape_sim *sim, const bytes *b)
+static void restore(drape_context *ctx, drape_sim *sim, const fuzz_saved *b)
 {
     const uint64_t before = drape_sim_hash(sim);
     const drape_status status = drape_sim_restore_from(sim, b->data, b->size);
@@ -94,7 +79,7 @@ static void restore(drape_context *ctx, drape_sim *sim, const bytes *b)
 #define MAX_INTEGRATORS 32
 
 static drape_model *model_made;
-static bytes checkpoint_of[MAX_INTEGRATORS];
+static fuzz_saved checkpoint_of[MAX_INTEGRATORS];
 static unsigned integrator_count;
 
 static drape_sim *open_sim(drape_context *ctx, unsigned integrator)
@@ -120,15 +105,15 @@ static void make_checkpoints(void)
         FUZZ_REQUIRE(integrator_count < MAX_INTEGRATORS, "%u integrators", integrator_count);
         drape_sim *sim = open_sim(ctx, integrator_count);
         FUZZ_REQUIRE(drape_sim_advance(sim, 3 * STEP) == DRAPE_OK, "%s", drape_context_message(ctx));
-        FUZZ_REQUIRE(drape_sim_save_to(sim, keep, &checkpoint_of[integrator_count]) == DRAPE_OK, "%s",
+        FUZZ_REQUIRE(drape_sim_save_to(sim, fuzz_keep, &checkpoint_of[integrator_count]) == DRAPE_OK, "%s",
                      drape_context_message(ctx));
         drape_sim_destroy(&sim);
     }
 }
 
-static bytes copy(const bytes *from)
+static fuzz_saved copy(const fuzz_saved *from)
 {
-    bytes b = {malloc(from->size), from->size};
+    fuzz_saved b = {.data = malloc(from->size), .size = from->size};
     FUZZ_REQUIRE(b.data, "no memory for %zu bytes", b.size);
     memcpy(b.data, from->data, b.size);
     return b;
@@ -140,7 +125,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     drape_context *ctx = fuzz_open(MAX_MEMORY);
     fuzz_bytes in = {.at = data, .end = data + size};
     const unsigned integrator = fuzz_below(&in, integrator_count);
-    bytes b = copy(&checkpoint_of[integrator]);
+    fuzz_saved b = copy(&checkpoint_of[integrator]);
     drape_sim *sim = open_sim(ctx, integrator);
     FUZZ_REQUIRE(drape_sim_advance(sim, STEP) == DRAPE_OK, "%s", drape_context_message(ctx));
     for (int i = 0; i < CHANGES && in.at < in.end; i++)

@@ -98,8 +98,7 @@ static const char *const changes[][3] = {
 /* ---- The host ---- */
 
 typedef struct checkpoint {
-    uint8_t *data;
-    size_t size, room;
+    fuzz_saved bytes; /* without data: there is none */
     uint64_t hash;
     int events; /* that the host had added */
     int changes;
@@ -113,7 +112,7 @@ typedef struct host {
     drape_model *twin_model;
     drape_sim *twin; /* NULL: none */
     drape_sim_def def;
-    checkpoint saved; /* without data: none */
+    checkpoint saved;
     int events, changes;
     bool windy, refused; /* refused: the scene is not that of the sim, as its last change was */
 } host;
@@ -413,14 +412,6 @@ static const struct {
 };
 #define CALLS (sizeof calls / sizeof *calls)
 
-static void check_finite(const drape_sim *sim, const char *when)
-{
-    const size_t n = 3 * (size_t)drape_model_node_count(drape_sim_model(sim));
-    FUZZ_REQUIRE(isfinite(drape_sim_time(sim)) && drape_all_finite(drape_sim_positions(sim), n) &&
-                     drape_all_finite(drape_sim_velocities(sim), n),
-                 "after %s, at t = %g", when, drape_sim_time(sim));
-}
-
 static drape_status do_once(host *h, drape_sim *sim, unsigned k, const args *a)
 {
     const uint64_t before = drape_sim_hash(sim);
@@ -428,7 +419,7 @@ static drape_status do_once(host *h, drape_sim *sim, unsigned k, const args *a)
     fuzz_check(h->ctx, status, calls[k].name);
     FUZZ_REQUIRE(!status || calls[k].advances || drape_sim_hash(sim) == before, "%s: %s", calls[k].name,
                  drape_context_message(h->ctx));
-    check_finite(sim, calls[k].name);
+    fuzz_check_finite(sim, calls[k].name);
     return status;
 }
 
@@ -464,19 +455,6 @@ static void change_scene(host *h, const args *a)
 
 /* ---- Checkpoints ---- */
 
-static drape_status keep(void *user, const void *piece, size_t size)
-{
-    checkpoint *c = user;
-    if (c->size + size > c->room) {
-        c->room = 2 * (c->size + size);
-        c->data = realloc(c->data, c->room);
-        FUZZ_REQUIRE(c->data, "no memory for %zu bytes", c->room);
-    }
-    memcpy(c->data + c->size, piece, size);
-    c->size += size;
-    return DRAPE_OK;
-}
-
 /* Another sim of the same scene, which does from now on what the sim does. */
 static void make_twin(host *h)
 {
@@ -491,7 +469,7 @@ static void make_twin(host *h)
         return;
     }
     if (!status)
-        status = drape_sim_restore_from(h->twin, h->saved.data, h->saved.size);
+        status = drape_sim_restore_from(h->twin, h->saved.bytes.data, h->saved.bytes.size);
     fuzz_check(h->ctx, status, "drape_sim_restore_from");
     FUZZ_REQUIRE(!status || status == DRAPE_E_MEMORY, "%s", drape_context_message(h->ctx));
     if (status)
@@ -502,11 +480,11 @@ static void make_twin(host *h)
 
 static void save(host *h, bool with_twin)
 {
-    h->saved.size = 0;
+    h->saved.bytes.size = 0;
     h->saved.hash = drape_sim_hash(h->sim);
     h->saved.events = h->events;
     h->saved.changes = h->changes;
-    const drape_status status = drape_sim_save_to(h->sim, keep, &h->saved);
+    const drape_status status = drape_sim_save_to(h->sim, fuzz_keep, &h->saved.bytes);
     FUZZ_REQUIRE(status == DRAPE_OK, "%s", drape_context_message(h->ctx));
     FUZZ_REQUIRE(drape_sim_hash(h->sim) == h->saved.hash, "saving changed the sim");
     if (with_twin && !h->refused)
@@ -515,10 +493,10 @@ static void save(host *h, bool with_twin)
 
 static void restore(host *h)
 {
-    if (!h->saved.data)
+    if (!h->saved.bytes.data)
         return;
     const uint64_t before = drape_sim_hash(h->sim);
-    const drape_status status = drape_sim_restore_from(h->sim, h->saved.data, h->saved.size);
+    const drape_status status = drape_sim_restore_from(h->sim, h->saved.bytes.data, h->saved.bytes.size);
     fuzz_check(h->ctx, status, "drape_sim_restore_from");
     const bool same = h->saved.changes == h->changes && h->saved.events == h->events;
     FUZZ_REQUIRE(!status || !same || status == DRAPE_E_MEMORY, "%s", drape_context_message(h->ctx));
@@ -637,7 +615,7 @@ static void run(host *h, fuzz_bytes *in)
             drop_twin(h);
             fuzz_check(h->ctx, drape_sim_advance_realtime(h->sim, a.seconds, 1e-4 * (a.choice % 2), NULL),
                        "drape_sim_advance_realtime");
-            check_finite(h->sim, "a starved frame");
+            fuzz_check_finite(h->sim, "a starved frame");
         } else if (what == CALLS + 5)
             query_both(h, &a);
         else
@@ -673,7 +651,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     drape_sim_destroy(&h.sim);
     drape_model_destroy(&h.model);
     drape_scene_destroy(&h.scene);
-    free(h.saved.data);
+    free(h.saved.bytes.data);
     fuzz_close(&h.ctx);
     remove(BODY);
     return 0;
