@@ -163,6 +163,10 @@ static int open_named(drape_file *file)
 
 drape_status drape_file_begin(drape_file *file)
 {
+    if (file->folder && !drape_folder_is_name(file->path))
+        return drape_fail(file->ctx, DRAPE_E_FILE,
+                          "cannot write \"%.300s\" into the folder \"%.300s\": not the name of a file in it",
+                          file->path, drape_folder_path(file->folder));
     file->fd = file->folder ? open_part(file) : open_named(file);
     if (file->fd < 0)
         return fail(file, "write", errno);

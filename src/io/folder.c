@@ -132,7 +132,7 @@ static uint64_t hexadecimal(const json_t *line, const char *key)
     return text ? strtoull(text, NULL, 16) : 0;
 }
 
-static bool is_file_name(const char *name)
+bool drape_folder_is_name(const char *name)
 {
     return name && *name && !strchr(name, '/') && strcmp(name, ".") != 0 && strcmp(name, "..") != 0;
 }
@@ -144,7 +144,7 @@ static void take_line(drape_folder *f, const char *text, size_t length)
     const char *name = json_string_value(json_object_get(line, "file"));
     if (json_object_get(line, "token"))
         f->tokens[f->token_count++] = hexadecimal(line, "token");
-    if (is_file_name(name)) {
+    if (drape_folder_is_name(name)) {
         entry *e = &f->entries[f->entry_count];
         *e = (entry){.name = drape_arena_text(&f->lines, name),
                      .line = f->entry_count,
@@ -386,7 +386,7 @@ static drape_status visit_files(drape_folder *f, visit *each, const void *user)
     drape_status status = DRAPE_OK;
     struct dirent *file;
     while (errno = 0, !status && (file = readdir(dir)))
-        if (is_file_name(file->d_name))
+        if (drape_folder_is_name(file->d_name))
             status = each(f, file->d_name, user);
     if (!status && errno)
         status = drape_file_fail(f->ctx, "read the folder", f->path, errno);

@@ -39,6 +39,10 @@ void drape_folder_close(drape_folder **folder); /* *folder may be NULL */
 /* The same, and removes the manifest, and the folder if there is nothing else in it. */
 void drape_folder_discard(drape_folder **folder);
 
+/* Whether a name, which may come from a file of somebody else, is that of an entry of a folder: not a path that
+ * leads out of it. Every file of a folder is begun under such a name (drape_file_begin). */
+bool drape_folder_is_name(const char *name);
+
 const char *drape_folder_path(const drape_folder *folder); /* without a slash at its end */
 int drape_folder_descriptor(const drape_folder *folder);
 

@@ -200,13 +200,14 @@ static void fit(sequence *s)
         s->fitted = 0;
 }
 
-static double distance(const json_t *a, const json_t *b)
+static double distance(const json_t *first, const json_t *second)
 {
-    const json_t *x = json_object_get(a, "positions"), *y = json_object_get(b, "positions");
+    const json_t *x = json_object_get(first, "positions"), *y = json_object_get(second, "positions");
     double sum = 0;
     size_t size = json_array_size(x);
     for (size_t i = 0; i < size; i++) {
-        double d = json_number_value(json_array_get(x, i)) - json_number_value(json_array_get(y, i));
+        const json_t *a = json_array_get(x, i), *b = json_array_get(y, i);
+        double d = json_is_number(a) && json_is_number(b) ? json_number_value(a) - json_number_value(b) : NAN;
         sum += d * d;
     }
     return size > 0 && size == json_array_size(y) ? sqrt(sum / ((double)size / 3)) : NAN;
@@ -230,7 +231,7 @@ static void read_sequence(const lab *l, size_t first, sequence *s)
         bool good = lab_is_good(r);
         double moved = before && good ? distance(before, r) : NAN;
         s->failed += !good;
-        s->rejected += (int64_t)lab_number(r, "rejected");
+        s->rejected += json_integer_value(json_object_get(r, "rejected"));
         if (moved > ROUNDING && s->count < MAX_LEVELS) {
             s->value[s->count] = lab_tag_number(before, "value");
             s->moved[s->count++] = moved;
@@ -335,10 +336,9 @@ static bool draw_sequence(lab_figure *f, const sequence *s, size_t variant)
     const lab_style style = lab_style_of(s->integrator, variant), open = lab_style_of(s->integrator, 1);
     const size_t first = s->fitted ? s->count - s->fitted : 0;
     for (int fitted = 0; fitted < 2; fitted++) {
-        const int block = lab_figure_data(f);
+        const size_t block = lab_figure_data(f);
         for (size_t i = fitted ? first : 0; i < (fitted ? s->count : first); i++)
-            fprintf(f->script, "%.9g %.9g\n", s->value[i], s->moved[i]);
-        lab_figure_data_end(f);
+            lab_figure_point(f, s->value[i], s->moved[i]);
         snprintf(text, sizeof text, isnan(s->line.slope) ? "%s" : "%s (%.2f)", s->series, s->line.slope);
         if (fitted)
             lab_figure_curve(f, block, style, text);
@@ -352,14 +352,14 @@ static bool draw_sequence(lab_figure *f, const sequence *s, size_t variant)
 static drape_status draw(lab *l, const sequence *sequences, size_t count, const char *knob, const char *label)
 {
     lab_figure f;
-    char name[64];
+    char name[96];
     size_t points = 0;
     bool others = false;
     double *xy = drape_arena_take(&l->arena, 2 * MAX_LEVELS * count, sizeof *xy);
     snprintf(name, sizeof name, "converge_%s", knob);
-    drape_status status = xy ? lab_figure_begin(l, &f, name) : DRAPE_E_MEMORY;
-    if (status)
-        return status;
+    if (!xy)
+        return DRAPE_E_MEMORY;
+    lab_figure_begin(l, &f, name);
     for (size_t k = 0; k < count; k++) {
         const sequence *s = &sequences[k];
         if (s->count == 0 || strcmp(is_tolerance(s) ? "rtol" : s->knob, knob) != 0)
@@ -385,7 +385,9 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
 static void write_table(lab *l, const sequence *s)
 {
     lab_page_heading(l, s->series);
-    fprintf(l->page, "<table><tr><th>%s</th><th>moved [m]</th><th>order</th></tr>\n", s->knob);
+    fputs("<table><tr><th>", l->page);
+    lab_page_text(l, s->knob);
+    fputs("</th><th>moved [m]</th><th>order</th></tr>\n", l->page);
     for (size_t i = 0; i < s->count; i++) {
         fprintf(l->page, "<tr><td>%.6g</td><td>%.4g</td><td>", s->value[i], s->moved[i]);
         if (i > 0 && !s->unrefined)

@@ -3,10 +3,10 @@
 
 #include "base/clock.h"
 #include "base/def.h"
-#include "base/hash.h"
 #include "base/param.h"
 #include "lab/plan.h"
 #include "lab/run.h"
+#include "lab/schema.h"
 #include "lab/sweep.h"
 #include "lab/text.h"
 
@@ -137,22 +137,17 @@ drape_status lab_check_integrators(const lab *l)
 
 static drape_status plan(lab *l)
 {
-    char digits[17], *text;
-    size_t length;
-    drape_status status = lab_read_text(&l->arena, NULL, l->def->scene, &text, &length);
+    char digits[17]; /* lines of a scene that was changed since do not belong to this experiment */
+    drape_status status = lab_identify(l->ctx, &(lab_request){.def = l->def}, digits);
     if (status)
         return status;
-    /* The hash of the scene's text: lines of a scene that was changed since do not belong to this
-     * experiment. */
-    snprintf(digits, sizeof digits, "%016llx",
-             (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, text, length));
     json_t *settings = json_array();
     for (size_t i = 0; i < l->def->setting_count; i++)
         json_array_append_new(settings,
                               json_pack("[s,s]", l->def->settings[i].pointer, l->def->settings[i].value));
-    l->about = json_pack("{s:s, s:s, s:s, s:s, s:o, s:{}, s:[]}", "experiment", l->experiment->entry.name,
-                         "drape", drape_version(), "scene", l->def->scene, "scene_hash", digits, "settings",
-                         settings, "arguments", "cases");
+    l->about = json_pack("{s:s, s:s, s:o, s:s, s:o, s:{}, s:[]}", "experiment", l->experiment->entry.name,
+                         "drape", drape_version(), "scene", drape_json_text(l->def->scene), "scene_hash",
+                         digits, "settings", settings, "arguments", "cases");
     l->cases = json_object_get(l->about, "cases");
     l->arguments = json_object_get(l->about, "arguments");
     if (!l->cases || !l->arguments)
@@ -220,10 +215,13 @@ static drape_status parse_about(lab *l, const char *folder, json_t **about)
     drape_status status = lab_read_text(&l->arena, folder, ABOUT, &text, &size);
     if (status)
         return status;
-    *about = json_loadb(text, size, 0, &fault);
-    return *about ? DRAPE_OK
-                  : drape_fail(l->ctx, DRAPE_E_PARSE, "%.400s/" ABOUT ":%d:%d: %.200s", folder, fault.line,
-                               fault.column, fault.text);
+    *about = json_loadb(text, size, JSON_REJECT_DUPLICATES, &fault);
+    if (!*about)
+        return drape_fail(l->ctx, DRAPE_E_PARSE, "%.400s/" ABOUT ":%d:%d: %.200s", folder, fault.line,
+                          fault.column, fault.text);
+    char path[500];
+    snprintf(path, sizeof path, "%.450s/" ABOUT, folder);
+    return lab_check_about(l->ctx, path, *about);
 }
 
 /* Whether the cases are the same: what the figures show may differ. */
@@ -260,8 +258,7 @@ static bool writes(const void *user, const char *name)
     lab_cases_name(user, cases);
     return strcmp(name, ABOUT) == 0 || strcmp(name, cases) == 0 || strcmp(name, "results.csv") == 0 ||
            strcmp(name, "report.html") == 0 || strncmp(name, "reference", 9) == 0 || ends_in(name, ".svg") ||
-           ends_in(name, ".pdf") || ends_in(name, ".gp") || strcmp(name, "tables.md") == 0 ||
-           strcmp(name, "plan.json") == 0;
+           ends_in(name, ".pdf") || strcmp(name, "tables.md") == 0 || strcmp(name, "plan.json") == 0;
 }
 
 /* Shards may write into one folder at the same time. */
@@ -386,7 +383,7 @@ static drape_status report(lab *l)
         if (l->results[i]) {
             outcome->done++;
             outcome->failed += !lab_is_good(l->results[i]);
-            outcome->rejected += (int64_t)lab_number(l->results[i], "rejected");
+            outcome->rejected += json_integer_value(json_object_get(l->results[i], "rejected"));
         }
     }
     fprintf(l->summary,
@@ -403,7 +400,8 @@ static drape_status report(lab *l)
         return status;
     }
     status = l->experiment->report(l);
-    snprintf(title, sizeof title, "drape %s: %s", l->experiment->entry.name, lab_text(l->about, "scene"));
+    snprintf(title, sizeof title, "drape %s: %.400s", l->experiment->entry.name, lab_text(l->about, "scene"));
+    drape_make_printable(title);
     if (!status)
         status = lab_write_page(l, title);
     char path[512];
@@ -429,11 +427,18 @@ static drape_status begin(drape_context *ctx, const drape_lab_def *def, const ch
     return l->folder && l->summary && l->page ? DRAPE_OK : drape_fail(ctx, DRAPE_E_MEMORY, "no memory");
 }
 
-/* The outcome takes over the summary. */
+/* The outcome takes over the summary, which is for a terminal. */
 static void end(lab *l)
 {
     if (l->summary)
         fclose(l->summary);
+    for (char *line = l->summary_text, *stop; line; line = stop ? stop + 1 : NULL) {
+        if ((stop = strchr(line, '\n')))
+            *stop = 0;
+        drape_make_printable(line);
+        if (stop)
+            *stop = '\n';
+    }
     if (l->page)
         fclose(l->page);
     free(l->page_text);
@@ -513,9 +518,9 @@ static drape_status read_folders(lab *l, const char *const *folders, size_t coun
         return status;
     l->cases = json_object_get(l->about, "cases");
     l->arguments = json_object_get(l->about, "arguments");
-    if (find(l, lab_text(l->about, "experiment")) || !json_is_array(l->cases))
-        return drape_fail(l->ctx, DRAPE_E_PARSE, "%.400s/" ABOUT ": not an experiment", folders[0]);
-    status = make_results(l);
+    status = find(l, lab_text(l->about, "experiment"));
+    if (!status)
+        status = make_results(l);
     for (size_t i = 0; !status && i < count; i++) {
         json_t *about = NULL;
         status = parse_about(l, folders[i], &about);

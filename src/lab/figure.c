@@ -1,35 +1,36 @@
 /* figure.c: see figure.h. */
 #include "lab/figure.h"
 
+#include "base/hash.h"
 #include "lab/text.h"
 
-#include <errno.h>
+#include <cairo-pdf.h>
+#include <cairo-svg.h>
+#include <ctype.h>
 #include <math.h>
-#include <spawn.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-extern char **environ;
-
-/* Lengths [mm] unless they say otherwise. */
+/* Lengths [mm], and places from the lower left corner of the page. */
 #define WIDTH       84.0 /* a column of a paper */
 #define POINT       (25.4 / 72)
-#define PIXEL       (25.4 / 96)
-#define FONT        7.5  /* [pt] */
-#define POWER       1.17 /* exponents, which gnuplot sets at 0.8 of the font, by this: 7 pt */
-#define EM          (FONT * POINT)
+#define EM          (7.5 * POINT)
+#define PI          3.14159265358979323846
 #define PLOT_HEIGHT 52.0
 #define RIGHT       3.0
 #define TOP         2.5
-#define TITLE       4.5 /* height of a title */
-#define TICK        1.4 /* length of a tick, with the space after it */
-#define LINE        3.6 /* of the legend */
-#define SAMPLE      7.0 /* of a line or swatch in the legend, with the space after it */
-#define GAP         3.0 /* between columns of the legend */
-#define BAR         2.6 /* height of the scale of colours */
-#define THICK       1.2 /* [pixel] of curves */
+#define TITLE       4.5  /* height of a title */
+#define TICK        1.4  /* length of a tick, with the space after it */
+#define LINE        3.6  /* of the legend */
+#define SAMPLE      7.0  /* of a line or swatch in the legend, with the space after it */
+#define GAP         3.0  /* between columns of the legend */
+#define BAR         2.6  /* height of the scale of colours */
+#define THICK       0.32 /* curves */
+#define THIN        0.16 /* frame and ticks */
+#define WIDEST_NAME 34.0 /* of a tick */
+#define FAR         1e4
+#define HATCHING    1.5 /* between the lines of a hatch, along the axes */
+#define HAIR        0.03
 
 /* ---- Styles ---- */
 
@@ -39,7 +40,8 @@ extern char **environ;
  * 2009). */
 static const int colours[] = {LAB_BLUE,   LAB_RED,  0x009e73, LAB_BLACK, LAB_ORANGE, 0x56b4e9,
                               LAB_PURPLE, 0x440099, 0x663311, 0x88bb66,  0x225555,   0x2255ee};
-static const int points[] = {7, 5, 9, 13, 11, 15, 2}; /* gnuplot's filled markers; one less: the open one */
+static const int points[] = {7,  5,  9, 13,
+                             11, 15, 2}; /* filled markers (put_marker); one less: the open one */
 
 lab_style lab_style_of(const char *integrator, size_t variant)
 {
@@ -58,9 +60,10 @@ lab_style lab_style_of(const char *integrator, size_t variant)
 static const int scale_colours[] = {0x102070, 0x1d3b77, 0x2e557b, 0x446e7d, 0x5e877b,
                                     0x7d9f75, 0x9fb76b, 0xc5ce5c, 0xf0e442};
 
-/* ---- Text ---- */
+/* ---- The page ---- */
 
-/* The width of a text [mm]: DejaVu Sans [em / 1000], the widest of the usual fonts without serifs. */
+/* The width of a text [mm]: DejaVu Sans [em / 1000], the widest of the usual fonts without serifs; other
+ * characters are counted as 1 em. */
 static double text_width(const char *text)
 {
     static const short widths[] = {
@@ -71,17 +74,132 @@ static double text_width(const char *text)
         278, 974, 634, 612, 635, 635, 411, 521, 392, 634, 592, 818, 592, 592,  525, 636, 337, 636, 838};
     double sum = 0;
     for (; *text; text++)
-        sum += *text >= ' ' && *text <= '~' ? widths[*text - ' '] : 1000;
+        if ((*text & 0xc0) != 0x80) /* not within a character of UTF-8 */
+            sum += *text >= ' ' && *text <= '~' ? widths[*text - ' '] : 1000;
     return sum * 1e-3 * EM;
 }
 
-/* A text of gnuplot's: in it quotes are doubled. */
-static void put_quoted(FILE *out, const char *text)
+/* A page: cairo has points from the upper left corner. Text is data for it, which nothing interprets. */
+typedef struct page {
+    cairo_t *cairo;
+    double height;
+} page;
+
+static double across(double x)
 {
-    fputc('\'', out);
-    for (; *text; text++)
-        fputs(*text == '\'' ? "''" : (char[]){*text, 0}, out);
-    fputc('\'', out);
+    return x / POINT;
+}
+
+static double down(const page *p, double y)
+{
+    return (p->height - y) / POINT;
+}
+
+static void set_colour(const page *p, int colour)
+{
+    cairo_set_source_rgb(p->cairo, (colour >> 16 & 255) / 255.0, (colour >> 8 & 255) / 255.0,
+                         (colour & 255) / 255.0);
+}
+
+/* A path through points x, y; NaN is a gap. */
+static void put_path(const page *p, const double *xy, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (i == 0 || isnan(xy[2 * i - 2]))
+            cairo_move_to(p->cairo, across(xy[2 * i]), down(p, xy[2 * i + 1]));
+        else if (!isnan(xy[2 * i]))
+            cairo_line_to(p->cairo, across(xy[2 * i]), down(p, xy[2 * i + 1]));
+}
+
+static void put_line(const page *p, const double *xy, size_t count, int colour, double width, int dash)
+{
+    static const double dashes[][6] = {{3, 2.6}, {1, 2}, {4.5, 1.8, 1, 1.8}, {4.5, 1.5, 1, 1.5, 1, 1.5}};
+    const int pieces[] = {2, 2, 4, 6};
+    put_path(p, xy, count);
+    set_colour(p, colour);
+    cairo_set_line_width(p->cairo, across(width));
+    cairo_set_dash(p->cairo, dash < 2 ? NULL : dashes[dash - 2], dash < 2 ? 0 : pieces[dash - 2], 0);
+    cairo_stroke(p->cairo);
+}
+
+static void put_box(const page *p, double left, double bottom, double right, double top, int colour)
+{
+    cairo_rectangle(p->cairo, across(left), down(p, top), across(right - left), across(top - bottom));
+    set_colour(p, colour);
+    cairo_fill(p->cairo);
+}
+
+/* Lines x - y = a multiple of the distance, so that the hatches of neighbouring boxes join. */
+static void put_hatch(const page *p, double left, double bottom, double right, double top, int colour)
+{
+    for (double k = ceil((left - top) / HATCHING); k * HATCHING < right - bottom; k++) {
+        const double offset = k * HATCHING, from = fmax(left, bottom + offset),
+                     to = fmin(right, top + offset);
+        if (to > from)
+            put_line(p, (double[]){from, from - offset, to, to - offset}, 2, colour, THICK, 1);
+    }
+}
+
+/* A marker, by its number: 1 plus, 2 cross; 4 square, 6 circle, 8 and 10 triangles, 12 diamond, 14 pentagon, and
+ * the next number of each for the filled one. */
+static void put_marker(const page *p, double x, double y, lab_style s)
+{
+    static const struct {
+        int corners;
+        double turn; /* of the first one */
+    } shapes[] = {{4, PI / 4}, {20, 0}, {3, PI / 2}, {3, -PI / 2}, {4, PI / 2}, {5, PI / 2}};
+    const double r = s.dash ? 0.4 : 0.55, q = s.point == 1 ? 0 : r; /* larger where no line shows the place */
+    if (s.point < 4) {
+        put_line(p, (double[]){x - r, y - q, x + r, y + q, NAN, NAN, x - q, y + r, x + q, y - r}, 5, s.colour,
+                 THIN, 1);
+        return;
+    }
+    const int corners = shapes[s.point / 2 - 2].corners;
+    for (int i = 0; i < corners; i++) {
+        const double angle = shapes[s.point / 2 - 2].turn + 2 * PI * i / corners;
+        const double size = corners > 5 ? r : 1.35 * r; /* areas alike */
+        (i ? cairo_line_to : cairo_move_to)(p->cairo, across(x + size * cos(angle)),
+                                            down(p, y + size * sin(angle)));
+    }
+    cairo_close_path(p->cairo);
+    set_colour(p, s.colour);
+    cairo_set_line_width(p->cairo, across(THIN));
+    cairo_set_dash(p->cairo, NULL, 0, 0);
+    (s.point % 2 ? cairo_fill : cairo_stroke)(p->cairo);
+}
+
+typedef enum anchor { START, MIDDLE, END, UPRIGHT /* the middle, read from below */ } anchor;
+
+/* A text, centred in height at y, and an exponent behind it (NULL: none). A text that is wider than the room for
+ * it ends with dots. */
+static void put_text(const page *p, double x, double y, anchor at, const char *text, double room,
+                     const char *exponent)
+{
+    static const double shares[] = {0, 0.5, 1, 0.5};
+    char cut[200];
+    snprintf(cut, sizeof cut, "%.190s", text);
+    drape_make_printable(cut);
+    for (size_t end = strlen(cut); end > 0 && text_width(cut) > room; snprintf(cut + end, 4, "..."))
+        while (--end > 0 && (cut[end] & 0xc0) == 0x80)
+            continue;
+    json_t *valid = drape_json_text(cut); /* cut within a character, it was not UTF-8 */
+    const char *shown = valid ? json_string_value(valid) : "";
+    cairo_text_extents_t first, second = {0};
+    if (exponent)
+        cairo_text_extents(p->cairo, exponent, &second);
+    cairo_text_extents(p->cairo, shown, &first);
+    cairo_save(p->cairo);
+    set_colour(p, LAB_BLACK);
+    cairo_translate(p->cairo, across(x), down(p, y));
+    cairo_rotate(p->cairo, at == UPRIGHT ? -PI / 2 : 0);
+    cairo_move_to(p->cairo, -shares[at] * (first.x_advance + second.x_advance), across(0.36 * EM));
+    cairo_show_text(p->cairo, shown);
+    cairo_rel_move_to(p->cairo, 0, across(-0.45 * EM));
+    if (exponent)
+        cairo_show_text(p->cairo, exponent);
+    cairo_new_path(p->cairo);
+    cairo_restore(p->cairo);
+    json_decref(valid);
 }
 
 /* ---- Axes ---- */
@@ -91,61 +209,92 @@ static double ends_ratio(const lab_axis *a)
     return a->log ? log10(a->to / a->from) : a->to - a->from;
 }
 
-/* Powers of ten, at most about six; between them ticks without numbers. If there is at most one, 1, 2 and
- * 5 times such a power, or over less than a factor of 10 also 3 times, of 4 all multiples. */
-static void put_log_ticks(const lab_axis *a, FILE *out)
+/* Where a value stands, as a share of the axis; far off the page it is not told apart. */
+static double share_at(const lab_axis *a, double value)
 {
+    const double share = (a->log ? log10(value / a->from) : value - a->from) / ends_ratio(a);
+    return isnan(share) ? NAN : fmin(FAR, fmax(-FAR, share));
+}
+
+/* Whether the ends can be drawn: values of a file may be so large or small that they have no range. */
+static bool has_range(const lab_axis *a)
+{
+    return isfinite(a->from) && isfinite(ends_ratio(a)) && ends_ratio(a) > 0 && (!a->log || a->from > 0);
+}
+
+/* An axis on a page: its low end, and its length to the right or up. Ticks stand outside. */
+typedef struct ruler {
+    const page *p;
+    const lab_axis *axis;
+    double x, y, length;
+    bool upright;
+} ruler;
+
+/* power: of ten, whose exponent is the text. */
+static void put_tick(const ruler *r, double value, const char *text, bool power)
+{
+    const double at = r->length * share_at(r->axis, value), size = *text ? 1 : 0.5;
+    const double x = r->x + (r->upright ? 0 : at), y = r->y + (r->upright ? at : 0);
+    if (r->axis->name_count == 0)
+        put_line(r->p, (double[]){x, y, x - r->upright * size, y - !r->upright * size}, 2, LAB_BLACK, THIN,
+                 1);
+    if (*text)
+        put_text(r->p, x - r->upright * TICK, y - !r->upright * (TICK + 0.85 * EM), r->upright ? END : MIDDLE,
+                 power ? "10" : text, WIDEST_NAME, power ? text : NULL);
+}
+
+/* Powers of ten, at most about six; between them ticks without numbers, unless powers are left out. If there
+ * is at most one, 1, 2 and 5 times such a power, or over less than a factor of 10 also 3 times, of 4 all
+ * multiples. */
+static void put_log_ticks(const ruler *r)
+{
+    const lab_axis *a = r->axis;
     const int first = (int)floor(log10(a->from)), last = (int)ceil(log10(a->to));
     const int powers = (int)floor(log10(a->to) + 1e-9) - (int)ceil(log10(a->from) - 1e-9) + 1;
     const int stride = 1 + (powers - 1) / 6;
-    const char *comma = "";
     for (int k = first; k <= last; k++)
-        for (int digit = 1; digit < 10; digit++) {
+        for (int digit = 1; digit < (stride > 2 ? 2 : 10); digit++) {
             const double value = digit * pow(10, k);
             const bool numbered = powers > 1 ? digit == 1 && (k - first) % stride == 0
                                              : a->to < 4 * a->from || (digit == 3 && a->to < 10 * a->from) ||
                                                    digit == 1 || digit == 2 || digit == 5;
+            char text[32] = "";
             if (value < a->from * (1 - 1e-9) || value > a->to * (1 + 1e-9))
                 continue;
             if (numbered && powers > 1)
-                fprintf(out, "%s'10^{/*%.2f %d}' %.9g", comma, POWER, k, value);
+                snprintf(text, sizeof text, "%d", k);
             else if (numbered)
-                fprintf(out, "%s'%g' %.9g", comma, value, value);
-            else
-                fprintf(out, "%s'' %.9g 1", comma, value);
-            comma = ", ";
+                snprintf(text, sizeof text, "%g", value);
+            put_tick(r, value, text, numbered && powers > 1);
         }
 }
 
-/* Multiples of 1, 2 or 5 times a power of ten, at most six. */
-static void put_linear_ticks(const lab_axis *a, FILE *out)
+/* Multiples of 1, 2 or 5 times a power of ten, at most seven. */
+static void put_linear_ticks(const ruler *r)
 {
+    const lab_axis *a = r->axis;
     const double raw = (a->to - a->from) / 6, size = pow(10, floor(log10(raw)));
     const double step = raw <= size       ? size
                         : raw <= 2 * size ? 2 * size
                         : raw <= 5 * size ? 5 * size
                                           : 10 * size;
-    const char *comma = "";
-    for (double k = ceil(a->from / step - 1e-9); k * step <= a->to + 1e-9 * step; k++, comma = ", ")
-        fprintf(out, "%s'%g' %.9g", comma, k * step + 0.0, k * step); /* not -0 */
+    const double first = ceil(a->from / step - 1e-9);
+    for (int i = 0; i < 7 && (first + i) * step <= a->to + 1e-9 * step; i++) {
+        char text[32];
+        snprintf(text, sizeof text, "%g", (first + i) * step + 0.0); /* not -0 */
+        put_tick(r, (first + i) * step, text, false);
+    }
 }
 
-static void put_axis(const lab_axis *a, const char *name, FILE *out)
+static void put_axis(const page *p, const lab_axis *a, double x, double y, double length, bool upright)
 {
-    fprintf(out, "set %srange [%.9g:%.9g]\n", name, a->from, a->to);
-    if (a->log)
-        fprintf(out, "set logscale %s\n", name);
-    fprintf(out, "set %stics (", name);
-    for (int i = 0; i < a->name_count; i++) {
-        fputs(i ? ", " : "", out);
-        put_quoted(out, a->names[i]);
-        fprintf(out, " %d", i);
-    }
+    const ruler r = {p, a, x, y, length, upright};
+    for (int i = 0; i < a->name_count; i++)
+        put_tick(&r, i, a->names[i], false);
     if (a->name_count == 0 && a->log)
-        put_log_ticks(a, out);
+        put_log_ticks(&r);
     else if (a->name_count == 0)
-        put_linear_ticks(a, out);
-    fprintf(out, ")%s\n", a->name_count > 0 ? " noenhanced" : "");
+        put_linear_ticks(&r);
 }
 
 /* The room that the numbers or names of the y axis need. */
@@ -154,7 +303,137 @@ static double ticks_width(const lab_axis *a)
     double widest = text_width(a->log ? "10-10" : "0.0005");
     for (int i = 0; i < a->name_count; i++)
         widest = fmax(i ? widest : 0, text_width(a->names[i]));
-    return widest;
+    return fmin(widest, WIDEST_NAME);
+}
+
+/* ---- Elements ---- */
+
+/* Kinds of elements, in the order of the page's layers for the same block. */
+enum { CURVE, ORDER /* the number at the end of a line of that order */, BOXES, VALUES, HATCH };
+
+/* Room for one more of `count` members; NULL: out of memory, which the end of the figure reports. */
+static void *grow(lab_figure *f, void *memory, size_t count, size_t size)
+{
+    void *grown = memory;
+    if ((count & (count - 1)) == 0) /* 0 or a power of two */
+        grown = drape_arena_resize(&f->l->arena, memory, count ? 2 * count : 1, size);
+    f->failed |= !grown;
+    return f->failed ? NULL : grown;
+}
+
+void lab_figure_begin(lab *l, lab_figure *f, const char *name)
+{
+    *f = (lab_figure){.l = l, .plot_height = PLOT_HEIGHT};
+    snprintf(f->name, sizeof f->name - 17, "%s", name);
+    for (char *at = f->name; *at; at++)
+        if ((unsigned char)*at > 127 || (!isalnum(*at) && (at == f->name || !strchr("-_.", *at))))
+            *at = '_';
+    if (strcmp(f->name, name) != 0) { /* another name could become the same */
+        const size_t end = strlen(f->name);
+        snprintf(f->name + end, sizeof f->name - end, "_%016llx",
+                 (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, name, strlen(name)));
+    }
+}
+
+static void put_value(lab_figure *f, double value)
+{
+    double *values = grow(f, f->values, f->used, sizeof *values);
+    if (!values)
+        return;
+    f->values = values;
+    f->values[f->used++] = value;
+}
+
+/* A block begins with the number of its values. */
+size_t lab_figure_data(lab_figure *f)
+{
+    f->block = f->used;
+    put_value(f, 0);
+    return f->block;
+}
+
+static void put_values(lab_figure *f, const double *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        put_value(f, values[i]);
+    if (!f->failed)
+        f->values[f->block] += (double)count;
+}
+
+void lab_figure_point(lab_figure *f, double x, double y)
+{
+    put_values(f, (double[]){x, y}, 2);
+}
+
+void lab_figure_box(lab_figure *f, double left, double right, double bottom, double top, double fill)
+{
+    put_values(f, (double[]){left, right, bottom, top, fill}, 5);
+}
+
+static void add_element(lab_figure *f, int kind, size_t block, lab_style style)
+{
+    lab_element *elements = grow(f, f->elements, (size_t)f->element_count, sizeof *elements);
+    if (!elements)
+        return;
+    f->elements = elements;
+    f->elements[f->element_count++] = (lab_element){kind, block, style};
+}
+
+static void add_entry(lab_figure *f, const lab_entry *entry)
+{
+    if (f->entries < LAB_MAX_ENTRIES)
+        f->legend[f->entries++] = *entry;
+}
+
+void lab_figure_curve(lab_figure *f, size_t block, lab_style style, const char *text)
+{
+    add_element(f, CURVE, block, style);
+    if (!text)
+        return;
+    lab_entry entry = {.style = style};
+    snprintf(entry.text, sizeof entry.text, "%s", text);
+    add_entry(f, &entry);
+}
+
+static bool is_in(const lab_entry *entries, int count, const char *text, size_t length)
+{
+    for (int i = 0; i < count; i++)
+        if (strncmp(entries[i].text, text, length) == 0 &&
+            (entries[i].text[length] == 0 || entries[i].text[length] == ','))
+            return true;
+    return false;
+}
+
+void lab_figure_series(lab_figure *f, size_t block, const char *integrator, size_t variant, const char *name)
+{
+    const lab_style style = lab_style_of(integrator, variant);
+    const char *comma = strchr(name, ',');
+    if (variant == 0 || !comma || !is_in(f->legend, f->entries, integrator, strlen(integrator))) {
+        lab_figure_curve(f, block, style, name);
+        return;
+    }
+    lab_figure_curve(f, block, style, NULL);
+    const char *what = comma + 1 + strspn(comma + 1, " ");
+    if (f->variant_count == LAB_MAX_VARIANTS || is_in(f->variants, f->variant_count, what, strlen(what)))
+        return;
+    lab_entry *entry = &f->variants[f->variant_count++];
+    *entry = (lab_entry){.style = {LAB_BLACK, style.dash, LAB_OPEN_MARKER}};
+    snprintf(entry->text, sizeof entry->text, "%s", what);
+}
+
+void lab_figure_boxes(lab_figure *f, size_t block)
+{
+    add_element(f, BOXES, block, (lab_style){0});
+}
+
+void lab_figure_values(lab_figure *f, size_t block)
+{
+    add_element(f, VALUES, block, (lab_style){0});
+}
+
+void lab_figure_hatch(lab_figure *f, size_t block, int colour)
+{
+    add_element(f, HATCH, block, (lab_style){.colour = colour});
 }
 
 void lab_figure_fit(lab_figure *f, const double *xy, size_t count, int orders)
@@ -190,128 +469,15 @@ void lab_figure_fit(lab_figure *f, const double *xy, size_t count, int orders)
     y->from = fmin(y->from, low / space);
     for (int order = 1; order <= orders; order++) {
         const double end = low * pow(10, order * span);
-        const int block = lab_figure_data(f);
-        fprintf(f->script, "%.9g %.9g\n%.9g %.9g\n", left, low, right, end);
-        lab_figure_data_end(f);
+        const size_t block = lab_figure_data(f);
+        lab_figure_point(f, left, low);
+        lab_figure_point(f, right, end);
         lab_figure_curve(f, block, (lab_style){LAB_GREY, 2, 0},
                          order > 1     ? NULL
                          : orders == 1 ? "slope 1"
                                        : "slopes 1 and 2");
-        fprintf(f->script, "set label '%d' at first %.9g,%.9g offset 0.4,0 left\n", order, right, end);
+        add_element(f, ORDER, block, (lab_style){.point = order});
     }
-}
-
-/* ---- Elements ---- */
-
-drape_status lab_figure_begin(lab *l, lab_figure *f, const char *name)
-{
-    *f = (lab_figure){.plot_height = PLOT_HEIGHT};
-    snprintf(f->name, sizeof f->name, "%s", name);
-    f->script = open_memstream(&f->text, &f->size);
-    f->plot = open_memstream(&f->plot_text, &f->plot_size);
-    if (f->script && f->plot)
-        return DRAPE_OK;
-    if (f->script)
-        fclose(f->script);
-    free(f->text);
-    return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a figure");
-}
-
-int lab_figure_data(lab_figure *f)
-{
-    fprintf(f->script, "$d%d << EOD\n", f->blocks);
-    return f->blocks++;
-}
-
-void lab_figure_data_end(lab_figure *f)
-{
-    fputs("EOD\n", f->script);
-}
-
-static void add_element(lab_figure *f, int block)
-{
-    fprintf(f->plot, "%s$d%d ", f->elements++ ? ", " : "plot ", block);
-}
-
-static void add_entry(lab_figure *f, const lab_entry *entry)
-{
-    if (f->entries < LAB_MAX_ENTRIES)
-        f->legend[f->entries++] = *entry;
-}
-
-/* gnuplot's SVG joins neighbouring arrows of one width and colour and gives all of them the dashes of the
- * first: each kind of dashes has a width of its own. */
-static void put_style(FILE *out, lab_style s)
-{
-    if (s.dash == 0)
-        fprintf(out, "lw %.2f lc rgb '#%06x'", THICK, (unsigned)s.colour);
-    else
-        fprintf(out, "lw %.2f dt %d lc rgb '#%06x'", THICK + 0.01 * (s.dash - 1), s.dash, (unsigned)s.colour);
-}
-
-/* Markers without a line are larger: nothing else shows where they are. */
-static double point_size(lab_style s)
-{
-    return s.dash ? 0.35 : 0.5;
-}
-
-void lab_figure_curve(lab_figure *f, int block, lab_style style, const char *text)
-{
-    add_element(f, block);
-    fputs(style.dash == 0 ? "with points " : style.point ? "with linespoints " : "with lines ", f->plot);
-    put_style(f->plot, style);
-    if (style.point)
-        fprintf(f->plot, " pt %d ps %.2f", style.point, point_size(style));
-    if (!text)
-        return;
-    lab_entry entry = {.style = style};
-    snprintf(entry.text, sizeof entry.text, "%s", text);
-    add_entry(f, &entry);
-}
-
-static bool is_in(const lab_entry *entries, int count, const char *text, size_t length)
-{
-    for (int i = 0; i < count; i++)
-        if (strncmp(entries[i].text, text, length) == 0 &&
-            (entries[i].text[length] == 0 || entries[i].text[length] == ','))
-            return true;
-    return false;
-}
-
-void lab_figure_series(lab_figure *f, int block, const char *integrator, size_t variant, const char *name)
-{
-    const lab_style style = lab_style_of(integrator, variant);
-    const char *comma = strchr(name, ',');
-    if (variant == 0 || !comma || !is_in(f->legend, f->entries, integrator, strlen(integrator))) {
-        lab_figure_curve(f, block, style, name);
-        return;
-    }
-    lab_figure_curve(f, block, style, NULL);
-    const char *what = comma + 2;
-    if (f->variant_count == LAB_MAX_VARIANTS || is_in(f->variants, f->variant_count, what, strlen(what)))
-        return;
-    lab_entry *entry = &f->variants[f->variant_count++];
-    *entry = (lab_entry){.style = {LAB_BLACK, style.dash, LAB_OPEN_MARKER}};
-    snprintf(entry->text, sizeof entry->text, "%s", what);
-}
-
-void lab_figure_boxes(lab_figure *f, int block)
-{
-    add_element(f, block);
-    fputs("using 1:2:3:4:5:6:7 with boxxyerror fs solid 1 noborder lc rgb variable", f->plot);
-}
-
-void lab_figure_values(lab_figure *f, int block)
-{
-    add_element(f, block);
-    fputs("using 1:2:3:4:5:6:7 with boxxyerror fs solid 1 noborder lc palette", f->plot);
-}
-
-void lab_figure_hatch(lab_figure *f, int block, int colour)
-{
-    add_element(f, block);
-    fprintf(f->plot, "using 1:2:3:4:5:6 with boxxyerror fs transparent pattern 5 noborder lc rgb '#%06x'",
-            (unsigned)colour);
 }
 
 void lab_figure_marker(lab_figure *f, lab_style style, const char *text)
@@ -348,7 +514,7 @@ static layout lay_out(const lab_figure *f)
 {
     double widest = 0;
     for (int i = 0; i < f->entries; i++)
-        widest = fmax(widest, text_width(f->legend[i].text));
+        widest = fmax(widest, fmin(WIDTH - 2 - SAMPLE, text_width(f->legend[i].text)));
     layout at = {.column = SAMPLE + widest + GAP};
     at.columns = (int)fmax(1, fmin(f->entries, floor((WIDTH - 2 + GAP) / at.column)));
     at.rows = (f->entries + at.columns - 1) / at.columns;
@@ -361,201 +527,170 @@ static layout lay_out(const lab_figure *f)
     return at;
 }
 
-static void put_label(FILE *out, const layout *at, double x, double y, const char *text, const char *how)
-{
-    fputs("set label ", out);
-    put_quoted(out, text);
-    fprintf(out, " at screen %.5f,%.5f %s noenhanced\n", x / WIDTH, y / at->height, how);
-}
+/* ---- Drawing ---- */
 
-static void put_swatch(FILE *out, double left, double bottom, double right, double top, const char *fill,
-                       int colour)
-{
-    fprintf(out,
-            "set object rectangle from screen %.5f,%.5f to screen %.5f,%.5f fs %s noborder fc rgb '#%06x'\n",
-            left, bottom, right, top, fill, (unsigned)colour);
-}
-
-static void put_legend(const lab_figure *f, const layout *at, FILE *out)
+static void put_legend(const lab_figure *f, const layout *at, const page *p)
 {
     for (int i = 0; i < f->entries; i++) {
         const lab_entry *e = &f->legend[i];
-        const double x = 1 + at->column * (i / at->rows),
+        const double x = 1 + at->column * (i / at->rows), end = x + SAMPLE - 1.2,
                      y = 1 + LINE * (at->rows - 1 - i % at->rows) + 0.5 * LINE;
-        const double from = x / WIDTH, to = (x + SAMPLE - 1.2) / WIDTH, middle = y / at->height;
         if (e->swatch) {
-            put_swatch(out, from, (y - 0.9) / at->height, to, (y + 0.9) / at->height, "solid 1",
-                       e->style.colour);
+            put_box(p, x, y - 0.9, end, y + 0.9, e->style.colour);
             if (e->hatched)
-                put_swatch(out, from, (y - 0.9) / at->height, to, (y + 0.9) / at->height,
-                           "transparent pattern 5", LAB_BLACK);
-        } else if (e->style.dash) {
-            fprintf(out, "set arrow from screen %.5f,%.5f to screen %.5f,%.5f nohead ", from, middle, to,
-                    middle);
-            put_style(out, e->style);
-            fputc('\n', out);
-        }
+                put_hatch(p, x, y - 0.9, end, y + 0.9, LAB_BLACK);
+        } else if (e->style.dash)
+            put_line(p, (double[]){x, y, end, y}, 2, e->style.colour, THICK, e->style.dash);
         if (!e->swatch && e->style.point)
-            fprintf(out, "set label '' at screen %.5f,%.5f point pt %d ps %.2f lw %.2g lc rgb '#%06x'\n",
-                    (from + to) / 2, middle, e->style.point, point_size(e->style), THICK,
-                    (unsigned)e->style.colour);
-        put_label(out, at, x + SAMPLE, y, e->text, "left");
+            put_marker(p, 0.5 * (x + end), y, e->style);
+        put_text(p, x + SAMPLE, y, START, e->text, WIDTH - x - SAMPLE, NULL);
     }
+}
+
+static int scale_colour(double share)
+{
+    const int count = sizeof scale_colours / sizeof *scale_colours;
+    const double place = fmin(1, fmax(0, share)) * (count - 1);
+    const int k = (int)fmin(count - 2, floor(place));
+    int colour = 0;
+    for (int shift = 0; shift <= 16; shift += 8) {
+        const int low = scale_colours[k] >> shift & 255, high = scale_colours[k + 1] >> shift & 255;
+        colour |= (int)lround(low + (place - k) * (high - low)) << shift;
+    }
+    return colour;
+}
+
+static void put_frame(const page *p, double left, double bottom, double right, double top)
+{
+    put_line(p, (double[]){left, bottom, right, bottom, right, top, left, top, left, bottom, right, bottom},
+             6, LAB_BLACK, THIN, 1);
 }
 
 /* The bar of colours, with numbers and label below it. */
-static void put_scale(const lab_figure *f, const layout *at, FILE *out)
+static void put_scale(const lab_figure *f, const layout *at, const page *p)
 {
-    const int count = sizeof scale_colours / sizeof *scale_colours;
-    fputs("set palette defined (", out);
-    for (int i = 0; i < count; i++)
-        fprintf(out, "%s%d '#%06x'", i ? ", " : "", i, (unsigned)scale_colours[i]);
-    fprintf(out,
-            ") maxcolors %d\nset colorbox horizontal user origin screen %.5f,%.5f size screen %.5f,%.5f\n",
-            LAB_SHADES, at->left / WIDTH, at->scale / at->height, 1 - (RIGHT + at->left) / WIDTH,
-            BAR / at->height);
-    put_axis(&f->scale, "cb", out);
-    fputs("set cbtics scale 0.5,0.25 offset 0,0.3\n", out);
-    put_label(out, at, 0.5 * (at->left + WIDTH - RIGHT), at->legend + 0.6 * EM, f->scale.label, "center");
+    const double right = WIDTH - RIGHT, width = right - at->left;
+    for (int k = 0; k < LAB_SHADES; k++) /* each to the end of the bar: no gaps */
+        put_box(p, at->left + width * k / LAB_SHADES, at->scale, right, at->scale + BAR,
+                scale_colour((k + 0.5) / LAB_SHADES));
+    put_frame(p, at->left, at->scale, right, at->scale + BAR);
+    put_axis(p, &f->scale, at->left, at->scale, width, false);
+    put_text(p, at->left + 0.5 * width, at->legend + 0.6 * EM, MIDDLE, f->scale.label, WIDTH, NULL);
 }
 
-static void put_script(const lab_figure *f, FILE *out)
+/* Where a point of the axes is on the page. */
+static void place(const lab_figure *f, const layout *at, double x, double y, double out[2])
+{
+    out[0] = at->left + (WIDTH - RIGHT - at->left) * share_at(&f->axes[0], x);
+    out[1] = at->bottom + f->plot_height * share_at(&f->axes[1], y);
+}
+
+static void draw_element(const lab_figure *f, const layout *at, const lab_element *e, const page *p)
+{
+    const double *data = f->values + e->block + 1;
+    const size_t count = (size_t)f->values[e->block];
+    double low[2], high[2], *xy;
+    switch (e->kind) {
+    case CURVE:
+        xy = drape_arena_take(&f->l->arena, count, sizeof *xy);
+        for (size_t i = 0; xy && i < count; i += 2)
+            place(f, at, data[i], data[i + 1], xy + i);
+        if (xy && e->style.dash)
+            put_line(p, xy, count / 2, e->style.colour, THICK, e->style.dash);
+        for (size_t i = 0; xy && e->style.point && i < count; i += 2)
+            if (!isnan(xy[i]) && !isnan(xy[i + 1]))
+                put_marker(p, xy[i], xy[i + 1], e->style);
+        drape_arena_release(&f->l->arena, xy);
+        break;
+    case ORDER:
+        place(f, at, data[count - 2], data[count - 1], high);
+        put_text(p, high[0] + 1, high[1], START, e->style.point == 1 ? "1" : "2", EM, NULL);
+        break;
+    default:
+        for (size_t k = 0; k < count; k += 5) {
+            place(f, at, data[k], data[k + 2], low);
+            place(f, at, data[k + 1], data[k + 3], high);
+            if (e->kind == HATCH)
+                put_hatch(p, low[0], low[1], high[0], high[1], e->style.colour);
+            else /* a hair larger, under its neighbours: no gaps */
+                put_box(p, low[0], low[1], high[0] + HAIR, high[1] + HAIR,
+                        e->kind == BOXES ? (int)data[k + 4] : scale_colour(share_at(&f->scale, data[k + 4])));
+        }
+    }
+}
+
+static void draw_page(const lab_figure *f, const layout *at, const page *p)
+{
+    const double left = at->left, right = WIDTH - RIGHT, low = at->bottom, high = low + f->plot_height;
+    cairo_select_font_face(p->cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_set_font_size(p->cairo, across(EM));
+    put_box(p, 0, 0, WIDTH, at->height, LAB_WHITE);
+    cairo_save(p->cairo);
+    cairo_rectangle(p->cairo, across(left), down(p, high), across(right - left), across(high - low));
+    cairo_clip(p->cairo);
+    for (int i = 0; i < f->element_count; i++)
+        draw_element(f, at, &f->elements[i], p);
+    cairo_restore(p->cairo);
+    put_frame(p, left, low, right, high);
+    put_axis(p, &f->axes[0], left, low, right - left, false);
+    put_axis(p, &f->axes[1], left, low, high - low, true);
+    put_text(p, 0.5 * (left + right), (has_scale(f) ? at->scale + BAR : at->legend) + 0.6 * EM, MIDDLE,
+             f->axes[0].label, WIDTH, NULL);
+    if (has_scale(f))
+        put_scale(f, at, p);
+    put_text(p, 0.7 * EM, 0.5 * (low + high), UPRIGHT, f->axes[1].label, at->height, NULL);
+    put_text(p, 0.5 * (left + right), high + 0.5 * TITLE, MIDDLE, f->title, right - left, NULL);
+    put_legend(f, at, p);
+}
+
+static cairo_status_t put_bytes(void *out, const unsigned char *data, unsigned size)
+{
+    return fwrite(data, 1, size, out) == size ? CAIRO_STATUS_SUCCESS : CAIRO_STATUS_WRITE_ERROR;
+}
+
+/* Writes the figure as a file of one kind. caption: the page gets it, too; NULL: it does not. */
+static drape_status write_figure(lab *l, const lab_figure *f, const char *ending, const char *caption,
+                                 cairo_surface_t *make(cairo_write_func_t, void *, double, double))
 {
     const layout at = lay_out(f);
-    const double top = at.bottom + f->plot_height;
-    fprintf(out,
-            "# gnuplot %s.gp\nset lmargin at screen %.5f\nset rmargin at screen %.5f\nset bmargin at screen "
-            "%.5f\n"
-            "set tmargin at screen %.5f\nunset key\nset border 15 lw 0.6\n"
-            "set tics out nomirror scale 0.5,0.25\nset xtics offset 0,0.3\nset ytics offset 0.6,0\n",
-            f->name, at.left / WIDTH, 1 - RIGHT / WIDTH, at.bottom / at.height, top / at.height);
-    put_axis(&f->axes[0], "x", out);
-    put_axis(&f->axes[1], "y", out);
-    put_label(out, &at, 0.5 * (at.left + WIDTH - RIGHT),
-              (has_scale(f) ? at.scale + BAR : at.legend) + 0.6 * EM, f->axes[0].label, "center");
-    if (has_scale(f))
-        put_scale(f, &at, out);
-    put_label(out, &at, 0.7 * EM, 0.5 * (at.bottom + top), f->axes[1].label, "center rotate by 90");
-    put_label(out, &at, 0.5 * (at.left + WIDTH - RIGHT), top + 0.5 * TITLE, f->title, "center");
-    put_legend(f, &at, out);
-    fputs(f->text, out);
-    fprintf(out,
-            "set terminal svg size %.0f,%.0f dynamic font 'sans-serif,%.4g' background '#ffffff' name '%s'\n",
-            WIDTH / PIXEL, at.height / PIXEL, FONT * POINT / PIXEL, f->name);
-    fprintf(out, "set output '%s.svg'\n%s\n", f->name, f->plot_text);
-    fprintf(out,
-            "set terminal pdfcairo size %.4gcm,%.4gcm font 'Sans,%.4g' fontscale %.4g\nset output "
-            "'%s.pdf'\nreplot\n",
-            WIDTH / 10, at.height / 10, FONT, PIXEL / POINT, f->name); /* Pango's points are pixels */
-}
-
-/* ---- gnuplot ---- */
-
-/* Runs a program and waits for it; returns its exit code, -1 where it did not run. Its output is
- * discarded. */
-static int run_program(char *const *arguments)
-{
-    posix_spawn_file_actions_t actions;
-    pid_t child;
-    int code = -1;
-    if (posix_spawn_file_actions_init(&actions))
-        return -1;
-    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", 0, 0);
-    posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", 1, 0);
-    posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", 1, 0);
-    bool started = posix_spawnp(&child, arguments[0], &actions, NULL, arguments, environ) == 0;
-    posix_spawn_file_actions_destroy(&actions);
-    if (!started)
-        return -1;
-    while (waitpid(child, &code, 0) < 0)
-        if (errno != EINTR)
-            return -1;
-    return WIFEXITED(code) ? WEXITSTATUS(code) : -1;
-}
-
-/* A folder for one figure, outside the folder of the experiment, where gnuplot must open nothing
- * (io/folder.h): it has name.gp, and then name.svg and name.pdf. */
-typedef struct scratch {
-    char folder[160];
-    char names[3][104]; /* script, SVG, PDF */
-} scratch;
-
-static bool scratch_open(scratch *s, const char *name, const char *script, size_t size)
-{
-    const char *const endings[3] = {"gp", "svg", "pdf"}, *base = getenv("TMPDIR");
-    char path[272];
-    for (int i = 0; i < 3; i++)
-        snprintf(s->names[i], sizeof s->names[i], "%s.%s", name, endings[i]);
-    snprintf(s->folder, sizeof s->folder, "%s/drape-XXXXXX", base && strlen(base) < 128 ? base : "/tmp");
-    if (!mkdtemp(s->folder))
-        return false;
-    snprintf(path, sizeof path, "%s/%s", s->folder, s->names[0]);
-    FILE *file = fopen(path, "w");
-    const bool written = file && fwrite(script, 1, size, file) == size;
-    return file && fclose(file) == 0 && written;
-}
-
-static void scratch_remove(const scratch *s)
-{
-    char path[272];
-    for (int i = 0; i < 3; i++) {
-        snprintf(path, sizeof path, "%s/%s", s->folder, s->names[i]);
-        unlink(path);
-    }
-    rmdir(s->folder);
-}
-
-/* Runs gnuplot in the folder, and copies what it drew into the folder of the experiment. */
-static drape_status scratch_draw(scratch *s, lab *l, bool *drawn)
-{
-    char go[176];
-    snprintf(go, sizeof go, "cd '%s'", s->folder);
-    char *const arguments[] = {(char[]){"gnuplot"}, (char[]){"-e"}, go, s->names[0], NULL};
-    drape_status status = DRAPE_OK;
-    *drawn = run_program(arguments) == 0;
-    for (int i = 1; *drawn && !status && i < 3; i++) {
-        char *text = NULL;
-        size_t size = 0;
-        status = lab_read_text(&l->arena, s->folder, s->names[i], &text, &size);
-        if (!status)
-            status = lab_write_text(l, s->names[i], text, size);
-        drape_arena_release(&l->arena, text);
-    }
-    return status;
-}
-
-static drape_status draw(lab *l, const lab_figure *f, const char *caption)
-{
-    char *text = NULL;
+    char name[sizeof f->name + 4], *text = NULL;
     size_t size = 0;
-    scratch s = {.folder = ""};
-    bool drawn = false;
     FILE *out = open_memstream(&text, &size);
     if (!out)
         return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a figure");
-    put_script(f, out);
-    fclose(out);
-    const bool ready = scratch_open(&s, f->name, text, size);
-    drape_status status = lab_write_text(l, s.names[0], text, size);
+    cairo_surface_t *surface = make(put_bytes, out, across(WIDTH), across(at.height));
+    const page p = {cairo_create(surface), at.height};
+    draw_page(f, &at, &p);
+    cairo_surface_finish(surface);
+    const bool failed = cairo_status(p.cairo) || cairo_surface_status(surface);
+    cairo_destroy(p.cairo);
+    cairo_surface_destroy(surface);
+    snprintf(name, sizeof name, "%s%s", f->name, ending);
+    drape_status status = fclose(out) || failed
+                              ? drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for the figure %s", name)
+                              : lab_write_text(l, name, text, size);
+    if (!status && caption)
+        lab_page_figure(l, text, size, caption);
     free(text);
-    if (!status && ready)
-        status = scratch_draw(&s, l, &drawn);
-    if (*s.folder)
-        scratch_remove(&s);
-    if (status || drawn)
-        return status ? status : lab_page_figure(l, f->name, caption);
-    fprintf(l->summary, "gnuplot is missing or failed on %s: this report has no figures\n", s.names[0]);
-    return DRAPE_OK;
+    return status;
 }
 
 drape_status lab_figure_end(lab *l, lab_figure *f, const char *caption)
 {
-    fclose(f->script);
-    fclose(f->plot);
     for (int i = 0; i < f->variant_count; i++)
         add_entry(f, &f->variants[i]);
-    drape_status status = f->elements > 0 ? draw(l, f, caption) : DRAPE_OK;
-    free(f->text);
-    free(f->plot_text);
+    drape_status status = f->failed ? DRAPE_E_MEMORY : DRAPE_OK;
+    const bool empty = status || f->element_count == 0;
+    if (!empty &&
+        !(has_range(&f->axes[0]) && has_range(&f->axes[1]) && (!has_scale(f) || has_range(&f->scale))))
+        status = drape_fail(l->ctx, DRAPE_E_PARSE,
+                            "the figure %s cannot be drawn: its values, %g to %g and %g to %g, have no range",
+                            f->name, f->axes[0].from, f->axes[0].to, f->axes[1].from, f->axes[1].to);
+    if (!status && !empty)
+        status = write_figure(l, f, ".svg", caption, cairo_svg_surface_create_for_stream);
+    if (!status && !empty)
+        status = write_figure(l, f, ".pdf", NULL, cairo_pdf_surface_create_for_stream);
+    drape_arena_release(&l->arena, f->values);
+    drape_arena_release(&l->arena, f->elements);
     return status;
 }

@@ -1,7 +1,7 @@
 /*
  * figure.h: the figures of the experiments, as a column of a paper: 84 mm wide, text of 7 pt and more,
- * as SVG and as PDF with its font embedded. gnuplot draws them; where text stands is computed here,
- * from the widths of its characters, so that legends and labels touch nothing.
+ * as SVG and as PDF with its font embedded by cairo. Where text stands is computed from the widths of its
+ * characters, so that legends and labels touch nothing.
  *
  * Colours are those of Okabe and Ito, Color Universal Design (2008), and five more, which people with any
  * form of colour blindness tell apart. An integrator has the same colour and marker in every figure.
@@ -26,7 +26,7 @@
 #define LAB_RED    0xd55e00
 #define LAB_PURPLE 0xcc79a7
 
-/* Markers of gnuplot's that are not those of an integrator. */
+/* Markers that are not those of an integrator. */
 #define LAB_PLUS_MARKER  1
 #define LAB_CROSS_MARKER 2
 #define LAB_OPEN_MARKER  6
@@ -34,7 +34,7 @@
 typedef struct lab_style {
     int colour;
     int dash;  /* 1: solid; 0: no line, markers only */
-    int point; /* a marker of gnuplot's; 0: none */
+    int point; /* a marker (put_marker); 0: none */
 } lab_style;
 
 /* The style of an integrator. Its variants, numbered from 0, have its colour, other dashes and open
@@ -57,47 +57,58 @@ typedef struct lab_entry {
     bool hatched; /* the area */
 } lab_entry;
 
+typedef struct lab_element {
+    int kind;     /* of figure.c */
+    size_t block; /* of data */
+    lab_style style;
+} lab_element;
+
 /* A figure while it is made. */
 typedef struct lab_figure {
-    char name[96];
+    lab *l;
+    char name[96];   /* of its files, without their endings */
     char title[160]; /* "": none */
     lab_axis axes[2];
-    lab_axis scale;         /* of the colours of lab_figure_values, drawn below the frame; to <= from: none */
-    double plot_height;     /* [mm] of the frame; default 52 */
-    FILE *script;           /* data: between lab_figure_data and lab_figure_data_end a point a line */
-    FILE *plot;             /* the elements of the plot */
-    char *text, *plot_text; /* what was written to them */
-    size_t size, plot_size;
-    int blocks, elements;
+    lab_axis scale;        /* of the colours of lab_figure_values, drawn below the frame; to <= from: none */
+    double plot_height;    /* [mm] of the frame; default 52 */
+    double *values;        /* (used) of all blocks of data; in the arena */
+    size_t used, block;    /* block: the last one */
+    lab_element *elements; /* (element_count) in the arena */
+    int element_count;
+    bool failed; /* out of memory */
     lab_entry legend[LAB_MAX_ENTRIES];
     int entries;
     lab_entry variants[LAB_MAX_VARIANTS]; /* last in the legend */
     int variant_count;
 } lab_figure;
 
-/* Begins the figure of that name, whose axes the caller sets. Errors: DRAPE_E_MEMORY. */
-drape_status lab_figure_begin(lab *l, lab_figure *f, const char *name);
+/* Begins the figure of that name, whose axes the caller sets. Its files are called as the name is, but for characters other
+ * than letters, digits and "-_.", and for long names, where a hash tells names apart. */
+void lab_figure_begin(lab *l, lab_figure *f, const char *name);
 
-/* Begins and ends a block of data, which is printed to f->script; returns its number. */
-int lab_figure_data(lab_figure *f);
-void lab_figure_data_end(lab_figure *f);
+/* Begins a block of data; returns what names it. */
+size_t lab_figure_data(lab_figure *f);
+
+/* Adds a point or a box to the last block. NaN makes a gap in a curve. */
+void lab_figure_point(lab_figure *f, double x, double y);
+void lab_figure_box(lab_figure *f, double left, double right, double bottom, double top, double fill);
 
 /* Points (x, y) of a block, joined by lines. text: in the legend; NULL: not there. */
-void lab_figure_curve(lab_figure *f, int block, lab_style style, const char *text);
+void lab_figure_curve(lab_figure *f, size_t block, lab_style style, const char *text);
 
 /* The curve of a series of an integrator, "be" or "be, error control". In the legend variants share an entry
  * for what they have in common, "error control", in black: a name and a dash tell a series. */
-void lab_figure_series(lab_figure *f, int block, const char *integrator, size_t variant, const char *name);
+void lab_figure_series(lab_figure *f, size_t block, const char *integrator, size_t variant, const char *name);
 
-/* Boxes of a block: x y left right bottom top colour. */
-void lab_figure_boxes(lab_figure *f, int block);
+/* Boxes of a block, filled with their colours. */
+void lab_figure_boxes(lab_figure *f, size_t block);
 
 /* The same with a value of the scale in place of the colour: from dark blue to yellow. Values beyond the ends
  * of the scale have the colours of these. */
-void lab_figure_values(lab_figure *f, int block);
+void lab_figure_values(lab_figure *f, size_t block);
 
-/* Hatches boxes of a block, which may have any seventh column, with lines of that colour. */
-void lab_figure_hatch(lab_figure *f, int block, int colour);
+/* Hatches boxes of a block, which may have any fill, with lines of that colour. */
+void lab_figure_hatch(lab_figure *f, size_t block, int colour);
 
 /* A marker in the legend, without a line. */
 void lab_figure_marker(lab_figure *f, lab_style style, const char *text);
@@ -109,9 +120,8 @@ void lab_figure_swatch(lab_figure *f, int colour, bool hatched, const char *text
  * (points: x, y in turn) and draws reference lines of slopes 1 to orders there, 2 at most. */
 void lab_figure_fit(lab_figure *f, const double *points, size_t count, int orders);
 
-/* Writes name.gp, has gnuplot make name.svg and name.pdf, and adds the figure with its caption to the
- * page. Without an element there is no figure. If gnuplot is missing or fails, only the summary says so.
- * Frees the memory. */
+/* Writes name.svg and name.pdf, and adds the figure with its caption to the page. Without an element there is
+ * no figure. Frees the memory. Errors: DRAPE_E_PARSE (values without a range), DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_figure_end(lab *l, lab_figure *f, const char *caption);
 
 #endif

@@ -19,6 +19,7 @@
 #define BASE_METHOD "be"
 #define LEVELS      11 /* of dt */
 #define MAX_SERIES  64 /* of a scene */
+#define MAX_POINTS  16 /* of a series */
 
 /* Ranks of dt = interval/2^k: a few points over all of the range first. */
 static const int dt_ranks[LEVELS] = {6, 2, 5, 0, 4, 1, 5, 3, 6, 4, 7};
@@ -189,6 +190,7 @@ static void complete_request(const lab *l, size_t index, lab_request *request)
     const set *own = l->own;
     const lab_ivp *s = &own->scenes[own->of[index]];
     request->scene = s->path;
+    request->identity = s->hash;
     request->reference = &s->reference;
     request->reference_error = s->error * s->size;
     request->times = s->times;
@@ -200,7 +202,7 @@ static void complete_request(const lab *l, size_t index, lab_request *request)
 /* The cases of a scene and a series, in the order of the plan: from coarse to fine. */
 typedef struct series {
     const char *scene, *name, *integrator, *knob;
-    const json_t *results[16];
+    const json_t *results[MAX_POINTS];
     size_t count; /* those that were run */
 } series;
 
@@ -292,7 +294,10 @@ static void put_cell(table *t, const char *text)
     fputs("<td>", t->l->page);
     lab_page_text(t->l, text);
     fputs("</td>", t->l->page);
-    fprintf(t->out, " %s |", text);
+    fputc(' ', t->out);
+    for (; *text; text++) /* a text is neither a cell more nor HTML */
+        fputs(*text == '|' ? "\\|" : *text == '<' ? "&lt;" : (char[]){*text, 0}, t->out);
+    fputs(" |", t->out);
 }
 
 static void end_row(table *t)
@@ -427,7 +432,7 @@ static void tabulate_orders(table *t)
     for (size_t i = 0; i < json_array_size(scenes); i++) {
         const size_t count = list_series(t->l, lab_text(json_array_get(scenes, i), "name"), list);
         for (size_t k = 0; k < count; k++) {
-            double dt[LEVELS], error[LEVELS];
+            double dt[MAX_POINTS], error[MAX_POINTS];
             char text[64];
             const size_t points = strcmp(list[k].knob, "dt") == 0 ? asymptotic_range(&list[k], dt, error) : 0;
             if (points < 3)
@@ -567,12 +572,11 @@ static size_t take_points(const chart *c, const series *s, bool gained, double *
     return count;
 }
 
-static int write_points(lab_figure *f, const double *xy, size_t count)
+static size_t write_points(lab_figure *f, const double *xy, size_t count)
 {
-    const int block = lab_figure_data(f);
+    const size_t block = lab_figure_data(f);
     for (size_t k = 0; k < count; k++)
-        fprintf(f->script, "%.9g %.9g\n", xy[2 * k], xy[2 * k + 1]);
-    lab_figure_data_end(f);
+        lab_figure_point(f, xy[2 * k], xy[2 * k + 1]);
     return block;
 }
 
@@ -598,11 +602,11 @@ static drape_status draw(lab *l, const json_t *about, const chart *c)
     size_t count = 0, variant = 0;
     bool any_gained = false;
     double *xy = drape_arena_take(&l->arena, 2 * l->count, sizeof *xy);
-    char name[96], caption[400];
-    snprintf(name, sizeof name, "%.64s_%s", scene, c->suffix);
-    drape_status status = xy ? lab_figure_begin(l, &f, name) : DRAPE_E_MEMORY;
-    if (status)
-        return status;
+    char name[300], caption[400];
+    snprintf(name, sizeof name, "%.255s_%s", scene, c->suffix);
+    if (!xy)
+        return DRAPE_E_MEMORY;
+    lab_figure_begin(l, &f, name);
     for (size_t i = 0; i < series_count; i++) {
         const series *s = &list[i];
         variant = i && strcmp(s->integrator, list[i - 1].integrator) == 0 ? variant + 1 : 0;
@@ -628,7 +632,7 @@ static drape_status draw(lab *l, const json_t *about, const chart *c)
     if (count > 0)
         lab_figure_fit(&f, xy, count, !c->knob ? 0 : strcmp(c->knob, "dt") == 0 ? 2 : 1);
     describe_chart(about, c, caption, sizeof caption);
-    status = lab_figure_end(l, &f, caption);
+    drape_status status = lab_figure_end(l, &f, caption);
     drape_arena_release(&l->arena, xy);
     return status;
 }
@@ -640,24 +644,21 @@ static drape_status draw_horizons(lab *l)
     const json_t *scenes = json_object_get(l->arguments, "scenes");
     lab_figure f;
     double low = 1, high = 1, last = 0;
-    drape_status status = lab_figure_begin(l, &f, "horizons");
-    if (status)
-        return status;
+    lab_figure_begin(l, &f, "horizons");
     for (size_t i = 0; i < json_array_size(scenes); i++) {
         const json_t *s = json_array_get(scenes, i), *t = json_object_get(s, "t_s"),
                      *growth = json_object_get(s, "growth");
         if (json_array_size(t) == 0)
             continue;
-        const int block = lab_figure_data(&f);
+        const size_t block = lab_figure_data(&f);
         for (size_t k = 0; k < json_array_size(t); k++) {
             const double x = json_number_value(json_array_get(t, k)) / lab_number(s, "duration_s"),
                          y = json_number_value(json_array_get(growth, k));
             low = y > 0 ? fmin(low, y) : low;
             high = fmax(high, y);
             last = fmax(last, x);
-            fprintf(f.script, "%.6g %.6g\n", x, y);
+            lab_figure_point(&f, x, y > 0 ? y : NAN);
         }
-        lab_figure_data_end(&f);
         lab_figure_curve(&f, block, (lab_style){palette[i % 5], 1 + (int)(i / 5), 0}, lab_text(s, "name"));
     }
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "time / duration of the scene");

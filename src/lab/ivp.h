@@ -20,9 +20,10 @@
 /* A scene of the set, or one that may become one. Its memory is in the arena that it was opened with. */
 typedef struct lab_ivp {
     drape_arena *arena;
-    const char *path, *name;  /* "DIR/NAME.json", "NAME" */
+    const char *path, *stem;  /* "DIR/NAME.json", "NAME" */
+    const char *name;         /* the same, printable */
     drape_lab_cancel *cancel; /* whether to stop, set by the caller; NULL: never */
-    char hash[17];            /* of the text of the scene */
+    char hash[17];            /* of the scene and the files that it names */
     drape_model *model;       /* to be closed */
     double size;              /* [m] */
     double node_mass;         /* [kg] mean */

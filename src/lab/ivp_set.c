@@ -44,24 +44,35 @@ static double mean_mass(const drape_model *model)
     return sum / count;
 }
 
+/* The name as it is shown and stored: printable, and in UTF-8. */
+static const char *shown_name(drape_arena *arena, const char *name)
+{
+    char *copy = drape_arena_text(arena, name);
+    if (copy)
+        drape_make_printable(copy);
+    json_t *text = copy ? drape_json_text(copy) : NULL;
+    const char *shown = text ? drape_arena_text(arena, json_string_value(text)) : NULL;
+    json_decref(text);
+    return shown;
+}
+
 drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
 {
-    char *text, *name;
-    size_t length;
+    char *name;
     *s = (lab_ivp){.arena = arena, .path = drape_arena_text(arena, path)};
     const char *slash = strrchr(path, '/');
-    s->name = name = drape_arena_text(arena, slash ? slash + 1 : path);
+    s->stem = name = drape_arena_text(arena, slash ? slash + 1 : path);
     if (!s->path || !name)
         return DRAPE_E_MEMORY;
     name[strrchr(name, '.') ? (size_t)(strrchr(name, '.') - name) : strlen(name)] = 0;
+    s->name = shown_name(arena, name);
+    if (!s->name)
+        return DRAPE_E_MEMORY;
     drape_status status = drape_model_load(arena->ctx, path, &s->model);
     if (!status)
-        status = lab_read_text(arena, NULL, path, &text, &length);
+        status = lab_hash_scene(arena->ctx, path, s->model, s->hash);
     if (status)
         return status;
-    snprintf(s->hash, sizeof s->hash, "%016llx",
-             (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, text, length));
-    drape_arena_release(arena, text);
     s->size = s->model->length;
     s->node_mass = mean_mass(s->model);
     s->contact = s->model->collider_count > 0 || s->model->contact.self;
@@ -176,10 +187,10 @@ char *lab_ivp_file(const lab_ivp *s, const char *kind, const char *ending)
 {
     const char *slash = strrchr(s->path, '/');
     const size_t folder = slash ? (size_t)(slash - s->path) + 1 : 0;
-    const size_t room = folder + strlen(kind) + strlen(s->name) + strlen(ending) + 3;
+    const size_t room = folder + strlen(kind) + strlen(s->stem) + strlen(ending) + 3;
     char *path = drape_arena_take(s->arena, room, 1);
     if (path)
-        snprintf(path, room, "%.*s%s/%s.%s", (int)folder, s->path, kind, s->name, ending);
+        snprintf(path, room, "%.*s%s/%s.%s", (int)folder, s->path, kind, s->stem, ending);
     return path;
 }
 

@@ -115,8 +115,9 @@ static drape_status save(lab *l, const sequence *s, bool chosen, const level *la
     return status;
 }
 
-/* Reads the saved level of an earlier run, if both files exist and belong together. s: as in name_file. */
-static bool read_saved(lab *l, const sequence *s, level *last)
+/* Reads the saved level of an earlier run, if both files exist and belong together and to the model. s: as in
+ * name_file. */
+static bool read_saved(lab *l, const drape_model *model, const sequence *s, level *last)
 {
     char name[64], *text = NULL, *data = NULL;
     size_t length = 0, bytes = 0;
@@ -125,15 +126,19 @@ static bool read_saved(lab *l, const sequence *s, level *last)
     name_file(l, s, "f64", name);
     read = read && !lab_read_text(&l->arena, l->folder, name, &data, &bytes);
     json_t *about = read ? json_loadb(text, length, 0, NULL) : NULL;
-    const int64_t frames = json_integer_value(json_object_get(about, "frames"));
-    const size_t size = (size_t)json_integer_value(json_object_get(about, "size"));
-    const bool fits = about && frames > 0 && bytes == size * (size_t)frames * sizeof(double);
+    const size_t size = 3 * (size_t)drape_model_node_count(model), frame = size * sizeof(double);
+    const int64_t frames = (int64_t)(bytes / frame);
+    const json_int_t levels = json_integer_value(json_object_get(about, "levels"));
+    const double error = lab_number(about, "error_m");
+    const bool fits = frames > 0 && bytes % frame == 0 && levels > 0 && levels <= MAX_LEVELS &&
+                      json_integer_value(json_object_get(about, "frames")) == frames &&
+                      lab_number(about, "value") > 0 && lab_number(about, "took_s") >= 0 &&
+                      lab_number(about, "spent_s") >= 0;
     if (fits) {
-        const double error = lab_number(about, "error_m");
         *last = (level){.trace = {size, frames, frames, (double *)(void *)data},
                         .error = isnan(error) ? INFINITY : error,
                         .knob = lab_number(about, "value"),
-                        .count = (int)json_integer_value(json_object_get(about, "levels")),
+                        .count = (int)levels,
                         .took = lab_number(about, "took_s"),
                         .spent = lab_number(about, "spent_s")};
     }
@@ -198,7 +203,7 @@ static drape_status refine_all(lab *l, const drape_model *model, int i, level *l
     const double deadline = deadline_of(l, i);
     drape_status status = DRAPE_OK;
     *last = (level){.error = INFINITY};
-    read_saved(l, &sequences[i], last);
+    read_saved(l, model, &sequences[i], last);
     while (!status && !last->ended_by && last->count < MAX_LEVELS && last->error > BEST * model->length) {
         last->ended_by = next_limit(l, last, deadline);
         if (!last->ended_by)
@@ -267,15 +272,13 @@ drape_status lab_make_reference(lab *l)
 {
     drape_model *model = NULL;
     level best;
-    drape_status status = DRAPE_OK;
-    if (!read_saved(l, NULL, &best)) {
+    drape_status status = lab_load(l->ctx, &(lab_request){.def = l->def}, &model);
+    if (!status && !read_saved(l, model, NULL, &best)) {
         if (l->def->progress)
             l->def->progress(l->def->user, 0, 0, NAN);
-        status = lab_load(l->ctx, &(lab_request){.def = l->def}, &model);
-        if (!status)
-            status = choose(l, model, &best);
-        drape_model_destroy(&model);
+        status = choose(l, model, &best);
     }
+    drape_model_destroy(&model);
     if (!status) {
         l->reference = best.trace;
         l->reference_error = best.error;

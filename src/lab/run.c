@@ -2,10 +2,15 @@
 #include "lab/run.h"
 
 #include "base/clock.h"
+#include "base/hash.h"
+#include "io/scene_copy.h"
 #include "lab/lab.h"
+#include "lab/text.h"
 #include "model/model.h"
+#include "sim/identity.h"
 #include "sim/sim.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -56,6 +61,43 @@ drape_status lab_load(drape_context *ctx, const lab_request *request, drape_mode
     if (!status)
         status = drape_scene_compile(scene, model);
     drape_scene_destroy(&scene);
+    return status;
+}
+
+static drape_status count_file(void *user, const char *path, const char *pointer)
+{
+    (void)path;
+    (void)pointer;
+    ++*(int *)user;
+    return DRAPE_OK;
+}
+
+drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_model *model, char digits[17])
+{
+    drape_arena arena = drape_arena_of(ctx);
+    char *text;
+    size_t size;
+    int files = 0;
+    drape_status status = lab_read_text(&arena, NULL, path, &text, &size);
+    if (!status)
+        status = drape_scene_files(ctx, model, path, count_file, &files);
+    if (!status) {
+        const uint64_t hash = drape_hash_bytes(DRAPE_HASH_START, text, size),
+                       compiled = files ? drape_model_identity(model) : 0;
+        snprintf(digits, 17, "%016" PRIx64, drape_hash_bytes(hash, &compiled, files ? sizeof compiled : 0));
+    }
+    drape_arena_free(&arena);
+    return status;
+}
+
+drape_status lab_identify(drape_context *ctx, const lab_request *request, char digits[17])
+{
+    drape_model *model = NULL;
+    const lab_request plain = {.def = request->def, .scene = request->scene};
+    drape_status status = lab_load(ctx, &plain, &model);
+    if (!status)
+        status = lab_hash_scene(ctx, request->scene ? request->scene : request->def->scene, model, digits);
+    drape_model_destroy(&model);
     return status;
 }
 

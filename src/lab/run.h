@@ -12,6 +12,7 @@
 typedef struct lab_request {
     const drape_lab_def *def;   /* scene, settings of all cases, cancel */
     const char *scene;          /* name of its file; NULL: the def's */
+    const char *identity;       /* that it must have when the case is done */
     const json_t *settings;     /* {pointer: value} of the case; NULL: none */
     const lab_trace *reference; /* NULL or no frames: nothing to compare with */
     double reference_error;     /* [m] estimate of its error */
@@ -32,6 +33,13 @@ typedef struct lab_request {
  * is to be destroyed in any case. */
 drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drape_scene **scene);
 drape_status lab_load(drape_context *ctx, const lab_request *request, drape_model **model);
+
+/* The identity of a scene and of all files that it names, as digits: a hash of its text, which goes on over the
+ * compiled model where the scene names files. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_model *model, char digits[17]);
+
+/* The same of the scene of a request, before the settings of its case, as it is now. Errors: those of loading. */
+drape_status lab_identify(drape_context *ctx, const lab_request *request, char digits[17]);
 
 /* Whether it compiles. */
 drape_status lab_try(drape_context *ctx, const lab_request *request);

@@ -482,8 +482,7 @@ static int write_row(map *m, layer kind, int row)
         before = here;
         if (!here.there || (next.there && next.fill == here.fill))
             continue;
-        fprintf(m->f.script, "%.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", from, bottom, from, right, bottom, top,
-                here.fill);
+        lab_figure_box(&m->f, from, right, bottom, top, here.fill);
         boxes++;
     }
     return boxes;
@@ -492,10 +491,9 @@ static int write_row(map *m, layer kind, int row)
 static void write_layer(map *m, layer kind)
 {
     int boxes = 0;
-    const int block = lab_figure_data(&m->f);
+    const size_t block = lab_figure_data(&m->f);
     for (int row = 0; row < m->rows; row++)
         boxes += write_row(m, kind, row);
-    lab_figure_data_end(&m->f);
     if (boxes == 0)
         return;
     if (kind == FLAT)
@@ -547,7 +545,7 @@ static void set_axis(const axis *a, lab_axis *out)
 }
 
 /* A black line on a white one is seen on every colour. */
-static void draw_limit(lab_figure *f, int block, bool first)
+static void draw_limit(lab_figure *f, size_t block, bool first)
 {
     lab_figure_curve(f, block, (lab_style){LAB_WHITE, 1, 0}, NULL);
     lab_figure_curve(f, block, (lab_style){LAB_BLACK, 2, 0}, first ? "explicit limit 2/omega" : NULL);
@@ -570,17 +568,16 @@ static void add_limit(map *m)
     bool any = false;
     if (step < 0 || step > 1)
         return;
-    const int block = lab_figure_data(&m->f);
+    const size_t block = lab_figure_data(&m->f);
     for (size_t cell = 0; cell < m->s->cells; cell++) {
         int index[MAX_AXES];
         const double limit = lab_number(m->l->results[m->first + cell], "explicit_limit_s");
         if (!is_on(m, cell, index) || index[step] != 0 || isnan(limit))
             continue;
         const double other = axis_value(&axes[1 - step], index[1 - step]);
-        fprintf(m->f.script, "%.9g %.9g\n", step == 0 ? limit : other, step == 0 ? other : limit);
+        lab_figure_point(&m->f, step == 0 ? limit : other, step == 0 ? other : limit);
         any = true;
     }
-    lab_figure_data_end(&m->f);
     if (any)
         draw_limit(&m->f, block, m->limits++ == 0);
 }
@@ -591,9 +588,9 @@ static void add_limit_at(lab_figure *f, const json_t *result, double bottom, dou
     const double limit = lab_number(result, "explicit_limit_s");
     if (!(limit >= f->axes[0].from && limit <= f->axes[0].to))
         return;
-    const int line = lab_figure_data(f);
-    fprintf(f->script, "%.9g %.9g\n%.9g %.9g\n", limit, bottom, limit, top);
-    lab_figure_data_end(f);
+    const size_t line = lab_figure_data(f);
+    lab_figure_point(f, limit, bottom);
+    lab_figure_point(f, limit, top);
     draw_limit(f, line, (*limits)++ == 0);
 }
 
@@ -629,9 +626,7 @@ static drape_status draw_map(lab *l, const space *s, const shade *sh, size_t fir
     snprintf(number, sizeof number, s->count == MAX_AXES ? "_%d" : "", third);
     snprintf(name, sizeof name, "map_%s%s%s%s", integrator, number, quantity ? "_" : "",
              quantity ? quantity->entry.name : "");
-    drape_status status = lab_figure_begin(l, &m.f, name);
-    if (status)
-        return status;
+    lab_figure_begin(l, &m.f, name);
     snprintf(m.f.title, sizeof m.f.title, s->count == MAX_AXES ? "%s, %.80s = %.4g %s" : "%s", integrator,
              axis_name(last), axis_value(last, third), lab_unit(last->pointer));
     snprintf(caption, sizeof caption, "%s%s%s", m.f.title, quantity ? ": " : "",
@@ -649,9 +644,9 @@ static drape_status draw_rows(lab *l, const space *s)
     const int rows = (int)(l->count / s->cells);
     map m = {.l = l, .s = s, .rows = rows};
     const char **names = drape_arena_take(&l->arena, (size_t)rows, sizeof *names);
-    drape_status status = names ? lab_figure_begin(l, &m.f, "map") : DRAPE_E_MEMORY;
-    if (status)
-        return status;
+    if (!names)
+        return DRAPE_E_MEMORY;
+    lab_figure_begin(l, &m.f, "map");
     set_axis(&s->axes[0], &m.f.axes[0]);
     m.f.axes[1] = (lab_axis){.from = -0.5, .to = rows - 0.5, .names = names, .name_count = rows};
     m.f.plot_height = 6.0 * rows;
@@ -720,20 +715,19 @@ static bool is_mark(const lab *l, const shade *sh, mark kind, size_t i)
 
 /* The marks of a kind of one integrator; missing values break the curve. height: of those without results. */
 static int write_marks(lab *l, const space *s, const shade *sh, size_t first, mark kind, double height,
-                       lab_figure *f, int *block)
+                       lab_figure *f, size_t *block)
 {
     int count = 0;
     *block = lab_figure_data(f);
     for (int k = 0; k < s->axes[0].count; k++) {
         const size_t i = first + (size_t)k;
         if (is_mark(l, sh, kind, i)) {
-            fprintf(f->script, "%.9g %.9g\n", axis_value(&s->axes[0], k),
-                    kind >= NO_RESULT ? height : curve_value(sh, shown_value(l, sh, i)));
+            lab_figure_point(f, axis_value(&s->axes[0], k),
+                             kind >= NO_RESULT ? height : curve_value(sh, shown_value(l, sh, i)));
             count++;
         } else if (count > 0)
-            fputs("\n", f->script);
+            lab_figure_point(f, NAN, NAN);
     }
-    lab_figure_data_end(f);
     return count;
 }
 
@@ -778,13 +772,12 @@ static drape_status draw_curves(lab *l, const space *s, const shade *sh)
 {
     const size_t rows = l->count / s->cells;
     char name[96], text[96];
-    int failed = 0, block, limits = 0;
+    int failed = 0, limits = 0;
+    size_t block;
     bool seen[MARKS] = {false};
     lab_figure f;
     snprintf(name, sizeof name, "curve_%s", sh->quantity->entry.name);
-    drape_status status = lab_figure_begin(l, &f, name);
-    if (status)
-        return status;
+    lab_figure_begin(l, &f, name);
     set_axis(&s->axes[0], &f.axes[0]);
     for (size_t r = 0; r < rows; r++)
         failed += lacks_results(l, s, sh, r * s->cells);
@@ -845,6 +838,29 @@ static void summarise(lab *l, const space *s, size_t first)
     fprintf(l->summary, "\n");
 }
 
+/* Whether the cases are those of the axes: the cells of an integrator after those of another. */
+static drape_status check_cells(lab *l, const space *s)
+{
+    for (size_t i = 0; i < l->count; i++) {
+        const json_t *one = json_array_get(l->cases, i), *first = json_array_get(l->cases, i - i % s->cells);
+        int index[MAX_AXES];
+        indices_of(s, i % s->cells, index);
+        bool there = strcmp(lab_tag_text(one, "integrator"), lab_tag_text(first, "integrator")) == 0;
+        for (int a = 0; a < s->count; a++) {
+            const axis *x = &s->axes[a];
+            const double value = axis_value(x, index[a]), size = x->log ? value : fabs(x->to - x->from);
+            there = there && fabs(lab_tag_number(one, x->pointer) - value) <= 1e-9 * size;
+        }
+        if (!there)
+            return drape_fail(l->ctx, DRAPE_E_PARSE,
+                              "experiment.json: /cases/%zu is not at its place on the axes", i);
+    }
+    return l->count % s->cells == 0
+               ? DRAPE_OK
+               : drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: %zu cases are no whole map of %zu cells",
+                            l->count, s->cells);
+}
+
 /* A summary and the figures. Axes and results are those of experiment.json: a merge has no def. */
 static drape_status report(lab *l)
 {
@@ -859,6 +875,8 @@ static drape_status report(lab *l)
         texts[a] = text ? text : "";
     }
     drape_status status = read_axes(l, texts, &s);
+    if (!status)
+        status = check_cells(l, &s);
     for (size_t first = 0; !status && first + s.cells <= l->count; first += s.cells)
         summarise(l, &s, first);
     if (!status) {

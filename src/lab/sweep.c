@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "io/export.h"
 #include "lab/plan.h"
+#include "lab/schema.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -16,21 +17,16 @@
 
 static drape_status take_line(lab *l, const char *path, int64_t number, const char *text, int64_t *found)
 {
-    json_t *line = json_loads(text, JSON_REJECT_DUPLICATES, NULL), *index = json_object_get(line, "case");
-    const json_int_t i = json_is_integer(index) ? json_integer_value(index) : -1;
-    if (i < 0 || (size_t)i >= l->count ||
-        !json_equal(json_object_get(line, "tags"),
-                    json_object_get(json_array_get(l->cases, (size_t)i), "tags"))) {
+    json_error_t fault;
+    json_t *line = json_loads(text, JSON_REJECT_DUPLICATES, &fault);
+    drape_status status = lab_check_line(l, path, number, line, &fault);
+    json_t **result = status ? NULL : &l->results[json_integer_value(json_object_get(line, "case"))];
+    if (!result || *result) {
         json_decref(line);
-        return drape_fail(l->ctx, DRAPE_E_PARSE, "%.500s:%lld: not a result of a case of this experiment",
-                          path, (long long)number);
+        return status;
     }
-    if (l->results[i]) {
-        json_decref(line);
-    } else {
-        l->results[i] = line;
-        ++*found;
-    }
+    *result = line;
+    ++*found;
     return DRAPE_OK;
 }
 
@@ -171,6 +167,7 @@ static void keep(sweep *s, size_t i, json_t *result)
 lab_request lab_request_of(const lab *l, size_t index)
 {
     lab_request request = {.def = l->def,
+                           .identity = lab_text(l->about, "scene_hash"),
                            .settings = json_object_get(json_array_get(l->cases, index), "settings"),
                            .reference = &l->reference,
                            .reference_error = l->reference_error,
@@ -180,6 +177,19 @@ lab_request lab_request_of(const lab *l, size_t index)
     if (l->experiment->request)
         l->experiment->request(l, index, &request);
     return request;
+}
+
+/* A case of a scene, or of a mesh, that has been edited meanwhile does not belong to the experiment. */
+static drape_status check_scene(drape_context *ctx, const lab_request *request)
+{
+    char now[17];
+    drape_status status = lab_identify(ctx, request, now);
+    if (status || strcmp(now, request->identity) == 0)
+        return status;
+    return drape_fail(ctx, DRAPE_E_ARGUMENT,
+                      "\"%.400s\", or a file that it names, was changed while the experiment runs; the "
+                      "results so far are of what it was before",
+                      request->scene ? request->scene : request->def->scene);
 }
 
 /* A thread: runs cases until there is none left. */
@@ -201,6 +211,8 @@ static void *work(void *user)
         request.deadline = s->deadline;
         request.given_up = &s->given_up;
         drape_status status = lab_run(ctx, &request, &result);
+        if (!status && result)
+            status = check_scene(ctx, &request);
         if (result)
             json_object_set_new(result, "case_cpu_s", json_real(drape_clock_thread_seconds() - start));
         pthread_mutex_lock(&s->lock);
@@ -209,6 +221,8 @@ static void *work(void *user)
         else if (status &&
                  (status != DRAPE_E_STOPPED || !s->status)) /* else given up for an earlier failure */
             stop(s, drape_fail(l->ctx, status, "%s", drape_context_message(ctx)));
+        if (status)
+            json_decref(result);
         pthread_mutex_unlock(&s->lock);
     }
     drape_context_destroy(&ctx);

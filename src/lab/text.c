@@ -84,8 +84,8 @@ drape_status lab_write_csv(lab *l)
                                           : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for results.csv");
     if (!status) {
         drape_file_put_text(&file, "case");
-        json_object_foreach(tags, key, unused) drape_file_print(&file, ",%s", key);
-        json_object_foreach(columns, key, unused) drape_file_print(&file, ",%s", key);
+        json_object_foreach(tags, key, unused) drape_csv_put_text(&file, key);
+        json_object_foreach(columns, key, unused) drape_csv_put_text(&file, key);
         for (size_t i = 0; i < l->count; i++) {
             const json_t *result = l->results[i];
             if (!result)
@@ -147,23 +147,15 @@ static void put_base64(FILE *out, const unsigned char *data, size_t size)
     }
 }
 
-drape_status lab_page_figure(lab *l, const char *name, const char *caption)
+void lab_page_figure(lab *l, const char *svg, size_t size, const char *caption)
 {
-    char file[128], *data;
-    size_t size;
-    snprintf(file, sizeof file, "%s.svg", name);
-    drape_status status = lab_read_text(&l->arena, l->folder, file, &data, &size);
-    if (status)
-        return status;
     fputs("<figure><img alt=\"", l->page);
     put_escaped(l->page, caption);
     fputs("\" src=\"data:image/svg+xml;base64,", l->page);
-    put_base64(l->page, (unsigned char *)data, size);
+    put_base64(l->page, (const unsigned char *)svg, size);
     fputs("\"><figcaption>", l->page);
     put_escaped(l->page, caption);
     fputs("</figcaption></figure>\n", l->page);
-    drape_arena_release(&l->arena, data);
-    return DRAPE_OK;
 }
 
 static const char style[] =

@@ -22,8 +22,8 @@ const char *lab_unit(const char *pointer);
 void lab_page_heading(lab *l, const char *text);
 void lab_page_text(lab *l, const char *text); /* escaped */
 
-/* Adds the figure name.svg of the folder with its caption. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
-drape_status lab_page_figure(lab *l, const char *name, const char *caption);
+/* Adds a figure with its caption. */
+void lab_page_figure(lab *l, const char *svg, size_t size, const char *caption);
 
 /* report.html of the summary and the body. */
 drape_status lab_write_page(lab *l, const char *title);

@@ -287,14 +287,16 @@ static const chart charts[] = {
     {"error_jacobians", "Jacobians", "jacobians", "error at the end, RMS [m]", "error_end_m"},
 };
 
-/* The points of a series, added to all: x, y in turn. Returns how many are there then. */
-static size_t take_points(const lab *l, const chart *c, const char *series, double *xy, size_t count)
+/* The points of the series that begins with a case, added to all: x, y in turn. Returns how many are there
+ * then. */
+static size_t take_points(const lab *l, const chart *c, size_t first, double *xy, size_t count)
 {
-    for (size_t i = 0; i < l->count; i++) {
+    const char *series = lab_tag_text(json_array_get(l->cases, first), "series");
+    for (size_t i = first;
+         i < l->count && strcmp(lab_tag_text(json_array_get(l->cases, i), "series"), series) == 0; i++) {
         const json_t *r = l->results[i];
         const double x = lab_number(r, c->x_key), y = lab_number(r, c->y_key);
-        if (strcmp(lab_tag_text(r, "series"), series) != 0 || isnan(resolved_error(r)) || !(x > 0) ||
-            !(y > 0))
+        if (isnan(resolved_error(r)) || !(x > 0) || !(y > 0))
             continue;
         xy[2 * count] = x;
         xy[2 * count++ + 1] = y;
@@ -309,9 +311,9 @@ static drape_status draw(lab *l, const chart *c)
     const char *series = "", *integrator = "";
     size_t count = 0, variant = 0;
     double *xy = drape_arena_take(&l->arena, 2 * l->count, sizeof *xy);
-    drape_status status = xy ? lab_figure_begin(l, &f, c->file) : DRAPE_E_MEMORY;
-    if (status)
-        return status;
+    if (!xy)
+        return DRAPE_E_MEMORY;
+    lab_figure_begin(l, &f, c->file);
     for (size_t i = 0; i < l->count; i++) {
         const json_t *one = json_array_get(l->cases, i);
         if (strcmp(lab_tag_text(one, "series"), series) == 0 || is_linear_case(one))
@@ -320,13 +322,12 @@ static drape_status draw(lab *l, const chart *c)
         series = lab_tag_text(one, "series");
         integrator = lab_tag_text(one, "integrator");
         const size_t before = count;
-        count = take_points(l, c, series, xy, count);
+        count = take_points(l, c, i, xy, count);
         if (count == before)
             continue;
-        const int block = lab_figure_data(&f);
+        const size_t block = lab_figure_data(&f);
         for (size_t k = before; k < count; k++)
-            fprintf(f.script, "%.9g %.9g\n", xy[2 * k], xy[2 * k + 1]);
-        lab_figure_data_end(&f);
+            lab_figure_point(&f, xy[2 * k], xy[2 * k + 1]);
         lab_figure_series(&f, block, integrator, variant, series);
     }
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->x_label);
@@ -357,7 +358,9 @@ static void write_table(lab *l)
         knob_text(r, knob, sizeof knob);
         fputs("<tr><td>", l->page);
         lab_page_text(l, lab_tag_text(r, "series"));
-        fprintf(l->page, "</td><td>%s</td><td>", knob);
+        fputs("</td><td>", l->page);
+        lab_page_text(l, knob);
+        fputs("</td><td>", l->page);
         lab_page_text(l, lab_text(r, "status"));
         fputs("</td>", l->page);
         for (size_t k = 0; k < columns; k++) {

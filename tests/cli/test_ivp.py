@@ -2,6 +2,7 @@
 """The test set of initial value problems: drape ivp. See program.py."""
 import csv
 import json
+import math
 import os
 import re
 import shutil
@@ -9,6 +10,7 @@ import struct
 import subprocess
 import sys
 
+from figure import Figure
 from program import SOURCES, drape, equal, good, read_json, read_npy, refused, run_tests, write_scene
 
 SET = SOURCES + "/examples/ivp"
@@ -90,14 +92,17 @@ def test_run_and_score():
     assert abs(orders["be"] - 1) < 0.1 and abs(orders["trbdf2"] - 2) < 0.1, orders
     assert "report" in out and os.path.exists("r/tables.md"), out
     # The diagram of the energy has the drift of each run, those of runs that gained energy as open markers.
-    with open("r/swing_energy.gp", encoding="utf-8") as file:
-        script = file.read()
-    heights = [float(line.split()[1]) for block in re.findall(r"\$d\d+ << EOD\n(.*?)EOD", script, re.S) for line in block.splitlines()]
     with open("r/results.csv", encoding="utf-8") as file:
         drifts = [float(row["energy_drift"]) for row in csv.DictReader(file)]
-    equal(len(heights), len(drifts), "points")
-    assert all(min(abs(abs(d) / h - 1) for h in heights) < 1e-6 for d in drifts), (heights, drifts)
-    equal("set label 'gained'" in script, min(drifts) < 0, "an entry for gains")
+    figure = Figure("r/swing_energy.svg")
+    left, top, right, bottom = figure.frame()
+    points = sorted(y for x, y, _, _ in figure.markers if left < x < right and top < y < bottom)
+    equal(len(points), len(drifts), "points")
+    wanted = sorted((math.log(abs(d)) for d in drifts), reverse=True)
+    for y, drift in zip(points, wanted):
+        along = (y - points[0]) / (points[-1] - points[0])
+        assert abs(wanted[0] + along * (wanted[-1] - wanted[0]) - drift) < 0.02, (points, wanted)
+    equal(figure.has("gained"), min(drifts) < 0, "an entry for gains")
 
 
 def test_shards():

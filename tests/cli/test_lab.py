@@ -2,6 +2,7 @@
 """The experiments of the program: tradeoff, stability, converge, merge; and validate. See program.py."""
 import csv
 import glob
+import math
 import os
 import re
 import shlex
@@ -13,6 +14,7 @@ import time
 
 import json
 
+from figure import Figure
 from program import PROGRAM, SOURCES, claim, drape, equal, good, read_json, refused, run_tests, scene, write_scene
 
 AXES = ["--axis", "/integrator/dt=1e-3:1e-1:3log", "--axis", "/cloth/0/material/young_modulus=1e4:1e6:2log"]
@@ -97,7 +99,7 @@ def test_one_axis():
     few = sum(count < 20 for count in steps.values())
     assert 0 < few < 6 and 1 in steps.values(), steps
     assert f"be: {6 - few} none rejected, {few} fewer than 20 steps\n" in out, out
-    assert "fewer than 20 steps" in open("s/map.svg", encoding="utf-8").read()
+    assert Figure("s/map.svg").has("fewer than 20 steps")
     equal(sorted(glob.glob("s/map_*")), [], "maps")
     page_is_alone("s/report.html")
 
@@ -108,23 +110,24 @@ def test_results_in_figures():
     one = ["stability", "scene.json", "--axis", "/integrator/dt=1e-3:3e-1:6log", "--integrators", "be,verlet", "--out", "s"]
     good(*one)
     equal(sorted(os.path.basename(path) for path in glob.glob("s/*.svg")), ["curve_energy_drift.svg", "map.svg"], "figures of one axis")
-    with open("s/curve_energy_drift.gp", encoding="utf-8") as file:
-        script = file.read()
     # A curve for each method; open markers where it took fewer than 20 steps, a row of crosses for verlet where it exploded.
-    blocks = [block.split() for block in re.findall(r"\$d\d+ << EOD\n(.*?)EOD", script, re.S)]
-    by_method = {}
+    figure, by_method = Figure("s/curve_energy_drift.svg"), {}
     for result in lines("s").values():
         by_method.setdefault(result["tags"]["integrator"], []).append(result)
     few = [r for r in by_method["be"] if r["accepted"] < 20]
     failed = [r for r in by_method["verlet"] if r["status"] != "ok"]
     assert few and failed and len(few) < 6 and len(failed) < 6, (few, failed)
-    sizes = [len(block) // 2 for block in blocks]
-    assert 6 - len(few) in sizes and len(few) in sizes and len(failed) in sizes, sizes
+    left, top, right, bottom = figure.frame()
+    of_be = [(y, shape[2]) for x, y, shape, colour in figure.markers if colour == (0, 114, 178) and left <= x <= right and top <= y <= bottom]
+    equal((len(of_be), sum(not filled for _, filled in of_be)), (6, len(few)), "markers of be, open ones")
+    equal(sum(shape[0] == 2 for x, y, shape, _ in figure.markers if left <= x <= right and top <= y <= bottom), len(failed), "crosses")
     for text in ("fewer than 20 steps", "stopped or exploded"):
-        assert f"set label '{text}'" in script, text
-    heights = {float(y) for block in blocks for y in block[1::2]}
-    drifts = {abs(r["energy_drift"]) for r in by_method["be"]}
-    assert all(min(abs(h / d - 1) for h in heights) < 1e-6 for d in drifts), (drifts, heights)
+        assert figure.has(text), text
+    heights = sorted(y for y, _ in of_be)
+    drifts = sorted((math.log(abs(r["energy_drift"])) for r in by_method["be"]), reverse=True)
+    for h, d in zip(heights, drifts):
+        along = (h - heights[0]) / (heights[-1] - heights[0])
+        assert abs(drifts[0] + along * (drifts[-1] - drifts[0]) - d) < 0.02, (heights, drifts)
     # Other results are drawn from the same lines.
     with open("s/cases.jsonl", encoding="utf-8") as file:
         before = sorted(file.read().splitlines())
@@ -140,11 +143,11 @@ def test_results_in_figures():
     good("merge", "parts", "--out", "m")
     scales, hatched = set(), False
     for name in ("be", "verlet"):
-        with open(f"m/map_{name}_energy_drift.gp", encoding="utf-8") as file:
-            script = file.read()
-        scales.add(re.search(r"set cbrange .*", script).group())
-        hatched |= "pattern 5 noborder lc rgb" in script
-    equal((len(scales), hatched), (1, True), "scales, hatches")
+        figure = Figure(f"m/map_{name}_energy_drift.svg")
+        below = figure.frame()[3] + 30 # the numbers of the scale
+        scales.add(tuple((one.text, round(one.boxes[0][0])) for one in figure.texts if one.boxes[0][1] > below and re.match("10-?\\d", one.text)))
+        hatched |= any(a[0] != b[0] and a[1] != b[1] and stroke in ((0, 0, 0), (255, 255, 255)) for a, b, stroke, _ in figure.lines)
+    equal((len(scales), hatched), (1, True), f"scales {scales}, hatches")
     refused("stability", "scene.json", *AXES, "--results", "energy_drif", "--out", "x", says='did you mean "energy_drift"')
     # Every name is a column of results.csv.
     names = refused("stability", "scene.json", *AXES, "--results", "?", "--out", "x", says="there are").split("there are ")[1]
@@ -159,22 +162,18 @@ def test_short_runs_are_hatched():
     write_scene(duration=0.3)
     good("stability", "scene.json", "--axis", "/integrator/dt=1e-3:3e-1:6log", "--axis", "/cloth/0/material/young_modulus=1e2:1e5:2log",
          "--integrators", "be", "--strain-limit", "1e-6", "--out", "s")
-    with open("s/map_be.gp", encoding="utf-8") as file:
-        script = file.read()
-    found = lines("s").values()
+    figure, found = Figure("s/map_be.svg"), lines("s").values()
     assert all(r["strain_max"] > 1e-6 for r in found), found
     short = {r["tags"]["/integrator/dt"] for r in found if r["accepted"] < 20}
-    assert short and "unphysical strain" in script and "fewer than 20 steps" in script, script
+    assert short and figure.has("unphysical strain") and figure.has("fewer than 20 steps")
     # The boxes that are hatched begin where the first of these cells does, half a step below its dt.
-    boxes = re.search(r"pattern 5 noborder lc rgb '#000000'", script) and re.findall(r"\$d(\d+) using 1:2:3:4:5:6 with", script)[0]
-    rows = re.search(rf"\$d{boxes} << EOD\n(.*?)EOD", script, re.S).group(1).splitlines()
-    half = 300 ** (0.5 / 5)
-    for row in rows:
-        assert abs(float(row.split()[2]) * half / min(short) - 1) < 1e-6, (row, short)
+    left, _, right, bottom = figure.frame()
+    hatch = min(x for a, b, stroke, _ in figure.lines if stroke == (0, 0, 0) and a[0] != b[0] and a[1] != b[1] and a[1] < bottom for x in (a[0], b[0]))
+    wanted = left + (right - left) * math.log(min(short) / 1e-3, 300) * 5 / 6
+    assert abs(hatch - wanted) < 0.1, (hatch, wanted)
     write_scene(duration=1000)
     good("stability", "scene.json", "--axis", "/cloth/0/material/density=100:200:2", "--integrators", "be", "--case-seconds", "0.05", "--out", "late")
-    with open("late/map.gp", encoding="utf-8") as file:
-        assert "set label 'over budget (0.05 s)'" in file.read()
+    assert Figure("late/map.svg").has("over budget (0.05 s)")
 
 
 def test_curves_without_values():
@@ -183,13 +182,11 @@ def test_curves_without_values():
     axis = ("--axis", "/integrator/dt=1e-3:1e-2:3log")
     for name, reason, options in (("explicit_limit_s", "no value", ("--results", "explicit_limit_s")),
                                   ("energy_drift", "over budget (1e-09 s)", ("--results", "energy_drift", "--case-seconds", "1e-9"))):
-        out = good("stability", "scene.json", *axis, "--integrators", "be,bdf2", *options, "--out", name)
-        assert "gnuplot" not in out or not shutil.which("gnuplot"), out
-        with open(f"{name}/curve_{name}.gp", encoding="utf-8") as file:
-            script = file.read()
+        good("stability", "scene.json", *axis, "--integrators", "be,bdf2", *options, "--out", name)
+        figure = Figure(f"{name}/curve_{name}.svg")
         for text in (reason, "be", "bdf2"):
-            assert f"set label '{text}' at screen" in script, (text, script)
-        assert "set ytics ('' 0)" in script, script  # no numbers
+            assert figure.has(text), (text, [one.text for one in figure.texts])
+        assert not any(one.boxes[0][2] < figure.frame()[0] and re.search(r"\d", one.text) for one in figure.texts), "no numbers"
 
 
 def test_plan():
@@ -312,7 +309,7 @@ def test_converge():
     # The order of dirk depends on rtol, too, unless it is given.
     out = good("converge", "scene.json", "--integrators", "dirk", "--levels", "5", "--out", "dirk")
     assert re.search(r"^dirk: no order, as it chooses its order.* a value of /integrator/order fixes it", out, re.M), out
-    assert os.path.exists("dirk/converge_rtol.gp")
+    assert os.path.exists("dirk/converge_rtol.svg")
     out = good("converge", "scene.json", "--integrators", "dirk", "--levels", "4", "--set", "/integrator/order=3", "--out", "fixed")
     assert re.search(r"^dirk: change proportional to rtol", out, re.M), out
     # A method of one order has a slope over rtol, which is not called an order.
@@ -349,10 +346,11 @@ def test_one_order_is_fitted():
     claim("c", "cases.jsonl")
     out = good(*command)
     assert "be: order 1 in dt" in out and "of the last 4 of 6 refinements, as the order of the others is another one" in out, out
-    with open("c/converge_dt.gp", encoding="utf-8") as file:
-        script = file.read()
-    sizes = [len(block.split()) // 2 for block in re.findall(r"\$d\d+ << EOD\n(.*?)EOD", script, re.S)]
-    assert sizes[:2] == [2, 4] and "set label 'be (1.00)'" in script and "set label 'not fitted'" in script, script
+    figure = Figure("c/converge_dt.svg")
+    left, top, right, bottom = figure.frame()
+    on_plot = [shape[2] for x, y, shape, _ in figure.markers if left < x < right and top < y < bottom]
+    equal((on_plot.count(True), on_plot.count(False)), (4, 2), "fitted and other refinements")
+    assert figure.has("be (1.00)") and figure.has("not fitted"), [one.text for one in figure.texts]
 
 
 def test_converge_in_space():
@@ -727,10 +725,9 @@ def test_map_is_labelled():
     """axes of a map have units, and rejections, if any, have a scale"""
     write_scene()
     good("stability", "scene.json", *AXES, "--integrators", "be,verlet", "--out", "s")
-    with open("s/map_verlet.gp", encoding="utf-8") as file:
-        script = file.read()
-    assert "set label 'dt [s]'" in script and "set label 'young_modulus [Pa]'" in script, script
-    assert "1/10" not in script, "rejections in the legend of a map without any"
+    figure = Figure("s/map_verlet.svg")
+    assert figure.has("dt [s]") and figure.has("young_modulus [Pa]"), [one.text for one in figure.texts]
+    assert not any("1/10" in one.text for one in figure.texts), "rejections in the legend of a map without any"
     # The lines are changed to have rejections: the report is made from the lines alone.
     with open("s/cases.jsonl", encoding="utf-8") as file:
         text = file.read()
@@ -738,12 +735,11 @@ def test_map_is_labelled():
         file.write(text.replace('"rejected":0', '"rejected":3'))
     claim("s", "cases.jsonl")
     good("stability", "scene.json", *AXES, "--integrators", "be,verlet", "--out", "s")
-    with open("s/map_be.gp", encoding="utf-8") as file:
-        script = file.read()
+    figure = Figure("s/map_be.svg")
     # 3 rejected in 100 steps; those of 10 steps and of 1 are too short.
     for text, there in (("none rejected", False), ("up to 1/100 rejected", False), ("up to 1/10 rejected", True), ("over 1/10 rejected", False),
                         ("fewer than 20 steps", True)):
-        equal(f"set label '{text}'" in script, there, text)
+        equal(figure.has(text), there, text)
 
 
 def test_over_budget():

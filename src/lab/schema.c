@@ -1,0 +1,148 @@
+/* schema.c: see schema.h; the form of both files is in lab.h. */
+#include "lab/schema.h"
+
+#include <string.h>
+
+#define LONGEST 512 /* of texts that are shown */
+
+/* Where the check is: the file, and the place in it. */
+typedef struct place {
+    drape_context *ctx;
+    const char *file;
+    char pointer[64];
+} place;
+
+static drape_status refuse(const place *at, const char *name, const char *why)
+{
+    return drape_fail(at->ctx, DRAPE_E_PARSE, "%.500s: %s%s%.100s: %s", at->file, at->pointer,
+                      *name ? "/" : "", name, why);
+}
+
+/* The result of json_unpack_ex, whose format says which members an object has, and of which types. */
+static drape_status unpacked(const place *at, int code, const json_error_t *fault)
+{
+    return code ? refuse(at, "", fault->text) : DRAPE_OK;
+}
+
+/* The members of an object, of which some are shown, or become part of the name of a file. */
+static drape_status check_members(const place *at, const json_t *object)
+{
+    const char *key;
+    json_t *value;
+    json_object_foreach((json_t *)(uintptr_t)object, key, value)
+    {
+        char copy[LONGEST] = "";
+        const char *text = json_is_string(value) ? json_string_value(value) : "";
+        snprintf(copy, sizeof copy, "%s", text);
+        drape_make_printable(copy);
+        if (strcmp(copy, text) != 0)
+            return refuse(at, key, "a text has control characters, or is longer than 511 bytes");
+    }
+    return DRAPE_OK;
+}
+
+static drape_status check_items(const place *at, const json_t *object, const char *key, bool texts)
+{
+    const json_t *list = json_object_get(object, key);
+    for (size_t i = 0; i < json_array_size(list); i++) {
+        const json_t *item = json_array_get(list, i);
+        if (texts ? !json_is_string(item) : !json_is_number(item) && !json_is_null(item))
+            return refuse(at, key, texts ? "must be texts" : "must be numbers or null");
+    }
+    return DRAPE_OK;
+}
+
+/* The cases of each series side by side; and the cases whose result is that of another. */
+static drape_status check_order(const place *at, const json_t *cases, size_t i, json_t *series)
+{
+    char name[2 * LONGEST];
+    const json_t *one = json_array_get(cases, i), *same = json_object_get(one, "same_as");
+    const json_int_t k = same ? json_integer_value(same) : 0, last = (json_int_t)i - 1;
+    if (same && (k < 0 || k > last || json_object_get(json_array_get(cases, (size_t)k), "same_as")))
+        return refuse(at, "same_as", "must be the number of an earlier case that has a result of its own");
+    snprintf(name, sizeof name, "%s\n%s", lab_tag_text(one, "scene"), lab_tag_text(one, "series"));
+    const json_t *before = json_object_get(series, name);
+    if (before && json_integer_value(before) != last)
+        return refuse(at, "tags", "the cases of a series must stand side by side");
+    return json_object_set_new(series, name, json_integer((json_int_t)i))
+               ? drape_fail(at->ctx, DRAPE_E_MEMORY, "no memory for the cases")
+               : DRAPE_OK;
+}
+
+static drape_status check_cases(place *at, const json_t *cases)
+{
+    json_t *series = json_object(), *one;
+    json_error_t fault;
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && (one = json_array_get(cases, i)); i++) {
+        snprintf(at->pointer, sizeof at->pointer, "/cases/%zu", i);
+        status = unpacked(at,
+                          json_unpack_ex(one, &fault, JSON_VALIDATE_ONLY, "{s:{s:s}, s?:{}, s?:I, s?:I}",
+                                         "tags", "integrator", "settings", "same_as", "rank"),
+                          &fault);
+        if (!status)
+            status = check_members(at, json_object_get(one, "tags"));
+        if (!status)
+            status = check_order(at, cases, i, series);
+    }
+    json_decref(series);
+    return status;
+}
+
+static drape_status check_scenes(place *at, const json_t *scenes)
+{
+    json_t *one;
+    json_error_t fault;
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && (one = json_array_get(scenes, i)); i++) {
+        snprintf(at->pointer, sizeof at->pointer, "/arguments/scenes/%zu", i);
+        status = unpacked(at,
+                          json_unpack_ex(one, &fault, JSON_VALIDATE_ONLY, "{s:s, s:F, s:F, s?:[], s?:[]}",
+                                         "name", "duration_s", "reference_error", "t_s", "growth"),
+                          &fault);
+        if (!status)
+            status = check_members(at, one);
+        if (!status)
+            status = check_items(at, one, "t_s", false);
+        if (!status)
+            status = check_items(at, one, "growth", false);
+    }
+    return status;
+}
+
+drape_status lab_check_about(drape_context *ctx, const char *file, json_t *about)
+{
+    json_error_t fault;
+    place at = {ctx, file, ""};
+    const json_t *arguments = json_object_get(about, "arguments");
+    drape_status status = unpacked(
+        &at,
+        json_unpack_ex(about, &fault, JSON_VALIDATE_ONLY, "{s:s, s:{s?:[], s?:[]}, s:[], s?:[], s?:[]}",
+                       "experiment", "arguments", "axes", "scenes", "cases", "results", "settings"),
+        &fault);
+    if (!status)
+        status = check_items(&at, arguments, "axes", true);
+    if (!status)
+        status = check_items(&at, about, "results", true);
+    if (!status)
+        status = check_scenes(&at, json_object_get(arguments, "scenes"));
+    return status ? status : check_cases(&at, json_object_get(about, "cases"));
+}
+
+drape_status lab_check_line(const lab *l, const char *file, int64_t number, json_t *line,
+                            const json_error_t *fault)
+{
+    json_error_t inside = *fault;
+    char path[520];
+    snprintf(path, sizeof path, "%.480s:%lld", file, (long long)number);
+    const place at = {l->ctx, path, "not a result of a case of this experiment"};
+    if (!line ||
+        json_unpack_ex(line, &inside, JSON_VALIDATE_ONLY, "{s:I, s:{}, s:s, s:I, s?:I, s?:{}, s?:[]}", "case",
+                       "tags", "status", "rejected", "accepted", "reasons", "positions"))
+        return refuse(&at, "", inside.text);
+    const json_int_t i = json_integer_value(json_object_get(line, "case"));
+    const json_t *one = i < 0 ? NULL : json_array_get(l->cases, (size_t)i);
+    if (!json_equal(json_object_get(line, "tags"), json_object_get(one, "tags")))
+        return refuse(&at, "", "it has another number, or other tags");
+    return check_items(&at, line, "positions", false);
+}
