@@ -1,7 +1,7 @@
 """The folder of a bake: the cloth that it belongs to, and the files in it that the add-on wrote. Nothing here needs Blender.
 
 The rule is that of the program (src/io/folder.h): only files that were written by it are replaced and removed. The folder has a record, bake.json: the owner, and size and checksum of each
-file. A file is ours if its name is in the record and its bytes are those that the record describes; all else is the user's, and is set aside under another name where it is in the way of a bake.
+file. A file is ours if its name is in the record and its bytes are those that the record describes; all else is the user's, and is set aside under another name if a bake needs its own.
 A file is written under a temporary name with the random number of the record, and is in the record before it gets its own name, so that a killed process leaves no file that the record
 does not have. Links in the folder are not followed. The folder is locked while it is open, so a lock ends with its process.
 """
@@ -120,7 +120,7 @@ class Folder:
     def _check_owner(self, record: Dict[str, Any]) -> None:
         """A cloth finds its bake again by its id when its file was moved or renamed with or without the folder, or the object was renamed. Not so a copy, of a file whose
         original is still there, or of an object: the bake is that of the original. An id that was not saved is replaced by the names of file and object."""
-        owner, recorded = self.owner, os.path.realpath(os.path.join(os.path.realpath(self.path), record["file"]))
+        owner, recorded = self.owner, os.path.realpath(os.path.join(self.path, record["file"]))
         here, known, shared = recorded == os.path.realpath(owner.file), owner.id == record["id"], record["id"] in owner.others
         other_file = not here and os.path.isfile(recorded)
         is_owner = known or here and not shared if owner.name == record["object"] else known and not shared
@@ -203,9 +203,7 @@ class Folder:
         try:
             os.link(old, new, follow_symlinks=False, **at)
             os.unlink(old, dir_fd=self._fd)
-        except FileExistsError:
-            raise
-        except OSError as error:  # a folder, or a file system without hard links
+        except OSError as error:  # it is there; or this is a folder, or a file system without hard links
             if self._stat(new):
                 raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), new) from error
             os.rename(old, new, **at)

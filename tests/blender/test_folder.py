@@ -262,10 +262,10 @@ def test_killed():
             finally:
                 for name in calls:
                     setattr(os, name, kept[name])
-            bake(scene__json="again", cloth__obj="again", collider_0__obj="again")
+            bake(scene__json="again", cloth__obj="again")
             names = {name for name in os.listdir("bake") if not FIRST_PART.fullmatch(name)}
             aside = {name for name in names if name.startswith("cloth.obj.changed")}  # two if it was killed while the file had both names
-            equal(names - aside, {"scene.json", "cloth.obj", "collider_0.obj", RECORD}, str(count))
+            equal(names - aside, {"scene.json", "cloth.obj", RECORD}, str(count))
             equal({read("bake/" + name) for name in aside}, {"mine"} if changed else set(), str(count))
             if left >= 0:
                 assert count > 15, count
