@@ -1,5 +1,6 @@
 """Drape in Blender: a mesh as cloth, baked by the program `drape`, played by the modifier Mesh Cache. docs/blender.md explains its use.
 
+    folder.py      the folder of a bake: whose it is, and which of its files may be replaced
     program.py     the program, a run of it, and its messages
     mesh.py        triangles, mesh files and rigid motions
     export.py      from a scene of Blender to a scene file of Drape
@@ -29,6 +30,7 @@ def register():
         bpy.utils.register_class(kind)
     for handlers, function in operators.HANDLERS:
         handlers.append(function)
+    operators.after_load()
     bpy.types.Object.drape = PointerProperty(type=properties.DRAPE_object)
 
 

@@ -2,7 +2,6 @@
 import json
 import os
 import re
-import shutil
 import tempfile
 from typing import Any, Dict, List, Optional, Tuple
 
@@ -10,7 +9,8 @@ import bpy
 import numpy as np
 
 from . import cache, mesh
-from .program import SCENE, Problem, vertices_file
+from .folder import Folder, Problem
+from .program import LOG, SCENE, vertices_file
 
 MODIFIER = "Drape"
 """name of the Mesh Cache modifier of a cloth"""
@@ -22,9 +22,6 @@ KEEP_NODES = {"ARMATURE", "CAST", "CORRECTIVE_SMOOTH", "CURVE", "DATA_TRANSFER",
               "MESH_CACHE", "MESH_DEFORM", "NORMAL_EDIT", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH", "SURFACE_DEFORM", "UV_PROJECT", "UV_WARP",
               "VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX", "VERTEX_WEIGHT_PROXIMITY", "WARP", "WAVE", "WEIGHTED_NORMAL"}
 """modifiers that leave the vertices of a mesh their numbers"""
-
-EXPORTED = re.compile(r"scene\.json|cloth\.obj|render\.obj|start\.obj|to_local\.npy|collider_\d+\.(obj|npy)|collider_\d+_vertices\.npy")
-"""names of the files that an export writes"""
 
 
 def modifier_of(thing):
@@ -360,23 +357,16 @@ def _collider(number: int, surface: Surface, folder: str, samples: Samples) -> D
     return {"type": "animated_mesh", "file": npy, "mesh": obj, "frame_rate": samples.rate, "open": not closed, "thickness": settings.surface_thickness, **common}
 
 
-def export(context, thing, folder: str) -> List[str]:
-    """Writes the bake of a cloth, ready to be run by `drape run scene.json --out run` in that folder, which is left as it is if something is wrong.
-    Returns warnings."""
+def export(context, thing, folder: Folder) -> List[str]:
+    """Takes the folder and writes the bake of a cloth, ready to be run by `drape run scene.json --out run` in it. It is left as it is if something is wrong. Returns warnings."""
     scene = context.scene
     if scene.frame_end <= scene.frame_start:
         raise Problem("the scene has one frame only: set its end")
-    if os.path.isdir(folder) and os.listdir(folder) and SCENE not in os.listdir(folder):
-        raise Problem(f"the folder {folder} has files of something else: choose another one")
     samples = Samples(context, thing)
     with tempfile.TemporaryDirectory() as made:
         _write(thing, samples, made)
-        os.makedirs(folder, exist_ok=True)
-        for name in os.listdir(folder):
-            if EXPORTED.fullmatch(name):
-                os.remove(os.path.join(folder, name))
-        for name in os.listdir(made):
-            shutil.move(os.path.join(made, name), os.path.join(folder, name))
+        folder.take()
+        folder.fill(made, keep=(LOG, cache.CACHE))
     return [f"{thing.name}: {course.warning}" for course in (samples.gravity, samples.wind) if course.warning] + [
         f"{surface.name}: {surface.warning}" for surface in samples.colliders if surface.warning]
 
@@ -404,5 +394,5 @@ def _write(thing, samples: Samples, folder: str) -> None:
     if settings.untangle:
         made["untangle"] = {}
     np.save(os.path.join(folder, cache.MATRICES), np.linalg.inv(np.array(samples.shown.matrices)))
-    with open(os.path.join(folder, SCENE), "w", encoding="utf-8") as file:
+    with open(os.path.join(folder, SCENE), "w", encoding="utf-8", errors="replace") as file:  # old files have names that are not UTF-8
         file.write("{" + ",\n ".join(f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in made.items()) + "}\n")

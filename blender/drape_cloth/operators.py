@@ -1,20 +1,21 @@
 """Baking, resuming, cancelling and clearing, as operators of Blender."""
+import contextlib
 import os
-import re
 from typing import List, Optional
 
 import bpy
 from bpy.app.handlers import persistent
 
 from . import cache, export, program
+from .folder import Folder, Owner, Problem, file_name, one_line
 from .properties import addon_preferences, find_program
 
 
 class Running:
     """A bake in progress, and its cloth, which may be renamed or deleted meanwhile."""
 
-    def __init__(self, thing, folder: str, bake: program.Bake, frame_start: int):
-        self.folder, self.bake, self.frame_start = folder, bake, frame_start
+    def __init__(self, thing, bake: program.Bake, frame_start: int):
+        self.bake, self.frame_start = bake, frame_start
         self.first_name = self.name = thing.name
         self._thing = thing
 
@@ -55,30 +56,47 @@ def after_undo(*_) -> None:
             one.find()
 
 
-HANDLERS = [(bpy.app.handlers.undo_pre, before_undo), (bpy.app.handlers.redo_pre, before_undo), (bpy.app.handlers.undo_post, after_undo), (bpy.app.handlers.redo_post, after_undo)]
+_file = 0  # that is open, by number
 
 
-def folder_name(name: str) -> str:
-    """A name for files: other characters than letters, digits, and - . _ and space are written as in addresses, so that different names remain so."""
-    return re.sub(r"[^\w. -]", lambda sign: "".join(f"%{byte:02X}" for byte in sign.group().encode("utf-8", "surrogateescape")), name)
+@persistent
+def after_load(*_) -> None:
+    """Another file is open: the bakes of the one before, if it was never saved, are not its own."""
+    global _file  # pylint: disable=global-statement
+    _file += 1
+
+
+HANDLERS = [(bpy.app.handlers.load_post, after_load), (bpy.app.handlers.undo_pre, before_undo), (bpy.app.handlers.redo_pre, before_undo),
+            (bpy.app.handlers.undo_post, after_undo), (bpy.app.handlers.redo_post, after_undo)]
+
+
+def unsaved_folder() -> str:
+    """The folder of the bakes of a file that was not saved yet. Blender removes it when it ends."""
+    return os.path.join(bpy.app.tempdir, f"unsaved_{_file}")
 
 
 def folder_of(thing) -> str:
-    """Where the bake of a cloth is kept. A file that was not saved yet has its bakes in a temporary folder, which is removed with it."""
+    """Where the bake of a cloth is kept."""
     named = thing.drape.folder
     if not named:
-        named = "//drape_" + folder_name(thing.name)
+        named = "//drape_" + file_name(thing.name)
     if named.startswith("//") and not bpy.data.filepath:
-        return os.path.join(bpy.app.tempdir, named[2:])
-    return os.path.normpath(bpy.path.abspath(named))
+        return os.path.join(unsaved_folder(), named[2:])
+    return os.path.abspath(bpy.path.abspath(named))  # a file that a script opened may have a relative path
+
+
+def owner_of(thing) -> Owner:
+    """The cloth as the owner of its bake."""
+    others = (other.drape.bake_id for other in bpy.data.objects if other != thing and not other.library)
+    return Owner(bpy.data.filepath or unsaved_folder(), thing.name, thing.drape.bake_id, frozenset(others) - {""})
 
 
 def check_modifiers(thing) -> None:
     """Raises a Problem if the modifier could not be set after the bake."""
     if thing.library:
-        raise program.Problem(f"{thing.name}: is linked from {thing.library.filepath}, so its modifiers cannot be changed here: make it local, or a library override")
+        raise Problem(f"{thing.name}: is linked from {thing.library.filepath}, so its modifiers cannot be changed here: make it local, or a library override")
     if export.modifier_of(thing) is None and any(modifier.is_override_data for modifier in list(thing.modifiers)[export.before_cloth(thing):]):
-        raise program.Problem(f"{thing.name}: has modifiers from its library, which a bake cannot be put before: make the object local")
+        raise Problem(f"{thing.name}: has modifiers from its library, which a bake cannot be put before: make the object local")
 
 
 def attach(context, thing, folder: str, frame_start: int) -> None:
@@ -121,50 +139,69 @@ class Baking:
         path = find_program()
         check_modifiers(thing)
         for one in list(running):
-            if os.path.realpath(one.folder) == os.path.realpath(folder):
+            if os.path.realpath(one.bake.folder.path) == os.path.realpath(folder):
                 if one.thing() is None:
                     running.remove(one)
                     one.bake.cancel()
                     one.bake.wait()
+                    one.bake.close()
                     continue
-                raise program.Problem(f"{thing.name}: {one.name} is being baked into the same folder, {folder}: cancel that bake, or choose another folder")
+                raise Problem(f"{thing.name}: {one.name} is being baked into the same folder, {folder}: cancel that bake, or choose another folder")
         for other in bpy.data.objects:
             if other != thing and other.type == "MESH" and not other.library and other.drape.role == "CLOTH" and folder_of(other) == folder:
-                raise program.Problem(f"{thing.name}: {other.name} has the same folder, {folder}: choose another one")
-        for text in self.prepare(context, thing, folder):
-            self.report({"WARNING"}, text)
-        frames, self.names = program.read(folder, thing.drape.simulated.name if thing.drape.simulated else None)
-        self.bake = program.Bake(path, folder, frames, self.resume, preferences.threads)
-        self.run = Running(thing, folder, self.bake, context.scene.frame_start)
+                raise Problem(f"{thing.name}: {other.name} has the same folder, {folder}: choose another one")
+        with contextlib.ExitStack() as after_failure:
+            owned = after_failure.enter_context(Folder(folder, owner_of(thing)))
+            after_failure.callback(self.say_aside, thing.name, owned)
+            self.prepare(context, thing, owned)
+            thing.drape.bake_id = owned.id
+            frames, self.names = program.read(folder, thing.drape.simulated.name if thing.drape.simulated else None)
+            self.bake = program.Bake(path, owned, frames, self.resume, preferences.threads)
+            after_failure.pop_all()  # `end` closes the folder
+        self.run = Running(thing, self.bake, context.scene.frame_start)
         running.append(self.run)
+
+    def say(self, kind: str, text: str) -> None:
+        self.report({kind}, one_line(text))
+
+    def say_aside(self, name: str, folder: Folder) -> None:
+        """Reports the files of the user that got another name."""
+        for text in folder.aside:
+            self.say("WARNING", f"{name}: {text}")
 
     def end(self, context) -> set:
         """After the end of the process: the frames so far are shown, whatever ended it."""
         running.remove(self.run)
-        thing, name, folder = self.run.thing(), self.run.name, self.run.folder
+        thing, name, folder = self.run.thing(), self.run.name, self.bake.folder
         done, failed = self.bake.done(), None
         try:
             failed = self.bake.result(self.names)
             for text in self.bake.warnings(self.names):
-                self.report({"WARNING"}, text)
-            if thing and folder_of(thing) != folder and name != self.run.first_name:
-                thing.drape.folder = "//drape_" + folder_name(self.run.first_name)  # where Resume finds it
+                self.say("WARNING", text)
+            if thing and folder_of(thing) != folder.path and name != self.run.first_name:
+                thing.drape.folder = "//drape_" + file_name(self.run.first_name)  # where Resume finds it
+                folder.rename(name)
             if done and thing:
                 cache.write(folder)
-                attach(context, thing, folder, self.run.frame_start)
-        except (program.Problem, OSError, RuntimeError) as problem:
+                attach(context, thing, folder.path, self.run.frame_start)
+        except (Problem, OSError, RuntimeError) as problem:
             failed = failed or f"{name}: {problem}"
+        try:
+            self.bake.close()
+        except OSError as problem:
+            failed = failed or f"{name}: {problem}"
+        self.say_aside(name, folder)
         if self.interrupted and not failed:
             failed = f"{name}: interrupted after {done} of {self.bake.frames} frames; Resume continues"
         if failed:
-            self.report({"ERROR"}, failed)
+            self.say("ERROR", failed)
             return {"CANCELLED"}
         if not thing:
-            self.report({"WARNING"}, f"{name}: there is no such object any more; {done} of {self.bake.frames} frames of its bake are in {folder}")
+            self.say("WARNING", f"{name}: there is no such object any more; {done} of {self.bake.frames} frames of its bake are in {folder.path}")
         elif self.bake.cancelled:
-            self.report({"INFO"}, f"{name}: cancelled after {done} of {self.bake.frames} frames; Resume continues")
+            self.say("INFO", f"{name}: cancelled after {done} of {self.bake.frames} frames; Resume continues")
         else:
-            self.report({"INFO"}, f"{name}: {done} frames")
+            self.say("INFO", f"{name}: {done} frames")
         return {"FINISHED"}
 
     def interrupt(self) -> None:
@@ -177,14 +214,14 @@ class Baking:
         with program.interrupts(self.interrupt):
             try:
                 self.start(context)
-            except (program.Problem, OSError) as problem:
-                self.report({"ERROR"}, str(problem))
+            except (Problem, OSError) as problem:
+                self.say("ERROR", str(problem))
                 return {"CANCELLED"}
             if self.interrupted:
                 self.bake.cancel()
             try:
                 self.bake.wait()
-            except program.Problem:  # it could not start again
+            except Problem:  # it could not start again
                 pass
         return self.end(context)
 
@@ -193,8 +230,8 @@ class Baking:
             return self.execute(context)
         try:
             self.start(context)
-        except (program.Problem, OSError) as problem:
-            self.report({"ERROR"}, str(problem))
+        except (Problem, OSError) as problem:
+            self.say("ERROR", str(problem))
             return {"CANCELLED"}
         self.shown = -1
         self.timer = context.window_manager.event_timer_add(0.25, window=context.window)
@@ -218,7 +255,7 @@ class Baking:
         try:
             if self.bake.running():
                 return {"PASS_THROUGH"}
-        except program.Problem:  # it could not start again
+        except Problem:  # it could not start again
             pass
         context.window_manager.event_timer_remove(self.timer)
         return self.end(context)
@@ -237,8 +274,9 @@ class DRAPE_OT_bake(Baking, bpy.types.Operator):
     bl_description = "Simulate the cloth over the frames of the scene, and play the result on the mesh"
     resume = False
 
-    def prepare(self, context, thing, folder: str) -> List[str]:
-        return export.export(context, thing, folder)
+    def prepare(self, context, thing, folder: Folder) -> None:
+        for text in export.export(context, thing, folder):
+            self.say("WARNING", text)
 
 
 class DRAPE_OT_resume(Baking, bpy.types.Operator):
@@ -247,8 +285,10 @@ class DRAPE_OT_resume(Baking, bpy.types.Operator):
     bl_description = "Continue a bake that was cancelled, with the scene as it was then; the result is that of a bake without interruption"
     resume = True
 
-    def prepare(self, context, thing, folder: str) -> List[str]:
-        return []
+    def prepare(self, context, thing, folder: Folder) -> None:
+        if not folder.taken:
+            raise Problem(f"{thing.name}: there is no bake in {folder.path}")
+        folder.take()
 
 
 class DRAPE_OT_cancel(bpy.types.Operator):

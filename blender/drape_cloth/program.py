@@ -1,7 +1,6 @@
 """The program `drape`: where it is, what it offers, and a run of it in the background. Nothing here needs Blender."""
 import contextlib
 import ctypes
-import itertools
 import json
 import os
 import re
@@ -12,6 +11,8 @@ import threading
 from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 import numpy as np
+
+from .folder import Folder, Problem
 
 SCENE = "scene.json"
 """the scene in the folder of a bake"""
@@ -25,10 +26,6 @@ INTERRUPTED = 130
 """exit code of a run that was asked to stop"""
 MAX_ASIDE = 20
 """changed files that a bake sets aside at most: a run has fewer"""
-
-
-class Problem(Exception):
-    """What keeps a cloth from being baked, in words for the user."""
 
 
 def find(preferred: str = "") -> str:
@@ -90,26 +87,30 @@ def interrupts(call: Callable[[], None]) -> Iterator[None]:
 
 
 class Bake:
-    """`drape run` on the scene in a folder, in a process of its own. Frames appear in the folder `run`, with a checkpoint now and then, so that
+    """`drape run` on the scene in a folder that was taken, in a process of its own. Frames appear in the folder `run`, with a checkpoint now and then, so that
     a run that is cancelled or killed can be resumed. resume: continue such a run, with the scene as it was.
 
     A file of an earlier run that was changed since, which the program refuses to replace, is set aside under another name, and the run starts again."""
 
-    def __init__(self, program: str, folder: str, frames: int, resume: bool = False, threads: int = 1):
+    def __init__(self, program: str, folder: Folder, frames: int, resume: bool = False, threads: int = 1):
         self.folder, self.frames = folder, frames
         self._command = [program, "run", SCENE, "--out", RUN, "--checkpoint-every", str(CHECKPOINT_EVERY), "--threads", str(threads)] + ["--resume"] * resume
         self.cancelled, self._resume = False, resume
-        self.aside: List[str] = []  # what happened to changed files
-        self._frames = os.path.join(folder, RUN, "energy.csv")
+        self._restarts = 0
+        self._frames = os.path.join(folder.path, RUN, "energy.csv")
+        if folder.is_directory(RUN) is False and not resume:
+            folder.set_aside(RUN)
+        if not folder.is_directory(RUN) and resume:
+            raise Problem(f"{folder.owner.name}: there is no folder {RUN} in {folder.path}, so there is nothing to resume")
         self._before = None if resume else self._written()
         self._start()
 
     def _start(self) -> None:
-        with open(os.path.join(self.folder, LOG), "wb") as log:
-            try:
-                self._process = subprocess.Popen(self._command, cwd=self.folder, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, env=environment())
-            except OSError as error:
-                raise Problem(f"{self._command[0]} cannot be started: {error}") from error
+        try:
+            self._log = self.folder.part(LOG)
+            self._process = subprocess.Popen(self._command, cwd=self.folder.path, stdin=subprocess.DEVNULL, stdout=self._log, stderr=subprocess.STDOUT, env=environment())
+        except OSError as error:
+            raise Problem(f"{self._command[0]} cannot be started: {error}") from error
 
     def running(self) -> bool:
         return self._process.poll() is None or not self.cancelled and not self._resume and self._set_aside()
@@ -121,15 +122,13 @@ class Bake:
     def _set_aside(self) -> bool:
         """After the end: whether a changed file stopped the run, and no longer does."""
         refused = re.search(rf'"({RUN}/[^"/]+)" (?:would be replaced, but|is not a manifest)', self.log()) if self._process.returncode else None
-        if not refused or len(self.aside) == MAX_ASIDE:
+        if not refused or self._restarts == MAX_ASIDE:
             return False
-        name = os.path.join(self.folder, refused.group(1))
-        kept = next(path for path in (f"{name}.changed{number or ''}" for number in itertools.count()) if not os.path.lexists(path))
         try:
-            os.rename(name, kept)
+            self.folder.set_aside(refused.group(1))
         except OSError:
             return False  # the program's message remains
-        self.aside.append(f"{refused.group(1)} had been changed since it was baked: it is now {os.path.basename(kept)}")
+        self._restarts += 1
         self._start()
         return True
 
@@ -162,6 +161,8 @@ class Bake:
         if self.running():
             self._process.kill()
         self._process.wait()
+        with contextlib.suppress(OSError):
+            self.close()
 
     def result(self, names: "Names") -> Optional[str]:
         """After the end: None if the run completed or was cancelled, else what went wrong."""
@@ -173,11 +174,20 @@ class Bake:
 
     def warnings(self, names: "Names") -> List[str]:
         """What the program found unusual about the run."""
-        return [f"{names.cloth.name}: {text}" for text in self.aside] + [names.explain(line[len("warning: "):]) for line in self.log().splitlines() if line.startswith("warning: ")]
+        return [names.explain(line[len("warning: "):]) for line in self.log().splitlines() if line.startswith("warning: ")]
 
     def log(self) -> str:
-        with open(os.path.join(self.folder, LOG), encoding="utf-8", errors="replace") as file:
-            return file.read()
+        """What the program printed so far. It goes on writing at the end of the file."""
+        fd = self._log.fileno()
+        return os.pread(fd, os.fstat(fd).st_size, 0).decode("utf-8", "replace")
+
+    def close(self) -> None:
+        """After the end: the folder is free for other bakes."""
+        try:
+            self.folder.publish(LOG)
+        finally:
+            self._log.close()
+            self.folder.close()
 
 
 class Part(NamedTuple):

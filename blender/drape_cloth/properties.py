@@ -100,6 +100,7 @@ class DRAPE_object(bpy.types.PropertyGroup):
     method: EnumProperty(name="Method", items=METHODS, default="be", description="Time integrator")
     steps: IntProperty(name="Steps per Frame", default=3, min=1, max=10000, description="Nominal steps in each frame; a step that fails is made again in smaller ones")
     rtol: FloatProperty(name="Tolerance", default=1e-3, min=1e-10, max=0.1, precision=6, description="Local error of a step, relative to the size of the scene")
+    bake_id: StringProperty(options={"HIDDEN"}, description="Random, from the first bake on: folders of bakes know their cloth by it")
     folder: StringProperty(name="Folder", subtype="DIR_PATH", description="Folder of the bake; empty: drape_ and the name of the object, beside the file")
 
     # A collider

@@ -23,18 +23,18 @@ RATE = 24
 PROGRAM = shutil.which("drape")
 bpy.ops.preferences.addon_install(filepath=os.environ["ZIP"])
 bpy.ops.preferences.addon_enable(module="drape_cloth")
-operators, program, export = (importlib.import_module("drape_cloth." + name) for name in ("operators", "program", "export"))
+operators, program, export, folders = (importlib.import_module("drape_cloth." + name) for name in ("operators", "program", "export", "folder"))
 
 
 # ---- Scenes ----
 
-def new_file(frames=FRAMES):
+def new_file(frames=FRAMES, name="test.blend"):
     """The factory scene, saved in the current folder."""
     bpy.ops.wm.read_factory_settings(use_empty=False)
     bpy.ops.preferences.addon_enable(module="drape_cloth")
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end, scene.render.fps = 1, frames, RATE
-    bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath("test.blend"))
+    bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath(name))
     return scene
 
 
@@ -65,14 +65,20 @@ def bake(thing, operator="bake"):
     return operators.folder_of(thing)
 
 
-def refused(thing):
+def refused(thing, operator="bake"):
     """The message of a bake that must fail."""
     bpy.context.view_layer.objects.active = thing
     try:
-        bpy.ops.drape.bake()
+        getattr(bpy.ops.drape, operator)()
     except RuntimeError as error:  # Blender raises one for a report of an error
         return str(error)
     raise AssertionError("the bake succeeded")
+
+
+def export_to(name, thing):
+    """The warnings of an export into a folder."""
+    with folders.Folder(os.path.abspath(name), operators.owner_of(thing)) as folder:
+        return export.export(bpy.context, thing, folder)
 
 
 # ---- Results ----
@@ -407,7 +413,7 @@ def test_wind():
     fields[0].keyframe_insert("rotation_euler", frame=1)
     fields[0].rotation_euler.z += 1
     fields[0].keyframe_insert("rotation_euler", frame=2 * FRAMES)
-    warning, = export.export(bpy.context, cloth, os.path.abspath("other"))
+    warning, = export_to("other", cloth)
     assert warning.startswith("Tablecloth: the wind (") and "changes its direction: the cloth feels that of the first frame" in warning
     cloth.drape.air = False
     scene.use_gravity = False
@@ -441,7 +447,9 @@ def test_cancel_and_resume():
     text = text.replace('"duration": ' + str(119 / 24), '"duration": ' + str(29 / 24))  # to save time; another duration is another run, so begin it anew
     with open(folder + "/scene.json", "w", encoding="utf-8") as file:
         file.write(text)
-    started = program.Bake(PROGRAM, folder, 30)
+    taken = folders.Folder(folder, operators.owner_of(cloth))
+    taken.take()
+    started = program.Bake(PROGRAM, taken, 30)
     while started.running() and started.done() < 9:
         time.sleep(0.01)
     started.kill()
@@ -635,7 +643,7 @@ def test_text():
         assert x[-1][:, 2].max() > 1 + extrude  # some of it lies on the letters
     bpy.data.objects.remove(text)
     cut = collider(mesh_object("Cut", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0.5, 0, 0)], [(0, 2, 1), (0, 4, 3), (4, 1, 3), (1, 2, 3), (2, 0, 3), (0, 1, 4)]))
-    warning, = export.export(bpy.context, cloth, os.path.abspath("other"))
+    warning, = export_to("other", cloth)
     assert warning == "Cut: 1 triangles without area are left out, and the surface is open there: merge vertices by distance", warning
     assert scene_of("other")["colliders"][0]["open"]
     cut.data.clear_geometry()
@@ -661,11 +669,119 @@ def test_changed_files():
         assert (positions(bake(cloth)) == x).all()
     changed = sorted(name for name in os.listdir(folder + "/run") if ".changed" in name)
     assert changed == [f"{name}.changed{number}" for name in ("energy.csv", "positions.npy") for number in ("", 1)], changed
-    names = [operators.folder_name(name) for name in ("Täch", "Tüch", "T_ch", "a/b", "a:b", "a%2Fb", "Cube.001", "Cube_001")]
-    assert names[:4] == ["Täch", "Tüch", "T_ch", "a%2Fb"] and len(set(names)) == len(names), names
-    for name in "Täch", "Tüch":
+
+
+def users_files(folder):
+    """What a folder has of the user: the bytes of files, and links."""
+    return {name: os.readlink(path) if os.path.islink(path) else open(path, encoding="utf-8").read()
+            for name in os.listdir(folder) for path in [folder + "/" + name] if os.path.islink(path) or os.path.isfile(path)}
+
+
+def test_users_files():
+    """a folder of the user is refused as it is; files that the user changed or put into a bake's folder keep their bytes, and links are not followed"""
+    new_file(frames=3)
+    cloth = sheet(quality="REALTIME", z=2, folder="//mine")
+    os.mkdir("mine")
+    for name in "mine/scene.json", "mine/cloth.obj", "mine/collider_0.obj", "letter.txt":
+        with open(name, "w", encoding="utf-8") as file:
+            file.write("of the user")
+    os.symlink("../letter.txt", "mine/drape.log")
+    before = users_files("mine")
+    for operator in "bake", "resume":
+        assert "has files of something else" in refused(cloth, operator) and users_files("mine") == before
+    cloth.drape.folder = ""
+    folder = bake(cloth)
+    x = positions(folder)
+    os.rename(folder + "/run", "elsewhere")
+    os.symlink("../elsewhere", folder + "/run")
+    left = os.listdir("elsewhere")
+    assert "Tablecloth: there is no folder run in" in refused(cloth, "resume") and os.listdir("elsewhere") == left
+    links = "drape.log", "cloth.pc2", "scene.json", "to_local.npy", "collider_0.obj"
+    for name in links:
+        if os.path.exists(folder + "/" + name):
+            os.remove(folder + "/" + name)
+        os.symlink("../letter.txt", folder + "/" + name)
+    with open(folder + "/cloth.obj", "a", encoding="utf-8") as file:
+        file.write("# of the user")
+    collider(bpy.data.objects["Cube"])
+    assert len(positions(bake(cloth))) == len(x)
+    assert {os.readlink(f"{folder}/{name}.changed") for name in links} == {"../letter.txt"} and os.readlink(folder + "/run.changed") == "../elsewhere"
+    assert os.listdir("elsewhere") == left and not os.path.islink(folder + "/run") and not [name for name in os.listdir(folder) if name.endswith(".part")]
+    with open("letter.txt", encoding="utf-8") as letter, open(folder + "/cloth.obj.changed", encoding="utf-8") as mesh:
+        assert letter.read() == "of the user" and mesh.read().endswith("# of the user")
+    count = len(os.listdir(folder))
+    plays(cloth, bake(cloth))
+    assert len(os.listdir(folder)) == count, os.listdir(folder)  # nothing else was changed
+
+
+def test_owner():
+    """two files with an object of the same name do not share a bake; a file finds its own after it was moved, or was not saved, and a copy does not get that of the original"""
+    new_file(frames=3, name="a.blend")
+    folder = bake(sheet(quality="REALTIME"))
+    before = scene_of(folder), positions(folder)
+
+    def untouched(of="a.blend"):
+        for operator in "bake", "resume":
+            assert f"drape_Tablecloth has the bake of Tablecloth of {of}: name another one" in refused(bpy.data.objects["Tablecloth"], operator)
+        assert scene_of(folder) == before[0] and (positions(folder) == before[1]).all()
+
+    new_file(frames=3, name="b.blend")
+    cloth = sheet(quality="REALTIME", z=2)
+    untouched()
+    cloth.drape.folder = "//other"
+    assert bake(cloth) == os.path.abspath("other")
+    bpy.ops.wm.open_mainfile(filepath="a.blend")  # as it was saved before the bake
+    cloth = sheet(quality="REALTIME")
+    assert (positions(bake(cloth, "resume")) == before[1]).all() and cloth.drape.bake_id
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath("copy.blend"))
+    untouched()
+    os.rename("a.blend", "moved.blend")
+    bpy.ops.wm.open_mainfile(filepath="moved.blend")
+    bake(bpy.data.objects["Tablecloth"])
+    before = scene_of(folder), positions(folder)
+    bpy.ops.wm.open_mainfile(filepath="copy.blend")
+    untouched("moved.blend")
+    os.mkdir("project")
+    for name in "moved.blend", "drape_Tablecloth":
+        os.rename(name, "project/" + name)
+    bpy.ops.wm.open_mainfile(filepath="project/moved.blend")
+    cloth = bpy.data.objects["Tablecloth"]
+    assert bake(cloth, "resume") == os.path.abspath("project/drape_Tablecloth")
+    bpy.ops.object.select_all(action="DESELECT")
+    cloth.select_set(True)
+    bpy.ops.object.duplicate()
+    copy = bpy.context.object
+    assert copy.drape.bake_id == cloth.drape.bake_id and bake(copy) == os.path.abspath("project/drape_Tablecloth.001")
+    bake(cloth)
+    cloth.name, copy.name = "First", "Tablecloth"
+    assert bake(cloth) == os.path.abspath("project/drape_First")
+    for _ in range(2):  # files that were never saved
+        bpy.ops.wm.read_homefile(use_factory_startup=True)
+        bpy.ops.preferences.addon_enable(module="drape_cloth")
+        bpy.context.scene.frame_end = 3
+        cloth = sheet(quality="REALTIME")
+        folder = bake(cloth)
+        cloth.drape.bake_id = ""  # as after an undo
+        assert bake(cloth) == folder and folder.startswith(bpy.app.tempdir)
+
+
+def test_names():
+    """whatever the name of an object is, its bake is in one folder beside the file, and what is said about it is one line"""
+    new_file(frames=2)
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    cloth = sheet(side=4, quality="REALTIME")
+    for name in "Täch", "Tüch", "a\nb", "q\"'`$(touch x)`", "../up", "..", "\x1b[31mred", "ü" * 31, "/" * 63, "%s", "scene.json: 3":
         cloth.name = name
-        assert bake(cloth) == os.path.abspath("drape_" + name)
+        before = set(os.listdir("."))
+        folder = bake(cloth)
+        assert cloth.name == name and os.path.dirname(folder) == os.getcwd() and set(os.listdir(".")) - before == {os.path.basename(folder)}, (name, folder)
+        plays(cloth, folder)
+        assert bake(cloth, "resume") == folder
+        cloth.drape.fabric = "sackcloth"
+        said = refused(cloth).strip()
+        assert said.startswith("Error: " + folders.one_line(name) + ": /cloth/0/material/fabric") and said.isprintable(), said
+        cloth.drape.fabric = ""
 
 
 def test_interrupt():
