@@ -2,13 +2,16 @@
 #define _XOPEN_SOURCE 700 /* setitimer */
 #include "fuzz/fuzz.h"
 
+#include <dirent.h>
 #include <math.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <sys/time.h>
+#include <unistd.h>
 
 #include "base/clock.h"
 #include "base/finite.h"
@@ -95,6 +98,66 @@ void fuzz_check(const drape_context *ctx, drape_status status, const char *call)
     FUZZ_REQUIRE(status <= 0, "%s: %s", call, drape_status_name(status));
     FUZZ_REQUIRE(status == DRAPE_OK || (*message && !strchr(message, '\n')), "%s: %s: '%s'", call,
                  drape_status_name(status), message);
+}
+
+/* ---- Folders ---- */
+
+static char folder[256];
+
+void fuzz_remove(const char *path)
+{
+    char file[600];
+    struct dirent *entry;
+    DIR *dir = opendir(path);
+    while (dir && (entry = readdir(dir))) {
+        snprintf(file, sizeof file, "%s/%s", path, entry->d_name);
+        unlink(file);
+    }
+    if (dir)
+        closedir(dir);
+    rmdir(path);
+}
+
+static void remove_folder(void)
+{
+    fuzz_remove(folder);
+}
+
+/* Where the next piece begins, or the end. */
+static const uint8_t *next_piece(const uint8_t *at, const uint8_t *end)
+{
+    for (; end - at >= 4; at++)
+        if (memcmp(at, "=== ", 4) == 0)
+            return at;
+    return end;
+}
+
+const char *fuzz_folder(const uint8_t *data, size_t size)
+{
+    const uint8_t *end = data + size;
+    const char *base = getenv("TMPDIR");
+    if (!*folder) {
+        snprintf(folder, sizeof folder, "%s/drape-fuzz-%ld", base ? base : "/tmp", (long)getpid());
+        atexit(remove_folder);
+    }
+    fuzz_remove(folder);
+    FUZZ_REQUIRE(mkdir(folder, 0777) == 0, "%s", folder);
+    for (const uint8_t *at = next_piece(data, end), *next; at < end; at = next) {
+        char path[400], name[64] = "";
+        next = next_piece(at + 4, end);
+        const uint8_t *line = memchr(at, '\n', (size_t)(next - at));
+        const size_t length = line ? (size_t)(line - at - 4) : 0;
+        if (length == 0 || length >= sizeof name || memchr(at, '/', length + 4) || memchr(at, 0, length + 4))
+            continue;
+        memcpy(name, at + 4, length);
+        snprintf(path, sizeof path, "%s/%s", folder, name);
+        FILE *file = strcmp(name, ".") == 0 || strcmp(name, "..") == 0 ? NULL : fopen(path, "wb");
+        if (!file)
+            continue;
+        FUZZ_REQUIRE(fwrite(line + 1, 1, (size_t)(next - line - 1), file) == (size_t)(next - line - 1), "%s", path);
+        fclose(file);
+    }
+    return folder;
 }
 
 /* ---- Bytes ---- */

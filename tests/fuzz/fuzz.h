@@ -47,6 +47,15 @@ unsigned fuzz_below(fuzz_bytes *bytes, unsigned count);            /* 0 to count
 double fuzz_between(fuzz_bytes *bytes, double low, double high);   /* one of 65 536 equally spaced values */
 double fuzz_magnitude(fuzz_bytes *bytes, double low, double high); /* the same in its logarithm */
 
+/* ---- Folders ---- */
+
+/* A folder of this process, with files: each piece of the bytes that begins with a line "=== NAME" is the content
+ * of NAME. Files of the call before are removed. The folder is removed at exit. */
+const char *fuzz_folder(const uint8_t *data, size_t size);
+
+/* Removes a folder and the files in it. */
+void fuzz_remove(const char *folder);
+
 /* ---- Sims ---- */
 
 /* Advances to t in at most `attempts` attempts, and cancels the advance after `seconds` of CPU, as a single
