@@ -36,9 +36,16 @@ def table(columns: Mapping[str, Any]) -> Table:
     return pandas.DataFrame(arrays)
 
 
+def _regular(path):
+    """The path of a file of a run, unless a pipe or a device has its name: reading that might never end."""
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise FileError(f'cannot read "{path}": it is not a regular file')
+    return path
+
+
 def read_csv(path) -> Table:
     """A table that Drape wrote. Columns of numbers are arrays of float64 or, if all are whole, int64; others have texts."""
-    with open(path, newline="", encoding="utf-8") as file:
+    with open(_regular(path), newline="", encoding="utf-8") as file:
         reader = csv.reader(file)
         names: List[str] = next(reader, [])
         rows = [row for row in reader if len(row) == len(names)]  # a run that was killed may have left half a line
@@ -94,7 +101,7 @@ class Run:
         """Positions of the vertices of render_mesh in a frame [m]: of `render_positions.npy` or, if the run has none, computed from the positions."""
         path = os.path.join(self.folder, "render_positions.npy") if self.folder else ""
         if os.path.exists(path):
-            return np.array(np.load(path, mmap_mode="r")[frame])
+            return np.array(np.load(_regular(path), mmap_mode="r")[frame])
         if self.positions is None:
             raise FileError(f"{self}: has no positions.npy")
         return self.model.render_positions(np.array(self.positions[frame]))
@@ -170,13 +177,13 @@ class Page:
 def load(folder) -> Run:
     """A finished run, or one in progress, from the folder that `drape run --out` wrote. Positions are mapped into memory, not read."""
     folder = os.path.abspath(folder)
-    if not os.path.exists(os.path.join(folder, "scene.json")):
+    if not os.path.isfile(os.path.join(folder, "scene.json")):
         raise FileError(f'"{folder}" is not the folder of a run: it has no scene.json')
     positions, summary = os.path.join(folder, "positions.npy"), {}
     if os.path.exists(os.path.join(folder, "summary.json")):
-        with open(os.path.join(folder, "summary.json"), encoding="utf-8") as file:
+        with open(_regular(os.path.join(folder, "summary.json")), encoding="utf-8") as file:
             summary = json.load(file)
-    return Run(Scene(os.path.join(folder, "scene.json")), np.load(positions, mmap_mode="r") if os.path.exists(positions) else None,
+    return Run(Scene(os.path.join(folder, "scene.json")), np.load(_regular(positions), mmap_mode="r") if os.path.exists(positions) else None,
                read_csv(os.path.join(folder, "steps.csv")), read_csv(os.path.join(folder, "energy.csv")), summary, folder)
 
 
@@ -228,7 +235,8 @@ def _bring_files(folder) -> None:
         if os.path.realpath(os.path.dirname(item)) == os.path.realpath(folder):
             return os.path.basename(item)
         if item not in there:
-            there[item] = f"scene_file_{len(there)}{os.path.splitext(item)[1]}"
+            ending = re.search(r"\.[0-9A-Za-z]{1,14}\Z", item)
+            there[item] = f"scene_file_{len(there)}{ending[0] if ending else ''}"
             shutil.copyfile(item, os.path.join(folder, there[item]))
         return there[item]
 
@@ -343,7 +351,7 @@ def call(*command: str, folder=None, accept: Sequence[int] = (0,)) -> str:
     status = {2: Status.E_ARGUMENT, 130: Status.E_STOPPED}.get(process.returncode, Status.E_SOLVER)
     summary = os.path.join(folder, "summary.json") if folder else ""
     if process.returncode == 1 and os.path.exists(summary):
-        with open(summary, encoding="utf-8") as file:
+        with open(_regular(summary), encoding="utf-8") as file:
             name = json.load(file).get("status", "").upper()
         status = Status.__members__.get(name, status)
     lines = [line for line in errors.splitlines() if line.strip()] or output.splitlines()[-1:]

@@ -100,24 +100,31 @@ char *drape_copy_text(drape_context *ctx, const char *text)
     return copy;
 }
 
-/* The number of bytes at text that are not to be printed. */
-static size_t unprintable(const unsigned char *text)
+/* The UTF-8 character at text and its number of bytes; 0: there is none (RFC 3629, section 3). */
+static size_t character(const unsigned char *text, uint32_t *code)
 {
-    if (*text < ' ' || *text == 127)
-        return 1;
-    if (text[0] == 0xc2 && text[1] >= 0x80 && text[1] <= 0x9f)
-        return 2;
-    if (text[0] == 0xe2 && text[1] == 0x80 && text[2] >= 0xaa && text[2] <= 0xae)
-        return 3;
-    return text[0] == 0xe2 && text[1] == 0x81 && text[2] >= 0xa6 && text[2] <= 0xa9 ? 3 : 0;
+    static const uint32_t first[] = {0, 0x80, 0x800, 0x10000}; /* in an encoding of so many bytes more */
+    const size_t more = *text >= 0xf0 ? 3 : *text >= 0xe0 ? 2 : *text >= 0xc0 ? 1 : 0;
+    *code = more ? *text & (0x3fu >> more) : *text;
+    for (size_t i = 1; i <= more; i++) {
+        if ((text[i] & 0xc0) != 0x80)
+            return 0;
+        *code = *code << 6 | (text[i] & 0x3f);
+    }
+    const bool stray = (*text >= 0x80 && !more) || *text >= 0xf8, surrogate = *code >> 11 == 0xd800 >> 11;
+    return stray || surrogate || *code < first[more] || *code > 0x10ffff ? 0 : more + 1;
 }
 
 void drape_make_printable(char *text)
 {
-    while (*text) {
-        const size_t count = unprintable((const unsigned char *)text);
-        memset(text, *text >= '\t' && *text <= '\r' ? ' ' : '?', count);
-        text += count ? count : 1;
+    for (size_t count; *text; text += count) {
+        uint32_t c;
+        count = character((const unsigned char *)text, &c);
+        if (count == 0 || c < ' ' || (c >= 0x7f && c <= 0x9f) || (c >= 0x202a && c <= 0x202e) ||
+            (c >= 0x2066 && c <= 0x2069)) {
+            count += count == 0;
+            memset(text, *text >= '\t' && *text <= '\r' ? ' ' : '?', count);
+        }
     }
 }
 
@@ -207,6 +214,8 @@ drape_status drape_check_cancel(drape_context *ctx)
 void drape_context_set_message(drape_context *ctx, const char *format, ...)
 {
     va_list args;
+    if (!ctx || !format)
+        return;
     va_start(args, format);
     fail(ctx, DRAPE_OK, "", format, args);
     va_end(args);

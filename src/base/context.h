@@ -39,7 +39,8 @@ char *drape_copy_text(drape_context *ctx, const char *text);
 
 /* Replaces what a terminal would obey instead of show, as text quoted from files and arguments may contain
  * it: tabs and ends of lines by spaces; other control characters, also those of UTF-8 (U+0080 to U+009F),
- * and marks that change the direction of writing (U+202A to U+202E, U+2066 to U+2069) by question marks. */
+ * marks that change the direction of writing (U+202A to U+202E, U+2066 to U+2069), and bytes that are not
+ * UTF-8 by question marks. All that the program prints of a file, a name or an argument passes here. */
 void drape_make_printable(char *text);
 
 /* Set the message and return status. drape_fail_at also names the place by its JSON pointer: message

@@ -101,9 +101,10 @@ int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *reques
 /* Prints one line "drape run: text" on stderr. Returns CLI_BAD_INPUT. */
 int cli_misuse(const char *verb, const char *format, ...) DRAPE_PRINTF(2, 3);
 
-/* A text of the user's as it may be printed, shortened to 255 bytes: in printf("%s", CLI_SHOWN(name)). */
-#define CLI_SHOWN(text) cli_shown((char[256]){0}, text)
-const char *cli_shown(char room[256], const char *text);
+/* A text of the user's as it may be printed, shortened to 255 bytes, or as the room has it: in printf("%s",
+ * CLI_SHOWN(name)). */
+#define CLI_SHOWN(text) cli_shown((char[256]){0}, 256, text)
+const char *cli_shown(char *room, size_t size, const char *text);
 
 /* Prints a message of the library on stderr: as it is if it begins with an operand, as
  * "scene.json:6:26: /cloth/0: text" does, else behind "drape VERB: ". */

@@ -182,7 +182,8 @@ static drape_status gather(drape_arena *arena, const cli_scene *in, cli_info *in
 static int print_json(const cli_info *info)
 {
     json_t *json = cli_info_json(info);
-    int failed = !json || json_dumpf(json, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(15));
+    int failed =
+        !json || json_dumpf(json, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(15) | JSON_ENSURE_ASCII);
     fputc('\n', stdout);
     json_decref(json);
     return failed && !ferror(stdout) ? CLI_FAILED : CLI_DONE;

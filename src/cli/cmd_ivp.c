@@ -106,7 +106,7 @@ static int do_scenes(const ivp_request *request, size_t action)
     const int scenes = actions[action].operands ? 1 : command->operand_count - 1;
     for (int i = 1; i <= scenes && code != CLI_INTERRUPTED; i++) {
         if (scenes > 1)
-            printf("%s\n", command->operands[i]);
+            puts(CLI_SHOWN(command->operands[i]));
         code = do_scene(request, actions[action].deed, command->operands[i],
                         actions[action].operands == 2 ? command->operands[2] : NULL);
         worst = code > worst ? code : worst;

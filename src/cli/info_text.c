@@ -146,7 +146,8 @@ static void print_member(json_t *value)
 {
     char *text = json_is_string(value) ? NULL : json_dumps(value, JSON_ENCODE_ANY | JSON_REAL_PRECISION(9));
     if (text)
-        printf("%.*s%s", MAX_WRITTEN, text, strlen(text) > MAX_WRITTEN ? " ..." : "");
+        printf("%s%s", cli_shown((char[MAX_WRITTEN + 1]){0}, MAX_WRITTEN + 1, text),
+               strlen(text) > MAX_WRITTEN ? " ..." : "");
     else if (json_is_string(value))
         fputs(CLI_SHOWN(json_string_value(value)), stdout);
     free(text);
@@ -375,7 +376,7 @@ static void print_time(double seconds)
 static void print_cost(const cli_info *info, const char *name, const char *cloth, long long nonzeros,
                        long long bytes, double residual, double jacobian)
 {
-    printf("  %-20s %-10.10s", name, CLI_SHOWN(cloth));
+    printf("  %-20s %-10s", name, cli_shown((char[11]){0}, 11, cloth));
     print_count(nonzeros);
     print_count(bytes);
     print_time(residual);

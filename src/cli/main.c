@@ -10,7 +10,10 @@
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
+
+#define MIN_STACK (1 << 20) /* [bytes] of any thread: Drape needs a fifth of it, the rest is for libraries */
 
 /* If the program is started with a standard descriptor closed, a file that is opened later would become, say,
  * the standard output. The substitutes that are opened here fail on use, as the closed descriptor does. */
@@ -143,7 +146,13 @@ static int finish_output(int code)
 
 int main(int argc, char **argv)
 {
+    struct rlimit stack;
     fill_descriptors();
+    if (getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur < MIN_STACK) {
+        fprintf(stderr, "drape: the stack is limited to %llu KiB, by ulimit -s; at least %d KiB are needed\n",
+                (unsigned long long)stack.rlim_cur / 1024, MIN_STACK / 1024);
+        return CLI_FAILED;
+    }
     ignore_write_signals();
     cli_catch_signals();
     return finish_output(run(argc, argv));

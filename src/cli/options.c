@@ -74,9 +74,9 @@ void cli_print_help(const drape_verb *verb)
     print_option("help", NULL, "this text");
 }
 
-const char *cli_shown(char room[256], const char *text)
+const char *cli_shown(char *room, size_t size, const char *text)
 {
-    snprintf(room, 256, "%s", text);
+    snprintf(room, size, "%s", text);
     drape_make_printable(room);
     return room;
 }

@@ -4,59 +4,22 @@
 #include "sim/sim.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 /* ---- Reading ---- */
-
-static drape_status read_all(drape_context *ctx, int fd, const char *path, char *to, size_t size)
-{
-    size_t done = 0;
-    while (done < size) {
-        ssize_t n = read(fd, to + done, size - done);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0) /* the file was shortened meanwhile */
-            return drape_file_fail(ctx, "read", path, n < 0 ? errno : EIO);
-        done += (size_t)n;
-    }
-    return DRAPE_OK;
-}
-
-static drape_status take_file(drape_context *ctx, int fd, const char *path, void **bytes, size_t *size)
-{
-    struct stat info;
-    if (fstat(fd, &info))
-        return drape_file_fail(ctx, "read", path, errno);
-    if (!S_ISREG(info.st_mode))
-        return drape_fail(ctx, DRAPE_E_FILE, "cannot read \"%.500s\": it is not a regular file", path);
-    *size = (size_t)info.st_size;
-    *bytes = drape_alloc(ctx, *size, 1);
-    if (!*bytes)
-        return DRAPE_E_MEMORY;
-    drape_status status = read_all(ctx, fd, path, *bytes, *size);
-    if (status) {
-        drape_free(ctx, *bytes);
-        *bytes = NULL;
-    }
-    return status;
-}
 
 drape_status drape_checkpoint_read(drape_context *ctx, const char *path, bool *there, void **bytes,
                                    size_t *size)
 {
+    char *text;
     *bytes = NULL;
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    const int fd = drape_file_open(ctx, path);
     if (there)
         *there = fd >= 0;
-    if (fd < 0 && there && (errno == ENOENT || errno == ENOTDIR))
-        return DRAPE_OK;
     if (fd < 0)
-        return drape_file_fail(ctx, "read", path, errno);
-    drape_status status = take_file(ctx, fd, path, bytes, size);
-    close(fd);
+        return there && (errno == ENOENT || errno == ENOTDIR) ? DRAPE_OK : DRAPE_E_FILE;
+    const drape_status status = drape_file_take(ctx, fd, path, INT64_MAX, &text, size);
+    *bytes = text;
     return status;
 }
 

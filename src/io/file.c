@@ -33,6 +33,60 @@ static drape_status fail(const drape_file *file, const char *deed, int error)
     return drape_file_fail(file->ctx, deed, path, error);
 }
 
+int drape_open_regular(int dir, const char *path, int flags)
+{
+    struct stat info;
+    const int fd = openat(dir, path, flags | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (fd >= 0 && fstat(fd, &info) == 0 && S_ISREG(info.st_mode))
+        return fd;
+    const bool special = fd >= 0 || errno == ELOOP || errno == ENXIO || errno == EISDIR;
+    if (fd >= 0)
+        close(fd);
+    errno = special ? EINVAL : errno;
+    return -1;
+}
+
+int drape_file_open(drape_context *ctx, const char *path)
+{
+    const int fd = drape_open_regular(AT_FDCWD, path, O_RDONLY), error = errno;
+    if (fd < 0 && error != EINVAL)
+        drape_file_fail(ctx, "read", path, error);
+    else if (fd < 0)
+        drape_fail(ctx, DRAPE_E_FILE, "cannot read \"%.500s\": it is not a regular file", path);
+    errno = error;
+    return fd;
+}
+
+drape_status drape_file_take(drape_context *ctx, int fd, const char *path, off_t limit, char **bytes,
+                             size_t *size)
+{
+    struct stat info;
+    int error = fstat(fd, &info) ? errno : info.st_size > limit ? EFBIG : 0;
+    char *to = *bytes = error ? NULL : drape_alloc(ctx, (size_t)info.st_size + 1, 1);
+    for (*size = 0; to && !error && *size < (size_t)info.st_size;) {
+        const ssize_t n = read(fd, to + *size, (size_t)info.st_size - *size);
+        if (n > 0)
+            *size += (size_t)n;
+        else if (n == 0) /* it was shortened meanwhile */
+            error = EIO;
+        else if (errno != EINTR)
+            error = errno;
+    }
+    close(fd);
+    if (!error)
+        return to ? DRAPE_OK : DRAPE_E_MEMORY;
+    drape_free(ctx, to);
+    *bytes = NULL;
+    return drape_file_fail(ctx, "read", path, error);
+}
+
+drape_status drape_file_read(drape_context *ctx, const char *path, off_t limit, char **bytes, size_t *size)
+{
+    const int fd = drape_file_open(ctx, path);
+    *bytes = NULL;
+    return fd < 0 ? DRAPE_E_FILE : drape_file_take(ctx, fd, path, limit, bytes, size);
+}
+
 drape_status drape_file_create(drape_context *ctx, size_t path_length, drape_file *file)
 {
     *file = (drape_file){.ctx = ctx, .dir = -1, .path_size = path_length + 1};

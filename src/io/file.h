@@ -18,7 +18,8 @@
 #include "base/context.h"
 #include "io/folder.h"
 
-#define DRAPE_FILE_PART ".part" /* suffix of temporary names */
+#define DRAPE_FILE_PART ".part"          /* suffix of temporary names */
+#define DRAPE_MAX_TABLE ((off_t)1 << 32) /* [bytes] of a file with rows or lines that is read */
 
 /* A file with all members zero does not exist: closing and destroying it does nothing. */
 typedef struct drape_file {
@@ -119,6 +120,20 @@ drape_status drape_file_close(drape_file *file);
 
 /* Sets the message `cannot DEED "PATH": strerror(error)` and returns DRAPE_E_FILE. */
 drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *path, int error);
+
+/* Opens a regular file below the folder `dir`, a descriptor or AT_FDCWD. Returns -1 with errno, which is
+ * EINVAL for anything else, such as a pipe or a device: opening it does not wait. */
+int drape_open_regular(int dir, const char *path, int flags);
+
+/* Opens a file of a run or an experiment for reading, as all readers do; a failure also sets the message. */
+int drape_file_open(drape_context *ctx, const char *path);
+
+/* Reads all of such a file, of at most `limit` bytes, and a 0 after it; *bytes, for drape_free, is NULL after
+ * a failure. drape_file_take: from a descriptor, which it closes. Errors: DRAPE_E_FILE,
+ * DRAPE_E_MEMORY. */
+drape_status drape_file_read(drape_context *ctx, const char *path, off_t limit, char **bytes, size_t *size);
+drape_status drape_file_take(drape_context *ctx, int fd, const char *path, off_t limit, char **bytes,
+                             size_t *size);
 
 /* Creates a folder and its missing parents, with the mode 0777 & ~umask. path is modified during the call.
  * Errors: DRAPE_E_FILE. */

@@ -23,6 +23,8 @@
 #define HEAD_START   "{\"manifest\":1,"
 #define HEAD_TOKEN   "\"token\":\"%016" PRIx64 "\"}"
 #define HEAD_SIZE    200
+#define VALUES_SIZE  80                           /* for the values of an entry */
+#define LINE_SIZE    (20 + 6 * 255 + VALUES_SIZE) /* a name of 255 bytes, each escaped, and its values */
 #define MAX_MANIFEST ((off_t)1 << 30)
 #define ADVICE       "name another folder, or move the file away"
 
@@ -90,15 +92,7 @@ static drape_status lock(drape_folder *f)
 
 int drape_folder_open_file(const drape_folder *f, const char *name, int flags)
 {
-    struct stat info;
-    int fd = openat(f->fd, name, flags | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
-    if (fd >= 0 && fstat(fd, &info) == 0 && S_ISREG(info.st_mode))
-        return fd;
-    const bool special = fd >= 0 || errno == ELOOP || errno == ENXIO || errno == EISDIR;
-    if (fd >= 0)
-        close(fd);
-    errno = special ? EINVAL : errno;
-    return -1;
+    return drape_open_regular(f->fd, name, flags | O_NOFOLLOW);
 }
 
 int drape_folder_enter(char *path)
@@ -186,23 +180,18 @@ static drape_status take_lines(drape_folder *f, const char *text, size_t size)
 
 static drape_status read_manifest(drape_folder *f)
 {
-    struct stat info;
+    char path[512], *text;
+    size_t size;
     int fd = drape_folder_open_file(f, DRAPE_MANIFEST_NAME, O_RDONLY);
+    snprintf(path, sizeof path, "%.480s/" DRAPE_MANIFEST_NAME, f->path);
     if (fd < 0 && errno == ENOENT)
         return DRAPE_OK;
     if (fd < 0)
         return errno == EINVAL ? refuse(f, DRAPE_MANIFEST_NAME, "it is not a regular file")
                                : fail(f, "read", DRAPE_MANIFEST_NAME, errno);
-    size_t size = fstat(fd, &info) == 0 && info.st_size < MAX_MANIFEST ? (size_t)info.st_size : 0, used = 0;
-    char *text = drape_alloc(f->ctx, size, 1);
-    ssize_t count = 1;
-    while (text && used < size && (count = read(fd, text + used, size - used)) != 0 &&
-           (count > 0 || errno == EINTR))
-        used += count > 0 ? (size_t)count : 0;
-    drape_status status = !text       ? DRAPE_E_MEMORY
-                          : count < 0 ? fail(f, "read", DRAPE_MANIFEST_NAME, errno)
-                                      : take_lines(f, text, used);
-    close(fd);
+    drape_status status = drape_file_take(f->ctx, fd, path, MAX_MANIFEST, &text, &size);
+    if (!status)
+        status = take_lines(f, text, size);
     drape_free(f->ctx, text);
     return status;
 }
@@ -268,7 +257,7 @@ int drape_folder_descriptor(const drape_folder *folder)
 
 static bool checksum_of(int fd, uint64_t *size, uint64_t *sum)
 {
-    unsigned char bytes[65536];
+    unsigned char bytes[16384];
     drape_checksum c = {0};
     ssize_t count;
     while ((count = read(fd, bytes, sizeof bytes)) != 0 && (count > 0 || errno == EINTR))
@@ -489,29 +478,41 @@ static drape_status append(drape_folder *f, const char *text, size_t length, boo
 
 static drape_status add_line(drape_folder *f, const char *line, bool durable)
 {
-    char text[512];
+    char text[LINE_SIZE + 2];
     int length = snprintf(text, sizeof text, "%s%s\n", f->torn ? "\n" : "", line);
     f->torn = false;
     return append(f, text, (size_t)length, durable);
 }
 
+/* The name as a string of JSON, as RFC 8259 in section 7 demands. */
+static drape_status add_entry(drape_folder *f, const entry *e, bool durable)
+{
+    char line[LINE_SIZE];
+    size_t n = (size_t)snprintf(line, sizeof line, "{\"file\":\"");
+    for (const char *c = e->name; *c && n < LINE_SIZE - VALUES_SIZE; c++)
+        n += (size_t)snprintf(line + n, sizeof line - n,
+                              (unsigned char)*c < ' ' ? "\\u%04x"
+                              : strchr("\"\\", *c)    ? "\\%c"
+                                                      : "%c",
+                              *c);
+    if (e->growing)
+        snprintf(line + n, sizeof line - n, "\",\"inode\":\"%" PRIx64 "\",\"born\":\"%" PRIx64 "\"}",
+                 e->inode, e->born);
+    else
+        snprintf(line + n, sizeof line - n, "\",\"size\":%" PRIu64 ",\"checksum\":\"%016" PRIx64 "\"}",
+                 e->size, e->sum);
+    return add_line(f, line, durable);
+}
+
 drape_status drape_folder_note(drape_folder *f, const char *name, const drape_checksum *sum, bool durable)
 {
-    char line[400];
-    snprintf(line, sizeof line, "{\"file\":\"%.255s\",\"size\":%" PRIu64 ",\"checksum\":\"%016" PRIx64 "\"}",
-             name, sum->size, sum->sum);
-    return add_line(f, line, durable);
+    return add_entry(f, &(entry){.name = name, .size = sum->size, .sum = sum->sum}, durable);
 }
 
 drape_status drape_folder_note_growing(drape_folder *f, const char *name, int fd, bool durable)
 {
-    char line[400];
-    uint64_t inode = 0, born = 0;
-    if (!identity_of(fd, &inode, &born))
-        return fail(f, "write", name, errno);
-    snprintf(line, sizeof line, "{\"file\":\"%.255s\",\"inode\":\"%" PRIx64 "\",\"born\":\"%" PRIx64 "\"}",
-             name, inode, born);
-    return add_line(f, line, durable);
+    entry e = {.name = name, .growing = true};
+    return identity_of(fd, &e.inode, &e.born) ? add_entry(f, &e, durable) : fail(f, "write", name, errno);
 }
 
 static drape_status put_head(drape_folder *f)
@@ -526,21 +527,9 @@ static drape_status put_entries(drape_folder *f)
 {
     drape_status status = DRAPE_OK;
     struct stat info;
-    for (size_t i = 0; i < f->entry_count && !status; i++) {
-        const entry *e = &f->entries[i];
-        char line[400];
-        if (fstatat(f->fd, e->name, &info, AT_SYMLINK_NOFOLLOW))
-            continue;
-        if (e->growing)
-            snprintf(line, sizeof line,
-                     "{\"file\":\"%.255s\",\"inode\":\"%" PRIx64 "\",\"born\":\"%" PRIx64 "\"}", e->name,
-                     e->inode, e->born);
-        else
-            snprintf(line, sizeof line,
-                     "{\"file\":\"%.255s\",\"size\":%" PRIu64 ",\"checksum\":\"%016" PRIx64 "\"}", e->name,
-                     e->size, e->sum);
-        status = add_line(f, line, false);
-    }
+    for (size_t i = 0; i < f->entry_count && !status; i++)
+        if (fstatat(f->fd, f->entries[i].name, &info, AT_SYMLINK_NOFOLLOW) == 0)
+            status = add_entry(f, &f->entries[i], false);
     return status;
 }
 
@@ -660,9 +649,10 @@ drape_status drape_folder_verify(drape_folder *f, const char *name)
 {
     struct stat info;
     const int fd = drape_folder_open_file(f, name, O_RDONLY);
-    if (fd < 0)
+    if (fd >= 0)
+        close(fd);
+    else if (errno != EINVAL)
         return fail(f, "continue", name, errno);
-    close(fd);
     const char *why = why_not_ours(f, name, &info);
     return why ? drape_fail(f->ctx, DRAPE_E_PARSE, "cannot continue \"%.300s/%.200s\": it is damaged: %s",
                             f->path, name, why)

@@ -2,7 +2,6 @@
 #include "io/record.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -35,7 +34,8 @@ drape_status drape_record_scene(drape_context *ctx, const char *folder, char **p
     *path = drape_record_path(ctx, folder, DRAPE_SCENE_COPY);
     if (!*path)
         return DRAPE_E_MEMORY;
-    if (access(*path, R_OK) == 0)
+    struct stat info;
+    if (access(*path, R_OK) == 0 && stat(*path, &info) == 0 && S_ISREG(info.st_mode))
         return DRAPE_OK;
     drape_free(ctx, *path);
     *path = NULL;
@@ -78,13 +78,12 @@ static drape_status open_positions(drape_record *run)
     char *path = path_of(run, "positions.npy");
     if (!path)
         return DRAPE_E_MEMORY;
-    run->positions = open(path, O_RDONLY | O_CLOEXEC);
-    drape_status status =
-        run->positions < 0
-            ? drape_fail(run->ctx, DRAPE_E_FILE,
-                         "cannot read \"%.500s\": %s; a run writes it with the frame format npy", path,
-                         strerror(errno))
-            : read_header(run, path);
+    run->positions = drape_file_open(run->ctx, path);
+    drape_status status = run->positions >= 0 ? read_header(run, path) : DRAPE_E_FILE;
+    if (run->positions < 0 && errno == ENOENT)
+        drape_fail(run->ctx, status,
+                   "cannot read \"%.500s\": there is no such file; a run writes it with the frame format npy",
+                   path);
     drape_free(run->ctx, path);
     return status;
 }
@@ -152,24 +151,24 @@ static const char *find_columns(table *t, char *header)
     return NULL;
 }
 
-/* Reads a line and removes its end; false at the end of the file, and for an incomplete line left by a
- * killed run. */
-static bool next_line(FILE *file, char **line, size_t *room)
+/* Takes a line from *rest and removes its end; NULL at the end of the text, and for an incomplete line that a
+ * killed run left. */
+static char *next_line(char **rest)
 {
-    ssize_t length = getline(line, room, file);
-    if (length < 1 || (*line)[length - 1] != '\n')
-        return false;
-    (*line)[length - 1] = 0;
-    return true;
+    char *line = *rest, *end = strchr(line, '\n');
+    if (!end)
+        return NULL;
+    *end = 0;
+    *rest = end + 1;
+    return line;
 }
 
-static int64_t read_rows(FILE *file, const table *t, char **line, size_t *room, drape_row_reader *reader,
-                         void *user)
+static int64_t read_rows(char *text, const table *t, drape_row_reader *reader, void *user)
 {
     int64_t rows = 0;
-    while (next_line(file, line, room)) {
+    for (char *line; (line = next_line(&text));) {
         char *cells[MAX_CELLS], *wanted[DRAPE_MOST_COLUMNS], none[] = "";
-        size_t found = split(*line, cells, MAX_CELLS);
+        size_t found = split(line, cells, MAX_CELLS);
         for (size_t i = 0; i < t->count; i++)
             wanted[i] = t->place[i] < found ? cells[t->place[i]] : none;
         reader(user, rows++, wanted);
@@ -180,20 +179,17 @@ static int64_t read_rows(FILE *file, const table *t, char **line, size_t *room, 
 static drape_status read_table(const drape_record *run, const char *path, table *t, drape_row_reader *reader,
                                void *user, int64_t *rows)
 {
-    char *line = NULL;
-    size_t room = 0;
-    FILE *file = fopen(path, "r");
-    if (!file)
-        return drape_file_fail(run->ctx, "read", path, errno);
-    const char *missing = next_line(file, &line, &room) ? find_columns(t, line) : t->columns[0];
-    if (!missing)
-        *rows = read_rows(file, t, &line, &room, reader, user);
-    int error = ferror(file) ? errno : 0;
-    free(line);
-    fclose(file);
-    if (missing)
-        return drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": there is no column \"%s\"", path, missing);
-    return error ? drape_file_fail(run->ctx, "read", path, error) : DRAPE_OK;
+    char *text;
+    size_t size;
+    drape_status status = drape_file_read(run->ctx, path, DRAPE_MAX_TABLE, &text, &size);
+    char *rest = text, *header = status ? NULL : next_line(&rest);
+    const char *missing = header ? find_columns(t, header) : t->columns[0];
+    if (!status && !missing)
+        *rows = read_rows(rest, t, reader, user);
+    else if (!status)
+        status = drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": there is no column \"%s\"", path, missing);
+    drape_free(run->ctx, text);
+    return status;
 }
 
 drape_status drape_record_rows(const drape_record *run, const char *name, const char *const *columns,

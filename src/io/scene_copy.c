@@ -3,7 +3,6 @@
 #include "io/scene_copy.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>
@@ -13,9 +12,10 @@
 #include "io/file.h"
 #include "model/scene_text.h"
 
-#define MESH_NAME   "scene_mesh_%d%.15s"
-#define MESH_ROOM   48 /* for the name of a copied file */
-#define COPIED_ONCE 16384
+#define MESH_NAME    "scene_mesh_%d%s"
+#define MAX_ENDING   14
+#define ALPHANUMERIC "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
+#define COPIED_ONCE  16384
 
 typedef struct copier {
     drape_context *ctx;
@@ -145,25 +145,30 @@ static drape_status keep_path(copier *c, const char *source, const char *pointer
     return status;
 }
 
+/* The ending of a file, with its dot, for the name of its copy; "" if it is none that tells a format. */
+static const char *ending_of(const char *source)
+{
+    const char *dot = strrchr(source, '.');
+    const size_t length = dot ? strspn(dot + 1, ALPHANUMERIC) : 0;
+    return length > 0 && length <= MAX_ENDING && !dot[1 + length] ? dot : "";
+}
+
 /* A file that cannot be read twice, such as a pipe, is not copied. */
 static drape_status copy_file(void *user, const char *source, const char *pointer)
 {
     copier *c = user;
     struct stat info;
-    char name[MESH_ROOM];
-    const char *ending = strrchr(source, '.');
     if (stat(source, &info) || S_ISDIR(info.st_mode))
         return keep_path(c, source, pointer);
     if (!S_ISREG(info.st_mode))
         return DRAPE_OK;
-    int from = open(source, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    const int from = drape_file_open(c->ctx, source);
     if (from < 0)
-        return drape_file_fail(c->ctx, "read the file", source, errno);
-    snprintf(name, sizeof name, MESH_NAME, c->files++, ending ? ending : "");
-    drape_file_name(&c->out, "%s", name);
+        return DRAPE_E_FILE;
+    drape_file_name(&c->out, MESH_NAME, c->files++, ending_of(source));
     drape_status status = copy_bytes(c, from, source);
     close(from);
-    return status ? status : drape_scene_set(c->scene, pointer, name);
+    return status ? status : drape_scene_set(c->scene, pointer, c->out.path);
 }
 
 /* ---- The scene ---- */

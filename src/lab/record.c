@@ -86,6 +86,7 @@ static void take_lines(char *text, lab_record *records, size_t count)
                                     .obtained = lab_number(line, "obtained"),
                                     .seconds = lab_number(line, "cpu_s")};
             snprintf(v->message, sizeof v->message, "%s", lab_text(line, "message"));
+            drape_make_printable(v->message);
             drape_validate_judge(record->reference, v);
             record->done = true;
         }

@@ -10,7 +10,6 @@
 #include <errno.h>
 #include <math.h>
 #include <pthread.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* ---- Lines ---- */
@@ -33,20 +32,15 @@ static drape_status take_line(lab *l, const char *path, int64_t number, const ch
 /* A last line without its end was cut short. */
 static drape_status read_file(lab *l, const char *path, int64_t *found)
 {
-    FILE *file = fopen(path, "r");
-    if (!file)
-        return drape_file_fail(l->ctx, "read", path, errno);
-    char *text = NULL;
-    size_t room = 0;
-    ssize_t length;
-    drape_status status = DRAPE_OK;
-    for (int64_t n = 1; !status && (length = getline(&text, &room, file)) > 0; n++)
-        if (text[length - 1] == '\n')
-            status = take_line(l, path, n, text, found);
-    if (ferror(file))
-        status = drape_file_fail(l->ctx, "read", path, errno);
-    free(text);
-    fclose(file);
+    char *text;
+    size_t size;
+    int64_t n = 1;
+    drape_status status = drape_file_read(l->ctx, path, DRAPE_MAX_TABLE, &text, &size);
+    for (char *line = text, *end; !status && (end = strchr(line, '\n')); line = end + 1) {
+        *end = 0;
+        status = take_line(l, path, n++, line, found);
+    }
+    drape_free(l->ctx, text);
     return status;
 }
 

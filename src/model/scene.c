@@ -130,19 +130,21 @@ static drape_status grow(drape_scene *scene, size_t used, size_t *room)
 }
 
 /* Reads to the end of the file: the size of a pipe is known only then, and a file may grow while it is
- * read. */
+ * read. A device may have no end: after a byte 0, which no scene has, reading ends, too. */
 static drape_status read_all(drape_scene *scene, FILE *file, size_t room, size_t *size)
 {
     *size = 0;
     scene->text = drape_alloc(scene->ctx, room + 1, 1);
     drape_status status = scene->text ? DRAPE_OK : DRAPE_E_MEMORY;
-    while (!status && !feof(file)) {
+    for (bool zero = false; !status && !zero && !feof(file);) {
         if (*size == room)
             status = grow(scene, *size, &room);
         if (status)
             break;
         errno = 0;
-        *size += fread(scene->text + *size, 1, room - *size, file);
+        const size_t count = fread(scene->text + *size, 1, room - *size, file);
+        zero = memchr(scene->text + *size, 0, count) != NULL;
+        *size += count;
         if (ferror(file))
             status = cannot_read(scene, strerror(errno));
         else if (*size > MAX_FILE)

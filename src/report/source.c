@@ -2,41 +2,19 @@
 #include "report/source.h"
 
 #include <errno.h>
-#include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "model/scene.h"
 
 #define SCENE_LIMIT ((off_t)64 << 20)
 
-/* Reads a whole file as a 0-terminated text. */
-static drape_status read_text(drape_context *ctx, const char *path, char **out)
-{
-    struct stat info;
-    int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-    if (fd < 0 || fstat(fd, &info) || !S_ISREG(info.st_mode) || info.st_size > SCENE_LIMIT) {
-        int error = fd < 0 ? errno : EFBIG;
-        if (fd >= 0)
-            close(fd);
-        return drape_file_fail(ctx, "read", path, error);
-    }
-    size_t size = (size_t)info.st_size, used = 0;
-    ssize_t count = 1;
-    *out = drape_alloc(ctx, size + 1, 1);
-    while (*out && used < size && (count = read(fd, *out + used, size - used)) > 0)
-        used += (size_t)count;
-    drape_status status = !*out ? DRAPE_E_MEMORY : count < 0 ? drape_file_fail(ctx, "read", path, errno) : 0;
-    close(fd);
-    return status;
-}
-
 static drape_status read_scene(drape_report_source *source, const char *folder)
 {
     char *path;
+    size_t size;
     drape_status status = drape_record_scene(source->ctx, folder, &path);
     if (!status)
-        status = read_text(source->ctx, path, &source->scene_text);
+        status = drape_file_read(source->ctx, path, SCENE_LIMIT, &source->scene_text, &size);
     if (!status)
         status = drape_model_load(source->ctx, path, &source->model);
     drape_free(source->ctx, path);
@@ -52,9 +30,15 @@ drape_status drape_report_source_open(drape_context *ctx, const char *folder, dr
     char *path = status ? NULL : drape_record_path(ctx, folder, "summary.json");
     if (status || !path)
         return status ? status : DRAPE_E_MEMORY;
-    source->summary = json_load_file(path, 0, NULL);
+    const int fd = drape_file_open(ctx, path);
+    if (fd < 0 && errno != ENOENT) /* a killed run has none */
+        status = DRAPE_E_FILE;
     drape_free(ctx, path);
-    return DRAPE_OK;
+    if (fd >= 0) {
+        source->summary = json_loadfd(fd, 0, NULL);
+        close(fd);
+    }
+    return status;
 }
 
 void drape_report_source_close(drape_report_source *source)

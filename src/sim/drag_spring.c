@@ -84,6 +84,8 @@ drape_status drape_sim_set_drag_springs(drape_sim *sim, int32_t count, const int
 void drape_sim_drag_spring_force(const drape_sim *sim, double force[3])
 {
     const drape_drag_springs *springs = sim ? drape_system_drag_springs(sim->system) : NULL;
+    if (!force)
+        return;
     memset(force, 0, 3 * sizeof *force);
     for (int32_t i = 0; springs && i < springs->count; i++) {
         const drape_drag_spring *spring = &springs->spring[i];

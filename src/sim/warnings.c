@@ -493,6 +493,7 @@ bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out)
         const size_t i = c.check++;
         if (checks[i].applies(sim, out->text, sizeof out->text) && c.index++ == index) {
             out->name = checks[i].name;
+            drape_make_printable(out->text);
             c.attempts = sim->attempts;
             sim->warning_cursor = c;
             return true;

@@ -576,6 +576,17 @@ def test_names():
         assert not bad.search(text), (args, bad.search(text), text)
         assert result.returncode in (0, 1, 2), (args, text)
     assert "b \u00e4\u20ac" in good("info", name)
+    write_scene(pins=[{"corner": "top-left", "name": evil, "clamp": True}], histories=[{"name": evil, "times": [0, 1], "values": [1, 1]}])
+    result = drape("run", "scene.json")
+    assert len(re.findall("^warning: .*b \u00e4\u20ac", result.stderr, re.M)) == 2 and not bad.search(result.stderr), result.stderr
+    text = good("info", "scene.json", "--json")
+    assert not bad.search(text), text
+    equal(json.loads(text)["cloths"][0]["pins"][0]["name"], evil, "a name in JSON")
+    # stray bytes, an encoding too long for its character, half of a pair of UTF-16, and what is beyond the last character
+    for odd in b"\xff", b"\x80", b"\xe2\x82", b"\xc0\xaf", b"\xed\xa0\x80", b"\xf4\x90\x80\x80", b"\xf8\x88\x80\x80\x80":
+        result = subprocess.run([PROGRAM, b"info", b"no" + odd + b".json"], capture_output=True, timeout=LIMIT)
+        shown = "no" + len(odd) * "?" + ".json: cannot read the scene: No such file or directory"
+        assert shown in result.stderr.decode(), (odd, result.stderr)
 
 
 def test_old_summary():

@@ -94,6 +94,22 @@ def test_render():
     fill(["render", "scene.json", "--out", "frames", "--size", "320x200"], "frames", is_whole, (0, 1, 100, 700))
 
 
+def test_stack():
+    """a stack that is too short is refused by every verb with one line; one of the least size is enough for all threads"""
+    def limit(size):
+        return lambda: resource.setrlimit(resource.RLIMIT_STACK, (size, resource.getrlimit(resource.RLIMIT_STACK)[1]))
+    write_scene()
+    for args in ["run", "scene.json"], ["stability", "scene.json", "--axis", "/integrator/dt=1e-3:1e-1:2log", "--out", "s"], ["--help"]:
+        result = drape(*args, preexec_fn=limit(64 * 1024))
+        equal((result.returncode, result.stdout, result.stderr),
+              (1, "", "drape: the stack is limited to 64 KiB, by ulimit -s; at least 1024 KiB are needed\n"), " ".join(args))
+    for args in ["run", "scene.json", "--threads", "2"], ["check", "scene.json"], ["modes", "scene.json"], ["stability", "scene.json", "--axis",
+                 "/integrator/dt=1e-3:1e-1:2log", "--integrators", "be,radau,ida,dirk", "--out", "s"]:
+        if args[0] == "run" or re.search(f"^ +{args[0]} ", good("--help"), re.M):
+            result = drape(*args, preexec_fn=limit(1024 * 1024))
+            equal((result.returncode, without_warnings(result.stderr)), (0, ""), " ".join(args))
+
+
 def test_no_folder():
     """a file is where a folder should be"""
     write_scene()

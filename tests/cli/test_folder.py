@@ -3,15 +3,17 @@
 touched, and do not hang on pipes. Output is TAP.
 """
 import hashlib
+import json
 import os
 import re
+import resource
 import shutil
 import signal
 import socket
 import subprocess
 import time
 
-from program import PROGRAM, SOURCES, Skip, drape, equal, good, read_json, refused, run_tests, signalled, write_scene
+from program import PROGRAM, SOURCES, Skip, drape, equal, good, read_json, refused, run_tests, scene, signalled, write_scene
 
 LIMIT = 60  # [s]
 MESH = SOURCES + "/tests/bad/good.obj"
@@ -275,6 +277,67 @@ def test_report():
     good("report", "out")
     for name in "positions.npy", "scene.json", "steps.csv":
         keeps("out", "report", "out", "--out", "out/" + name, says="it is an input")
+
+
+def npy(path, rows):
+    """An array of doubles, rows x 3, all 0."""
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, 3), }}".ljust(117) + "\n"
+    with open(path, "wb") as file:
+        file.write(b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode() + bytes(24 * rows))
+
+
+def test_endings():
+    """the copies of files that a scene names have safe names, whatever theirs are, and the folder is one that the next run replaces"""
+    os.mkdir("a.b")
+    for name, copy in (("./vel", "scene_mesh_0"), ("a.b/vel", "scene_mesh_0"), ('v.a"b', "scene_mesh_0"), ("v.\\", "scene_mesh_0"), ("v.\x1b[0m\n", "scene_mesh_0"),
+                       ("v.\u00e4", "scene_mesh_0"), ("v.", "scene_mesh_0"), ("v." + 15 * "x", "scene_mesh_0"), ("v.x.NPY", "scene_mesh_0.NPY")):
+        npy(name, 16)
+        whole = scene()
+        whole["cloth"][0]["start"] = {"velocities": name}
+        put("scene.json", json.dumps(whole))
+        good(*RUN[:4])
+        equal(read_json("out/scene.json")["cloth"][0]["start"]["velocities"], copy, name)
+        assert os.path.exists("out/" + copy), (name, os.listdir("out"))
+        good(*RUN[:4])
+        good("run", "out/scene.json")
+
+
+def test_special_files():
+    """a pipe or a device in place of a file of a run or an experiment is refused with one line: nothing waits, or reads without end"""
+    write_scene()
+    good(*RUN[:4], "--checkpoint-every", "1")
+    calls = [["report", "out"], ["check", "out"], ["run", "scene.json", "--resume", "--out", "out"]]
+    if re.search(r"^ +render +RUN", good("--help"), re.M):
+        calls.append(["render", "out", "--frame", "1", "--out", "x.png"])
+    reads = {"scene.json": calls, "energy.csv": calls, "positions.npy": calls, "steps.csv": [calls[0], calls[2]], "summary.json": [calls[0], calls[2]],
+             "checkpoint.drape": [calls[2]], "manifest.jsonl": [calls[0], calls[2]]}
+    for name, readers in reads.items():
+        os.rename("out/" + name, "aside")
+        for make in os.mkfifo, lambda path: os.symlink("/dev/zero", path):
+            make("out/" + name)
+            for args in readers:
+                refused(*args, says="no scene.json that can be read" if name == "scene.json" and args[0] != "run" else "not a regular file")
+            os.remove("out/" + name)
+        os.rename("aside", "out/" + name)
+    if re.search(r"^ +merge ", good("--help"), re.M):
+        good("converge", "scene.json", "--integrators", "be", "--levels", "3", "--out", "lab")
+        for name in "cases.jsonl", "experiment.json":
+            os.rename("lab/" + name, "aside")
+            os.mkfifo("lab/" + name)
+            refused("merge", "lab", "--out", "merged", says=f'cannot read "lab/{name}"')
+            os.remove("lab/" + name)
+            os.rename("aside", "lab/" + name)
+
+
+def test_devices():
+    """a scene may come from a pipe; a device that has no end is refused at its first byte"""
+    write_scene()
+    with open("scene.json", "rb") as file:
+        equal(subprocess.run([PROGRAM, "info", "/dev/stdin"], input=file.read(), capture_output=True, timeout=LIMIT).returncode, 0, "a pipe")
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    refused("info", "/dev/zero", says="/dev/zero:1:1: byte 0x00 is not allowed in a scene")
+    used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    assert used < 1, f"{used} s: it was read further"
 
 
 def test_experiments():

@@ -60,6 +60,19 @@ def test_failures():
     raises(drape.FileError, drape.run(sheet(duration=0.02)).report, "none/x.html", says="none/x.html")
 
 
+def test_special_files():
+    """a pipe or a device in the folder of a run is refused: reading it might never end"""
+    frames = len(drape.run(sheet(), out="special").times)
+    for name in "scene.json", "energy.csv", "steps.csv", "positions.npy", "summary.json":
+        os.rename("special/" + name, "aside")
+        for make in os.mkfifo, lambda path: os.symlink("/dev/zero", path):
+            make("special/" + name)
+            raises(drape.FileError, drape.load, "special", says="scene.json" if name == "scene.json" else "not a regular file")
+            os.remove("special/" + name)
+        os.rename("aside", "special/" + name)
+    equal(len(drape.load("special").times), frames)
+
+
 def test_stopped():
     """what ends a recording, an observer that stops or raises or Ctrl-C, comes out of it with the run up to there, which is the beginning of the whole one"""
     whole = drape.run(sheet())

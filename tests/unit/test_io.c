@@ -1315,6 +1315,48 @@ START_TEST(numbers_do_not_follow_the_locale)
 }
 END_TEST
 
+/* Whether Drape wrote the file of a name: to be refused, or replaced. */
+static bool takes(const void *name, const char *file)
+{
+    return strcmp(name, file) == 0;
+}
+
+/* The manifest of a folder is JSON whatever the names in it are: the next process knows them again, and
+ * writes them anew. */
+START_TEST(any_name_is_found_again)
+{
+    char longest[256];
+    world w;
+    set_up(&w);
+    memset(longest, '\1', 255);
+    longest[255] = 0;
+    const char *const names[] = {"a.\"b",     "back\\slash",          "line\nend",
+                                 "\x1b[0m\t", "\xc3\xa4\xe2\x82\xac", longest};
+    enum { NAMES = sizeof names / sizeof *names };
+    for (int turn = 0; turn < 3; turn++) {
+        drape_folder *folder = NULL;
+        ck_assert_int_eq(drape_folder_open(w.ctx, w.out, false, &folder), DRAPE_OK);
+        for (int i = 0; i < NAMES && turn > 0; i++) {
+            ck_assert_msg(drape_folder_check(folder, takes, NULL, names[i]) == DRAPE_OK, "%d: %s", i,
+                          drape_context_message(w.ctx));
+            ck_assert_int_eq(drape_folder_verify(folder, names[i]), DRAPE_OK);
+        }
+        ck_assert_int_eq(drape_folder_begin(folder, takes, "none"), DRAPE_OK);
+        for (int i = 0; i < NAMES && turn == 0; i++) {
+            drape_file file;
+            ck_assert_int_eq(drape_file_create_in(w.ctx, folder, &file), DRAPE_OK);
+            drape_file_name(&file, "%s", names[i]);
+            ck_assert_int_eq(drape_file_begin(&file), DRAPE_OK);
+            drape_file_put_text(&file, "text");
+            ck_assert_int_eq(i % 2 ? drape_file_finish(&file) : drape_file_publish(&file), DRAPE_OK);
+            drape_file_destroy(&file); /* one that was published is left growing, as by a kill */
+        }
+        drape_folder_close(&folder);
+    }
+    tear_down(&w);
+}
+END_TEST
+
 SUITE("io", npy_is_exact, npy_is_valid_after_each_frame, the_last_frame_comes_once, obj_parses_back,
       ply_parses_back, every_format_writes_the_same_frames, old_frames_are_removed_and_nothing_else,
       energies_are_of_the_state_at_or_after_the_frame, full_disk_leaves_whole_rows_of_energies,
@@ -1324,4 +1366,4 @@ SUITE("io", npy_is_exact, npy_is_valid_after_each_frame, the_last_frame_comes_on
       a_disk_full_from_the_start_is_reported_at_once, bad_folders_are_refused,
       unknown_formats_are_refused_before_anything_is_made, too_many_observers_are_reported,
       a_killed_run_leaves_whole_files, each_allocation_may_fail, summary_is_complete, summary_is_always_json,
-      summary_fails_whole, numbers_do_not_follow_the_locale)
+      summary_fails_whole, numbers_do_not_follow_the_locale, any_name_is_found_again)
