@@ -521,6 +521,8 @@ static drape_status read_folders(lab *l, const char *const *folders, size_t coun
     status = find(l, lab_text(l->about, "experiment"));
     if (!status)
         status = make_results(l);
+    if (!status && l->experiment->verify)
+        status = l->experiment->verify(l);
     for (size_t i = 0; !status && i < count; i++) {
         json_t *about = NULL;
         status = parse_about(l, folders[i], &about);

@@ -838,58 +838,75 @@ static void summarise(lab *l, const space *s, size_t first)
     fprintf(l->summary, "\n");
 }
 
-/* Whether the cases are those of the axes: the cells of an integrator after those of another. */
-static drape_status check_cells(lab *l, const space *s)
+/* The axes are those of experiment.json: a merge has no def. */
+static drape_status read_about(lab *l, space *s)
 {
-    for (size_t i = 0; i < l->count; i++) {
-        const json_t *one = json_array_get(l->cases, i), *first = json_array_get(l->cases, i - i % s->cells);
+    const json_t *axes = json_object_get(l->arguments, "axes");
+    const char *texts[MAX_AXES];
+    *s = (space){.count = (int)json_array_size(axes)};
+    if (s->count < 1 || s->count > MAX_AXES)
+        return drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: a map has 1 to 3 axes");
+    for (int a = 0; a < s->count; a++)
+        texts[a] = json_string_value(json_array_get(axes, (size_t)a));
+    return read_axes(l, texts, s);
+}
+
+/* The result that the figures show, by its number in experiment.json. */
+static drape_status read_result(lab *l, size_t i, const lab_quantity **quantity)
+{
+    const json_t *results = json_object_get(l->about, "results");
+    int k = 0;
+    drape_status status = drape_registry_choose(l->ctx, &lab_quantity_registry, "",
+                                                json_string_value(json_array_get(results, i)), &k);
+    *quantity = status ? NULL : lab_quantity_at(k);
+    return status;
+}
+
+/* Whether the cases are those of the axes, the cells of an integrator after those of another, and the results known. */
+static drape_status verify(lab *l)
+{
+    space s;
+    const lab_quantity *quantity;
+    drape_status status = read_about(l, &s);
+    for (size_t i = 0; !status && i < json_array_size(json_object_get(l->about, "results")); i++)
+        status = read_result(l, i, &quantity);
+    if (!status && l->count % s.cells != 0)
+        status = drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: %zu cases are no whole map of %zu cells",
+                            l->count, s.cells);
+    for (size_t i = 0; !status && i < l->count; i++) {
+        const json_t *one = json_array_get(l->cases, i), *first = json_array_get(l->cases, i - i % s.cells);
         int index[MAX_AXES];
-        indices_of(s, i % s->cells, index);
+        indices_of(&s, i % s.cells, index);
         bool there = strcmp(lab_tag_text(one, "integrator"), lab_tag_text(first, "integrator")) == 0;
-        for (int a = 0; a < s->count; a++) {
-            const axis *x = &s->axes[a];
+        for (int a = 0; a < s.count; a++) {
+            const axis *x = &s.axes[a];
             const double value = axis_value(x, index[a]), size = x->log ? value : fabs(x->to - x->from);
             there = there && fabs(lab_tag_number(one, x->pointer) - value) <= 1e-9 * size;
         }
         if (!there)
-            return drape_fail(l->ctx, DRAPE_E_PARSE,
-                              "experiment.json: /cases/%zu is not at its place on the axes", i);
+            status = drape_fail(l->ctx, DRAPE_E_PARSE,
+                                "experiment.json: /cases/%zu is not at its place on the axes", i);
     }
-    return l->count % s->cells == 0
-               ? DRAPE_OK
-               : drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: %zu cases are no whole map of %zu cells",
-                            l->count, s->cells);
+    return status;
 }
 
-/* A summary and the figures. Axes and results are those of experiment.json: a merge has no def. */
+/* A summary and the figures. */
 static drape_status report(lab *l)
 {
-    const json_t *axes = json_object_get(l->arguments, "axes"),
-                 *results = json_object_get(l->about, "results");
-    space s = {.count = (int)json_array_size(axes)};
-    const char *texts[MAX_AXES];
-    if (s.count < 1 || s.count > MAX_AXES)
-        return drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: a map has 1 to 3 axes");
-    for (int a = 0; a < s.count; a++) {
-        const char *text = json_string_value(json_array_get(axes, (size_t)a));
-        texts[a] = text ? text : "";
-    }
-    drape_status status = read_axes(l, texts, &s);
-    if (!status)
-        status = check_cells(l, &s);
+    space s;
+    drape_status status = read_about(l, &s);
     for (size_t first = 0; !status && first + s.cells <= l->count; first += s.cells)
         summarise(l, &s, first);
     if (!status) {
         lab_page_heading(l, "What happened");
         status = draw(l, &s, &(shade){.quantity = NULL});
     }
-    for (size_t i = 0; !status && i < json_array_size(results); i++) {
-        const char *name = json_string_value(json_array_get(results, i));
-        int k;
-        status = drape_registry_choose(l->ctx, &lab_quantity_registry, "", name ? name : "", &k);
+    for (size_t i = 0; !status && i < json_array_size(json_object_get(l->about, "results")); i++) {
+        const lab_quantity *quantity;
+        status = read_result(l, i, &quantity);
         if (!status) {
-            const shade sh = make_shade(l, lab_quantity_at(k));
-            lab_page_heading(l, lab_quantity_at(k)->entry.name);
+            const shade sh = make_shade(l, quantity);
+            lab_page_heading(l, quantity->entry.name);
             status = draw(l, &s, &sh);
         }
     }
@@ -899,6 +916,7 @@ static drape_status report(lab *l)
 const lab_experiment_ops lab_experiment_stability = {
     .entry = {.name = "stability", .summary = "maps of what happens over one to three values of the scene"},
     .plan = plan,
+    .verify = verify,
     .report = report,
     .shows_results = true,
 };

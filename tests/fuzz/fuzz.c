@@ -154,7 +154,8 @@ const char *fuzz_folder(const uint8_t *data, size_t size)
         FILE *file = strcmp(name, ".") == 0 || strcmp(name, "..") == 0 ? NULL : fopen(path, "wb");
         if (!file)
             continue;
-        FUZZ_REQUIRE(fwrite(line + 1, 1, (size_t)(next - line - 1), file) == (size_t)(next - line - 1), "%s", path);
+        FUZZ_REQUIRE(fwrite(line + 1, 1, (size_t)(next - line - 1), file) == (size_t)(next - line - 1), "%s",
+                     path);
         fclose(file);
     }
     return folder;
