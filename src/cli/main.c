@@ -13,7 +13,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#define MIN_STACK (1 << 20) /* [bytes] of any thread: Drape needs a fifth of it, the rest is for libraries */
+#define MIN_STACK (1 << 20) /* [bytes] of each thread; Drape takes up to a quarter, libraries the rest */
 
 /* If the program is started with a standard descriptor closed, a file that is opened later would become, say,
  * the standard output. The substitutes that are opened here fail on use, as the closed descriptor does. */

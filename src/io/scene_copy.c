@@ -145,7 +145,7 @@ static drape_status keep_path(copier *c, const char *source, const char *pointer
     return status;
 }
 
-/* The ending of a file, with its dot, for the name of its copy; "" if it is none that tells a format. */
+/* The ending of a file, with its dot, for the name of its copy; "" if it tells no format. */
 static const char *ending_of(const char *source)
 {
     const char *dot = strrchr(source, '.');

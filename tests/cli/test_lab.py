@@ -50,9 +50,9 @@ def test_names():
         with open(path, encoding="utf-8") as file:
             text = file.read()
         with open(path, "w", encoding="utf-8") as file:
-            file.write(text.replace('"be"', r'"b\u001b[31m\u009b\u202ee"'))
+            file.write(re.sub('"be(?=[",])', lambda match: r'"b\u001b[31m\u009b\u202ee', text))
     out = good("merge", "t", "--out", "m")
-    assert "the cheapest is b?[31m?????e, " in out and not re.search("[\x1b\x9b\u202e]", out), out
+    assert "the cheapest is b?[31m?????e" in out and not re.search("[\x1b\x9b\u202e]", out), out
     assert len(out.splitlines()) > 3, out
 
 
