@@ -134,17 +134,6 @@ static int make_def(const cli_lab_request *request, int default_jobs, double def
     return code;
 }
 
-static void print_lines(char *text)
-{
-    for (char *end; text && *text; text = end ? end + 1 : NULL) {
-        end = strchr(text, '\n');
-        if (end)
-            *end = 0;
-        drape_make_printable(text);
-        puts(text);
-    }
-}
-
 int cli_lab_conclude(const cli_command *command, drape_status status, drape_lab_outcome *outcome)
 {
     const int code = !status                                      ? CLI_DONE
@@ -152,7 +141,7 @@ int cli_lab_conclude(const cli_command *command, drape_status status, drape_lab_
                      : outcome->input && status != DRAPE_E_MEMORY ? CLI_BAD_INPUT
                                                                   : CLI_FAILED;
     if (!status)
-        print_lines(outcome->text);
+        fputs(outcome->text ? outcome->text : "", stdout);
     else if (code == CLI_INTERRUPTED)
         cli_report_interrupted(command->verb);
     else

@@ -495,6 +495,8 @@ drape_status drape_lab_run(drape_context *ctx, const char *experiment, const dra
     static drape_status (*const stages[])(lab *) = {plan,         try_scene, check_settings, make_results,
                                                     claim_folder, prepare,   lab_sweep,      report};
     lab l;
+    if (!outcome)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "an experiment needs an outcome");
     *outcome = (drape_lab_outcome){0};
     drape_status status = check_def(ctx, def);
     outcome->input = status;
@@ -543,10 +545,11 @@ drape_status drape_lab_merge(drape_context *ctx, const char *const *folders, siz
     drape_lab_def def;
     lab l;
     drape_file file = {0};
-    *outcome = (drape_lab_outcome){.input = true};
-    if (count < 1 || !folder || !*folder)
+    if (outcome)
+        *outcome = (drape_lab_outcome){.input = true};
+    if (!outcome || !folders || count < 1 || !folder || !*folder)
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
-                          "a merge needs folders with results, and one for the report");
+                          "a merge needs folders with results, one for the report, and an outcome");
     drape_lab_def_init(&def, sizeof def);
     locale_t old = drape_locale_enter();
     drape_status status = begin(ctx, &def, folder, outcome, &l);

@@ -104,7 +104,7 @@ static drape_status print_json(const lab_ivp *s, const double *x, json_t *score,
     all = drape_json_with(all, "error", errors);
     all = drape_json_with(all, "error_largest", largest);
     const bool failed = !all || json_object_update(all, score) ||
-                        json_dumpf(all, out, JSON_INDENT(2) | JSON_REAL_PRECISION(15));
+                        json_dumpf(all, out, JSON_ENSURE_ASCII | JSON_INDENT(2) | JSON_REAL_PRECISION(15));
     fputs("\n", out);
     json_decref(all);
     return failed ? drape_fail(s->arena->ctx, DRAPE_E_MEMORY, "the score cannot be printed") : DRAPE_OK;
@@ -265,9 +265,13 @@ drape_status lab_ivp_export(const lab_ivp *s, const char *path, FILE *out)
         status = drape_folder_begin(folder, writes, NULL);
     if (!status)
         status = put_all(s, drape_sim_velocities(sim), folder);
-    if (!status)
+    if (!status) {
+        char shown[4096];
+        snprintf(shown, sizeof shown, "%s", path);
+        drape_make_printable(shown);
         fprintf(out, "export    %s: start.obj, nodes.csv, pins.csv, times.csv, scene.json, reference.npy\n",
-                path);
+                shown);
+    }
     drape_folder_close(&folder);
     drape_sim_destroy(&sim);
     return status;

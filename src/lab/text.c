@@ -4,12 +4,8 @@
 #include "io/csv.h"
 #include "io/export.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 /* ---- Files ---- */
 
@@ -28,24 +24,14 @@ drape_status lab_write_text(lab *l, const char *name, const char *text, size_t s
 drape_status lab_read_text(drape_arena *arena, const char *folder, const char *name, char **text,
                            size_t *size)
 {
-    char path[4096];
-    struct stat info = {0};
+    char path[4096], *bytes;
     snprintf(path, sizeof path, "%s%s%s", folder ? folder : "", folder ? "/" : "", name);
-    const int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-    FILE *file = fd < 0 ? NULL : fdopen(fd, "r");
-    if (!file || fstat(fd, &info) || !S_ISREG(info.st_mode)) {
-        const int error = fd < 0 ? errno : EINVAL;
-        if (file)
-            fclose(file);
-        else if (fd >= 0)
-            close(fd);
-        return drape_file_fail(arena->ctx, "read", path, error);
-    }
-    *text = drape_arena_take(arena, (size_t)info.st_size + 1, 1);
-    *size = *text ? fread(*text, 1, (size_t)info.st_size, file) : 0;
-    const bool failed = ferror(file);
-    fclose(file);
-    return !*text ? DRAPE_E_MEMORY : failed ? drape_file_fail(arena->ctx, "read", path, EIO) : DRAPE_OK;
+    drape_status status = drape_file_read(arena->ctx, path, DRAPE_MAX_TABLE, &bytes, size);
+    *text = status ? NULL : drape_arena_take(arena, *size + 1, 1);
+    if (*text)
+        memcpy(*text, bytes, *size + 1);
+    drape_free(arena->ctx, bytes);
+    return status || *text ? status : DRAPE_E_MEMORY;
 }
 
 static void put_field(drape_file *file, const json_t *value)
