@@ -117,7 +117,7 @@ drape_status drape_file_sync_names(drape_file *file);
  * DRAPE_E_FILE. */
 drape_status drape_file_close(drape_file *file);
 
-/* Sets the message `cannot DEED "PATH": strerror(error)` and returns DRAPE_E_FILE. */
+/* Sets the message `cannot DEED "PATH": strerror(error)`. Returns DRAPE_E_FILE; for ENOMEM DRAPE_E_MEMORY. */
 drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *path, int error);
 
 /* Creates a folder and its missing parents, with the mode 0777 & ~umask. path is modified during the call.

@@ -185,15 +185,18 @@ static drape_status read_table(const drape_record *run, const char *path, table 
     FILE *file = fopen(path, "r");
     if (!file)
         return drape_file_fail(run->ctx, "read", path, errno);
+    errno = 0;
     const char *missing = next_line(file, &line, &room) ? find_columns(t, line) : t->columns[0];
     if (!missing)
         *rows = read_rows(file, t, &line, &room, reader, user);
-    int error = ferror(file) ? errno : 0;
+    int error = ferror(file) || drape_memory_ran_out() ? errno : 0;
     free(line);
     fclose(file);
-    if (missing)
-        return drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": there is no column \"%s\"", path, missing);
-    return error ? drape_file_fail(run->ctx, "read", path, error) : DRAPE_OK;
+    if (error)
+        return drape_file_fail(run->ctx, "read", path, error);
+    return missing
+               ? drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": there is no column \"%s\"", path, missing)
+               : DRAPE_OK;
 }
 
 drape_status drape_record_rows(const drape_record *run, const char *name, const char *const *columns,
