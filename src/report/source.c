@@ -3,9 +3,11 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/json_read.h"
 #include "model/scene.h"
 
 #define SCENE_LIMIT ((off_t)64 << 20)
@@ -52,9 +54,16 @@ drape_status drape_report_source_open(drape_context *ctx, const char *folder, dr
     char *path = status ? NULL : drape_record_path(ctx, folder, "summary.json");
     if (status || !path)
         return status ? status : DRAPE_E_MEMORY;
-    source->summary = json_load_file(path, 0, NULL);
+    char *text = NULL;
+    json_error_t error = {0};
+    status = read_text(ctx, path, &text);
+    if (!status)
+        source->summary = drape_json_read(text, strlen(text), 0, &error);
+    if (!status && !source->summary && json_error_code(&error) == json_error_out_of_memory)
+        status = drape_fail_memory(ctx, strlen(text));
+    drape_free(ctx, text);
     drape_free(ctx, path);
-    return DRAPE_OK;
+    return status == DRAPE_E_MEMORY ? status : DRAPE_OK; /* a run that was killed has none */
 }
 
 void drape_report_source_close(drape_report_source *source)

@@ -1,17 +1,16 @@
 #!/usr/bin/env python3
-"""test_shortage.py HEAP: verbs in which one allocation fails, of Drape or of a library. Either exit code 1 and one line of message, or all that the
-verb prints and writes is as without the failure. HEAP is the library of failing_heap.c. The suite takes some of the allocations, DRAPE_ALL all of them.
+"""test_shortage.py: verbs in which one allocation fails, of Drape or of a library. Either exit code 1 and one line of message, or all that the
+verb prints and writes is as without the failure. The suite takes some of the allocations, DRAPE_ALL all of them.
 Output is TAP.
 """
 import os
 import re
 import shutil
 import subprocess
-import sys
 
 from program import LIMIT, PROGRAM, Skip, equal, good, run_tests, without_warnings, write_scene
 
-HEAP = os.path.abspath(sys.argv.pop(1))
+HEAP = os.environ["DRAPE_BUILD"] + "/tests/libfailing_heap.so"
 SAMPLE = 40  # allocations of one command
 # Words and their order, without what differs from one call to the next: numbers, which are times, and checksums.
 NUMBERS = re.compile(rb"\b[0-9a-f]{16,}\b|[-+]?\b[0-9]+(\.[0-9]+)?(e[-+]?[0-9]+)?\b")
