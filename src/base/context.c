@@ -132,6 +132,7 @@ static drape_status fail(drape_context *ctx, drape_status status, const char *po
                          va_list args)
 {
     locale_t old = drape_locale_enter();
+    ctx->status = status;
     vsnprintf(ctx->text, sizeof ctx->text, format, args);
     drape_make_printable(ctx->text);
     snprintf(ctx->pointer, sizeof ctx->pointer, "%s", pointer);

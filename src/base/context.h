@@ -3,6 +3,7 @@
 #ifndef DRAPE_BASE_CONTEXT_H
 #define DRAPE_BASE_CONTEXT_H
 
+#include <errno.h>
 #include <locale.h>
 
 #include "drape/extend.h"
@@ -14,7 +15,8 @@
 struct drape_context {
     drape_context_def def;
     char message[DRAPE_MESSAGE_SIZE];
-    char pointer[256]; /* JSON pointer of the last fault, from which the scene reader finds line and column;
+    drape_status status; /* with which it was set */
+    char pointer[256];   /* JSON pointer of the last fault, from which the scene reader finds line and column;
                           "": none */
     char text[DRAPE_MESSAGE_SIZE];                   /* the message without its place */
     drape_term_ops host_terms[DRAPE_MAX_HOST_TERMS]; /* copies, with the size of this version */
@@ -53,6 +55,14 @@ drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *
 drape_status drape_fail_unsaid(drape_context *ctx, drape_status status, const char *pointer,
                                const char *format, ...) DRAPE_PRINTF(4, 5);
 drape_status drape_fail_memory(drape_context *ctx, size_t bytes);
+
+/* Whether an allocation has failed since the caller set errno to 0, also one of a library that does not
+ * report it: malloc leaves ENOMEM there, and neither a success nor free changes it. Between the two, nothing
+ * else may set errno. */
+static inline bool drape_memory_ran_out(void)
+{
+    return errno == ENOMEM;
+}
 
 /* For long operations before a sim runs, called between their stages: returns DRAPE_E_STOPPED with a message
  * if the host asks to cancel. */

@@ -36,7 +36,8 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
     [DRAPE_REASON_SINGULAR] =
         REASON("singular", "KINSOL, IDA, newton_k, radau", "a factorisation or a linear solve failed"),
     [DRAPE_REASON_SOLVER] = REASON("solver", "KINSOL, IDA", "any other failure that these libraries report"),
-    [DRAPE_REASON_MEMORY] = REASON("memory", "Newton, newton_k", "memory for the factors ran out"),
+    [DRAPE_REASON_MEMORY] =
+        REASON("memory", "Newton, newton_k, dirk", "memory for the factors, or for the first step, ran out"),
     [DRAPE_REASON_NONFINITE] = REASON("nonfinite", "all integrators",
                                       "an infinity or NaN in the residual, the Jacobian or the new state"),
     [DRAPE_REASON_ERROR_TEST] =

@@ -10,6 +10,8 @@
 #include "io/record.h"
 #include "sim/sim.h"
 
+#include <jansson.h>
+
 /* ---- Exit codes ---- */
 
 enum {
@@ -110,8 +112,16 @@ const char *cli_shown(char *room, size_t size, const char *text);
  * "scene.json:6:26: /cloth/0: text" does, else behind "drape VERB: ". */
 void cli_print_message(const cli_command *command, const char *message);
 
-/* Prints the message of the command's context so. Returns the exit code that it is given. */
+/* Prints the message of the command's context so. Returns the exit code that it is given, but CLI_FAILED if
+ * memory ran out: the input may be good. */
 int cli_report(const cli_command *command, int code);
+
+/* The same for memory that ran out without a message. */
+int cli_report_memory(const cli_command *command);
+
+/* Prints a value, whose reference it takes over: all of it or a message. The caller has set errno to 0 before
+ * it made the value. Returns the exit code. */
+int cli_print_json(const cli_command *command, json_t *value, size_t flags);
 
 /* ---- Scenes ---- */
 

@@ -179,14 +179,13 @@ static drape_status gather(drape_arena *arena, const cli_scene *in, cli_info *in
     return status;
 }
 
-static int print_json(const cli_info *info)
+static int print(const cli_command *command, bool json, const cli_info *info)
 {
-    json_t *json = cli_info_json(info);
-    int failed =
-        !json || json_dumpf(json, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(15) | JSON_ENSURE_ASCII);
-    fputc('\n', stdout);
-    json_decref(json);
-    return failed && !ferror(stdout) ? CLI_FAILED : CLI_DONE;
+    errno = 0;
+    if (json)
+        return cli_print_json(command, cli_info_json(info), JSON_INDENT(2) | JSON_REAL_PRECISION(15) | JSON_ENSURE_ASCII);
+    cli_info_text(info);
+    return drape_memory_ran_out() ? cli_report_memory(command) : CLI_DONE;
 }
 
 static int run(const void *command)
@@ -199,10 +198,7 @@ static int run(const void *command)
         drape_status status = gather(request->command.arena, &in, &info);
         code = status == DRAPE_E_STOPPED ? cli_report_interrupted(request->command.verb)
                : status                  ? cli_report(&request->command, CLI_FAILED)
-               : request->json           ? print_json(&info)
-                                         : CLI_DONE;
-        if (!status && !request->json)
-            cli_info_text(&info);
+                                         : print(&request->command, request->json, &info);
     }
     cli_scene_free(&in);
     return code;

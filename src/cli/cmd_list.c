@@ -343,22 +343,14 @@ static int print_tables(const list_style *style, const char *name)
     return printed ? CLI_DONE : unknown_name(name);
 }
 
-static int print_schema(void)
-{
-    json_t *schema = cli_schema();
-    int failed = !schema || json_dumpf(schema, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(15));
-    fputc('\n', stdout);
-    json_decref(schema);
-    return failed && !ferror(stdout) ? cli_misuse("list", "out of memory for the schema") : CLI_DONE;
-}
-
 static int print_request(const void *command)
 {
     const list_request *request = command;
     if (request->schema && (request->command.operand || request->markdown))
         return cli_misuse("list", "--schema takes no name: it prints the schema of a whole scene");
+    errno = 0;
     if (request->schema)
-        return print_schema();
+        return cli_print_json(&request->command, cli_schema(), JSON_INDENT(2) | JSON_REAL_PRECISION(15));
     return print_tables(request->markdown ? &markdown_style : &text_style, request->command.operand);
 }
 

@@ -81,8 +81,9 @@ static drape_status write_table(const job *j, drape_folder *folder)
     return status ? status : closed;
 }
 
-static drape_status print_json(const job *j)
+static int print_json(const job *j)
 {
+    errno = 0;
     json_t *list = json_array();
     for (int32_t k = 0; k < j->modes.count; k++) {
         const drape_mode *mode = &j->modes.modes[k];
@@ -98,13 +99,7 @@ static drape_status print_json(const job *j)
     json_t *all = drape_json_with(json_object(), "modes", list);
     all = drape_json_with(all, "eigenvalues_below", json_integer(j->modes.below));
     all = drape_json_with(all, "force", drape_json_number(j->modes.force));
-    char *text = all ? json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
-    json_decref(all);
-    if (!text)
-        return DRAPE_E_MEMORY;
-    puts(text);
-    free(text);
-    return DRAPE_OK;
+    return cli_print_json(&j->request->command, all, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
 }
 
 static void print_vibration(int32_t number, const drape_mode *mode)
@@ -205,10 +200,9 @@ static int compute(job *j, const cli_state *state)
         status = write_output(j);
     if (status)
         return code_of(&request->command, status);
-    if (!request->json)
-        print_table(j);
-    else if (print_json(j))
-        return cli_report(&request->command, CLI_FAILED);
+    if (request->json)
+        return print_json(j);
+    print_table(j);
     return fflush(stdout) ? CLI_FAILED : CLI_DONE;
 }
 

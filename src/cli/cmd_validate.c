@@ -75,7 +75,7 @@ static void json_record(const lab_record *record, bool first)
 {
     json_t *object = lab_record_json(record);
     char *text = object ? json_dumps(object, JSON_REAL_PRECISION(17)) : NULL;
-    printf("%s\n%s", first ? "" : ",", text ? text : "{}");
+    printf("%s\n%s", first ? "" : ",", text ? text : "");
     free(text);
     json_decref(object);
 }
@@ -209,7 +209,10 @@ static drape_status run_cases(run *r, const validate_style *style, int counts[4]
             break;
         counts[record->v.verdict]++;
         cli_progress_hide(&r->progress);
+        errno = 0;
         style->record(record, i == 0);
+        if (drape_memory_ran_out())
+            status = drape_fail_memory(r->ctx, 1);
         if (fflush(stdout)) /* nobody reads it */
             break;
     }

@@ -94,12 +94,12 @@ static int make_def(const cli_lab_request *request, int default_jobs, double def
     char *folder = drape_arena_take(arena, room, 1);
     drape_lab_setting *settings = drape_arena_take(arena, command->setting_count, sizeof *settings);
     if (drape_arena_status(arena))
-        return cli_misuse(command->verb, "out of memory");
+        return cli_report_memory(command);
     drape_lab_def_init(def, sizeof *def);
     def->integrator_count = split(arena, request->integrators, &integrators);
     def->result_count = split(arena, request->results, &results);
     if (drape_arena_status(arena))
-        return cli_misuse(command->verb, "out of memory");
+        return cli_report_memory(command);
     for (size_t i = 0; i < command->setting_count; i++)
         settings[i] = (drape_lab_setting){command->settings[i].pointer, command->settings[i].value};
     /* scenes/flag.json, tradeoff -> flag.tradeoff */

@@ -91,7 +91,7 @@ static int run_verb(const drape_verb *verb, int argc, char **argv)
     drape_status status = cli_context_create(&ctx);
     drape_arena arena = drape_arena_of(ctx);
     cli_command *request = status ? NULL : drape_arena_take(&arena, 1, verb->request_size);
-    int code = CLI_BAD_INPUT;
+    int code = CLI_FAILED;
     if (request) {
         request->arena = &arena;
         request->ctx = ctx;

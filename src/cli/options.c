@@ -6,7 +6,6 @@
 
 #include <errno.h>
 #include <getopt.h>
-#include <jansson.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -113,7 +112,24 @@ int cli_report(const cli_command *command, int code)
     if (cli_interrupted() && code != CLI_INTERRUPTED)
         return cli_report_interrupted(command->verb);
     cli_print_message(command, drape_context_message(command->ctx));
-    return code;
+    return command->ctx->status == DRAPE_E_MEMORY ? CLI_FAILED : code;
+}
+
+int cli_report_memory(const cli_command *command)
+{
+    drape_fail(command->ctx, DRAPE_E_MEMORY, "out of memory");
+    return cli_report(command, CLI_FAILED);
+}
+
+int cli_print_json(const cli_command *command, json_t *value, size_t flags)
+{
+    char *text = value ? json_dumps(value, flags | JSON_ENCODE_ANY) : NULL;
+    const bool whole = text && !drape_memory_ran_out();
+    if (whole)
+        puts(text);
+    free(text);
+    json_decref(value);
+    return whole ? CLI_DONE : cli_report_memory(command);
 }
 
 static int unknown_option(const drape_verb *verb, const option_list *list, const char *given)
@@ -136,7 +152,7 @@ static int unknown_option(const drape_verb *verb, const option_list *list, const
 static int add_setting(cli_command *command, const cli_option *option, const char *pointer, const char *value)
 {
     if (!pointer || !value)
-        return cli_misuse(command->verb, "out of memory for the command line");
+        return cli_report_memory(command);
     command->settings[command->setting_count++] = (cli_setting){
         .option = option->name, .pointer = pointer, .value = value, .must_act = option->must_act};
     return CLI_GO_ON;
@@ -158,6 +174,7 @@ static int add_pointer_and_value(cli_command *command, const cli_option *option,
 /* "a,b" -> ["a","b"]; "" -> [] */
 static int add_list(cli_command *command, const cli_option *option, const char *argument)
 {
+    errno = 0;
     json_t *array = json_array();
     bool good = array != NULL, more = *argument != 0;
     for (const char *word = argument; good && more;) {
@@ -168,6 +185,8 @@ static int add_list(cli_command *command, const cli_option *option, const char *
     }
     char *text = good ? json_dumps(array, JSON_COMPACT) : NULL;
     json_decref(array);
+    if (!text && drape_memory_ran_out())
+        return cli_report_memory(command);
     if (!text)
         return cli_misuse(command->verb, "--%s \"%.60s\": must be names separated by commas, in UTF-8",
                           option->name, argument);
@@ -292,7 +311,7 @@ int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *reques
         return cli_misuse(verb->entry.name, "%s", verb->missing);
     request->settings = drape_arena_take(request->arena, (size_t)argc, sizeof *request->settings);
     if (!request->settings)
-        return cli_misuse(verb->entry.name, "out of memory for the command line");
+        return cli_report_memory(request);
     for (size_t i = 0; i < list.count; i++)
         table[i] = (struct option){.name = list.options[i]->name,
                                    .has_arg = list.options[i]->argument ? required_argument : no_argument,

@@ -316,14 +316,20 @@ static drape_first_order_outcome step(drape_first_order *f, double end, double *
     N_VScale(1, f->rate, s->rate_before);
     s->far_after = s->last_after = 0;
     s->matrices = f->linear->factorizations;
-    s->attempted = true;
     f->counted = 0; /* ARKODE begins to count */
     int (*const set_size)(void *, sunrealtype) =
         isnan(fixed_step(s)) ? ARKStepSetInitStep : ARKStepSetFixedStep;
     if (ARKStepReInit(m, NULL, rhs, s->t, s->before) || set_size(m, s->next) ||
         ARKStepSetStopTime(m, s->stop))
         return DRAPE_FIRST_ORDER_REFUSED;
-    const drape_first_order_outcome outcome = outcome_of(ARKStepEvolve(m, end, f->y, t, ARK_ONE_STEP));
+    drape_reserve reserve = {.used = false}; /* the first call takes memory */
+    drape_status memory =
+        s->attempted ? DRAPE_OK : drape_reserve_open(&reserve, f->arena->ctx, 2 * (size_t)f->n);
+    const drape_first_order_outcome outcome =
+        memory ? DRAPE_FIRST_ORDER_MEMORY : outcome_of(ARKStepEvolve(m, end, f->y, t, ARK_ONE_STEP));
+    s->attempted |= !memory;
+    if (drape_reserve_close(&reserve, f->arena->ctx, memory))
+        return DRAPE_FIRST_ORDER_MEMORY;
     if (outcome != DRAPE_FIRST_ORDER_STEPPED)
         return outcome;
     if (!copy_last_derivative(f))

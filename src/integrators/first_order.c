@@ -421,6 +421,7 @@ static drape_status status_of(drape_first_order_outcome outcome, bool nonfinite,
         [DRAPE_FIRST_ORDER_SINGULAR] = {DRAPE_RETRY_LINEAR, DRAPE_REASON_SINGULAR},
         [DRAPE_FIRST_ORDER_RESIDUAL] = {DRAPE_RETRY_NONFINITE, DRAPE_REASON_NONFINITE},
         [DRAPE_FIRST_ORDER_REFUSED] = {DRAPE_E_SOLVER, DRAPE_REASON_SOLVER},
+        [DRAPE_FIRST_ORDER_MEMORY] = {DRAPE_E_MEMORY, DRAPE_REASON_MEMORY},
     };
     if (outcome == DRAPE_FIRST_ORDER_NEWTON && nonfinite)
         outcome = DRAPE_FIRST_ORDER_RESIDUAL;
@@ -596,9 +597,12 @@ drape_status drape_first_order_create(drape_first_order *s, const drape_first_or
     s->n = 3 * (int64_t)s->model->free_count;
     memcpy(s->values, values, (size_t)param_count * sizeof *values);
     create_arrays(s);
+    drape_reserve reserve = {.used = false};
     drape_status status = drape_arena_status(arena);
-    if (!status && drape_sundials_context(&s->sun))
-        status = drape_fail_memory(ctx, sizeof(void *));
+    if (!status)
+        status = drape_reserve_open(&reserve, ctx, 2 * (size_t)s->n);
+    if (!status)
+        status = drape_sundials_context(ctx, &s->sun);
     status = drape_ranks_agree(s->ranks, ctx, status);
     if (!status && s->n > 0)
         status = create_vectors(s);
@@ -610,16 +614,16 @@ drape_status drape_first_order_create(drape_first_order *s, const drape_first_or
             arena, s->sun, drape_linear_of(s->ranks, (int)values[DRAPE_FIRST_ORDER_LINEAR_SOLVER]),
             drape_system_pattern(s->system), drape_system_pool(s->system),
             drape_system_cancel_flag(s->system), &s->linear);
-    if (status || s->n == 0)
-        return status;
-    s->linear->owner = s;
-    s->linear->tolerance = LINEAR_TOLERANCE;
-    bool created = drape_sun_newton_create(&s->newton, s->y, 2 * s->n, s->ranks, s->sun);
-    created = drape_ranks_all(s->ranks, created) && solver->create(s);
-    if (!created)
-        return drape_fail(ctx, DRAPE_E_MEMORY, "%s cannot be set up for %lld unknowns", solver->name,
-                          (long long)(2 * s->n));
-    return DRAPE_OK;
+    if (!status && s->n > 0) {
+        s->linear->owner = s;
+        s->linear->tolerance = LINEAR_TOLERANCE;
+        bool created = drape_sun_newton_create(&s->newton, s->y, 2 * s->n, s->ranks, s->sun);
+        created = drape_ranks_all(s->ranks, created) && solver->create(s);
+        if (!created)
+            status = drape_fail(ctx, DRAPE_E_MEMORY, "out of memory: %s cannot be set up for %lld unknowns",
+                                solver->name, (long long)(2 * s->n));
+    }
+    return drape_reserve_close(&reserve, ctx, status);
 }
 
 void drape_first_order_destroy(void **state)

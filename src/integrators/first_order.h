@@ -87,7 +87,8 @@ typedef enum drape_first_order_outcome {
     DRAPE_FIRST_ORDER_NEWTON,
     DRAPE_FIRST_ORDER_SINGULAR,
     DRAPE_FIRST_ORDER_RESIDUAL, /* it could not be evaluated */
-    DRAPE_FIRST_ORDER_REFUSED   /* no smaller step helps */
+    DRAPE_FIRST_ORDER_REFUSED,  /* no smaller step helps */
+    DRAPE_FIRST_ORDER_MEMORY    /* ran out */
 } drape_first_order_outcome;
 
 /* A solver of SUNDIALS. Its functions may assume that there are free DOFs, except `destroy`. */

@@ -58,11 +58,11 @@ drape_status drape_radau_matrix_create(drape_arena *arena, drape_system *system,
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < n; i++)
         m->mass[i] = model->mass[model->node_of_free[i / 3]];
-    if (drape_sundials_context(&m->sun))
-        return drape_fail_memory(arena->ctx, sizeof(void *));
-    drape_status status =
-        drape_sun_linear_create(arena, m->sun, ops, drape_system_pattern(system), drape_system_pool(system),
-                                drape_system_cancel_flag(system), &m->linear);
+    drape_status status = drape_sundials_context(arena->ctx, &m->sun);
+    if (!status)
+        status =
+            drape_sun_linear_create(arena, m->sun, ops, drape_system_pattern(system),
+                                    drape_system_pool(system), drape_system_cancel_flag(system), &m->linear);
     return status ? status : take_values(m);
 }
 

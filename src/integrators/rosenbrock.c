@@ -466,8 +466,9 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
         status = drape_arena_status(arena);
     if (status || s->common.equation.dofs == 0)
         return status;
-    if (drape_sundials_context(&s->sun))
-        return drape_fail_memory(arena->ctx, sizeof s->sun);
+    status = drape_sundials_context(arena->ctx, &s->sun);
+    if (status)
+        return status;
     return drape_sun_linear_create(arena, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
                                    drape_system_pattern(system), drape_system_pool(system),
                                    drape_system_cancel_flag(system), &s->linear);

@@ -20,7 +20,8 @@ drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *p
     char text[128];
     if (strerror_r(error, text, sizeof text))
         snprintf(text, sizeof text, "error %d", error);
-    return drape_fail(ctx, DRAPE_E_FILE, "cannot %s \"%.500s\": %s", deed, path, text);
+    return drape_fail(ctx, error == ENOMEM ? DRAPE_E_MEMORY : DRAPE_E_FILE, "cannot %s \"%.500s\": %s", deed,
+                      path, text);
 }
 
 /* The same for a file, by its whole name. */

@@ -118,7 +118,7 @@ drape_status drape_file_sync_names(drape_file *file);
  * DRAPE_E_FILE. */
 drape_status drape_file_close(drape_file *file);
 
-/* Sets the message `cannot DEED "PATH": strerror(error)` and returns DRAPE_E_FILE. */
+/* Sets the message `cannot DEED "PATH": strerror(error)`. Returns DRAPE_E_FILE; for ENOMEM DRAPE_E_MEMORY. */
 drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *path, int error);
 
 /* Opens a regular file below the folder `dir`, a descriptor or AT_FDCWD. Returns -1 with errno, which is

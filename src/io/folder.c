@@ -6,7 +6,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
-#include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,6 +15,7 @@
 #include <unistd.h>
 
 #include "base/arena.h"
+#include "base/json_read.h"
 #include "io/file.h"
 
 #define PART_PREFIX  ".drape-%016" PRIx64 "-"
@@ -132,9 +132,12 @@ bool drape_folder_is_name(const char *name)
 }
 
 /* A line that cannot be read is left out: what it described is then not ours. */
-static void take_line(drape_folder *f, const char *text, size_t length)
+static drape_status take_line(drape_folder *f, const char *text, size_t length)
 {
-    json_t *line = json_loadb(text, length, 0, NULL);
+    json_error_t error;
+    json_t *line = drape_json_read(text, length, 0, &error);
+    if (!line && json_error_code(&error) == json_error_out_of_memory)
+        return drape_fail_memory(f->ctx, length);
     const char *name = json_string_value(json_object_get(line, "file"));
     if (json_object_get(line, "token"))
         f->tokens[f->token_count++] = hexadecimal(line, "token");
@@ -150,6 +153,7 @@ static void take_line(drape_folder *f, const char *text, size_t length)
         f->entry_count += e->name != NULL;
     }
     json_decref(line);
+    return DRAPE_OK;
 }
 
 static int by_name(const void *a, const void *b)
@@ -168,8 +172,12 @@ static drape_status take_lines(drape_folder *f, const char *text, size_t size)
     f->tokens = drape_arena_take(&f->lines, lines, sizeof *f->tokens);
     if (drape_arena_status(&f->lines))
         return DRAPE_E_MEMORY;
-    for (const char *at = text, *end; (end = memchr(at, '\n', size - (size_t)(at - text))); at = end + 1)
-        take_line(f, at, (size_t)(end - at));
+    drape_status status = DRAPE_OK;
+    for (const char *at = text, *end; !status && (end = memchr(at, '\n', size - (size_t)(at - text)));
+         at = end + 1)
+        status = take_line(f, at, (size_t)(end - at));
+    if (status)
+        return status;
     f->torn = size > 0 && text[size - 1] != '\n';
     qsort(f->entries, f->entry_count, sizeof *f->entries, by_name);
     if (f->token_count == 0 && !f->shared)

@@ -2,12 +2,13 @@
  * json.h: building JSON with jansson.
  *
  * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere ends as
- * NULL at the top: only the finished value needs a check.
+ * NULL at the top: only the finished value needs a check. Where NULL also stands for a value that is left
+ * out, set errno to 0 before, and check drape_memory_ran_out() too.
  */
 #ifndef DRAPE_IO_JSON_H
 #define DRAPE_IO_JSON_H
 
-#include "base/context.h"
+#include "io/file.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -29,6 +30,19 @@ static inline json_t *drape_json_append(json_t *array, json_t *value)
         return array;
     json_decref(array);
     return NULL;
+}
+
+static inline int drape_json_put_piece(const char *bytes, size_t size, void *file)
+{
+    drape_file_put(file, bytes, size);
+    return 0; /* the file keeps its first failure */
+}
+
+/* Adds a value to a file. NULL, and out of memory here, count as a failed write. */
+static inline void drape_json_put(drape_file *file, const json_t *value, size_t flags)
+{
+    if (json_dump_callback(value, drape_json_put_piece, file, flags) && !file->error)
+        file->error = ENOMEM;
 }
 
 /* JSON has no NaN and no infinity: null stands for both. */

@@ -314,12 +314,6 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     return drape_json_with(object, "hash", hash(sim));
 }
 
-static int put(const char *bytes, size_t size, void *file)
-{
-    drape_file_put(file, bytes, size);
-    return 0; /* the file keeps its first failure */
-}
-
 static drape_status write_json(drape_context *ctx, const json_t *json, drape_folder *folder, const char *path,
                                drape_file *file)
 {
@@ -331,8 +325,7 @@ static drape_status write_json(drape_context *ctx, const json_t *json, drape_fol
     status = drape_file_begin(file);
     if (status)
         return status;
-    if (json_dump_callback(json, put, file, JSON_INDENT(2) | JSON_REAL_PRECISION(17)))
-        return drape_fail(ctx, DRAPE_E_MEMORY, "out of memory for the summary \"%.500s\"", path);
+    drape_json_put(file, json, JSON_INDENT(2) | JSON_REAL_PRECISION(17));
     drape_file_put_text(file, "\n");
     return drape_file_finish(file);
 }
@@ -345,11 +338,13 @@ drape_status drape_summary_write(drape_context *ctx, drape_sim *sim, const drape
     drape_file file = {0};
     locale_t old = drape_locale_enter();
     const drape_ranks *ranks = drape_model_ranks(sim->model);
+    errno = 0;
     json_t *json = summary(sim, def);
-    drape_status status =
-        json && ranks && ranks->rank > 0 ? DRAPE_OK /* rank 0 writes it */
-        : json                           ? write_json(ctx, json, folder, path, &file)
-               : drape_fail(ctx, DRAPE_E_MEMORY, "out of memory for the summary \"%.500s\"", path);
+    drape_status status = DRAPE_OK;
+    if (!json || drape_memory_ran_out())
+        status = drape_fail(ctx, DRAPE_E_MEMORY, "out of memory for the summary \"%.500s\"", path);
+    else if (!ranks || ranks->rank == 0) /* rank 0 writes it */
+        status = write_json(ctx, json, folder, path, &file);
     json_decref(json);
     drape_file_destroy(&file);
     drape_locale_leave(old);

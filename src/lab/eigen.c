@@ -12,6 +12,15 @@
 #define MIN_BASIS    20 /* vectors of the Krylov space; twice the wanted ones if that is more */
 #define SPARE_BASIS  8
 
+/* The routine itself: dseupd_c takes memory and does not check that there is some. The lengths of the texts
+ * come last. */
+void dseupd_(const a_int *vectors, const char *how, a_int *select, double *value, double *vector,
+             const a_int *rows, const double *shift, const char *kind, const a_int *n, const char *which,
+             const a_int *wanted, const double *tolerance, double *residual, const a_int *basis,
+             double *krylov, const a_int *krylov_rows, a_int *parameters, a_int *pointers, double *work,
+             double *work_small, const a_int *room, a_int *info, size_t how_length, size_t kind_length,
+             size_t which_length);
+
 /* ARPACK's routines have static variables. */
 static pthread_mutex_t arpack_mutex = PTHREAD_MUTEX_INITIALIZER;
 
@@ -89,13 +98,15 @@ static drape_status iterate(drape_context *ctx, search *s, a_int *parameters, a_
 static drape_status extract(drape_context *ctx, search *s, a_int *parameters, a_int *pointers, int32_t *found,
                             double *value, double *vector)
 {
+    const a_int vectors = 1, room = s->basis * (s->basis + 8);
+    const double shift = 0, tolerance = TOLERANCE;
     a_int info = 0;
     *found = 0;
     if (parameters[4] == 0)
         return DRAPE_OK;
-    dseupd_c(1, "A", s->select, s->values, s->vectors, s->n, 0, "G", s->n, "LA", s->wanted, TOLERANCE,
-             s->residual, s->basis, s->vectors, s->n, parameters, pointers, s->work, s->work_small,
-             s->basis * (s->basis + 8), &info);
+    dseupd_(&vectors, "A", s->select, s->values, s->vectors, &s->n, &shift, "G", &s->n, "LA", &s->wanted,
+            &tolerance, s->residual, &s->basis, s->vectors, &s->n, parameters, pointers, s->work,
+            s->work_small, &room, &info, 1, 1, 2);
     if (info != 0)
         return drape_fail(ctx, DRAPE_E_SOLVER, "the eigensolver dseupd of ARPACK failed: info = %d",
                           (int)info);

@@ -53,8 +53,8 @@ static void put_line(drape_file *file, const lab_record *record)
     char digits[17];
     json_t *line = lab_record_json(record);
     hash_of(record, digits);
-    json_object_set_new(line, "scene_hash", json_string(digits));
-    json_object_set_new(line, "drape", json_string(drape_version()));
+    line = drape_json_with(line, "scene_hash", json_string(digits));
+    line = drape_json_with(line, "drape", json_string(drape_version()));
     lab_put_line(file, line);
     json_decref(line);
 }

@@ -2,6 +2,7 @@
 #include "lab/sweep.h"
 
 #include "base/clock.h"
+#include "base/json_read.h"
 #include "io/export.h"
 #include "lab/plan.h"
 #include "lab/schema.h"
@@ -17,7 +18,9 @@
 static drape_status take_line(lab *l, const char *path, int64_t number, const char *text, int64_t *found)
 {
     json_error_t fault;
-    json_t *line = json_loads(text, JSON_REJECT_DUPLICATES, &fault);
+    json_t *line = drape_json_read(text, strlen(text), JSON_REJECT_DUPLICATES, &fault);
+    if (!line && json_error_code(&fault) == json_error_out_of_memory)
+        return drape_fail_memory(l->ctx, strlen(text));
     drape_status status = lab_check_line(l, path, number, line, &fault);
     json_t **result = status ? NULL : &l->results[json_integer_value(json_object_get(line, "case"))];
     if (!result || *result) {
@@ -65,10 +68,8 @@ drape_status lab_read_lines(lab *l, const char *folder, int64_t *found)
 
 void lab_put_line(drape_file *file, const json_t *object)
 {
-    char *text = json_dumps(object, JSON_COMPACT | JSON_REAL_PRECISION(17));
-    drape_file_put_text(file, text ? text : "");
+    drape_json_put(file, object, JSON_COMPACT | JSON_REAL_PRECISION(17));
     drape_file_put_text(file, "\n");
-    free(text);
 }
 
 drape_status lab_begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file)
@@ -144,9 +145,13 @@ static void keep(sweep *s, size_t i, json_t *result)
 {
     lab *l = s->l;
     const drape_lab_def *def = l->def;
-    json_object_set_new(result, "case", json_integer((json_int_t)i));
-    json_object_set_new(result, "tags", json_deep_copy(json_object_get(json_array_get(l->cases, i), "tags")));
+    json_t *tags = json_deep_copy(json_object_get(json_array_get(l->cases, i), "tags"));
+    if (json_object_set_new(result, "case", json_integer((json_int_t)i)) ||
+        json_object_set_new(result, "tags", tags))
+        stop(s, drape_fail_memory(l->ctx, 1));
     l->results[i] = result;
+    if (s->status)
+        return;
     s->done++;
     lab_put_line(&s->file, result);
     drape_status status = drape_file_keep(&s->file);

@@ -1,6 +1,7 @@
 /* gltf.c: see gltf.h. */
 #include "mesh/gltf.h"
 
+#include "base/json_read.h"
 #include "mesh/npy_array.h"
 
 #include <inttypes.h>
@@ -23,10 +24,10 @@ static drape_status parse_json(drape_gltf *g, const char *text, size_t size)
     json_error_t error;
     if (size > MAX_JSON)
         return FAIL(g, "its JSON has %zu bytes; at most %zu are read", size, MAX_JSON);
-    g->root = json_loadb(text, size, JSON_DECODE_INT_AS_REAL, &error);
+    g->root = drape_json_read(text, size, JSON_DECODE_INT_AS_REAL, &error);
     if (g->root && json_is_object(g->root))
         return DRAPE_OK;
-    if (!g->root && (json_error_code(&error) == json_error_out_of_memory || !*error.text))
+    if (!g->root && json_error_code(&error) == json_error_out_of_memory)
         return drape_fail_memory(g->ctx, size);
     return FAIL(g, "its JSON, byte %d: %s", g->root ? 0 : error.position,
                 g->root ? "it is no object" : error.text);

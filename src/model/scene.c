@@ -2,11 +2,11 @@
 #include "model/scene.h"
 
 #include <ctype.h>
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/json_read.h"
 #include "model/scene_cs184.h"
 #include "model/scene_json.h"
 #include "model/scene_print.h"
@@ -113,7 +113,8 @@ void drape_scene_print(drape_scene *scene, drape_text_sink *sink, void *user)
 
 static drape_status cannot_read(drape_scene *scene, const char *why)
 {
-    return drape_fail(scene->ctx, DRAPE_E_FILE, "%s: cannot read the scene: %s", scene->name, why);
+    return drape_fail(scene->ctx, drape_memory_ran_out() ? DRAPE_E_MEMORY : DRAPE_E_FILE,
+                      "%s: cannot read the scene: %s", scene->name, why);
 }
 
 /* Doubles the buffer and keeps the bytes used so far. */
@@ -208,8 +209,6 @@ static drape_status syntax_fault(drape_scene *scene, json_error_t *error)
         break;
     }
     const char *text = error->text;
-    if (!*text)
-        return drape_fail_memory(scene->ctx, consumed);
     if (strncmp(text, "'[' or ", 7) == 0) /* tokens that jansson accepts at the top level and a scene does
                                              not */
         text += 7;
@@ -225,7 +224,7 @@ static drape_status parse_blanked(drape_scene *scene, char *blanked, size_t size
         return parse_fault(scene, offset, "this comment is not closed");
     if (blanked[strspn(blanked, " \t\r\n")] == 0)
         return drape_fail(scene->ctx, DRAPE_E_PARSE, "%s: the scene is empty", scene->name);
-    scene->root = json_loadb(blanked, size, LOAD_FLAGS, &error);
+    scene->root = drape_json_read(blanked, size, LOAD_FLAGS, &error);
     if (!scene->root)
         return syntax_fault(scene, &error);
     if (!json_is_object(scene->root)) {
@@ -319,11 +318,10 @@ static drape_status cannot_set(drape_scene *scene, const char *pointer, const ch
 /* Returns 1 if the text is UTF-8, 0 if it is not, -1 if memory is out: jansson returns NULL in both cases. */
 static int is_utf8(const char *text)
 {
-    json_t *checked = json_string(text), *any = json_string_nocheck(text);
-    int answer = checked ? 1 : any ? 0 : -1;
+    errno = 0;
+    json_t *checked = json_string(text);
     json_decref(checked);
-    json_decref(any);
-    return answer;
+    return checked ? 1 : drape_memory_ran_out() ? -1 : 0;
 }
 
 static drape_status check_pointer(drape_scene *scene, const char *pointer)
@@ -350,7 +348,7 @@ static drape_status check_pointer(drape_scene *scene, const char *pointer)
 
 /* Parses a number in forms that people write and JSON does not allow: ".5", "-.5", "+5", "5." and these with
  * an exponent. Returns NULL if the text is not a number. */
-static json_t *loose_number(const char *text)
+static json_t *loose_number(const char *text, json_error_t *error)
 {
     char number[MAX_NUMBER + 3];
     const size_t digits = strspn(text, "+-"), length = strlen(text);
@@ -369,23 +367,22 @@ static json_t *loose_number(const char *text)
         }
     }
     number[n] = 0;
-    return json_loads(number, LOAD_FLAGS | JSON_DECODE_ANY, NULL);
+    return drape_json_read(number, n, LOAD_FLAGS | JSON_DECODE_ANY, error);
 }
 
 /* Parses a text as a JSON value, or takes it as a string. */
 static drape_status parse_value(drape_scene *scene, const char *text, json_t **value)
 {
     json_error_t error;
-    *value = json_loads(text, LOAD_FLAGS | JSON_DECODE_ANY, &error);
+    *value = drape_json_read(text, strlen(text), LOAD_FLAGS | JSON_DECODE_ANY, &error);
     if (*value)
         return DRAPE_OK;
     int utf8 = is_utf8(text);
     if (utf8 == 0)
         return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "a value is UTF-8, this one is not");
-    bool no_memory = !*error.text || json_error_code(&error) == json_error_out_of_memory;
-    if (!no_memory)
-        *value = loose_number(text);
-    if (!no_memory && !*value)
+    if (json_error_code(&error) != json_error_out_of_memory)
+        *value = loose_number(text, &error);
+    if (!*value && json_error_code(&error) != json_error_out_of_memory)
         *value = json_string(text);
     return *value ? DRAPE_OK : drape_fail_memory(scene->ctx, strlen(text));
 }

@@ -312,8 +312,9 @@ drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *sy
         status = choose_pattern(s, dt);
     if (status)
         return status;
-    if (drape_sundials_context(&s->sun))
-        return drape_fail_memory(arena->ctx, sizeof s->sun);
+    status = drape_sundials_context(arena->ctx, &s->sun);
+    if (status)
+        return status;
     return drape_sun_linear_create(arena, s->sun, drape_linear_best(3 * (int64_t)m->free_count),
                                    drape_system_pattern(system), drape_system_pool(system),
                                    drape_system_cancel_flag(system), &s->linear);

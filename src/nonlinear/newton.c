@@ -725,7 +725,7 @@ static drape_status create_search(drape_arena *arena, drape_newton *s)
 static drape_status create_vectors(drape_arena *arena, drape_newton *s)
 {
     const int64_t n = (int64_t)s->equation->dofs;
-    const bool begun = !drape_sundials_context(&s->sun) && (s->kin = KINCreate(s->sun));
+    const bool begun = !drape_sundials_context(arena->ctx, &s->sun) && (s->kin = KINCreate(s->sun));
     if (!drape_ranks_all(s->equation->ranks, begun) ||
         !(s->unknown = drape_vector_make(s->equation->ranks, n, s->equation->f, s->sun)) ||
         !(s->ones = N_VClone(s->unknown)) || !(s->weights = N_VClone(s->unknown)))
@@ -754,7 +754,8 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s)
     s->linear->solver->ops->setup = factor;
     s->linear->solver->ops->solve = correct;
     return configure(s) ? DRAPE_OK
-                        : drape_fail(arena->ctx, DRAPE_E_MEMORY, "KINSOL cannot be set up for %lld unknowns",
+                        : drape_fail(arena->ctx, DRAPE_E_MEMORY,
+                                     "out of memory: KINSOL cannot be set up for %lld unknowns",
                                      (long long)s->equation->dofs);
 }
 
@@ -782,10 +783,15 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
         status = drape_arena_status(arena);
     if (!status && s->searches)
         status = create_search(arena, s);
+    drape_reserve reserve = {.used = false};
+    if (!status)
+        status = drape_reserve_open(&reserve, arena->ctx, equation->dofs);
     status = drape_ranks_agree(equation->ranks, arena->ctx, status);
     if (!status)
         status = drape_ranks_agree(equation->ranks, arena->ctx, create_vectors(arena, s));
-    return status || equation->dofs == 0 ? status : create_solver(arena, s);
+    if (!status && equation->dofs > 0)
+        status = create_solver(arena, s);
+    return drape_reserve_close(&reserve, arena->ctx, status);
 }
 
 void drape_newton_destroy(drape_newton **newton)

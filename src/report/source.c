@@ -2,8 +2,10 @@
 #include "report/source.h"
 
 #include <errno.h>
+#include <string.h>
 #include <unistd.h>
 
+#include "base/json_read.h"
 #include "model/scene.h"
 
 #define SCENE_LIMIT ((off_t)64 << 20)
@@ -30,14 +32,20 @@ drape_status drape_report_source_open(drape_context *ctx, const char *folder, dr
     char *path = status ? NULL : drape_record_path(ctx, folder, "summary.json");
     if (status || !path)
         return status ? status : DRAPE_E_MEMORY;
+    char *text = NULL;
+    size_t size = 0;
+    json_error_t error = {0};
     const int fd = drape_file_open(ctx, path);
-    if (fd < 0 && errno != ENOENT) /* a killed run has none */
+    if (fd >= 0)
+        status = drape_file_take(ctx, fd, path, SCENE_LIMIT, &text, &size);
+    else if (errno != ENOENT) /* a run that was killed has none */
         status = DRAPE_E_FILE;
+    if (text)
+        source->summary = drape_json_read(text, size, 0, &error);
+    if (text && !source->summary && json_error_code(&error) == json_error_out_of_memory)
+        status = drape_fail_memory(ctx, size);
+    drape_free(ctx, text);
     drape_free(ctx, path);
-    if (fd >= 0) {
-        source->summary = json_loadfd(fd, 0, NULL);
-        close(fd);
-    }
     return status;
 }
 

@@ -360,10 +360,17 @@ static bool allocate(maker *m)
     return !drape_arena_status(&m->scratch) && !drape_arena_status(m->arena);
 }
 
+static size_t row_bytes(const drape_pattern *p)
+{
+    return (size_t)p->block_start[p->block_count] * sizeof *p->block_row;
+}
+
 static drape_status make(maker *m)
 {
-    if (!allocate(m) || !order(m))
+    if (!allocate(m))
         return DRAPE_E_MEMORY;
+    if (!order(m))
+        return drape_fail_memory(m->arena->ctx, row_bytes(m->pattern));
     invert(m);
     find_parents(m);
     find_postorder(m);
@@ -387,11 +394,6 @@ struct drape_shared_elimination {
 static size_t start_bytes(const drape_pattern *p)
 {
     return ((size_t)p->block_count + 1) * sizeof *p->block_start;
-}
-
-static size_t row_bytes(const drape_pattern *p)
-{
-    return (size_t)p->block_start[p->block_count] * sizeof *p->block_row;
 }
 
 static bool is_of(const drape_shared_elimination *shared, const drape_pattern *p)

@@ -17,6 +17,7 @@
 #define MIN_RCOND 1e-15 /* smaller: singular to working precision; new pivots are tried first */
 
 typedef struct klu_state {
+    drape_context *ctx;
     const drape_pattern *pattern;
     int64_t *row; /* (nonzeros) of the pattern */
     klu_l_common common;
@@ -47,6 +48,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     klu_state *s = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
+    s->ctx = arena->ctx;
     s->pattern = pattern;
     klu_l_defaults(&s->common);
     s->common.ordering = ORDER_AMD;
@@ -58,9 +60,11 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     drape_pattern_list_rows(pattern, s->row);
     s->symbolic = klu_l_analyze(pattern->n, indices(pattern->column), indices(s->row), &s->common);
     if (!s->symbolic)
-        return drape_fail(arena->ctx, s->common.status == KLU_OUT_OF_MEMORY ? DRAPE_E_MEMORY : DRAPE_E_SOLVER,
-                          "KLU cannot analyse the %lld x %lld Jacobian: status %d", (long long)pattern->n,
-                          (long long)pattern->n, (int)s->common.status);
+        return s->common.status == KLU_OUT_OF_MEMORY
+                   ? drape_fail_memory(s->ctx, s->common.memusage)
+                   : drape_fail(s->ctx, DRAPE_E_SOLVER,
+                                "KLU cannot analyse the %lld x %lld Jacobian: status %d",
+                                (long long)pattern->n, (long long)pattern->n, (int)s->common.status);
     *state = s;
     return DRAPE_OK;
 }
@@ -97,8 +101,9 @@ static drape_status factor(void *state, const double *values)
     double *v = (double *)(uintptr_t)values; /* not written either */
     if (refactor(s, v) || factor_afresh(s, v))
         return DRAPE_OK;
+    const bool no_memory = s->common.status == KLU_OUT_OF_MEMORY;
     klu_l_free_numeric(&s->numeric, &s->common);
-    return DRAPE_RETRY_LINEAR;
+    return no_memory ? drape_fail_memory(s->ctx, s->common.memusage) : DRAPE_RETRY_LINEAR;
 }
 
 static drape_status solve(void *state, const double *b, double *x)

@@ -2,6 +2,8 @@
 #ifndef DRAPE_SOLVERS_SUNDIALS_COMPAT_H
 #define DRAPE_SOLVERS_SUNDIALS_COMPAT_H
 
+#include "solvers/reserve.h"
+
 #include <stdint.h>
 #include <sundials/sundials_config.h>
 #include <sundials/sundials_context.h>
@@ -20,8 +22,7 @@ static inline void drape_sundials_quiet(int line, const char *function, const ch
 {
     (void)line, (void)function, (void)file, (void)message, (void)code, (void)data, (void)context;
 }
-/* A SUNDIALS context that prints nothing: failures are read from return codes. 0 on success. */
-static inline int drape_sundials_context(SUNContext *out)
+static inline int drape_sundials_create(SUNContext *out)
 {
     int code = SUNContext_Create(SUN_COMM_NULL, out);
     if (!code) {
@@ -35,7 +36,7 @@ static inline int drape_sundials_context(SUNContext *out)
 #define DRAPE_CVODE_QUIET(cv)   ((void)0)
 #define DRAPE_ARKODE_QUIET(ark) ((void)0)
 #else
-static inline int drape_sundials_context(SUNContext *out)
+static inline int drape_sundials_create(SUNContext *out)
 {
     return SUNContext_Create(NULL, out);
 }
@@ -49,5 +50,15 @@ static inline void drape_sundials_quiet(int code, const char *module, const char
 #define DRAPE_CVODE_QUIET(cv)   CVodeSetErrHandlerFn(cv, drape_sundials_quiet, NULL)
 #define DRAPE_ARKODE_QUIET(ark) ARKStepSetErrHandlerFn(ark, drape_sundials_quiet, NULL)
 #endif
+
+/* A SUNDIALS context that prints nothing: failures are read from return codes. Errors: DRAPE_E_MEMORY. */
+static inline drape_status drape_sundials_context(drape_context *ctx, SUNContext *out)
+{
+    drape_reserve reserve = {.used = false};
+    drape_status status = drape_reserve_open(&reserve, ctx, 0);
+    if (!status && drape_sundials_create(out))
+        status = drape_fail_memory(ctx, sizeof *out);
+    return drape_reserve_close(&reserve, ctx, status);
+}
 
 #endif
