@@ -77,10 +77,10 @@ typedef struct drape_context_def {
     /* Receives log lines without a newline. Default NULL: no logging. */
     void (*log)(void *user, drape_log_level level, const char *text);
     void *log_user;
-    /* Called between the stages of reading or compiling a scene and of creating or restoring a sim, on the
-     * calling thread. If it returns true, the operation ends with DRAPE_E_STOPPED as if it had never been
-     * started. It may be called thousands of times, so it must be cheap and free of side effects. Default
-     * NULL: never cancel. To stop a running sim, use drape_sim_cancel. */
+    /* Called while a scene is read or compiled, a sim is created or restored, and what passes through what is
+     * counted, on the calling thread. If it returns true, the operation ends with DRAPE_E_STOPPED as if it
+     * had never been started. It may be called thousands of times, so it must be cheap and free of side
+     * effects. Default NULL: never cancel. To stop a running sim, use drape_sim_cancel. */
     bool (*cancel)(void *user);
     void *cancel_user;
 } drape_context_def;
@@ -994,7 +994,7 @@ DRAPE_API uint64_t drape_sim_hash(const drape_sim *sim);
 /* Counts the triangles of the cloth that reach into a collider: one of 28 points of the triangle is deeper
  * than 1e-9 m, an edge of the collider passes through it, or one of its sides passes through a triangle of
  * the collider. collider is its number in the scene, from 0. *deepest, if not NULL, receives the largest
- * depth [m] that was found. Returns -1 if there is no such collider, or memory is out. */
+ * depth [m] that was found. Returns -1 if there is no such collider, memory is out, or it was cancelled. */
 DRAPE_API int32_t drape_sim_inside(const drape_sim *sim, int32_t collider, double *deepest);
 
 /* A node of cloth that bodies leave no room: a collider whose surface does not hold it for the time being. */
@@ -1021,8 +1021,8 @@ DRAPE_API int32_t drape_sim_relaxed(const drape_sim *sim, int32_t index, drape_r
 
 /* Counts the pairs of an edge and a triangle that pass through each other, with exact signs: of the cloth
  * and a collider, of which either may have the edge, or of the cloth itself if collider is -1. Edges that
- * only touch, and pairs that share a node, do not count. Returns -1 if there is no such collider, or
- * memory is out. */
+ * only touch, and pairs that share a node, do not count. Returns -1 if there is no such collider, memory is
+ * out, or the context's cancel function asked to stop. */
 DRAPE_API int64_t drape_sim_intersections(const drape_sim *sim, int32_t collider);
 
 /* ---- Sim: queries ---- */

@@ -11,7 +11,8 @@
 #include <string.h>
 
 /* The shortest def of an older host. */
-#define MIN_SIZE offsetof(drape_context_def, log)
+#define MIN_SIZE        offsetof(drape_context_def, log)
+#define BETWEEN_CANCELS (1 << 20) /* operations */
 
 static void *default_allocate(void *user, size_t size)
 {
@@ -210,6 +211,15 @@ drape_status drape_check_cancel(drape_context *ctx)
     if (!ctx->def.cancel || !ctx->def.cancel(ctx->def.cancel_user))
         return DRAPE_OK;
     return drape_fail(ctx, DRAPE_E_STOPPED, "cancelled");
+}
+
+drape_status drape_check_cancel_after(drape_context *ctx, size_t work)
+{
+    ctx->work += work;
+    if (ctx->work >= BETWEEN_CANCELS && drape_check_cancel(ctx))
+        return DRAPE_E_STOPPED;
+    ctx->work %= BETWEEN_CANCELS;
+    return DRAPE_OK;
 }
 
 void drape_context_set_message(drape_context *ctx, const char *format, ...)

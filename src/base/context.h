@@ -24,6 +24,7 @@ struct drape_context {
     drape_collider_ops host_colliders[DRAPE_MAX_HOST_COLLIDERS];
     int host_collider_count;
     struct drape_shared_elimination *eliminations; /* those in use (solvers/elimination.h); NULL: none */
+    size_t work; /* operations since the host was last asked whether to cancel */
 };
 
 /* User-defined entry number `index` of the context, of the terms that cloths or seams may have; NULL past the
@@ -67,6 +68,10 @@ static inline bool drape_memory_ran_out(void)
 /* For long operations before a sim runs, called between their stages: returns DRAPE_E_STOPPED with a message
  * if the host asks to cancel. */
 drape_status drape_check_cancel(drape_context *ctx);
+
+/* For long loops: adds `work`, operations of some nanoseconds each, to those since the host was last asked,
+ * and asks again after a million of them. */
+drape_status drape_check_cancel_after(drape_context *ctx, size_t work);
 
 void drape_log(drape_context *ctx, drape_log_level level, const char *format, ...) DRAPE_PRINTF(3, 4);
 

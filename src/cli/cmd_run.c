@@ -42,6 +42,7 @@ typedef struct run {
     double wall;                      /* duration of the run [s] */
     const char *warned[MAX_WARNINGS]; /* names of the warnings that are printed already */
     int warned_count;
+    bool uncounted; /* what passes through what at the end was not counted */
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
 } run;
@@ -308,7 +309,7 @@ static void print_untangling(const run *r)
 }
 
 /* Printed only if cloth reaches into a collider, or passes through itself, at the end. */
-static void print_inside(const run *r)
+static void print_inside(run *r)
 {
     double deepest;
     int32_t faces;
@@ -318,12 +319,13 @@ static void print_inside(const run *r)
                    faces == 1 ? "" : "s", faces == 1 ? "es" : "", CLI_SHOWN(r->in.model->colliders[c].name),
                    deepest);
     const int64_t edges = drape_sim_intersections(r->in.sim, -1);
+    r->uncounted = edges < 0; /* also where what is inside was not: a request to stop stays */
     if (edges > 0)
         printf("crossed   %lld edge-face intersection%s of the cloth with itself\n", (long long)edges,
                edges == 1 ? "" : "s");
 }
 
-static void print_results(const run *r)
+static void print_results(run *r)
 {
     const drape_model *model = r->in.model;
     const drape_statistics s = drape_sim_statistics(r->in.sim);
@@ -442,7 +444,7 @@ static void simulate(run *r)
         write_summary(r, NULL, r->request->summary);
 }
 
-/* A signal after the last step does not interrupt the run. */
+/* A signal after the last step does not interrupt the run, unless it cut the counts short. */
 static int conclude(run *r)
 {
     print_results(r);
@@ -450,7 +452,8 @@ static int conclude(run *r)
     if (!r->status) /* a failure has its own line */
         print_warnings(r);
     if (!r->status)
-        return CLI_DONE;
+        return r->uncounted && cli_interrupted() ? cli_report_interrupted(r->request->command.verb)
+                                                 : CLI_DONE;
     cli_print_message(&r->request->command, r->message);
     return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
 }

@@ -23,8 +23,11 @@ _Static_assert(ATOMIC_POINTER_LOCK_FREE == 2, "a signal handler reads it");
 static void on_signal(int signal)
 {
     const struct itimerval again = {.it_interval = {.tv_usec = PERIOD}, .it_value = {.tv_usec = PERIOD}};
+    const struct sigaction end = {.sa_handler = SIG_DFL};
     (void)signal;
     interrupted = 1;
+    for (size_t i = 0; i < sizeof caught / sizeof *caught; i++)
+        sigaction(caught[i], &end, NULL);
     setitimer(ITIMER_REAL, &again, NULL);
 }
 
@@ -46,8 +49,7 @@ void cli_signals_cancel(drape_sim *sim)
  * such a job is intended. */
 void cli_catch_signals(void)
 {
-    const struct sigaction action = {.sa_handler = on_signal, .sa_flags = (int)SA_RESETHAND},
-                           timer = {.sa_handler = on_timer};
+    const struct sigaction action = {.sa_handler = on_signal}, timer = {.sa_handler = on_timer};
     sigaction(SIGALRM, &timer, NULL);
     for (size_t i = 0; i < sizeof caught / sizeof *caught; i++)
         sigaction(caught[i], &action, NULL);

@@ -34,7 +34,7 @@ drape_status drape_shape_check_volume(drape_context *ctx, const drape_mesh_sourc
 {
     const double volume = six_volumes(mesh) / 6;
     if (volume > 0)
-        return DRAPE_OK;
+        return drape_check_cancel_after(ctx, 8 * (size_t)mesh->triangle_count);
     return drape_mesh_fail(ctx, source, 0,
                            "the mesh is inside out: its volume is %g m3; triangles go counterclockwise seen "
                            "from outside; remedy: turn all faces over (flip normals)",

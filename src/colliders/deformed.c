@@ -78,6 +78,7 @@ drape_status drape_deformed_nearest(drape_context *ctx, const drape_motion *moti
         double own[3];
         drape_pose_own(&pose, x + 3 * (size_t)nodes[i], own);
         triangles[i] = drape_nearest_on(&tree, points, own, INFINITY).triangle;
+        status = drape_check_cancel_after(ctx, 64 + (size_t)tree.count);
     }
     drape_arena_free(&arena);
     return status;

@@ -42,6 +42,11 @@ drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t eleme
     return drape_arena_status(arena);
 }
 
+drape_status drape_term_check_cancel(drape_term_builder *builder, size_t work)
+{
+    return drape_check_cancel_after(builder->model->ctx, work);
+}
+
 void drape_term_anchor(drape_term_builder *builder)
 {
     builder->term->anchored = true;
@@ -146,9 +151,9 @@ void drape_term_sew(drape_term_builder *builder, int32_t a, int32_t b)
         return;
     }
     while (sewn[a] != a)
-        a = sewn[a];
+        a = sewn[a] = sewn[sewn[a]];
     while (sewn[b] != b)
-        b = sewn[b];
+        b = sewn[b] = sewn[sewn[b]];
     sewn[a > b ? a : b] = a < b ? a : b;
 }
 

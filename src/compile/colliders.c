@@ -105,11 +105,8 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
     model->colliders = drape_arena_take(&model->arena, def->collider_count, sizeof *model->colliders);
     if (!model->colliders)
         return DRAPE_E_MEMORY;
-    for (size_t i = 0; !status && i < def->collider_count; i++) {
-        status = drape_check_cancel(model->ctx);
-        if (!status)
-            status = compile_collider(model, i, def);
-    }
+    for (size_t i = 0; !status && i < def->collider_count; i++)
+        status = drape_check_cancel(model->ctx) ? DRAPE_E_STOPPED : compile_collider(model, i, def);
     model->collider_count = status ? 0 : (int32_t)def->collider_count;
     for (int32_t i = 0; i < model->collider_count; i++)
         model->has_dissipation =

@@ -202,9 +202,7 @@ static drape_status compile_cloths(drape_model *model, const drape_scene_def *de
         return DRAPE_E_MEMORY;
     drape_status status = DRAPE_OK;
     for (size_t c = 0; !status && c < def->cloth_count; c++) {
-        status = drape_check_cancel(model->ctx);
-        if (!status)
-            status = compile_cloth(model, (int32_t)c, def);
+        status = drape_check_cancel(model->ctx) ? DRAPE_E_STOPPED : compile_cloth(model, (int32_t)c, def);
         model->cloth_count = (int32_t)c + 1; /* count an unfinished cloth, too, so that it is freed */
     }
     if (!status)
@@ -244,11 +242,8 @@ drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape
     model->arena = drape_arena_of(ctx);
     model->ctx = ctx;
     drape_status status = drape_compile_check_def(ctx, def);
-    for (size_t i = 0; !status && i < sizeof stages / sizeof *stages; i++) {
-        status = drape_check_cancel(ctx);
-        if (!status)
-            status = stages[i](model, def);
-    }
+    for (size_t i = 0; !status && i < sizeof stages / sizeof *stages; i++)
+        status = drape_check_cancel(ctx) ? DRAPE_E_STOPPED : stages[i](model, def);
     if (!status)
         status = drape_compile_pattern(model);
     for (int32_t c = 0; c < model->cloth_count; c++) /* a scene without bending keeps no hinges */

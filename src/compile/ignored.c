@@ -32,7 +32,8 @@ static drape_status ignore(drape_model *model, int32_t cloth, const char *pointe
         model->ignored[(model->collider_count + c) * model->cloth_count + cloth] = 1;
         model->ignored[(model->collider_count + cloth) * model->cloth_count + c] = 1;
     }
-    return found ? DRAPE_OK
+    return found ? drape_check_cancel_after(model->ctx,
+                                            8 * (size_t)(model->collider_count + model->cloth_count))
                  : drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
                                  "there is no collider and no cloth \"%.60s\"", name);
 }

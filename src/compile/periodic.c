@@ -121,12 +121,13 @@ static drape_status match(pairing *p, drape_arena *scratch)
     const size_t axis = (size_t)longest_axis(&p->to, x);
     placed *list = drape_arena_take(scratch, count, sizeof *list);
     p->partner = drape_arena_take(scratch, count, sizeof *p->partner);
-    if (drape_arena_status(scratch))
-        return DRAPE_E_MEMORY;
+    drape_status status = drape_arena_status(scratch);
+    if (status)
+        return status;
     for (size_t i = 0; i < count; i++)
         list[i] = (placed){x[3 * (size_t)p->to.node[i] + axis], p->to.node[i]};
     qsort(list, count, sizeof *list, compare);
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; !status && i < count; i++) {
         double at[3];
         size_t low = 0, high = count;
         for (size_t k = 0; k < 3; k++)
@@ -145,8 +146,9 @@ static drape_status match(pairing *p, drape_arena *scratch)
             return refuse_pair(p, p->from.node[i], at);
         p->partner[i] = list[low].node;
         p->to.taken[list[low].node] = 0; /* each is the partner of one */
+        status = drape_check_cancel_after(p->model->ctx, count);
     }
-    return DRAPE_OK;
+    return status;
 }
 
 /* Nodes inside the mesh are not on an edge that another one continues. */
@@ -275,15 +277,15 @@ static drape_status place(pairing *p, bool may_move)
 
 /* ---- Sets of images ---- */
 
-static int32_t root_of(const int32_t *parent, int32_t node)
+static int32_t root_of(int32_t *parent, int32_t node)
 {
     while (parent[node] != node)
-        node = parent[node];
+        node = parent[node] = parent[parent[node]];
     return node;
 }
 
 /* parent (node_count): a tree of each set, whose root is its first node. */
-static drape_status list_sets(drape_model *m, const int32_t *parent)
+static drape_status list_sets(drape_model *m, int32_t *parent)
 {
     int32_t members = 0;
     m->image_set = drape_arena_take(&m->arena, (size_t)m->node_count, sizeof *m->image_set);
@@ -317,22 +319,6 @@ static drape_status list_sets(drape_model *m, const int32_t *parent)
     return DRAPE_OK;
 }
 
-/* The edge between two nodes of a cloth; -1: there is none. */
-static int32_t edge_between(const drape_mesh *mesh, int32_t a, int32_t b)
-{
-    const int32_t lower = a < b ? a : b, higher = a < b ? b : a;
-    int32_t low = 0, high = mesh->edge_count;
-    while (low < high) {
-        const int32_t middle = low + (high - low) / 2, *end = mesh->edge + 2 * (size_t)middle;
-        if (end[0] < lower || (end[0] == lower && end[1] < higher))
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    const int32_t *found = mesh->edge + 2 * (size_t)low;
-    return low < mesh->edge_count && found[0] == lower && found[1] == higher ? low : -1;
-}
-
 /* Notes which edges of triangles are the same one: those between paired nodes, each beside one triangle. */
 static drape_status pair_mesh_edges(const pairing *p, int32_t *image, drape_arena *scratch)
 {
@@ -346,7 +332,7 @@ static drape_status pair_mesh_edges(const pairing *p, int32_t *image, drape_aren
         partner[p->from.node[i]] = p->partner[i];
     for (int32_t e = 0; e < mesh->edge_count; e++) {
         const int32_t a = partner[mesh->edge[2 * (size_t)e]], b = partner[mesh->edge[2 * (size_t)e + 1]];
-        const int32_t other = a < 0 || b < 0 ? -1 : edge_between(mesh, a, b);
+        const int32_t other = a < 0 || b < 0 ? -1 : drape_edge_between(mesh->edge, mesh->edge_count, a, b);
         if (other < 0 || mesh->edge_triangle[2 * (size_t)e + 1] >= 0 ||
             mesh->edge_triangle[2 * (size_t)other + 1] >= 0)
             continue;
@@ -559,7 +545,8 @@ static bool reaches_over_edges(const drape_model *m, const drape_term *term)
                 const int32_t *node = el->node + (size_t)e * (size_t)el->nodes,
                               first = m->cloths[term->cloth].first_node, i = node[a] - first,
                               j = node[b] - first;
-                if (i != j && edge_between(mesh, i, j) < 0 && !(el->nodes == 2 && in_one_cell(mesh, i, j)))
+                if (i != j && drape_edge_between(mesh->edge, mesh->edge_count, i, j) < 0 &&
+                    !(el->nodes == 2 && in_one_cell(mesh, i, j)))
                     return true;
             }
     return false;

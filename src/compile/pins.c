@@ -82,9 +82,8 @@ static double displace_along(const drape_model *model, int32_t number, double t,
         return next;
     const drape_track *track = &model->tracks[number];
     drape_track_displacement(track->keys, track->key_count, t, d);
-    for (size_t k = track->key_count; k-- > 0 && track->keys[k].time > t;)
-        next = track->keys[k].time;
-    return next;
+    const size_t after = (size_t)(drape_track_key_before(track->keys, track->key_count, t) + 1);
+    return after < track->key_count ? track->keys[after].time : next;
 }
 
 /* The same of a node along all directions that are held, and of the keys of all tracks. */
@@ -109,6 +108,7 @@ static bool moves_alike(const drape_model *model, const double *n, int32_t track
         t = fmin(displace_along(model, track, t, d[0]), displace(model, all, t, d[1]));
         apart = fmax(apart, fabs(vec3_dot(n, d[0]) - vec3_dot(n, d[1])));
         size = fmax(size, fmax(vec3_norm(d[0]), vec3_norm(d[1])));
+        model->ctx->work += 64; /* drape_check_cancel_after at the next node asks then */
     }
     return apart <= PARALLEL * size;
 }
@@ -125,10 +125,10 @@ static bool tracks_agree(const drape_model *model, int32_t a, int32_t b)
     static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     holding all = {.count = 3, .track = {b, b, b}};
     memcpy(all.normal, axes, sizeof axes);
-    bool same = only_displaces(model, a) && only_displaces(model, b);
-    for (int k = 0; same && k < 3; k++)
+    bool same = a == b || (only_displaces(model, a) && only_displaces(model, b));
+    for (int k = 0; same && a != b && k < 3; k++)
         same = moves_alike(model, axes[k], a, &all);
-    return same || a == b;
+    return same;
 }
 
 static drape_status refuse_motions(const drape_model *model, const char *at, int32_t node, const double *n,
@@ -175,8 +175,8 @@ static drape_status take_node(void *user, const char *key, int32_t local)
 {
     pin_place *pin = user;
     int32_t node = pin->cloth->first_node + local;
+    drape_status status = drape_check_cancel_after(pin->model->ctx, 8);
     if (pin->count > 0) {
-        drape_status status = DRAPE_OK;
         for (int i = 0; !status && i < pin->count && !pin->held[node]; i++)
             status =
                 add_direction(pin, key, node, pin->direction[i], pin->def->key_count > 0 ? pin->track : -1);
@@ -195,7 +195,7 @@ static drape_status take_node(void *user, const char *key, int32_t local)
     pin->model->pinned[node] = 1;
     pin->clamped[node] |= pin->def->clamp;
     pin->held[node] = 1;
-    return DRAPE_OK;
+    return status;
 }
 
 /* Pins the selected nodes. */
@@ -321,7 +321,7 @@ static drape_status list_nodes(const pin_place *pin, drape_pin *to)
         if (pin->held[i])
             to->node[listed++] = i;
     memset(pin->held + first, 0, (size_t)count);
-    return DRAPE_OK;
+    return drape_check_cancel_after(pin->model->ctx, 8 * (size_t)count);
 }
 
 static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, int32_t c, pin_place *pin)
@@ -375,7 +375,7 @@ static drape_status join_tracks(drape_model *model, const holding *all, drape_tr
         track->keys[k].time = t;
         t = displace(model, all, t, track->keys[k].displacement);
     }
-    return DRAPE_OK;
+    return drape_check_cancel_after(model->ctx, 128 * track->key_count);
 }
 
 /* The first pin that holds a node in all directions. */
@@ -391,9 +391,11 @@ static const drape_pin *full_pin_of(const drape_model *model, int32_t node)
  * collider carries go before. */
 static drape_status check_both(const drape_model *model, const pin_place *pin)
 {
-    for (int32_t node = 0; node < model->node_count; node++) {
+    drape_status status = DRAPE_OK;
+    for (int32_t node = 0; !status && node < model->node_count; node++) {
         const holding *all = &pin->all[node];
         const int32_t track = pin->track_of_node[node];
+        status = drape_check_cancel_after(model->ctx, 8);
         if (!model->pinned[node] || !only_displaces(model, track))
             continue;
         for (int i = 0; i < all->count; i++) {
@@ -408,7 +410,7 @@ static drape_status check_both(const drape_model *model, const pin_place *pin)
             return refuse_motions(model, at, node, all->normal[i], full_pin_of(model, node));
         }
     }
-    return DRAPE_OK;
+    return status;
 }
 
 /* Nodes that are held in three directions are pinned: with a track, if one of them moves. */
@@ -505,7 +507,7 @@ static drape_status turn_edges_of(drape_model *model, const drape_pin *pin, uint
 {
     const drape_cloth *cloth = &model->cloths[pin->cloth];
     const uint8_t *of_node = held + cloth->first_node;
-    drape_status status = DRAPE_OK;
+    drape_status status = drape_check_cancel_after(model->ctx, 4 * (size_t)cloth->mesh.edge_count);
     for (int32_t i = 0; i < pin->node_count; i++)
         held[pin->node[i]] = 1;
     for (int32_t e = 0; !status && e < cloth->mesh.edge_count; e++) {

@@ -6,8 +6,6 @@
 #include <math.h>
 #include <stdio.h>
 
-#define BETWEEN_CANCELS 4096 /* vertices */
-
 static bool is_given(const drape_mesh_def *def)
 {
     return def->grid.type || def->file || def->positions || def->triangles;
@@ -37,8 +35,7 @@ static drape_status bind_vertices(drape_model *model, const drape_mesh_source *s
                                    "max_distance is %g m; remedy: bring both meshes to the same place and "
                                    "size, as by a transform, or raise max_distance",
                                    (int)i, point[0], point[1], point[2], distance, cloth->max_distance);
-        if (i % BETWEEN_CANCELS == 0)
-            status = drape_check_cancel(model->ctx);
+        status = drape_check_cancel_after(model->ctx, 256 + (size_t)tree->count);
     }
     return status;
 }

@@ -200,9 +200,7 @@ drape_status drape_compile_seams(drape_model *model, const drape_scene_def *def)
     for (int32_t i = 0; i < model->node_count; i++)
         model->sewn[i] = i;
     for (size_t i = 0; !status && i < def->seam_count; i++) {
-        status = drape_check_cancel(model->ctx);
-        if (!status)
-            status = compile_seam(model, i, &def->seams[i]);
+        status = drape_check_cancel(model->ctx) ? DRAPE_E_STOPPED : compile_seam(model, i, &def->seams[i]);
         model->seam_count = (int32_t)i + 1;
     }
     return status;

@@ -84,7 +84,7 @@ static drape_status take_box(const drape_selection *s)
     for (int k = 0; k < 3; k++)
         if (!(low[k] <= high[k]))
             return refuse(s, "/box", "min must not be above max in any coordinate");
-    drape_status status = DRAPE_OK;
+    drape_status status = drape_check_cancel_after(s->ctx, 8 * (size_t)s->mesh->node_count);
     int32_t taken = 0;
     for (int32_t i = 0; !status && i < s->mesh->node_count; i++) {
         const double *x = s->mesh->x + 3 * (size_t)i;

@@ -25,6 +25,7 @@ typedef struct search {
     int32_t edge;
     drape_intersection_visit *visit;
     void *user;
+    size_t tested; /* triangles, for this edge */
 } search;
 
 static bool are_neighbours(const drape_model *model, const int32_t *edge, const int32_t *triangle)
@@ -35,10 +36,11 @@ static bool are_neighbours(const drape_model *model, const int32_t *edge, const 
 
 static void try_triangle(void *user, int32_t element)
 {
-    const search *s = user;
+    search *s = user;
     const int32_t *edge = s->edges->edge + 2 * (size_t)s->edge,
                   *triangle = s->triangles->triangle + 3 * (size_t)element;
     const double *corner[3];
+    s->tested++;
     if (s->edges->x == s->triangles->x && are_neighbours(s->edges->model, edge, triangle))
         return;
     for (int a = 0; a < 3; a++)
@@ -62,7 +64,9 @@ drape_status drape_intersect(drape_context *ctx, const drape_surface *edges, con
         drape_bvh_fit(&tree, triangles->x);
     for (s.edge = 0; !status && s.edge < edges->edge_count; s.edge++) {
         const drape_box box = drape_box_of(edges->edge + 2 * (size_t)s.edge, 2, edges->x, 0);
+        s.tested = 1;
         drape_bvh_query(&tree, &box, try_triangle, &s);
+        status = drape_check_cancel_after(ctx, 64 * s.tested); /* more where signs need long sums */
     }
     drape_arena_free(&arena);
     return status;

@@ -16,6 +16,7 @@
 
 #include "geometry/bvh.h"
 #include "geometry/round.h"
+#include "mesh/mesh.h"
 
 #include <float.h>
 #include <math.h>
@@ -62,21 +63,6 @@ static void add_normals(const drape_collider_shape *s, int32_t t, drape_mesh_dis
     }
 }
 
-/* Returns the number of the segment a b. */
-static int32_t find_segment(const drape_collider_shape *s, int32_t a, int32_t b)
-{
-    int32_t low = 0, high = s->segment_count - 1, least = a < b ? a : b, most = a < b ? b : a;
-    while (low < high) {
-        int32_t middle = low + (high - low) / 2;
-        const int32_t *ends = s->segment + 2 * (size_t)middle;
-        if (ends[0] < least || (ends[0] == least && ends[1] < most))
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 drape_mesh_distance *drape_mesh_distance_create(drape_arena *arena, const drape_collider_shape *shape,
                                                 drape_mesh_side side)
 {
@@ -94,7 +80,7 @@ drape_mesh_distance *drape_mesh_distance_create(drape_arena *arena, const drape_
         return NULL;
     for (size_t i = 0; i < 3 * triangles; i++) {
         const int32_t *n = shape->triangle + i - i % 3;
-        mesh->edge_of[i] = find_segment(shape, n[i % 3], n[(i + 1) % 3]);
+        mesh->edge_of[i] = drape_edge_between(shape->segment, shape->segment_count, n[i % 3], n[(i + 1) % 3]);
     }
     drape_mesh_distance_refit(mesh, shape);
     return mesh;

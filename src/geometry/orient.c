@@ -118,5 +118,8 @@ int drape_orient(const double *a, const double *b, const double *c, const double
     const double volume = vec3_dot(n, w);
     if (fabs(volume) > ROUNDINGS * DBL_EPSILON * vec3_norm(u) * vec3_norm(v) * vec3_norm(w))
         return volume > 0 ? 1 : -1;
+    for (int k = 0; k < 3; k++) /* layers that lie on each other in a plane of space, without long sums */
+        if (u[k] == 0 && v[k] == 0 && w[k] == 0)
+            return 0;
     return orient_exactly(a, b, c, d, u, v, w);
 }

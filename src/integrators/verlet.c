@@ -480,9 +480,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     memcpy(out->x, in->x, nodes * sizeof *out->x);
     memcpy(out->v, in->v, nodes * sizeof *out->v);
     info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
+    s->self.cancel = s->limit.cancel = s->contact.cancel = *drape_system_cancel_flag(s->system);
     for (int64_t k = 0; k < n; k++) {
-        if (drape_system_cancelled(s->system))
-            return drape_system_status(s->system);
         const substep sub = {.t0 = in->t + (double)k / (double)n * (out->t - in->t),
                              .t =
                                  k + 1 == n ? out->t : in->t + (double)(k + 1) / (double)n * (out->t - in->t),
@@ -496,6 +495,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
             substep_position(s, &sub);
         else
             substep_velocity(s, &sub, k == 0);
+        if (drape_system_cancelled(s->system))
+            return drape_system_status(s->system);
     }
     info->iterations = (int)n;
     return blew_up(s, out, info) ? DRAPE_RETRY_NONFINITE : DRAPE_OK;

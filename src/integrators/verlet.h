@@ -44,9 +44,10 @@ typedef struct drape_verlet_contact {
     const drape_model *model;
     const drape_motion *motion; /* of its colliders */
     int rule;
-    double offset;         /* [m] CS184: how far outside of a flat surface a node is put */
-    double friction_range; /* [m] Boson: friction acts up to this far from a surface */
-    double friction_drag;  /* [N s/m] Boson: drag of a node under friction */
+    double offset;             /* [m] CS184: how far outside of a flat surface a node is put */
+    double friction_range;     /* [m] Boson: friction acts up to this far from a surface */
+    double friction_drag;      /* [N s/m] Boson: drag of a node under friction */
+    const atomic_bool *cancel; /* NULL, or raised: what is left is not done, as the step will not count */
 } drape_verlet_contact;
 
 /* Moves the nodes that are inside of a collider at time t; the substep of h seconds began at t0. Returns the
@@ -67,6 +68,7 @@ typedef struct drape_verlet_self {
     drape_neighbours neighbours; /* the broad phase */
     uint64_t *box;               /* (node_count) the box of a node; NULL: all near nodes push */
     double per_box[3];           /* boxes per metre */
+    const atomic_bool *cancel;   /* as in drape_verlet_contact */
 } drape_verlet_self;
 
 /* same_box: only nodes in the same box push, as in CS184. */
@@ -88,10 +90,11 @@ typedef struct drape_verlet_limit {
     int32_t patch_count;
     drape_verlet_patch *patch;
     int32_t node_count;
-    double *x;             /* planes (3 x node_count) */
-    const uint8_t *pinned; /* of the model */
-    int passes;            /* at most */
-    double slack;          /* passes end where no length is more than this times the longest */
+    double *x;                 /* planes (3 x node_count) */
+    const uint8_t *pinned;     /* of the model */
+    int passes;                /* at most */
+    const atomic_bool *cancel; /* as in drape_verlet_contact */
+    double slack;              /* passes end where no length is more than this times the longest */
 } drape_verlet_limit;
 
 /* All springs: the elements of two nodes of every term that measures a strain. */

@@ -281,6 +281,7 @@ void drape_verlet_limit_lengths(const drape_verlet_limit *l, double *x)
 {
     planes_from((size_t)l->node_count, x, l->x);
     for (int k = 0; k < l->passes && pass(l) > l->slack * l->slack; k++)
-        ;
+        if (l->cancel && atomic_load(l->cancel))
+            break;
     planes_to((size_t)l->node_count, l->x, x);
 }

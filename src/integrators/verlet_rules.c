@@ -121,7 +121,8 @@ double drape_verlet_project(const drape_verlet_contact *contact, double t0, doub
                             const double *x0, double *x)
 {
     double work = 0;
-    for (int32_t c = 0; c < contact->model->collider_count; c++) {
+    for (int32_t c = 0;
+         c < contact->model->collider_count && !(contact->cancel && atomic_load(contact->cancel)); c++) {
         pose p = {.collider = &contact->model->colliders[c]};
         drape_motion_pose(contact->motion, c, t0, t0, &p.before);
         drape_motion_pose(contact->motion, c, t, t, &p.at);
@@ -157,7 +158,7 @@ double drape_verlet_friction(const drape_verlet_contact *contact, double t, cons
     double power = 0;
     if (contact->rule != DRAPE_VERLET_BOSON)
         return 0;
-    for (int32_t k = 0; k < m->collider_count; k++) {
+    for (int32_t k = 0; k < m->collider_count && !(contact->cancel && atomic_load(contact->cancel)); k++) {
         drape_collider_pose at;
         drape_motion_pose(contact->motion, k, t, t, &at);
         for (int32_t f = 0; f < m->free_count; f++) {
@@ -283,7 +284,7 @@ void drape_verlet_self_push(drape_verlet_self *s, double share, double *x)
     drape_neighbours_update(&s->neighbours, share, x);
     for (int32_t i = 0; s->box && i < s->model->node_count; i++)
         s->box[i] = box_of(s, x + 3 * (size_t)i);
-    for (int32_t i = 0; i < s->model->node_count; i++) {
+    for (int32_t i = 0; i < s->model->node_count && !(s->cancel && atomic_load(s->cancel)); i++) {
         int32_t room[DRAPE_MAX_NEIGHBOURS + 1];
         const int32_t *near;
         if (s->model->pinned[i])

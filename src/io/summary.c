@@ -124,10 +124,12 @@ static json_t *realtime(const drape_summary_realtime *r)
     return with_reals(with_counts(json_object(), counts, LENGTH(counts)), times, LENGTH(times));
 }
 
-/* A count of the sim; NULL, which fails the summary, if memory was out. */
-static json_t *found(int64_t count)
+/* A count of the sim; null if the host cancelled it; NULL, which fails the summary, if memory was out. */
+static json_t *found(const drape_sim *sim, int64_t count)
 {
-    return count >= 0 ? json_integer((json_int_t)count) : NULL;
+    if (count >= 0)
+        return json_integer((json_int_t)count);
+    return drape_check_cancel(sim->ctx) ? json_null() : NULL;
 }
 
 /* For each collider, if there are any: the number of triangles of the cloth that reach into it, how deep [m],
@@ -140,15 +142,15 @@ static json_t *with_inside(json_t *object, const drape_sim *sim)
         drape_inside inside;
         if (drape_sim_find_inside(sim, c, &inside))
             inside = (drape_inside){.triangles = -1, .deepest = NAN, .intersections = -1};
-        json_t *one = drape_json_with(json_object(), "triangles", found(inside.triangles));
+        json_t *one = drape_json_with(json_object(), "triangles", found(sim, inside.triangles));
         one = drape_json_with(one, "deepest", drape_json_number(inside.deepest));
-        one = drape_json_with(one, "intersections", found(inside.intersections));
+        one = drape_json_with(one, "intersections", found(sim, inside.intersections));
         list = drape_json_append(list, one);
     }
     if (colliders > 0)
         object = drape_json_with(object, "inside", json_incref(list));
     json_decref(list);
-    return drape_json_with(object, "intersections", found(drape_sim_intersections(sim, -1)));
+    return drape_json_with(object, "intersections", found(sim, drape_sim_intersections(sim, -1)));
 }
 
 /* For each collider, and pinned pieces of cloth, that left cloth no room, if there are any: the number of
@@ -265,7 +267,7 @@ static json_t *warnings(drape_sim *sim)
             return NULL;
         }
     }
-    if (!drape_sim_take_warning_failure(sim))
+    if (!drape_sim_take_warning_failure(sim) || drape_check_cancel(sim->ctx))
         return list;
     json_decref(list);
     return NULL;

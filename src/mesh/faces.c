@@ -192,12 +192,15 @@ static void cut_ears(polygon *p, int count)
     put_triangle(p, ring[0], ring[1], ring[2]);
 }
 
-static void divide(drape_mesh *mesh)
+static drape_status divide(drape_mesh *mesh)
 {
     drape_faces *f = &mesh->faces;
     polygon p = {.mesh = mesh, .out = f->corner};
-    for (int32_t i = 0; i < f->count; i++) {
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; !status && i < f->count; i++) {
         const int32_t count = f->first[i + 1] - f->first[i];
+        status = drape_check_cancel_after(mesh->arena.ctx,
+                                          16 * (size_t)(count <= MAX_EARS ? count * count : count));
         p.corner = f->first[i];
         if (count == 4)
             divide_quadrilateral(&p);
@@ -209,6 +212,7 @@ static void divide(drape_mesh *mesh)
     }
     for (size_t i = 0; i < 3 * (size_t)mesh->triangle_count; i++)
         mesh->triangle[i] = f->node[f->corner[i]];
+    return status;
 }
 
 /* ---- Texture coordinates ---- */
@@ -303,7 +307,9 @@ static void drop(drape_arena *arena, drape_faces *f)
 drape_status drape_faces_complete(drape_context *ctx, drape_mesh *mesh)
 {
     drape_faces *f = &mesh->faces;
-    divide(mesh);
+    const drape_status status = divide(mesh);
+    if (status)
+        return status;
     const bool has_uvs = complete_uvs(f);
     if (!has_uvs && f->material_count == 0 && f->count == mesh->triangle_count) {
         drop(&mesh->arena, f);

@@ -14,6 +14,7 @@
 #define HEADER     12 /* [bytes] of the file */
 #define CHUNK      8  /* [bytes] of the header of a chunk */
 #define MAX_JSON   ((size_t)1 << 28)
+#define MAX_READ   ((size_t)1 << 32) /* [bytes] of numbers: those of an accessor may be read many times */
 
 #define FAIL(g, ...) drape_mesh_fail((g)->ctx, (g)->file, 0, __VA_ARGS__)
 
@@ -160,7 +161,7 @@ drape_status drape_gltf_index(const drape_gltf *g, const char *owner, const json
     char where[160];
     *index = -1;
     if (!value)
-        return DRAPE_OK;
+        return drape_check_cancel_after(g->ctx, 64);
     snprintf(where, sizeof where, "%s: \"%s\"", owner, key);
     return drape_gltf_index_of(g, where, value, limit, index);
 }
@@ -321,6 +322,10 @@ static drape_status read_elements(const drape_gltf *g, drape_arena *arena, const
     drape_status status = DRAPE_OK;
     if (dense)
         status = locate(g, owner, object, out->count, (size_t)(out->width * c->bytes), &from);
+    const size_t bytes = (size_t)out->count * (size_t)out->width * sizeof *out->value;
+    if (!status && arena->bytes + bytes > MAX_READ)
+        status = FAIL(g, "%s: its numbers, and those read before, take more than %zu bytes", owner, MAX_READ);
+    status = status ? status : drape_check_cancel_after(g->ctx, bytes);
     if (status)
         return status;
     out->value = drape_arena_take(arena, (size_t)out->count, (size_t)out->width * sizeof *out->value);

@@ -202,6 +202,7 @@ static drape_status read_statements(obj_reader *reader)
             read_file_name(reader);
         else if (drape_word_is(word, "f"))
             status = read_polygon(reader);
+        status = status ? status : drape_check_cancel_after(reader->ctx, 64);
     } while (!status && drape_text_next_line(&reader->text));
     return status;
 }

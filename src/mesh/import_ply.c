@@ -535,6 +535,7 @@ static drape_status read_items(ply_reader *reader, bool counting)
         for (int64_t item = 0; item < reader->element->count && !status; item++) {
             reader->item = item;
             status = read_item(reader);
+            status = status ? status : drape_check_cancel_after(reader->ctx, 64);
         }
     }
     return status;

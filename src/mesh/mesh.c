@@ -99,12 +99,10 @@ static drape_status place_nodes(drape_context *ctx, const char *pointer, const d
 static drape_status complete(drape_context *ctx, const drape_mesh_source *source, drape_mesh *mesh)
 {
     drape_status status = drape_mesh_validate_triangles(ctx, source, mesh);
-    if (!status)
-        status = drape_check_cancel(ctx);
+    status = status ? status : drape_check_cancel(ctx);
     if (!status)
         status = drape_mesh_connect(ctx, source, mesh);
-    if (!status)
-        status = drape_check_cancel(ctx);
+    status = status ? status : drape_check_cancel(ctx);
     if (!status)
         status = drape_mesh_validate_nodes(ctx, source, mesh);
     if (!status)
@@ -131,8 +129,7 @@ drape_status drape_mesh_place(drape_context *ctx, const char *pointer, const dra
         status = drape_mesh_check_transform(ctx, pointer, def->scale, def->rotate, def->translate);
     if (!status)
         status = take_from_source(ctx, pointer, def, folder, mesh);
-    if (!status)
-        status = drape_check_cancel(ctx);
+    status = status ? status : drape_check_cancel(ctx);
     if (!status)
         status = place_nodes(ctx, pointer, &source, def, mesh);
     if (status)

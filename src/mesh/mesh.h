@@ -117,6 +117,9 @@ drape_status drape_mesh_validate_shapes(drape_context *ctx, const drape_mesh_sou
  * may have either orientation. */
 drape_status drape_mesh_connect(drape_context *ctx, const drape_mesh_source *source, drape_mesh *mesh);
 
+/* The number of the edge between two nodes, of edges in ascending order; -1: there is none. */
+int32_t drape_edge_between(const int32_t *edge, int32_t edge_count, int32_t a, int32_t b);
+
 /* To be called after drape_mesh_connect. Checks that every node has a triangle and that its triangles form
  * one fan. */
 drape_status drape_mesh_validate_nodes(drape_context *ctx, const drape_mesh_source *source,

@@ -46,10 +46,11 @@ static int compare_edges(const void *left, const void *right)
     return a[0] != b[0] ? (a[0] > b[0]) - (a[0] < b[0]) : (a[1] > b[1]) - (a[1] < b[1]);
 }
 
-static int32_t root_of(const open_node *list, int32_t i)
+/* Halves the path: chains stay short. */
+static int32_t root_of(open_node *list, int32_t i)
 {
     while (list[i].same != i)
-        i = list[i].same;
+        i = list[i].same = list[list[i].same].same;
     return i;
 }
 
@@ -76,7 +77,7 @@ static double join_near(const drape_mesh *mesh, open_node *list, int32_t count, 
 }
 
 /* Whether every open edge lies on another one once the nodes are joined, and none has become a point. */
-static bool edges_meet(const open_node *list, int32_t count, open_edge *edge)
+static bool edges_meet(open_node *list, int32_t count, open_edge *edge)
 {
     bool meet = count > 0;
     for (int32_t i = 0; i < count; i++) {

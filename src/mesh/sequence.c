@@ -116,6 +116,7 @@ drape_status drape_sequence_validate(drape_context *ctx, const drape_mesh_source
         status = drape_mesh_validate_positions(ctx, &part, &at);
         if (!status)
             status = drape_mesh_validate_shapes(ctx, &part, &at);
+        status = status ? status : drape_check_cancel_after(ctx, 16 * (size_t)at.triangle_count);
     }
     return status;
 }

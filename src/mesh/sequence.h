@@ -49,7 +49,7 @@ extern const drape_registry drape_sequence_registry;
 /* Reads frames into the arena, and the triangles into *mesh, which started as all zeros and which
  * drape_mesh_free frees, on failure as well; its positions are those of the first frame. Faults are reported
  * at pointer/file, pointer/mesh and pointer/times, with frame, node and value. Errors: DRAPE_E_ARGUMENT,
- * DRAPE_E_FILE, DRAPE_E_PARSE, DRAPE_E_MEMORY. */
+ * DRAPE_E_FILE, DRAPE_E_PARSE, DRAPE_E_MEMORY, DRAPE_E_STOPPED (the context's cancel function). */
 drape_status drape_sequence_read(drape_arena *arena, const char *pointer, const char *folder,
                                  const drape_sequence_def *def, drape_mesh *mesh, drape_sequence *out);
 

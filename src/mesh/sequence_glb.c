@@ -4,6 +4,7 @@
  * split a point where its normal or texture has a seam: points that coincide in all frames become one, and
  * points without triangles are left out, so that a surface is as closed as it looks.
  */
+#include "base/hash.h"
 #include "base/vec3.h"
 #include "mesh/contents.h"
 #include "mesh/gltf_scene.h"
@@ -14,10 +15,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TRIANGLES   4    /* the mode of a primitive */
-#define MODES       7    /* of primitives */
-#define ENOUGH      1e-6 /* of a frame, by which the last may be behind the end of the animation */
-#define MOST_FRAMES 1e15 /* for a conversion to int64; far more than are allowed */
+#define TRIANGLES   4      /* the mode of a primitive */
+#define MODES       7      /* of primitives */
+#define ENOUGH      1e-6   /* of a frame, by which the last may be behind the end of the animation */
+#define MOST_FRAMES 1e15   /* for a conversion to int64; far more than are allowed */
+#define POSE        32     /* operations for a node, a joint or a channel in a frame */
+#define MAX_WORK    0x1p34 /* operations for all frames */
 
 /* The joints of a skin. */
 typedef struct skin {
@@ -48,6 +51,7 @@ typedef struct reader {
     int32_t part_count, part_room;
     int32_t *corner; /* (triangle_count x 3) */
     int64_t point_count, triangle_count, triangle_room;
+    double work; /* operations for a frame */
 } reader;
 
 #define FAIL(r, ...) drape_mesh_fail((r)->source->ctx, &(r)->source->file, 0, __VA_ARGS__)
@@ -66,6 +70,7 @@ static drape_status read_skin(reader *r, int32_t index)
     s->count = (int32_t)json_array_size(joints);
     if (s->count == 0)
         return FAIL(r, "%s has no joints", owner);
+    r->work += POSE * (double)s->count;
     s->joint = drape_arena_take(&r->arena, (size_t)s->count, sizeof *s->joint);
     s->inverse = drape_arena_take(&r->arena, (size_t)s->count, sizeof *s->inverse);
     s->now = drape_arena_take(&r->arena, (size_t)s->count, sizeof *s->now);
@@ -279,6 +284,7 @@ static drape_status read_primitive(reader *r, int32_t node, int32_t mesh, const 
     }
     r->parts[r->part_count++] = p;
     r->point_count += p.count;
+    r->work += (double)p.count * (1.0 + p.targets + 4.0 * p.sets);
     return DRAPE_OK;
 }
 
@@ -318,7 +324,7 @@ static void place_point(const reader *r, const part *p, size_t point, double *ou
     const drape_gltf_node *node = &r->scene.nodes[p->node];
     double x[3] = {p->x[3 * point], p->x[3 * point + 1], p->x[3 * point + 2]}, y[3], sum[3] = {0};
     for (int32_t k = 0; k < p->targets; k++)
-        for (size_t axis = 0; p->target[k] && axis < 3; axis++)
+        for (size_t axis = 0; p->target[k] && node->now_weight[k] != 0 && axis < 3; axis++)
             x[axis] += node->now_weight[k] * p->target[k][3 * point + axis];
     if (p->sets == 0)
         drape_gltf_map_point(&node->world, x, sum);
@@ -377,6 +383,11 @@ static drape_status sample(reader *r, drape_mesh *mesh, drape_sequence *out)
     const drape_gltf_scene *scene = &r->scene;
     const double rate = r->source->rate,
                  frames = fmin(ceil((scene->end - scene->start) * rate - ENOUGH) + 1, MOST_FRAMES);
+    const double work = r->work + POSE * ((double)scene->node_count + scene->channel_count);
+    if (frames * work > MAX_WORK)
+        return FAIL(r,
+                    "%.0f frames of %.3g points, joints and morph targets are more than %.3g; lower the rate",
+                    frames, work, MAX_WORK);
     drape_status status = drape_mesh_allocate(r->source->ctx, &r->source->file, (size_t)r->point_count,
                                               (size_t)r->triangle_count, mesh);
     if (!status)
@@ -389,8 +400,9 @@ static drape_status sample(reader *r, drape_mesh *mesh, drape_sequence *out)
     for (int32_t f = 0; !status && f < out->frame_count; f++) {
         double *x = out->x + 3 * (size_t)f * (size_t)mesh->node_count;
         pose(r, fmin(scene->start + f / rate, scene->end));
-        status = check_mirrors(r, f, mesh);
-        for (int32_t k = 0; k < r->part_count; k++)
+        status = drape_check_cancel_after(r->source->ctx, (size_t)work);
+        status = status ? status : check_mirrors(r, f, mesh);
+        for (int32_t k = 0; k < r->part_count && !status; k++)
             for (int32_t i = 0; i < r->parts[k].count; i++)
                 place_point(r, &r->parts[k], (size_t)i, x + 3 * (size_t)(r->parts[k].first + i));
         const drape_mesh frame = {.node_count = mesh->node_count, .x = x};
@@ -406,46 +418,49 @@ static drape_status sample(reader *r, drape_mesh *mesh, drape_sequence *out)
 
 /* ---- Points that are one ---- */
 
-/* A point with all its frames. */
+/* A point, with a hash of all its frames. */
 typedef struct track {
-    const double *x;
-    size_t stride;
-    int32_t frames, point;
+    uint64_t hash;
+    int32_t point;
 } track;
 
 static int compare_tracks(const void *left, const void *right)
 {
     const track *a = left, *b = right;
-    for (int32_t f = 0; f < a->frames; f++) {
-        const int order =
-            memcmp(a->x + (size_t)f * a->stride, b->x + (size_t)f * b->stride, 3 * sizeof(double));
-        if (order != 0)
-            return order;
-    }
-    return a->point < b->point ? -1 : a->point > b->point;
+    return a->hash != b->hash ? (a->hash > b->hash ? 1 : -1) : (a->point > b->point) - (a->point < b->point);
 }
 
-static bool are_same(const track *a, const track *b)
+static bool are_same(const drape_sequence *frames, const track *a, const track *b)
 {
-    const track c = {.x = b->x, .stride = b->stride, .frames = b->frames, .point = a->point};
-    return compare_tracks(a, &c) == 0;
+    bool same = a->hash == b->hash;
+    for (int32_t f = 0; same && f < frames->frame_count; f++) {
+        const double *x = frames->x + 3 * (size_t)f * (size_t)frames->node_count;
+        same = memcmp(x + 3 * (size_t)a->point, x + 3 * (size_t)b->point, 3 * sizeof *x) == 0;
+    }
+    return same;
 }
 
 /* Sets to[i] to the first point that moves as i does. */
-static drape_status find_same(drape_arena *arena, const drape_mesh *mesh, const drape_sequence *frames,
-                              int32_t *to)
+static drape_status find_same(drape_arena *arena, const drape_sequence *frames, int32_t *to)
 {
-    const size_t points = (size_t)mesh->node_count;
-    track *tracks = drape_arena_take(arena, points, sizeof *tracks);
-    if (!tracks)
-        return DRAPE_E_MEMORY;
-    for (size_t i = 0; i < points; i++)
-        tracks[i] = (track){frames->x + 3 * i, 3 * points, frames->frame_count, (int32_t)i};
-    qsort(tracks, points, sizeof *tracks, compare_tracks);
-    for (size_t i = 0; i < points; i++)
-        to[tracks[i].point] =
-            i > 0 && are_same(&tracks[i - 1], &tracks[i]) ? to[tracks[i - 1].point] : tracks[i].point;
-    return DRAPE_OK;
+    const size_t points = (size_t)frames->node_count, count = points * (size_t)frames->frame_count;
+    track *tracks = drape_arena_take(arena, points, sizeof *tracks), *first = tracks, *t = tracks;
+    drape_status status = drape_arena_status(arena);
+    for (size_t i = 0; !status && i < points; i++)
+        tracks[i] = (track){DRAPE_HASH_START, (int32_t)i};
+    for (size_t i = 0; !status && i < count; i++) {
+        tracks[i % points].hash =
+            drape_hash_bytes(tracks[i % points].hash, frames->x + 3 * i, 3 * sizeof *frames->x);
+        status = drape_check_cancel_after(arena->ctx, 8);
+    }
+    if (!status)
+        qsort(tracks, points, sizeof *tracks, compare_tracks);
+    for (; !status && t < tracks + points; t++) {
+        first = are_same(frames, first, t) ? first : t;
+        to[t->point] = first->point;
+        status = drape_check_cancel_after(arena->ctx, (size_t)frames->frame_count);
+    }
+    return status;
 }
 
 /* Triangles that have lost a side, as at the pole of a sphere, are left out. */
@@ -488,7 +503,7 @@ static void drop_points(drape_mesh *mesh, drape_sequence *frames, int32_t *numbe
 static drape_status weld(reader *r, drape_mesh *mesh, drape_sequence *frames)
 {
     int32_t *number = drape_arena_take(&r->arena, (size_t)mesh->node_count, sizeof *number);
-    const drape_status status = number ? find_same(&r->arena, mesh, frames, number) : DRAPE_E_MEMORY;
+    const drape_status status = number ? find_same(&r->arena, frames, number) : DRAPE_E_MEMORY;
     if (status)
         return status;
     weld_triangles(mesh, number);

@@ -116,3 +116,18 @@ drape_status drape_mesh_connect(drape_context *ctx, const drape_mesh_source *sou
     drape_arena_free(&scratch);
     return status;
 }
+
+int32_t drape_edge_between(const int32_t *edge, int32_t edge_count, int32_t a, int32_t b)
+{
+    const int32_t lower = a < b ? a : b, higher = a < b ? b : a;
+    int32_t low = 0, high = edge_count;
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2, *end = edge + 2 * (size_t)middle;
+        if (end[0] < lower || (end[0] == lower && end[1] < higher))
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    const int32_t *found = edge + 2 * (size_t)low;
+    return low < edge_count && found[0] == lower && found[1] == higher ? low : -1;
+}

@@ -9,8 +9,7 @@
 
 #define PI 3.14159265358979323846
 
-/* Returns the last key at or before t; -1 if t is before the first. */
-static int64_t key_before(const drape_track_key *keys, size_t key_count, double t)
+int64_t drape_track_key_before(const drape_track_key *keys, size_t key_count, double t)
 {
     int64_t low = -1, high = (int64_t)key_count;
     while (high - low > 1) {
@@ -25,7 +24,7 @@ static int64_t key_before(const drape_track_key *keys, size_t key_count, double 
 
 void drape_track_displacement(const drape_track_key *keys, size_t key_count, double t, double displacement[3])
 {
-    int64_t k = key_before(keys, key_count, t);
+    int64_t k = drape_track_key_before(keys, key_count, t);
     if (key_count == 0) {
         memset(displacement, 0, 3 * sizeof *displacement);
         return;
@@ -39,7 +38,7 @@ void drape_track_displacement(const drape_track_key *keys, size_t key_count, dou
 
 void drape_track_velocity(const drape_track_key *keys, size_t key_count, double t, double velocity[3])
 {
-    int64_t k = key_before(keys, key_count, t);
+    int64_t k = drape_track_key_before(keys, key_count, t);
     bool inside = k >= 0 && k + 1 < (int64_t)key_count;
     for (int i = 0; i < 3; i++)
         velocity[i] = inside ? (keys[k + 1].displacement[i] - keys[k].displacement[i]) /
@@ -53,8 +52,10 @@ void drape_track_velocity(const drape_track_key *keys, size_t key_count, double 
 static const drape_turn *turn_before(const drape_turns *turns, double t, double *share)
 {
     const drape_turn *key = turns->keys, *last = turns->keys + turns->key_count - 1;
-    while (key < last && key[1].time <= t)
-        key++;
+    for (const drape_turn *end = last + 1; end - key > 1;) {
+        const drape_turn *middle = key + (end - key) / 2;
+        *(middle->time <= t ? &key : &end) = middle;
+    }
     *share = key < last && t > key->time ? (t - key->time) / (key[1].time - key->time) : 0;
     return key;
 }

@@ -5,6 +5,8 @@
 
 #include "model/model.h"
 
+int64_t drape_track_key_before(const drape_track_key *keys, size_t key_count, double t); /* -1: none */
+
 /* Computes the displacement [m] at time t [s]: linear between keys, constant before the first and after the
  * last, 0 without keys. */
 void drape_track_displacement(const drape_track_key *keys, size_t key_count, double t,

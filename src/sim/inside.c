@@ -86,19 +86,10 @@ static drape_status intersect(drape_arena *arena, search *s)
 
 /* ---- Triangles ---- */
 
-static int compare_edges(const void *a, const void *b)
-{
-    const int32_t *p = a, *q = b;
-    return p[0] != q[0] ? (p[0] > q[0] ? 1 : -1) : (p[1] > q[1]) - (p[1] < q[1]);
-}
-
-/* Edges are sorted by their nodes, the lower first. */
 static bool side_crosses(const search *s, int32_t a, int32_t b)
 {
-    const int32_t key[] = {a < b ? a : b, a < b ? b : a};
-    const int32_t *edge =
-        bsearch(key, s->model->edge, (size_t)s->model->edge_count, sizeof key, compare_edges);
-    return edge && s->edge_crosses[(edge - s->model->edge) / 2];
+    const int32_t edge = drape_edge_between(s->model->edge, s->model->edge_count, a, b);
+    return edge >= 0 && s->edge_crosses[edge];
 }
 
 static bool is_pierced(const search *s, int32_t triangle)
@@ -174,7 +165,8 @@ drape_status drape_find_inside(drape_context *ctx, const drape_model *m, const d
     search s = search_of(m, collider, pose, x, found);
     drape_status status = intersect(&arena, &s);
     for (int32_t f = 0; !status && f < m->triangle_count; f++) {
-        if (drape_model_ignores(m, collider->index, m->triangle[3 * (size_t)f]))
+        status = drape_check_cancel_after(ctx, 28 * (100 + (size_t)collider->shape.triangle_count));
+        if (status || drape_model_ignores(m, collider->index, m->triangle[3 * (size_t)f]))
             continue;
         const double depth = fmax(deepest_sample(&s, m->triangle + 3 * (size_t)f), deepest_between(&s, f));
         found->triangles += depth > TOUCH || is_pierced(&s, f);

@@ -13,16 +13,16 @@ typedef struct drape_inside {
 
 /* The collider is one of the model or, if that deforms, what it is at the moment (colliders/deformed.h). x
  * (node_count x 3) must be finite. Of each triangle 28 points are tested. Edges of the collider are the
- * segments of its shape; a round collider has its axis, if it has one. Errors: DRAPE_E_MEMORY. */
+ * segments of its shape; a round collider has its axis, if it has one. Errors: DRAPE_E_MEMORY, DRAPE_E_STOPPED. */
 drape_status drape_find_inside(drape_context *ctx, const drape_model *model, const drape_collider *collider,
                                const drape_collider_pose *pose, const double *x, drape_inside *found);
 
 /* Counts the triangles of cloth without a pinned node that an edge of the collider passes through, or with a
- * side that passes through a triangle of it. Errors: DRAPE_E_MEMORY. */
+ * side that passes through a triangle of it. Errors as before. */
 drape_status drape_find_pierced(drape_context *ctx, const drape_model *model, const drape_collider *collider,
                                 const drape_collider_pose *pose, const double *x, int32_t *pierced);
 
-/* The same in the present state of a sim. Errors: DRAPE_E_ARGUMENT (no such collider), DRAPE_E_MEMORY. */
+/* The same in the present state of a sim. Errors: DRAPE_E_ARGUMENT (no such collider), those of the former. */
 drape_status drape_sim_find_inside(const drape_sim *sim, int32_t collider, drape_inside *found);
 
 #endif

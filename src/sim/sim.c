@@ -171,20 +171,17 @@ static drape_status start_sim(drape_sim *sim, int threads)
     drape_status status = drape_chosen_check(sim->ctx, &sim->chosen, sim->model);
     if (!status)
         status = create_states(sim);
-    if (!status)
-        status = drape_check_cancel(sim->ctx);
+    status = status ? status : drape_check_cancel(sim->ctx);
     status = agree(sim, status);
     if (!status)
         status = create_system(sim, threads);
     if (!status)
         start_pins(sim);
-    if (!status)
-        status = drape_check_cancel(sim->ctx);
+    status = status ? status : drape_check_cancel(sim->ctx);
     status = agree(sim, status);
     if (!status)
         status = create_integrator(sim);
-    if (!status)
-        status = drape_check_cancel(sim->ctx);
+    status = status ? status : drape_check_cancel(sim->ctx);
     if (!status)
         status = drape_events_create(sim);
     status = agree(sim, status);

@@ -115,7 +115,7 @@ struct drape_sim {
     drape_energy energy, attempted;     /* of the present state; of the last attempted one */
     bool energy_known, attempted_known; /* whether these two are valid */
     drape_warning_cursor warning_cursor;
-    bool warning_failed;               /* memory was out for a test of drape_sim_warning */
+    bool warning_failed; /* memory was out for a test of drape_sim_warning, or it was cancelled */
     uint64_t model_hash, choices_hash; /* identify what a checkpoint belongs to; valid if identity_known */
     bool identity_known;
     /* The members from here on stay in place when a restored sim replaces the others (checkpoint.c). */

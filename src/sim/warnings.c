@@ -168,13 +168,15 @@ static bool has_large_file(drape_sim *sim, char *text, size_t size)
 }
 
 /* Free nodes of the cloth inside a collider. A pinned node may be there on purpose, and faces of which
- * only the middle is inside do not count: some contact is kept at nodes only. */
-static int32_t free_nodes_inside(const drape_model *m, const drape_collider *collider,
+ * only the middle is inside do not count: some contact is kept at nodes only. -1: it was cancelled. */
+static int32_t free_nodes_inside(drape_context *ctx, const drape_model *m, const drape_collider *collider,
                                  const drape_collider_pose *pose, const double *x, double *deepest)
 {
     int32_t count = 0;
     *deepest = 0;
     for (int32_t f = 0; f < m->free_count; f++) {
+        if (drape_check_cancel_after(ctx, 100 + (size_t)collider->shape.triangle_count))
+            return -1;
         const double *at = x + 3 * (size_t)m->node_of_free[f];
         if (drape_model_ignores(m, collider->index, m->node_of_free[f]))
             continue;
@@ -205,13 +207,13 @@ static bool describe_inside(drape_sim *sim, const double *x, bool start, char *t
             sim->warning_failed = true;
             return false;
         }
-        const int32_t count = free_nodes_inside(m, body, &pose, x, &deepest);
+        const int32_t count = free_nodes_inside(sim->ctx, m, body, &pose, x, &deepest);
         if (count > 0)
             snprintf(text, size,
                      "/colliders/%d: %d free node%s of the cloth %s%s inside %s, up to %.3g m deep%s", (int)c,
                      (int)count, count == 1 ? "" : "s", what, count == 1 ? "s" : "", m->colliders[c].name,
                      deepest, advice);
-        else if (drape_find_pierced(sim->ctx, m, body, &pose, x, &pierced))
+        else if (count < 0 || drape_find_pierced(sim->ctx, m, body, &pose, x, &pierced))
             sim->warning_failed = true;
         else if (pierced > 0)
             snprintf(text, size, "/colliders/%d: %d triangle%s of the cloth %s%s pierced by %s%s", (int)c,

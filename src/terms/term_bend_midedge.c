@@ -182,13 +182,10 @@ static bool is_linked(const drape_midedge *patch, int h)
 /* The number of the hinge at an edge, by bisection. */
 static int32_t hinge_at(const drape_cloth_view *cloth, int32_t edge)
 {
-    int32_t low = 0, high = cloth->hinge_count - 1;
-    while (low < high) {
+    int32_t low = 0, high = cloth->hinge_count;
+    while (high - low > 1) {
         const int32_t middle = low + (high - low) / 2;
-        if (cloth->hinge_edge[middle] < edge)
-            low = middle + 1;
-        else
-            high = middle;
+        *(cloth->hinge_edge[middle] <= edge ? &low : &high) = middle;
     }
     return low;
 }
@@ -248,7 +245,8 @@ static drape_status reserve(const drape_cloth_view *cloth, const double *values,
     sizes n = {.parts = cloth->hinge_count, .nodes = 3};
     bool shifted = false;
     drape_midedge patch;
-    for (int32_t t = 0; t < cloth->triangle_count; t++) {
+    drape_status status = DRAPE_OK;
+    for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
         int32_t node[MIDEDGE_NODES];
         if (!drape_midedge_of(cloth, t, values, law, &patch))
             return drape_orthotropic_refuse(builder, t);
@@ -262,6 +260,7 @@ static drape_status reserve(const drape_cloth_view *cloth, const double *values,
         for (int r = 0; r < patch.rank; r++)
             for (int h = 0; h < MIDEDGE_HINGES; h++)
                 n.links += patch.c[r][h] != 0;
+        status = drape_term_check_cancel(builder, 4096);
     }
     if (n.links > INT32_MAX || n.parts > INT32_MAX)
         return drape_term_refuse(builder, "the mesh is too large: %.0f angles in elements; at most %d",
@@ -269,7 +268,7 @@ static drape_status reserve(const drape_cloth_view *cloth, const double *values,
     const bool own = n.parts > cloth->hinge_count;
     if (own)
         drape_term_anchor(builder);
-    drape_status status = drape_term_reserve_nodes(builder, (int32_t)n.squares, n.nodes, REST_COUNT);
+    status = status ? status : drape_term_reserve_nodes(builder, (int32_t)n.squares, n.nodes, REST_COUNT);
     return status ? status
                   : drape_term_reserve_parts(builder, (int32_t)n.parts, (int32_t)n.links,
                                              !own      ? 0
@@ -452,6 +451,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
                 drape_term_set_slider(builder, s, element, slides.stiffness[s] * patch.k[r],
                                       slides.limit[s] * patch.k[r]);
         }
+        status = drape_term_check_cancel(builder, 4096);
     }
     return status;
 }

@@ -11,6 +11,9 @@ extern const drape_term_ops *const drape_terms[]; /* NULL-ended */
 extern const drape_term_ops *const drape_seams[]; /* NULL-ended */
 extern const drape_registry drape_term_registry, drape_seam_registry;
 
+/* drape_check_cancel_after, for builders of elements that take long. */
+drape_status drape_term_check_cancel(drape_term_builder *builder, size_t work);
+
 /* Rest value number `item` of an element. */
 static inline double drape_rest_of(const drape_elements *el, int item, int32_t element)
 {

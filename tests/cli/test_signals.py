@@ -5,16 +5,18 @@ had already completed. Output is TAP.
 The moments are random; the seed is printed, and DRAPE_SEED=N sets it. A child is signalled once it catches signals, as /proc shows (Linux):
 the program installs its handlers first.
 """
+import json
 import os
 import random
 import re
 import resource
 import shutil
 import signal
+import struct
 import subprocess
 import time
 
-from program import PROGRAM, Skip, drape, equal, good, read_json, read_npy, read_steps, run_tests, without_warnings, write_scene
+from program import PROGRAM, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, without_warnings, write_scene
 
 LIMIT = 120  # [s] that a child may take to end
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
@@ -40,12 +42,20 @@ def catches(pid):
     return mask >> (signal.SIGHUP - 1) & 1  # the last signal that the program catches
 
 
-def struck(delay, one, *args, **options):
-    """Runs a verb and signals it after a delay. Returns exit code, stdout, stderr."""
+def computed(pid):
+    """CPU time [s] that a process has taken."""
+    with open(f"/proc/{pid}/stat", encoding="utf-8") as file:
+        return sum(map(int, file.read().rsplit(")", 1)[1].split()[11:13])) / os.sysconf("SC_CLK_TCK")
+
+
+def struck(delay, one, *args, until=lambda pid: True, **options):
+    """Runs a verb and signals it after a delay, and once `until` is true of its process. Returns exit code, stdout, stderr."""
     with subprocess.Popen([PROGRAM, *args], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                           **options) as child:
         end = time.monotonic() + LIMIT
         while child.poll() is None and not catches(child.pid) and time.monotonic() < end:
+            time.sleep(0.0005)
+        while child.poll() is None and not until(child.pid) and time.monotonic() < end:
             time.sleep(0.0005)
         time.sleep(delay)
         if child.poll() is None:
@@ -56,6 +66,11 @@ def struck(delay, one, *args, **options):
             child.kill()
             raise
     return child.returncode, out, without_warnings(err)
+
+
+def steps_begin(_):
+    """Whether the run that writes into "out" is about to make its first step."""
+    return os.path.exists("out/steps.csv")
 
 
 def busy():
@@ -140,10 +155,10 @@ def test_static():
         material={"young_modulus": 1200, "poisson_ratio": 0, "thickness": 0.01, "areal_density": 0.1},
         terms=["stretch.cst", "bend.midedge", {"type": "load.moment", "edge": "right", "moment": 6.283e-4}],
         pins=[{"edge": "left", "clamp": True}], gravity=[0, 0, 0], integrator={"method": "static", "tolerance": 1e-11}, duration=1)
-    start, begun = time.monotonic(), busy()
+    begun = busy()
     good("run", "scene.json", "--summary", "whole.json")
-    delay, whole, begun = 0.2 * (time.monotonic() - start), busy() - begun, busy()
-    code, _, err = struck(delay, signal.SIGINT, "run", "scene.json", "--out", "out")
+    whole, begun = busy() - begun, busy()
+    code, _, err = struck(0, signal.SIGINT, "run", "scene.json", "--out", "out", until=steps_begin)
     took = busy() - begun
     equal((code, without_warnings(err)), (130, "drape run: t=0: interrupted\n"))
     assert took < 0.9 * whole, (took, whole)
@@ -151,18 +166,43 @@ def test_static():
     equal((summary["status"], summary["steps"]["accepted"]), ("e_stopped", 0))
 
 
+def endless():
+    """A step that takes minutes: so many passes over so many springs, to lengths that they can only come nearer to."""
+    return write_scene(
+        mesh={"grid": "square", "columns": 150, "rows": 150, "width": 1, "height": 1}, terms=[{"type": "spring.structural", "stiffness": 1000}],
+        pins=[{"row": 0}], duration=1,
+        integrator={"method": "verlet", "dt": 0.01, "strain_limit": 0, "strain_limit_iterations": 1000000, "strain_limit_tolerance": 0})
+
+
 def test_long_step():
     """a long step is cancelled by a signal; the run ends with the last accepted state"""
-    write_scene(mesh={"grid": "square", "columns": 201, "rows": 201, "width": 1, "height": 1}, duration=10,
-                integrator={"method": "be", "dt": 0.05})
-    start, begun = time.monotonic(), busy()
-    good("run", "scene.json", "--duration", "0.05")
-    delay, step, begun = 0.2 * (time.monotonic() - start), busy() - begun, busy()
-    code, _, err = struck(delay, signal.SIGINT, "run", "scene.json", "--out", "out")
-    took = busy() - begun
+    endless()
+    code, _, err = struck(0, signal.SIGINT, "run", "scene.json", "--out", "out", until=steps_begin)
     equal((code, without_warnings(err)), (130, "drape run: t=0: interrupted\n"))
-    assert took < 0.9 * step, (took, step)
     equal(read_json("out/summary.json")["status"], "e_stopped")
+
+
+def test_two_signals():
+    """a second signal, of whatever kind, ends the program at once, as a kill does; the run can be made again in its folder"""
+    endless()
+    for _ in range(5):  # the step is cancelled half a second after the first signal, which may be before the second
+        with subprocess.Popen([PROGRAM, "run", "scene.json", "--out", "out"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as child:
+            while child.poll() is None and not (catches(child.pid) and steps_begin(child.pid)):
+                time.sleep(0.0005)
+            child.send_signal(signal.SIGINT)
+            while child.poll() is None and catches(child.pid):
+                time.sleep(0.0005)
+            child.send_signal(signal.SIGTERM)
+            try:
+                code = child.wait(LIMIT)
+            finally:
+                child.kill()
+        equal(read_steps("out"), [])
+        if code != 130:
+            break
+        shutil.rmtree("out")
+    equal(code, -signal.SIGTERM)
+    good("run", "scene.json", "--set", "/integrator/strain_limit_iterations=1", "--duration", "0.01", "--out", "out")
 
 
 def test_resume():
@@ -192,6 +232,63 @@ def test_reading():
             equal((code, out, err), (130, "", f"drape {verb}: interrupted\n"))
         if begun:
             os.close(writer)
+
+
+def write_glb(path, targets, seconds, copies=8):
+    """A tetrahedron, several times, with morph targets of which each has the same displacements; their weights go from 0 to 1."""
+    point = [c for _ in range(copies) for p in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)) for c in p]
+    corner = [4 * k + c for k in range(copies) for c in (0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3)]
+    data, views, accessors = b"", [], []
+    for kind, form, component, values in (("VEC3", "f", 5126, point), ("SCALAR", "H", 5123, corner), ("VEC3", "f", 5126, [1e-3] * len(point)),
+                                          ("SCALAR", "f", 5126, [0, seconds]), ("SCALAR", "f", 5126, [0] * targets + [1] * targets)):
+        part = struct.pack(f"<{len(values)}{form}", *values)
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(part)})
+        accessors.append({"bufferView": len(views) - 1, "componentType": component, "type": kind,
+                          "count": len(values) // (3 if kind == "VEC3" else 1)})
+        data += part + bytes(-len(part) % 4)
+    text = json.dumps({
+        "asset": {"version": "2.0"}, "buffers": [{"byteLength": len(data)}], "bufferViews": views, "accessors": accessors,
+        "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "targets": [{"POSITION": 2}] * targets}]}],
+        "animations": [{"samplers": [{"input": 3, "output": 4}], "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}]}],
+    }, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    with open(path, "wb") as file:
+        file.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(data)) + struct.pack("<I4s", len(text), b"JSON") + text +
+                   struct.pack("<I4s", len(data), b"BIN\0") + data)
+
+
+def test_small_and_slow():
+    """small files whose reading takes long: morph targets times frames, pins times nodes, keys of their tracks times nodes; and the bound of such"""
+    body = {"type": "animated_mesh", "file": "morph.glb", "frame_rate": 1000, "open": True}
+    write_glb("morph.glb", 4000, 130)
+    write_scene(colliders=[body])
+    os.rename("scene.json", "morph.json")
+    sheet = {"grid": "square", "columns": 1000, "rows": 1000, "width": 1, "height": 1}
+    everything = [[-9, -9, -9], [9, 9, 9]]
+    write_scene(mesh=sheet, pins=[{"box": everything}] * 2000)
+    os.rename("scene.json", "pins.json")
+    write_scene(mesh=sheet, pins=[{"box": everything, "track": [[t, [0, 0, k]] for t in range(1000)]} for k in (0, 0)])
+    os.rename("scene.json", "tracks.json")
+    for file in "morph.json", "pins.json", "tracks.json":
+        assert os.path.getsize(file) < 300000, file
+        code, _, err = struck(0, signal.SIGINT, "info", file, until=lambda pid: computed(pid) >= 2)
+        equal((code, err), (130, "drape info: interrupted\n"), file)
+    write_glb("morph.glb", 4000, 900)
+    refused("info", "morph.json", says="/colliders/0/file: morph.glb: 900001 frames")
+
+
+def test_count():
+    """the count of what passes through what at the end, which takes minutes for so many layers: the run has completed, and says that it did not count"""
+    layer = ["v %.6f %.6f %.6f\n" % (x + k * 1e-4, 0.31 * x + 0.17 * z, z) for k in range(9000) for x, z in ((0, 0), (3, 0), (0, 3))]
+    with open("layers.obj", "w", encoding="ascii") as file:
+        file.writelines(layer + [f"f {3 * k + 1} {3 * k + 2} {3 * k + 3}\n" for k in range(9000)])
+    write_scene(mesh={"file": "layers.obj"}, terms=["stretch.edge"], pins=[], integrator={"method": "verlet", "dt": 0.01}, duration=0.01)
+    code, out, err = struck(0, signal.SIGINT, "run", "scene.json", "--out", "out", until=lambda pid: steps_begin(pid) and len(read_steps("out")) > 0)
+    equal((code, without_warnings(err)), (130, "drape run: interrupted\n"))
+    summary = read_json("out/summary.json")
+    equal((summary["status"], summary["intersections"]), ("ok", None))
+    assert "status    ok" in out, out
 
 
 def wait_until_idle(child):

@@ -578,10 +578,32 @@ START_TEST(own_boxes_miss_what_cs184_misses)
 }
 END_TEST
 
-SUITE("verlet", the_position_form_is_the_recurrence_of_positions, a_state_restarts_it_exactly,
-      omega_is_that_of_a_chain, steps_are_stable_only_below_the_limit, steps_follow_the_limit,
-      a_blow_up_is_reported, a_plane_stops_as_in_cs184, friction_is_against_the_moving_surface,
-      a_sphere_pushes_along_its_radius, a_floor_keeps_the_place_as_in_boson, friction_on_forces_as_in_boson,
+/* Pushes, which may take hours in a heap of many points, end at once when the step is cancelled. */
+START_TEST(a_cancelled_push_moves_nothing)
+{
+    double x[3 * 196], before[3 * 196];
+    scene s = crumpled(0.02, 0.02, x);
+    const atomic_bool raised = true;
+    drape_verlet_self self;
+    drape_arena arena = drape_arena_of(s.ctx);
+    ck_assert_int_eq(drape_verlet_self_create(&arena, s.model, false, &self), DRAPE_OK);
+    memcpy(before, x, sizeof x);
+    self.cancel = &raised;
+    drape_verlet_self_push(&self, 1, x);
+    ck_assert(memcmp(x, before, sizeof x) == 0);
+    self.cancel = NULL;
+    drape_verlet_self_push(&self, 1, x);
+    ck_assert(memcmp(x, before, sizeof x) != 0);
+    drape_arena_free(&arena);
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("verlet", a_cancelled_push_moves_nothing, the_position_form_is_the_recurrence_of_positions,
+      a_state_restarts_it_exactly, omega_is_that_of_a_chain, steps_are_stable_only_below_the_limit,
+      steps_follow_the_limit, a_blow_up_is_reported, a_plane_stops_as_in_cs184,
+      friction_is_against_the_moving_surface, a_sphere_pushes_along_its_radius,
+      a_floor_keeps_the_place_as_in_boson, friction_on_forces_as_in_boson,
       friction_of_a_moving_floor_has_power, a_rising_floor_does_work, strains_are_limited,
       patches_are_one_spring_after_the_other, forces_are_those_of_the_system, boxes_find_all_pairs,
       own_boxes_miss_what_cs184_misses)
