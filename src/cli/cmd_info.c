@@ -183,7 +183,8 @@ static int print(const cli_command *command, bool json, const cli_info *info)
 {
     errno = 0;
     if (json)
-        return cli_print_json(command, cli_info_json(info), JSON_INDENT(2) | JSON_REAL_PRECISION(15) | JSON_ENSURE_ASCII);
+        return cli_print_json(command, cli_info_json(info),
+                              JSON_INDENT(2) | JSON_REAL_PRECISION(15) | JSON_ENSURE_ASCII);
     cli_info_text(info);
     return drape_memory_ran_out() ? cli_report_memory(command) : CLI_DONE;
 }

@@ -2,8 +2,6 @@
 #include "report/source.h"
 
 #include <errno.h>
-#include <string.h>
-#include <unistd.h>
 
 #include "base/json_read.h"
 #include "model/scene.h"
