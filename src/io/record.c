@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/finite.h"
 #include "io/npy.h"
 #include "io/scene_copy.h"
 
@@ -100,7 +101,11 @@ drape_status drape_record_read(const drape_record *run, int64_t frame, double *x
             return drape_file_fail(run->ctx, "read frames of", run->folder, count < 0 ? errno : EIO);
         used += (size_t)count;
     }
-    return DRAPE_OK;
+    return drape_all_finite(x, size / 8)
+               ? DRAPE_OK
+               : drape_fail(run->ctx, DRAPE_E_PARSE,
+                            "\"%.500s/positions.npy\": frame %" PRId64 " has a number that is not finite",
+                            run->folder, frame);
 }
 
 /* ---- Tables ---- */

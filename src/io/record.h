@@ -28,7 +28,8 @@ char *drape_record_path(drape_context *ctx, const char *folder, const char *name
 drape_status drape_record_open(drape_context *ctx, const char *folder, int32_t nodes, drape_record *run);
 void drape_record_close(drape_record *run); /* does nothing to an empty one */
 
-/* Reads the positions of a frame into x (nodes x 3 [m]). Errors: DRAPE_E_FILE. */
+/* Reads the positions of a frame into x (nodes x 3 [m]). Errors: DRAPE_E_FILE, DRAPE_E_PARSE (a number is not
+ * finite). */
 drape_status drape_record_read(const drape_record *run, int64_t frame, double *x);
 
 /* Gets one row of a table: the texts of the requested columns, valid during the call. */

@@ -252,7 +252,7 @@ static void put_byte(encoder *e, unsigned byte)
 static unsigned level_of(const drape_report_field *field, int k, double value)
 {
     double level = field->step[k] > 0 ? floor((value - field->low[k]) / field->step[k] + 0.5) : 0;
-    return level < 0 ? 0 : level > LEVELS ? LEVELS : (unsigned)level;
+    return !(level > 0) ? 0 : level > LEVELS ? LEVELS : (unsigned)level;
 }
 
 static void put_values(encoder *e, const drape_report_field *f, const double *values, size_t count)
