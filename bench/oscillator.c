@@ -147,7 +147,7 @@ static double bare_drift(int order, double tolerance, drape_statistics *work)
     double t = 0, end = PERIODS * 2 * acos(-1), change = NAN;
     long steps = 0, residuals = 0;
     *work = (drape_statistics){0};
-    if (drape_sundials_context(&sun))
+    if (drape_sundials_create(&sun))
         return NAN;
     N_Vector y = N_VNew_Serial(2, sun), rate = N_VNew_Serial(2, sun);
     double *a = N_VGetArrayPointer(y), *b = N_VGetArrayPointer(rate);

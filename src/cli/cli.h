@@ -17,7 +17,7 @@
 enum {
     CLI_GO_ON = -1, /* not an exit code: the verb continues */
     CLI_DONE = 0,
-    CLI_FAILED = 1,       /* the simulation, a check or the output failed */
+    CLI_FAILED = 1,       /* the simulation, a check or the output failed, or memory ran out */
     CLI_BAD_INPUT = 2,    /* the scene or the command line is wrong; nothing was written */
     CLI_INTERRUPTED = 130 /* interrupted by a signal */
 };

@@ -200,7 +200,7 @@ static inline bool ida_full_open(ida_full *f, drape_context *ctx, const drape_mo
                                  double atol_v, int max_order, int ordering)
 {
     *f = (ida_full){.ctx = ctx, .model = model, .n = 3 * (int64_t)model->free_count};
-    bool good = model->moved_count == 0 && ida_full_arrays(f) && !drape_sundials_context(&f->sun);
+    bool good = model->moved_count == 0 && ida_full_arrays(f) && !drape_sundials_create(&f->sun);
     if (good) {
         const sunindextype n = 2 * f->n, nonzeros = n + 2 * model->pattern.nonzeros;
         f->y = N_VNew_Serial(n, f->sun);
