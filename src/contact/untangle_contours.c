@@ -559,7 +559,7 @@ drape_status drape_untangle_contours(drape_untangler *u)
         status = list_records(u);
     int32_t *order = drape_arena_take(u->arena, (size_t)u->crossing_count + 1, sizeof *order);
     if (status || !order)
-        return DRAPE_E_MEMORY;
+        return status ? status : DRAPE_E_MEMORY;
     for (int32_t c = 0, contours = 0; c < u->crossing_count; c++) {
         if (u->crossing[c].contour >= 0)
             continue;

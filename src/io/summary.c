@@ -127,9 +127,7 @@ static json_t *realtime(const drape_summary_realtime *r)
 /* A count of the sim; null if the host cancelled it; NULL, which fails the summary, if memory was out. */
 static json_t *found(const drape_sim *sim, int64_t count)
 {
-    if (count >= 0)
-        return json_integer((json_int_t)count);
-    return drape_check_cancel(sim->ctx) ? json_null() : NULL;
+    return count >= 0 ? json_integer((json_int_t)count) : drape_check_cancel(sim->ctx) ? json_null() : NULL;
 }
 
 /* For each collider, if there are any: the number of triangles of the cloth that reach into it, how deep [m],

@@ -13,7 +13,8 @@ typedef struct drape_inside {
 
 /* The collider is one of the model or, if that deforms, what it is at the moment (colliders/deformed.h). x
  * (node_count x 3) must be finite. Of each triangle 28 points are tested. Edges of the collider are the
- * segments of its shape; a round collider has its axis, if it has one. Errors: DRAPE_E_MEMORY, DRAPE_E_STOPPED. */
+ * segments of its shape; a round collider has its axis, if it has one. Errors: DRAPE_E_MEMORY,
+ * DRAPE_E_STOPPED (the context's cancel function). */
 drape_status drape_find_inside(drape_context *ctx, const drape_model *model, const drape_collider *collider,
                                const drape_collider_pose *pose, const double *x, drape_inside *found);
 
@@ -22,7 +23,7 @@ drape_status drape_find_inside(drape_context *ctx, const drape_model *model, con
 drape_status drape_find_pierced(drape_context *ctx, const drape_model *model, const drape_collider *collider,
                                 const drape_collider_pose *pose, const double *x, int32_t *pierced);
 
-/* The same in the present state of a sim. Errors: DRAPE_E_ARGUMENT (no such collider), those of the former. */
+/* The same in the present state of a sim. Errors: DRAPE_E_ARGUMENT (no such collider), and those above. */
 drape_status drape_sim_find_inside(const drape_sim *sim, int32_t collider, drape_inside *found);
 
 #endif
