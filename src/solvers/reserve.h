@@ -1,8 +1,8 @@
 /*
  * reserve.h: memory for where SUNDIALS finds none. What creates its solvers and vectors crashes, prints or
  * frees twice where malloc fails, so while a reserve is open on a thread, malloc and calloc take from it
- * instead of failing (--wrap in src/meson.build). In a program that links the static library, or with a shared
- * SUNDIALS, they fail, but only if memory runs out after the reserve was found.
+ * instead of failing (--wrap in src/meson.build). In a program that links the static library, or with a
+ * shared SUNDIALS, they fail, but only if memory runs out after the reserve was found.
  */
 #ifndef DRAPE_SOLVERS_RESERVE_H
 #define DRAPE_SOLVERS_RESERVE_H

@@ -1,5 +1,6 @@
-/* failing_heap.c: preloaded into the program by test_shortage.py, makes one allocation of the process fail: that of number DRAPE_HEAP_FAIL, counted
- * from main on. Where DRAPE_HEAP_COUNT names a file, the number of all of them is written there. */
+/* failing_heap.c: preloaded into the program by test_shortage.py, makes one allocation of the process fail:
+ * that of number DRAPE_HEAP_FAIL, counted from main on. Where DRAPE_HEAP_COUNT names a file, the number of
+ * all of them is written there. */
 #include <errno.h>
 #include <malloc.h>
 #include <stdatomic.h>
