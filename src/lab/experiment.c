@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "base/def.h"
+#include "base/json_read.h"
 #include "base/param.h"
 #include "lab/plan.h"
 #include "lab/run.h"
@@ -215,7 +216,9 @@ static drape_status parse_about(lab *l, const char *folder, json_t **about)
     drape_status status = lab_read_text(&l->arena, folder, ABOUT, &text, &size);
     if (status)
         return status;
-    *about = json_loadb(text, size, JSON_REJECT_DUPLICATES, &fault);
+    *about = drape_json_read(text, size, JSON_REJECT_DUPLICATES, &fault);
+    if (!*about && json_error_code(&fault) == json_error_out_of_memory)
+        return drape_fail_memory(l->ctx, size);
     if (!*about)
         return drape_fail(l->ctx, DRAPE_E_PARSE, "%.400s/" ABOUT ":%d:%d: %.200s", folder, fault.line,
                           fault.column, fault.text);
@@ -238,9 +241,11 @@ static bool is_same(const json_t *a, const json_t *b)
 
 static drape_status write_about(lab *l)
 {
+    errno = 0;
     char *text = json_dumps(l->about, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
-    drape_status status = text ? lab_write_text(l, ABOUT, text, strlen(text))
-                               : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for " ABOUT);
+    drape_status status = text && !drape_memory_ran_out()
+                              ? lab_write_text(l, ABOUT, text, strlen(text))
+                              : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for " ABOUT);
     free(text);
     return status;
 }
