@@ -1,4 +1,5 @@
-/* info.h: what `drape info` gathers about a scene, for both of its outputs. */
+/* info.h: what `drape info` gathers about a scene (cmd_info.c), makes a JSON object of (info_json.c, with
+ * info_form.c) and prints, as JSON or for reading (info_text.c). */
 #ifndef DRAPE_CLI_INFO_H
 #define DRAPE_CLI_INFO_H
 
@@ -12,13 +13,10 @@
 #include <jansson.h>
 
 typedef struct cli_cloth_info {
-    double mass, area;     /* [kg], [m2] */
-    int32_t pinned, moved; /* nodes; moved ones are pinned, too */
+    double mass, area;                /* [kg], [m2] */
+    int32_t pinned, moved, supported; /* nodes; moved ones are pinned, too; supported ones are held in some
+                                         directions only */
 } cli_cloth_info;
-
-typedef struct cli_collider_info {
-    int32_t inside; /* nodes at t = 0 */
-} cli_collider_info;
 
 typedef struct cli_info {
     const char *path;
@@ -26,72 +24,39 @@ typedef struct cli_info {
     const drape_sim *sim;
     drape_scene_def def; /* what the model was compiled from */
     drape_profile profile;
-    bool has_limit;               /* the integrator has a stability limit: */
-    drape_stability stability;    /* at the start, of a step of profile.dt */
-    int64_t frames;               /* of a whole run */
-    cli_cloth_info *cloths;       /* one for each of the model */
-    cli_collider_info *colliders; /* likewise */
+    bool has_limit;            /* the integrator has a stability limit: */
+    drape_stability stability; /* at the start, of a step of profile.dt */
+    int64_t frames;            /* of a whole run */
+    cli_cloth_info *cloths;    /* one for each of the model */
+    int32_t *inside;           /* nodes at t = 0, for each collider of the model */
+    bool described;            /* for reading: every value of a scene and every quantity is an object with
+                                  "value" and "unit", as parameters are, and "default" where it has one */
 } cli_info;
 
-/* A choice of the scene: an integrator, a controller, or contact. */
-typedef struct cli_chosen {
-    const char *title, *name, *summary; /* "integrator", "be" */
-    const drape_param *params;
-    int param_count;
-    const double *values;
-    const drape_choice *choice; /* what the scene said */
-    bool (*ignores)(const drape_chosen *chosen, const char *name);
-} cli_chosen;
-
-#define CLI_CHOSEN 2
-void cli_chosen_entries(const drape_sim *sim, cli_chosen entries[CLI_CHOSEN]);
-
-/* Contact, self-contact and the untangling of the start, if the scene has them, in the same form. */
-typedef struct cli_contact_entries {
-    int count;
-    cli_chosen entries[3];
-    double values[3][DRAPE_MAX_PARAMS];
-} cli_contact_entries;
-void cli_contact(const drape_sim *sim, cli_contact_entries *out);
-
-/* Whether the scene gave the parameter. */
-bool cli_is_given(const drape_choice *choice, const char *name);
-
-/* The text that the scene gave for a parameter; "" if none. */
-const char *cli_text_of(const drape_choice *choice, const char *name);
-
-/* A share of the residual, Jacobian, factor and solve of one Newton iteration [1]. */
-double cli_share(const cli_info *info, double seconds);
-
-/* The name of the cloth or the seam whose term it is. */
-const char *cli_owner(const drape_model *model, const drape_term *term);
-
-/* The time of assembling besides the terms: clearing, masses. */
-double cli_other_residual_seconds(const cli_info *info);
-double cli_other_jacobian_seconds(const cli_info *info);
-
-void cli_info_text(const cli_info *info);    /* on stdout */
 json_t *cli_info_json(const cli_info *info); /* a new reference; NULL: out of memory */
 
-/* The value of a key in a def, a new reference; NULL: none is given, or out of memory. */
-json_t *cli_key_json(const drape_scene_key *key, const void *def);
+/* Prints that object, described, on stdout. Removes from its terms what it prints as a table. */
+void cli_info_text(json_t *described);
 
-/* An object of a scene with the values of its def, those by default included; a new reference. */
-json_t *cli_form_json(const drape_scene_object *form, const void *def);
+/* ---- Parts of the object: new references ---- */
 
-/* Of a cloth, as in a scene, new references: its pins with the nodes that they select, the triangles that
- * carry them and the pivot about which they turn; its masses; its periodic edges; how it starts, NULL: at
- * rest. */
-json_t *cli_pins_json(const cli_info *info, int32_t c);
-json_t *cli_masses_json(const cli_info *info, int32_t c);
-json_t *cli_periodic_json(const cli_info *info, int32_t c);
-json_t *cli_start_json(const cli_info *info, int32_t c);
-json_t *cli_render_mesh_json(const cli_info *info, int32_t c); /* NULL: none */
+/* Takes the reference to a value. */
+json_t *cli_described(const cli_info *info, json_t *value, const char *unit);
 
-/* The histories of the scene. */
-json_t *cli_histories_json(const cli_info *info);
+/* Each parameter with "value", "unit" and "default". choice: what the scene said; NULL: not known, a value
+ * that equals the default counts as one, and texts are empty. */
+json_t *cli_params_json(const drape_param *params, int param_count, const double *values,
+                        const drape_choice *choice);
 
-/* The grid of a cloth, with its values; NULL if its mesh is not a grid. */
-const drape_grid_ops *cli_grid_of(const drape_entry_def *def, double *values);
+/* The same without a choice; if not described, the values alone that are not derived. */
+json_t *cli_values_json(const cli_info *info, const drape_param *params, int param_count,
+                        const double *values);
+
+/* Adds the keys that have a value, except names, which are shown where they are used. */
+json_t *cli_with_keys(const cli_info *info, json_t *object, const drape_scene_object *form, const void *def);
+
+/* An object of a scene with the values of its def, those by default included; an array of such. */
+json_t *cli_form_json(const cli_info *info, const drape_scene_object *form, const void *def);
+json_t *cli_forms_json(const cli_info *info, const drape_scene_object *form, const void *defs, size_t count);
 
 #endif

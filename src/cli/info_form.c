@@ -1,10 +1,135 @@
-/* info_form.c: what `drape info` says of the pins, masses and start of a cloth, from the form of a scene, so
- * that a new key of theirs is in it. */
+/* info_form.c: parameters and objects of a scene as JSON, from their tables, so that `drape info` shows every
+ * new key. */
 #include "cli/info.h"
 #include "io/json.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
+
+json_t *cli_described(const cli_info *info, json_t *value, const char *unit)
+{
+    return info->described
+               ? drape_json_with(drape_json_with(json_object(), "value", value), "unit", json_string(unit))
+               : value;
+}
+
+/* ---- Parameters ---- */
+
+/* The setting that the scene gave; NULL: none. */
+static const drape_setting *given(const drape_choice *choice, const char *name)
+{
+    for (size_t i = 0; choice && i < choice->setting_count; i++)
+        if (strcmp(choice->settings[i].name, name) == 0)
+            return &choice->settings[i];
+    return NULL;
+}
+
+static json_t *value_of(const drape_param *param, const double *value, const drape_setting *setting)
+{
+    if (isnan(*value) && param->derived)
+        return json_string(param->derived);
+    switch (param->kind) {
+    case DRAPE_PARAM_BOOLEAN:
+        return json_boolean(*value != 0);
+    case DRAPE_PARAM_CHOICE:
+        return json_string(param->choices[(int)*value]);
+    case DRAPE_PARAM_VECTOR:
+    case DRAPE_PARAM_TURN:
+        return drape_json_numbers(value, 3);
+    case DRAPE_PARAM_TEXT:
+        return drape_json_text(setting && setting->text ? setting->text : "");
+    case DRAPE_PARAM_INTEGER:
+    case DRAPE_PARAM_POINTS: /* their number */
+        return json_integer((json_int_t)*value);
+    case DRAPE_PARAM_NUMBER:
+        break;
+    }
+    return drape_json_number(*value);
+}
+
+static bool is_default(const drape_param *param, const double *value)
+{
+    bool same = true;
+    for (int k = 0; k < drape_param_width(param); k++)
+        same = same && (value[k] == param->default_value || (isnan(value[k]) && isnan(param->default_value)));
+    return same;
+}
+
+json_t *cli_params_json(const drape_param *params, int param_count, const double *values,
+                        const drape_choice *choice)
+{
+    json_t *object = json_object();
+    for (int p = 0; p < param_count; p++) {
+        const double *value = values + drape_param_place(params, p);
+        const drape_setting *setting = given(choice, params[p].name);
+        const bool usual = choice ? !setting : is_default(&params[p], value);
+        json_t *one = drape_json_with(json_object(), "value", value_of(&params[p], value, setting));
+        one = drape_json_with(one, "unit", json_string(params[p].unit));
+        object =
+            drape_json_with(object, params[p].name, drape_json_with(one, "default", json_boolean(usual)));
+    }
+    return object;
+}
+
+json_t *cli_values_json(const cli_info *info, const drape_param *params, int param_count,
+                        const double *values)
+{
+    json_t *object = info->described ? cli_params_json(params, param_count, values, NULL) : json_object();
+    for (int p = 0; p < param_count && !info->described; p++) {
+        const double *value = values + drape_param_place(params, p);
+        if (!isnan(*value))
+            object = drape_json_with(object, params[p].name, value_of(&params[p], value, NULL));
+    }
+    return object;
+}
+
+/* ---- Keys ---- */
+
+/* NULL: none is given. */
+static json_t *key_json(const drape_scene_key *key, const void *def)
+{
+    const char *const *texts;
+    drape_setting value;
+    if (key->shape == DRAPE_SCENE_LIST) {
+        json_t *array = json_array();
+        for (size_t i = 0, count = drape_scene_texts(key, def, &texts); i < count; i++)
+            array = drape_json_append(array, drape_json_text(texts[i]));
+        return array;
+    }
+    if (!drape_scene_value(key, def, &value))
+        return NULL;
+    if (value.vector)
+        return drape_json_numbers(value.vector, value.vector_count);
+    return value.text ? drape_json_text(value.text) : value_of(&key->param, &value.number, NULL);
+}
+
+json_t *cli_with_keys(const cli_info *info, json_t *object, const drape_scene_object *form, const void *def)
+{
+    union {
+        drape_scene_def scene;
+        drape_cloth_def cloth;
+        drape_collider_def collider;
+        drape_event_def event;
+    } defaults = {.scene = {.struct_size = 0}};
+    assert(form->def_size <= sizeof defaults);
+    drape_scene_set_defaults(form, &defaults);
+    for (size_t i = 0; i < form->key_count; i++) {
+        const drape_scene_key *key = &form->keys[i];
+        const bool named = key->param.kind == DRAPE_PARAM_TEXT && key->shape == DRAPE_SCENE_VALUE;
+        json_t *value = key->shape <= DRAPE_SCENE_LIST && !named ? key_json(key, def) : NULL;
+        if (!value)
+            continue;
+        json_t *usual = key_json(key, &defaults);
+        const bool same = json_equal(value, usual);
+        json_decref(usual);
+        value = cli_described(info, value, key->param.unit);
+        if (info->described)
+            value = drape_json_with(value, "default", json_boolean(same));
+        object = drape_json_with(object, key->param.name, value);
+    }
+    return object;
+}
 
 /* ---- Objects of a form ---- */
 
@@ -53,7 +178,7 @@ static json_t *number_element(const void *element)
 }
 
 /* NULL: it has no elements. */
-static json_t *array_json(const char *def, const drape_scene_key *key)
+static json_t *array_json(const cli_info *info, const char *def, const drape_scene_key *key)
 {
     const bool texts = key->param.kind == DRAPE_PARAM_TEXT, track = key->shape == DRAPE_SCENE_TRACK,
                numbers = key->param.kind == DRAPE_PARAM_NUMBER;
@@ -69,7 +194,7 @@ static json_t *array_json(const char *def, const drape_scene_key *key)
     json_t *array = count > 0 ? json_array() : NULL;
     for (size_t i = 0; i < count; i++) {
         const char *element = elements + i * size;
-        array = drape_json_append(array, key->child ? cli_form_json(key->child, element)
+        array = drape_json_append(array, key->child ? cli_form_json(info, key->child, element)
                                          : track    ? track_element(element)
                                          : texts    ? text_element(element)
                                          : numbers  ? number_element(element)
@@ -78,22 +203,24 @@ static json_t *array_json(const char *def, const drape_scene_key *key)
     return array;
 }
 
-static json_t *json_of(const drape_scene_key *key, const char *def)
+static json_t *json_of(const cli_info *info, const drape_scene_key *key, const char *def)
 {
+    json_t *value;
     switch (key->shape) {
     case DRAPE_SCENE_VALUE:
-        return cli_key_json(key, def);
+        value = key_json(key, def);
+        return value ? cli_described(info, value, key->param.unit) : NULL;
     case DRAPE_SCENE_LIST:
     case DRAPE_SCENE_TRACK:
     case DRAPE_SCENE_OBJECTS:
     case DRAPE_SCENE_ENTRIES:
-        return array_json(def, key);
+        return array_json(info, def, key);
     case DRAPE_SCENE_BOX:
         return box_json(def, key);
     case DRAPE_SCENE_QUATERNION:
         return quaternion_json(def, key);
     case DRAPE_SCENE_OBJECT:
-        return cli_form_json(key->child, def + key->offset);
+        return cli_form_json(info, key->child, def + key->offset);
     case DRAPE_SCENE_VERSION:
     case DRAPE_SCENE_REMARK:
         break;
@@ -114,103 +241,22 @@ static bool is_turned_otherwise(const drape_scene_object *form, const drape_scen
     return otherwise;
 }
 
-json_t *cli_form_json(const drape_scene_object *form, const void *def)
+json_t *cli_form_json(const cli_info *info, const drape_scene_object *form, const void *def)
 {
     json_t *object = json_object();
     for (size_t i = 0; i < form->key_count; i++) {
         const drape_scene_key *key = &form->keys[i];
-        json_t *value = is_turned_otherwise(form, key, def) ? NULL : json_of(key, def);
+        json_t *value = is_turned_otherwise(form, key, def) ? NULL : json_of(info, key, def);
         if (value)
             object = drape_json_with(object, key->param.name, value);
     }
     return object;
 }
 
-/* ---- Of a cloth ---- */
-
-/* The nodes that the pin selects are in place of how it selects them. */
-static json_t *selected(json_t *object, const drape_model *model, const drape_pin *pin)
+json_t *cli_forms_json(const cli_info *info, const drape_scene_object *form, const void *defs, size_t count)
 {
-    json_t *nodes = json_array();
-    for (int i = 0; object && drape_form_pin.one_of[i]; i++)
-        json_object_del(object, drape_form_pin.one_of[i]);
-    for (int32_t i = 0; i < pin->node_count; i++)
-        nodes = drape_json_append(nodes, json_integer(pin->node[i] - model->cloths[pin->cloth].first_node));
-    return drape_json_with(object, "nodes", nodes);
-}
-
-/* The triangles that carry its nodes, in their order. */
-static json_t *carried(json_t *object, const drape_model *model, const drape_pin *pin)
-{
-    json_t *triangles = json_array();
-    for (int32_t i = 0; i < pin->node_count; i++)
-        triangles = drape_json_append(triangles, json_integer(model->ride[pin->node[i]].triangle));
-    json_object_del(object, "triangle");
-    return drape_json_with(object, "triangles", triangles);
-}
-
-static json_t *pin_json(const drape_model *model, const drape_pin *pin, const drape_pin_def *def)
-{
-    const int32_t first = pin->node_count > 0 ? pin->node[0] : -1;
-    json_t *object = selected(cli_form_json(&drape_form_pin, def), model, pin);
-    object = drape_json_with(object, "name", drape_json_text(pin->name));
-    if (def->attach && first >= 0 && model->ride[first].triangle >= 0)
-        object = carried(object, model, pin);
-    for (int32_t i = 0; def->turn_count > 0 && i < model->moved_count; i++)
-        if (model->moved_node[i] == first && model->moved_track[i] >= 0)
-            object = drape_json_with(object, "pivot",
-                                     drape_json_numbers(model->tracks[model->moved_track[i]].pivot, 3));
-    return object;
-}
-
-json_t *cli_pins_json(const cli_info *info, int32_t c)
-{
-    const drape_cloth_def *def = &info->def.cloths[c];
-    const drape_pin *pin = info->model->pins;
-    json_t *pins = json_array();
-    for (int32_t i = 0; i < c; i++)
-        pin += info->def.cloths[i].pin_count;
-    for (size_t i = 0; i < def->pin_count; i++)
-        pins = drape_json_append(pins, pin_json(info->model, &pin[i], &def->pins[i]));
-    return pins;
-}
-
-json_t *cli_masses_json(const cli_info *info, int32_t c)
-{
-    const drape_cloth_def *def = &info->def.cloths[c];
-    json_t *masses = json_array();
-    for (size_t i = 0; i < def->mass_count; i++)
-        masses = drape_json_append(masses, cli_form_json(&drape_form_mass, &def->masses[i]));
-    return masses;
-}
-
-json_t *cli_periodic_json(const cli_info *info, int32_t c)
-{
-    const drape_cloth_def *def = &info->def.cloths[c];
-    json_t *periodic = json_array();
-    for (size_t i = 0; i < def->periodic_count; i++)
-        periodic = drape_json_append(periodic, cli_form_json(&drape_form_periodic, &def->periodic[i]));
-    return periodic;
-}
-
-json_t *cli_histories_json(const cli_info *info)
-{
-    json_t *histories = json_array();
-    for (size_t i = 0; i < info->def.history_count; i++)
-        histories = drape_json_append(histories, cli_form_json(&drape_form_history, &info->def.histories[i]));
-    return histories;
-}
-
-json_t *cli_start_json(const cli_info *info, int32_t c)
-{
-    const drape_scene_object *form = drape_scene_key_of(&drape_form_cloth, "start")->child;
-    drape_start_def defaults = {.file = NULL};
-    drape_scene_set_defaults(form, &defaults);
-    json_t *object = cli_form_json(form, &info->def.cloths[c].start), *rest = cli_form_json(form, &defaults);
-    if (json_equal(object, rest)) {
-        json_decref(object);
-        object = NULL;
-    }
-    json_decref(rest);
-    return object;
+    json_t *array = json_array();
+    for (size_t i = 0; i < count; i++)
+        array = drape_json_append(array, cli_form_json(info, form, (const char *)defs + i * form->def_size));
+    return array;
 }

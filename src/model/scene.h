@@ -122,10 +122,6 @@ void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size)
 /* Names the keys of which one must be given: "exactly one of grid, file"; "" without such a rule. */
 void drape_scene_one_of_text(const drape_scene_object *object, char *text, size_t size);
 
-/* Writes the value of a key in a def as text, also for a list of texts: "[0, 1, 0]", "npy, glb"; "" if none
- * is given. */
-void drape_scene_value_text(const drape_scene_key *key, const void *def, char *text, size_t size);
-
 /* Writes the default as text: "60", "required"; "" if there is nothing to say. */
 void drape_scene_default_text(const drape_scene_key *key, char *text, size_t size);
 

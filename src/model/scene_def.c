@@ -264,41 +264,13 @@ void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size)
              has_unit ? key->param.unit : "", key->at_least ? ", at least one" : "", most);
 }
 
-static size_t append(char *text, size_t size, size_t used, const char *separator, const char *word)
-{
-    return used < size ? used + (size_t)snprintf(text + used, size - used, "%s%s", separator, word) : used;
-}
-
 void drape_scene_one_of_text(const drape_scene_object *object, char *text, size_t size)
 {
     size_t used = 0;
     *text = 0;
-    for (int i = 0; object->one_of && object->one_of[i]; i++)
-        used = append(text, size, used, i ? ", " : "exactly one of ", object->one_of[i]);
-}
-
-void drape_scene_value_text(const drape_scene_key *key, const void *def, char *text, size_t size)
-{
-    const bool is_list = key->shape == DRAPE_SCENE_LIST;
-    const char *const *texts;
-    drape_setting value = {.text = NULL};
-    size_t used = 0, count = is_list ? drape_scene_texts(key, def, &texts) : 0;
-    char number[40];
-    *text = 0;
-    for (size_t i = 0; i < count; i++)
-        used = append(text, size, used, i ? ", " : "", texts[i]);
-    if (is_list || !drape_scene_value(key, def, &value))
-        return;
-    for (size_t i = 0; i < value.vector_count; i++) {
-        snprintf(number, sizeof number, "%.10g", value.vector[i]);
-        used = append(text, size, used, i ? ", " : "[", number);
-    }
-    if (value.vector)
-        append(text, size, used, "]", "");
-    else if (value.text)
-        snprintf(text, size, "%s", value.text);
-    else
-        drape_param_value_text(&key->param, &value.number, text, size);
+    for (int i = 0; object->one_of && object->one_of[i] && used < size; i++)
+        used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "exactly one of ",
+                                 object->one_of[i]);
 }
 
 void drape_scene_default_text(const drape_scene_key *key, char *text, size_t size)
