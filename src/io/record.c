@@ -104,7 +104,7 @@ drape_status drape_record_read(const drape_record *run, int64_t frame, double *x
     return drape_all_finite(x, size / 8)
                ? DRAPE_OK
                : drape_fail(run->ctx, DRAPE_E_PARSE,
-                            "\"%.500s/positions.npy\": frame %" PRId64 " has a number that is not finite",
+                            "\"%.500s/positions.npy\": frame %" PRId64 " has a position that is not finite",
                             run->folder, frame);
 }
 
