@@ -42,20 +42,6 @@ def page_is_alone(path):
     return text
 
 
-def test_names():
-    """names in the results of an experiment reach the terminal without what it would obey"""
-    write_scene()
-    good("tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t")
-    for path in "t/experiment.json", "t/cases.jsonl":
-        with open(path, encoding="utf-8") as file:
-            text = file.read()
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(re.sub('"be(?=[",])', lambda match: r'"b\u001b[31m\u009b\u202ee', text))
-    out = good("merge", "t", "--out", "m")
-    assert "the cheapest is b?[31m?????e" in out and not re.search("[\x1b\x9b\u202e]", out), out
-    assert len(out.splitlines()) > 3, out
-
-
 def test_tradeoff():
     """tradeoff runs every integrator, names its reference's error, and writes CSV, lines, pictures, a page"""
     write_scene()
