@@ -132,14 +132,6 @@ static void make_state(checker *c, const drape_state *rest)
         c->history[i] = uniform(c);
 }
 
-static double mean_edge(const drape_model *m)
-{
-    double sum = 0;
-    for (int32_t e = 0; e < m->edge_count; e++)
-        sum += m->edge_length[e];
-    return m->edge_count > 0 ? sum / m->edge_count : m->length;
-}
-
 /* ---- One term, element by element ---- */
 
 /* The results of a user-defined or built-in function for one element: a value, its gradient and Hessian. */
@@ -658,7 +650,7 @@ drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, u
     checker c = {.system = system,
                  .model = model,
                  .random = seed,
-                 .size = mean_edge(model),
+                 .size = drape_model_mean_edge(model),
                  .results = results,
                  .t = turning_time(model)};
     *result_count = 0;

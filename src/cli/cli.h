@@ -88,6 +88,10 @@ typedef struct drape_verb {
     int (*run)(const void *request); /* returns the exit code */
 } drape_verb;
 
+/* The members of a verb for an array of options that are read into a struct of this type. */
+#define CLI_OPTIONS(array, type)                                                                             \
+    .options = (array), .option_count = sizeof(array) / sizeof *(array), .request_size = sizeof(type)
+
 extern const drape_verb *const drape_verbs[]; /* NULL-ended */
 extern const drape_registry drape_verb_registry;
 

@@ -199,8 +199,6 @@ const drape_verb drape_verb_check = {
         "through its triangles, triangles that reach into a collider, and edges of either that pass through\n"
         "triangles of the other, with each collider where its track has it at that time. Prints a line for\n"
         "each frame and obstacle where there are any. Exit code 0: there are none.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(check_request),
+    CLI_OPTIONS(options, check_request),
     .run = run,
 };

@@ -19,8 +19,6 @@ const drape_verb drape_verb_converge = {
     .details = "Halves the step of every integrator repeatedly (ida: divides rtol by 10), and with --space "
                "the edges of\nthe grids. The distances between successive final states give the order and "
                "its confidence interval.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(cli_lab_request),
+    CLI_OPTIONS(options, cli_lab_request),
     .run = run,
 };

@@ -76,12 +76,6 @@ static int code_of(const cli_command *command, drape_status status)
                       status == DRAPE_E_SOLVER || status == DRAPE_E_MEMORY ? CLI_FAILED : CLI_BAD_INPUT);
 }
 
-static bool interrupted(void *user)
-{
-    (void)user;
-    return cli_interrupted();
-}
-
 static int do_scene(const ivp_request *request, ivp_deed *deed, const char *scene, const char *more)
 {
     const cli_command *command = &request->lab.command;
@@ -89,7 +83,7 @@ static int do_scene(const ivp_request *request, ivp_deed *deed, const char *scen
     lab_ivp s = {0};
     bool good = true;
     drape_status status = lab_ivp_open(&arena, scene, &s);
-    s.cancel = interrupted;
+    s.cancel = cli_interrupted_by;
     if (!status)
         status = deed(&s, request, more, &good);
     lab_ivp_close(&s);
@@ -165,8 +159,6 @@ const drape_verb drape_verb_ivp = {
         "by the\n"
         "same command. --case-seconds is also the CPU time that a method may take for a reference (default "
         "60).",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(ivp_request),
+    CLI_OPTIONS(options, ivp_request),
     .run = run,
 };

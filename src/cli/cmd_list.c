@@ -367,8 +367,6 @@ const drape_verb drape_verb_list = {
     .details = "Prints the keys of a scene and all that it can choose from, or one table, or one entry. The "
                "table\n`scene` has the keys of all objects of a scene; the name of an object, such as `pin`, "
                "shows its keys.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(list_request),
+    CLI_OPTIONS(options, list_request),
     .run = print_request,
 };

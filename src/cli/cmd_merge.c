@@ -35,8 +35,6 @@ const drape_verb drape_verb_merge = {
     .max_operands = 100000,
     .details = "Merges the results of an experiment that ran in parts (--shard I/N), and makes the report "
                "once all\ncases are done. If some are missing, it says how many.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(merge_request),
+    CLI_OPTIONS(options, merge_request),
     .run = merge,
 };

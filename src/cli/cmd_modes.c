@@ -248,8 +248,6 @@ const drape_verb drape_verb_modes = {
         "(gravity, load.line ...) at which K becomes singular, extrapolated linearly from that state: from\n"
         "the start, that is without loads, or from the equilibrium under all of them.\n"
         "With --out, DIR gets frames of one period of each mode, one after the other.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(modes_request),
+    CLI_OPTIONS(options, modes_request),
     .run = run,
 };

@@ -250,8 +250,6 @@ const drape_verb drape_verb_path = {
                "point has the number of modes in which it is unstable. A step that fails is made again with "
                "half its\n"
                "length. The scene has no colliders and no self-contact.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(path_request),
+    CLI_OPTIONS(options, path_request),
     .run = run,
 };

@@ -579,8 +579,6 @@ const drape_verb drape_verb_render = {
     .details =
         "Draws a scene, which it simulates, or a run, which `drape run --out` wrote. No display is needed.\n"
         "With --compare, several are drawn side by side in one picture or film.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(render_request),
+    CLI_OPTIONS(options, render_request),
     .run = run,
 };

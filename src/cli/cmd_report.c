@@ -48,8 +48,6 @@ const drape_verb drape_verb_report = {
     .details = "Writes one HTML file from RUN, the folder that `drape run SCENE --out RUN` wrote: the cloth "
                "in motion, plots of\nenergies and steps, the summary and the scene. A browser shows it "
                "without a network.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(report_request),
+    CLI_OPTIONS(options, report_request),
     .run = run,
 };

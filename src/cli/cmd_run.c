@@ -589,8 +589,6 @@ const drape_verb drape_verb_run = {
         "the run after the step in progress, or within it after half a second, and keeps what was "
         "written;\nbefore the first step, nothing is written. A run with --checkpoint-every that was killed "
         "resumes with --resume,\nand ends with the same results as a run that was not killed.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(run_request),
+    CLI_OPTIONS(options, run_request),
     .run = run_on_ranks,
 };

@@ -35,8 +35,6 @@ const drape_verb drape_verb_stability = {
         "cpu_s ... The same command with others draws them from the same cases.\nUses all cores unless "
         "--jobs says "
         "how many. After Ctrl-C, the same command resumes where it stopped.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(cli_lab_request),
+    CLI_OPTIONS(options, cli_lab_request),
     .run = run,
 };

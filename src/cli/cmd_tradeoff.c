@@ -28,8 +28,6 @@ const drape_verb drape_verb_tradeoff = {
         "solution whose\n"
         "own error is estimated. After Ctrl-C, or where cases were left out, the same command continues.\n"
         "Cases run one at a time, so that their CPU times can be compared; --jobs runs several.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(cli_lab_request),
+    CLI_OPTIONS(options, cli_lab_request),
     .run = run,
 };

@@ -161,12 +161,6 @@ static int find(const char *name, const drape_reference **only)
     return CLI_GO_ON;
 }
 
-static bool interrupted(void *user)
-{
-    (void)user;
-    return cli_interrupted();
-}
-
 /* The cases of a run, and how far it is. */
 typedef struct run {
     drape_context *ctx;
@@ -200,7 +194,8 @@ static drape_status run_cases(run *r, const validate_style *style, int counts[4]
         lab_record *record = &r->records[i];
         show_progress(r, i);
         if (!record->done) {
-            status = drape_validate(r->ctx, record->reference, record->index, interrupted, NULL, &record->v);
+            status = drape_validate(r->ctx, record->reference, record->index, cli_interrupted_by, NULL,
+                                    &record->v);
             record->done = !status;
             if (!status && r->file.open)
                 status = lab_record_keep(&r->file, record);
@@ -303,8 +298,6 @@ const drape_verb drape_verb_validate = {
                "form, a\nseries or a differential equation. Terms that are known to converge to another "
                "value are reported as a\ndocumented model error. Exit code 0: none failed. All references "
                "take four minutes of CPU time.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(validate_request),
+    CLI_OPTIONS(options, validate_request),
     .run = main_validate,
 };

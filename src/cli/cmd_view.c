@@ -584,8 +584,6 @@ const drape_verb drape_verb_view = {
     .details = "Opens a window, paused. Space runs and pauses, N makes one step, R starts again, Esc quits, "
                "H shows all\n"
                "keys. Drag a node with the left button; dragging elsewhere rotates the camera.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .request_size = sizeof(view_request),
+    CLI_OPTIONS(options, view_request),
     .run = run,
 };

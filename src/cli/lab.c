@@ -16,12 +16,6 @@ static void show(void *user, int64_t done, int64_t total, double seconds_left)
     cli_progress_count(user, done, total, seconds_left);
 }
 
-static bool interrupted(void *user)
-{
-    (void)user;
-    return cli_interrupted();
-}
-
 /* "1/4" */
 static int read_shard(const cli_lab_request *request, drape_lab_def *def)
 {
@@ -121,7 +115,7 @@ static int make_def(const cli_lab_request *request, int default_jobs, double def
     def->case_seconds = request->case_seconds > 0 ? request->case_seconds : def->case_seconds;
     def->strain_limit = request->strain_limit > 0 ? request->strain_limit : def->strain_limit;
     def->progress = show;
-    def->cancel = interrupted;
+    def->cancel = cli_interrupted_by;
     int code = read_levels(request, def);
     if (code == CLI_GO_ON)
         code = read_shard(request, def);

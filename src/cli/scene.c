@@ -48,12 +48,6 @@ static drape_status load(const cli_command *command, const char *path, cli_choos
     return status ? status : check_formats(s);
 }
 
-static bool interrupted(void *user)
-{
-    (void)user;
-    return cli_interrupted();
-}
-
 /* A warning that follows itself, as when a scene is read for several purposes, is printed once. */
 static void print_warning(void *user, drape_log_level level, const char *message)
 {
@@ -69,7 +63,7 @@ drape_status cli_context_create(drape_context **out)
 {
     drape_context_def def;
     drape_context_def_init(&def, sizeof def);
-    def.cancel = interrupted;
+    def.cancel = cli_interrupted_by;
     def.log = print_warning;
     return drape_context_create(&def, out);
 }

@@ -60,6 +60,12 @@ bool cli_interrupted(void)
     return interrupted != 0;
 }
 
+bool cli_interrupted_by(void *unused)
+{
+    (void)unused;
+    return interrupted != 0;
+}
+
 int cli_report_interrupted(const char *verb)
 {
     fflush(stdout);

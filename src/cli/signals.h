@@ -12,6 +12,7 @@
 void cli_catch_signals(void);
 
 bool cli_interrupted(void);
+bool cli_interrupted_by(void *unused); /* the same as a callback of the library */
 
 /* Sets the sim whose step in progress is cancelled half a second after a signal, unless it completes before.
  * NULL: none. */

@@ -76,17 +76,6 @@ static drape_status list_side(const pairing *p, const char *key, const drape_sel
     return status;
 }
 
-typedef struct placed {
-    double along;
-    int32_t node;
-} placed;
-
-static int compare(const void *a, const void *b)
-{
-    const placed *p = a, *q = b;
-    return p->along != q->along ? (p->along > q->along) - (p->along < q->along) : p->node - q->node;
-}
-
 /* The axis along which the nodes of a side extend most. */
 static int longest_axis(const side *s, const double *x)
 {
@@ -119,14 +108,14 @@ static drape_status match(pairing *p, drape_arena *scratch)
     const double *x = p->cloth->mesh.x, slip = SLIP * p->model->length;
     const size_t count = (size_t)p->to.count;
     const size_t axis = (size_t)longest_axis(&p->to, x);
-    placed *list = drape_arena_take(scratch, count, sizeof *list);
+    drape_placed *list = drape_arena_take(scratch, count, sizeof *list);
     p->partner = drape_arena_take(scratch, count, sizeof *p->partner);
     drape_status status = drape_arena_status(scratch);
     if (status)
         return status;
     for (size_t i = 0; i < count; i++)
-        list[i] = (placed){x[3 * (size_t)p->to.node[i] + axis], p->to.node[i]};
-    qsort(list, count, sizeof *list, compare);
+        list[i] = (drape_placed){x[3 * (size_t)p->to.node[i] + axis], p->to.node[i]};
+    qsort(list, count, sizeof *list, drape_compare_placed);
     for (size_t i = 0; !status && i < count; i++) {
         double at[3];
         size_t low = 0, high = count;

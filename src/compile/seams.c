@@ -50,24 +50,12 @@ static drape_status take_node(void *user, const char *key, int32_t local)
 
 /* ---- The order of a box ---- */
 
-typedef struct placed {
-    double along;
-    int32_t node;
-} placed;
-
-static int compare(const void *a, const void *b)
-{
-    const placed *p = a, *q = b;
-    return p->along != q->along ? (p->along > q->along) - (p->along < q->along)
-                                : (p->node > q->node) - (p->node < q->node);
-}
-
 /* Sorts the nodes along the longest side of their bounding box. */
 static drape_status sort(side *s, drape_arena *scratch)
 {
     const double *x = s->model->cloths[s->cloth].mesh.x;
     double low[3], high[3];
-    placed *list = drape_arena_take(scratch, (size_t)s->count, sizeof *list);
+    drape_placed *list = drape_arena_take(scratch, (size_t)s->count, sizeof *list);
     int axis = 0;
     if (!list)
         return DRAPE_E_MEMORY;
@@ -82,8 +70,8 @@ static drape_status sort(side *s, drape_arena *scratch)
     for (int k = 1; k < 3; k++)
         axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
     for (int32_t i = 0; i < s->count; i++)
-        list[i] = (placed){x[3 * (size_t)s->node[i] + (size_t)axis], s->node[i]};
-    qsort(list, (size_t)s->count, sizeof *list, compare);
+        list[i] = (drape_placed){x[3 * (size_t)s->node[i] + (size_t)axis], s->node[i]};
+    qsort(list, (size_t)s->count, sizeof *list, drape_compare_placed);
     for (int32_t i = 0; i < s->count; i++)
         s->node[i] = list[i].node;
     return DRAPE_OK;

@@ -123,3 +123,10 @@ drape_status drape_select_nodes(const drape_selection *s)
         return take_sides(s, "/edge", s->edge, s->edge);
     return s->has_box ? take_box(s) : take_row(s);
 }
+
+int drape_compare_placed(const void *a, const void *b)
+{
+    const drape_placed *p = a, *q = b;
+    return p->along != q->along ? (p->along > q->along) - (p->along < q->along)
+                                : (p->node > q->node) - (p->node < q->node);
+}

@@ -33,4 +33,11 @@ typedef struct drape_selection {
  * that is not in the mesh, nothing selected, or by more than one key), those of take. */
 drape_status drape_select_nodes(const drape_selection *selection);
 
+/* A node at a coordinate along an axis, and the order of these, for qsort: by coordinate, then by node. */
+typedef struct drape_placed {
+    double along;
+    int32_t node;
+} drape_placed;
+int drape_compare_placed(const void *a, const void *b);
+
 #endif

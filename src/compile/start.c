@@ -168,8 +168,7 @@ static drape_status read_velocities(drape_model *model, const char *pointer, con
     drape_arena scratch = drape_arena_of(model->ctx);
     drape_contents whole = {0};
     drape_npy_array array = {0};
-    const char *path = drape_contents_path(&scratch, folder, def->velocity_file);
-    drape_status status = path ? drape_contents_read(&scratch, place, path, &whole) : DRAPE_E_MEMORY;
+    drape_status status = drape_contents_read(&scratch, place, folder, def->velocity_file, &whole);
     if (!status)
         status = drape_npy_array_parse(model->ctx, &source, whole.data, whole.size, &array);
     if (!status && (array.dimensions != 2 || array.shape[0] != mesh->node_count || array.shape[1] != 3))

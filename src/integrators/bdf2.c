@@ -76,12 +76,12 @@ static void set_equation(bdf2_state *s, const drape_state *in, double a, double 
         e->v_base[at] = -w * dx;
         e->inertia[i] = dx + (in->v[at] + dv) / w;
     }
-    drape_implicit_momentum(c, in, c->momentum[0]);
+    drape_implicit_momentum(c, in->t, in->x, in->v, c->momentum[0]);
     drape_implicit_set_momenta(c, w, 1, c->momentum[0], a, a > 0 ? s->past.dp : NULL);
     e->point.history = c->history;
     if (!c->history)
         return;
-    drape_implicit_measure(c, in, s->q0);
+    drape_implicit_measure(c, in->t, in->x, s->q0);
     for (int64_t i = 0; i < e->model->measure_count; i++)
         c->history[i] = -w * (s->q0[i] + (a > 0 ? a * s->past.dq[i] : 0));
 }
@@ -97,13 +97,12 @@ static void remember(bdf2_state *s, const drape_state *in, const drape_state *ou
         s->made.dx[i] = out->x[i] - in->x[i];
         s->made.dv[i] = out->v[i] - in->v[i];
     }
-    drape_implicit_momentum(
-        c, &(drape_state){.t = out->t, .x = out->x, .v = out->v, .internal = in->internal}, c->momentum[1]);
+    drape_implicit_momentum(c, out->t, out->x, out->v, c->momentum[1]);
     for (size_t i = 0; s->made.dp && i < c->equation.nodes; i++)
         s->made.dp[i] = c->momentum[1][i] - c->momentum[0][i];
     if (!c->history)
         return;
-    drape_implicit_measure(c, &(drape_state){.t = out->t, .x = out->x, .internal = in->internal}, s->made.dq);
+    drape_implicit_measure(c, out->t, out->x, s->made.dq);
     for (int64_t i = 0; i < c->equation.model->measure_count; i++)
         s->made.dq[i] -= s->q0[i];
 }
@@ -173,10 +172,6 @@ const drape_integrator_ops drape_integrator_bdf2 = {
     .momenta = true,
     .step = step,
     .restart = restart,
-    .residual = drape_implicit_residual,
-    .tolerance = drape_implicit_tolerance,
-    .work = drape_implicit_work,
     .archive = archive,
-    .bytes = drape_implicit_bytes,
-    .destroy = drape_implicit_destroy,
+    DRAPE_IMPLICIT_OPS,
 };

@@ -38,12 +38,8 @@ const drape_integrator_ops drape_integrator_be = {
     .momenta = true,
     .step = step,
     .restart = drape_implicit_restart,
-    .residual = drape_implicit_residual,
-    .tolerance = drape_implicit_tolerance,
-    .work = drape_implicit_work,
     .archive = drape_implicit_archive,
-    .bytes = drape_implicit_bytes,
-    .destroy = drape_implicit_destroy,
+    DRAPE_IMPLICIT_OPS,
     .mean_velocities = true,
     .by_ranks = true,
 };

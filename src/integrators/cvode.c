@@ -43,7 +43,6 @@ static const drape_param params[PARAM_COUNT] = {
 typedef struct cvode_state {
     drape_first_order base;
     drape_cvode_log log;
-    double stop; /* [s] steps end there */
 } cvode_state;
 
 static drape_cvode_log *log_of(drape_first_order *f)
@@ -79,19 +78,17 @@ static bool configure(drape_first_order *f)
 {
     void *m = f->memory;
     DRAPE_CVODE_QUIET(m);
-    bool good = drape_cvode_log_init(log_of(f), m, rhs, f->y, f->newton.solver) && !CVodeSetUserData(m, f) &&
-                !CVodeSVtolerances(m, 0, f->weights) &&
-                !CVodeSetLinearSolver(m, f->linear->solver, f->linear->matrix) &&
-                !CVodeSetLinSysFn(m, system_matrix) && drape_sun_newton_set_test(&f->newton) &&
-                !CVodeSetMaxOrd(m, (int)f->values[DRAPE_FIRST_ORDER_ORDER]) &&
-                !CVodeSetMaxErrTestFails(m, DRAPE_FIRST_ORDER_ERROR_FAILS) &&
-                !CVodeSetMaxConvFails(m, DRAPE_FIRST_ORDER_SOLVER_FAILS) &&
-                !CVodeSetNonlinConvCoef(m, NEWTON_SHARE) && !CVodeSetDeltaGammaMaxLSetup(m, GAMMA_CHANGE) &&
-                !CVodeSetLSetupFrequency(m, SETUP_STEPS) && !CVodeSetMaxHnilWarns(m, -1) &&
-                !CVodeSetStabLimDet(m, f->values[PARAM_STABILITY_DETECTION] != 0);
-    if (good && !isnan(f->values[DRAPE_FIRST_ORDER_MAX_STEP]))
-        good = !CVodeSetMaxStep(m, f->values[DRAPE_FIRST_ORDER_MAX_STEP]);
-    return good;
+    return drape_cvode_log_init(log_of(f), m, rhs, f->y, f->newton.solver) && !CVodeSetUserData(m, f) &&
+           !CVodeSVtolerances(m, 0, f->weights) &&
+           !CVodeSetLinearSolver(m, f->linear->solver, f->linear->matrix) &&
+           !CVodeSetLinSysFn(m, system_matrix) && drape_sun_newton_set_test(&f->newton) &&
+           !CVodeSetMaxOrd(m, (int)f->values[DRAPE_FIRST_ORDER_ORDER]) &&
+           !CVodeSetMaxErrTestFails(m, DRAPE_FIRST_ORDER_ERROR_FAILS) &&
+           !CVodeSetMaxConvFails(m, DRAPE_FIRST_ORDER_SOLVER_FAILS) &&
+           !CVodeSetNonlinConvCoef(m, NEWTON_SHARE) && !CVodeSetDeltaGammaMaxLSetup(m, GAMMA_CHANGE) &&
+           !CVodeSetLSetupFrequency(m, SETUP_STEPS) && !CVodeSetMaxHnilWarns(m, -1) &&
+           !CVodeSetStabLimDet(m, f->values[PARAM_STABILITY_DETECTION] != 0) &&
+           !CVodeSetMaxStep(m, drape_first_order_max_step(f));
 }
 
 static bool create_cvode(drape_first_order *f)
@@ -104,12 +101,6 @@ static bool create_cvode(drape_first_order *f)
     return drape_cvode_log_create(log_of(f), f->arena, f->y) && f->memory && configure(f);
 }
 
-static void destroy_cvode(drape_first_order *f)
-{
-    if (f->memory)
-        CVodeFree(&f->memory);
-}
-
 static bool begin(drape_first_order *f, double t, double h)
 {
     return drape_cvode_log_begin(log_of(f), f->memory, t, h > 0 ? h : drape_first_order_first_step(f), f->y);
@@ -120,16 +111,10 @@ static bool must_begin(const drape_first_order *f)
     return drape_cvode_log_is_full(&((const cvode_state *)f)->log);
 }
 
-static bool stop_at(drape_first_order *f, double stop)
-{
-    ((cvode_state *)f)->stop = stop;
-    return true;
-}
-
 static drape_first_order_outcome step(drape_first_order *f, double end, double *t)
 {
     (void)end;
-    switch (drape_cvode_log_step(log_of(f), f->memory, ((cvode_state *)f)->stop, f->y, t)) {
+    switch (drape_cvode_log_step(log_of(f), f->memory, f->span[1], f->y, t)) {
     case CV_SUCCESS:
     case CV_TSTOP_RETURN:
         return DRAPE_FIRST_ORDER_STEPPED;
@@ -182,11 +167,14 @@ static int vectors(const drape_first_order *f)
 
 static const drape_first_order_solver solver = {
     .name = "CVODE",
+    .state_size = sizeof(cvode_state),
+    .param_count = PARAM_COUNT,
+    .loose_order = LOOSE_ORDER,
+    .tight_order = TIGHT_ORDER,
     .create = create_cvode,
-    .destroy = destroy_cvode,
+    .free = CVodeFree,
     .begin = begin,
     .must_begin = must_begin,
-    .stop_at = stop_at,
     .step = step,
     .last_step = CVodeGetLastStep,
     .current_step = CVodeGetCurrentStep,
@@ -199,10 +187,7 @@ static const drape_first_order_solver solver = {
 
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
-    cvode_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
-    return s ? drape_first_order_create(&s->base, &solver, arena, system, values, PARAM_COUNT, LOOSE_ORDER,
-                                        TIGHT_ORDER)
-             : DRAPE_E_MEMORY;
+    return drape_first_order_create(&solver, arena, system, values, state);
 }
 
 const drape_integrator_ops drape_integrator_cvode = {
@@ -212,15 +197,5 @@ const drape_integrator_ops drape_integrator_cvode = {
               DRAPE_PARAMS(params)},
     .order = 5,
     .create = create,
-    .own_steps = true,
-    .gain = DRAPE_FIRST_ORDER_GAIN,
-    .smooth_forces = true,
-    .step = drape_first_order_step,
-    .interpolate = drape_first_order_interpolate,
-    .interpolate_velocities = drape_first_order_interpolate_velocities,
-    .restart = drape_first_order_restart,
-    .work = drape_first_order_work,
-    .archive = drape_first_order_archive,
-    .bytes = drape_first_order_bytes,
-    .destroy = drape_first_order_destroy,
+    DRAPE_FIRST_ORDER_OPS,
 };

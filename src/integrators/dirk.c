@@ -90,7 +90,6 @@ typedef struct dirk_state {
     int64_t matrices;             /* factored before that step */
     double error;                 /* estimated local error of the last step relative to the tolerance */
     bool attempted;               /* a step, by this ARKODE */
-    double stop;                  /* [s] steps end there */
 } dirk_state;
 
 static int order_of(const dirk_state *s)
@@ -177,19 +176,17 @@ static bool configure(drape_first_order *f)
 {
     void *m = f->memory;
     DRAPE_ARKODE_QUIET(m);
-    bool good = !ARKStepSetUserData(m, f) && !ARKStepSVtolerances(m, 0, f->weights) &&
-                !ARKStepSetTableNum(m, methods[order_of((dirk_state *)f)].table, ARKODE_ERK_NONE) &&
-                !ARKStepSetLinearSolver(m, f->linear->solver, f->linear->matrix) &&
-                !ARKStepSetLinSysFn(m, system_matrix) && !ARKStepSetLinearSolutionScaling(m, SUNFALSE) &&
-                !ARKStepSetNonlinearSolver(m, f->newton.solver) && drape_sun_newton_set_test(&f->newton) &&
-                !ARKStepSetDeduceImplicitRhs(m, SUNTRUE) && !ARKStepSetStagePredictFn(m, predict) &&
-                !ARKStepSetMaxNonlinIters(m, MAX_CORRECTIONS) &&
-                !ARKStepSetMaxErrTestFails(m, DRAPE_FIRST_ORDER_ERROR_FAILS) &&
-                !ARKStepSetMaxConvFails(m, DRAPE_FIRST_ORDER_SOLVER_FAILS) &&
-                !ARKStepSetNonlinConvCoef(m, NEWTON_SHARE) && !ARKStepSetMaxHnilWarns(m, -1);
-    if (good && !isnan(f->values[DRAPE_FIRST_ORDER_MAX_STEP]))
-        good = !ARKStepSetMaxStep(m, f->values[DRAPE_FIRST_ORDER_MAX_STEP]);
-    return good;
+    return !ARKStepSetUserData(m, f) && !ARKStepSVtolerances(m, 0, f->weights) &&
+           !ARKStepSetTableNum(m, methods[order_of((dirk_state *)f)].table, ARKODE_ERK_NONE) &&
+           !ARKStepSetLinearSolver(m, f->linear->solver, f->linear->matrix) &&
+           !ARKStepSetLinSysFn(m, system_matrix) && !ARKStepSetLinearSolutionScaling(m, SUNFALSE) &&
+           !ARKStepSetNonlinearSolver(m, f->newton.solver) && drape_sun_newton_set_test(&f->newton) &&
+           !ARKStepSetDeduceImplicitRhs(m, SUNTRUE) && !ARKStepSetStagePredictFn(m, predict) &&
+           !ARKStepSetMaxNonlinIters(m, MAX_CORRECTIONS) &&
+           !ARKStepSetMaxErrTestFails(m, DRAPE_FIRST_ORDER_ERROR_FAILS) &&
+           !ARKStepSetMaxConvFails(m, DRAPE_FIRST_ORDER_SOLVER_FAILS) &&
+           !ARKStepSetNonlinConvCoef(m, NEWTON_SHARE) && !ARKStepSetMaxHnilWarns(m, -1) &&
+           !ARKStepSetMaxStep(m, drape_first_order_max_step(f));
 }
 
 static bool create_arkode(drape_first_order *f)
@@ -211,15 +208,12 @@ static bool create_arkode(drape_first_order *f)
     return f->memory && configure(f);
 }
 
-static void destroy_arkode(drape_first_order *f)
+static void destroy_vectors(drape_first_order *f)
 {
-    dirk_state *s = (dirk_state *)f;
-    if (f->memory)
-        ARKStepFree(&f->memory);
-    N_Vector vectors[] = {s->before, s->rate_before, s->far};
-    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
-        if (vectors[i])
-            N_VDestroy(vectors[i]);
+    const dirk_state *s = (dirk_state *)f;
+    N_VDestroy(s->before);
+    N_VDestroy(s->rate_before);
+    N_VDestroy(s->far);
 }
 
 static bool begin(drape_first_order *f, double t, double h)
@@ -228,12 +222,6 @@ static bool begin(drape_first_order *f, double t, double h)
     s->t = t;
     s->next = h > 0 ? h : isnan(fixed_step(s)) ? drape_first_order_first_step(f) : fixed_step(s);
     s->error = 1;
-    return true;
-}
-
-static bool stop_at(drape_first_order *f, double stop)
-{
-    ((dirk_state *)f)->stop = stop;
     return true;
 }
 
@@ -291,7 +279,7 @@ static void choose_next(dirk_state *s)
     if (growth > 1 && growth < KEEP)
         growth = 1;
     s->next = limit_effort(s, growth) * s->h;
-    if (attempts == 1 && s->t == s->stop)
+    if (attempts == 1 && s->t == f->span[1])
         s->next = fmax(s->next, chosen);
     s->error = error;
 }
@@ -320,7 +308,7 @@ static drape_first_order_outcome step(drape_first_order *f, double end, double *
     int (*const set_size)(void *, sunrealtype) =
         isnan(fixed_step(s)) ? ARKStepSetInitStep : ARKStepSetFixedStep;
     if (ARKStepReInit(m, NULL, rhs, s->t, s->before) || set_size(m, s->next) ||
-        ARKStepSetStopTime(m, s->stop))
+        ARKStepSetStopTime(m, f->span[1]))
         return DRAPE_FIRST_ORDER_REFUSED;
     drape_reserve reserve = {.used = false}; /* the first call takes memory */
     drape_status memory =
@@ -396,10 +384,14 @@ static int vectors(const drape_first_order *f)
 
 static const drape_first_order_solver solver = {
     .name = "ARKODE",
+    .state_size = sizeof(dirk_state),
+    .param_count = PARAM_COUNT,
+    .loose_order = LOOSE_ORDER,
+    .tight_order = TIGHT_ORDER,
     .create = create_arkode,
-    .destroy = destroy_arkode,
+    .free = ARKStepFree,
+    .destroy_vectors = destroy_vectors,
     .begin = begin,
-    .stop_at = stop_at,
     .step = step,
     .last_step = ARKStepGetLastStep,
     .current_step = ARKStepGetCurrentStep,
@@ -412,10 +404,7 @@ static const drape_first_order_solver solver = {
 
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
-    dirk_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
-    return s ? drape_first_order_create(&s->base, &solver, arena, system, values, PARAM_COUNT, LOOSE_ORDER,
-                                        TIGHT_ORDER)
-             : DRAPE_E_MEMORY;
+    return drape_first_order_create(&solver, arena, system, values, state);
 }
 
 const drape_integrator_ops drape_integrator_dirk = {
@@ -425,16 +414,6 @@ const drape_integrator_ops drape_integrator_dirk = {
               DRAPE_PARAMS(params)},
     .order = 5,
     .create = create,
-    .own_steps = true,
     .order_parameter = "order",
-    .gain = DRAPE_FIRST_ORDER_GAIN,
-    .smooth_forces = true,
-    .step = drape_first_order_step,
-    .interpolate = drape_first_order_interpolate,
-    .interpolate_velocities = drape_first_order_interpolate_velocities,
-    .restart = drape_first_order_restart,
-    .work = drape_first_order_work,
-    .archive = drape_first_order_archive,
-    .bytes = drape_first_order_bytes,
-    .destroy = drape_first_order_destroy,
+    DRAPE_FIRST_ORDER_OPS,
 };

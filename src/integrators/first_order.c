@@ -18,11 +18,6 @@ enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
 /* Fraction of the time: steps whose sum ends this near to the end of an advance end there. What is left is
  * the sum's rounding error, which the schedule does not step over. */
 #define LANDED (1e3 * DBL_EPSILON)
-/* Of the time in which the scene moves by its size. What comes too near crosses the least gap of contact,
- * 1e-3 of a thickness, in longer steps at any speed that it can have, so steps as short as this, one
- * after the other, lead nowhere. A few may start the solver. */
-#define LEAST_STEP 1e-10
-#define MAX_TINY   20
 /* Relative residual of iterative linear solvers. IDA allows them 0.05 of the bound of the Newton iteration,
  * here 0.1 of the error tolerance. With this, corrections of up to 50 tolerances are within that; a larger
  * one does not end the iteration. */
@@ -42,6 +37,17 @@ static void place_pins(drape_first_order *s, double t)
                                   s->v + 3 * (size_t)m->moved_node[i]);
 }
 
+/* s->x, s->v at time t. */
+static drape_point point_at(const drape_first_order *s, double t)
+{
+    return (drape_point){.x = s->x,
+                         .v = s->v,
+                         .internal = s->internal,
+                         .t = t,
+                         .span = {s->span[0], s->span[1]},
+                         .instant = true};
+}
+
 static drape_point place(drape_first_order *s, double t, const double *y)
 {
     place_pins(s, t);
@@ -51,12 +57,7 @@ static drape_point place(drape_first_order *s, double t, const double *y)
     }
     if (s->ranks)
         s->ranks->fetch(s->ranks, (double *[]){s->x, s->v}, 2);
-    return (drape_point){.x = s->x,
-                         .v = s->v,
-                         .internal = s->internal,
-                         .t = t,
-                         .span = {s->span[0], s->span[1]},
-                         .instant = true};
+    return point_at(s, t);
 }
 
 /* ---- Residual ---- */
@@ -254,12 +255,7 @@ static void measure_powers(drape_first_order *s, double t, double powers[2])
 {
     const drape_model *m = s->model;
     const drape_motion *motion = s->motion;
-    const drape_point point = {.x = s->x,
-                               .v = s->v,
-                               .internal = s->internal,
-                               .t = t,
-                               .span = {s->span[0], s->span[1]},
-                               .instant = true};
+    const drape_point point = point_at(s, t);
     powers[0] = powers[1] = 0;
     if (s->dissipated) {
         drape_system_dissipation(s->system, &point, s->dissipated);
@@ -342,10 +338,8 @@ static bool exhausted(drape_first_order *s, const drape_state *in, drape_step_in
 /* Stops a run whose steps have become so small that it no longer moves, as where nothing can yield. */
 static drape_status check_step_size(drape_first_order *s, double h, bool last, drape_step_info *info)
 {
-    s->tiny = h < s->least_step && !last ? s->tiny + 1 : 0;
-    if (s->tiny <= MAX_TINY)
+    if (drape_step_moves(h, s->size, s->speed, last, &s->tiny))
         return DRAPE_OK;
-    s->tiny = 0;
     info->h = h;
     s->crossing = s->crossed;
     info->reason = s->crossing ? s->crossing_reason : drape_reason_name(DRAPE_REASON_ERROR_TEST);
@@ -405,7 +399,7 @@ static drape_status prepare(drape_first_order *s, const drape_state *in, double 
             return status;
         measure_powers(s, in->t, s->powers);
     }
-    return s->solver->stop_at(s, stop) ? DRAPE_OK : DRAPE_E_SOLVER;
+    return DRAPE_OK;
 }
 
 static drape_status status_of(drape_first_order_outcome outcome, bool nonfinite, const char **reason)
@@ -552,15 +546,16 @@ static void create_arrays(drape_first_order *s)
 }
 
 /* Derived defaults, and the weights that follow from them. */
-static void set_tolerances(drape_first_order *s, int loose_order, int tight_order)
+static void set_tolerances(drape_first_order *s)
 {
-    double rtol = s->values[DRAPE_FIRST_ORDER_RTOL], size = NAN, speed = NAN;
+    const double rtol = s->values[DRAPE_FIRST_ORDER_RTOL];
     drape_derive_tolerances(s->model, rtol, &s->values[DRAPE_FIRST_ORDER_ATOL_X],
                             &s->values[DRAPE_FIRST_ORDER_ATOL_V]);
-    drape_derive_tolerances(s->model, 1, &size, &speed);
-    s->least_step = LEAST_STEP * size / speed;
+    s->size = s->speed = NAN;
+    drape_derive_tolerances(s->model, 1, &s->size, &s->speed);
     if (isnan(s->values[DRAPE_FIRST_ORDER_ORDER]))
-        s->values[DRAPE_FIRST_ORDER_ORDER] = rtol >= DRAPE_FIRST_ORDER_TIGHT ? loose_order : tight_order;
+        s->values[DRAPE_FIRST_ORDER_ORDER] =
+            rtol >= DRAPE_FIRST_ORDER_TIGHT ? s->solver->loose_order : s->solver->tight_order;
     double *w = N_VGetArrayPointer(s->weights);
     for (int64_t i = 0; i < s->n; i++) {
         w[i] = s->values[DRAPE_FIRST_ORDER_ATOL_X];
@@ -581,11 +576,13 @@ static drape_status create_vectors(drape_first_order *s)
     return DRAPE_OK;
 }
 
-drape_status drape_first_order_create(drape_first_order *s, const drape_first_order_solver *solver,
-                                      drape_arena *arena, drape_system *system, const double *values,
-                                      int param_count, int loose_order, int tight_order)
+drape_status drape_first_order_create(const drape_first_order_solver *solver, drape_arena *arena,
+                                      drape_system *system, const double *values, void **state)
 {
     drape_context *ctx = arena->ctx;
+    drape_first_order *s = *state = drape_arena_take(arena, 1, solver->state_size);
+    if (drape_ranks_agree_memory(drape_model_ranks(drape_system_model(system)), ctx, s))
+        return DRAPE_E_MEMORY;
     s->solver = solver;
     s->arena = arena;
     s->system = system;
@@ -595,7 +592,7 @@ drape_status drape_first_order_create(drape_first_order *s, const drape_first_or
     s->exact_span = 1;
     s->reached = s->from = NAN;
     s->n = 3 * (int64_t)s->model->free_count;
-    memcpy(s->values, values, (size_t)param_count * sizeof *values);
+    memcpy(s->values, values, (size_t)solver->param_count * sizeof *values);
     create_arrays(s);
     drape_reserve reserve = {.used = false};
     drape_status status = drape_arena_status(arena);
@@ -608,7 +605,7 @@ drape_status drape_first_order_create(drape_first_order *s, const drape_first_or
         status = create_vectors(s);
     status = drape_ranks_agree(s->ranks, ctx, status);
     if (!status && s->n > 0)
-        set_tolerances(s, loose_order, tight_order);
+        set_tolerances(s);
     if (!status && s->n > 0)
         status = drape_sun_linear_create(
             arena, s->sun, drape_linear_of(s->ranks, (int)values[DRAPE_FIRST_ORDER_LINEAR_SOLVER]),
@@ -632,15 +629,16 @@ void drape_first_order_destroy(void **state)
     if (!s)
         return;
     if (s->solver)
-        s->solver->destroy(s);
+        s->solver->free(&s->memory);
+    if (s->solver && s->solver->destroy_vectors)
+        s->solver->destroy_vectors(s);
     drape_sun_newton_free(&s->newton);
     drape_sun_linear_destroy(&s->linear);
-    N_Vector vectors[] = {s->y, s->rate, s->weights, s->between};
-    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
-        if (vectors[i])
-            N_VDestroy(vectors[i]);
-    if (s->sun)
-        SUNContext_Free(&s->sun);
+    N_VDestroy(s->y);
+    N_VDestroy(s->rate);
+    N_VDestroy(s->weights);
+    N_VDestroy(s->between);
+    SUNContext_Free(&s->sun);
     *state = NULL;
 }
 
@@ -649,14 +647,7 @@ void drape_first_order_destroy(void **state)
 drape_work drape_first_order_work(const void *state)
 {
     const drape_first_order *s = state;
-    drape_work work = s->work;
-    if (s->linear) {
-        work.factorizations = s->linear->factorizations;
-        work.linear_iterations = s->linear->iterations;
-        work.factor_seconds = s->linear->factor_seconds;
-        work.solve_seconds = s->linear->solve_seconds;
-    }
-    return work;
+    return drape_work_with_linear(s->work, s->linear);
 }
 
 /* Its factors are kept between steps, with c_j and D. */
@@ -688,7 +679,7 @@ void drape_first_order_archive(void *state, drape_archive *a)
     drape_archive_int64(a, &s->tiny);
     drape_archive_int64(a, &s->steps);
     drape_archive_int64(a, &counted);
-    if (a->reading && !(counted >= 0 && s->tiny >= 0 && s->tiny <= MAX_TINY && s->steps >= 0 &&
+    if (a->reading && !(counted >= 0 && s->tiny >= 0 && s->tiny <= DRAPE_MAX_TINY_STEPS && s->steps >= 0 &&
                         (double)s->steps <= s->values[DRAPE_FIRST_ORDER_MAX_STEPS]))
         drape_archive_fail(a, DRAPE_E_PARSE,
                            "the checkpoint has an impossible number of steps or iterations");

@@ -55,12 +55,8 @@ enum {
 #define DRAPE_FIRST_ORDER_PARAMS(order_param)                                                                \
     [DRAPE_FIRST_ORDER_RTOL] = DRAPE_RTOL_PARAM, [DRAPE_FIRST_ORDER_ATOL_X] = DRAPE_ATOL_X_PARAM,            \
     [DRAPE_FIRST_ORDER_ATOL_V] = DRAPE_ATOL_V_PARAM, [DRAPE_FIRST_ORDER_ORDER] = order_param,                \
-    [DRAPE_FIRST_ORDER_MAX_STEP] =                                                                           \
-        DRAPE_NUMBER("max_step", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),           \
-    [DRAPE_FIRST_ORDER_MAX_STEPS] =                                                                          \
-        DRAPE_INTEGER("max_steps", "1/s", 100000, 1, 1e9,                                                    \
-                      "largest number of steps within one second of simulated time, not counting those "     \
-                      "that end an advance; one more ends the run"),                                         \
+    [DRAPE_FIRST_ORDER_MAX_STEP] = DRAPE_MAX_STEP_PARAM,                                                     \
+    [DRAPE_FIRST_ORDER_MAX_STEPS] = DRAPE_MAX_STEPS_PARAM,                                                   \
     [DRAPE_FIRST_ORDER_LINEAR_SOLVER] =                                                                      \
         DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver",                     \
                      .aliases = drape_linears_aliases),                                                      \
@@ -73,9 +69,15 @@ extern const char *const drape_first_order_matrices[];
 #define DRAPE_FIRST_ORDER_TIGHT        1e-4 /* rtol below which the higher order is the default */
 #define DRAPE_FIRST_ORDER_ERROR_FAILS  10   /* error test failures in one step */
 #define DRAPE_FIRST_ORDER_SOLVER_FAILS 10   /* convergence failures in one step */
-/* Share of the energy of a scene. At rtol 1e-3 the energy of a smooth fall oscillates by half a percent: a
- * larger gain means that waves are amplified. */
-#define DRAPE_FIRST_ORDER_GAIN 0.02
+
+/* The part of an integrator that all have in common; the functions are declared below. */
+#define DRAPE_FIRST_ORDER_OPS                                                                                \
+    .own_steps = true, .gain = DRAPE_LOCAL_ERROR_GAIN, .smooth_forces = true,                                \
+    .step = drape_first_order_step, .interpolate = drape_first_order_interpolate,                            \
+    .interpolate_velocities = drape_first_order_interpolate_velocities,                                      \
+    .restart = drape_first_order_restart, .work = drape_first_order_work,                                    \
+    .archive = drape_first_order_archive, .bytes = drape_first_order_bytes,                                  \
+    .destroy = drape_first_order_destroy
 
 typedef struct drape_first_order drape_first_order;
 
@@ -91,17 +93,20 @@ typedef enum drape_first_order_outcome {
     DRAPE_FIRST_ORDER_MEMORY    /* ran out */
 } drape_first_order_outcome;
 
-/* A solver of SUNDIALS. Its functions may assume that there are free DOFs, except `destroy`. */
+/* A solver of SUNDIALS. Its functions may assume that there are free DOFs, except those that free. */
 typedef struct drape_first_order_solver {
-    const char *name; /* for messages */
+    const char *name;             /* for messages */
+    size_t state_size;            /* of the state of the entry */
+    int param_count;              /* of the entry */
+    int loose_order, tight_order; /* defaults of the order: for rtol >= DRAPE_FIRST_ORDER_TIGHT, and below */
     /* Creates f->memory with all settings, from f->y and f->rate; attaches f->linear and f->newton. */
     bool (*create)(drape_first_order *f);
-    void (*destroy)(drape_first_order *f);
+    void (*free)(void **memory);                   /* of the library */
+    void (*destroy_vectors)(drape_first_order *f); /* of the entry; NULL: it has none */
     /* Restarts at t from y, y' in f->y, f->rate with a first step of h at most; 0: it chooses. */
     bool (*begin)(drape_first_order *f, double t, double h);
-    bool (*must_begin)(const drape_first_order *f);     /* it has to restart; NULL: never by itself */
-    bool (*stop_at)(drape_first_order *f, double stop); /* steps end there */
-    /* One step towards end. *t: where it ended, y there in f->y. */
+    bool (*must_begin)(const drape_first_order *f); /* it has to restart; NULL: never by itself */
+    /* One step towards end, at most to f->span[1]. *t: where it ended, y there in f->y. */
     drape_first_order_outcome (*step)(drape_first_order *f, double end, double *t);
     int (*last_step)(void *memory, sunrealtype *h);
     int (*current_step)(void *memory, sunrealtype *h);
@@ -148,8 +153,8 @@ struct drape_first_order {
     double from;            /* [s] time at which the last successful step began; NAN: none */
     double powers[2];       /* [W] power of dissipation; power of pins; both at the time reached */
     double second;          /* [s] beginning of the second of simulated time in which steps are counted */
-    double least_step;      /* [s] */
-    int64_t tiny;           /* steps in a row that were shorter than that */
+    double size, speed;     /* [m], [m/s]: of the scene, by which time is measured */
+    int64_t tiny;           /* tiny steps in a row: drape_step_moves */
     int64_t steps;          /* attempted in that second, except those that end an advance */
     long counted;           /* Newton iterations of the library that `work` contains already */
     drape_work work;
@@ -174,6 +179,12 @@ void drape_first_order_force(drape_first_order *f, double t, const double *y);
 /* To be called with what follows from that force, `out` (2 n). 0; > 0: not finite, or it crosses contact;
  * < 0: fatal. start: the time at which the evaluation began [s of drape_system_clock]. */
 int drape_first_order_judge(drape_first_order *f, double t, const double *out, double start);
+/* The largest step as SUNDIALS takes it: 0 stands for none [s]. */
+static inline double drape_first_order_max_step(const drape_first_order *f)
+{
+    const double max = f->values[DRAPE_FIRST_ORDER_MAX_STEP];
+    return max > 0 ? max : 0; /* none is NaN */
+}
 /* y' = (v, -M^-1 g): a callback of CVODE and ARKODE; user: the drape_first_order. */
 int drape_first_order_rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user);
 /* Weighted root mean square of a vector: 1 is the tolerance. */
@@ -192,11 +203,10 @@ int drape_first_order_solve_rhs(SUNLinearSolver solver, SUNMatrix matrix, N_Vect
 
 /* ---- For an entry of the table; `state` begins with a drape_first_order ---- */
 
-/* Fills f, which is zero, with the solver and its parameters. An order that is derived is loose_order for
- * rtol >= 1e-4, else tight_order. Errors: out of memory; it must be destroyed after one, too. */
-drape_status drape_first_order_create(drape_first_order *f, const drape_first_order_solver *solver,
-                                      drape_arena *arena, drape_system *system, const double *values,
-                                      int param_count, int loose_order, int tight_order);
+/* Creates the state of an entry with the solver and its parameters. Errors: out of memory; it must be
+ * destroyed after one, too. */
+drape_status drape_first_order_create(const drape_first_order_solver *solver, drape_arena *arena,
+                                      drape_system *system, const double *values, void **state);
 drape_status drape_first_order_step(void *state, const drape_state *in, drape_state *out, double h,
                                     drape_step_info *info);
 void drape_first_order_interpolate(void *state, double t, double *x);

@@ -153,14 +153,8 @@ static void settle(alpha_state *s, const drape_state *in)
 static void evaluate_start(alpha_state *s, const drape_state *in, double h)
 {
     const drape_step_equation *e = &s->common.equation;
-    const drape_point start = {.x = in->x,
-                               .v = s->v0,
-                               .internal = in->internal,
-                               .t = in->t,
-                               .span = {e->point.span[0], e->point.span[1]},
-                               .instant = true};
     const bool known = s->known == in->t;
-    drape_system_force(e->system, &start, s->g0);
+    drape_implicit_force_at_start(&s->common, in, s->v0, s->g0);
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
         const double now = -s->g0[at] / e->model->mass[at / 3];
@@ -195,10 +189,6 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_implicit_base(common, in, out->t, h);
     common->equation.point.instant = true;
     memset(s->v0, 0, e->nodes * sizeof *s->v0);
-    for (size_t i = 0; i < e->dofs; i++) {
-        const size_t at = drape_step_equation_at(e, i);
-        s->v0[at] = in->v[at];
-    }
     move_pins(s, in, out->t, h);
     settle(s, in);
     const bool kink = drape_motion_at_kink(common->motion, in->t);
@@ -260,10 +250,6 @@ const drape_integrator_ops drape_integrator_generalized_alpha = {
     .step = step,
     .smooth_forces = true,
     .restart = restart,
-    .residual = drape_implicit_residual,
-    .tolerance = drape_implicit_tolerance,
-    .work = drape_implicit_work,
     .archive = archive,
-    .bytes = drape_implicit_bytes,
-    .destroy = drape_implicit_destroy,
+    DRAPE_IMPLICIT_OPS,
 };

@@ -52,18 +52,16 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
 static bool configure(drape_first_order *s)
 {
     DRAPE_IDA_QUIET(s->memory);
-    bool good = !IDAInit(s->memory, residual, 0, s->y, s->rate) && !IDASetUserData(s->memory, s) &&
-                !IDASVtolerances(s->memory, 0, s->weights) &&
-                !IDASetLinearSolver(s->memory, s->linear->solver, s->linear->matrix) &&
-                !IDASetNonlinearSolver(s->memory, s->newton.solver) &&
-                drape_sun_newton_set_test(&s->newton) && !IDASetJacFn(s->memory, jacobian) &&
-                !IDASetMaxOrd(s->memory, (int)s->values[DRAPE_FIRST_ORDER_ORDER]) &&
-                !IDASetMaxErrTestFails(s->memory, DRAPE_FIRST_ORDER_ERROR_FAILS) &&
-                !IDASetMaxConvFails(s->memory, DRAPE_FIRST_ORDER_SOLVER_FAILS) &&
-                !IDASetNonlinConvCoef(s->memory, NEWTON_SHARE) && !IDASetDeltaCjLSetup(s->memory, CJ_CHANGE);
-    if (good && !isnan(s->values[DRAPE_FIRST_ORDER_MAX_STEP]))
-        good = !IDASetMaxStep(s->memory, s->values[DRAPE_FIRST_ORDER_MAX_STEP]);
-    return good;
+    return !IDAInit(s->memory, residual, 0, s->y, s->rate) && !IDASetUserData(s->memory, s) &&
+           !IDASVtolerances(s->memory, 0, s->weights) &&
+           !IDASetLinearSolver(s->memory, s->linear->solver, s->linear->matrix) &&
+           !IDASetNonlinearSolver(s->memory, s->newton.solver) && drape_sun_newton_set_test(&s->newton) &&
+           !IDASetJacFn(s->memory, jacobian) &&
+           !IDASetMaxOrd(s->memory, (int)s->values[DRAPE_FIRST_ORDER_ORDER]) &&
+           !IDASetMaxErrTestFails(s->memory, DRAPE_FIRST_ORDER_ERROR_FAILS) &&
+           !IDASetMaxConvFails(s->memory, DRAPE_FIRST_ORDER_SOLVER_FAILS) &&
+           !IDASetNonlinConvCoef(s->memory, NEWTON_SHARE) && !IDASetDeltaCjLSetup(s->memory, CJ_CHANGE) &&
+           !IDASetMaxStep(s->memory, drape_first_order_max_step(s));
 }
 
 static bool create_ida(drape_first_order *s)
@@ -76,24 +74,15 @@ static bool create_ida(drape_first_order *s)
     return true;
 }
 
-static void destroy_ida(drape_first_order *s)
-{
-    if (s->memory)
-        IDAFree(&s->memory);
-}
-
 static bool begin(drape_first_order *s, double t, double h)
 {
     return !IDAReInit(s->memory, t, s->y, s->rate) && !IDASetInitStep(s->memory, h);
 }
 
-static bool stop_at(drape_first_order *s, double stop)
-{
-    return !IDASetStopTime(s->memory, stop);
-}
-
 static drape_first_order_outcome step(drape_first_order *s, double end, double *t)
 {
+    if (IDASetStopTime(s->memory, s->span[1]))
+        return DRAPE_FIRST_ORDER_REFUSED;
     switch (IDASolve(s->memory, end, t, s->y, s->rate, IDA_ONE_STEP)) {
     case IDA_SUCCESS:
     case IDA_TSTOP_RETURN:
@@ -140,10 +129,13 @@ static int vectors(const drape_first_order *s)
 
 static const drape_first_order_solver solver = {
     .name = "IDA",
+    .state_size = sizeof(drape_first_order),
+    .param_count = DRAPE_FIRST_ORDER_OWN,
+    .loose_order = LOOSE_ORDER,
+    .tight_order = TIGHT_ORDER,
     .create = create_ida,
-    .destroy = destroy_ida,
+    .free = IDAFree,
     .begin = begin,
-    .stop_at = stop_at,
     .step = step,
     .last_step = IDAGetLastStep,
     .current_step = IDAGetCurrentStep,
@@ -156,12 +148,7 @@ static const drape_first_order_solver solver = {
 
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
-    drape_first_order *s = *state = drape_arena_take(arena, 1, sizeof *s);
-    const drape_status status =
-        drape_ranks_agree_memory(drape_model_ranks(drape_system_model(system)), arena->ctx, s);
-    return status ? status
-                  : drape_first_order_create(s, &solver, arena, system, values, DRAPE_FIRST_ORDER_OWN,
-                                             LOOSE_ORDER, TIGHT_ORDER);
+    return drape_first_order_create(&solver, arena, system, values, state);
 }
 
 const drape_integrator_ops drape_integrator_ida = {
@@ -171,16 +158,6 @@ const drape_integrator_ops drape_integrator_ida = {
               DRAPE_PARAMS(params)},
     .order = 5,
     .create = create,
-    .own_steps = true,
     .by_ranks = true,
-    .gain = DRAPE_FIRST_ORDER_GAIN,
-    .smooth_forces = true,
-    .step = drape_first_order_step,
-    .interpolate = drape_first_order_interpolate,
-    .interpolate_velocities = drape_first_order_interpolate_velocities,
-    .restart = drape_first_order_restart,
-    .work = drape_first_order_work,
-    .archive = drape_first_order_archive,
-    .bytes = drape_first_order_bytes,
-    .destroy = drape_first_order_destroy,
+    DRAPE_FIRST_ORDER_OPS,
 };

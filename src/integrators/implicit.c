@@ -81,22 +81,35 @@ void drape_implicit_backward_euler(drape_implicit *s, const drape_state *in, dou
     e->mass_weight = mass_weight;
     for (size_t i = 0; i < e->dofs; i++)
         e->inertia[i] = h * in->v[drape_step_equation_at(e, i)];
-    drape_implicit_momentum(s, in, s->momentum[0]);
+    drape_implicit_momentum(s, in->t, in->x, in->v, s->momentum[0]);
     drape_implicit_set_momenta(s, 1 / h, 1, s->momentum[0], 0, NULL);
     e->point.history = s->history;
     if (!s->history)
         return;
-    drape_implicit_measure(s, in, s->history);
+    drape_implicit_measure(s, in->t, in->x, s->history);
     for (int64_t i = 0; i < e->model->measure_count; i++)
         s->history[i] /= -h;
 }
 
-void drape_implicit_momentum(drape_implicit *s, const drape_state *at, double *p)
+void drape_implicit_force_at_start(const drape_implicit *s, const drape_state *in, double *v, double *g)
 {
+    const drape_step_equation *e = &s->equation;
+    for (size_t i = 0; i < e->dofs; i++)
+        v[drape_step_equation_at(e, i)] = in->v[drape_step_equation_at(e, i)];
+    const drape_point start = {.x = in->x,
+                               .v = v,
+                               .internal = in->internal,
+                               .t = in->t,
+                               .span = {e->point.span[0], e->point.span[1]},
+                               .instant = true};
+    drape_system_force(e->system, &start, g);
+}
+
+void drape_implicit_momentum(const drape_implicit *s, double t, const double *x, const double *v, double *p)
+{
+    const drape_point point = {.x = x, .v = v, .internal = s->equation.point.internal, .t = t};
     if (s->equation.momentum)
-        drape_system_momentum(s->equation.system,
-                              &(drape_point){.x = at->x, .v = at->v, .internal = at->internal, .t = at->t},
-                              p);
+        drape_system_momentum(s->equation.system, &point, p);
 }
 
 void drape_implicit_set_momenta(drape_implicit *s, double rate, double a, const double *p_a, double b,
@@ -108,11 +121,11 @@ void drape_implicit_set_momenta(drape_implicit *s, double rate, double a, const 
         e->momentum[i] = -rate * (a * p_a[i] + (p_b ? b * p_b[i] : 0));
 }
 
-void drape_implicit_measure(drape_implicit *s, const drape_state *state, double *q)
+void drape_implicit_measure(const drape_implicit *s, double t, const double *x, double *q)
 {
+    const drape_point point = {.x = x, .internal = s->equation.point.internal, .t = t};
     if (s->history)
-        drape_system_measures(s->equation.system,
-                              &(drape_point){.x = state->x, .internal = state->internal, .t = state->t}, q);
+        drape_system_measures(s->equation.system, &point, q);
 }
 
 drape_status drape_implicit_solve(drape_implicit *s, drape_step_info *info)

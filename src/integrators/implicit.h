@@ -25,7 +25,11 @@ drape_status drape_implicit_init(drape_arena *arena, drape_system *system, drape
 drape_status drape_implicit_init_newton(drape_arena *arena, drape_system *system, const double *values,
                                         drape_implicit *implicit);
 
-/* The functions of integrators whose state begins with it, or is nothing else. */
+/* The part that those with Newton's method and a state that begins with it have in common, and functions of
+ * integrators whose state begins with it, or is nothing else. */
+#define DRAPE_IMPLICIT_OPS                                                                                   \
+    .residual = drape_implicit_residual, .tolerance = drape_implicit_tolerance, .work = drape_implicit_work, \
+    .bytes = drape_implicit_bytes, .destroy = drape_implicit_destroy
 drape_status drape_implicit_create(drape_arena *arena, drape_system *system, const double *values,
                                    void **state);
 void drape_implicit_restart(void *state, const drape_state *from);
@@ -49,14 +53,20 @@ void drape_implicit_base(drape_implicit *implicit, const drape_state *in, double
 void drape_implicit_backward_euler(drape_implicit *implicit, const drape_state *in, double t, double h,
                                    double mass_weight);
 
+/* g (nodes) at the state `in`, where the base of the equation begins; v (nodes): velocities, whose free nodes
+ * are set to those of `in`. */
+void drape_implicit_force_at_start(const drape_implicit *implicit, const drape_state *in, double *v,
+                                   double *g);
+
 /* Where no term has an energy of motion these do nothing. drape_implicit_momentum computes the momenta P
- * (nodes) at a state; drape_implicit_set_momenta has the equation add d/dt P = r (P - a P_a - b P_b). */
-void drape_implicit_momentum(drape_implicit *implicit, const drape_state *at, double *p);
+ * (nodes) at t, x, v in the step; drape_implicit_set_momenta has the equation add d/dt P = r (P - a P_a - b P_b). */
+void drape_implicit_momentum(const drape_implicit *implicit, double t, const double *x, const double *v,
+                             double *p);
 void drape_implicit_set_momenta(drape_implicit *implicit, double rate, double a, const double *p_a, double b,
                                 const double *p_b);
 
-/* Computes q (measures) at the positions of a state, if a law needs rates. */
-void drape_implicit_measure(drape_implicit *implicit, const drape_state *state, double *q);
+/* Computes q (measures) at t, x in the step, if a law needs rates. */
+void drape_implicit_measure(const drape_implicit *implicit, double t, const double *x, double *q);
 
 /* Solves for d by Newton's method, from the guess chosen by the parameters, or from the present d. Adds the
  * iterations to info. */

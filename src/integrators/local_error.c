@@ -17,10 +17,6 @@
 #define START_SHARE 0.1
 /* Fraction: a step as long as this much of what is left before a stop ends there; the rest is rounding. */
 #define LANDED (1 - 1e-9)
-/* Of the time in which the scene moves by its size: steps as short as this, one after the other, lead
- * nowhere, at any speed that the scene can have. A few may start a run. */
-#define LEAST_STEP 1e-10
-#define MAX_TINY   20
 
 void drape_local_error_init(const drape_system *system, const double *values, int power, drape_local_error *c)
 {
@@ -185,16 +181,6 @@ static drape_status reject(const drape_local_error *c, const drape_local_attempt
     return DRAPE_RETRY_REJECTED;
 }
 
-/* Stops a run whose steps have become so small that it no longer moves, as where nothing can yield. */
-static bool moves(drape_local_error *c, const drape_local_attempt *a)
-{
-    c->tiny = a->h < LEAST_STEP * c->size / c->speed && a->t1 != a->stop ? c->tiny + 1 : 0;
-    if (c->tiny <= MAX_TINY)
-        return true;
-    c->tiny = 0;
-    return false;
-}
-
 drape_status drape_local_error_test(drape_local_error *c, const drape_local_attempt *a, const double *ex,
                                     const double *ev, drape_step_info *info)
 {
@@ -206,7 +192,7 @@ drape_status drape_local_error_test(drape_local_error *c, const drape_local_atte
     }
     if (error > 1)
         return reject(c, a, error, node, info);
-    if (!moves(c, a)) {
+    if (!drape_step_moves(a->h, c->size, c->speed, a->t1 == a->stop, &c->tiny)) {
         info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
         return DRAPE_E_STEP_TOO_SMALL;
     }

@@ -43,17 +43,8 @@ enum {
 /* The beginning of the list of parameters of such an integrator. */
 #define DRAPE_LOCAL_ERROR_PARAMS                                                                             \
     [DRAPE_LOCAL_ERROR_RTOL] = DRAPE_RTOL_PARAM, [DRAPE_LOCAL_ERROR_ATOL_X] = DRAPE_ATOL_X_PARAM,            \
-    [DRAPE_LOCAL_ERROR_ATOL_V] = DRAPE_ATOL_V_PARAM,                                                         \
-    [DRAPE_LOCAL_ERROR_MAX_STEP] =                                                                           \
-        DRAPE_NUMBER("max_step", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),           \
-    [DRAPE_LOCAL_ERROR_MAX_STEPS] =                                                                          \
-        DRAPE_INTEGER("max_steps", "1/s", 100000, 1, 1e9,                                                    \
-                      "largest number of steps within one second of simulated time, not counting those "     \
-                      "that end an advance; one more ends the run")
-
-/* Energy that a run may gain without a source, for drape_integrator_ops.gain: under error control the energy
- * of smooth motion oscillates by less than that, so a larger gain means that waves are amplified. */
-#define DRAPE_LOCAL_ERROR_GAIN 0.02
+    [DRAPE_LOCAL_ERROR_ATOL_V] = DRAPE_ATOL_V_PARAM, [DRAPE_LOCAL_ERROR_MAX_STEP] = DRAPE_MAX_STEP_PARAM,    \
+    [DRAPE_LOCAL_ERROR_MAX_STEPS] = DRAPE_MAX_STEPS_PARAM
 
 /* What the size of a step follows from. */
 typedef struct drape_step_record {

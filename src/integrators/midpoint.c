@@ -54,10 +54,6 @@ const drape_integrator_ops drape_integrator_midpoint = {
     .create = drape_implicit_create,
     .step = step,
     .restart = drape_implicit_restart,
-    .residual = drape_implicit_residual,
-    .tolerance = drape_implicit_tolerance,
-    .work = drape_implicit_work,
     .archive = drape_implicit_archive,
-    .bytes = drape_implicit_bytes,
-    .destroy = drape_implicit_destroy,
+    DRAPE_IMPLICIT_OPS,
 };

@@ -781,15 +781,7 @@ static void destroy(void **state)
 static drape_work work(const void *state)
 {
     const radau_state *s = state;
-    const drape_sun_linear *linear = s->matrix.linear;
-    drape_work work = s->work;
-    if (linear) {
-        work.factorizations = linear->factorizations;
-        work.linear_iterations = linear->iterations;
-        work.factor_seconds = linear->factor_seconds;
-        work.solve_seconds = linear->solve_seconds;
-    }
-    return work;
+    return drape_work_with_linear(s->work, s->matrix.linear);
 }
 
 static void archive_polynomial(drape_archive *a, size_t n, polynomial *p)

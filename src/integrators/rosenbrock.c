@@ -480,8 +480,7 @@ static void destroy(void **state)
     if (!s)
         return;
     drape_sun_linear_destroy(&s->linear);
-    if (s->sun)
-        SUNContext_Free(&s->sun);
+    SUNContext_Free(&s->sun);
     *state = NULL;
 }
 
@@ -490,14 +489,7 @@ static void destroy(void **state)
 static drape_work work(const void *state)
 {
     const rosenbrock_state *s = state;
-    drape_work work = s->common.equation.work;
-    if (s->linear) {
-        work.factorizations = s->linear->factorizations;
-        work.linear_iterations = s->linear->iterations;
-        work.factor_seconds = s->linear->factor_seconds;
-        work.solve_seconds = s->linear->solve_seconds;
-    }
-    return work;
+    return drape_work_with_linear(s->common.equation.work, s->linear);
 }
 
 /* Each step has its own factors. */

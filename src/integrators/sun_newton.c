@@ -218,13 +218,11 @@ void drape_sun_newton_archive(drape_sun_newton *newton, drape_archive *a)
 
 void drape_sun_newton_free(drape_sun_newton *newton)
 {
-    if (newton->solver)
-        SUNNonlinSolFree(newton->solver);
+    SUNNonlinSolFree(newton->solver);
     newton->solver = NULL;
     N_Vector *const vectors[] = {&newton->residual, &newton->correction, &newton->next, &newton->trial};
     for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++) {
-        if (*vectors[i])
-            N_VDestroy(*vectors[i]);
+        N_VDestroy(*vectors[i]);
         *vectors[i] = NULL;
     }
 }

@@ -3,6 +3,11 @@
 
 #include "base/vec3.h"
 
+/* Of the time in which the scene moves by its size. What comes too near crosses the least gap of contact,
+ * 1e-3 of a thickness, in longer steps at any speed that it can have, so steps as short as this, one
+ * after the other, lead nowhere. */
+#define LEAST_STEP 1e-10
+
 void drape_derive_tolerances(const drape_model *model, double rtol, double *atol_x, double *atol_v)
 {
     double gravity = vec3_norm(model->gravity), length = model->length;
@@ -10,4 +15,13 @@ void drape_derive_tolerances(const drape_model *model, double rtol, double *atol
         *atol_x = rtol * length;
     if (isnan(*atol_v))
         *atol_v = rtol * (gravity > 0 ? sqrt(gravity * length) : length);
+}
+
+bool drape_step_moves(double h, double size, double speed, bool last, int64_t *tiny)
+{
+    *tiny = h < LEAST_STEP * size / speed && !last ? *tiny + 1 : 0;
+    if (*tiny <= DRAPE_MAX_TINY_STEPS)
+        return true;
+    *tiny = 0;
+    return false;
 }

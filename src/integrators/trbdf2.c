@@ -54,17 +54,9 @@ static drape_status solve_stage(trbdf2_state *s, double w, double *x, double *v,
 /* Computes g0, with the mean velocities of pins and colliders in the stage. */
 static void evaluate_start(trbdf2_state *s, const drape_state *in)
 {
-    drape_step_equation *e = &s->common.equation;
+    const drape_step_equation *e = &s->common.equation;
     memcpy(s->vg, e->v_base, e->nodes * sizeof *s->vg);
-    for (size_t i = 0; i < e->dofs; i++)
-        s->vg[drape_step_equation_at(e, i)] = in->v[drape_step_equation_at(e, i)];
-    const drape_point start = {.x = in->x,
-                               .v = s->vg,
-                               .internal = in->internal,
-                               .t = in->t,
-                               .span = {e->point.span[0], e->point.span[1]},
-                               .instant = true};
-    drape_system_force(e->system, &start, s->g0);
+    drape_implicit_force_at_start(&s->common, in, s->vg, s->g0);
 }
 
 /* The first stage, to xg, vg. The guess is free flight without g0, whose stiff part would make it far too
@@ -84,13 +76,12 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
         e->inertia[i] = flight - s->g0[at] / (e->model->mass[at / 3] * w * w);
         c->d[i] = c->inertial_guess ? flight : 0;
     }
-    drape_implicit_momentum(c, in, s->p0);
+    drape_implicit_momentum(c, in->t, in->x, in->v, s->p0);
     drape_implicit_set_momenta(c, w, 1, s->p0, 0, NULL);
     drape_status status = solve_stage(s, w, s->xg, s->vg, info);
     if (s->p0)
         memcpy(c->momentum[0], s->p0, e->nodes * sizeof *s->p0);
-    drape_implicit_momentum(
-        c, &(drape_state){.t = e->point.t, .x = s->xg, .v = s->vg, .internal = in->internal}, c->momentum[1]);
+    drape_implicit_momentum(c, e->point.t, s->xg, s->vg, c->momentum[1]);
     if (!status || info->usable)
         drape_implicit_audit_stage(c, in->x, s->xg, in->t, GAMMA * h, s->g0, info);
     return status;
@@ -121,8 +112,7 @@ static drape_status differentiate(trbdf2_state *s, const drape_state *in, double
         memcpy(c->momentum[0], c->momentum[1], e->nodes * sizeof *s->p0);
     drape_implicit_set_momenta(c, w, A1, c->momentum[0], -A0, s->p0);
     drape_status status = solve_stage(s, w, out->x, out->v, info);
-    drape_implicit_momentum(
-        c, &(drape_state){.t = out->t, .x = out->x, .v = out->v, .internal = in->internal}, c->momentum[1]);
+    drape_implicit_momentum(c, out->t, out->x, out->v, c->momentum[1]);
     if (!status || info->usable)
         drape_implicit_audit_stage(c, s->xg, out->x, in->t + GAMMA * h, (1 - GAMMA) * h, s->g0, info);
     return status;
@@ -159,10 +149,6 @@ const drape_integrator_ops drape_integrator_trbdf2 = {
     .momenta = true,
     .step = step,
     .restart = drape_implicit_restart,
-    .residual = drape_implicit_residual,
-    .tolerance = drape_implicit_tolerance,
-    .work = drape_implicit_work,
     .archive = drape_implicit_archive,
-    .bytes = drape_implicit_bytes,
-    .destroy = drape_implicit_destroy,
+    DRAPE_IMPLICIT_OPS,
 };

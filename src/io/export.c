@@ -128,9 +128,11 @@ drape_status drape_frame_files_end(drape_frame_files *frames)
     return drape_file_finish(&frames->file);
 }
 
-void drape_frame_files_close(drape_frame_files *frames)
+drape_status drape_frame_files_close(drape_context *ctx, void *state)
 {
-    drape_file_destroy(&frames->file);
+    (void)ctx;
+    drape_file_destroy(&((drape_frame_files *)state)->file);
+    return DRAPE_OK;
 }
 
 /* ---- OBJ ---- */

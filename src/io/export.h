@@ -124,16 +124,16 @@ drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *
  * is missing), DRAPE_E_PARSE (a frame is damaged), DRAPE_E_MEMORY. */
 drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def *def, const char *ending,
                                       int64_t count, drape_frame_files *frames);
-/* archive and cut for a state that begins with a drape_frame_files. The first archives nothing, because the
- * number of frames is enough; the second removes the frames after the first `frames`. */
+/* archive, cut and close for a state that begins with a drape_frame_files. The first archives nothing, because
+ * the number of frames is enough; the second removes the frames after the first `frames`. */
 void drape_frame_files_archive(void *state, drape_archive *a);
 drape_status drape_frame_files_cut(drape_context *ctx, void *state, int64_t frames);
+drape_status drape_frame_files_close(drape_context *ctx, void *state);
 /* Begins the file of one frame; the caller writes its content and ends it by drape_frame_files_end. Errors:
  * DRAPE_E_FILE. */
 drape_status drape_frame_files_begin(drape_frame_files *frames, int64_t frame);
 /* Gives the frame's file its name and closes it. Errors: DRAPE_E_FILE; then the frame does not exist. */
 drape_status drape_frame_files_end(drape_frame_files *frames);
-void drape_frame_files_close(drape_frame_files *frames);
 
 /* ---- Pieces of OBJ ---- */
 

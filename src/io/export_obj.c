@@ -46,13 +46,6 @@ static drape_status obj_resume(drape_context *ctx, const drape_export_def *def, 
     return drape_frame_files_resume(ctx, def, "obj", frames, state);
 }
 
-static drape_status obj_close(drape_context *ctx, void *state)
-{
-    (void)ctx;
-    drape_frame_files_close(state);
-    return DRAPE_OK;
-}
-
 const drape_exporter_ops drape_exporter_obj = {
     .entry =
         {.name = "obj",
@@ -67,5 +60,5 @@ const drape_exporter_ops drape_exporter_obj = {
     .archive = drape_frame_files_archive,
     .resume = obj_resume,
     .cut = drape_frame_files_cut,
-    .close = obj_close,
+    .close = drape_frame_files_close,
 };

@@ -64,13 +64,6 @@ static drape_status ply_resume(drape_context *ctx, const drape_export_def *def, 
     return drape_frame_files_resume(ctx, def, "ply", frames, state);
 }
 
-static drape_status ply_close(drape_context *ctx, void *state)
-{
-    (void)ctx;
-    drape_frame_files_close(state);
-    return DRAPE_OK;
-}
-
 const drape_exporter_ops drape_exporter_ply = {
     .entry = {.name = "ply",
               .summary = "frame_000000.ply ...: a binary PLY file for each frame, double precision",
@@ -82,5 +75,5 @@ const drape_exporter_ops drape_exporter_ply = {
     .archive = drape_frame_files_archive,
     .resume = ply_resume,
     .cut = drape_frame_files_cut,
-    .close = ply_close,
+    .close = drape_frame_files_close,
 };

@@ -39,7 +39,6 @@
 #define EXTENT      "[(%15.8e, %15.8e, %15.8e), (%15.8e, %15.8e, %15.8e)]"
 #define EXTENT_ROOM 128
 #define CODE        "%-20.12g"
-#define CODE_ROOM   32
 
 /* The tail of the object in positions.usda closes the samples, its mesh and /run; others have no /run. */
 static const char tails[2][16] = {"}\n}\n}\n", "}\n}\n"};

@@ -420,10 +420,9 @@ static drape_status vtp_sync(void *state)
 static drape_status vtp_close(drape_context *ctx, void *state)
 {
     vtp_state *vtp = state;
-    (void)ctx;
-    drape_status status = drape_file_close(&vtp->pvd);
+    const drape_status status = drape_file_close(&vtp->pvd);
     drape_file_destroy(&vtp->pvd);
-    drape_frame_files_close(&vtp->frames);
+    drape_frame_files_close(ctx, &vtp->frames);
     return status;
 }
 

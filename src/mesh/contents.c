@@ -66,13 +66,16 @@ static drape_status read_open_file(drape_arena *arena, const char *pointer, cons
 }
 
 /* O_NONBLOCK: opening a pipe without a writer would otherwise block for ever. */
-drape_status drape_contents_read(drape_arena *arena, const char *pointer, const char *path,
-                                 drape_contents *file)
+drape_status drape_contents_read(drape_arena *arena, const char *pointer, const char *folder,
+                                 const char *file, drape_contents *contents)
 {
+    const char *path = drape_contents_path(arena, folder, file);
+    if (!path)
+        return DRAPE_E_MEMORY;
     const int descriptor = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     if (descriptor < 0)
         return fail_file(arena->ctx, pointer, path, strerror(errno));
-    const drape_status status = read_open_file(arena, pointer, path, descriptor, file);
+    const drape_status status = read_open_file(arena, pointer, path, descriptor, contents);
     close(descriptor);
     return status;
 }

@@ -13,9 +13,9 @@ typedef struct drape_contents {
  * is out. */
 char *drape_contents_path(drape_arena *arena, const char *folder, const char *file);
 
-/* Reads a regular file of less than 2 GiB into memory of the arena. Errors, at the pointer: DRAPE_E_FILE,
- * DRAPE_E_MEMORY. */
-drape_status drape_contents_read(drape_arena *arena, const char *pointer, const char *path,
-                                 drape_contents *file);
+/* Reads a regular file of less than 2 GiB, whose path is made of folder and file as above, into memory of the
+ * arena. Errors, at the pointer: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status drape_contents_read(drape_arena *arena, const char *pointer, const char *folder,
+                                 const char *file, drape_contents *contents);
 
 #endif

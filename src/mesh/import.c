@@ -38,8 +38,7 @@ drape_status drape_mesh_read(drape_context *ctx, const char *pointer, const char
     const drape_mesh_source source = {.pointer = pointer, .file = file};
     drape_arena arena = drape_arena_of(ctx);
     drape_contents whole = {0};
-    char *path = drape_contents_path(&arena, folder, file);
-    drape_status status = path ? drape_contents_read(&arena, pointer, path, &whole) : DRAPE_E_MEMORY;
+    drape_status status = drape_contents_read(&arena, pointer, folder, file, &whole);
     if (!status)
         status = import->read(ctx, &source, whole.data, whole.size, mesh);
     drape_arena_free(&arena);

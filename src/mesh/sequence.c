@@ -75,8 +75,7 @@ static drape_status read_times(drape_arena *scratch, const drape_mesh_source *so
     drape_context *ctx = scratch->ctx;
     drape_contents whole = {0};
     drape_npy_array array;
-    const char *path = drape_contents_path(scratch, folder, source->file);
-    drape_status status = path ? drape_contents_read(scratch, source->pointer, path, &whole) : DRAPE_E_MEMORY;
+    drape_status status = drape_contents_read(scratch, source->pointer, folder, source->file, &whole);
     if (!status)
         status = drape_npy_array_parse(ctx, source, whole.data, whole.size, &array);
     if (!status && (array.dimensions != 1 || array.shape[0] != out->frame_count))

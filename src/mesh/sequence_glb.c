@@ -532,9 +532,8 @@ static drape_status read_glb(const drape_sequence_source *source, drape_mesh *me
 {
     reader r = {.source = source, .arena = drape_arena_of(source->ctx)};
     drape_contents whole = {0};
-    const char *path = drape_contents_path(&r.arena, source->folder, source->file.file);
     drape_status status =
-        path ? drape_contents_read(&r.arena, source->file.pointer, path, &whole) : DRAPE_E_MEMORY;
+        drape_contents_read(&r.arena, source->file.pointer, source->folder, source->file.file, &whole);
     if (!status)
         status = read_all(&r, whole.data, whole.size, mesh, out);
     drape_arena_free(&r.arena);

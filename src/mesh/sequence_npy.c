@@ -29,9 +29,8 @@ static drape_status read_npy(const drape_sequence_source *source, drape_mesh *me
     drape_arena scratch = drape_arena_of(source->ctx);
     drape_contents whole = {0};
     drape_npy_array array;
-    const char *path = drape_contents_path(&scratch, source->folder, source->file.file);
     drape_status status =
-        path ? drape_contents_read(&scratch, source->file.pointer, path, &whole) : DRAPE_E_MEMORY;
+        drape_contents_read(&scratch, source->file.pointer, source->folder, source->file.file, &whole);
     if (!status)
         status = drape_npy_array_parse(source->ctx, &source->file, whole.data, whole.size, &array);
     if (!status)

@@ -49,9 +49,8 @@ static drape_status read_pc2(const drape_sequence_source *source, drape_mesh *me
 {
     drape_arena scratch = drape_arena_of(source->ctx);
     drape_contents whole = {0};
-    const char *path = drape_contents_path(&scratch, source->folder, source->file.file);
     drape_status status =
-        path ? drape_contents_read(&scratch, source->file.pointer, path, &whole) : DRAPE_E_MEMORY;
+        drape_contents_read(&scratch, source->file.pointer, source->folder, source->file.file, &whole);
     if (!status)
         status = parse(source, mesh, &whole, out);
     drape_arena_free(&scratch);

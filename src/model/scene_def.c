@@ -174,69 +174,23 @@ void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size)
     drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
-void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size)
-{
-    drape_cloth_def defaults = {.struct_size = 0};
-    drape_scene_set_defaults(&drape_form_cloth, &defaults);
-    defaults.struct_size = struct_size;
-    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
-}
-
-void drape_collider_def_init(drape_collider_def *def, size_t struct_size)
-{
-    drape_collider_def defaults = {.struct_size = 0};
-    drape_scene_set_defaults(&drape_form_collider, &defaults);
-    defaults.struct_size = struct_size;
-    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
-}
-
-void drape_event_def_init(drape_event_def *def, size_t struct_size)
-{
-    drape_event_def defaults = {.struct_size = 0};
-    drape_scene_set_defaults(&drape_form_event, &defaults);
-    defaults.struct_size = struct_size;
-    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
-}
-
-void drape_seam_def_init(drape_seam_def *def, size_t struct_size)
-{
-    drape_seam_def defaults = {.struct_size = 0};
-    drape_scene_set_defaults(&drape_form_seam, &defaults);
-    defaults.struct_size = struct_size;
-    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
-}
-
-void drape_pin_def_init(drape_pin_def *def, size_t struct_size)
-{
-    drape_pin_def defaults = {.struct_size = 0};
-    drape_scene_set_defaults(&drape_form_pin, &defaults);
-    defaults.struct_size = struct_size;
-    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
-}
-
-void drape_history_def_init(drape_history_def *def, size_t struct_size)
-{
-    drape_history_def defaults = {.struct_size = 0};
-    drape_scene_set_defaults(&drape_form_history, &defaults);
-    defaults.struct_size = struct_size;
-    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
-}
-
-void drape_mass_def_init(drape_mass_def *def, size_t struct_size)
-{
-    drape_mass_def defaults = {.struct_size = 0};
-    drape_scene_set_defaults(&drape_form_mass, &defaults);
-    defaults.struct_size = struct_size;
-    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
-}
-
-void drape_periodic_def_init(drape_periodic_def *def, size_t struct_size)
-{
-    drape_periodic_def defaults = {.struct_size = 0};
-    drape_scene_set_defaults(&drape_form_periodic, &defaults);
-    defaults.struct_size = struct_size;
-    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
-}
+/* Defines drape_NAME_def_init, for a struct whose defaults are all in the table of keys. */
+#define DEFINE_INIT(name)                                                                                    \
+    void drape_##name##_def_init(drape_##name##_def *def, size_t struct_size)                                \
+    {                                                                                                        \
+        drape_##name##_def defaults = {.struct_size = 0};                                                    \
+        drape_scene_set_defaults(&drape_form_##name, &defaults);                                             \
+        defaults.struct_size = struct_size;                                                                  \
+        drape_def_fill(def, struct_size, &defaults, sizeof defaults);                                        \
+    }
+DEFINE_INIT(cloth)
+DEFINE_INIT(collider)
+DEFINE_INIT(event)
+DEFINE_INIT(seam)
+DEFINE_INIT(pin)
+DEFINE_INIT(history)
+DEFINE_INIT(mass)
+DEFINE_INIT(periodic)
 
 /* ---- Keys as text ---- */
 

@@ -378,11 +378,6 @@ void drape_approx_jacobian_archive(drape_approx_jacobian *s, drape_archive *a)
     drape_linear_archive(s->coarse.linear, s->coarse.solver, a, NULL);
 }
 
-int32_t drape_approx_jacobian_coarse_nodes(const drape_approx_jacobian *s)
-{
-    return s->coarse.prolong.coarse;
-}
-
 size_t drape_approx_jacobian_bytes(const drape_approx_jacobian *s)
 {
     return drape_linear_bytes(s->coarse.linear, s->coarse.solver);

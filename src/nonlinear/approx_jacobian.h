@@ -52,7 +52,6 @@ void drape_approx_jacobian_multiply(const drape_approx_jacobian *jacobian, const
 /* Archives what is kept between updates. */
 void drape_approx_jacobian_archive(drape_approx_jacobian *jacobian, drape_archive *a);
 
-int32_t drape_approx_jacobian_coarse_nodes(const drape_approx_jacobian *jacobian);
 size_t drape_approx_jacobian_bytes(const drape_approx_jacobian *jacobian); /* outside of its arena */
 
 #endif

@@ -799,17 +799,12 @@ void drape_newton_destroy(drape_newton **newton)
     drape_newton *s = *newton;
     if (!s)
         return;
-    if (s->kin)
-        KINFree(&s->kin);
+    KINFree(&s->kin);
     drape_sun_linear_destroy(&s->linear);
-    if (s->unknown)
-        N_VDestroy(s->unknown);
-    if (s->ones)
-        N_VDestroy(s->ones);
-    if (s->weights)
-        N_VDestroy(s->weights);
-    if (s->sun)
-        SUNContext_Free(&s->sun);
+    N_VDestroy(s->unknown);
+    N_VDestroy(s->ones);
+    N_VDestroy(s->weights);
+    SUNContext_Free(&s->sun);
     *newton = NULL;
 }
 
@@ -867,14 +862,7 @@ void drape_newton_archive(drape_newton *s, drape_archive *a)
 
 drape_work drape_newton_work(const drape_newton *s)
 {
-    drape_work work = s->equation->work;
-    if (s->linear) {
-        work.factorizations = s->linear->factorizations;
-        work.linear_iterations = s->linear->iterations;
-        work.factor_seconds = s->linear->factor_seconds;
-        work.solve_seconds = s->linear->solve_seconds;
-    }
-    return work;
+    return drape_work_with_linear(s->equation->work, s->linear);
 }
 
 #define KINSOL_VECTORS 8 /* six of its own, and two of weights */

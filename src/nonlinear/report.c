@@ -14,6 +14,17 @@ void drape_work_archive(drape_work *work, drape_archive *a)
         drape_archive_double(a, seconds[i]);
 }
 
+drape_work drape_work_with_linear(drape_work work, const drape_sun_linear *linear)
+{
+    if (!linear)
+        return work;
+    work.factorizations = linear->factorizations;
+    work.linear_iterations = linear->iterations;
+    work.factor_seconds = linear->factor_seconds;
+    work.solve_seconds = linear->solve_seconds;
+    return work;
+}
+
 drape_work drape_work_sum(drape_work work, const drape_work *other)
 {
     if (work.residuals == 0) { /* it has made no step since */

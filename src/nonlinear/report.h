@@ -4,6 +4,7 @@
 
 #include "assemble/system.h"
 #include "base/archive.h"
+#include "solvers/sun_linear.h"
 
 /* How one solve ended. */
 typedef struct drape_solve_report {
@@ -30,6 +31,9 @@ typedef struct drape_work {
 
 /* The counts and times of both, and the equilibrium of `work`. */
 drape_work drape_work_sum(drape_work work, const drape_work *other);
+
+/* The same work with what a linear solver counts, unless that is NULL. */
+drape_work drape_work_with_linear(drape_work work, const drape_sun_linear *linear);
 
 void drape_work_archive(drape_work *work, drape_archive *a);
 

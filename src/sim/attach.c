@@ -61,26 +61,6 @@ static drape_status check_triangles(const drape_sim *sim, int32_t collider, int3
     return DRAPE_OK;
 }
 
-/* Pins these nodes, or lets them go, if they are not so already. */
-static drape_status set_pins(drape_sim *sim, int32_t count, const int32_t *nodes, uint8_t pin)
-{
-    const size_t size = (size_t)sim->model->node_count * sizeof *sim->pinned;
-    bool differs = false;
-    for (int32_t i = 0; i < count && !differs; i++)
-        differs = sim->model->pinned[nodes[i]] != pin;
-    if (!differs)
-        return DRAPE_OK;
-    uint8_t *pinned = drape_alloc(sim->ctx, size, 1);
-    if (!pinned)
-        return DRAPE_E_MEMORY;
-    memcpy(pinned, sim->model->pinned, size);
-    for (int32_t i = 0; i < count; i++)
-        pinned[nodes[i]] = pin;
-    const drape_status status = drape_sim_repin(sim, pinned);
-    drape_free(sim->ctx, pinned);
-    return status;
-}
-
 /* Pins move with their colliders at once. */
 static void start_riding(drape_sim *sim, int32_t count, const int32_t *nodes)
 {
@@ -124,7 +104,7 @@ drape_status drape_sim_attach(drape_sim *sim, int32_t collider, int32_t count, c
     if (!status && !triangles && sim->model->colliders[collider].frames.frame_count > 0)
         status = find_triangles(sim, collider, count, nodes, &nearest);
     if (!status)
-        status = set_pins(sim, count, nodes, 1);
+        status = drape_sim_set_pins(sim, count, nodes, 1);
     if (!status)
         status = carry(sim, collider, count, nodes, nearest ? nearest : triangles);
     drape_free(sim->ctx, nearest);
@@ -141,7 +121,7 @@ drape_status drape_sim_detach(drape_sim *sim, int32_t count, const int32_t *node
             status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                                 "drape_sim_detach: no collider carries node %d, which is %s", (int)nodes[i],
                                 sim->model->pinned[nodes[i]] ? "pinned otherwise" : "free");
-    return status ? status : set_pins(sim, count, nodes, 0);
+    return status ? status : drape_sim_set_pins(sim, count, nodes, 0);
 }
 
 int32_t drape_sim_attached(const drape_sim *sim, int32_t node)

@@ -68,21 +68,14 @@ static const double *masses_of(const drape_sim *sim, const drape_model *model, d
 
 static drape_status change(drape_sim *sim, const drape_model *model)
 {
-    drape_sim *other = NULL;
     const size_t nodes = (size_t)model->node_count;
     uint8_t *pinned = drape_alloc(sim->ctx, nodes, sizeof *pinned);
     double *masses = drape_alloc(sim->ctx, nodes, sizeof *masses);
     drape_status status = DRAPE_E_MEMORY;
     if (pinned && masses)
-        status = drape_sim_create_like(sim, model, pins_of(sim, model, pinned), masses_of(sim, model, masses),
-                                       &other);
+        status = drape_sim_remake(sim, model, pins_of(sim, model, pinned), masses_of(sim, model, masses));
     if (!status)
-        status = drape_sim_continue(other, sim);
-    if (!status) {
-        drape_events_forget(other);
-        drape_sim_exchange(sim, other);
-    }
-    drape_sim_destroy(&other);
+        drape_events_forget(sim);
     drape_free(sim->ctx, masses);
     drape_free(sim->ctx, pinned);
     return status;

@@ -189,7 +189,7 @@ static void match_colliders(const drape_model *to, const drape_model *from, int3
     }
 }
 
-drape_status drape_sim_continue(drape_sim *to, drape_sim *from)
+static drape_status go_on(drape_sim *to, drape_sim *from)
 {
     int32_t *before = drape_alloc(to->ctx, (size_t)to->model->collider_count + 1, sizeof *before);
     if (!before)
@@ -209,5 +209,18 @@ drape_status drape_sim_continue(drape_sim *to, drape_sim *from)
     if (!status)
         copy_logged(to, from, before);
     drape_free(to->ctx, before);
+    return status;
+}
+
+drape_status drape_sim_remake(drape_sim *sim, const drape_model *model, const uint8_t *pinned,
+                              const double *masses)
+{
+    drape_sim *other = NULL;
+    drape_status status = drape_sim_create_like(sim, model, pinned, masses, &other);
+    if (!status)
+        status = go_on(other, sim);
+    if (!status)
+        drape_sim_exchange(sim, other);
+    drape_sim_destroy(&other);
     return status;
 }

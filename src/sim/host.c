@@ -242,10 +242,9 @@ drape_status drape_sim_deform_collider(drape_sim *sim, int32_t collider, double 
 drape_status drape_sim_collider_points(drape_sim *sim, int32_t collider, double *positions,
                                        double *velocities)
 {
-    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
-    if (status)
-        return status;
-    status = check_deforms(sim, "drape_sim_collider_points", collider);
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    drape_status status = check_deforms(sim, "drape_sim_collider_points", collider);
     if (!status && !positions)
         status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_points: positions is NULL");
     if (status)
@@ -348,6 +347,14 @@ static drape_status place(drape_sim *sim, drape_point *point)
     return drape_sim_begin_reading(sim);
 }
 
+/* Checks the arguments of a function that reads into an array. */
+static drape_status check_array(const drape_sim *sim, const char *function, const double *array)
+{
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    return array ? DRAPE_OK : drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: the array is NULL", function);
+}
+
 /* A pending request to cancel the next advance is not an error of reading. */
 static drape_status read_status(const drape_sim *sim)
 {
@@ -364,15 +371,10 @@ drape_status drape_sim_reactions_at(drape_sim *sim, const drape_point *point, do
 drape_status drape_sim_reactions(drape_sim *sim, double *forces)
 {
     drape_point point;
-    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
-    if (status)
-        return status;
-    if (!forces)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_reactions: the array is NULL");
-    status = place(sim, &point);
-    if (status)
-        return status;
-    return drape_sim_reactions_at(sim, &point, forces);
+    drape_status status = check_array(sim, "drape_sim_reactions", forces);
+    if (!status)
+        status = place(sim, &point);
+    return status ? status : drape_sim_reactions_at(sim, &point, forces);
 }
 
 static drape_status check_has_contact(const drape_sim *sim, const char *function)
@@ -388,12 +390,9 @@ static drape_status check_has_contact(const drape_sim *sim, const char *function
 drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)
 {
     drape_point point;
-    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
-    if (status)
-        return status;
-    if (!forces)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_contact_forces: the array is NULL");
-    status = check_has_contact(sim, "drape_sim_contact_forces");
+    drape_status status = check_array(sim, "drape_sim_contact_forces", forces);
+    if (!status)
+        status = check_has_contact(sim, "drape_sim_contact_forces");
     if (!status)
         status = place(sim, &point);
     if (status)
@@ -467,13 +466,12 @@ static drape_status read_wrench(drape_sim *sim, const char *function, int32_t co
 drape_status drape_sim_contacts(drape_sim *sim, int32_t room, drape_contact_point *contacts, int32_t *count)
 {
     drape_point point;
-    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
-    if (status)
-        return status;
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
     if (!count || room < 0 || (room > 0 && !contacts))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_contacts: room for %d, but no array or no count", (int)room);
-    status = check_has_contact(sim, "drape_sim_contacts");
+    drape_status status = check_has_contact(sim, "drape_sim_contacts");
     if (!status)
         status = place(sim, &point);
     if (status)
@@ -487,12 +485,9 @@ drape_status drape_sim_contacts(drape_sim *sim, int32_t room, drape_contact_poin
 drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3])
 {
     double sum[3], torque[3];
-    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
-    if (status)
-        return status;
-    if (!force)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_force: the array is NULL");
-    status = read_wrench(sim, "drape_sim_collider_force", collider, NULL, sum, torque);
+    drape_status status = check_array(sim, "drape_sim_collider_force", force);
+    if (!status)
+        status = read_wrench(sim, "drape_sim_collider_force", collider, NULL, sum, torque);
     if (!status)
         memcpy(force, sum, sizeof sum);
     return status;
@@ -502,14 +497,11 @@ drape_status drape_sim_collider_torque(drape_sim *sim, int32_t collider, const d
                                        double torque[3])
 {
     double force[3], sum[3];
-    drape_status status = sim ? DRAPE_OK : DRAPE_E_ARGUMENT;
-    if (status)
-        return status;
-    if (!torque)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_torque: the array is NULL");
-    if (about && !drape_all_finite(about, 3))
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_torque: the point is not finite");
-    status = read_wrench(sim, "drape_sim_collider_torque", collider, about, force, sum);
+    drape_status status = check_array(sim, "drape_sim_collider_torque", torque);
+    if (!status && about && !drape_all_finite(about, 3))
+        status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_torque: the point is not finite");
+    if (!status)
+        status = read_wrench(sim, "drape_sim_collider_torque", collider, about, force, sum);
     if (!status)
         memcpy(torque, sum, sizeof sum);
     return status;

@@ -25,15 +25,9 @@ static drape_status reweigh(drape_sim *sim, const double *masses)
 {
     const drape_model *base = drape_sim_base_model(sim);
     const bool as_compiled = memcmp(masses, base->mass, (size_t)base->node_count * sizeof *masses) == 0;
-    drape_sim *other = NULL;
-    drape_status status = drape_sim_create_like(sim, base, sim->pinned, as_compiled ? NULL : masses, &other);
+    const drape_status status = drape_sim_remake(sim, base, sim->pinned, as_compiled ? NULL : masses);
     if (!status)
-        status = drape_sim_continue(other, sim);
-    if (!status) {
-        drape_events_forget(other);
-        drape_sim_exchange(sim, other);
-    }
-    drape_sim_destroy(&other);
+        drape_events_forget(sim);
     return status;
 }
 

@@ -2,6 +2,7 @@
 #include "sim/profile.h"
 
 #include "base/clock.h"
+#include "mesh/grid.h"
 #include "solvers/linear.h"
 
 #include <math.h>
@@ -34,34 +35,19 @@ typedef struct bench {
 
 /* ---- The state ---- */
 
-/* Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX): the same everywhere. */
-static double next_random(uint64_t *seed)
-{
-    *seed = *seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-    return (double)(*seed >> 11) / 4503599627370496.0 - 1;
-}
-
-static double mean_edge(const drape_model *model)
-{
-    double sum = 0;
-    for (int32_t e = 0; e < model->edge_count; e++)
-        sum += model->edge_length[e];
-    return model->edge_count > 0 ? sum / model->edge_count : model->length;
-}
-
 static void deform(bench *s, double dt)
 {
     const drape_model *model = s->sim->model;
     const drape_state *from = drape_sim_state(s->sim);
-    double size = DEFORMATION * mean_edge(model);
+    double size = DEFORMATION * drape_model_mean_edge(model);
     uint64_t seed = 1;
     for (size_t i = 0; i < 3 * (size_t)model->node_count; i++) {
-        double d = model->pinned[i / 3] ? 0 : size * next_random(&seed);
+        double d = model->pinned[i / 3] ? 0 : size * drape_grid_random(&seed);
         s->x[i] = from->x[i] + d;
         s->v[i] = from->v[i] + d / dt;
     }
     for (int64_t i = 0; i < 3 * (int64_t)model->free_count; i++)
-        s->b[i] = next_random(&seed);
+        s->b[i] = drape_grid_random(&seed);
 }
 
 /* Evaluates as in a step of size dt from the state of the sim. */

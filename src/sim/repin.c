@@ -9,26 +9,12 @@ drape_status drape_sim_repin(drape_sim *sim, const uint8_t *pinned)
 {
     const drape_model *base = drape_sim_base_model(sim);
     const bool as_compiled = memcmp(pinned, base->pinned, (size_t)base->node_count * sizeof *pinned) == 0;
-    drape_sim *other = NULL;
-    drape_status status = drape_sim_create_like(sim, base, as_compiled ? NULL : pinned, sim->masses, &other);
-    if (!status)
-        status = drape_sim_continue(other, sim);
-    if (!status)
-        drape_sim_exchange(sim, other);
-    drape_sim_destroy(&other);
-    return status;
+    return drape_sim_remake(sim, base, as_compiled ? NULL : pinned, sim->masses);
 }
 
-/* ---- For hosts ---- */
-
-static drape_status set_pins(drape_sim *sim, const char *function, int32_t count, const int32_t *nodes,
-                             uint8_t pin)
+drape_status drape_sim_set_pins(drape_sim *sim, int32_t count, const int32_t *nodes, uint8_t pin)
 {
-    drape_status status = drape_sim_guard(sim, function);
-    if (!status)
-        status = drape_sim_check_nodes(sim, function, count, nodes);
-    if (status)
-        return status;
+    drape_status status = DRAPE_OK;
     const size_t size = (size_t)sim->model->node_count * sizeof *sim->pinned;
     uint8_t *pinned = drape_alloc(sim->ctx, size, 1);
     if (!pinned)
@@ -40,6 +26,17 @@ static drape_status set_pins(drape_sim *sim, const char *function, int32_t count
         status = drape_sim_repin(sim, pinned);
     drape_free(sim->ctx, pinned);
     return status;
+}
+
+/* ---- For hosts ---- */
+
+static drape_status set_pins(drape_sim *sim, const char *function, int32_t count, const int32_t *nodes,
+                             uint8_t pin)
+{
+    drape_status status = drape_sim_guard(sim, function);
+    if (!status)
+        status = drape_sim_check_nodes(sim, function, count, nodes);
+    return status ? status : drape_sim_set_pins(sim, count, nodes, pin);
 }
 
 drape_status drape_sim_pin(drape_sim *sim, int32_t count, const int32_t *nodes)

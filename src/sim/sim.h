@@ -142,21 +142,23 @@ drape_status drape_sim_check_nodes(const drape_sim *sim, const char *function, i
 drape_status drape_sim_create_like(const drape_sim *like, const drape_model *model, const uint8_t *pinned,
                                    const double *masses, drape_sim **out);
 
-/* Takes to a new sim all that goes on from one of the same cloth, whose model may have other pins, terms and
- * colliders. Errors: DRAPE_E_MEMORY, DRAPE_E_ARGUMENT (a pin is to be elsewhere); then `to` is only fit to be
- * destroyed. */
-drape_status drape_sim_continue(drape_sim *to, drape_sim *from);
-
 /* Exchanges the contents of two sims, except what belongs to the host and stays with `sim`: observers, the
  * cancel flag, the wind. Afterwards `other` has the former contents of `sim` and is only fit to be
  * destroyed. */
 void drape_sim_exchange(drape_sim *sim, drape_sim *other);
 
+/* Puts a new sim in the place of the present one, as which it goes on: of the same cloth, with other pins,
+ * masses, terms or colliders; arguments as for drape_sim_create_like. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER,
+ * DRAPE_E_ARGUMENT (a pin is to be elsewhere), DRAPE_E_STOPPED (the context's cancel function); then the sim is
+ * unchanged. */
+drape_status drape_sim_remake(drape_sim *sim, const drape_model *model, const uint8_t *pinned,
+                              const double *masses);
+
 /* Pins these nodes (node_count) and no others: nodes that become free go on with the velocity of their pins,
- * those that become pinned are held where they are. The sim is built anew, for a model with these pins, and
- * takes the place of the present one if that succeeds. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER,
- * DRAPE_E_STOPPED (the context's cancel function); then the sim is unchanged. */
+ * those that become pinned are held where they are. Errors: those of drape_sim_remake. */
 drape_status drape_sim_repin(drape_sim *sim, const uint8_t *pinned);
+/* Pins these nodes (count), or lets them go (pin 0), if they are not so already. */
+drape_status drape_sim_set_pins(drape_sim *sim, int32_t count, const int32_t *nodes, uint8_t pin);
 
 /* The model as it was compiled, with its own pins. */
 static inline const drape_model *drape_sim_base_model(const drape_sim *sim)

@@ -796,11 +796,3 @@ int drape_multigrid_levels(const drape_multigrid *m)
 {
     return m->count;
 }
-
-double drape_multigrid_complexity(const drape_multigrid *m)
-{
-    double sum = 0;
-    for (int k = 0; k < m->count; k++)
-        sum += (double)nonzeros(&m->level[k].a);
-    return sum / (double)nonzeros(&m->level[0].a);
-}

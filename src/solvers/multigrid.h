@@ -32,8 +32,7 @@ void drape_multigrid_apply(drape_multigrid *m, const double *r, double *z);
 /* y = A x. */
 void drape_multigrid_multiply(const drape_multigrid *m, const double *x, double *y);
 
-/* Number of levels, 1 if the matrix itself is factored; nonzeros of all matrices, in parts of the first. */
+/* Number of levels, 1 if the matrix itself is factored. */
 int drape_multigrid_levels(const drape_multigrid *m);
-double drape_multigrid_complexity(const drape_multigrid *m);
 
 #endif

@@ -2,7 +2,7 @@
 #ifndef DRAPE_TERMS_LOAD_H
 #define DRAPE_TERMS_LOAD_H
 
-#include "drape/extend.h"
+#include "terms/terms.h"
 
 /* The parameters that all loads begin with, as a list and among the values, where a box takes three a
  * corner. */
@@ -30,14 +30,6 @@ bool drape_load_in_box(const double *x, const double *low, const double *high);
 /* Refuses a mesh with two triangles of opposite orientations beside an edge: a load along normals would push
  * one of them forth and the other one back. */
 drape_status drape_load_check_faces(const drape_cloth_view *cloth, drape_term_builder *builder);
-
-/* How the load varies in time; the library multiplies by it. One value each, after all others. */
-#define DRAPE_LOAD_HISTORY                                                                                   \
-    DRAPE_TEXT("history", "name of a history of the scene, by which the load is multiplied",                 \
-               .derived = "none: it is constant")
-#define DRAPE_LOAD_RAMP                                                                                      \
-    DRAPE_NUMBER("ramp", "s", 0, 0, 1e9,                                                                     \
-                 "in place of a history: the time in which the load rises smoothly from 0; 0: it does not")
 
 #define DRAPE_LOAD_PARAMS                                                                                    \
     [DRAPE_LOAD_LIST_EDGE] =                                                                                 \

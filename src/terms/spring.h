@@ -20,6 +20,15 @@ enum {
 };
 extern const drape_param drape_spring_params[DRAPE_SPRING_PARAM_COUNT];
 
+/* What the constants of the terms have in common: of `entry`, and of the rest. */
+#define DRAPE_SPRING_ENTRY                                                                                   \
+    .reference = "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth "      \
+                 "behavior",                                                                                 \
+    DRAPE_PARAMS(drape_spring_params)
+#define DRAPE_SPRING_OPS                                                                                     \
+    .element_name = "spring", .nodes = 2, .damped = true, .distance = true, .convex = true,                  \
+    .measure = drape_spring_measure, .pair = drape_spring_pairs, .check = drape_spring_check
+
 /* The offset from one node of a spring to the other, in rows (>= 0) and columns of a grid. */
 typedef struct drape_spring_offset {
     int32_t rows, columns;

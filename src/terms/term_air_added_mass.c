@@ -48,11 +48,8 @@ static const drape_param params[LIST_COUNT] = {
                                    "density of the medium: 1.225 is air at sea level and 15 degrees"),
     [PARAM_WIND] = DRAPE_VECTOR("wind", "m/s", 0, -1e6, 1e6, "velocity of the medium"),
     [LIST_WAKE] = DRAPE_BOOLEAN("wake", true, "air that leaves across an edge takes its momentum along"),
-    [LIST_HISTORY] = DRAPE_TEXT("history", "name of a history of the scene, by which the wind is multiplied",
-                                .derived = "none: it is constant"),
-    [LIST_RAMP] = DRAPE_NUMBER("ramp", "s", 0, 0, 1e9,
-                               "in place of a history: the time in which the wind rises smoothly from 0; 0: "
-                               "it does not"),
+    [LIST_HISTORY] = DRAPE_HISTORY_PARAM_OF("wind"),
+    [LIST_RAMP] = DRAPE_RAMP_PARAM_OF("wind"),
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

@@ -47,11 +47,8 @@ static const drape_param params[LIST_COUNT] = {
                               "force by angle of attack a: sin^2 a, or (4 + pi) sin a/(4 + pi sin a)"),
     [LIST_FRICTION] = DRAPE_NUMBER("friction", "1", 0, 0, 1e6,
                                    "coefficient of friction along the sheet, of both sides together"),
-    [LIST_HISTORY] = DRAPE_TEXT("history", "name of a history of the scene, by which the wind is multiplied",
-                                .derived = "none: it is constant"),
-    [LIST_RAMP] = DRAPE_NUMBER("ramp", "s", 0, 0, 1e9,
-                               "in place of a history: the time in which the wind rises smoothly from 0; 0: "
-                               "it does not"),
+    [LIST_HISTORY] = DRAPE_HISTORY_PARAM_OF("wind"),
+    [LIST_RAMP] = DRAPE_RAMP_PARAM_OF("wind"),
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

@@ -13,8 +13,8 @@ static const drape_param params[LIST_COUNT] = {
                                   "at rest, are loaded"),
     [LIST_BOX_MAX] = DRAPE_VECTOR("box_max", "m", 1e9, -1e9, 1e9, "opposite corner of the box"),
     [LIST_FORCE] = DRAPE_VECTOR("force", "N", 0, -1e12, 1e12, "on each of the nodes; it keeps its direction"),
-    [LIST_HISTORY] = DRAPE_LOAD_HISTORY,
-    [LIST_RAMP] = DRAPE_LOAD_RAMP,
+    [LIST_HISTORY] = DRAPE_HISTORY_PARAM_OF("load"),
+    [LIST_RAMP] = DRAPE_RAMP_PARAM_OF("load"),
 };
 
 static bool takes(const drape_cloth_view *cloth, const double *values, int32_t i)

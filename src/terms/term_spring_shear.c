@@ -9,19 +9,9 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 
 const drape_term_ops drape_term_spring_shear = {
     .struct_size = sizeof(drape_term_ops),
-    .entry =
-        {.name = "spring.shear",
-         .summary = "springs along both diagonals of each cell of a square grid: E = 1/2 k (l - L)^2",
-         .reference =
-             "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth behavior",
-         DRAPE_PARAMS(drape_spring_params)},
-    .element_name = "spring",
-    .nodes = 2,
-    .damped = true,
-    .distance = true,
+    .entry = {.name = "spring.shear",
+              .summary = "springs along both diagonals of each cell of a square grid: E = 1/2 k (l - L)^2",
+              DRAPE_SPRING_ENTRY},
     .build = build,
-    .convex = true,
-    .measure = drape_spring_measure,
-    .pair = drape_spring_pairs,
-    .check = drape_spring_check,
+    DRAPE_SPRING_OPS,
 };

@@ -36,6 +36,15 @@ static inline double drape_pair_length(const drape_elements *el, int32_t element
     return vec3_norm(d);
 }
 
+/* How a load or the wind varies in time; the library multiplies by it. One value each, after all others. */
+#define DRAPE_HISTORY_PARAM_OF(what)                                                                         \
+    DRAPE_TEXT("history", "name of a history of the scene, by which the " what " is multiplied",             \
+               .derived = "none: it is constant")
+#define DRAPE_RAMP_PARAM_OF(what)                                                                            \
+    DRAPE_NUMBER("ramp", "s", 0, 0, 1e9,                                                                     \
+                 "in place of a history: the time in which the " what                                        \
+                 " rises smoothly from 0; 0: it does not")
+
 /* The numbers of DRAPE_LANES elements from `first` on; beyond the end the last one is repeated. */
 static inline void drape_lanes_elements(int32_t first, int32_t count, int32_t element[DRAPE_LANES])
 {
