@@ -209,7 +209,8 @@ static json_t *json_of(const cli_info *info, const drape_scene_key *key, const c
     switch (key->shape) {
     case DRAPE_SCENE_VALUE:
         value = key_json(key, def);
-        return value ? cli_described(info, value, key->param.unit) : NULL;
+        return value && key->param.kind != DRAPE_PARAM_TEXT ? cli_described(info, value, key->param.unit)
+                                                            : value;
     case DRAPE_SCENE_LIST:
     case DRAPE_SCENE_TRACK:
     case DRAPE_SCENE_OBJECTS:

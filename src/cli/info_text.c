@@ -115,7 +115,7 @@ static void print_object(int indent, json_t *object)
         if (strcmp(key, "parameters") == 0) {
             print_object(indent, value);
         } else if ((json_is_object(value) && !is_described(value)) ||
-                   json_object_get(json_array_get(value, 0), "name")) {
+                   json_is_string(json_object_get(json_array_get(value, 0), "name"))) {
             fputs(indent ? "" : "\n", stdout);
             print_block(indent, key, value);
         } else if ((strcmp(key, "name") != 0 || is_described(value)) &&

@@ -867,13 +867,13 @@ def test_info_of_contact():
     write_scene(colliders=[{"type": "plane", "name": "floor", "point": [0, 0, 0], "normal": [0, 3, 0], "friction": 0.5},
                            {"type": "box", "center": [0, 0, 0], "size": 0.05, "track": [[0, [0, 0, 0]], [2, [0, 1, 0]]]},
                            {"type": "mesh", "file": "tetrahedron.obj", "translate": [0, 5, 0]}],
-                self_contact={"thickness": 0.002}, contact={"friction_velocity": 0.01})
+                self_contact={"thickness": 0.002}, contact={"friction_velocity": 0.01}, histories=[{"name": "pull", "times": [0, 1], "values": [0, 0.5]}])
     with open("tetrahedron.obj", "w", encoding="utf-8") as file:
         file.write("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 4 3\nf 1 2 4\nf 2 3 4\n")
     words = good("info", "scene.json")
     for part in (r"\ncolliders\n  floor\n    type +plane\n", r"  normal +\[0, 3, 0\]\n", r"  friction +0\.5\n", r"\n  collider1\n    type +box\n",
                  r"  size +\[0\.05, 0\.05, 0\.05\] m\n", r"  track +\[\[0, \[0, 0, 0\]\], \[2, \[0, 1, 0\]\]\]\n", r"  file +tetrahedron\.obj\n",
-                 r"\n    nodes_inside +1\n", r"\ncontact\n +distance +0\.001 m \(default\)", r"thickness +0\.002 m\n"):
+                 r"\n    nodes_inside +1\n", r"\nhistories\n  pull\n    times +\[0, 1\]\n", r"\ncontact\n +distance +0\.001 m \(default\)", r"thickness +0\.002 m\n"):
         assert re.search(part, words), (part, words)
     found = json.loads(good("info", "scene.json", "--json"))
     floor, box, mesh = found["colliders"]
