@@ -53,13 +53,14 @@ void drape_implicit_base(drape_implicit *implicit, const drape_state *in, double
 void drape_implicit_backward_euler(drape_implicit *implicit, const drape_state *in, double t, double h,
                                    double mass_weight);
 
-/* g (nodes) at the state `in`, where the base of the equation begins; v (nodes): velocities, whose free nodes
- * are set to those of `in`. */
+/* g (nodes) at the state `in`, where the base of the equation begins; v (nodes): velocities, whose free
+ * nodes are set to those of `in`. */
 void drape_implicit_force_at_start(const drape_implicit *implicit, const drape_state *in, double *v,
                                    double *g);
 
 /* Where no term has an energy of motion these do nothing. drape_implicit_momentum computes the momenta P
- * (nodes) at t, x, v in the step; drape_implicit_set_momenta has the equation add d/dt P = r (P - a P_a - b P_b). */
+ * (nodes) at t, x, v in the step; drape_implicit_set_momenta has the equation add d/dt P = r (P - a P_a -
+ * b P_b). */
 void drape_implicit_momentum(const drape_implicit *implicit, double t, const double *x, const double *v,
                              double *p);
 void drape_implicit_set_momenta(drape_implicit *implicit, double rate, double a, const double *p_a, double b,
@@ -87,12 +88,13 @@ double drape_implicit_collider_work(const drape_implicit *implicit, double t0, d
 void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out,
                           drape_step_info *info);
 
-/* The same over one stage, from and to positions of all nodes, from t to t + span, by the midpoint rule with
- * the mean velocity: for methods of several stages, with forces at both ends of a stage, or whose velocity is
- * not that of the displacement. In an impact within a step of such a method, a pair may approach by its
- * velocity and part by its displacement, and would dissipate negative energy. If powers at the two ends were
- * used, the force of a stiff dashpot at a jump of a pin's velocity would count for a large part of the step.
- * momentum must be that of the ends of the stage. Overwrites the base of the equation and g (nodes). */
+/* The same over one stage, from and to positions of all nodes, from t to t + span, by the midpoint rule
+ * with the mean velocity: for methods of several stages, with forces at both ends of a stage, or whose
+ * velocity is not that of the displacement. In an impact within a step of such a method, a pair may
+ * approach by its velocity and part by its displacement, and would dissipate negative energy. If powers at
+ * the two ends were used, the force of a stiff dashpot at a jump of a pin's velocity would count for a
+ * large part of the step. momentum must be that of the ends of the stage. Overwrites the base of the
+ * equation and g (nodes). */
 void drape_implicit_audit_stage(drape_implicit *implicit, const double *from, const double *to, double t,
                                 double span, double *g, drape_step_info *info);
 /* The part of it that is dissipated. */

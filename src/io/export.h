@@ -124,8 +124,8 @@ drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *
  * is missing), DRAPE_E_PARSE (a frame is damaged), DRAPE_E_MEMORY. */
 drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def *def, const char *ending,
                                       int64_t count, drape_frame_files *frames);
-/* archive, cut and close for a state that begins with a drape_frame_files. The first archives nothing, because
- * the number of frames is enough; the second removes the frames after the first `frames`. */
+/* archive, cut and close for a state that begins with a drape_frame_files. The first archives nothing,
+ * because the number of frames is enough; the second removes the frames after the first `frames`. */
 void drape_frame_files_archive(void *state, drape_archive *a);
 drape_status drape_frame_files_cut(drape_context *ctx, void *state, int64_t frames);
 drape_status drape_frame_files_close(drape_context *ctx, void *state);

@@ -39,8 +39,8 @@ void drape_folder_close(drape_folder **folder); /* *folder may be NULL */
 /* The same, and removes the manifest, and the folder if there is nothing else in it. */
 void drape_folder_discard(drape_folder **folder);
 
-/* Whether a name, which may come from a file of somebody else, is that of an entry of a folder: not a path that
- * leads out of it. Every file of a folder is begun under such a name (drape_file_begin). */
+/* Whether a name, which may come from a file of somebody else, is that of an entry of a folder: not a path
+ * that leads out of it. Every file of a folder is begun under such a name (drape_file_begin). */
 bool drape_folder_is_name(const char *name);
 
 const char *drape_folder_path(const drape_folder *folder); /* without a slash at its end */
@@ -55,8 +55,8 @@ drape_status drape_folder_protect(drape_folder *folder, const char *path);
 drape_status drape_folder_check(drape_folder *folder, drape_folder_claim *writes, drape_folder_claim *clears,
                                 const void *user);
 
-/* Begins to write: removes those of our files that `clears` claims (NULL: none) and temporary files of killed
- * processes, and begins a manifest with the files that remain. Errors: DRAPE_E_FILE. */
+/* Begins to write: removes those of our files that `clears` claims (NULL: none) and temporary files of
+ * killed processes, and begins a manifest with the files that remain. Errors: DRAPE_E_FILE. */
 drape_status drape_folder_begin(drape_folder *folder, drape_folder_claim *clears, const void *user);
 
 /* Removes those of our files that are claimed. Errors: DRAPE_E_FILE. */
@@ -66,8 +66,9 @@ drape_status drape_folder_remove(drape_folder *folder, drape_folder_claim *claim
  * damaged), DRAPE_E_FILE. */
 drape_status drape_folder_verify(drape_folder *folder, const char *name);
 
-/* The same for all files that the manifest describes but those still growing when a process was killed: what
- * they must be is known elsewhere. complete: no file may be missing but `except`, which is written again. */
+/* The same for all files that the manifest describes but those still growing when a process was killed:
+ * what they must be is known elsewhere. complete: no file may be missing but `except`, which is written
+ * again. */
 drape_status drape_folder_verify_all(drape_folder *folder, bool complete, const char *except);
 
 /* A folder rehearses while the files of a run that is resumed are checked: what is then overwritten and
@@ -98,8 +99,8 @@ int drape_folder_open_file(const drape_folder *folder, const char *name, int fla
 /* Whether a file at path is directly in a folder. */
 bool drape_folder_has(const char *folder, const char *path);
 
-/* Opens the folder of a file at path, which is modified during the call, to reach files from it; readable or
- * not. Returns -1 with errno. */
+/* Opens the folder of a file at path, which is modified during the call, to reach files from it; readable
+ * or not. Returns -1 with errno. */
 int drape_folder_enter(char *path);
 
 /* Waits until manifest and names are on the disk. Errors: DRAPE_E_FILE. */

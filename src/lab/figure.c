@@ -140,8 +140,8 @@ static void put_hatch(const page *p, double left, double bottom, double right, d
     }
 }
 
-/* A marker, by its number: 1 plus, 2 cross; 4 square, 6 circle, 8 and 10 triangles, 12 diamond, 14 pentagon, and
- * the next number of each for the filled one. */
+/* A marker, by its number: 1 plus, 2 cross; 4 square, 6 circle, 8 and 10 triangles, 12 diamond, 14
+ * pentagon, and the next number of each for the filled one. */
 static void put_marker(const page *p, double x, double y, lab_style s)
 {
     static const struct {
@@ -170,8 +170,8 @@ static void put_marker(const page *p, double x, double y, lab_style s)
 
 typedef enum anchor { START, MIDDLE, END, UPRIGHT /* the middle, read from below */ } anchor;
 
-/* A text, centred in height at y, and an exponent behind it (NULL: none). A text that is wider than the room for
- * it ends with dots. */
+/* A text, centred in height at y, and an exponent behind it (NULL: none). A text that is longer than the
+ * width for it ends with dots. */
 static void put_text(const page *p, double x, double y, anchor at, const char *text, double room,
                      const char *exponent)
 {
@@ -209,7 +209,7 @@ static double ends_ratio(const lab_axis *a)
     return a->log ? log10(a->to / a->from) : a->to - a->from;
 }
 
-/* Where a value stands, as a share of the axis; far off the page it is not told apart. */
+/* Where a value stands, as a share of the axis; far off the page it is cut. */
 static double share_at(const lab_axis *a, double value)
 {
     const double share = (a->log ? log10(value / a->from) : value - a->from) / ends_ratio(a);
@@ -243,9 +243,9 @@ static void put_tick(const ruler *r, double value, const char *text, bool power)
                  power ? "10" : text, WIDEST_NAME, power ? text : NULL);
 }
 
-/* Powers of ten, at most about six; between them ticks without numbers, unless powers are left out. If there
- * is at most one, 1, 2 and 5 times such a power, or over less than a factor of 10 also 3 times, of 4 all
- * multiples. */
+/* Powers of ten, at most about six; between them ticks without numbers, unless powers are left out. If
+ * there is at most one, 1, 2 and 5 times such a power, or over less than a factor of 10 also 3 times, of 4
+ * all multiples. */
 static void put_log_ticks(const ruler *r)
 {
     const lab_axis *a = r->axis;

@@ -82,8 +82,8 @@ typedef struct lab_figure {
     int variant_count;
 } lab_figure;
 
-/* Begins the figure of that name, whose axes the caller sets. Its files are called as the name is, but for characters other
- * than letters, digits and "-_.", and for long names, where a hash tells names apart. */
+/* Begins the figure of that name, whose axes the caller sets. Its files are called as the name is, but for
+ * characters other than letters, digits and "-_.", and for long names, where a hash tells names apart. */
 void lab_figure_begin(lab *l, lab_figure *f, const char *name);
 
 /* Begins a block of data; returns what names it. */
@@ -96,15 +96,15 @@ void lab_figure_box(lab_figure *f, double left, double right, double bottom, dou
 /* Points (x, y) of a block, joined by lines. text: in the legend; NULL: not there. */
 void lab_figure_curve(lab_figure *f, size_t block, lab_style style, const char *text);
 
-/* The curve of a series of an integrator, "be" or "be, error control". In the legend variants share an entry
- * for what they have in common, "error control", in black: a name and a dash tell a series. */
+/* The curve of a series of an integrator, "be" or "be, error control". In the legend variants share an
+ * entry for what they have in common, "error control", in black: a name and a dash tell a series. */
 void lab_figure_series(lab_figure *f, size_t block, const char *integrator, size_t variant, const char *name);
 
 /* Boxes of a block, filled with their colours. */
 void lab_figure_boxes(lab_figure *f, size_t block);
 
-/* The same with a value of the scale in place of the colour: from dark blue to yellow. Values beyond the ends
- * of the scale have the colours of these. */
+/* The same with a value of the scale in place of the colour: from dark blue to yellow. Values beyond the
+ * ends of the scale have the colours of these. */
 void lab_figure_values(lab_figure *f, size_t block);
 
 /* Hatches boxes of a block, which may have any fill, with lines of that colour. */
@@ -120,8 +120,9 @@ void lab_figure_swatch(lab_figure *f, int colour, bool hatched, const char *text
  * (points: x, y in turn) and draws reference lines of slopes 1 to orders there, 2 at most. */
 void lab_figure_fit(lab_figure *f, const double *points, size_t count, int orders);
 
-/* Writes name.svg and name.pdf, and adds the figure with its caption to the page. Without an element there is
- * no figure. Frees the memory. Errors: DRAPE_E_PARSE (values without a range), DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Writes name.svg and name.pdf, and adds the figure with its caption to the page. Without an element there
+ * is no figure. Frees the memory. Errors: DRAPE_E_PARSE (values without a range), DRAPE_E_FILE,
+ * DRAPE_E_MEMORY. */
 drape_status lab_figure_end(lab *l, lab_figure *f, const char *caption);
 
 #endif

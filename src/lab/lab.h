@@ -37,11 +37,11 @@ typedef struct lab_experiment_ops {
     drape_status (*plan)(lab *l);
     /* Faults in what prepare will run, found before there is a folder. NULL: it runs nothing. */
     drape_status (*check)(lab *l);
-    /* Faults of an experiment.json that is merged, before there is a folder, which lab_check_about cannot see. NULL: there
-     * are none. Errors: DRAPE_E_PARSE, DRAPE_E_ARGUMENT. */
+    /* Faults of an experiment.json that is merged, before there is a folder, which lab_check_about cannot
+     * see. NULL: there are none. Errors: DRAPE_E_PARSE, DRAPE_E_ARGUMENT. */
     drape_status (*verify)(lab *l);
-    /* Completes the request of a case: its scene and what it is compared with, if these are not those of the
-     * def and of all cases. NULL: they are. */
+    /* Completes the request of a case: its scene and what it is compared with, if these are not those of
+     * the def and of all cases. NULL: they are. */
     void (*request)(const lab *l, size_t index, struct lab_request *request);
     /* Makes l->reference or l->probe. NULL: there is nothing to prepare. */
     drape_status (*prepare)(lab *l);

@@ -176,8 +176,8 @@ static bool is_set(const lab *l, const space *s, const char *pointer)
     return false;
 }
 
-/* Adds a cell of the map whose first case is `first`. Where the integrator ignores an axis, the cell has the
- * result of the first one along it. */
+/* Adds a cell of the map whose first case is `first`. Where the integrator ignores an axis, the cell has
+ * the result of the first one along it. */
 static drape_status add_cell(lab *l, const space *s, const drape_integrator_ops *integrator, size_t cell,
                              size_t first)
 {
@@ -187,8 +187,8 @@ static drape_status add_cell(lab *l, const space *s, const drape_integrator_ops 
     json_t *tags = json_pack("{s:s}", "integrator", integrator->entry.name),
            *settings = json_pack("{s:s}", "/integrator/method", integrator->entry.name);
     /* By default an explicit integrator takes as many substeps as its limit asks for, and the controller
-     * retries steps that fail. A map is to show the limit: one substep a step and no retries, unless they are
-     * asked for. */
+     * retries steps that fail. A map is to show the limit: one substep a step and no retries, unless they
+     * are asked for. */
     if (integrator->stability && !is_set(l, s, "/integrator/substeps") &&
         drape_param_find(integrator->entry.params, integrator->entry.param_count, "substeps") >= 0)
         json_object_set_new(settings, "/integrator/substeps", json_integer(1));
@@ -301,8 +301,8 @@ static const struct {
     [LATE] = {"over budget", LAB_DARK},
 };
 
-/* Whether a run completed in so few steps that nothing had the time to grow: it is hatched, whatever else is
- * said of it. */
+/* Whether a run completed in so few steps that nothing had the time to grow: it is hatched, whatever else
+ * is said of it. */
 static bool is_short(const json_t *result)
 {
     return lab_is_good(result) && lab_number(result, "accepted") < DRAPE_FEW_STEPS;
@@ -350,8 +350,8 @@ static double shown_value(const lab *l, const shade *sh, size_t i)
     return !has_results(judge(l, l->results[i])) ? NAN : sh->magnitude ? fabs(value) : value;
 }
 
-/* The range of the values: logarithmic, of magnitudes, if these differ much. Values that are zero are at the
- * low end then, below all others. */
+/* The range of the values: logarithmic, of magnitudes, if these differ much. Values that are zero are at
+ * the low end then, below all others. */
 static shade make_shade(const lab *l, const lab_quantity *quantity)
 {
     shade sh = {.quantity = quantity};
@@ -862,7 +862,8 @@ static drape_status read_result(lab *l, size_t i, const lab_quantity **quantity)
     return status;
 }
 
-/* Whether the cases are those of the axes, the cells of an integrator after those of another, and the results known. */
+/* Whether the cases are those of the axes, the cells of an integrator after those of another, and the
+ * results known. */
 static drape_status verify(lab *l)
 {
     space s;

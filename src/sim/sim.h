@@ -148,14 +148,14 @@ drape_status drape_sim_create_like(const drape_sim *like, const drape_model *mod
 void drape_sim_exchange(drape_sim *sim, drape_sim *other);
 
 /* Puts a new sim in the place of the present one, as which it goes on: of the same cloth, with other pins,
- * masses, terms or colliders; arguments as for drape_sim_create_like. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER,
- * DRAPE_E_ARGUMENT (a pin is to be elsewhere), DRAPE_E_STOPPED (the context's cancel function); then the sim is
- * unchanged. */
+ * masses, terms or colliders; arguments as for drape_sim_create_like. Errors: DRAPE_E_MEMORY,
+ * DRAPE_E_SOLVER, DRAPE_E_ARGUMENT (a pin is to be elsewhere), DRAPE_E_STOPPED (the context's cancel
+ * function); then the sim is unchanged. */
 drape_status drape_sim_remake(drape_sim *sim, const drape_model *model, const uint8_t *pinned,
                               const double *masses);
 
-/* Pins these nodes (node_count) and no others: nodes that become free go on with the velocity of their pins,
- * those that become pinned are held where they are. Errors: those of drape_sim_remake. */
+/* Pins these nodes (node_count) and no others: nodes that become free go on with the velocity of their
+ * pins, those that become pinned are held where they are. Errors: those of drape_sim_remake. */
 drape_status drape_sim_repin(drape_sim *sim, const uint8_t *pinned);
 /* Pins these nodes (count), or lets them go (pin 0), if they are not so already. */
 drape_status drape_sim_set_pins(drape_sim *sim, int32_t count, const int32_t *nodes, uint8_t pin);
@@ -213,9 +213,9 @@ void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *densit
  * or not the step is accepted. */
 void drape_sim_add_contact_work(drape_sim *sim);
 
-/* For forces in the present state: where no step has led to it, drape_system_begin_reading, with the work of
- * the laws of contact that it changes in the account; otherwise the last step has begun for them already.
- * Errors: DRAPE_E_MEMORY. */
+/* For forces in the present state: where no step has led to it, drape_system_begin_reading, with the work
+ * of the laws of contact that it changes in the account; otherwise the last step has begun for them
+ * already. Errors: DRAPE_E_MEMORY. */
 drape_status drape_sim_begin_reading(drape_sim *sim);
 
 /* Adds the work of an accepted step to the energy account. */

@@ -49,8 +49,8 @@ double fuzz_magnitude(fuzz_bytes *bytes, double low, double high); /* the same i
 
 /* ---- Folders ---- */
 
-/* A folder of this process, with files: each piece of the bytes that begins with a line "=== NAME" is the content
- * of NAME. Files of the call before are removed. The folder is removed at exit. */
+/* A folder of this process, with files: each piece of the bytes that begins with a line "=== NAME" is the
+ * content of NAME. Files of the call before are removed. The folder is removed at exit. */
 const char *fuzz_folder(const uint8_t *data, size_t size);
 
 /* Removes a folder and the files in it. */
@@ -58,12 +58,12 @@ void fuzz_remove(const char *folder);
 
 /* ---- Sims ---- */
 
-/* Advances to t in at most `attempts` attempts, and cancels the advance after `seconds` of CPU, as a single
- * attempt may take much work ("static" makes a thousand steps of pseudo time). An advance must end soon after
- * it is cancelled, measured in CPU time and not by the clock of a busy machine. A loop that never ends hangs,
- * which libFuzzer and the timeout of the tests report. Checks during and after the advance that all numbers
- * are finite and that a rejected attempt or a failure leaves the last accepted state to the bit. Call it once
- * for each sim. */
+/* Advances to t in at most `attempts` attempts, and cancels the advance after `seconds` of CPU, as a
+ * single attempt may take much work ("static" makes a thousand steps of pseudo time). An advance must end
+ * soon after it is cancelled, measured in CPU time and not by the clock of a busy machine. A loop that
+ * never ends hangs, which libFuzzer and the timeout of the tests report. Checks during and after the
+ * advance that all numbers are finite and that a rejected attempt or a failure leaves the last accepted
+ * state to the bit. Call it once for each sim. */
 drape_status fuzz_advance(drape_context *ctx, drape_sim *sim, double t, int attempts, double seconds);
 
 /* Checks that the time, the positions and the velocities of a sim are finite; when: for the message. */

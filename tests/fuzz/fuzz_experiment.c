@@ -1,5 +1,5 @@
-/* fuzz_experiment.c: the bytes are the files of the folder of an experiment, which is merged into another: it is
- * refused with one line, or makes a report, and nothing is written but into the other folder. */
+/* fuzz_experiment.c: the bytes are the files of the folder of an experiment, which is merged into another:
+ * it is refused with one line, or makes a report, and nothing is written but into the other folder. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,5 @@
-/* fuzz_frames.c: the bytes are files of the animation of a body: frames.npy or frames.pc2, mesh.obj, times.npy. */
+/* fuzz_frames.c: the bytes are files of the animation of a body: frames.npy or frames.pc2, mesh.obj,
+ * times.npy. */
 #include <stdio.h>
 #include <unistd.h>
 
