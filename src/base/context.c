@@ -122,7 +122,7 @@ void drape_make_printable(char *text)
         uint32_t c;
         count = character((const unsigned char *)text, &c);
         if (count == 0 || c < ' ' || (c >= 0x7f && c <= 0x9f) || (c >= 0x202a && c <= 0x202e) ||
-            (c >= 0x2066 && c <= 0x2069)) {
+            (c >= 0x2066 && c <= 0x2069) || (c & 0xfffe) == 0xfffe || (c >= 0xfdd0 && c <= 0xfdef)) {
             count += count == 0;
             memset(text, *text >= '\t' && *text <= '\r' ? ' ' : '?', count);
         }

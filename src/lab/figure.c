@@ -7,6 +7,7 @@
 #include <cairo-pdf.h>
 #include <cairo-svg.h>
 #include <ctype.h>
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -114,11 +115,12 @@ static void put_path(const page *p, const double *xy, size_t count)
 static void put_line(const page *p, const double *xy, size_t count, int colour, double width, int dash)
 {
     static const double dashes[][6] = {{3, 2.6}, {1, 2}, {4.5, 1.8, 1, 1.8}, {4.5, 1.5, 1, 1.5, 1, 1.5}};
-    const int pieces[] = {2, 2, 4, 6};
+    static const int pieces[] = {2, 2, 4, 6};
+    const int kind = dash < 2 || dash > 5 ? -1 : dash - 2;
     put_path(p, xy, count);
     set_colour(p, colour);
     cairo_set_line_width(p->cairo, across(width));
-    cairo_set_dash(p->cairo, dash < 2 ? NULL : dashes[dash - 2], dash < 2 ? 0 : pieces[dash - 2], 0);
+    cairo_set_dash(p->cairo, kind < 0 ? NULL : dashes[kind], kind < 0 ? 0 : pieces[kind], 0);
     cairo_stroke(p->cairo);
 }
 
@@ -206,13 +208,13 @@ static void put_text(const page *p, double x, double y, anchor at, const char *t
 
 static double ends_ratio(const lab_axis *a)
 {
-    return a->log ? log10(a->to / a->from) : a->to - a->from;
+    return a->log ? log10(a->to) - log10(a->from) : a->to - a->from;
 }
 
 /* Where a value stands, as a share of the axis; far off the page it is cut. */
 static double share_at(const lab_axis *a, double value)
 {
-    const double share = (a->log ? log10(value / a->from) : value - a->from) / ends_ratio(a);
+    const double share = (a->log ? log10(value) - log10(a->from) : value - a->from) / ends_ratio(a);
     return isnan(share) ? NAN : fmin(FAR, fmax(-FAR, share));
 }
 
@@ -383,6 +385,8 @@ static void add_entry(lab_figure *f, const lab_entry *entry)
 {
     if (f->entries < LAB_MAX_ENTRIES)
         f->legend[f->entries++] = *entry;
+    else
+        snprintf(f->legend[LAB_MAX_ENTRIES - 1].text, sizeof entry->text, "and others");
 }
 
 void lab_figure_curve(lab_figure *f, size_t block, lab_style style, const char *text)
@@ -452,8 +456,8 @@ void lab_figure_fit(lab_figure *f, const double *xy, size_t count, int orders)
     /* A single value is given a decade. */
     for (lab_axis *a = x; a <= y; a++) {
         const double widen = a->to > a->from ? pow(a->to / a->from, margin) : sqrt(10);
-        a->from /= widen;
-        a->to *= widen;
+        a->from = fmax(a->from / widen, DBL_MIN);
+        a->to = fmin(a->to * widen, DBL_MAX);
     }
     if (orders == 0)
         return;
@@ -662,13 +666,17 @@ static drape_status write_figure(lab *l, const lab_figure *f, const char *ending
     const page p = {cairo_create(surface), at.height};
     draw_page(f, &at, &p);
     cairo_surface_finish(surface);
-    const bool failed = cairo_status(p.cairo) || cairo_surface_status(surface);
+    const cairo_status_t fault =
+        cairo_status(p.cairo) ? cairo_status(p.cairo) : cairo_surface_status(surface);
     cairo_destroy(p.cairo);
     cairo_surface_destroy(surface);
     snprintf(name, sizeof name, "%s%s", f->name, ending);
-    drape_status status = fclose(out) || failed
-                              ? drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for the figure %s", name)
-                              : lab_write_text(l, name, text, size);
+    const bool no_memory =
+        fclose(out) || fault == CAIRO_STATUS_NO_MEMORY || fault == CAIRO_STATUS_WRITE_ERROR;
+    drape_status status = no_memory ? drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for the figure %s", name)
+                          : fault   ? drape_fail(l->ctx, DRAPE_E_PARSE, "the figure %s cannot be drawn: %s",
+                                                 name, cairo_status_to_string(fault))
+                                    : lab_write_text(l, name, text, size);
     if (!status && caption)
         lab_page_figure(l, text, size, caption);
     free(text);
@@ -679,7 +687,7 @@ drape_status lab_figure_end(lab *l, lab_figure *f, const char *caption)
 {
     for (int i = 0; i < f->variant_count; i++)
         add_entry(f, &f->variants[i]);
-    drape_status status = f->failed ? DRAPE_E_MEMORY : DRAPE_OK;
+    drape_status status = f->failed ? DRAPE_E_MEMORY : drape_check_cancel(l->ctx);
     const bool empty = status || f->element_count == 0;
     if (!empty &&
         !(has_range(&f->axes[0]) && has_range(&f->axes[1]) && (!has_scale(f) || has_range(&f->scale))))

@@ -659,7 +659,8 @@ static drape_status draw_horizons(lab *l)
             last = fmax(last, x);
             lab_figure_point(&f, x, y > 0 ? y : NAN);
         }
-        lab_figure_curve(&f, block, (lab_style){palette[i % 5], 1 + (int)(i / 5), 0}, lab_text(s, "name"));
+        lab_figure_curve(&f, block, (lab_style){palette[i % 5], 1 + (int)(i / 5 % 5), 0},
+                         lab_text(s, "name"));
     }
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "time / duration of the scene");
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "growth of the perturbation");

@@ -5,7 +5,6 @@
 #include "base/hash.h"
 #include "io/scene_copy.h"
 #include "lab/lab.h"
-#include "lab/text.h"
 #include "model/model.h"
 #include "sim/identity.h"
 #include "sim/sim.h"
@@ -64,29 +63,40 @@ drape_status lab_load(drape_context *ctx, const lab_request *request, drape_mode
     return status;
 }
 
-static drape_status count_file(void *user, const char *path, const char *pointer)
+typedef struct files {
+    drape_context *ctx;
+    uint64_t hash;
+    int count;
+} files;
+
+/* Several files at once, as a folder of frames, are hashed as the model has them. */
+static drape_status add_file(void *user, const char *path, const char *pointer)
 {
-    (void)path;
+    files *f = user;
+    char *bytes;
+    size_t size;
     (void)pointer;
-    ++*(int *)user;
-    return DRAPE_OK;
+    drape_status status = drape_file_read(f->ctx, path, DRAPE_MAX_TABLE, &bytes, &size);
+    if (!status)
+        f->hash = drape_hash_bytes(f->hash, bytes, size);
+    drape_free(f->ctx, bytes);
+    f->count++;
+    return status == DRAPE_E_MEMORY ? status : DRAPE_OK;
 }
 
 drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_model *model, char digits[17])
 {
-    drape_arena arena = drape_arena_of(ctx);
+    files f = {.ctx = ctx};
     char *text;
     size_t size;
-    int files = 0;
-    drape_status status = lab_read_text(&arena, NULL, path, &text, &size);
+    drape_status status = drape_file_read(ctx, path, DRAPE_MAX_TABLE, &text, &size);
     if (!status)
-        status = drape_scene_files(ctx, model, path, count_file, &files);
-    if (!status) {
-        const uint64_t hash = drape_hash_bytes(DRAPE_HASH_START, text, size),
-                       compiled = files ? drape_model_identity(model) : 0;
-        snprintf(digits, 17, "%016" PRIx64, drape_hash_bytes(hash, &compiled, files ? sizeof compiled : 0));
-    }
-    drape_arena_free(&arena);
+        f.hash = drape_hash_bytes(DRAPE_HASH_START, text, size);
+    drape_free(ctx, text);
+    if (!status)
+        status = drape_scene_files(ctx, model, path, add_file, &f);
+    const uint64_t compiled = f.count ? drape_model_identity(model) : 0;
+    snprintf(digits, 17, "%016" PRIx64, drape_hash_bytes(f.hash, &compiled, f.count ? sizeof compiled : 0));
     return status;
 }
 

@@ -34,8 +34,8 @@ typedef struct lab_request {
 drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drape_scene **scene);
 drape_status lab_load(drape_context *ctx, const lab_request *request, drape_model **model);
 
-/* The identity of a scene and of all files that it names, as digits: a hash of its text, which goes on
- * over the compiled model where the scene names files. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* The identity of a scene and of all files that it names, as digits: a hash of its text and of these
+ * files, and of the compiled model where there are any. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_model *model, char digits[17]);
 
 /* The same of the scene of a request, before the settings of its case, as it is now. Errors: those of

@@ -3,7 +3,9 @@
 
 #include <string.h>
 
-#define LONGEST 512 /* of texts that are shown */
+#define LONGEST    512 /* of texts that are shown */
+#define MAX_SERIES 4096
+#define MAX_SCENES 256
 
 /* Where the check is: the file, and the place in it. */
 typedef struct place {
@@ -15,7 +17,7 @@ typedef struct place {
 static drape_status refuse(const place *at, const char *name, const char *why)
 {
     return drape_fail(at->ctx, DRAPE_E_PARSE, "%.500s: %s%s%.100s: %s", at->file, at->pointer,
-                      *name ? "/" : "", name, why);
+                      !*name ? "" : *at->pointer == '/' || !*at->pointer ? "/" : ": ", name, why);
 }
 
 /* The result of json_unpack_ex, whose format says which members an object has, and of which types. */
@@ -24,13 +26,23 @@ static drape_status unpacked(const place *at, int code, const json_error_t *faul
     return code ? refuse(at, "", fault->text) : DRAPE_OK;
 }
 
-/* The members of an object, of which some are shown, or become part of the name of a file. */
-static drape_status check_members(const place *at, const json_t *object)
+static bool is_one_of(const char *key, const char *const *keys)
+{
+    while (*keys && strcmp(*keys, key) != 0)
+        keys++;
+    return *keys != NULL;
+}
+
+/* The members of an object, scalars but for some. Texts are shown, or become part of the name of a file. */
+static drape_status check_members(const place *at, const json_t *object, const char *const *nested)
 {
     const char *key;
     json_t *value;
     json_object_foreach((json_t *)(uintptr_t)object, key, value)
     {
+        if ((json_is_object(value) || json_is_array(value) || json_is_boolean(value)) &&
+            !is_one_of(key, nested))
+            return refuse(at, key, "must be a text, a number or null");
         char copy[LONGEST] = "";
         const char *text = json_is_string(value) ? json_string_value(value) : "";
         snprintf(copy, sizeof copy, "%s", text);
@@ -62,6 +74,8 @@ static drape_status check_order(const place *at, const json_t *cases, size_t i, 
         return refuse(at, "same_as", "must be the number of an earlier case that has a result of its own");
     snprintf(name, sizeof name, "%s\n%s", lab_tag_text(one, "scene"), lab_tag_text(one, "series"));
     const json_t *before = json_object_get(series, name);
+    if (json_object_size(series) > MAX_SERIES)
+        return refuse(at, "tags", "there are more than 4096 series");
     if (before && json_integer_value(before) != last)
         return refuse(at, "tags", "the cases of a series must stand side by side");
     return json_object_set_new(series, name, json_integer((json_int_t)i))
@@ -73,15 +87,16 @@ static drape_status check_cases(place *at, const json_t *cases)
 {
     json_t *series = json_object(), *one;
     json_error_t fault;
-    drape_status status = DRAPE_OK;
+    drape_status status = json_array_size(cases) ? DRAPE_OK : refuse(at, "cases", "there is none");
     for (size_t i = 0; !status && (one = json_array_get(cases, i)); i++) {
         snprintf(at->pointer, sizeof at->pointer, "/cases/%zu", i);
-        status = unpacked(at,
-                          json_unpack_ex(one, &fault, JSON_VALIDATE_ONLY, "{s:{s:s}, s?:{}, s?:I, s?:I}",
-                                         "tags", "integrator", "settings", "same_as", "rank"),
-                          &fault);
+        status = unpacked(
+            at,
+            json_unpack_ex(one, &fault, JSON_VALIDATE_ONLY, "{s:{s:s, s?:s, s?:s, s?:s}, s?:{}, s?:I, s?:I}",
+                           "tags", "integrator", "scene", "series", "knob", "settings", "same_as", "rank"),
+            &fault);
         if (!status)
-            status = check_members(at, json_object_get(one, "tags"));
+            status = check_members(at, json_object_get(one, "tags"), (const char *const[]){NULL});
         if (!status)
             status = check_order(at, cases, i, series);
     }
@@ -93,7 +108,8 @@ static drape_status check_scenes(place *at, const json_t *scenes)
 {
     json_t *one;
     json_error_t fault;
-    drape_status status = DRAPE_OK;
+    drape_status status =
+        json_array_size(scenes) <= MAX_SCENES ? DRAPE_OK : refuse(at, "arguments/scenes", "more than 256");
     for (size_t i = 0; !status && (one = json_array_get(scenes, i)); i++) {
         snprintf(at->pointer, sizeof at->pointer, "/arguments/scenes/%zu", i);
         status = unpacked(at,
@@ -101,7 +117,7 @@ static drape_status check_scenes(place *at, const json_t *scenes)
                                          "name", "duration_s", "reference_error", "t_s", "growth"),
                           &fault);
         if (!status)
-            status = check_members(at, one);
+            status = check_members(at, one, (const char *const[]){"t_s", "growth", NULL});
         if (!status)
             status = check_items(at, one, "t_s", false);
         if (!status)
@@ -144,5 +160,7 @@ drape_status lab_check_line(const lab *l, const char *file, int64_t number, json
     const json_t *one = i < 0 ? NULL : json_array_get(l->cases, (size_t)i);
     if (!json_equal(json_object_get(line, "tags"), json_object_get(one, "tags")))
         return refuse(&at, "", "it has another number, or other tags");
-    return check_items(&at, line, "positions", false);
+    drape_status status =
+        check_members(&at, line, (const char *const[]){"tags", "reasons", "positions", NULL});
+    return status ? status : check_items(&at, line, "positions", false);
 }

@@ -131,6 +131,18 @@ static double resolved_error(const json_t *result)
     return lab_is_good(result) && error > RESOLVED * lab_number(result, "reference_error_m") ? error : NAN;
 }
 
+/* Cases that were run of the series of a case, which stand side by side. */
+static int count_beside(const lab *l, size_t i)
+{
+    const char *series = lab_tag_text(json_array_get(l->cases, i), "series");
+    int count = 0;
+    while (i > 0 && strcmp(lab_tag_text(json_array_get(l->cases, i - 1), "series"), series) == 0)
+        i--;
+    for (; i < l->count && strcmp(lab_tag_text(json_array_get(l->cases, i), "series"), series) == 0; i++)
+        count += l->results[i] != NULL;
+    return count;
+}
+
 /* Cases of a series that were run. */
 static int count_run(const lab *l, const char *series)
 {
@@ -145,11 +157,17 @@ static int count_run(const lab *l, const char *series)
 static const json_t *cheapest(const lab *l, double error, const char *series)
 {
     const json_t *best = NULL;
+    const char *counted = "";
+    int count = 0; /* of that series */
     for (size_t i = 0; i < l->count; i++) {
         const json_t *r = l->results[i];
-        if (is_linear_case(r) || !(resolved_error(r) <= error) ||
-            (series && strcmp(lab_tag_text(r, "series"), series) != 0) ||
-            count_run(l, lab_tag_text(r, "series")) < FEWEST)
+        const char *own = lab_tag_text(r, "series");
+        if (is_linear_case(r) || !(resolved_error(r) <= error) || (series && strcmp(own, series) != 0))
+            continue;
+        if (strcmp(own, counted) != 0)
+            count = count_beside(l, i);
+        counted = own;
+        if (count < FEWEST)
             continue;
         if (!best || lab_number(r, "cpu_s") < lab_number(best, "cpu_s"))
             best = r;
@@ -232,8 +250,8 @@ static void report_sparse(lab *l)
     for (size_t i = 0; i < l->count; i++) {
         const json_t *one = json_array_get(l->cases, i);
         const char *series = lab_tag_text(one, "series");
-        const int count = count_run(l, series);
-        if (strcmp(series, before) != 0 && !is_linear_case(one) && count > 0 && count < FEWEST) {
+        const int count = strcmp(series, before) != 0 && !is_linear_case(one) ? count_beside(l, i) : 0;
+        if (count > 0 && count < FEWEST) {
             if (!any)
                 fprintf(l->summary, "Too few cases for a comparison, which takes %d:", FEWEST);
             fprintf(l->summary, "%s %s (%d)", any ? "," : "", series, count);

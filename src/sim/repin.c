@@ -14,7 +14,11 @@ drape_status drape_sim_repin(drape_sim *sim, const uint8_t *pinned)
 
 drape_status drape_sim_set_pins(drape_sim *sim, int32_t count, const int32_t *nodes, uint8_t pin)
 {
-    drape_status status = DRAPE_OK;
+    bool differs = false;
+    for (int32_t i = 0; i < count && !differs; i++)
+        differs = sim->model->pinned[nodes[i]] != pin;
+    if (!differs)
+        return DRAPE_OK;
     const size_t size = (size_t)sim->model->node_count * sizeof *sim->pinned;
     uint8_t *pinned = drape_alloc(sim->ctx, size, 1);
     if (!pinned)
@@ -22,8 +26,7 @@ drape_status drape_sim_set_pins(drape_sim *sim, int32_t count, const int32_t *no
     memcpy(pinned, sim->model->pinned, size);
     for (int32_t i = 0; i < count; i++)
         pinned[nodes[i]] = pin;
-    if (memcmp(pinned, sim->model->pinned, size) != 0)
-        status = drape_sim_repin(sim, pinned);
+    const drape_status status = drape_sim_repin(sim, pinned);
     drape_free(sim->ctx, pinned);
     return status;
 }
