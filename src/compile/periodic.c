@@ -108,13 +108,13 @@ static drape_status match(pairing *p, drape_arena *scratch)
     const double *x = p->cloth->mesh.x, slip = SLIP * p->model->length;
     const size_t count = (size_t)p->to.count;
     const size_t axis = (size_t)longest_axis(&p->to, x);
-    drape_placed *list = drape_arena_take(scratch, count, sizeof *list);
+    drape_node_along *list = drape_arena_take(scratch, count, sizeof *list);
     p->partner = drape_arena_take(scratch, count, sizeof *p->partner);
     drape_status status = drape_arena_status(scratch);
     if (status)
         return status;
     for (size_t i = 0; i < count; i++)
-        list[i] = (drape_placed){x[3 * (size_t)p->to.node[i] + axis], p->to.node[i]};
+        list[i] = (drape_node_along){x[3 * (size_t)p->to.node[i] + axis], p->to.node[i]};
     qsort(list, count, sizeof *list, drape_compare_placed);
     for (size_t i = 0; !status && i < count; i++) {
         double at[3];

@@ -55,7 +55,7 @@ static drape_status sort(side *s, drape_arena *scratch)
 {
     const double *x = s->model->cloths[s->cloth].mesh.x;
     double low[3], high[3];
-    drape_placed *list = drape_arena_take(scratch, (size_t)s->count, sizeof *list);
+    drape_node_along *list = drape_arena_take(scratch, (size_t)s->count, sizeof *list);
     int axis = 0;
     if (!list)
         return DRAPE_E_MEMORY;
@@ -70,7 +70,7 @@ static drape_status sort(side *s, drape_arena *scratch)
     for (int k = 1; k < 3; k++)
         axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
     for (int32_t i = 0; i < s->count; i++)
-        list[i] = (drape_placed){x[3 * (size_t)s->node[i] + (size_t)axis], s->node[i]};
+        list[i] = (drape_node_along){x[3 * (size_t)s->node[i] + (size_t)axis], s->node[i]};
     qsort(list, (size_t)s->count, sizeof *list, drape_compare_placed);
     for (int32_t i = 0; i < s->count; i++)
         s->node[i] = list[i].node;

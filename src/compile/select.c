@@ -126,7 +126,7 @@ drape_status drape_select_nodes(const drape_selection *s)
 
 int drape_compare_placed(const void *a, const void *b)
 {
-    const drape_placed *p = a, *q = b;
+    const drape_node_along *p = a, *q = b;
     return p->along != q->along ? (p->along > q->along) - (p->along < q->along)
                                 : (p->node > q->node) - (p->node < q->node);
 }

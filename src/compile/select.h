@@ -34,10 +34,10 @@ typedef struct drape_selection {
 drape_status drape_select_nodes(const drape_selection *selection);
 
 /* A node at a coordinate along an axis, and the order of these, for qsort: by coordinate, then by node. */
-typedef struct drape_placed {
+typedef struct drape_node_along {
     double along;
     int32_t node;
-} drape_placed;
+} drape_node_along;
 int drape_compare_placed(const void *a, const void *b);
 
 #endif

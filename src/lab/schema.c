@@ -17,7 +17,10 @@ typedef struct place {
 static drape_status refuse(const place *at, const char *name, const char *why)
 {
     return drape_fail(at->ctx, DRAPE_E_PARSE, "%.500s: %s%s%.100s: %s", at->file, at->pointer,
-                      !*name ? "" : *at->pointer == '/' || !*at->pointer ? "/" : ": ", name, why);
+                      !*name                                 ? ""
+                      : *at->pointer == '/' || !*at->pointer ? "/"
+                                                             : ": ",
+                      name, why);
 }
 
 /* The result of json_unpack_ex, whose format says which members an object has, and of which types. */
