@@ -138,22 +138,29 @@ drape_status lab_check_integrators(const lab *l)
 
 static drape_status plan(lab *l)
 {
-    char digits[17]; /* lines of a scene that was changed since do not belong to this experiment */
-    drape_status status = lab_identify(l->ctx, &(lab_request){.def = l->def}, digits);
-    if (status)
-        return status;
+    char digits[17];
     json_t *settings = json_array();
     for (size_t i = 0; i < l->def->setting_count; i++)
         json_array_append_new(settings,
                               json_pack("[s,s]", l->def->settings[i].pointer, l->def->settings[i].value));
     l->about = json_pack("{s:s, s:s, s:o, s:s, s:o, s:{}, s:[]}", "experiment", l->experiment->entry.name,
-                         "drape", drape_version(), "scene", drape_json_text(l->def->scene), "scene_hash",
-                         digits, "settings", settings, "arguments", "cases");
+                         "drape", drape_version(), "scene", drape_json_text(l->def->scene), "scene_hash", "",
+                         "settings", settings, "arguments", "cases");
     l->cases = json_object_get(l->about, "cases");
     l->arguments = json_object_get(l->about, "arguments");
     if (!l->cases || !l->arguments)
         return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "the settings are not UTF-8, or there is no memory");
-    return l->experiment->plan(l);
+    drape_status status = l->experiment->plan(l);
+    if (!status)
+        status = lab_check_about(l->ctx, "the plan", l->about);
+    /* Lines of a scene that was changed since do not belong to this experiment. */
+    const json_t *first = json_array_get(l->cases, 0);
+    if (!status)
+        status = lab_identify(
+            l->ctx, &(lab_request){.def = l->def, .identified = json_object_get(first, "settings")}, digits);
+    if (!status && json_object_set_new(l->about, "scene_hash", json_string(digits)))
+        status = drape_fail_memory(l->ctx, sizeof digits);
+    return status;
 }
 
 /* Refuses settings that no case takes from the scene: a user who sets dt for a tradeoff expects runs at that

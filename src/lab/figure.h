@@ -21,7 +21,6 @@
 #define LAB_GREY   0x999999
 #define LAB_DARK   0x4d4d4d
 #define LAB_BLUE   0x0072b2
-#define LAB_YELLOW 0xf0e442
 #define LAB_ORANGE 0xe69f00
 #define LAB_RED    0xd55e00
 #define LAB_PURPLE 0xcc79a7

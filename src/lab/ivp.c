@@ -191,6 +191,7 @@ static void complete_request(const lab *l, size_t index, lab_request *request)
     const lab_ivp *s = &own->scenes[own->of[index]];
     request->scene = s->path;
     request->identity = s->hash;
+    request->identified = NULL;
     request->reference = &s->reference;
     request->reference_error = s->error * s->size;
     request->times = s->times;

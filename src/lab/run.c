@@ -12,6 +12,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define SHORT 1.0 /* [s] CPU: longer runs are not repeated, since noise is a small share of them */
 
@@ -84,30 +85,61 @@ static drape_status add_file(void *user, const char *path, const char *pointer)
     return status == DRAPE_E_MEMORY ? status : DRAPE_OK;
 }
 
-drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_model *model, char digits[17])
+static drape_status hash_text(drape_context *ctx, const char *path, uint64_t *hash)
 {
-    files f = {.ctx = ctx};
     char *text;
     size_t size;
     drape_status status = drape_file_read(ctx, path, DRAPE_MAX_TABLE, &text, &size);
-    if (!status)
-        f.hash = drape_hash_bytes(DRAPE_HASH_START, text, size);
+    *hash = status ? 0 : drape_hash_bytes(DRAPE_HASH_START, text, size);
     drape_free(ctx, text);
+    return status;
+}
+
+static void put_digits(uint64_t hash, char digits[17])
+{
+    snprintf(digits, 17, "%016" PRIx64, hash);
+}
+
+drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_model *model, char digits[17])
+{
+    files f = {.ctx = ctx};
+    drape_status status = hash_text(ctx, path, &f.hash);
     if (!status)
         status = drape_scene_files(ctx, model, path, add_file, &f);
     const uint64_t compiled = f.count ? drape_model_identity(model) : 0;
-    snprintf(digits, 17, "%016" PRIx64, drape_hash_bytes(f.hash, &compiled, f.count ? sizeof compiled : 0));
+    put_digits(drape_hash_bytes(f.hash, &compiled, f.count ? sizeof compiled : 0), digits);
     return status;
+}
+
+static const char *path_of(const lab_request *request)
+{
+    return request->scene ? request->scene : request->def->scene;
 }
 
 drape_status lab_identify(drape_context *ctx, const lab_request *request, char digits[17])
 {
     drape_model *model = NULL;
-    const lab_request plain = {.def = request->def, .scene = request->scene};
+    const lab_request plain = {.def = request->def, .scene = request->scene, .settings = request->identified};
     drape_status status = lab_load(ctx, &plain, &model);
     if (!status)
-        status = lab_hash_scene(ctx, request->scene ? request->scene : request->def->scene, model, digits);
+        status = lab_hash_scene(ctx, path_of(request), model, digits);
     drape_model_destroy(&model);
+    return status;
+}
+
+drape_status lab_check_identity(drape_context *ctx, const lab_request *request)
+{
+    uint64_t hash;
+    char now[17];
+    drape_status status = hash_text(ctx, path_of(request), &hash);
+    put_digits(hash, now); /* the identity of a scene without files: there is nothing to compile */
+    if (!status && strcmp(now, request->identity) != 0)
+        status = lab_identify(ctx, request, now);
+    if (!status && strcmp(now, request->identity) != 0)
+        status = drape_fail(ctx, DRAPE_E_ARGUMENT,
+                            "\"%.400s\", or a file that it names, was changed while the experiment runs; the "
+                            "results so far are of what it was before",
+                            path_of(request));
     return status;
 }
 

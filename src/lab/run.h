@@ -12,7 +12,8 @@
 typedef struct lab_request {
     const drape_lab_def *def;   /* scene, settings of all cases, cancel */
     const char *scene;          /* name of its file; NULL: the def's */
-    const char *identity;       /* that it must have when the case is done */
+    const char *identity;       /* that the scene must have when the case is done (lab_identify) */
+    const json_t *identified;   /* settings with which it has that identity; NULL: none */
     const json_t *settings;     /* {pointer: value} of the case; NULL: none */
     const lab_trace *reference; /* NULL or no frames: nothing to compare with */
     double reference_error;     /* [m] estimate of its error */
@@ -38,9 +39,13 @@ drape_status lab_load(drape_context *ctx, const lab_request *request, drape_mode
  * files, and of the compiled model where there are any. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_model *model, char digits[17]);
 
-/* The same of the scene of a request, before the settings of its case, as it is now. Errors: those of
- * loading. */
+/* The same of the scene of a request as it is now, with the settings `identified`, which are those of one case
+ * for all: a scene may lack what the cases set. Errors: those of loading. */
 drape_status lab_identify(drape_context *ctx, const lab_request *request, char digits[17]);
+
+/* Whether the scene still has the identity of the request. Errors: those of loading, DRAPE_E_ARGUMENT (it has
+ * another one). */
+drape_status lab_check_identity(drape_context *ctx, const lab_request *request);
 
 /* Whether it compiles. */
 drape_status lab_try(drape_context *ctx, const lab_request *request);

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#define LONGEST    512 /* of texts that are shown */
+#define LONGEST    DRAPE_MESSAGE_SIZE /* of texts that are shown */
 #define MAX_SERIES 4096
 #define MAX_SCENES 256
 
@@ -51,7 +51,7 @@ static drape_status check_members(const place *at, const json_t *object, const c
         snprintf(copy, sizeof copy, "%s", text);
         drape_make_printable(copy);
         if (strcmp(copy, text) != 0)
-            return refuse(at, key, "a text has control characters, or is longer than 511 bytes");
+            return refuse(at, key, "a text has control characters, or is longer than 1023 bytes");
     }
     return DRAPE_OK;
 }

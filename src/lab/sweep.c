@@ -146,12 +146,13 @@ static void keep(sweep *s, size_t i, json_t *result)
     lab *l = s->l;
     const drape_lab_def *def = l->def;
     json_t *tags = json_deep_copy(json_object_get(json_array_get(l->cases, i), "tags"));
-    if (json_object_set_new(result, "case", json_integer((json_int_t)i)) ||
-        json_object_set_new(result, "tags", tags))
-        stop(s, drape_fail_memory(l->ctx, 1));
+    const bool failed = json_object_set_new(result, "case", json_integer((json_int_t)i)) ||
+                        json_object_set_new(result, "tags", tags);
     l->results[i] = result;
-    if (s->status)
+    if (failed) {
+        stop(s, drape_fail_memory(l->ctx, 1));
         return;
+    }
     s->done++;
     lab_put_line(&s->file, result);
     drape_status status = drape_file_keep(&s->file);
@@ -167,6 +168,7 @@ lab_request lab_request_of(const lab *l, size_t index)
 {
     lab_request request = {.def = l->def,
                            .identity = lab_text(l->about, "scene_hash"),
+                           .identified = json_object_get(json_array_get(l->cases, 0), "settings"),
                            .settings = json_object_get(json_array_get(l->cases, index), "settings"),
                            .reference = &l->reference,
                            .reference_error = l->reference_error,
@@ -176,19 +178,6 @@ lab_request lab_request_of(const lab *l, size_t index)
     if (l->experiment->request)
         l->experiment->request(l, index, &request);
     return request;
-}
-
-/* A case of a scene, or of a mesh, that has been edited meanwhile does not belong to the experiment. */
-static drape_status check_scene(drape_context *ctx, const lab_request *request)
-{
-    char now[17];
-    drape_status status = lab_identify(ctx, request, now);
-    if (status || strcmp(now, request->identity) == 0)
-        return status;
-    return drape_fail(ctx, DRAPE_E_ARGUMENT,
-                      "\"%.400s\", or a file that it names, was changed while the experiment runs; the "
-                      "results so far are of what it was before",
-                      request->scene ? request->scene : request->def->scene);
 }
 
 /* A thread: runs cases until there is none left. */
@@ -211,7 +200,7 @@ static void *work(void *user)
         request.given_up = &s->given_up;
         drape_status status = lab_run(ctx, &request, &result);
         if (!status && result)
-            status = check_scene(ctx, &request);
+            status = lab_check_identity(ctx, &request);
         if (result)
             json_object_set_new(result, "case_cpu_s", json_real(drape_clock_thread_seconds() - start));
         pthread_mutex_lock(&s->lock);

@@ -283,6 +283,18 @@ def test_budget():
     refused("tradeoff", "scene.json", "--budget", "0", "--out", "n", says="--budget \"0\": must be minutes, above 0, or none")
 
 
+def test_axis_completes_the_scene():
+    """a scene may lack a value that an axis gives it"""
+    whole = scene()
+    del whole["cloth"][0]["material"]["density"]
+    with open("scene.json", "w", encoding="utf-8") as file:
+        json.dump(whole, file)
+    command = ["stability", "scene.json", "--axis", "/cloth/0/material/density=100:200:2", "--integrators", "be", "--out", "s"]
+    good(*command)
+    good(*command)
+    equal([r["status"] for r in lines("s").values()], ["ok", "ok"], "cases")
+
+
 def test_ignored_axis():
     """an integrator that ignores an axis runs once along it"""
     write_scene()

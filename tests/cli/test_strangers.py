@@ -5,10 +5,12 @@ import json
 import os
 import re
 import shutil
+import subprocess
 import sys
+import time
 
 from figure import Figure
-from program import SOURCES, drape, equal, good, read_json, refused, run_tests, scene, write_scene
+from program import LIMIT, PROGRAM, SOURCES, drape, equal, good, read_json, refused, run_tests, scene, write_scene
 
 NAMES = {
     "newline": 'a\nsystem("touch RAN_CODE")\nb',
@@ -170,6 +172,7 @@ def test_merge():
         else:
             change(folder, f"in{number}", edit)
         refused("merge", f"in{number}", "--out", "X", says=says, env=environment)
+    good("merge", change("map", "in_message", lambda about, cases: cases[0].update(message="x" * 1000)), "--out", "out_message")
     before = tree("out", "in")
     for kind, name in NAMES.items():
         def rename(about, cases, name=name):
@@ -243,6 +246,20 @@ def test_changed_mesh():
         refused(*repeated, says="holds another experiment")
     mesh(3)
     good(*command, "--out", "again")
+    for _ in range(20):  # while it runs; once more if it was complete before this process could change the mesh
+        mesh(3)
+        shutil.rmtree("running", ignore_errors=True)
+        with subprocess.Popen([PROGRAM, *command[:3], "/integrator/dt=1e-4:1e-2:400log", *command[4:], "--out", "running"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+            while process.poll() is None and not (os.path.exists("running/cases.jsonl") and os.path.getsize("running/cases.jsonl")):
+                time.sleep(0.002)
+            mesh(9)
+            said = process.communicate(timeout=LIMIT)[1]
+        if process.returncode:
+            break
+    equal(process.returncode, 1, said)
+    assert "was changed while the experiment runs" in said, said
+    with open("running/cases.jsonl", encoding="utf-8") as file:
+        equal({json.loads(line)["nodes"] for line in file}, {9}, "nodes of the cases that are kept")
 
 
 sys.exit(run_tests(globals()))
