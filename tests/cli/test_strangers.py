@@ -224,12 +224,13 @@ def test_names_of_files():
 def test_changed_mesh():
     """an experiment goes on only with the meshes that it began with, in one folder, in shards, and while it runs"""
     def mesh(count):
-        with open("sheet.obj", "w", encoding="ascii") as file:
+        with open("sheet.new", "w", encoding="ascii") as file:
             for k in range(count * count):
                 file.write(f"v {k % count / (count - 1)} 0.8 {k // count / (count - 1)}\n")
             for k in range(count * count):
                 if k % count < count - 1 and k < count * (count - 1):
                     file.write(f"f {k + 1} {k + 1 + count} {k + 2 + count}\nf {k + 1} {k + 2 + count} {k + 2}\n")
+        os.replace("sheet.new", "sheet.obj")
     mesh(3)
     write_scene(mesh={"file": "sheet.obj"}, pins=[{"nodes": [0, 1]}])
     command = ["stability", "scene.json", "--axis", "/integrator/dt=1e-3:1e-2:4log", "--integrators", "be"]
