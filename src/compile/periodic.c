@@ -115,7 +115,7 @@ static drape_status match(pairing *p, drape_arena *scratch)
         return status;
     for (size_t i = 0; i < count; i++)
         list[i] = (drape_node_along){x[3 * (size_t)p->to.node[i] + axis], p->to.node[i]};
-    qsort(list, count, sizeof *list, drape_compare_placed);
+    qsort(list, count, sizeof *list, drape_compare_along);
     for (size_t i = 0; !status && i < count; i++) {
         double at[3];
         size_t low = 0, high = count;

@@ -71,7 +71,7 @@ static drape_status sort(side *s, drape_arena *scratch)
         axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
     for (int32_t i = 0; i < s->count; i++)
         list[i] = (drape_node_along){x[3 * (size_t)s->node[i] + (size_t)axis], s->node[i]};
-    qsort(list, (size_t)s->count, sizeof *list, drape_compare_placed);
+    qsort(list, (size_t)s->count, sizeof *list, drape_compare_along);
     for (int32_t i = 0; i < s->count; i++)
         s->node[i] = list[i].node;
     return DRAPE_OK;

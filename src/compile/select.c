@@ -124,7 +124,7 @@ drape_status drape_select_nodes(const drape_selection *s)
     return s->has_box ? take_box(s) : take_row(s);
 }
 
-int drape_compare_placed(const void *a, const void *b)
+int drape_compare_along(const void *a, const void *b)
 {
     const drape_node_along *p = a, *q = b;
     return p->along != q->along ? (p->along > q->along) - (p->along < q->along)

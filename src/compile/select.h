@@ -38,6 +38,6 @@ typedef struct drape_node_along {
     double along;
     int32_t node;
 } drape_node_along;
-int drape_compare_placed(const void *a, const void *b);
+int drape_compare_along(const void *a, const void *b);
 
 #endif
