@@ -143,13 +143,13 @@ static int count_beside(const lab *l, size_t i)
     return count;
 }
 
-/* Cases of a series that were run. */
+/* The same of a series by its name. */
 static int count_run(const lab *l, const char *series)
 {
-    int count = 0;
     for (size_t i = 0; i < l->count; i++)
-        count += strcmp(lab_tag_text(l->results[i], "series"), series) == 0;
-    return count;
+        if (strcmp(lab_tag_text(json_array_get(l->cases, i), "series"), series) == 0)
+            return count_beside(l, i);
+    return 0;
 }
 
 /* The cheapest case whose error is at most that; of one series, or NULL of any. Series with
