@@ -39,8 +39,8 @@ drape_status lab_load(drape_context *ctx, const lab_request *request, drape_mode
  * files, and of the compiled model where there are any. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_model *model, char digits[17]);
 
-/* The same of the scene of a request as it is now, with the settings `identified`, which are those of one case
- * for all: a scene may lack what the cases set. Errors: those of loading. */
+/* The same of the scene of a request as it is now, with the settings `identified`, which are those of one
+ * case for all: a scene may lack what the cases set. Errors: those of loading. */
 drape_status lab_identify(drape_context *ctx, const lab_request *request, char digits[17]);
 
 /* Whether the scene still has the identity of the request. Errors: those of loading, DRAPE_E_ARGUMENT (it has
