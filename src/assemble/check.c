@@ -10,6 +10,10 @@
  * begins, its gradient is arbitrarily small, so an element's error is relative to at least a millionth of
  * the term's largest entry.
  *
+ * Derivatives of contact jump where a closest point leaves a face or an edge; some of thousands of pairs are
+ * nearer to that than any step, but not on both sides. Of nearly parallel edges they change over 1e-8 m. So
+ * along a direction slopes to either side count, extrapolated, with steps that only exact positions allow.
+ *
  * Contact is checked where the scene has it: the sheet is moved until its deepest node is half of the
  * activation distance away from a collider, or is folded onto itself; steps are relative to that distance.
  */
@@ -28,6 +32,8 @@
 #define DIFFERENCE_STEP 1e-5 /* of the mean edge length */
 #define SHORTER_STEP    0.1  /* from one step of the differences to the next */
 #define STEPS           3
+#define FINER           8.0 /* from one step along a direction to the next, */
+#define LEVELS          5   /* of so many */
 /* of the term's largest derivative: the smallest scale of an element's errors */
 #define MIN_SCALE        1e-6
 #define GRADIENT_LIMIT   1e-7
@@ -45,6 +51,7 @@ typedef struct checker {
     double size; /* [m] mean edge length */
     double *x, *v, *internal, *history;
     double *x2, *v2, *g1, *g2, *direction; /* (node_count x 3) scratch */
+    double *beside[2 * LEVELS];            /* forces after and before a state, of each step */
     double *values;                        /* a Jacobian in the system's pattern */
     drape_arena *arena;
     drape_check_result *results;
@@ -440,37 +447,54 @@ static void contact_force(drape_system *system, const drape_point *point, double
     drape_system_contact_part(system, point, true, g, NULL);
 }
 
-/* The error of the Jacobian in c->values along c->direction, at a point whose x and v are the checker's. */
-static double direction_error(checker *c, double step, drape_point point, force *of)
+/* The error of the derivative `exact` of component i: the smallest of what slopes after and before the state
+ * and their mean, the central difference, are extrapolated to from two successive steps. */
+static double component_error(const checker *c, size_t i, double step, double exact)
 {
-    const drape_model *m = c->model;
-    size_t n = 3 * (size_t)m->node_count;
-    point.x = c->x2;
-    point.v = c->v2;
-    move(c, step, point.weight);
-    of(c->system, &point, c->g1);
-    move(c, -step, point.weight);
-    of(c->system, &point, c->g2);
-    for (size_t i = 0; i < n; i++)
-        c->g1[i] = m->pinned[i / 3] ? 0 : (c->g1[i] - c->g2[i]) / (2 * step);
-    multiply(c, c->g2);
-    double scale = fmax(largest(c->g2, n), largest(c->g1, n));
-    return ratio(largest_difference(c->g1, c->g2, n), scale);
+    double error = INFINITY, longer[3] = {NAN, NAN, NAN};
+    for (int k = 0; k < LEVELS; k++, step /= FINER) {
+        const double after = (c->beside[2 * k][i] - c->g1[i]) / step,
+                     before = (c->g1[i] - c->beside[2 * k + 1][i]) / step,
+                     slope[3] = {after, before, (after + before) / 2};
+        for (int j = 0; j < 3; j++) {
+            const double rest = (slope[j] - longer[j]) / (j < 2 ? FINER - 1 : FINER * FINER - 1);
+            error = fmin(error, fabs(slope[j] + rest - exact));
+            longer[j] = slope[j];
+        }
+    }
+    return error;
 }
 
-/* The error of the Jacobian in c->values: the largest over all directions, each with its best step of
- * STEPS, from `step` down. */
+/* The error of the Jacobian in c->values along c->direction, at a point whose force is c->g1. */
+static double direction_error(checker *c, double step, drape_point point, force *of)
+{
+    const size_t n = 3 * (size_t)c->model->node_count;
+    double error = 0, s = step;
+    point.x = c->x2;
+    point.v = c->v2;
+    for (int k = 0; k < 2 * LEVELS; s /= k++ % 2 ? FINER : 1) {
+        move(c, k % 2 ? -s : s, point.weight);
+        of(c->system, &point, c->beside[k]);
+    }
+    multiply(c, c->g2);
+    for (size_t i = 0; i < n; i++)
+        error = fmax(error, c->model->pinned[i / 3] ? 0 : component_error(c, i, step, c->g2[i]));
+    return error < INFINITY ? ratio(error, largest(c->g2, n) + error) : INFINITY;
+}
+
+/* The error of the Jacobian in c->values: the largest over all directions, at a point whose x and v are the
+ * checker's. Steps are powers of two, directions multiples of 1/512: they move positions without rounding. */
 static double largest_direction_error(checker *c, double step, const drape_point *point, force *of)
 {
     double error = 0;
+    int exponent;
+    frexp(step, &exponent);
+    of(c->system, point, c->g1);
     for (int r = 0; r < DIRECTIONS; r++) {
-        double best = INFINITY, shorter = step;
         for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++)
-            c->direction[i] = uniform(c);
+            c->direction[i] = rint(512 * uniform(c)) / 512;
         drape_system_project(c->system, c->direction); /* displacements that supports allow */
-        for (int k = 0; k < STEPS; k++, shorter *= SHORTER_STEP)
-            best = fmin(best, direction_error(c, shorter, *point, of));
-        error = fmax(error, best);
+        error = fmax(error, direction_error(c, ldexp(1, exponent), *point, of));
     }
     return error;
 }
@@ -620,6 +644,8 @@ static drape_status allocate(checker *c, drape_arena *arena)
     double **arrays[] = {&c->x, &c->v, &c->x2, &c->v2, &c->g1, &c->g2, &c->direction};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         *arrays[i] = drape_arena_take(arena, n, sizeof(double));
+    for (int i = 0; i < 2 * LEVELS; i++)
+        c->beside[i] = drape_arena_take(arena, n, sizeof(double));
     c->internal = drape_arena_take(arena, (size_t)c->model->internal_count, sizeof(double));
     c->history = drape_arena_take(arena, measures, sizeof(double));
     c->arena = arena;

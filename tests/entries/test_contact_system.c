@@ -580,6 +580,68 @@ START_TEST(only_scenes_with_contact_have_it_checked)
 }
 END_TEST
 
+/* A sheet of 0.8 m as an OBJ file: nodes off the points of a grid by so much of a cell and off the plane by
+ * 2e-4 m at most, diagonals in either direction. */
+static void draw_sheet(const char *path, double jitter, uint64_t seed)
+{
+    enum { SIDE = 24 };
+    FILE *file = fopen(path, "w");
+    ck_assert_ptr_nonnull(file);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const bool inner = i % SIDE > 0 && i % SIDE < SIDE - 1 && i / SIDE > 0 && i / SIDE < SIDE - 1;
+        const double dx = random_number(&seed), dz = random_number(&seed), y = random_number(&seed);
+        fprintf(file, "v %.17g %.17g %.17g\n", 0.8 / (SIDE - 1) * (i % SIDE + (inner ? jitter * dx : 0)),
+                2e-4 * y, 0.8 / (SIDE - 1) * (i / SIDE + (inner ? jitter * dz : 0)));
+    }
+    for (int i = 0; i < SIDE * (SIDE - 1); i++) {
+        const int a = i + 1, b = a + 1, c = a + SIDE, d = c + 1; /* from 1 on */
+        if (i % SIDE == SIDE - 1)
+            continue;
+        if (random_number(&seed) > 0)
+            fprintf(file, "f %d %d %d\nf %d %d %d\n", a, c, b, b, c, d);
+        else
+            fprintf(file, "f %d %d %d\nf %d %d %d\n", a, c, d, a, d, b);
+    }
+    fclose(file);
+}
+
+/* A folded sheet with bumps has thousands of pairs: some are nearer to the switch from one pair of closest
+ * features to another than the steps of differences, and in some, of nearly parallel edges, the derivatives
+ * change over 1e-8 m. All are exact there, too. */
+START_TEST(drawn_sheets_pass)
+{
+    static const struct {
+        double jitter, friction;
+        uint64_t seed;
+    } sheets[] = {{0, 0, 6}, {0, 0, 26}, {0, 0.3, 26}, {0.1, 0.3, 1}, {0.2, 0.3, 2}, {0.3, 0.3, 3}};
+    static drape_check_result found[DRAPE_MAX_CHECK_RESULTS];
+    enter_folder();
+    for (size_t k = 0; k < sizeof sheets / sizeof *sheets; k++) {
+        draw_sheet("sheet.obj", sheets[k].jitter, sheets[k].seed);
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'file': 'sheet.obj'}, 'material': {'young_modulus': 1e6,"
+            " 'thickness': 1e-3, 'areal_density': 0.2}, 'terms': ['stretch.cst']}],"
+            " 'self_contact': {'thickness': 2e-3, 'friction': %g}, 'contact': {'distance': 4e-3},"
+            " 'colliders': [{'type': 'sphere', 'center': [0,0,0], 'radius': 0.3, 'friction': 0.3}],"
+            " 'duration': 1}",
+            sheets[k].friction);
+        for (unsigned seed = 2; seed <= 4; seed += 2) {
+            int count = 0, self = 0;
+            ck_assert_int_eq(drape_check_derivatives(s.ctx, s.sim->system, seed, found, &count), DRAPE_OK);
+            for (int i = 0; i < count; i++) {
+                ck_assert_msg(found[i].pass, "sheet %d, seed %u: %s %s: %g", (int)k, seed, found[i].term,
+                              found[i].what, found[i].error);
+                self += strcmp(found[i].term, "self_contact") == 0 && found[i].error > 0;
+            }
+            ck_assert_int_eq(self, 2);
+        }
+        scene_close(&s);
+    }
+    unlink("sheet.obj");
+    leave_folder();
+}
+END_TEST
+
 /* Without colliders and self-contact, contact takes no time and no memory. The time of contact is separate
  * from the other parts of a step, not within them: the sum of all parts is at most the time of the steps,
  * up to the rounding of sums. */
@@ -775,5 +837,6 @@ END_TEST
 SUITE("contact_system", every_collider, colliders_without_terms, cloth_on_cloth, near_the_least_gap,
       a_correction_arrives_from_beyond_the_distance, a_thrown_node_is_stopped,
       a_cancelled_search_moves_nothing, the_jacobian_has_the_predicted_forces, landing_takes_few_iterations,
-      nan_is_forgotten, only_scenes_with_contact_have_it_checked, scenes_without_contact_pay_nothing,
-      all_bytes_are_counted, active_contacts_are_all_pairs, queries_change_nothing)
+      nan_is_forgotten, only_scenes_with_contact_have_it_checked, drawn_sheets_pass,
+      scenes_without_contact_pay_nothing, all_bytes_are_counted, active_contacts_are_all_pairs,
+      queries_change_nothing)
