@@ -1367,8 +1367,11 @@ typedef struct drape_attempt {
                          alone leaves; NaN: the integrator guarantees none */
     drape_diagnostic diagnostic; /* the element or node to report */
     double error; /* [m] estimated distance between the end of the step and the solution of its equation from
-                     the same start, RMS over all nodes; NaN: the integrator estimates none. Those that
-                     converge to a tolerance do not. */
+                     the same start, RMS over all nodes: with be and its like the last correction, which is
+                     more than what it left; NaN: the integrator estimates none */
+    double
+        left; /* [J] work of the residual along the last correction, about twice the energy that it gained; with
+                     newton_k of the correction that would follow; NaN: not estimated */
 } drape_attempt;
 
 /* The kind of an event. */

@@ -10,6 +10,10 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
         REASON("rounding", "Newton",
                "accepted: the residual is above `tolerance`, but within the rounding error of "
                "the forces that it sums"),
+    [DRAPE_REASON_LOCAL_ERROR] =
+        REASON("local_error", "Newton",
+               "accepted: the residual is above the default `tolerance`, but what is left is small beside "
+               "the step's own error"),
     [DRAPE_REASON_CORRECTION] =
         REASON("correction", "Newton",
                "accepted: the residual is above `tolerance`, but a correction was within "

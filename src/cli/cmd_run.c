@@ -220,7 +220,7 @@ static void print_steps(const run *r, const drape_statistics *s)
     fputc('\n', stdout);
 }
 
-static void print_newton(const drape_statistics *s)
+static void print_newton(const drape_statistics *s, const drape_left *left)
 {
     int64_t attempts = s->steps_accepted + s->steps_rejected;
     printf(
@@ -229,11 +229,15 @@ static void print_newton(const drape_statistics *s)
         (long long)s->residuals, (long long)s->jacobians, (long long)s->factorizations);
     if (!isnan(s->tolerance))
         printf("tolerance %.4g N on the residual of a node\n", s->tolerance);
+    if (left->by_error > 0)
+        printf("solved    %lld steps to their local error; last corrections of %.3g m and %.3g J at most\n",
+               (long long)left->by_error, s->error_max, left->largest);
     if (s->steps_accepted > 0 && !isnan(s->error_bound))
         printf(
             "error     %.3g m at most, %.3g m in the last step, by estimate; %lld steps above the bound of "
-            "%.3g m; errors of steps may add up\n",
-            s->error_max, s->error_last, (long long)s->steps_above_error, s->error_bound);
+            "%.3g m, %lld above their local error; errors of steps may add up\n",
+            s->error_max, s->error_last, (long long)s->steps_above_error, s->error_bound,
+            (long long)left->above_own);
 }
 
 static void print_energy(const run *r)
@@ -334,7 +338,7 @@ static void print_results(run *r)
            (long long)drape_model_dof_count(model), (long long)drape_model_nonzero_count(model));
     printf("time      %.9g of %.9g s\n", drape_sim_time(r->in.sim), drape_model_duration(model));
     print_steps(r, &s);
-    print_newton(&s);
+    print_newton(&s, &r->in.sim->left);
     printf("strain    %.5g to %.5g\n", s.strain_min, s.strain_max);
     if (s.stability_known)
         printf("equilibrium %s, %lld unstable modes\n", s.unstable_modes == 0 ? "stable" : "unstable",

@@ -1,6 +1,7 @@
 /* implicit.c: see implicit.h. */
 #include "integrators/implicit.h"
 
+#include <math.h>
 #include <string.h>
 
 /* ---- Creation and destruction ---- */
@@ -79,6 +80,8 @@ void drape_implicit_backward_euler(drape_implicit *s, const drape_state *in, dou
     drape_implicit_base(s, in, t, h);
     e->point.weight = 1 / h;
     e->mass_weight = mass_weight;
+    e->expected = e->inertia;
+    e->error_share = 0.5; /* the local error is h^2 a / 2, and d - h v0 is h^2 a */
     for (size_t i = 0; i < e->dofs; i++)
         e->inertia[i] = h * in->v[drape_step_equation_at(e, i)];
     drape_implicit_momentum(s, in->t, in->x, in->v, s->momentum[0]);
@@ -151,7 +154,11 @@ void drape_implicit_report(const drape_solve_report *report, drape_step_info *in
     info->laborious |= report->laborious;
     info->residual = report->residual;
     info->tolerance = report->tolerance;
-    info->error = report->error;
+    info->error = fmax(info->error, report->error); /* of several stages; NaN at first */
+    info->left = fmax(info->left, report->left);
+    info->own = report->own;
+    info->solved = report->solved;
+    info->by_error |= report->by_error;
     info->further_seconds += report->further_seconds;
     info->lenient = report->lenient;
     info->usable = report->usable;

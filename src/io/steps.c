@@ -13,7 +13,7 @@
 static const char columns[] = "attempt,t,h,accepted,status,reason,iterations,residual,tolerance,"
                               "kinetic,elastic,gravity,contact,dissipated,numerical,"
                               "worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit,"
-                              "error,events\n";
+                              "error,left,events\n";
 
 drape_status drape_steps_open(drape_context *ctx, drape_folder *folder, bool resumes, drape_file *file)
 {
@@ -86,6 +86,7 @@ drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, c
     put_energy(file, energy);
     put_worst(file, &attempt->diagnostic);
     drape_csv_put_number(file, attempt->error);
+    drape_csv_put_number(file, attempt->left);
     put_events(file, events);
     drape_file_put_text(file, "\n");
     return drape_file_keep(file);

@@ -72,13 +72,18 @@ static json_t *newton(const drape_statistics *s)
     return with_counts(json_object(), counts, LENGTH(counts));
 }
 
-/* The estimated distance of steps to the solution of their equation [m]. */
-static json_t *error(const drape_statistics *s)
+/* The estimated distance of steps to the solution of their equation [m], and the energy that is left [J]. */
+static json_t *error(const drape_statistics *s, const drape_left *left)
 {
-    const real_item lengths[] = {
-        {"bound", s->error_bound}, {"largest", s->error_max}, {"last", s->error_last}};
-    json_t *object = with_reals(json_object(), lengths, LENGTH(lengths));
-    return drape_json_with(object, "steps_above", json_integer((json_int_t)s->steps_above_error));
+    const real_item amounts[] = {{"bound", s->error_bound},
+                                 {"largest", s->error_max},
+                                 {"last", s->error_last},
+                                 {"largest_left", left->largest},
+                                 {"last_left", left->last}};
+    const count_item counts[] = {{"steps_above", s->steps_above_error},
+                                 {"steps_by_local_error", left->by_error},
+                                 {"steps_above_local_error", left->above_own}};
+    return with_counts(with_reals(json_object(), amounts, LENGTH(amounts)), counts, LENGTH(counts));
 }
 
 static json_t *wall(const drape_summary_def *def, const drape_statistics *s)
@@ -294,8 +299,8 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     object = drape_json_with(object, "steps", steps(sim, &s));
     object = drape_json_with(object, "newton", newton(&s));
     object = drape_json_with(object, "tolerance", drape_json_number(s.tolerance));
-    if (!isnan(s.error_bound))
-        object = drape_json_with(object, "error", error(&s));
+    if (!isnan(s.error_bound) || !isnan(s.error_max))
+        object = drape_json_with(object, "error", error(&s, &sim->left));
     object = drape_json_with(object, "wall_s", wall(def, &s));
     object = drape_json_with(object, "energy", energy(sim));
     object = drape_json_with(object, "strain", strain(&s));

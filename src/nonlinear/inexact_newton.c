@@ -2,7 +2,7 @@
  * inexact_newton.c: see inexact_newton.h. The stages of an iteration:
  *     correct   A p = -F with A near J: by conjugate gradients, or with factors and predicted stress
  *     feasible  p shortened where pieces meet, until nothing passes through anything
- *     advance   d + a p, with the length a where the residual does little work along p
+ *     advance   d + a p, with the length a of the line search (line_search.h)
  *     estimate  the distance to the solution, from one more p or by the contraction of an earlier step
  */
 #include "nonlinear/inexact_newton.h"
@@ -13,17 +13,14 @@
 #include "base/reason.h"
 #include "nonlinear/approx_jacobian.h"
 #include "nonlinear/factored_jacobian.h"
+#include "nonlinear/line_search.h"
 #include "nonlinear/stress_predictor.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Fraction of the initial work along a correction that the residual may do beyond the minimum. */
-#define WORK_FRACTION 0.5
-#define MAX_TRIALS    8    /* of step lengths beyond the first; the last one is taken if F is finite there */
-#define SHORT_STEP    0.5  /* after a shorter step the next matrix has all of the positive parts */
-#define MIN_REPAIR    1e-3 /* smallest first share of the positive parts; otherwise half of the last one */
-#define SHARE_GROWTH  4    /* factor from one share tried to the next */
+#define WORK_FRACTION 0.5 /* of its initial work along an estimate, that the residual may do at its end */
+#define SHORT_STEP    0.5 /* after a shorter step the next matrix has all of the positive parts */
 #define SMALL_STEP                                                                                           \
     0.01 /* of an edge: after a shorter one, RMS, the exact matrix is tried again, without contact */
 #define MAX_PREDICTION 8 /* corrections in a solve, after which stress is not predicted, as in newton.c */
@@ -98,21 +95,22 @@ struct drape_inexact_newton {
     drape_factored_jacobian *factored; /* the factors in solves that use them, NULL in others */
     bool cheap;                        /* of the settings */
     drape_stress_predictor predictor;  /* with factors */
-    double share;                      /* of the positive parts in the next matrix; with factors */
-    double used_share, repair_share;   /* in the last matrix; in the last one that was indefinite without */
-    bool indefinite;                   /* one in this solve was */
+    bool positive;                     /* the next matrix has the positive parts; with factors */
+    bool lengthens;                    /* corrections by the last one are lengthened */
+    bool indefinite;                   /* the last one that was tried without positive parts */
     bool linearized;                   /* this solve began with the linearized equation */
     bool unstable;                     /* the last matrix of this solve was, as far as it was tried */
     bool shortened;                    /* a correction of this solve was, by the line search */
-    double length;                     /* that the line search gave the last correction */
-    bool friction;                     /* the matrices of this solve have that of friction */
+    drape_islands islands;
+    drape_line_search search;
+    bool friction;           /* the matrices of this solve have that of friction */
     double friction_seconds; /* of the last iteration with it; not archived: with a deadline alone it matters,
                                 and then results depend on the clock */
     double rounding;         /* [N] error of forces as estimated last in this solve; INFINITY */
     double edge;             /* [m] mean length of an edge */
     contraction first;       /* of the first correction */
     bool nonlinear;          /* forces are, along the correction of the last estimate */
-    double *p, *minus_f, *trial; /* free DOFs */
+    double *p, *minus_f, *trial; /* free DOFs; trial: of the search, or scratch */
     double *fraction;            /* nodes; NULL without contact */
     double *f, *g;               /* free DOFs, nodes: kept while F is evaluated elsewhere */
 };
@@ -137,15 +135,17 @@ drape_status drape_inexact_newton_create(drape_arena *arena, drape_step_equation
         s->edge += m->edge_length[i] / m->edge_count;
     s->p = drape_arena_take(arena, equation->dofs, sizeof *s->p);
     s->minus_f = drape_arena_take(arena, equation->dofs, sizeof *s->minus_f);
-    s->trial = drape_arena_take(arena, equation->dofs, sizeof *s->trial);
     s->f = drape_arena_take(arena, equation->dofs, sizeof *s->f);
     s->g = drape_arena_take(arena, equation->nodes, sizeof *s->g);
     if (equation->x_ahead)
         s->fraction = drape_arena_take(arena, equation->nodes / 3, sizeof *s->fraction);
-    if (drape_arena_status(arena) || equation->dofs == 0)
-        return drape_arena_status(arena);
+    drape_status status = drape_islands_init(arena, equation->dofs / 3, &s->islands);
+    if (!status)
+        status = drape_line_search_init(arena, equation, &s->islands, &s->search);
+    s->trial = s->search.trial;
+    if (status || drape_arena_status(arena) || equation->dofs == 0)
+        return status ? status : drape_arena_status(arena);
     bool factored = matrix == DRAPE_INEXACT_FACTORED, only = true;
-    drape_status status = DRAPE_OK;
     if (matrix == DRAPE_INEXACT_AUTO)
         status = drape_factored_jacobian_is_better(equation->system, dt, &factored, &only);
     only |= !equation->x_ahead;
@@ -179,10 +179,11 @@ static void begin(drape_inexact_newton *s, bool follows, bool cheap)
     if (s->approximate)
         drape_approx_jacobian_begin(s->approximate);
     s->rounding = INFINITY;
-    s->share = 1;
+    s->positive = true;
     if (!follows || s->first.mass_weight != e->mass_weight)
         s->first = (contraction){0};
     s->indefinite = s->unstable = s->shortened = s->linearized = false;
+    drape_islands_find(&s->islands, drape_system_pattern(e->system));
     drape_step_equation_predict_contact(e, NULL);
     if (!s->factored || (follows && s->predictor.valid))
         return;
@@ -216,36 +217,30 @@ static drape_status solve(drape_inexact_newton *s, double tolerance, int max_ite
     return status;
 }
 
-static drape_status update_factored(drape_inexact_newton *s, double share)
+static drape_status update_factored(drape_inexact_newton *s, bool positive)
 {
     drape_step_equation *e = s->equation;
     drape_point point = e->point;
     point.stress = drape_stress_predictor_stress(&s->predictor);
     drape_status status =
-        drape_factored_jacobian_update(s->factored, &point, e->mass_weight, share, &e->work);
+        drape_factored_jacobian_update(s->factored, &point, e->mass_weight, positive ? 1 : 0, &e->work);
     if (status == DRAPE_E_STOPPED)
         drape_system_cancelled(e->system); /* so that the step ends as cancelled */
-    s->used_share = share;
+    s->lengthens = positive;
     return status;
 }
 
-/* The first matrix of a solve has all of the positive parts, the others as little of them as makes them
- * definite: the smaller the share, the faster the convergence, as in newton.c. */
+/* The first matrix of a solve has the positive parts, the others only where they are not definite without, as
+ * in newton.c. */
 static drape_status update_definite(drape_inexact_newton *s)
 {
-    double share = s->indefinite && s->share == 0 ? s->repair_share : s->share;
-    drape_status status = update_factored(s, share);
-    if (share == 0)
-        s->unstable = status == DRAPE_RETRY_LINEAR;
-    s->share = 0;
-    if (status != DRAPE_RETRY_LINEAR || share == 1)
-        return status;
-    share = share > 0 ? fmin(1, SHARE_GROWTH * share) : fmax(s->repair_share / 2, MIN_REPAIR);
-    while ((status = update_factored(s, share)) == DRAPE_RETRY_LINEAR && share < 1)
-        share = fmin(1, SHARE_GROWTH * share);
-    s->repair_share = share;
-    s->indefinite = true;
-    return status;
+    const bool positive = s->positive || s->indefinite;
+    s->positive = false;
+    if (positive)
+        return update_factored(s, true);
+    drape_status status = update_factored(s, false);
+    s->unstable = s->indefinite = status == DRAPE_RETRY_LINEAR;
+    return s->unstable ? update_factored(s, true) : status;
 }
 
 /* Whether an iteration that only reduces the error is expected to end in time. */
@@ -323,12 +318,12 @@ static drape_status guess_linearized(drape_inexact_newton *s, const drape_inexac
         return DRAPE_OK;
     drape_step_equation_pull(e, s->trial, s->f);
     memcpy(e->f, s->f, e->dofs * sizeof *e->f);
-    s->share = 0;
+    s->positive = false;
     drape_status status = correct(s, settings, 0);
     if (!status && drape_all_finite(s->p, e->dofs))
         memcpy(d, s->p, e->dofs * sizeof *d);
     s->linearized = true;
-    s->share = 1;
+    s->positive = true;
     s->indefinite = s->unstable = false;
     drape_step_equation_begin(e);
     return status < 0 ? status : DRAPE_OK;
@@ -408,36 +403,23 @@ static void make_correction_feasible(drape_inexact_newton *s)
 
 /* ---- Advance ---- */
 
-/* Takes a step a p at whose end the residual does little work along p, by doubling and bisection. Positive
- * parts make a matrix too stiff: its corrections are lengthened, but not with contact, to which that might
- * lead. Returns false if F is finite at none of the step lengths. Stress was predicted for the whole of p. */
+/* Takes p, or as much of it as the search says. The matrix may have coupled islands by contact. Positive
+ * parts make it too stiff: its corrections are lengthened, but not with contact, to which that might lead.
+ * Returns false if F is not finite there. Stress was predicted for the whole of p. */
 static bool advance(drape_inexact_newton *s, double *d)
 {
     drape_step_equation *e = s->equation;
-    const bool lengthens = s->factored && s->used_share > 0 && !s->fraction;
-    const double start = drape_step_equation_dot(e, e->f, s->p);
-    double low = 0, high = INFINITY, a = 1, work = 0;
-    bool finite = false;
-    for (int k = 0; k <= MAX_TRIALS; k++) {
-        finite = drape_step_equation_try(e, d, a, s->p, s->trial, &work);
-        const bool whole = a == 1 && (start >= 0 || (work < 0 && !lengthens));
-        if (finite && (whole || k == MAX_TRIALS || fabs(work) <= -WORK_FRACTION * start))
-            break;
-        if (finite && work < 0)
-            low = a;
-        else
-            high = a;
-        a = k + 1 == MAX_TRIALS && low > 0 ? low : isinf(high) ? 2 * a : (low + high) / 2;
-    }
-    if (!finite)
-        return false;
-    memcpy(d, s->trial, e->dofs * sizeof *d);
-    s->length = a;
-    s->shortened |= a < 1;
-    s->share = a < SHORT_STEP ? 1 : 0;
-    if (a != 1)
+    const bool lengthens = s->factored && s->lengthens && !s->fraction;
+    if (s->fraction)
+        drape_islands_find(&s->islands, drape_system_pattern(e->system));
+    drape_line_search_along(&s->search, d, lengthens ? INFINITY : 1, s->p);
+    for (size_t i = 0; i < e->dofs; i++)
+        d[i] += s->p[i];
+    s->shortened |= s->search.shortest < 1;
+    s->positive = s->search.shortest < SHORT_STEP;
+    if (s->search.shortest < 1 || s->search.longest > 1)
         drape_stress_predictor_forget(&s->predictor);
-    return true;
+    return drape_line_search_knows(&s->search, d) || drape_step_equation_evaluate(e, d);
 }
 
 /* ---- Estimate ---- */
@@ -446,17 +428,6 @@ static bool advance(drape_inexact_newton *s, double *d)
 static double rms(const drape_step_equation *e, const double *p)
 {
     return sqrt(3 * drape_step_equation_dot(e, p, p) / (double)e->nodes);
-}
-
-/* |M^-1 F| / m_w */
-static double inertial_error(const drape_step_equation *e)
-{
-    double sum = 0;
-    for (size_t i = 0; i < e->dofs; i++) {
-        const double p = e->f[i] / (e->mass_weight * e->model->mass[drape_step_equation_at(e, i) / 3]);
-        sum += p * p;
-    }
-    return sqrt(3 * sum / (double)e->nodes);
 }
 
 /* Returns to d from another point, as if F had been evaluated there last. Contact keeps forces of its own. */
@@ -499,24 +470,26 @@ static double stiffness_share(drape_inexact_newton *s, double *d, bool *adds)
  * With contact, where returning to d would take another evaluation, p is added to d if it can be: 32 random
  * scenes of cloth on balls and floors came a sixth nearer at the same cost, 16 others did not. Without
  * contact it gained nothing. */
-static double estimate_error(drape_inexact_newton *s, double *d, bool corrected)
+static double estimate_error(drape_inexact_newton *s, double *d, bool corrected, double *left)
 {
     drape_step_equation *e = s->equation;
-    double inertial = inertial_error(e), share = 1;
+    double inertial = drape_step_equation_inertial_error(e, left), share = 1;
     s->nonlinear = false;
     if (!corrected || !(inertial > 0) || solve(s, ESTIMATE_TOLERANCE, ESTIMATE_ITERATIONS))
         return inertial;
-    double along = rms(e, s->p);
+    double along = rms(e, s->p), gain = -drape_step_equation_dot(e, e->f, s->p);
     if (s->factored) {
         bool adds = s->fraction;
         make_correction_feasible(s);
         share = stiffness_share(s, d, &adds);
         if (adds && !solve(s, ESTIMATE_TOLERANCE, ESTIMATE_ITERATIONS)) {
             along = rms(e, s->p);
-            inertial = inertial_error(e);
+            gain = -drape_step_equation_dot(e, e->f, s->p);
+            inertial = drape_step_equation_inertial_error(e, left);
         }
     }
     along /= share;
+    *left = gain > 0 ? fmin(gain / share, *left) : *left;
     const double power = s->fraction ? INERTIAL_CONTACT : INERTIAL;
     return along > 0 && along < inertial ? along * drape_pow(inertial / along, power) : inertial;
 }
@@ -601,13 +574,15 @@ static bool has_fallen(const drape_inexact_newton *s, const drape_inexact_settin
         const bool near = p->iteration == 1 || fmin(1, p->ratio) * p->last < FAR_ABOVE * settings->error;
         return (near && slow_error(s, p) <= settings->error) || !has_time(settings, p->seconds);
     }
-    return left < p->bound && (!s->factored || inertial_error(s->equation) <= MAX_DRIFT * s->edge);
+    return left < p->bound &&
+           (!s->factored || drape_step_equation_inertial_error(s->equation, NULL) <= MAX_DRIFT * s->edge);
 }
 
 static bool is_quiet(const drape_inexact_newton *s, double error)
 {
     const drape_step_equation *e = s->equation;
-    return !goes_by_error(s) || sqrt(error * inertial_error(e)) <= MAX_JUMP * e->model->length;
+    return !goes_by_error(s) ||
+           sqrt(error * drape_step_equation_inertial_error(e, NULL)) <= MAX_JUMP * e->model->length;
 }
 
 static void measure_contraction(drape_inexact_newton *s, double error, double first)
@@ -653,7 +628,7 @@ static drape_status make_iteration(drape_inexact_newton *s, const drape_inexact_
     if (!advance(s, d))
         return DRAPE_RETRY_NONFINITE;
     memmove(p->step + 1, p->step, (STEPS_KEPT - 1) * sizeof *p->step);
-    p->step[0] = s->length * now;
+    p->step[0] = rms(s->equation, s->p);
     return DRAPE_OK;
 }
 
@@ -677,7 +652,7 @@ static drape_status make_timed_iteration(drape_inexact_newton *s, const drape_in
 static void update_estimate(drape_inexact_newton *s, double *d, progress *p, drape_solve_report *report)
 {
     const double start = drape_clock_seconds();
-    p->near = estimate_error(s, d, p->iteration > 0);
+    p->near = estimate_error(s, d, p->iteration > 0, &report->left);
     report->error = fmax(p->near, slow_error(s, p));
     const double took = drape_clock_seconds() - start;
     p->seconds += took - p->estimating;
@@ -728,6 +703,7 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
         const double aim = (s->factored || s->fraction ? 1 : CHEAP_SHARE) * settings->error;
         const bool ends = most || (report->error <= aim && !measures) ||
                           (p.iteration >= least_iterations(s) && !has_time(settings, p.seconds));
+        report->solved = converged;
         if (converged || (fell && !lost && ends && is_quiet(s, report->error)))
             return DRAPE_OK;
         if (most) {
@@ -747,18 +723,22 @@ drape_status drape_inexact_newton_solve(drape_inexact_newton *s, const drape_ine
                                         double *d, drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
-    *report =
-        (drape_solve_report){.tolerance = NAN, .error = NAN}; /* the residual is reported but not bounded */
+    /* the residual is reported but not bounded */
+    *report = (drape_solve_report){.tolerance = NAN, .error = NAN, .left = NAN, .own = NAN};
     if (e->dofs == 0) {
         begin(s, settings->follows, settings->cheap);
         drape_step_equation_evaluate(e, d);
         report->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
-        report->error = report->residual = 0;
+        report->error = report->residual = report->left = report->own = 0;
+        report->solved = true;
         return drape_system_status(e->system);
     }
     drape_status status = iterate(s, settings, d, report);
     report->residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
     report->diagnostic = drape_step_equation_diagnose(e, settings->tolerance);
+    report->own = 0;
+    for (size_t i = 0; i < e->dofs; i++)
+        report->own += drape_step_equation_own_error(e, i, d[i]);
     if (status == DRAPE_RETRY_NONFINITE) {
         report->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
         return drape_step_equation_find_cause(e, status, report);
@@ -778,7 +758,6 @@ void drape_inexact_newton_archive(drape_inexact_newton *s, drape_archive *a)
         drape_approx_jacobian_archive(s->approximate, a);
     if (!s->factors)
         return;
-    drape_archive_double(a, &s->repair_share);
     drape_stress_predictor_archive(&s->predictor, a);
     drape_factored_jacobian_archive(s->factors, a);
 }

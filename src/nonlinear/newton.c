@@ -3,13 +3,13 @@
  *
  *     guess      the caller's d or, where pins move, that of the equation linearized at the start of the
  *                step; shortened where cloth would meet something; d = 0 if it violates a limit
- *     residual   F(d)
+ *     residual   F(d), and which islands of the cloth are done by it (stopping.h)
  *     jacobian   J(d), in a pattern that includes the contacts there
  *     factor     factors of J or, where contact makes J unsymmetric, of a symmetric matrix near J; an
- *                indefinite one is repaired by a share of the positive parts of its elements
+ *                indefinite one is replaced by that with the positive parts of its elements
  *     correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress and normal
- *                forces of contact predicted for the next J; p shortened or lengthened by line search,
- *                completed by chord steps
+ *                forces of contact predicted for the next J; p shortened or lengthened (line_search.h), and
+ *                which islands are done by what it gained
  *     conclude   what KINSOL's return code means, and F at the final d, in the requested norm
  *
  * KINSOL calls the stages between guess and conclude in each iteration: residual as its system function,
@@ -17,8 +17,10 @@
  *
  * KINSOL does the rest: it adds p to d, counts iterations, and ends the loop when the largest component of
  * F is within its bound, when p is too short to change anything, when p is at its size limit five times in
- * a row, or after max_iterations. With `newton: modified` it also decides when factors are too old, and
- * with `globalization: line_search` it shortens p itself, by the sum of squares of F.
+ * a row, or after max_iterations. An island that is done gives KINSOL an F of 0, which its own test takes as
+ * converged, and which keeps the island in its place. With `newton: modified` KINSOL also decides when
+ * factors are too old, and with `globalization: line_search` it shortens p itself, by the sum of squares of
+ * F.
  *
  * Contact and the default globalization, `work`, are implemented here, inside `correct`: the solution that
  * KINSOL gets from its linear solver is the step to be taken. KINSOL's own line search can neither stop at
@@ -29,17 +31,12 @@
  * the cloth. Then the matrix that is factored is symmetric, the symmetric part of J with the normal forces
  * held fixed, and p solves J p = -F to a part of F by a few iterations of GMRES with these factors
  * (solvers/refine.h). A factorisation of J would cost two to four times as much, and could not tell whether J
- * is indefinite: ten flags drawn at random take 0.27 to 1.03 of its CPU time. Where the matrix is repaired by
- * a share of the positive parts, the rest of the coupling of friction with normal forces is in J, and not in
- * what is factored. With all of them there is none: corrections that are short because it is missing would be
- * made by such matrices for ever, so that after a short one the exact matrix is tried again.
+ * is indefinite: ten flags drawn at random take 0.27 to 1.03 of its CPU time. With positive parts there is no
+ * coupling of friction with normal forces: corrections that are short because it is missing would be made by
+ * such matrices for ever, so that after a short one the exact matrix is tried again.
  *
  * A sheet that buckles crosses many states with an indefinite J. Once J was indefinite, the next matrices of
- * the solve are repaired without trying J, until a correction is short.
- *
- * With contact, a lengthened correction and each chord step are tested for feasibility, as p is; one that is
- * not feasible is not made. There are no chord steps in a solve without stress prediction (of a model without
- * measures, or of an equation without x_start).
+ * the solve have the positive parts without trying J, until a correction is short.
  */
 #include "nonlinear/newton.h"
 #include "base/elementary.h"
@@ -48,6 +45,7 @@
 #include "base/reason.h"
 #include "base/vec3.h"
 #include "nonlinear/residual_bound.h"
+#include "nonlinear/stopping.h"
 #include "nonlinear/stress_predictor.h"
 #include "solvers/sun_linear.h"
 #include "solvers/sundials_memory.h"
@@ -68,23 +66,17 @@
  * that KINSOL would compute itself, by exp of the C library, whose bits depend on the processor */
 #define MAX_RESIDUAL_RATIO 0.9
 
-#define WORK_FRACTION  0.5  /* a is accepted where |F(d + a p) . p| is at most this fraction of its start */
-#define MAX_TRIALS     8    /* trial points of the line search */
 #define SHORT_STEP     0.5  /* after a shorter step the next matrix is positive semidefinite */
-#define MAX_LENGTH     2    /* of a correction with contact */
+#define MAX_LENGTH     2    /* of a correction by positive parts with contact; without, there is no limit */
+#define EXACT          0.1  /* of the residual, that an iterative solver may leave in an exact correction */
 #define SMALL_STEP     0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
-#define MIN_SHARE      1e-3 /* smallest first share of the positive parts; otherwise half of the last one */
-#define SHARE_GROWTH   4    /* factor from one share tried to the next */
 #define MAX_PREDICTION 8    /* corrections in a solve, after which stress is no longer predicted */
 /* Of |F|: residual left in a correction by the symmetric matrix; without friction, a flag of 13 x 13 nodes
  * takes a quarter and three quarters more iterations with 1e-4 and 1e-3 than with 1e-5, others as many, and
  * the least CPU with 1e-4 */
 #define CORRECTION          1e-4
 #define FRICTION_CORRECTION 1e-2
-#define MAX_CHORDS          2 /* chord steps for each correction */
-/* The same with contact, whose evaluation takes most of an iteration: one must be enough to end the solve */
-#define MAX_CHORDS_IN_CONTACT 1
-#define STALLED               0.5 /* of the residual before: if no more is gained, it may be rounding */
+#define STALLED             0.5 /* of the residual before: if no more is gained, it may be rounding */
 /* A solve is laborious after more iterations than the larger of these: a number, and a share of the most. */
 #define EASY       10
 #define EASY_SHARE 0.4
@@ -109,28 +101,30 @@ struct drape_newton {
     N_Vector unknown, ones; /* unknown wraps the caller's d during a solve */
     N_Vector weights;       /* of the components of F in its norm */
     drape_sun_linear *linear;
-    drape_stress_predictor predictor; /* if it searches */
-    double *trial;                    /* free DOFs: where the line search was last; NULL unless it searches */
-    double *fraction;                 /* nodes: scratch of the guess; NULL without contact */
-    double edge;                      /* [m] mean length of an edge */
-    double *chord, *chord_minus_f;    /* free DOFs: a chord step and its right-hand side; the same */
+    /* If it searches. */
+    drape_islands islands;
+    drape_stopping stopping;
+    drape_line_search search;
+    drape_stress_predictor predictor;
+    double *zero, *pull, *minus_pull; /* free DOFs: scratch of the linearized guess */
+
+    double *fraction; /* nodes: scratch of the guess; NULL without contact */
+    double edge;      /* [m] mean length of an edge */
 
     /* Kept between solves. */
-    double repair_share;         /* the share that made the last indefinite matrix definite */
     bool factored;               /* there are factors, which modified Newton may keep */
     double factored_mass_weight; /* mass weight of these factors */
 
     /* Kept between the iterations of one solve. */
     int corrections;
-    double rounding;       /* of F in its norm, as last estimated; INFINITY: it was not */
-    double residual;       /* weighted, largest component, at the last iterate that KINSOL evaluated */
-    double forcing_norm;   /* |F| where the last correction was made; NAN: none was */
-    double positive_share; /* of the positive parts, requested for the present matrix; after a line search,
-                              for the next one; with `project` every matrix has all of them */
-    bool indefinite;       /* the exact matrix was at the last iterate where it was tried */
-    bool trial_evaluated;  /* the last evaluation was at `trial`, and F is finite there */
-    bool near_enough;      /* that iterate is within correction_tolerance */
-    drape_status failure;  /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
+    double rounding;      /* of F in its norm, as last estimated; INFINITY: it was not */
+    double residual;      /* weighted, largest component, at the last iterate that KINSOL evaluated */
+    double forcing_norm;  /* |F| where the last correction was made; NAN: none was */
+    bool positive;        /* the present matrix has the positive parts; after a search, the next one has;
+                              with `project` every matrix has */
+    bool indefinite;      /* the exact matrix was at the last iterate where it was tried */
+    bool near_enough;     /* the last correction was whole and within correction_tolerance */
+    drape_status failure; /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
 };
 
 /* A callback's return value: KINSOL takes > 0 as recoverable and < 0 as fatal, as drape_status does. */
@@ -158,13 +152,14 @@ static void begin(drape_newton *s)
     s->corrections = 0;
     s->residual = s->rounding = INFINITY;
     s->forcing_norm = NAN;
-    s->positive_share = 0;
-    s->indefinite = false;
-    s->trial_evaluated = s->near_enough = false;
+    s->positive = s->indefinite = s->near_enough = false;
     s->failure = DRAPE_OK;
     drape_step_equation_predict_contact(e, NULL);
     if (!s->searches)
         return;
+    s->search.evaluated = false;
+    drape_islands_find(&s->islands, drape_system_pattern(e->system));
+    drape_stopping_begin(&s->stopping);
     double clock = drape_system_clock(e->system);
     drape_point start = e->point;
     start.x = e->x_start;
@@ -195,7 +190,7 @@ static bool is_rounding(drape_newton *s, const double *d, bool *finite)
     drape_step_equation *e = s->equation;
     const double before = s->residual;
     s->residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
-    if (s->residual <= max_norm_bound(s) || !(s->residual > STALLED * before) || s->positive_share > 0)
+    if (s->residual <= max_norm_bound(s) || !(s->residual > STALLED * before) || s->positive)
         return false;
     const bool rounding =
         drape_step_equation_is_rounding(e, d, (drape_norm)s->values[DRAPE_NEWTON_NORM], &s->rounding);
@@ -203,39 +198,63 @@ static bool is_rounding(drape_newton *s, const double *d, bool *finite)
     return rounding;
 }
 
+/* Contact may couple new nodes: then the linear solver is created again, and the islands may be others, which
+ * begin anew. */
+static drape_status extend_pattern(drape_newton *s, const drape_point *point)
+{
+    bool changed;
+    drape_status status = drape_system_extend_pattern(s->equation->system, point, &changed);
+    const drape_pattern *pattern = drape_system_pattern(s->equation->system);
+    s->linear->stale |= changed;
+    if (!status && s->linear->stale)
+        status = drape_sun_linear_extend_pattern(s->linear, pattern);
+    if (!status && changed && s->searches && drape_islands_find(&s->islands, pattern))
+        drape_stopping_begin(&s->stopping);
+    return status;
+}
+
+/* Which islands are done at the last evaluation of F; contact there may couple those that were to others. A
+ * state that would be rejected for what has become of an element is solved to the residual. *done: all are. */
+static drape_status judge_islands(drape_newton *s, bool *done)
+{
+    const drape_step_equation *e = s->equation;
+    const drape_status status = s->fraction ? extend_pattern(s, &e->point) : DRAPE_OK;
+    const char *reason;
+    drape_diagnostic diagnostic;
+    *done = !status && drape_stopping_test_residual(&s->stopping, max_norm_bound(s));
+    if (*done && s->stopping.ended_by_error &&
+        drape_system_check(e->system, e->x, e->x_start, e->point.internal, &reason, &diagnostic)) {
+        drape_stopping_begin(&s->stopping);
+        s->stopping.strict = true;
+        *done = drape_stopping_test_residual(&s->stopping, max_norm_bound(s));
+    }
+    return status;
+}
+
 /* KINSOL must never get a NaN: its norms ignore it, so it would look like convergence. After a line search
- * F is known already. An F that is only rounding, or at an iterate that is near enough, is given to KINSOL
- * as 0, which ends its loop. */
+ * F is known already. An F that is only rounding, or of islands that are done, is given to KINSOL as 0. */
 static int residual(N_Vector d_vector, N_Vector f, void *user)
 {
     drape_newton *s = user;
     drape_step_equation *e = s->equation;
     const double *d = N_VGetArrayPointer(d_vector);
-    bool finite = true;
-    const bool known = s->trial_evaluated && memcmp(d, s->trial, e->dofs * sizeof *d) == 0;
+    double *out = N_VGetArrayPointer(f);
+    bool finite = true, done = false;
+    const bool known = s->searches && drape_line_search_knows(&s->search, d);
     if (!drape_ranks_all(e->ranks, known)) {
-        s->trial_evaluated = false;
+        s->search.evaluated = false;
         finite = drape_step_equation_evaluate(e, d);
     }
-    if (finite && (s->near_enough || is_rounding(s, d, &finite)))
-        N_VConst(0, f);
-    else
-        memcpy(N_VGetArrayPointer(f), e->f, e->dofs * sizeof *e->f);
-    return drape_system_status(e->system) ? -1 : finite ? 0 : 1;
+    const drape_status status = s->searches && finite ? judge_islands(s, &done) : DRAPE_OK;
+    done = done || (finite && (s->near_enough || is_rounding(s, d, &finite)));
+    for (size_t i = 0; i < e->dofs; i++)
+        out[i] = done || e->weight[i / 3] == 0 ? 0 : e->f[i];
+    if (status || drape_system_status(e->system))
+        return return_status(s, status < 0 ? status : -1);
+    return finite ? 0 : 1;
 }
 
 /* ---- Jacobian ---- */
-
-/* Contact may couple new nodes: then the linear solver is created again. */
-static drape_status extend_pattern(drape_newton *s, const drape_point *point)
-{
-    bool changed;
-    drape_status status = drape_system_extend_pattern(s->equation->system, point, &changed);
-    s->linear->stale |= changed;
-    if (!status && s->linear->stale)
-        status = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->equation->system));
-    return status;
-}
 
 /* Excludes contact and the new analysis in extend_pattern, which are timed separately. */
 static double jacobian_clock(const drape_newton *s)
@@ -243,15 +262,15 @@ static double jacobian_clock(const drape_newton *s)
     return drape_system_clock(s->equation->system) - s->linear->factor_seconds;
 }
 
-/* J(d) with a share of the positive parts, into the values of the linear solver; if J is unsymmetric, a
- * symmetric matrix near it, which is corrected for J. */
-static drape_status assemble(drape_newton *s, const double *d, double positive_share)
+/* J(d), with the positive parts of its elements or without, into the values of the linear solver; if J is
+ * unsymmetric, a symmetric matrix near it, which is corrected for J. */
+static drape_status assemble(drape_newton *s, const double *d, bool positive)
 {
     drape_step_equation *e = s->equation;
-    const double share = s->values[DRAPE_NEWTON_PROJECT] != 0 ? 1 : positive_share;
+    const double share = positive || s->values[DRAPE_NEWTON_PROJECT] != 0 ? 1 : 0;
     double start = jacobian_clock(s);
-    s->trial_evaluated = false;
-    s->positive_share = positive_share;
+    s->search.evaluated = false;
+    s->positive = positive;
     drape_step_equation_move(e, d);
     drape_status status = extend_pattern(s, &e->point);
     if (status)
@@ -272,8 +291,8 @@ static int jacobian(N_Vector d, N_Vector f, SUNMatrix matrix, void *user, N_Vect
 {
     (void)f, (void)matrix, (void)scratch1, (void)scratch2;
     drape_newton *s = user;
-    const bool repair = s->searches && s->indefinite && s->positive_share == 0;
-    return return_status(s, assemble(s, N_VGetArrayPointer(d), repair ? s->repair_share : s->positive_share));
+    const bool positive = s->positive || (s->searches && s->indefinite);
+    return return_status(s, assemble(s, N_VGetArrayPointer(d), positive));
 }
 
 /* ---- Factor ---- */
@@ -289,44 +308,22 @@ static drape_status factor_matrix(drape_newton *s, bool definite)
     return status;
 }
 
-/* Assembles and factors J at the present iterate with a share of the positive parts. With share 1 it is
- * factored in any case, with less only if it is positive definite, else the result is DRAPE_RETRY_LINEAR. */
-static drape_status factor_with_share(drape_newton *s, double share)
+/* Assembles and factors the matrix with the positive parts at the present iterate. */
+static drape_status factor_positive(drape_newton *s)
 {
-    drape_status status = assemble(s, N_VGetArrayPointer(s->unknown), share);
-    return status ? status : factor_matrix(s, share < 1);
-}
-
-/* The next share of the positive parts to try after `share` did not make the matrix definite: at first half
- * of the one that was needed last. */
-static double larger_share(const drape_newton *s, double share)
-{
-    return share > 0 ? fmin(1, SHARE_GROWTH * share) : fmax(s->repair_share / 2, MIN_SHARE);
-}
-
-static void keep_share(drape_newton *s, double share)
-{
-    s->repair_share = share;
+    const drape_status status = assemble(s, N_VGetArrayPointer(s->unknown), true);
     s->indefinite = true;
+    return status ? status : factor_matrix(s, false);
 }
 
-/* An indefinite matrix gives useless directions. With the whole positive parts they are descent directions,
- * but convergence is slow: the smaller the share that makes the matrix definite, the nearer its direction
- * is to Newton's. The first share tried is half of the one that was needed last; after an indefinite matrix
- * in the same solve, that one itself, which `jacobian` has assembled. */
+/* An indefinite matrix gives useless directions. Those of the matrix with the positive parts descend. */
 static int factor(SUNLinearSolver solver, SUNMatrix matrix)
 {
     (void)matrix;
     drape_newton *s = ((drape_sun_linear *)solver->content)->owner;
-    const bool repairs = s->searches && s->positive_share < 1;
-    drape_status status = factor_matrix(s, repairs);
-    if (status != DRAPE_RETRY_LINEAR || !repairs)
-        return return_status(s, status);
-    double share = larger_share(s, s->positive_share);
-    while ((status = factor_with_share(s, share)) == DRAPE_RETRY_LINEAR && share < 1)
-        share = larger_share(s, share);
-    keep_share(s, share);
-    return return_status(s, status);
+    const bool definite = s->searches && !s->positive;
+    const drape_status status = factor_matrix(s, definite);
+    return return_status(s, status == DRAPE_RETRY_LINEAR && definite ? factor_positive(s) : status);
 }
 
 /* ---- Guess where pins move ---- */
@@ -351,44 +348,33 @@ static drape_status guess_linearized(drape_newton *s, double *d)
     drape_step_equation *e = s->equation;
     if (!linearizes(s))
         return DRAPE_OK;
-    N_VSetArrayPointer(s->trial, s->unknown);
-    drape_step_equation_pull(e, s->trial, s->chord);
+    N_VSetArrayPointer(s->zero, s->unknown);
+    drape_step_equation_pull(e, s->zero, s->pull);
     for (size_t i = 0; i < e->dofs; i++)
-        s->chord_minus_f[i] = -s->chord[i];
-    drape_status status = assemble(s, s->trial, 0);
+        s->minus_pull[i] = -s->pull[i];
+    drape_status status = assemble(s, s->zero, false);
     if (!status)
         status = factor(s->linear->solver, NULL);
     if (!status)
-        status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
-    if (!status && drape_step_equation_is_finite(e, s->chord))
-        memcpy(d, s->chord, e->dofs * sizeof *d);
-    s->positive_share = 0;
-    s->indefinite = false;
+        status = drape_sun_linear_solve(s->linear, s->minus_pull, s->pull);
+    if (!status && drape_step_equation_is_finite(e, s->pull))
+        memcpy(d, s->pull, e->dofs * sizeof *d);
+    s->positive = s->indefinite = false;
     drape_step_equation_begin(e);
     return status < 0 ? status : DRAPE_OK;
 }
 
 /* ---- Correct ---- */
 
-/* No solution or not a descent direction: the matrix is indefinite, which the factorisation did not detect.
- * An iterative solver notices it in the solve: shares of the positive parts are tried as in `factor`.
- * Otherwise the matrix with the whole of them is factored, and gives p. */
+/* No solution or not a descent direction: the matrix is indefinite, which the factorisation, or an iterative
+ * solver, did not detect. */
 static drape_status ensure_descent(drape_newton *s, drape_status status, const double *minus_f, double *p)
 {
     const bool descends = !status && drape_step_equation_dot(s->equation, minus_f, p) > 0;
-    if (status < 0 || descends || s->positive_share == 1)
+    if (status < 0 || descends || s->positive)
         return status;
-    double share = status == DRAPE_RETRY_LINEAR ? larger_share(s, s->positive_share) : 1;
-    for (;; share = larger_share(s, share)) {
-        status = factor_with_share(s, share);
-        if (!status)
-            status = drape_sun_linear_solve(s->linear, minus_f, p);
-        if (status != DRAPE_RETRY_LINEAR || share == 1)
-            break;
-    }
-    if (share < 1)
-        keep_share(s, share);
-    return status;
+    status = factor_positive(s);
+    return status ? status : drape_sun_linear_solve(s->linear, minus_f, p);
 }
 
 /* If many corrections have not led to a solution, the sheet is buckling: then forces extrapolated along the
@@ -404,46 +390,6 @@ static void predict_stress(drape_newton *s, const double *p)
     e->work.jacobian_seconds += drape_system_clock(e->system) - start;
 }
 
-/* Whether the step a p from d is feasible. */
-static bool is_feasible(drape_newton *s, const double *d, double a, const double *p)
-{
-    drape_step_equation *e = s->equation;
-    drape_step_equation_move(e, d);
-    for (size_t i = 0; i < e->dofs; i++)
-        s->trial[i] = a * p[i];
-    return drape_step_equation_make_feasible(e, s->trial) == 1;
-}
-
-/* The step length a at which p is taken: there the work of the residual along p, F(d + a p) . p, is in
- * magnitude at most a fraction of `start`, its value at a = 0; a positive value lies beyond the minimum. It
- * is found by doubling and bisection. This is the line search of Matthies & Strang 1979: it needs no
- * energy, so it applies to friction and damping, too. A matrix with positive parts is far too stiff along
- * unstable directions: its corrections are lengthened until the work is small enough, because otherwise a
- * buckling sheet takes a hundred of them; with contact at most doubled, and only if that is feasible. Other
- * corrections are taken whole if they stop short of the minimum. */
-static double search_along(drape_newton *s, const double *d, const double *p, double start)
-{
-    drape_step_equation *e = s->equation;
-    const bool lengthens = s->positive_share > 0;
-    double low = 0, high = INFINITY, a = 1;
-    for (int k = 0; k < MAX_TRIALS; k++) {
-        double work;
-        if (a > 1 && e->x_ahead && !(a <= MAX_LENGTH && is_feasible(s, d, a, p))) {
-            s->trial_evaluated = false; /* the last trial may not have been at `low` */
-            return low;
-        }
-        s->trial_evaluated = drape_step_equation_try(e, d, a, p, s->trial, &work);
-        if (fabs(work) <= -WORK_FRACTION * start || (work < 0 && a == 1 && !lengthens))
-            return a;
-        if (work < 0)
-            low = a;
-        else
-            high = a;
-        a = isinf(high) ? 2 * a : (low + high) / 2;
-    }
-    return low > 0 ? low : a;
-}
-
 /* The longest displacement of a node in p. */
 static double longest(const drape_step_equation *e, const double *p)
 {
@@ -451,68 +397,6 @@ static double longest(const drape_step_equation *e, const double *p)
     for (size_t i = 0; i < e->dofs; i += 3)
         squared = fmax(squared, vec3_dot(p + i, p + i));
     return sqrt(drape_ranks_largest(e->ranks, squared));
-}
-
-static double largest(const drape_step_equation *e, const double *f)
-{
-    double max = 0;
-    for (size_t i = 0; i < e->dofs; i++)
-        max = fmax(max, e->weight[i / 3] * fabs(f[i]));
-    return drape_ranks_largest(e->ranks, max);
-}
-
-/* Whether a chord step is within correction_tolerance. It is what the correction before it has left where
- * corrections contract fast; a sheet that crumples may be ten times as far from the solution. Comparing with
- * NaN, the default, is false. */
-static bool is_near_enough(const drape_newton *s, const double *chord)
-{
-    const double nodes = s->equation->all_dofs / 3;
-    return sqrt(drape_step_equation_dot(s->equation, chord, chord) / nodes) <=
-           s->values[DRAPE_NEWTON_CORRECTION_TOLERANCE];
-}
-
-/* Chord steps: if p lowered the residual so far that lowering it by the same factor once or twice more
- * would end the solve, the rest is corrected with the factors that gave p, at a tenth of the cost of an
- * iteration. With correction_tolerance the first chord step is always made, for its length. F is known at
- * d + p; minus_f is -F at d. A chord step that does not lower the residual is undone, and one that is not
- * feasible is not made. */
-static drape_status add_chords(drape_newton *s, const double *d, double *p, const double *minus_f)
-{
-    drape_step_equation *e = s->equation;
-    double bound = max_norm_bound(s), before = largest(e, e->f), rate = before / largest(e, minus_f);
-    bool measures = !isnan(s->values[DRAPE_NEWTON_CORRECTION_TOLERANCE]);
-    for (int left = e->x_ahead ? MAX_CHORDS_IN_CONTACT : MAX_CHORDS;
-         left > 0 && before > bound && (measures || before * drape_pow(rate, left) <= bound); left--) {
-        for (size_t i = 0; i < e->dofs; i++)
-            s->chord_minus_f[i] = -e->f[i];
-        drape_status status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
-        if (status || drape_step_equation_make_feasible(e, s->chord) < 1)
-            return status < 0 ? status : DRAPE_OK;
-        for (size_t i = 0; i < e->dofs; i++)
-            s->trial[i] = d[i] + (p[i] + s->chord[i]);
-        s->trial_evaluated = drape_step_equation_evaluate(e, s->trial);
-        double after = s->trial_evaluated ? largest(e, e->f) : INFINITY;
-        s->near_enough = is_near_enough(s, s->chord);
-        if (!(after < before)) {
-            s->trial_evaluated = false;
-            return DRAPE_OK;
-        }
-        for (size_t i = 0; i < e->dofs; i++)
-            p[i] += s->chord[i];
-        if (s->near_enough)
-            return DRAPE_OK;
-        measures = false;
-        rate = after / before;
-        before = after;
-    }
-    return DRAPE_OK;
-}
-
-/* The share of the positive parts in the next matrix, after a step of length a. */
-static double next_share(const drape_newton *s, double a)
-{
-    const bool lacks_coupling = s->contact_unsymmetric && s->positive_share == 1;
-    return a < SHORT_STEP && !lacks_coupling ? 1 : 0;
 }
 
 /* How much of the residual iterative linear solvers leave in the next correction. */
@@ -529,12 +413,60 @@ static void choose_forcing(drape_newton *s, const double *minus_f)
     s->linear->tolerance = fmin(fmax(forcing, FORCING_MIN), FORCING_MAX);
 }
 
+/* A chord step: if a whole correction p has lowered the residual, `before`, so far that lowering it by the
+ * same factor once more would end the solve, the rest is corrected with the factors that gave p, at a tenth of
+ * the cost of an iteration. F is known at d + p. A chord step that is not feasible is not made, and one that
+ * does not end the solve is undone. */
+static drape_status add_chord(drape_newton *s, const double *d, double before, double *p)
+{
+    drape_step_equation *e = s->equation;
+    const double bound = max_norm_bound(s), now = drape_step_equation_norm(e, DRAPE_NORM_MAX);
+    if (!(now > bound && now / before * now <= bound))
+        return DRAPE_OK;
+    for (size_t i = 0; i < e->dofs; i++)
+        s->minus_pull[i] = e->weight[i / 3] == 0 ? 0 : -e->f[i];
+    const drape_status status = drape_sun_linear_solve(s->linear, s->minus_pull, s->pull);
+    if (status || drape_step_equation_make_feasible(e, s->pull) < 1)
+        return status < 0 ? status : DRAPE_OK;
+    for (size_t i = 0; i < e->dofs; i++)
+        s->search.trial[i] = d[i] + (p[i] + s->pull[i]);
+    s->search.evaluated = drape_step_equation_evaluate(e, s->search.trial) &&
+                          drape_step_equation_norm(e, DRAPE_NORM_MAX) <= bound;
+    for (size_t i = 0; i < e->dofs && s->search.evaluated; i++)
+        p[i] += s->pull[i];
+    return DRAPE_OK;
+}
+
+/* Takes the correction p from d as far as the search says. whole: contact has not shortened it. An iterative
+ * solver that leaves much of the residual is no exact matrix. */
+static drape_status advance(drape_newton *s, const double *d, bool whole, double *p)
+{
+    const drape_step_equation *e = s->equation;
+    const bool exact = !s->positive && s->values[DRAPE_NEWTON_PROJECT] == 0 &&
+                       s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT &&
+                       s->linear->tolerance <= EXACT;
+    const double longest = !s->positive ? 1 : e->x_ahead ? MAX_LENGTH : INFINITY;
+    const double tolerance = s->values[DRAPE_NEWTON_CORRECTION_TOLERANCE];
+    const double before = drape_step_equation_norm(e, DRAPE_NORM_MAX);
+    double error, left;
+    predict_stress(s, p);
+    drape_line_search_along(&s->search, d, longest, p);
+    const bool at_once = s->search.evaluated && s->search.shortest == 1 && s->search.longest == 1;
+    drape_stopping_test_error(&s->stopping, s->search.lengths, d, p, exact, whole);
+    drape_stopping_report(&s->stopping, &error, &left);
+    s->near_enough = e->x_start && whole && s->search.shortest >= 1 &&
+                     error * sqrt(3 * e->all_nodes / e->all_dofs) <= tolerance;
+    s->positive = s->search.shortest < SHORT_STEP && !(s->contact_unsymmetric && s->positive);
+    if (s->search.shortest < 1 || s->search.longest > 1)
+        drape_stress_predictor_forget(&s->predictor);
+    return at_once ? add_chord(s, d, before, p) : DRAPE_OK;
+}
+
 /* Turns p into the step that is taken from the present iterate d. A p that is not finite is left to KINSOL,
  * whose evaluation then fails. */
 static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
 {
     drape_step_equation *e = s->equation;
-    const double *d = N_VGetArrayPointer(s->unknown);
     choose_forcing(s, minus_f);
     drape_status status = drape_sun_linear_solve(s->linear, minus_f, p);
     if (s->searches)
@@ -544,19 +476,8 @@ static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
     s->indefinite = s->indefinite && longest(e, p) > SMALL_STEP * s->edge;
     if (s->searches)
         drape_step_equation_predict_contact(e, p);
-    drape_step_equation_make_feasible(e, p);
-    double start = -drape_step_equation_dot(e, minus_f, p);
-    if (!s->searches || start >= 0)
-        return DRAPE_OK;
-    predict_stress(s, p);
-    double a = search_along(s, d, p, start);
-    s->positive_share = next_share(s, a);
-    if (a == 1)
-        return s->predictor.active && s->trial_evaluated ? add_chords(s, d, p, minus_f) : DRAPE_OK;
-    for (size_t i = 0; i < e->dofs; i++)
-        p[i] *= a;
-    drape_stress_predictor_forget(&s->predictor);
-    return DRAPE_OK;
+    const bool whole = drape_step_equation_make_feasible(e, p) == 1;
+    return s->searches ? advance(s, N_VGetArrayPointer(s->unknown), whole, p) : DRAPE_OK;
 }
 
 static int correct(SUNLinearSolver solver, SUNMatrix matrix, N_Vector p, N_Vector minus_f,
@@ -607,6 +528,25 @@ static drape_status status_of(int code, const char **reason)
     }
 }
 
+/* What is left is less than the last corrections, where these contract; without one it is less than if nothing
+ * but inertia resisted F. Pseudo-transient steps, which have no start, are no motion. */
+static void estimate_left(drape_newton *s, const double *d, drape_solve_report *report)
+{
+    const drape_step_equation *e = s->equation;
+    double error, left;
+    if (!s->searches || !e->x_start || isnan(report->residual))
+        return;
+    report->own = 0;
+    for (size_t i = 0; i < e->dofs; i++)
+        report->own += drape_step_equation_own_error(e, i, d[i]);
+    report->own = drape_ranks_sum(e->ranks, report->own);
+    report->error = drape_step_equation_inertial_error(e, &report->left);
+    if (!drape_stopping_report(&s->stopping, &error, &left))
+        return;
+    report->error = fmin(report->error, error);
+    report->left = fmin(report->left, left);
+}
+
 /* Whether F at d is small enough. If KINSOL converged, its last evaluation was at d; otherwise it may have
  * been at a trial point. */
 static drape_status judge(drape_newton *s, drape_status status, const double *d, drape_solve_report *report)
@@ -618,13 +558,16 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     report->tolerance = tolerance;
     report->residual = finite ? drape_step_equation_norm(e, norm) : NAN;
     report->diagnostic = drape_step_equation_diagnose(e, tolerance);
+    estimate_left(s, d, report);
     if (report->residual <= tolerance) {
         report->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
         return DRAPE_OK;
     }
-    if (!status && s->near_enough) {
-        report->reason = drape_reason_name(DRAPE_REASON_CORRECTION);
+    if (!status && (s->near_enough || s->stopping.ended_by_error)) {
+        report->reason =
+            drape_reason_name(s->near_enough ? DRAPE_REASON_CORRECTION : DRAPE_REASON_LOCAL_ERROR);
         report->tolerance = NAN; /* the residual has none */
+        report->by_error = !s->near_enough;
         return DRAPE_OK;
     }
     double rounding = finite ? drape_step_equation_rounding(e, d, norm) : NAN;
@@ -641,6 +584,15 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     return finite ? status : drape_step_equation_find_cause(e, status, report);
 }
 
+/* Whether KINSOL could not go on because all that is left, besides islands that are done, is rounding. */
+static bool is_settled(drape_newton *s, drape_status status, const double *d)
+{
+    drape_step_equation *e = s->equation;
+    const drape_norm norm = (drape_norm)s->values[DRAPE_NEWTON_NORM];
+    return status > 0 && s->stopping.ended_by_error && drape_step_equation_evaluate(e, d) &&
+           drape_step_equation_norm(e, norm) <= drape_step_equation_rounding(e, d, norm);
+}
+
 static drape_status conclude(drape_newton *s, int code, const double *d, drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
@@ -650,6 +602,10 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     report->iterations = (int)iterations;
     report->laborious = (double)iterations > fmax(EASY, EASY_SHARE * s->values[DRAPE_NEWTON_MAX_ITERATIONS]);
     e->work.newton_iterations += iterations;
+    if (s->searches && is_settled(s, status, d))
+        status = DRAPE_OK;
+    if (s->searches)
+        drape_stopping_end(&s->stopping);
     if (drape_system_agree(e->system))
         return drape_system_status(e->system);
     if (s->failure) {
@@ -659,7 +615,9 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     }
     if (status)
         drape_newton_forget_factors(s);
-    return judge(s, status, d, report);
+    status = judge(s, status, d, report);
+    report->solved = !status;
+    return status;
 }
 
 /* ---- A solve ---- */
@@ -670,10 +628,13 @@ drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *
     *report =
         (drape_solve_report){.reason = drape_reason_name(DRAPE_REASON_CONVERGED),
                              .error = NAN,
+                             .left = NAN,
+                             .own = NAN,
                              .lenient = s->values[DRAPE_NEWTON_ON_FAILURE] == DRAPE_NEWTON_FAILURE_ACCEPT};
     begin(s);
     if (e->dofs == 0) {
         drape_step_equation_evaluate(e, d);
+        report->solved = true;
         return DRAPE_OK;
     }
     drape_status status = guess_linearized(s, d);
@@ -711,14 +672,19 @@ static bool configure(drape_newton *s)
            !KINSetMaxBetaFails(s->kin, MAX_BETA_FAIL);
 }
 
-static drape_status create_search(drape_arena *arena, drape_newton *s)
+/* by_error: a solve may end by the local error of the step. */
+static drape_status create_search(drape_arena *arena, drape_newton *s, bool by_error)
 {
-    const size_t n = s->equation->dofs;
-    s->trial = drape_arena_take(arena, n, sizeof *s->trial);
-    s->chord = drape_arena_take(arena, n, sizeof *s->chord);
-    s->chord_minus_f = drape_arena_take(arena, n, sizeof *s->chord_minus_f);
-    drape_status status = drape_stress_predictor_init(arena, s->equation->system, &s->predictor);
-    return status ? status : drape_arena_status(arena);
+    drape_step_equation *e = s->equation;
+    s->zero = drape_arena_take(arena, e->dofs, sizeof *s->zero);
+    s->pull = drape_arena_take(arena, e->dofs, sizeof *s->pull);
+    s->minus_pull = drape_arena_take(arena, e->dofs, sizeof *s->minus_pull);
+    drape_status status = drape_islands_init(arena, e->dofs / 3, &s->islands);
+    if (!status)
+        status = drape_line_search_init(arena, e, &s->islands, &s->search);
+    if (!status)
+        status = drape_stopping_init(arena, e, &s->islands, by_error, &s->stopping);
+    return status ? status : drape_stress_predictor_init(arena, e->system, &s->predictor);
 }
 
 /* Making a vector of ranks is collective, and copying it is not. */
@@ -766,7 +732,6 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
     if (drape_ranks_agree_memory(equation->ranks, arena->ctx, s))
         return DRAPE_E_MEMORY;
     s->equation = equation;
-    s->repair_share = 1;
     s->edge = drape_model_mean_edge(equation->model);
     memcpy(s->values, values, sizeof s->values);
     if (equation->x_ahead)
@@ -782,7 +747,7 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
     if (!status)
         status = drape_arena_status(arena);
     if (!status && s->searches)
-        status = create_search(arena, s);
+        status = create_search(arena, s, isnan(values[DRAPE_NEWTON_TOLERANCE]));
     drape_reserve reserve = {.used = false};
     if (!status)
         status = drape_reserve_open(&reserve, arena->ctx, equation->dofs);
@@ -847,7 +812,6 @@ void drape_newton_archive(drape_newton *s, drape_archive *a)
     const bool modified = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_MODIFIED;
     drape_archive_mark(a, "newton");
     drape_archive_doubles(a, e->f, e->dofs);
-    drape_archive_double(a, &s->repair_share);
     drape_archive_bool(a, &s->factored);
     drape_archive_double(a, &s->factored_mass_weight);
     drape_work_archive(&e->work, a);

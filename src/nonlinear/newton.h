@@ -49,7 +49,8 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
     [DRAPE_NEWTON_TOLERANCE] =                                                                               \
         DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,           \
                      "bound on the residual of the free nodes of an accepted state, measured by norm; at "   \
-                     "most 1 % of their load"),                                                              \
+                     "most 1 % of their load. By default be and bdf2 with globalization work also end "      \
+                     "a solve when what is left is small beside the local error of the step"),               \
     [DRAPE_NEWTON_NORM] =                                                                                    \
         DRAPE_CHOICE("norm", DRAPE_NORM_MAX, drape_newton_norms,                                             \
                      "norm of the residual: largest component, sum, or root of the sum of squares"),         \
@@ -60,8 +61,8 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
                      "accept: continue with an unconverged state, as in the DEP report, and log it"),        \
     [DRAPE_NEWTON_METHOD] =                                                                                  \
         DRAPE_CHOICE("newton", DRAPE_NEWTON_METHOD_EXACT, drape_newton_methods,                              \
-                     "exact: a Jacobian in each iteration, except for chord steps at the end with "          \
-                     "globalization work; modified: factors kept for up to 10 iterations and across steps"), \
+                     "exact: a Jacobian in each iteration; modified: factors kept for up to 10 iterations "  \
+                     "and across steps"),                                                                    \
     [DRAPE_NEWTON_GLOBALIZATION] = DRAPE_CHOICE(                                                             \
         "globalization", DRAPE_NEWTON_GLOBAL_AUTO, drape_newton_globalizations,                              \
         "none: full Newton steps, failures go to the controller; line_search: steps shortened until the "    \
@@ -87,9 +88,8 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
                      "the residual, 1e-4 to 0.9"),                                                           \
     [DRAPE_NEWTON_CORRECTION_TOLERANCE] = DRAPE_NUMBER(                                                      \
         "correction_tolerance", "m", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1,                               \
-        "a solve also ends, whatever its residual, after a whole correction and a chord step by the same "   \
-        "matrix that lowers the residual and whose root mean square over the free nodes is at most this; "   \
-        "static ends by its residual only")
+        "a solve also ends, whatever its residual, after a whole correction whose root mean square over "    \
+        "the free nodes is at most this; static ends by its residual only")
 
 /* Values of the choices among these parameters. */
 enum { DRAPE_NEWTON_FAILURE_REJECT, DRAPE_NEWTON_FAILURE_ACCEPT };

@@ -13,6 +13,10 @@ typedef struct drape_solve_report {
     double residual, tolerance; /* [N] */
     bool laborious; /* near the largest number of iterations: a larger step of the same motion might fail */
     double error;   /* [m] estimated RMS distance of the nodes to the solution; NaN: no estimate */
+    double left;    /* [J] what is left to gain, estimated likewise (stopping.h) */
+    double own;     /* [J] the same measure of the local error of the method; NaN: no estimate */
+    bool solved;    /* the solve ended by one of its rules, not because its effort was spent */
+    bool by_error;  /* for a cloth that was the local error */
     double further_seconds; /* [s] spent on iterations that only reduced this error */
     /* lenient: the settings have on_failure accept, so states are only checked for numbers that are not
      * finite and for passing through something. usable: the status is > 0, and the settings ask to continue

@@ -19,7 +19,8 @@ drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, 
                                .ranks = drape_model_ranks(model),
                                .nodes = 3 * (size_t)model->node_count,
                                .dofs = 3 * (size_t)model->free_count,
-                               .all_dofs = 3 * (double)drape_model_all_free(model)};
+                               .all_dofs = 3 * (double)drape_model_all_free(model),
+                               .all_nodes = (double)drape_model_whole(model)->node_count};
     s->x_base = drape_arena_take(arena, s->nodes, sizeof *s->x_base);
     s->v_base = drape_arena_take(arena, s->nodes, sizeof *s->v_base);
     s->inertia = drape_arena_take(arena, s->dofs, sizeof *s->inertia);
@@ -267,6 +268,19 @@ bool drape_step_equation_is_rounding(drape_step_equation *s, const double *d, dr
         return false;
     *rounding = drape_step_equation_rounding(s, d, norm);
     return size <= *rounding;
+}
+
+double drape_step_equation_inertial_error(const drape_step_equation *s, double *left)
+{
+    double squares = 0, work = 0;
+    for (size_t i = 0; i < s->dofs; i++) {
+        const double p = s->f[i] / (s->mass_weight * s->model->mass[drape_step_equation_at(s, i) / 3]);
+        squares += p * p;
+        work += p * s->f[i];
+    }
+    if (left)
+        *left = drape_ranks_sum(s->ranks, work);
+    return sqrt(drape_ranks_sum(s->ranks, squares) / s->all_nodes);
 }
 
 drape_diagnostic drape_step_equation_diagnose(const drape_step_equation *s, double tolerance)

@@ -15,7 +15,8 @@
  * falls, and zero where that energy is smallest. A step is feasible if no two pieces pass through each
  * other on it.
  *
- * The solvers are newton.h (to a tolerance) and inexact_newton.h (a fixed number of iterations).
+ * The solvers are newton.h (to a tolerance or to the local error) and inexact_newton.h (a fixed number of
+ * iterations).
  */
 #ifndef DRAPE_NONLINEAR_STEP_EQUATION_H
 #define DRAPE_NONLINEAR_STEP_EQUATION_H
@@ -29,14 +30,19 @@ typedef struct drape_step_equation {
     const drape_ranks *ranks; /* the model's: sums below are those of all ranks */
     size_t nodes, dofs;       /* entries of these arrays */
     double all_dofs;          /* of all ranks */
+    double all_nodes;         /* likewise; free or not */
 
     /* The equation, which an integrator sets before a solve. */
     double *x_base, *v_base; /* nodes: at d = 0; pinned nodes as at the end of the step */
     double *inertia;         /* free DOFs: p [m] */
     double mass_weight;      /* m_w [1/s2] */
-    double *momentum;        /* nodes: added to g, the const of point.momentum [N]; NULL: no term has one */
-    drape_point point;       /* w, history, internal variables, time; its x and v are those below */
-    const double *x_start;   /* nodes: the beginning of the step or stage; NULL: no stress prediction
+    /* free DOFs [m], and C: the local error of the method is about C (d - expected) (stopping.h); NULL: there
+     * is no estimate of it */
+    const double *expected;
+    double error_share;
+    double *momentum;      /* nodes: added to g, the const of point.momentum [N]; NULL: no term has one */
+    drape_point point;     /* w, history, internal variables, time; its x and v are those below */
+    const double *x_start; /* nodes: the beginning of the step or stage; NULL: no stress prediction
                                 (stress_predictor.h) */
 
     bool pins_pull; /* the guess takes the pull of moved pins to all nodes (newton.c) */
@@ -129,6 +135,18 @@ bool drape_step_equation_is_rounding(drape_step_equation *equation, const double
 
 /* Changes each number of n, three a node, by DBL_EPSILON times the largest of its node, up or down. */
 void drape_step_equation_shift(double *nodes, size_t n);
+
+/* |M^-1 F| / m_w, RMS over all nodes [m]: the distance to the solution if nothing but inertia resisted F, and
+ * for forces with a convex potential more than it. *left: F' M^-1 F / m_w [J] likewise; may be NULL. */
+double drape_step_equation_inertial_error(const drape_step_equation *equation, double *left);
+
+/* m_w m |C (d - expected)|^2 of free DOF i [J], which counts for the local error; 0 without an estimate. */
+static inline double drape_step_equation_own_error(const drape_step_equation *equation, size_t i, double d)
+{
+    const double error = equation->expected ? equation->error_share * (d - equation->expected[i]) : 0;
+    return equation->mass_weight * equation->model->mass[drape_step_equation_at(equation, i) / 3] * error *
+           error;
+}
 
 /* Describes the free node with the largest weighted residual. */
 drape_diagnostic drape_step_equation_diagnose(const drape_step_equation *equation, double tolerance);

@@ -28,7 +28,8 @@
 /* Limits relative to the energy available to the run so far. Integrators that conserve energy, or bound an
  * error, let it oscillate by some per cent. */
 #define STEP_GAIN 0.25 /* gained in one step */
-/* gained since numerical dissipation was largest; an integrator may set another limit */
+/* gained since numerical dissipation was largest, where an integrator does not set another limit; or left to
+ * gain in a step that is not solved */
 #define RUN_GAIN 0.1
 /* The same of a solver that stops before it converges, with the work of the residuals that it left: F d in a
  * step of displacement d, with which a step of backward Euler ends as if F were a force of the host. For a
@@ -251,6 +252,19 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
                     run / scale, UNCONVERGED_GAIN);
     else
         return false;
+    return true;
+}
+
+/* What a step may leave is measured by energies that contact and pins do not feed: a body that gives cloth no
+ * room can press any energy into it. */
+bool drape_sim_left_too_much(drape_sim *sim, const drape_state *out, drape_step_info *info)
+{
+    const drape_energy *e = &sim->attempted;
+    const double scale = scene_energy(sim->model) + e->kinetic + fabs(e->elastic);
+    if (info->solved || sim->realtime.active || !(info->left > RUN_GAIN * scale))
+        return false;
+    info->diagnostic =
+        gain_at(sim, out->v, "energy left to gain / energy of the motion", info->left / scale, RUN_GAIN);
     return true;
 }
 

@@ -148,12 +148,13 @@ static bool is_next_frame(const drape_sim *sim)
 static void archive_statistics(drape_sim *sim, drape_archive *a)
 {
     drape_statistics *s = &sim->statistics;
-    int64_t *const counts[] = {&s->steps_accepted,    &s->steps_rejected, &s->steps_unconverged,
-                               &s->steps_above_error, &s->steps_held,     &sim->attempts,
-                               &sim->failed,          &sim->held_up,      &sim->next_frame};
-    double *const numbers[] = {&sim->held_up_from, &s->h_min,        &s->h_max,      &s->wall_setup,
-                               &s->wall_steps,     &s->wall_contact, &s->strain_min, &s->strain_max,
-                               &s->error_max,      &s->error_last};
+    int64_t *const counts[] = {&s->steps_accepted,    &s->steps_rejected,  &s->steps_unconverged,
+                               &s->steps_above_error, &s->steps_held,      &sim->attempts,
+                               &sim->failed,          &sim->held_up,       &sim->next_frame,
+                               &sim->left.by_error,   &sim->left.above_own};
+    double *const numbers[] = {&sim->held_up_from, &s->h_min,        &s->h_max,          &s->wall_setup,
+                               &s->wall_steps,     &s->wall_contact, &s->strain_min,     &s->strain_max,
+                               &s->error_max,      &s->error_last,   &sim->left.largest, &sim->left.last};
     drape_archive_mark(a, "statistics");
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
         drape_archive_int64(a, counts[i]);

@@ -69,7 +69,9 @@ drape_status drape_sim_hold(drape_sim *sim, drape_state *next, drape_step_info *
                               .h = h,
                               .residual = NAN,
                               .tolerance = NAN,
-                              .error = NAN};
+                              .error = NAN,
+                              .left = NAN,
+                              .own = NAN};
     info->diagnostic =
         (drape_diagnostic){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
     memcpy(next->x, now->x, n * sizeof *next->x);

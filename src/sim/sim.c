@@ -159,6 +159,7 @@ static drape_status open_sim(drape_context *ctx, const drape_model *model, const
                        .arena = drape_arena_create(ctx),
                        .model = model,
                        .statistics = {.error_max = NAN, .error_last = NAN},
+                       .left = {.largest = NAN, .last = NAN},
                        .realtime = {.longest_asked = def->realtime_step},
                        .frame_rate = def->frame_rate > 0 ? def->frame_rate : model->frame_rate,
                        .teleport_speed = def->teleport_speed};

@@ -62,6 +62,13 @@ typedef struct drape_realtime_memory {
     int64_t crossed;                /* and the calls with any */
 } drape_realtime_memory;
 
+/* What steps left of the solution of their equation, by estimate (nonlinear/stopping.h). */
+typedef struct drape_left {
+    double largest, last; /* [J] of the accepted steps; NaN: not estimated */
+    int64_t by_error;     /* accepted steps that were solved to their local error */
+    int64_t above_own;    /* accepted steps that were not solved, and left more than that */
+} drape_left;
+
 struct drape_sim {
     drape_context *ctx;
     drape_arena *arena; /* holds all memory of the sim and stays at its address: see drape_sim_read */
@@ -103,6 +110,7 @@ struct drape_sim {
     double further_seconds; /* [s] of the last attempt, see drape_step_info; not archived: it is read at
                                     once */
     drape_statistics statistics; /* counted by the driver; the integrator has the others */
+    drape_left left;
     drape_reason_total reasons[DRAPE_MAX_REASONS];
     int reason_count;
     drape_audit audit;
@@ -192,6 +200,11 @@ double drape_sim_error_bound(const drape_sim *sim);
 /* Whether out has energy that neither the state before nor the work on it can account for, in this step or
  * since the beginning of the run; info->diagnostic then says how much. */
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info);
+
+/* Whether a step to `out` that was not solved left more than a share of the energies of the motion. Then the
+ * diagnostic says so. With a time budget any step is better than none. */
+/* To be called after drape_sim_ran_away, which measures them. */
+bool drape_sim_left_too_much(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
 /* Settles what the residual of a step to `out` did. What it was dissipated at once is not counted as
  * dissipated. With a time budget, what the residuals so far have put into the motion is taken back from it:

@@ -48,6 +48,10 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
         info->reason = drape_reason_name(DRAPE_REASON_ENERGY);
         return DRAPE_RETRY_REJECTED;
     }
+    if (!info->lenient && drape_sim_left_too_much(sim, next, info)) {
+        info->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
+        return DRAPE_RETRY_NONLINEAR;
+    }
     const drape_state *before = drape_sim_state(sim);
     drape_status status =
         drape_system_check_contact(sim->system, next->x, next->t, &info->reason, &info->diagnostic);
@@ -202,13 +206,17 @@ static void rotate_states(drape_sim *sim)
     sim->next = spare;
 }
 
-/* error: NaN if the integrator estimates none. */
-static void count_error(drape_sim *sim, double error)
+/* Lengths and energies are NaN if the integrator estimates none. */
+static void count_error(drape_sim *sim, const drape_step_info *info)
 {
     drape_statistics *s = &sim->statistics;
-    s->error_last = error;
-    s->error_max = fmax(s->error_max, error);
-    s->steps_above_error += error > drape_sim_error_bound(sim);
+    s->error_last = info->error;
+    s->error_max = fmax(s->error_max, info->error);
+    s->steps_above_error += info->error > drape_sim_error_bound(sim);
+    sim->left.last = info->left;
+    sim->left.largest = fmax(sim->left.largest, info->left);
+    sim->left.by_error += info->by_error;
+    sim->left.above_own += !info->solved && info->left > info->own;
 }
 
 static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
@@ -233,7 +241,7 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     s->h_max = fmax(info->h, s->h_max);
     s->steps_accepted++;
     s->steps_unconverged += info->usable;
-    count_error(sim, info->error);
+    count_error(sim, info);
     drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t, h_next, !info->laborious);
 }
 
@@ -457,7 +465,8 @@ static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *
                            .residual = info->residual,
                            .tolerance = info->tolerance,
                            .diagnostic = info->diagnostic,
-                           .error = info->error};
+                           .error = info->error,
+                           .left = info->left};
 }
 
 /* After an attempt that failed: holds the cloth, if that is the last resort and possible. The step is then
@@ -494,7 +503,8 @@ static bool hold(drape_sim *sim, drape_status failure, bool stopped, drape_step_
  * continue. */
 static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status *stop)
 {
-    drape_step_info info = {.reason = drape_reason_name(DRAPE_REASON_CONVERGED), .h = h, .error = NAN};
+    drape_step_info info = {
+        .reason = drape_reason_name(DRAPE_REASON_CONVERGED), .h = h, .error = NAN, .left = NAN, .own = NAN};
     drape_trial trial;
     double t = drape_sim_state(sim)->t;
     const double memory[2] = {sim->scratch[0], sim->scratch[1]};

@@ -368,6 +368,14 @@ static bool is_inaccurate(drape_sim *sim, char *text, size_t size)
 {
     const drape_statistics s = drape_sim_statistics(sim);
     const bool last = s.error_last > s.error_bound;
+    if (!last && (double)sim->left.above_own > MOST * (double)s.steps_accepted) {
+        snprintf(text, size,
+                 "%s: %lld of %lld steps were accepted although they left more than the local error of the "
+                 "method, up to %.3g J: a smaller dt comes nearer, and \"be\" solves its steps",
+                 sim->chosen.integrator->entry.name, (long long)sim->left.above_own,
+                 (long long)s.steps_accepted, sim->left.largest);
+        return true;
+    }
     if (!last && !((double)s.steps_above_error > MOST * (double)s.steps_accepted))
         return false;
     snprintf(

@@ -206,7 +206,7 @@ def test_many_iterations():
     ball = {"type": "sphere", "center": [0.5, -0.35, -0.5], "radius": 0.3}
     cloth = {"mesh": {"grid": "square", "columns": 12, "rows": 12, "width": 1, "height": 1}, "terms": ["stretch.edge", "bend.hinge"],
              "material": {"young_modulus": 1e8, "thickness": 2e-4, "areal_density": 0.1}}
-    write_scene(cloth=[cloth], colliders=[ball], duration=0.5, integrator={"method": "be", "dt": 1 / 60})
+    write_scene(cloth=[cloth], colliders=[ball], duration=0.5, integrator={"method": "be", "dt": 1 / 60, "tolerance": 1e-6})
     text = found()
     summary = read_json("s.json")
     a_step = summary["newton"]["iterations"] / (summary["steps"]["accepted"] + summary["steps"]["rejected"])

@@ -85,7 +85,7 @@ static const soak cases[] = {
                            "'contact': {'friction': 'lagged'},"
                            "'integrator': {'dt': 0.016666666666666666}, 'duration': 1}",
      .mark = 20,
-     .warm = 30,
+     .warm = 90,
      .pins = {0, 11},
      .sway = {0.1, 0, 0.05},
      .collider = {0, 0.04, 0.1}},

@@ -19,7 +19,8 @@ typedef struct dep_case {
 /* What the attempts of a run reported. */
 typedef struct dep_log {
     int64_t attempts, accepted, rejected, unconverged;
-    bool honest;    /* "converged" was reported if the residual is within the tolerance, and only then */
+    bool honest;    /* "converged" was reported if the residual is within the tolerance, and only then, or
+                       "local_error" if a step was solved to that */
     bool converged; /* all accepted attempts */
 } dep_log;
 
@@ -29,7 +30,9 @@ static inline drape_status dep_note(void *user, const drape_event *event)
     const drape_attempt *a = event->attempt;
     if (event->kind != DRAPE_EVENT_ATTEMPT)
         return DRAPE_OK;
-    const bool within = a->residual <= a->tolerance, called = strcmp(a->reason, "converged") == 0;
+    const bool by_error = strcmp(a->reason, "local_error") == 0;
+    const bool within = by_error || a->residual <= a->tolerance;
+    const bool called = by_error || strcmp(a->reason, "converged") == 0;
     log->honest &= a->index == log->attempts && isfinite(a->t) && a->h > 0 && a->reason[0] != 0;
     log->honest &= a->status == DRAPE_OK ? within && called : a->status > 0 && !called;
     log->converged &= !a->accepted || (a->status == DRAPE_OK && within);

@@ -231,18 +231,23 @@ START_TEST(iterations_follow_while_it_is_above_the_bound)
 }
 END_TEST
 
-/* The default bound is a thousandth of the diagonal. Integrators that converge to a tolerance estimate no
- * error. */
+/* The default bound is a thousandth of the diagonal. be has an estimate and no bound; integrators that choose
+ * their steps have neither. */
 START_TEST(the_default_bound_is_a_thousandth_of_the_size)
 {
-    scene s = open(&soft, "newton_k", ""), other = open(&soft, "be", "");
+    scene s = open(&soft, "newton_k", ""), be = open(&soft, "be", ""), other = open(&soft, "ida", "");
     scene_advance(&s, DT);
+    scene_advance(&be, DT);
     scene_advance(&other, DT);
+    const drape_statistics some = drape_sim_statistics(be.sim);
+    ck_assert(isnan(some.error_bound) && some.error_max >= some.error_last && some.error_last >= 0);
+    ck_assert_int_eq(some.steps_above_error, 0);
     ck_assert_double_eq_tol(drape_sim_statistics(s.sim).error_bound, 1e-3 * SIZE, 1e-15);
     const drape_statistics none = drape_sim_statistics(other.sim);
     ck_assert(isnan(none.error_bound) && isnan(none.error_max) && isnan(none.error_last));
     ck_assert_int_eq(none.steps_above_error, 0);
     scene_close(&s);
+    scene_close(&be);
     scene_close(&other);
 }
 END_TEST

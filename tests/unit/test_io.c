@@ -510,11 +510,11 @@ static int split(char *row, char **field, int room, char **next)
     return count;
 }
 
-#define FIELDS 23
+#define FIELDS 24
 static const char columns[] =
     "attempt,t,h,accepted,status,reason,iterations,residual,tolerance,kinetic,elastic,gravity,contact,"
     "dissipated,numerical,worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit,error,"
-    "events\n";
+    "left,events\n";
 
 static void check_number(const char *text, double expected)
 {
@@ -561,7 +561,8 @@ static void check_row(char *const *field, const drape_attempt *a, const drape_en
         check_number(field[9 + i], energies[i]);
     check_worst(field + 15, &a->diagnostic);
     check_number(field[21], a->error);
-    ck_assert_str_eq(field[22], ""); /* this scene has none; cli/cli runs one that has */
+    check_number(field[22], a->left);
+    ck_assert_str_eq(field[23], ""); /* this scene has none; cli/cli runs one that has */
 }
 
 START_TEST(steps_has_a_row_for_each_attempt)
@@ -596,6 +597,7 @@ START_TEST(steps_quotes_and_keeps_digits)
         .residual = -NAN,
         .tolerance = INFINITY,
         .error = 1.0 / 7,
+        .left = 1e-7 / 7,
         .diagnostic = {"ratio, \"worst\"", "host\nterm", 7, {1, 23, 456, -1}, 0, 5e-324, -1 / 3.0}};
     drape_attempt calm = attempt;
     calm.diagnostic = (drape_diagnostic){"", "", -1, {-1, -1, -1, -1}, -1, 0, 0};
@@ -1214,8 +1216,9 @@ START_TEST(summary_is_complete)
     const char *path = in_folder(w.out, "summary.json");
     ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &def, NULL, path), DRAPE_OK);
     json_t *json = load_summary(path);
-    check_keys(json, "status message version nodes dofs nnz frames time steps newton tolerance wall_s energy "
-                     "strain intersections warnings hash ");
+    check_keys(json,
+               "status message version nodes dofs nnz frames time steps newton tolerance error wall_s energy "
+               "strain intersections warnings hash ");
     check_keys(json_object_get(json, "steps"), "accepted rejected unconverged held h_min h_max reasons ");
     check_keys(json_object_get(json, "newton"),
                "iterations jacobians factorizations linear_iterations residuals ");
@@ -1223,6 +1226,9 @@ START_TEST(summary_is_complete)
                "total setup steps residual jacobian factor solve contact output ");
     check_keys(json_object_get(json, "energy"), "kinetic elastic gravity contact dissipated numerical ");
     check_keys(json_object_get(json, "strain"), "min max ");
+    check_keys(json_object_get(json, "error"),
+               "bound largest last largest_left last_left steps_above steps_by_local_error "
+               "steps_above_local_error ");
     ck_assert_str_eq(json_string_value(json_object_get(json, "status")), "e_step_too_small");
     ck_assert_str_eq(json_string_value(json_object_get(json, "message")), def.message);
     ck_assert_double_eq(real(json, NULL, "frames"), 6);

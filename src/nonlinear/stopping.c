@@ -1,0 +1,113 @@
+/* stopping.c: see stopping.h. */
+#include "nonlinear/stopping.h"
+
+#include <math.h>
+#include <string.h>
+
+drape_status drape_stopping_init(drape_arena *arena, drape_step_equation *equation,
+                                 const drape_islands *islands, bool by_error, drape_stopping *s)
+{
+    *s = (drape_stopping){.equation = equation, .islands = islands, .by_error = by_error};
+    s->progress = drape_arena_take(arena, equation->dofs / 3 + 1, sizeof *s->progress);
+    s->weight = drape_arena_take(arena, equation->dofs / 3, sizeof *s->weight);
+    if (drape_arena_status(arena))
+        return drape_arena_status(arena);
+    memcpy(s->weight, equation->weight, equation->dofs / 3 * sizeof *s->weight);
+    return DRAPE_OK;
+}
+
+void drape_stopping_end(drape_stopping *s)
+{
+    memcpy(s->equation->weight, s->weight, s->equation->dofs / 3 * sizeof *s->weight);
+}
+
+void drape_stopping_begin(drape_stopping *s)
+{
+    drape_stopping_end(s);
+    s->ended_by_error = s->strict = false;
+    for (int32_t k = 0; k < s->islands->count; k++)
+        s->progress[k] = (drape_progress){.gain = NAN, .decrease = INFINITY};
+}
+
+/* Takes the weight from the nodes of islands that are done. Returns whether all are. */
+static bool leave_done(drape_stopping *s)
+{
+    bool all = true;
+    for (size_t i = 0; i < s->equation->dofs / 3; i++) {
+        const bool done = s->progress[s->islands->of[i]].done;
+        if (done)
+            s->equation->weight[i] = 0;
+        all &= done;
+    }
+    return all;
+}
+
+bool drape_stopping_test_residual(drape_stopping *s, double bound)
+{
+    const drape_step_equation *e = s->equation;
+    for (int32_t k = 0; k < s->islands->count; k++)
+        s->progress[k].largest = 0;
+    for (size_t i = 0; i < e->dofs; i++) {
+        double *largest = &s->progress[s->islands->of[i / 3]].largest;
+        *largest = fmax(*largest, s->weight[i / 3] * fabs(e->f[i]));
+    }
+    s->progress[0].largest = drape_ranks_largest(e->ranks, s->progress[0].largest);
+    for (int32_t k = 0; k < s->islands->count; k++)
+        s->progress[k].done |= s->progress[k].largest <= bound;
+    return leave_done(s);
+}
+
+/* Sets what depends on the nodes of each island that is not done: its local error at d + p, and the length of
+ * p. */
+static void measure(drape_stopping *s, const double *d, const double *p)
+{
+    const drape_step_equation *e = s->equation;
+    for (int32_t k = 0; k < s->islands->count; k++)
+        if (!s->progress[k].done)
+            s->progress[k].own = s->progress[k].squares = 0;
+    for (size_t i = 0; i < e->dofs; i++) {
+        drape_progress *q = &s->progress[s->islands->of[i / 3]];
+        if (q->done)
+            continue;
+        q->own += drape_step_equation_own_error(e, i, d[i] + p[i]);
+        q->squares += p[i] * p[i];
+    }
+    s->progress[0].own = drape_ranks_sum(e->ranks, s->progress[0].own);
+    s->progress[0].squares = drape_ranks_sum(e->ranks, s->progress[0].squares);
+}
+
+void drape_stopping_test_error(drape_stopping *s, const drape_length *lengths, const double *d,
+                               const double *p, bool exact, bool whole)
+{
+    const double share = DRAPE_LOCAL_ERROR_SHARE * DRAPE_LOCAL_ERROR_SHARE;
+    measure(s, d, p);
+    for (int32_t k = 0; k < s->islands->count; k++) {
+        drape_progress *q = &s->progress[k];
+        const drape_length *l = &lengths[k];
+        const double bound = share * q->own, last = q->decrease;
+        if (q->done)
+            continue;
+        const bool descends = l->start < 0 && l->found && isfinite(l->end);
+        q->gain = fmax(-l->start, 0);
+        q->decrease = descends ? -l->length * (l->start + l->end) / 2 : INFINITY;
+        if (s->by_error && !s->strict && whole && l->length >= 1 && q->gain <= bound &&
+            q->decrease <= bound && (exact || last <= bound))
+            q->done = s->ended_by_error = true;
+    }
+    leave_done(s);
+}
+
+bool drape_stopping_report(const drape_stopping *s, double *error, double *left)
+{
+    double squares = 0;
+    bool corrected = false;
+    *left = 0;
+    for (int32_t k = 0; k < s->islands->count; k++)
+        if (!isnan(s->progress[k].gain)) {
+            squares += s->progress[k].squares;
+            *left += s->progress[k].gain;
+            corrected = true;
+        }
+    *error = sqrt(squares / s->equation->all_nodes);
+    return corrected;
+}

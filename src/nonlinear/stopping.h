@@ -1,0 +1,74 @@
+/*
+ * stopping.h: when a solve is good enough. Every island is judged by itself, and keeps its place once it is
+ * done; the solve ends when all are. An island is done by one of two rules:
+ *
+ *     residual     no weighted component of F is above the bound
+ *     local error  a correction p gains little beside the error that the step has even if its equation is
+ *                  solved exactly:
+ *                      -F . p <= theta^2 m_w sum m |e|^2    [J]
+ *                  with the method's own local error e = C (d + p - q) [m], theta = DRAPE_LOCAL_ERROR_SHARE
+ *
+ * The equation is E'(d) = 0 for E = m_w/2 (d - p_0)' M (d - p_0) + V(d), with the inertial displacement p_0,
+ * if its forces have a potential V. A correction by the exact Jacobian gains, of a quadratic E, half of
+ * -F . p = x' E'' x, where x is the distance from d to the solution. Where V is convex along x that is at least
+ * m_w |x|_M^2, |x|_M^2 = sum m |x|^2, so that |x|_M <= theta |e|_M already before the correction, and in stiff
+ * directions far less. At rest both sides vanish, and the residual decides. For friction and damping, which
+ * have no potential, this is a heuristic. Hairer & Wanner 1996, IV.8, end the iterations of Radau IIA by the
+ * error of the step likewise; Deuflhard 2011, Newton Methods for Nonlinear Problems, 3.3, measures by energy.
+ *
+ * The correction must not have been shortened, by contact or by the line search, and the energy must not have
+ * fallen by more than the bound, either, by the trapezoidal rule -a (F(d) + F(d + a p)) . p / 2. A matrix with
+ * positive parts, or an old one, is stiffer than J, and -F . p is less than what is left: then the same must
+ * hold of the correction before. Predicted stress (stress_predictor.h) counts as exact: it becomes so.
+ */
+#ifndef DRAPE_NONLINEAR_STOPPING_H
+#define DRAPE_NONLINEAR_STOPPING_H
+
+#include "nonlinear/line_search.h"
+
+/* theta: the coefficient of IDA's nonlinear convergence test, of its tolerance there (Hindmarsh et al. 2005) */
+#define DRAPE_LOCAL_ERROR_SHARE 0.33
+
+/* What is known of an island in a solve. */
+typedef struct drape_progress {
+    bool done;
+    double largest;  /* [N] weighted component of F */
+    double gain;     /* [J] -F . p of the last correction; NaN: there was none */
+    double squares;  /* [m2] sum of |p|^2 over the nodes */
+    double decrease; /* [J] of the energy by it; INFINITY: not known, or there was none */
+    double own;      /* [J] m_w sum m |e|^2 */
+} drape_progress;
+
+typedef struct drape_stopping {
+    drape_step_equation *equation;
+    const drape_islands *islands;
+    drape_progress *progress; /* (islands) */
+    double *weight;           /* free nodes: of their residual in norms */
+    bool by_error;            /* the second rule counts */
+    bool ended_by_error;      /* it was needed in this solve */
+    bool strict;              /* it does not count in the rest of this solve */
+} drape_stopping;
+
+/* by_error: whether the rule of the local error counts, in solves of an equation that has `expected`. Errors:
+ * DRAPE_E_MEMORY. */
+drape_status drape_stopping_init(drape_arena *arena, drape_step_equation *equation,
+                                 const drape_islands *islands, bool by_error, drape_stopping *stopping);
+
+/* Begins a solve, or begins again because the islands have changed. Nodes of islands that are done have no
+ * weight in norms of F until drape_stopping_end. */
+void drape_stopping_begin(drape_stopping *stopping);
+void drape_stopping_end(drape_stopping *stopping);
+
+/* After an evaluation of F: ends islands by their residual. Returns whether all are done, by any rule. */
+bool drape_stopping_test_residual(drape_stopping *stopping, double bound);
+
+/* After a search along a correction, at d + p where it ended: ends islands by their local error. exact: the
+ * correction is by the Jacobian, and whole: it was not shortened because of contact. */
+void drape_stopping_test_error(drape_stopping *stopping, const drape_length *lengths, const double *d,
+                               const double *p, bool exact, bool whole);
+
+/* The last corrections of all islands: their root mean square over all nodes [m] and -F . p [J]. False if there
+ * was none. */
+bool drape_stopping_report(const drape_stopping *stopping, double *error, double *left);
+
+#endif
