@@ -344,7 +344,7 @@ static const char *why_not_described(const drape_folder *f, const char *name, st
 static const char *why_not_ours(drape_folder *f, const char *name, struct stat *info)
 {
     const char *why = why_not_described(f, name, info);
-    if (!why || f->manifest < 0 || read_manifest(f))
+    if (!why || (f->manifest < 0 && !f->shared) || read_manifest(f))
         return why;
     return why_not_described(f, name, info);
 }
