@@ -1369,9 +1369,8 @@ typedef struct drape_attempt {
     double error; /* [m] estimated distance between the end of the step and the solution of its equation from
                      the same start, RMS over all nodes: with be and its like the last correction, which is
                      more than what it left; NaN: the integrator estimates none */
-    double
-        left; /* [J] work of the residual along the last correction, about twice the energy that it gained; with
-                     newton_k of the correction that would follow; NaN: not estimated */
+    double left;  /* [J] work of the residual along the last correction, about twice the energy that it
+                    gained; with newton_k of the correction that would follow; NaN: not estimated */
 } drape_attempt;
 
 /* The kind of an event. */

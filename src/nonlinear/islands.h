@@ -1,8 +1,8 @@
 /*
  * islands.h: the parts of the cloth that the equation of a step couples: the connected components of the
- * pattern of J. Two cloths that are neither sewn together nor in contact, and have not been since contact last
- * extended the pattern, are two islands. The stopping rules judge every island by itself, and without contact
- * so does the line search.
+ * pattern of J. Two cloths that are neither sewn together nor in contact, and have not been since contact
+ * last extended the pattern, are two islands. The stopping rules judge every island by itself, and without
+ * contact so does the line search.
  */
 #ifndef DRAPE_NONLINEAR_ISLANDS_H
 #define DRAPE_NONLINEAR_ISLANDS_H

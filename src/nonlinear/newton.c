@@ -214,7 +214,8 @@ static drape_status extend_pattern(drape_newton *s, const drape_point *point)
 }
 
 /* Which islands are done at the last evaluation of F; contact there may couple those that were to others. A
- * state that would be rejected for what has become of an element is solved to the residual. *done: all are. */
+ * state that would be rejected for what has become of an element is solved to the residual. *done: all are.
+ * */
 static drape_status judge_islands(drape_newton *s, bool *done)
 {
     const drape_step_equation *e = s->equation;
@@ -414,9 +415,9 @@ static void choose_forcing(drape_newton *s, const double *minus_f)
 }
 
 /* A chord step: if a whole correction p has lowered the residual, `before`, so far that lowering it by the
- * same factor once more would end the solve, the rest is corrected with the factors that gave p, at a tenth of
- * the cost of an iteration. F is known at d + p. A chord step that is not feasible is not made, and one that
- * does not end the solve is undone. */
+ * same factor once more would end the solve, the rest is corrected with the factors that gave p, at a tenth
+ * of the cost of an iteration. F is known at d + p. A chord step that is not feasible is not made, and one
+ * that does not end the solve is undone. */
 static drape_status add_chord(drape_newton *s, const double *d, double before, double *p)
 {
     drape_step_equation *e = s->equation;
@@ -528,8 +529,8 @@ static drape_status status_of(int code, const char **reason)
     }
 }
 
-/* What is left is less than the last corrections, where these contract; without one it is less than if nothing
- * but inertia resisted F. Pseudo-transient steps, which have no start, are no motion. */
+/* What is left is less than the last corrections, where these contract; without one it is less than if
+ * nothing but inertia resisted F. Pseudo-transient steps, which have no start, are no motion. */
 static void estimate_left(drape_newton *s, const double *d, drape_solve_report *report)
 {
     const drape_step_equation *e = s->equation;
@@ -581,7 +582,8 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
         status = DRAPE_RETRY_NONLINEAR;
     }
     report->usable = report->lenient && finite && status > 0;
-    return finite ? status : drape_step_equation_find_cause(e, status, report);
+    return finite && status != DRAPE_RETRY_NONFINITE ? status
+                                                     : drape_step_equation_find_cause(e, status, report);
 }
 
 /* Whether KINSOL could not go on because all that is left, besides islands that are done, is rounding. */

@@ -10,23 +10,24 @@
  *
  * The equation is E'(d) = 0 for E = m_w/2 (d - p_0)' M (d - p_0) + V(d), with the inertial displacement p_0,
  * if its forces have a potential V. A correction by the exact Jacobian gains, of a quadratic E, half of
- * -F . p = x' E'' x, where x is the distance from d to the solution. Where V is convex along x that is at least
- * m_w |x|_M^2, |x|_M^2 = sum m |x|^2, so that |x|_M <= theta |e|_M already before the correction, and in stiff
- * directions far less. At rest both sides vanish, and the residual decides. For friction and damping, which
- * have no potential, this is a heuristic. Hairer & Wanner 1996, IV.8, end the iterations of Radau IIA by the
- * error of the step likewise; Deuflhard 2011, Newton Methods for Nonlinear Problems, 3.3, measures by energy.
+ * -F . p = x' E'' x, where x is the distance from d to the solution. Where V is convex along x that is at
+ * least m_w |x|_M^2, |x|_M^2 = sum m |x|^2, so that |x|_M <= theta |e|_M already before the correction, and
+ * in stiff directions far less. At rest both sides vanish, and the residual decides. For friction and
+ * damping, which have no potential, this is a heuristic. Hairer & Wanner 1996, IV.8, end the iterations of
+ * Radau IIA by the error of the step likewise; Deuflhard 2011, Newton Methods for Nonlinear Problems, 3.3,
+ * measures by energy.
  *
  * The correction must not have been shortened, by contact or by the line search, and the energy must not have
- * fallen by more than the bound, either, by the trapezoidal rule -a (F(d) + F(d + a p)) . p / 2. A matrix with
- * positive parts, or an old one, is stiffer than J, and -F . p is less than what is left: then the same must
- * hold of the correction before. Predicted stress (stress_predictor.h) counts as exact: it becomes so.
+ * fallen by more than the bound, either, by the trapezoidal rule -a (F(d) + F(d + a p)) . p / 2. A matrix
+ * with positive parts, or an old one, is stiffer than J, and -F . p is less than what is left: then the same
+ * must hold of the correction before. Predicted stress (stress_predictor.h) counts as exact: it becomes so.
  */
 #ifndef DRAPE_NONLINEAR_STOPPING_H
 #define DRAPE_NONLINEAR_STOPPING_H
 
 #include "nonlinear/line_search.h"
 
-/* theta: the coefficient of IDA's nonlinear convergence test, of its tolerance there (Hindmarsh et al. 2005) */
+/* theta: the coefficient of IDA's nonlinear convergence test, of its tolerance there (Hindmarsh 2005) */
 #define DRAPE_LOCAL_ERROR_SHARE 0.33
 
 /* What is known of an island in a solve. */
@@ -67,8 +68,8 @@ bool drape_stopping_test_residual(drape_stopping *stopping, double bound);
 void drape_stopping_test_error(drape_stopping *stopping, const drape_length *lengths, const double *d,
                                const double *p, bool exact, bool whole);
 
-/* The last corrections of all islands: their root mean square over all nodes [m] and -F . p [J]. False if there
- * was none. */
+/* The last corrections of all islands: their root mean square over all nodes [m] and -F . p [J]. False if
+ * there was none. */
 bool drape_stopping_report(const drape_stopping *stopping, double *error, double *left);
 
 #endif
