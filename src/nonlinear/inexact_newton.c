@@ -145,6 +145,7 @@ drape_status drape_inexact_newton_create(drape_arena *arena, drape_step_equation
     s->trial = s->search.trial;
     if (status || drape_arena_status(arena) || equation->dofs == 0)
         return status ? status : drape_arena_status(arena);
+    drape_islands_find(&s->islands, drape_system_pattern(equation->system)); /* contact alone changes it */
     bool factored = matrix == DRAPE_INEXACT_FACTORED, only = true;
     if (matrix == DRAPE_INEXACT_AUTO)
         status = drape_factored_jacobian_is_better(equation->system, dt, &factored, &only);
@@ -183,7 +184,6 @@ static void begin(drape_inexact_newton *s, bool follows, bool cheap)
     if (!follows || s->first.mass_weight != e->mass_weight)
         s->first = (contraction){0};
     s->indefinite = s->unstable = s->shortened = s->linearized = false;
-    drape_islands_find(&s->islands, drape_system_pattern(e->system));
     drape_step_equation_predict_contact(e, NULL);
     if (!s->factored || (follows && s->predictor.valid))
         return;
@@ -403,15 +403,13 @@ static void make_correction_feasible(drape_inexact_newton *s)
 
 /* ---- Advance ---- */
 
-/* Takes p, or as much of it as the search says. The matrix may have coupled islands by contact. Positive
- * parts make it too stiff: its corrections are lengthened, but not with contact, to which that might lead.
- * Returns false if F is not finite there. Stress was predicted for the whole of p. */
+/* Takes p, or as much of it as the search says. Positive parts make the matrix too stiff: its corrections
+ * are lengthened, but not with contact, to which that might lead. Returns false if F is not finite there.
+ * Stress was predicted for the whole of p. */
 static bool advance(drape_inexact_newton *s, double *d)
 {
     drape_step_equation *e = s->equation;
     const bool lengthens = s->factored && s->lengthens && !s->fraction;
-    if (s->fraction)
-        drape_islands_find(&s->islands, drape_system_pattern(e->system));
     drape_line_search_along(&s->search, d, lengthens ? INFINITY : 1, s->p);
     for (size_t i = 0; i < e->dofs; i++)
         d[i] += s->p[i];
@@ -736,9 +734,7 @@ drape_status drape_inexact_newton_solve(drape_inexact_newton *s, const drape_ine
     drape_status status = iterate(s, settings, d, report);
     report->residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
     report->diagnostic = drape_step_equation_diagnose(e, settings->tolerance);
-    report->own = 0;
-    for (size_t i = 0; i < e->dofs; i++)
-        report->own += drape_step_equation_own_error(e, i, d[i]);
+    report->own = drape_step_equation_local_error(e, d);
     if (status == DRAPE_RETRY_NONFINITE) {
         report->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
         return drape_step_equation_find_cause(e, status, report);

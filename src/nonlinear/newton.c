@@ -8,8 +8,8 @@
  *     factor     factors of J or, where contact makes J unsymmetric, of a symmetric matrix near J; an
  *                indefinite one is replaced by that with the positive parts of its elements
  *     correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress and normal
- *                forces of contact predicted for the next J; p shortened or lengthened (line_search.h), and
- *                which islands are done by what it gained
+ *                forces of contact predicted for the next J; p shortened or lengthened (line_search.h), or
+ *                completed by a chord step; which islands are done by what it gained
  *     conclude   what KINSOL's return code means, and F at the final d, in the requested norm
  *
  * KINSOL calls the stages between guess and conclude in each iteration: residual as its system function,
@@ -106,7 +106,7 @@ struct drape_newton {
     drape_stopping stopping;
     drape_line_search search;
     drape_stress_predictor predictor;
-    double *zero, *pull, *minus_pull; /* free DOFs: scratch of the linearized guess */
+    double *step, *right; /* free DOFs: a step, and its right-hand side, that KINSOL does not ask for */
 
     double *fraction; /* nodes: scratch of the guess; NULL without contact */
     double edge;      /* [m] mean length of an edge */
@@ -349,17 +349,17 @@ static drape_status guess_linearized(drape_newton *s, double *d)
     drape_step_equation *e = s->equation;
     if (!linearizes(s))
         return DRAPE_OK;
-    N_VSetArrayPointer(s->zero, s->unknown);
-    drape_step_equation_pull(e, s->zero, s->pull);
+    N_VSetArrayPointer(s->search.trial, s->unknown);
+    drape_step_equation_pull(e, s->search.trial, s->step);
     for (size_t i = 0; i < e->dofs; i++)
-        s->minus_pull[i] = -s->pull[i];
-    drape_status status = assemble(s, s->zero, false);
+        s->right[i] = -s->step[i];
+    drape_status status = assemble(s, s->search.trial, false);
     if (!status)
         status = factor(s->linear->solver, NULL);
     if (!status)
-        status = drape_sun_linear_solve(s->linear, s->minus_pull, s->pull);
-    if (!status && drape_step_equation_is_finite(e, s->pull))
-        memcpy(d, s->pull, e->dofs * sizeof *d);
+        status = drape_sun_linear_solve(s->linear, s->right, s->step);
+    if (!status && drape_step_equation_is_finite(e, s->step))
+        memcpy(d, s->step, e->dofs * sizeof *d);
     s->positive = s->indefinite = false;
     drape_step_equation_begin(e);
     return status < 0 ? status : DRAPE_OK;
@@ -414,27 +414,27 @@ static void choose_forcing(drape_newton *s, const double *minus_f)
     s->linear->tolerance = fmin(fmax(forcing, FORCING_MIN), FORCING_MAX);
 }
 
-/* A chord step: if a whole correction p has lowered the residual, `before`, so far that lowering it by the
- * same factor once more would end the solve, the rest is corrected with the factors that gave p, at a tenth
- * of the cost of an iteration. F is known at d + p. A chord step that is not feasible is not made, and one
- * that does not end the solve is undone. */
-static drape_status add_chord(drape_newton *s, const double *d, double before, double *p)
+/* A chord step: if a whole correction p has lowered the residual so far that lowering it by the same factor
+ * once more would end the solve, the rest is corrected with the factors that gave p, at a tenth of the cost
+ * of an iteration. F is known at d + p. A chord step that is not feasible is not made, and one that does not
+ * end the solve is undone. */
+static drape_status add_chord(drape_newton *s, const double *d, double *p)
 {
     drape_step_equation *e = s->equation;
     const double bound = max_norm_bound(s), now = drape_step_equation_norm(e, DRAPE_NORM_MAX);
-    if (!(now > bound && now / before * now <= bound))
+    if (!(now > bound && now / s->residual * now <= bound))
         return DRAPE_OK;
     for (size_t i = 0; i < e->dofs; i++)
-        s->minus_pull[i] = e->weight[i / 3] == 0 ? 0 : -e->f[i];
-    const drape_status status = drape_sun_linear_solve(s->linear, s->minus_pull, s->pull);
-    if (status || drape_step_equation_make_feasible(e, s->pull) < 1)
+        s->right[i] = e->weight[i / 3] == 0 ? 0 : -e->f[i];
+    const drape_status status = drape_sun_linear_solve(s->linear, s->right, s->step);
+    if (status || drape_step_equation_make_feasible(e, s->step) < 1)
         return status < 0 ? status : DRAPE_OK;
     for (size_t i = 0; i < e->dofs; i++)
-        s->search.trial[i] = d[i] + (p[i] + s->pull[i]);
+        s->search.trial[i] = d[i] + (p[i] + s->step[i]);
     s->search.evaluated = drape_step_equation_evaluate(e, s->search.trial) &&
                           drape_step_equation_norm(e, DRAPE_NORM_MAX) <= bound;
     for (size_t i = 0; i < e->dofs && s->search.evaluated; i++)
-        p[i] += s->pull[i];
+        p[i] += s->step[i];
     return DRAPE_OK;
 }
 
@@ -448,7 +448,6 @@ static drape_status advance(drape_newton *s, const double *d, bool whole, double
                        s->linear->tolerance <= EXACT;
     const double longest = !s->positive ? 1 : e->x_ahead ? MAX_LENGTH : INFINITY;
     const double tolerance = s->values[DRAPE_NEWTON_CORRECTION_TOLERANCE];
-    const double before = drape_step_equation_norm(e, DRAPE_NORM_MAX);
     double error, left;
     predict_stress(s, p);
     drape_line_search_along(&s->search, d, longest, p);
@@ -460,7 +459,7 @@ static drape_status advance(drape_newton *s, const double *d, bool whole, double
     s->positive = s->search.shortest < SHORT_STEP && !(s->contact_unsymmetric && s->positive);
     if (s->search.shortest < 1 || s->search.longest > 1)
         drape_stress_predictor_forget(&s->predictor);
-    return at_once ? add_chord(s, d, before, p) : DRAPE_OK;
+    return at_once ? add_chord(s, d, p) : DRAPE_OK;
 }
 
 /* Turns p into the step that is taken from the present iterate d. A p that is not finite is left to KINSOL,
@@ -537,10 +536,7 @@ static void estimate_left(drape_newton *s, const double *d, drape_solve_report *
     double error, left;
     if (!s->searches || !e->x_start || isnan(report->residual))
         return;
-    report->own = 0;
-    for (size_t i = 0; i < e->dofs; i++)
-        report->own += drape_step_equation_own_error(e, i, d[i]);
-    report->own = drape_ranks_sum(e->ranks, report->own);
+    report->own = drape_step_equation_local_error(e, d);
     report->error = drape_step_equation_inertial_error(e, &report->left);
     if (!drape_stopping_report(&s->stopping, &error, &left))
         return;
@@ -678,9 +674,8 @@ static bool configure(drape_newton *s)
 static drape_status create_search(drape_arena *arena, drape_newton *s, bool by_error)
 {
     drape_step_equation *e = s->equation;
-    s->zero = drape_arena_take(arena, e->dofs, sizeof *s->zero);
-    s->pull = drape_arena_take(arena, e->dofs, sizeof *s->pull);
-    s->minus_pull = drape_arena_take(arena, e->dofs, sizeof *s->minus_pull);
+    s->step = drape_arena_take(arena, e->dofs, sizeof *s->step);
+    s->right = drape_arena_take(arena, e->dofs, sizeof *s->right);
     drape_status status = drape_islands_init(arena, e->dofs / 3, &s->islands);
     if (!status)
         status = drape_line_search_init(arena, e, &s->islands, &s->search);

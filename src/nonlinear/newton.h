@@ -1,6 +1,6 @@
 /*
- * newton.h: solves a step equation to a tolerance by Newton's method, with KINSOL. The comment at the top
- * of newton.c describes an iteration, and which parts of it are KINSOL's.
+ * newton.h: solves a step equation to a tolerance or to the local error of the step by Newton's method, with
+ * KINSOL. The comment at the top of newton.c describes an iteration, and which parts of it are KINSOL's.
  */
 #ifndef DRAPE_NONLINEAR_NEWTON_H
 #define DRAPE_NONLINEAR_NEWTON_H
@@ -113,8 +113,9 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
 void drape_newton_destroy(drape_newton **newton);
 
 /* Solves the equation for d (free DOFs; on entry the guess). DRAPE_OK: the residual at d is within the
- * tolerance, in the requested norm. > 0: it is not, and the report says why; report->usable if the settings
- * ask to continue nevertheless. In both cases the equation was evaluated last at d. */
+ * tolerance, in the requested norm, or one of the other rules of stopping.h and the settings holds, which the
+ * report names. > 0: none does, and the report says why; report->usable if the settings ask to continue
+ * nevertheless. In both cases the equation was evaluated last at d. */
 drape_status drape_newton_solve(drape_newton *newton, double *d, drape_solve_report *report);
 
 /* J at a point with the given mass weight, in the pattern that the system has there; valid until the next

@@ -283,6 +283,14 @@ double drape_step_equation_inertial_error(const drape_step_equation *s, double *
     return sqrt(drape_ranks_sum(s->ranks, squares) / s->all_nodes);
 }
 
+double drape_step_equation_local_error(const drape_step_equation *s, const double *d)
+{
+    double sum = s->expected ? 0 : NAN;
+    for (size_t i = 0; i < s->dofs; i++)
+        sum += drape_step_equation_own_error(s, i, d[i]);
+    return drape_ranks_sum(s->ranks, sum);
+}
+
 drape_diagnostic drape_step_equation_diagnose(const drape_step_equation *s, double tolerance)
 {
     for (size_t i = 0; i < s->dofs; i++)

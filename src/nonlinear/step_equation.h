@@ -148,6 +148,9 @@ static inline double drape_step_equation_own_error(const drape_step_equation *eq
            error;
 }
 
+/* Its sum, the local error by the measure of stopping.h; NaN without an estimate. */
+double drape_step_equation_local_error(const drape_step_equation *equation, const double *d);
+
 /* Describes the free node with the largest weighted residual. */
 drape_diagnostic drape_step_equation_diagnose(const drape_step_equation *equation, double tolerance);
 

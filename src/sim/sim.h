@@ -202,8 +202,8 @@ double drape_sim_error_bound(const drape_sim *sim);
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
 /* Whether a step to `out` that was not solved left more than a share of the energies of the motion. Then the
- * diagnostic says so. With a time budget any step is better than none. */
-/* To be called after drape_sim_ran_away, which measures them. */
+ * diagnostic says so. With a time budget any step is better than none. To be called after drape_sim_ran_away,
+ * which measures these energies. */
 bool drape_sim_left_too_much(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
 /* Settles what the residual of a step to `out` did. What it was dissipated at once is not counted as
