@@ -17,7 +17,7 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
     [DRAPE_REASON_CORRECTION] =
         REASON("correction", "Newton",
                "accepted: the residual is above `tolerance`, but a correction was within "
-               "`correction_tolerance`"),
+               "`correction_tolerance` or, of newton_k, what is left within `error`"),
     [DRAPE_REASON_ITERATIONS] =
         REASON("iterations", "newton_k",
                "accepted after the given number of iterations, with a residual above `tolerance`"),

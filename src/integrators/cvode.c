@@ -80,7 +80,7 @@ static bool configure(drape_first_order *f)
     DRAPE_CVODE_QUIET(m);
     return drape_cvode_log_init(log_of(f), m, rhs, f->y, f->newton.solver) && !CVodeSetUserData(m, f) &&
            !CVodeSVtolerances(m, 0, f->weights) &&
-           !CVodeSetLinearSolver(m, f->linear->solver, f->linear->matrix) &&
+           !CVodeSetLinearSolver(m, f->linear->shell.solver, f->linear->shell.matrix) &&
            !CVodeSetLinSysFn(m, system_matrix) && drape_sun_newton_set_test(&f->newton) &&
            !CVodeSetMaxOrd(m, (int)f->values[DRAPE_FIRST_ORDER_ORDER]) &&
            !CVodeSetMaxErrTestFails(m, DRAPE_FIRST_ORDER_ERROR_FAILS) &&
@@ -93,8 +93,8 @@ static bool configure(drape_first_order *f)
 
 static bool create_cvode(drape_first_order *f)
 {
-    f->linear->solver->ops->solve = drape_first_order_solve_rhs;
-    f->linear->solver->ops->setup = factor;
+    f->linear->shell.solver->ops->solve = drape_first_order_solve_rhs;
+    f->linear->shell.solver->ops->setup = factor;
     f->newton.mass = f->mass;
     f->newton.gamma = CVodeGetCurrentGamma;
     f->memory = CVodeCreate(CV_BDF, f->sun);

@@ -178,7 +178,7 @@ static bool configure(drape_first_order *f)
     DRAPE_ARKODE_QUIET(m);
     return !ARKStepSetUserData(m, f) && !ARKStepSVtolerances(m, 0, f->weights) &&
            !ARKStepSetTableNum(m, methods[order_of((dirk_state *)f)].table, ARKODE_ERK_NONE) &&
-           !ARKStepSetLinearSolver(m, f->linear->solver, f->linear->matrix) &&
+           !ARKStepSetLinearSolver(m, f->linear->shell.solver, f->linear->shell.matrix) &&
            !ARKStepSetLinSysFn(m, system_matrix) && !ARKStepSetLinearSolutionScaling(m, SUNFALSE) &&
            !ARKStepSetNonlinearSolver(m, f->newton.solver) && drape_sun_newton_set_test(&f->newton) &&
            !ARKStepSetDeduceImplicitRhs(m, SUNTRUE) && !ARKStepSetStagePredictFn(m, predict) &&
@@ -192,7 +192,7 @@ static bool configure(drape_first_order *f)
 static bool create_arkode(drape_first_order *f)
 {
     dirk_state *s = (dirk_state *)f;
-    f->linear->solver->ops->solve = solve;
+    f->linear->shell.solver->ops->solve = solve;
     f->newton.mass = f->mass;
     f->newton.gamma = ARKStepGetCurrentGamma;
     f->newton.is_due = matrix_is_due;

@@ -27,7 +27,7 @@ drape_status drape_implicit_init_newton(drape_arena *arena, drape_system *system
     drape_status status = drape_ranks_agree(drape_model_ranks(drape_system_model(system)), arena->ctx,
                                             drape_implicit_init(arena, system, s));
     s->inertial_guess = values[DRAPE_NEWTON_PREDICTOR] == DRAPE_NEWTON_PREDICTOR_INERTIAL;
-    return status ? status : drape_newton_create(arena, &s->equation, values, &s->newton);
+    return status ? status : drape_newton_create(arena, &s->equation, values, NULL, &s->newton);
 }
 
 drape_status drape_implicit_create(drape_arena *arena, drape_system *system, const double *values,
@@ -94,6 +94,18 @@ void drape_implicit_backward_euler(drape_implicit *s, const drape_state *in, dou
         s->history[i] /= -h;
 }
 
+double drape_implicit_pins_ahead(const drape_implicit *s, const drape_state *in, double h)
+{
+    const drape_step_equation *e = &s->equation;
+    double most = 0;
+    for (int32_t i = 0; i < s->motion->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            const size_t at = 3 * (size_t)s->motion->moved_node[i] + k;
+            most = fmax(most, fabs(e->x_base[at] - in->x[at] - h * in->v[at]));
+        }
+    return drape_ranks_largest(e->ranks, most);
+}
+
 void drape_implicit_force_at_start(const drape_implicit *s, const drape_state *in, double *v, double *g)
 {
     const drape_step_equation *e = &s->equation;
@@ -142,7 +154,7 @@ drape_status drape_implicit_solve(drape_implicit *s, drape_step_info *info)
 drape_status drape_implicit_solve_from(drape_implicit *s, drape_step_info *info)
 {
     drape_solve_report report;
-    drape_status status = drape_newton_solve(s->newton, s->d, &report);
+    drape_status status = drape_newton_solve(s->newton, NULL, s->d, &report);
     drape_implicit_report(&report, info);
     return status;
 }
@@ -281,7 +293,7 @@ void drape_implicit_archive(void *state, drape_archive *a)
 
 drape_work drape_implicit_work(const void *state)
 {
-    return drape_newton_work(((const drape_implicit *)state)->newton);
+    return ((const drape_implicit *)state)->equation.work;
 }
 
 size_t drape_implicit_bytes(const void *state)

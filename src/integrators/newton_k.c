@@ -1,25 +1,25 @@
 /*
- * newton_k: backward Euler with k inexact Newton iterations in each step, for real time. be.c solves the
- * same equation to a tolerance; here the solver is nonlinear/inexact_newton.h. No step is accepted
- * unchecked: the final residual and an estimate of the error are reported, and if neither has fallen below
- * that of the guess the step is refused, so that the controller halves it.
+ * newton_k: backward Euler with a few inexact Newton iterations in each step, for real time (Dembo, Eisenstat
+ * & Steihaug 1982). be.c solves the same equation by the same kernel, nonlinear/newton.h; here
+ *     - the matrix is only near the Jacobian, and cheaper (nonlinear/matrix.h),
+ *     - a solve also ends when the estimated error is within a bound in metres, and after a number of
+ *       iterations, or when its time is spent, in any case. If then neither the residual nor the estimate is
+ *       below that of the guess, the step is refused, so that the controller halves it: no step is accepted
+ *       unchecked.
  *
  * The guess extrapolates the motion, with a share s of the last change of velocity,
  *     d = h v0 + s h^2 (v0 - v-1)/h0
- * s = 1/2 halves the error of one iteration on a swinging sheet; s = 1 amplifies its own noise and
- * diverges. A change that is not like the one before it does not go on: after pins have turned, a guess
- * with half of it is so far off that it may lead to another solution. So s is at most the correlation of
- * the two,
+ * s = 1/2 halves the error of one iteration on a swinging sheet; s = 1 amplifies its own noise and diverges.
+ * A change that is not like the one before it does not go on: after pins have turned, a guess with half of it
+ * is so far off that it may lead to another solution. So s is at most the correlation of the two,
  *     (a0, a1)_M / max(|a0|_M^2, |a1|_M^2)
- * and 0 where there is none, or the last step ended in contact: 36 scenes in contact drawn at random took
- * 27 % fewer iterations than with s = 1/2, and 14 % fewer with the correlation alone, and were as far off
- * or nearer. h/h0 > 1 diverges, too: where a step was halved and the next is not, what the short step
- * left as noise would count twice, the longer step would be refused for the energy of it, and so on. h/h0
- * is 1 at most.
+ * and 0 where there is none, or the last step ended in contact: 36 scenes in contact drawn at random took 27
+ * % fewer iterations than with s = 1/2, and 14 % fewer with the correlation alone, and were as far off or
+ * nearer. h/h0 > 1 diverges, too: where a step was halved and the next is not, what the short step left as
+ * noise would count twice, the longer step would be refused for the energy of it, and so on. h/h0 is 1 at
+ * most.
  */
 #include "integrators/implicit.h"
-#include "nonlinear/inexact_newton.h"
-#include "nonlinear/residual_bound.h"
 
 #include <math.h>
 #include <string.h>
@@ -38,9 +38,9 @@ enum {
     PARAM_COUNT
 };
 
-static const char *const corrections[] = {[DRAPE_INEXACT_AUTO] = "auto",
-                                          [DRAPE_INEXACT_APPROXIMATE] = "conjugate_gradients",
-                                          [DRAPE_INEXACT_FACTORED] = "factors",
+static const char *const corrections[] = {[DRAPE_MATRIX_AUTO] = "auto",
+                                          [DRAPE_MATRIX_APPROXIMATE] = "conjugate_gradients",
+                                          [DRAPE_MATRIX_FACTORED] = "factors",
                                           NULL};
 
 static const drape_param params[PARAM_COUNT] = {
@@ -49,19 +49,17 @@ static const drape_param params[PARAM_COUNT] = {
         DRAPE_INTEGER("iterations", "1", 1, 1, 1000, "least number of inexact Newton iterations in a step"),
     [PARAM_ERROR] = DRAPE_NUMBER(
         "error", "m", DRAPE_DERIVED("1e-3 times the diagonal of the rest bounding box"), DRAPE_ABOVE(0), 1e9,
-        "further iterations follow while the estimated distance to the converged "
-        "step, RMS over the nodes, is above this, with conjugate gradients and without contact above half of "
-        "it; "
-        "not a bound on an accepted state"),
+        "further iterations follow until the estimated distance to the converged step, RMS over the nodes, "
+        "is "
+        "at most this; not a bound on an accepted state"),
     [PARAM_TOLERANCE] =
         DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,
                      "residual of the free nodes, largest component, below which no iteration is made, at "
                      "most 1 % of their load; not a bound on an accepted state"),
-    [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER(
-        "rescue_iterations", "1", 20, 0, 100000,
-        "up to so many further iterations while the estimated distance is above error, or too much "
-        "is left: with factors and without contact energy, else residual; a step that then "
-        "is not nearer than the guess, or further off than the scene is large, is rejected"),
+    [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 20, 0, 100000,
+                                              "up to so many further iterations; a step that then is not "
+                                              "nearer than the guess, or further off than "
+                                              "the scene is large, is rejected"),
     [PARAM_EXTRAPOLATION] =
         DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
                      "largest fraction of the last change of velocity that is added to the guess"),
@@ -74,7 +72,7 @@ static const drape_param params[PARAM_COUNT] = {
         DRAPE_INTEGER("coarse_spacing", "1", 0, 0, 100,
                       "edges between the centres of the coarse functions; 0: by the number of nodes"),
     [PARAM_CORRECTIONS] = DRAPE_CHOICE(
-        "corrections", DRAPE_INEXACT_AUTO, corrections,
+        "corrections", DRAPE_MATRIX_AUTO, corrections,
         "conjugate_gradients: a matrix with edges and springs, and one number for each pair of nodes of all "
         "other measures, is never factored; factors: one with all terms, and such numbers for the bending of "
         "flat cloth only; auto: factors for terms that the first matrix would hold back, for stiff cloth, "
@@ -97,7 +95,6 @@ static const struct {
 typedef struct newton_k {
     drape_implicit common;
     double values[PARAM_COUNT];
-    drape_inexact_newton *newton;
     double *past[PAST]; /* nodes: velocities at the start of the present step and of those before it */
     double past_time[PAST], past_end; /* [s] of these; end of the last attempt, NAN: there is none */
     bool touches, touched; /* the last attempt, and the step before the present one, ended in contact */
@@ -126,24 +123,18 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     s->deadline = INFINITY;
     restart(s, NULL);
     drape_status status = drape_implicit_init(arena, system, &s->common);
-    if (!status)
-        status = drape_residual_bound_set(&s->common.equation, DRAPE_NORM_MAX, values[PARAM_TOLERANCE],
-                                          &s->values[PARAM_TOLERANCE]);
     for (int k = 0; k < PAST; k++)
         s->past[k] = drape_arena_take(arena, s->common.equation.nodes, sizeof *s->past[k]);
+    double newton[DRAPE_NEWTON_PARAM_COUNT];
+    for (int i = 0; i < DRAPE_NEWTON_PARAM_COUNT; i++)
+        drape_param_default(&drape_newton_params[i], newton + i);
+    newton[DRAPE_NEWTON_TOLERANCE] = values[PARAM_TOLERANCE];
+    const drape_matrix_choice choice = {.kind = (drape_matrix_kind)values[PARAM_CORRECTIONS],
+                                        .dt = values[PARAM_DT],
+                                        .coarse_spacing = (int)values[PARAM_COARSE_SPACING]};
     if (!status)
-        status = drape_inexact_newton_create(arena, &s->common.equation,
-                                             (drape_inexact_matrix)values[PARAM_CORRECTIONS],
-                                             values[PARAM_DT], (int)values[PARAM_COARSE_SPACING], &s->newton);
+        status = drape_newton_create(arena, &s->common.equation, newton, &choice, &s->common.newton);
     return status ? status : drape_arena_status(arena);
-}
-
-static void destroy(void **state)
-{
-    newton_k *s = *state;
-    if (s)
-        drape_inexact_newton_destroy(&s->newton);
-    *state = NULL;
 }
 
 /* Keeps the velocities with which steps began. A second attempt at the same step has the same past. */
@@ -198,20 +189,6 @@ static void guess(newton_k *s, const drape_state *in, double h)
     }
 }
 
-/* How far moved pins get ahead of where their velocity at the start of the step would take them [m]. */
-static double pins_ahead(const newton_k *s, const drape_state *in, double h)
-{
-    const drape_step_equation *e = &s->common.equation;
-    const drape_motion *motion = drape_system_motion(e->system);
-    double most = 0;
-    for (int32_t i = 0; i < motion->moved_count; i++)
-        for (size_t k = 0; k < 3; k++) {
-            const size_t at = 3 * (size_t)motion->moved_node[i] + k;
-            most = fmax(most, fabs(e->x_base[at] - in->x[at] - h * in->v[at]));
-        }
-    return most;
-}
-
 /* The relative residual that is left. An error e in the displacement of a step is an error e/h in its
  * velocity, and a second has 1/h steps: for the sum to vanish with h like the method's own error, e must be
  * of order h^3. The error of the guess is of order h^2, so the relative residual is of order h. */
@@ -236,22 +213,20 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
               linear_iterations = efforts[s->effort].linear_iterations;
     drape_solve_report report;
     drape_implicit_backward_euler(&s->common, in, out->t, h, 1 / h * (1 / h));
-    const bool follows = in->t == s->past_end;
+    e->pins_ahead = drape_implicit_pins_ahead(&s->common, in, h);
     remember(s, in, out->t);
     guess(s, in, h);
-    const drape_inexact_settings settings = {
-        .iterations = iterations ? iterations : (int)s->values[PARAM_ITERATIONS],
-        .rescue_iterations = (int)s->values[PARAM_RESCUE_ITERATIONS],
-        .tolerance = s->values[PARAM_TOLERANCE],
+    const int least = iterations ? iterations : (int)s->values[PARAM_ITERATIONS];
+    const drape_newton_effort effort = {
+        .least = least,
+        .most = least + (int)s->values[PARAM_RESCUE_ITERATIONS],
         .error = s->values[PARAM_ERROR],
         .deadline = s->deadline,
+        .keeps = true,
         .linear_tolerance = linear_tolerance(s),
         .cheap = s->effort > 0,
-        .follows = follows,
-        .pins_ahead = pins_ahead(s, in, h),
-        .max_linear_iterations =
-            linear_iterations ? linear_iterations : (int)s->values[PARAM_LINEAR_ITERATIONS]};
-    drape_status status = drape_inexact_newton_solve(s->newton, &settings, s->common.d, &report);
+        .linear_iterations = linear_iterations ? linear_iterations : (int)s->values[PARAM_LINEAR_ITERATIONS]};
+    drape_status status = drape_newton_solve(s->common.newton, &effort, s->common.d, &report);
     drape_implicit_report(&report, info);
     s->touches = is_in_contact(e->system);
     if (status)
@@ -272,11 +247,6 @@ static void set_deadline(void *state, double seconds)
     ((newton_k *)state)->deadline = seconds;
 }
 
-static drape_work work(const void *state)
-{
-    return ((const newton_k *)state)->common.equation.work;
-}
-
 static void archive(void *state, drape_archive *a)
 {
     newton_k *s = state;
@@ -287,22 +257,12 @@ static void archive(void *state, drape_archive *a)
     }
     drape_archive_bool(a, &s->touches);
     drape_archive_bool(a, &s->touched);
-    drape_inexact_newton_archive(s->newton, a);
-}
-
-static double tolerance(const void *state)
-{
-    return ((const newton_k *)state)->values[PARAM_TOLERANCE];
+    drape_newton_archive(s->common.newton, a);
 }
 
 static double error_bound(const void *state)
 {
     return ((const newton_k *)state)->values[PARAM_ERROR];
-}
-
-static size_t bytes(const void *state)
-{
-    return drape_inexact_newton_bytes(((const newton_k *)state)->newton);
 }
 
 const drape_integrator_ops drape_integrator_newton_k = {
@@ -318,12 +278,12 @@ const drape_integrator_ops drape_integrator_newton_k = {
     .restart = restart,
     .efforts = sizeof efforts / sizeof *efforts,
     .set_effort = set_effort,
-    .tolerance = tolerance,
+    .tolerance = drape_implicit_tolerance,
     .error_bound = error_bound,
     .set_deadline = set_deadline,
-    .work = work,
+    .work = drape_implicit_work,
     .archive = archive,
-    .bytes = bytes,
-    .destroy = destroy,
+    .bytes = drape_implicit_bytes,
+    .destroy = drape_implicit_destroy,
     .mean_velocities = true,
 };

@@ -11,6 +11,7 @@
  * that is thrown on a slope, 378, 0, 0 and 1 mm, and 567 mm. */
 #define INNER_ITERATIONS 2
 #define INNER_TOLERANCE  0.3
+#define MAX_ITERATIONS   60 /* until a solve says otherwise */
 
 /* ---- Symmetric 3 x 3 blocks: xx xy xz yy yz zz ---- */
 
@@ -290,31 +291,38 @@ static drape_status factor_coarse(drape_approx_jacobian *s, drape_work *work)
     return status;
 }
 
-static drape_status update(drape_approx_jacobian *s, const drape_point *point, double mass_weight,
-                           bool friction, drape_work *work)
+/* The next matrix on the coarse space is that of the first matrix of a solve. Later ones keep its factors,
+ * which only precondition. */
+static void begin(void *matrix, bool friction, int most)
 {
-    drape_status status = evaluate_remainder(s, point, friction);
-    if (status)
-        return status;
-    drape_scalar_stiffness_weigh(&s->scalar, point->weight, mass_weight);
-    evaluate_pairs(s, point);
-    invert_diagonal(s);
-    return s->coarse_due ? factor_coarse(s, work) : DRAPE_OK;
-}
-
-void drape_approx_jacobian_begin(drape_approx_jacobian *s)
-{
+    drape_approx_jacobian *s = matrix;
     s->coarse_due = true;
+    s->has_friction = friction;
+    s->most = most;
 }
 
-drape_status drape_approx_jacobian_update(drape_approx_jacobian *s, const drape_point *point,
-                                          double mass_weight, bool friction, drape_work *work)
+static drape_status assemble(void *matrix, const drape_point *point, double mass_weight, bool positive,
+                             drape_work *work)
 {
-    double start = drape_system_clock(s->system) - work->factor_seconds;
-    drape_status status = update(s, point, mass_weight, friction, work);
+    drape_approx_jacobian *s = matrix;
+    const double start = drape_system_clock(s->system);
+    (void)positive; /* it always is */
+    drape_status status = evaluate_remainder(s, point, s->has_friction);
+    if (!status) {
+        drape_scalar_stiffness_weigh(&s->scalar, point->weight, mass_weight);
+        evaluate_pairs(s, point);
+        invert_diagonal(s);
+    }
     work->jacobians++;
-    work->jacobian_seconds += drape_system_clock(s->system) - work->factor_seconds - start;
+    work->jacobian_seconds += drape_system_clock(s->system) - start;
     return status;
+}
+
+static drape_status factor(void *matrix, bool definite, drape_work *work)
+{
+    drape_approx_jacobian *s = matrix;
+    (void)definite;
+    return s->coarse_due ? factor_coarse(s, work) : DRAPE_OK;
 }
 
 static void solve_symmetric(void *owner, const double *b, double *x)
@@ -323,14 +331,20 @@ static void solve_symmetric(void *owner, const double *b, double *x)
     drape_pcg_solve(&s->pcg, b, x, INNER_TOLERANCE, INNER_ITERATIONS);
 }
 
-int drape_approx_jacobian_solve(drape_approx_jacobian *s, const double *b, double *x, double tolerance,
-                                int max_iterations)
+static drape_status solve(void *matrix, const double *b, double tolerance, double *x, bool *definite,
+                          drape_work *work)
 {
+    drape_approx_jacobian *s = matrix;
+    const double start = drape_clock_seconds();
     int iterations = 1;
-    if (drape_nonsymmetric_solve(&s->friction, b, x, &iterations))
-        return iterations;
-    drape_pcg_solve(&s->pcg, b, x, tolerance, max_iterations);
-    return s->pcg.iterations;
+    if (!drape_nonsymmetric_solve(&s->friction, b, x, &iterations)) {
+        drape_pcg_solve(&s->pcg, b, x, tolerance, s->most);
+        iterations = s->pcg.iterations;
+    }
+    *definite = true;
+    work->linear_iterations += iterations;
+    work->solve_seconds += drape_clock_seconds() - start;
+    return DRAPE_OK;
 }
 
 /* ---- Creation and destruction ---- */
@@ -346,7 +360,7 @@ drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *syst
     s->system = system;
     s->model = drape_system_model(system);
     s->nodes = s->model->free_count;
-    s->coarse_due = true;
+    begin(s, true, MAX_ITERATIONS);
     const size_t n = 3 * (size_t)s->nodes;
     s->inverse = drape_arena_take(arena, 2 * n, sizeof *s->inverse);
     s->pcg = drape_pcg_of(arena, (int64_t)n, s, multiply, precondition);
@@ -357,28 +371,38 @@ drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *syst
     return status ? status : drape_arena_status(arena);
 }
 
-void drape_approx_jacobian_destroy(drape_approx_jacobian **out)
+static void destroy(void *matrix)
 {
-    drape_approx_jacobian *s = *out;
+    drape_approx_jacobian *s = matrix;
     if (!s)
         return;
     drape_linear_destroy(s->coarse.linear, &s->coarse.solver);
     drape_arena_free(&s->remainder.arena);
     drape_nonsymmetric_free(&s->friction);
-    *out = NULL;
 }
 
-/* Each step begins with an update, so the factors themselves are not archived, only the state that later
+/* Each solve begins with a new matrix, so the factors themselves are not archived, only the state that later
  * ones depend on. */
-void drape_approx_jacobian_archive(drape_approx_jacobian *s, drape_archive *a)
+static void archive(void *matrix, drape_archive *a, bool kept)
 {
+    drape_approx_jacobian *s = matrix;
+    (void)kept;
     drape_archive_mark(a, "approximate jacobian");
     if (drape_archive_has_read(a))
         drape_archive_note(a, drape_approx_jacobian_extend(s));
     drape_linear_archive(s->coarse.linear, s->coarse.solver, a, NULL);
 }
 
-size_t drape_approx_jacobian_bytes(const drape_approx_jacobian *s)
+static size_t bytes(const void *matrix)
 {
-    return drape_linear_bytes(s->coarse.linear, s->coarse.solver);
+    const drape_approx_jacobian *s = matrix;
+    return s->coarse.linear ? drape_linear_bytes(s->coarse.linear, s->coarse.solver) : 0;
 }
+
+const drape_matrix_ops drape_approx_jacobian_ops = {.begin = begin,
+                                                    .assemble = assemble,
+                                                    .factor = factor,
+                                                    .solve = solve,
+                                                    .archive = archive,
+                                                    .bytes = bytes,
+                                                    .destroy = destroy};

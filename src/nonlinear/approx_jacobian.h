@@ -1,10 +1,10 @@
 /*
  * approx_jacobian.h: an approximation of the Jacobian of a step equation that costs a fraction of it, for a
- * few inexact Newton iterations (inexact_newton.h):
+ * few inexact Newton iterations (newton.h):
  *     A = m_w M + C (x) I + sum over pairs [H -H; -H H] + R
  * with
  *     H  3 x 3 blocks of the measures that depend on the distance of two nodes: the positive semidefinite
- *        part, computed at each update.
+ *        part, computed at each point.
  *     C  all other measures, above all bending: one scalar for each pair of nodes, constant
  *        (scalar_stiffness.h). Liu, Bouaziz & Kavan 2017 use such a matrix for all terms. For stretching it
  *        would resist motion across the sheet, too, with thousands of times the sheet's inertia, which ten
@@ -19,39 +19,19 @@
 #ifndef DRAPE_NONLINEAR_APPROX_JACOBIAN_H
 #define DRAPE_NONLINEAR_APPROX_JACOBIAN_H
 
-#include "nonlinear/report.h"
+#include "nonlinear/matrix.h"
 
 typedef struct drape_approx_jacobian drape_approx_jacobian;
 
+extern const drape_matrix_ops drape_approx_jacobian_ops;
+
 /* For a system with at least one free node. spacing: edges between the centres of the coarse functions; 0:
  * chosen by the number of nodes. The arena must outlive it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER; even
- * then drape_approx_jacobian_destroy must be called, to free what is not in the arena. */
+ * then it must be destroyed. */
 drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *system, int spacing,
                                           drape_approx_jacobian **out);
-void drape_approx_jacobian_destroy(drape_approx_jacobian **jacobian);
-
-/* A step begins: the next update factors the matrix on the coarse space again. Further updates keep these
- * factors, which only precondition. */
-void drape_approx_jacobian_begin(drape_approx_jacobian *jacobian);
-
-/* Computes the matrix at a point and counts the work; with `friction`, where some acts, also what corrects
- * its solutions, by nonsymmetric.h. Returns a status > 0 if it has no factors on the coarse space. Errors:
- * DRAPE_E_MEMORY, if contact couples new nodes. */
-drape_status drape_approx_jacobian_update(drape_approx_jacobian *jacobian, const drape_point *point,
-                                          double mass_weight, bool friction, drape_work *work);
-
-/* x = A^-1 b (free DOFs), until the residual falls to `tolerance` times its initial value, in the norm of
- * the preconditioner; corrected for friction if the last update was asked for that. Returns the number of
- * iterations. */
-int drape_approx_jacobian_solve(drape_approx_jacobian *jacobian, const double *b, double *x, double tolerance,
-                                int max_iterations);
 
 /* y = A x, for tests. */
 void drape_approx_jacobian_multiply(const drape_approx_jacobian *jacobian, const double *x, double *y);
-
-/* Archives what is kept between updates. */
-void drape_approx_jacobian_archive(drape_approx_jacobian *jacobian, drape_archive *a);
-
-size_t drape_approx_jacobian_bytes(const drape_approx_jacobian *jacobian); /* outside of its arena */
 
 #endif

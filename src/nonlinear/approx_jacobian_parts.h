@@ -45,7 +45,9 @@ struct drape_approx_jacobian {
     double *h;            /* (6 x pairs) */
     drape_scalar_stiffness scalar;
     coarse_matrix coarse;
-    bool coarse_due; /* its factors are not of this step */
+    bool coarse_due; /* its factors are not of this solve */
+    bool has_friction;
+    int most; /* iterations of conjugate gradients in a solution */
     remainder_matrix remainder;
     double *inverse; /* (6 x nodes) of the diagonal blocks */
     drape_pcg pcg;

@@ -1,14 +1,14 @@
 /*
  * factored_jacobian.h: a positive semidefinite matrix near the Jacobian of a step equation, with its
- * factors, for fixed numbers of iterations (inexact_newton.h) where the matrix of approx_jacobian.h is too
+ * factors, for fixed numbers of iterations (newton.h) where the matrix of approx_jacobian.h is too
  * far from J or too ill-conditioned:
  *     A = m_w M + C (x) I + J+
  * with
  *     C   bending of flat cloth: one scalar for each pair of nodes, constant (scalar_stiffness.h); a
  *         hundredth of the time of its Hessians
- *     J+  all other terms and contact, with the positive semidefinite parts of their elements or a share
- *         of them: 1 is positive semidefinite, and converges slowly where cloth is compressed; 0 is exact,
- *         except for contact, but may be indefinite
+ *     J+  all other terms and contact, with the positive semidefinite parts of their elements, which
+ *         converges slowly where cloth is compressed, or without, exact but for contact, where A may be
+ *         indefinite
  * It is symmetric; where there is friction, drag or a load that follows the cloth, solutions are corrected
  * for what is not (nonsymmetric.h).
  *
@@ -28,9 +28,11 @@
 #ifndef DRAPE_NONLINEAR_FACTORED_JACOBIAN_H
 #define DRAPE_NONLINEAR_FACTORED_JACOBIAN_H
 
-#include "nonlinear/report.h"
+#include "nonlinear/matrix.h"
 
 typedef struct drape_factored_jacobian drape_factored_jacobian;
+
+extern const drape_matrix_ops drape_factored_jacobian_ops;
 
 /* *better: whether the model needs this matrix for steps of dt: a term of it is neither a measure of pairs
  * nor flat bending, or is drag that couples nodes, or its membrane is so stiff that conjugate gradients need
@@ -40,31 +42,12 @@ drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, 
 
 /* For a system with at least one free node, whose pattern may then leave out what only bending couples
  * (drape_system_leave_out). dt: the nominal step. The arena must outlive it. Errors: DRAPE_E_MEMORY,
- * DRAPE_E_SOLVER; even then drape_factored_jacobian_destroy must be called, to free what is not in the
- * arena. */
+ * DRAPE_E_SOLVER; even then it must be destroyed. */
 drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *system, double dt,
                                             drape_factored_jacobian **out);
-void drape_factored_jacobian_destroy(drape_factored_jacobian **jacobian);
 
-/* Computes the matrix at a point with a share of the positive parts, factors it, and counts the work. A
- * status > 0: it has no factors; with a share below 1 also if it is not positive definite. Errors:
- * DRAPE_E_MEMORY, if contact couples new nodes; DRAPE_E_STOPPED. */
-drape_status drape_factored_jacobian_update(drape_factored_jacobian *jacobian, const drape_point *point,
-                                            double mass_weight, double share, drape_work *work);
-
-/* x = A^-1 b (free DOFs); with the factors of N, until the residual falls to `tolerance` times its initial
- * value in the norm of N^-1, or A turns out not to be definite, where x is a descent direction. Sets the
- * number of iterations and whether A was definite as far as it was seen. A status > 0: x is not finite. */
-drape_status drape_factored_jacobian_solve(drape_factored_jacobian *jacobian, const double *b,
-                                           double tolerance, double *x, int *iterations, bool *definite);
-
-/* The matrix of the last update that has factors, A or N, for tests. */
+/* The matrix that has factors, A or N, for tests. */
 bool drape_factored_jacobian_is_lumped(const drape_factored_jacobian *jacobian);
 const double *drape_factored_jacobian_values(const drape_factored_jacobian *jacobian);
-
-/* Archives what is kept between updates. */
-void drape_factored_jacobian_archive(drape_factored_jacobian *jacobian, drape_archive *a);
-
-size_t drape_factored_jacobian_bytes(const drape_factored_jacobian *jacobian); /* outside of its arena */
 
 #endif

@@ -34,12 +34,12 @@ static double length_at(const drape_line_search *s, size_t i)
     return s->lengths[s->islands->of[i / 3]].length;
 }
 
-/* Evaluates F at d + a p. */
-static void try_lengths(drape_line_search *s, const double *d, const double *p)
+/* Evaluates F at d + (before + a p), rounded as the caller adds them. */
+static void try_lengths(drape_line_search *s, const double *d, const double *before, const double *p)
 {
     drape_step_equation *e = s->equation;
     for (size_t i = 0; i < e->dofs; i++)
-        s->trial[i] = d[i] + length_at(s, i) * p[i];
+        s->trial[i] = d[i] + ((before ? before[i] : 0) + length_at(s, i) * p[i]);
     s->evaluated = drape_step_equation_evaluate(e, s->trial);
     if (s->evaluated)
         measure(s, p);
@@ -96,7 +96,8 @@ static bool stays_feasible(drape_line_search *s, const double *d, const double *
     return a <= longest && drape_step_equation_make_feasible(e, s->trial) == 1;
 }
 
-void drape_line_search_along(drape_line_search *s, const double *d, double longest, double *p)
+void drape_line_search_along(drape_line_search *s, const double *d, const double *before, double longest,
+                             double *p)
 {
     const int32_t count = s->islands->count;
     const bool joint = s->equation->x_ahead;
@@ -114,7 +115,7 @@ void drape_line_search_along(drape_line_search *s, const double *d, double longe
         s->evaluated = false;
         if (!stays_feasible(s, d, p, longest))
             break;
-        try_lengths(s, d, p);
+        try_lengths(s, d, before, p);
         found = judge_all(s, joint, longest > 1);
     }
     s->shortest = INFINITY;

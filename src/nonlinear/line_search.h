@@ -33,12 +33,13 @@ typedef struct drape_line_search {
 drape_status drape_line_search_init(drape_arena *arena, drape_step_equation *equation,
                                     const drape_islands *islands, drape_line_search *search);
 
-/* Searches along p (free DOFs) from d, where the equation was evaluated last. A matrix with positive parts is
- * far too stiff along unstable directions: its corrections are lengthened until the work is small enough,
- * because otherwise a buckling sheet takes a hundred of them. longest: the largest length that is tried, 1
- * for others, which are taken whole if they stop short of the minimum; with contact, longer ones only where
- * that is feasible. p becomes the step to take, a p. */
-void drape_line_search_along(drape_line_search *search, const double *d, double longest, double *p);
+/* Searches along p (free DOFs) from d + before (NULL: d), where the equation was evaluated last. A matrix
+ * with positive parts is far too stiff along unstable directions: its corrections are lengthened until the
+ * work is small enough, because otherwise a buckling sheet takes a hundred of them. longest: the largest
+ * length that is tried, 1 for others, which are taken whole if they stop short of the minimum; with contact,
+ * longer ones only where that is feasible. p becomes the step to take, a p. */
+void drape_line_search_along(drape_line_search *search, const double *d, const double *before, double longest,
+                             double *p);
 
 /* Whether the equation was evaluated at d by the last search, so that its F there is known. */
 bool drape_line_search_knows(const drape_line_search *search, const double *d);

@@ -1,49 +1,46 @@
 /*
  * newton.c: see newton.h. A solve runs through these stages, whose functions follow in this order:
  *
- *     guess      the caller's d or, where pins move, that of the equation linearized at the start of the
- *                step; shortened where cloth would meet something; d = 0 if it violates a limit
+ *     guess      the caller's d or, where pins jerk, that of the equation linearized at the start of the
+ *                step; made feasible (guess.h)
  *     residual   F(d), and which islands of the cloth are done by it (stopping.h)
- *     jacobian   J(d), in a pattern that includes the contacts there
- *     factor     factors of J or, where contact makes J unsymmetric, of a symmetric matrix near J; an
- *                indefinite one is replaced by that with the positive parts of its elements
- *     correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress and normal
- *                forces of contact predicted for the next J; p shortened or lengthened (line_search.h), or
- *                completed by a chord step; which islands are done by what it gained
+ *     matrix     A near J(d), in a pattern that includes the contacts there, and its factors (matrix.h);
+ *                where it is indefinite, that with the positive parts of all elements
+ *     correct    p = -A^-1 F, made a descent direction, shortened to its feasible fraction; stress and normal
+ *                forces of contact predicted for the next A; p shortened or lengthened by the search
+ *                (line_search.h); which islands are done by what it gained
+ *     estimate   what is left at d + p, by one more correction with the same factors; made, where it ends the
+ *                solve
  *     conclude   what KINSOL's return code means, and F at the final d, in the requested norm
  *
  * KINSOL calls the stages between guess and conclude in each iteration: residual as its system function,
- * jacobian as its Jacobian function, factor and correct as setup and solve of its linear solver.
- *
- * KINSOL does the rest: it adds p to d, counts iterations, and ends the loop when the largest component of
- * F is within its bound, when p is too short to change anything, when p is at its size limit five times in
- * a row, or after max_iterations. An island that is done gives KINSOL an F of 0, which its own test takes as
- * converged, and which keeps the island in its place. With `newton: modified` KINSOL also decides when
- * factors are too old, and with `globalization: line_search` it shortens p itself, by the sum of squares of
- * F.
+ * matrix as its Jacobian function and the setup of its linear solver, correct and estimate as the solve of
+ * that. It adds p to d, counts iterations, and ends the loop when the largest component of F is within its
+ * bound, when p is too short to change anything, when p is at its size limit five times in a row, or after
+ * max_iterations. An island that is done gives KINSOL an F of 0, which its own test takes as converged, and
+ * which keeps the island in its place. With `newton: modified` KINSOL also decides when factors are too old,
+ * and with `globalization: line_search` it shortens p itself, by the sum of squares of F.
  *
  * Contact and the default globalization, `work`, are implemented here, inside `correct`: the solution that
  * KINSOL gets from its linear solver is the step to be taken. KINSOL's own line search can neither stop at
  * contact nor ask for another matrix, and it measures progress by the sum of squares of F, in which stiff
  * stretching outweighs all other forces.
  *
- * J is unsymmetric with friction, which changes with the normal force, and with drag and loads that follow
- * the cloth. Then the matrix that is factored is symmetric, the symmetric part of J with the normal forces
- * held fixed, and p solves J p = -F to a part of F by a few iterations of GMRES with these factors
- * (solvers/refine.h). A factorisation of J would cost two to four times as much, and could not tell whether J
- * is indefinite: ten flags drawn at random take 0.27 to 1.03 of its CPU time. With positive parts there is no
- * coupling of friction with normal forces: corrections that are short because it is missing would be made by
- * such matrices for ever, so that after a short one the exact matrix is tried again.
- *
  * A sheet that buckles crosses many states with an indefinite J. Once J was indefinite, the next matrices of
- * the solve have the positive parts without trying J, until a correction is short.
+ * the solve have the positive parts without trying J, until a correction is short. Matrices with positive
+ * parts have no coupling of friction with normal forces: corrections that are short because it is missing
+ * would be made by such matrices for ever, so that with friction the exact matrix is tried again after a
+ * short one.
  */
 #include "nonlinear/newton.h"
-#include "base/elementary.h"
 
+#include "base/clock.h"
+#include "base/elementary.h"
 #include "base/finite.h"
 #include "base/reason.h"
 #include "base/vec3.h"
+#include "nonlinear/exact_jacobian.h"
+#include "nonlinear/guess.h"
 #include "nonlinear/residual_bound.h"
 #include "nonlinear/stopping.h"
 #include "nonlinear/stress_predictor.h"
@@ -70,13 +67,16 @@
 #define MAX_LENGTH     2    /* of a correction by positive parts with contact; without, there is no limit */
 #define EXACT          0.1  /* of the residual, that an iterative solver may leave in an exact correction */
 #define SMALL_STEP     0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
+#define MAX_AHEAD      0.1  /* of an edge: pins further ahead of the guess pull it along */
+#define MAX_CHORDS     2    /* simplified corrections after one correction, without contact */
 #define MAX_PREDICTION 8    /* corrections in a solve, after which stress is no longer predicted */
-/* Of |F|: residual left in a correction by the symmetric matrix; without friction, a flag of 13 x 13 nodes
- * takes a quarter and three quarters more iterations with 1e-4 and 1e-3 than with 1e-5, others as many, and
- * the least CPU with 1e-4 */
-#define CORRECTION          1e-4
-#define FRICTION_CORRECTION 1e-2
-#define STALLED             0.5 /* of the residual before: if no more is gained, it may be rounding */
+#define STALLED        0.5  /* of the residual before: if no more is gained, it may be rounding */
+/* Corrections that contract by less are taken to contract by so much: nine more like the last one follow. */
+#define MAX_CONTRACTION 0.9
+#define ESTIMATE        0.5 /* of the residual, that conjugate gradients leave in an estimate */
+/* Corrections where cloth touches something, however little time there is: what fewer leave throws it about,
+ * so that later steps need more (docs/realtime.md, "What is saved first"). */
+#define MIN_IN_CONTACT 3
 /* A solve is laborious after more iterations than the larger of these: a number, and a share of the most. */
 #define EASY       10
 #define EASY_SHARE 0.4
@@ -94,21 +94,24 @@
 struct drape_newton {
     drape_step_equation *equation;
     double values[DRAPE_NEWTON_PARAM_COUNT];
-    bool searches;                               /* globalization `work` */
-    bool contact_unsymmetric, terms_unsymmetric; /* the Jacobian of contact, of the terms may be */
+    bool searches;              /* globalization `work` */
+    bool friction;              /* matrices with positive parts are others than without, in contact too */
+    drape_matrix usual, cheap;  /* cheap.ops NULL: there is no other */
+    const drape_matrix *matrix; /* of this solve */
     SUNContext sun;
     void *kin;
+    drape_sun_shell shell;
     N_Vector unknown, ones; /* unknown wraps the caller's d during a solve */
     N_Vector weights;       /* of the components of F in its norm */
-    drape_sun_linear *linear;
     /* If it searches. */
     drape_islands islands;
+    int64_t version; /* of the pattern that they are of */
     drape_stopping stopping;
     drape_line_search search;
     drape_stress_predictor predictor;
     double *step, *right; /* free DOFs: a step, and its right-hand side, that KINSOL does not ask for */
 
-    double *fraction; /* nodes: scratch of the guess; NULL without contact */
+    double *fraction; /* nodes: scratch of feasibility; NULL without contact */
     double edge;      /* [m] mean length of an edge */
 
     /* Kept between solves. */
@@ -116,14 +119,21 @@ struct drape_newton {
     double factored_mass_weight; /* mass weight of these factors */
 
     /* Kept between the iterations of one solve. */
+    drape_newton_effort effort, own_effort; /* of this solve; where the caller has none */
     int corrections;
-    double rounding;      /* of F in its norm, as last estimated; INFINITY: it was not */
-    double residual;      /* weighted, largest component, at the last iterate that KINSOL evaluated */
-    double forcing_norm;  /* |F| where the last correction was made; NAN: none was */
+    double tolerance;    /* relative residual that iterative solvers leave */
+    double rounding;     /* of F in its norm, as last estimated; INFINITY: it was not */
+    double residual;     /* weighted, largest component, at the last iterate that KINSOL evaluated */
+    double forcing_norm; /* |F| where the last correction was made; NAN: none was */
+    double start, left;  /* [N2] |F|^2 at the guess, and where it was evaluated last */
+    double first, error; /* [m] RMS of the first correction, and of the last one or its estimate */
+    double begun, seconds,
+        further;          /* [s] when the last iteration began, what it took, of those beyond the least */
     bool positive;        /* the present matrix has the positive parts; after a search, the next one has;
                               with `project` every matrix has */
     bool indefinite;      /* the exact matrix was at the last iterate where it was tried */
     bool near_enough;     /* the last correction was whole and within correction_tolerance */
+    bool spent;           /* the time is */
     drape_status failure; /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
 };
 
@@ -143,22 +153,119 @@ static double max_norm_bound(const drape_newton *s)
                                     (drape_norm)s->values[DRAPE_NEWTON_NORM], s->equation->all_dofs);
 }
 
+static bool is_in_contact(const drape_newton *s)
+{
+    double gap;
+    return s->fraction &&
+           drape_ranks_any(s->equation->ranks,
+                           drape_contact_active(drape_system_contact(s->equation->system), &gap) > 0);
+}
+
+/* RMS over all nodes; pinned ones do not move. */
+static double rms(const drape_step_equation *e, const double *p)
+{
+    return sqrt(drape_step_equation_dot(e, p, p) / e->all_nodes);
+}
+
+/* ---- Matrix ---- */
+
+/* Of the present pattern, to which contact may have added; other islands begin anew. */
+static void find_islands(drape_newton *s)
+{
+    const drape_system *system = s->equation->system;
+    if (s->version == drape_system_pattern_version(system))
+        return;
+    s->version = drape_system_pattern_version(system);
+    if (drape_islands_find(&s->islands, drape_system_pattern(system)))
+        drape_stopping_begin(&s->stopping);
+}
+
+static drape_status assemble(drape_newton *s, const double *d, bool positive)
+{
+    drape_step_equation *e = s->equation;
+    s->search.evaluated = false;
+    s->positive = positive;
+    drape_step_equation_move(e, d);
+    drape_point point = e->point;
+    point.stress = drape_stress_predictor_stress(&s->predictor);
+    return s->matrix->ops->assemble(s->matrix->self, &point, e->mass_weight, positive, &e->work);
+}
+
+static int jacobian(N_Vector d, N_Vector f, SUNMatrix matrix, void *user, N_Vector scratch1,
+                    N_Vector scratch2)
+{
+    (void)f, (void)matrix, (void)scratch1, (void)scratch2;
+    drape_newton *s = user;
+    s->begun = s->effort.deadline == INFINITY ? 0 : drape_clock_seconds();
+    const bool positive = s->positive || (s->searches && s->indefinite);
+    return return_status(s, assemble(s, N_VGetArrayPointer(d), positive));
+}
+
+/* Factors the assembled matrix; definite: only if it is positive definite, else DRAPE_RETRY_LINEAR. */
+static drape_status factor_matrix(drape_newton *s, bool definite)
+{
+    drape_step_equation *e = s->equation;
+    drape_status status = s->matrix->ops->factor(s->matrix->self, definite, &e->work);
+    s->factored = !status;
+    s->factored_mass_weight = e->mass_weight;
+    if (status == DRAPE_E_STOPPED)
+        drape_system_cancelled(e->system); /* so that the step ends as cancelled */
+    return status;
+}
+
+/* Assembles and factors the matrix with the positive parts at the present iterate. */
+static drape_status factor_positive(drape_newton *s)
+{
+    const drape_status status = assemble(s, N_VGetArrayPointer(s->unknown), true);
+    s->indefinite = true;
+    return status ? status : factor_matrix(s, false);
+}
+
+/* An indefinite matrix gives useless directions. Those of the matrix with the positive parts descend. */
+static drape_status factor(drape_newton *s)
+{
+    const bool definite = s->searches && !s->positive;
+    const drape_status status = factor_matrix(s, definite);
+    return status == DRAPE_RETRY_LINEAR && definite ? factor_positive(s) : status;
+}
+
+static int setup(SUNLinearSolver solver, SUNMatrix matrix)
+{
+    (void)matrix;
+    drape_newton *s = solver->content;
+    return return_status(s, factor(s));
+}
+
+static drape_status solve(drape_newton *s, const double *b, double tolerance, double *x)
+{
+    bool definite;
+    const drape_status status =
+        s->matrix->ops->solve(s->matrix->self, b, tolerance, x, &definite, &s->equation->work);
+    s->indefinite |= !definite;
+    return status;
+}
+
 /* ---- Guess ---- */
 
 static void begin(drape_newton *s)
 {
     drape_step_equation *e = s->equation;
     drape_step_equation_begin(e);
+    s->matrix = s->effort.cheap && s->cheap.ops ? &s->cheap : &s->usual;
+    if (s->matrix->ops && s->matrix->ops->begin)
+        s->matrix->ops->begin(s->matrix->self, !s->effort.cheap, s->effort.linear_iterations);
     s->corrections = 0;
     s->residual = s->rounding = INFINITY;
-    s->forcing_norm = NAN;
-    s->positive = s->indefinite = s->near_enough = false;
+    s->start = s->left = s->first = s->error = s->forcing_norm = NAN;
+    s->seconds = s->further = 0;
+    s->positive = s->indefinite = s->near_enough = s->spent = false;
     s->failure = DRAPE_OK;
     drape_step_equation_predict_contact(e, NULL);
     if (!s->searches)
         return;
     s->search.evaluated = false;
-    drape_islands_find(&s->islands, drape_system_pattern(e->system));
+    s->stopping.by_error = s->effort.by_error;
+    find_islands(s);
     drape_stopping_begin(&s->stopping);
     double clock = drape_system_clock(e->system);
     drape_point start = e->point;
@@ -167,19 +274,40 @@ static void begin(drape_newton *s)
     e->work.jacobian_seconds += drape_system_clock(e->system) - clock;
 }
 
-/* The guess is shortened only at nodes that would meet something: all pairs that come near in the step are
- * active from the first matrix on, and none of them holds up the rest of the cloth.
- *
- * A guess that violates a limit is worse than d = 0: springs beyond their limit pull with forces far above
- * any others. */
-static void improve_guess(drape_newton *s, double *d)
+/* Whether the solve begins with the linearized equation. Its solution knows of no contact to come. */
+static bool linearizes(const drape_newton *s)
+{
+    const drape_step_equation *e = s->equation;
+    return s->searches && !s->fraction && e->x_start &&
+           s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT &&
+           s->values[DRAPE_NEWTON_PREDICTOR] == DRAPE_NEWTON_PREDICTOR_INERTIAL &&
+           e->pins_ahead > MAX_AHEAD * s->edge && drape_step_equation_pins_move(e);
+}
+
+/* Where a pin takes a sheet along, nodes that keep their velocity stay behind. The elements at the pin are
+ * stretched by as much, and it takes many corrections until their forces have reached the rest of a stiff
+ * sheet. The linearized equation takes the pull of the pins to all nodes at once: d = -A^-1 (F + dF/dpins
+ * times their displacement), with F and A at the start of the step. A guess needs no exact derivative: the
+ * pull is a difference. */
+static drape_status guess_linearized(drape_newton *s, double *d)
 {
     drape_step_equation *e = s->equation;
-    if (s->fraction && !drape_step_equation_shorten_nodes(e, d, s->fraction))
-        drape_step_equation_make_feasible(e, d);
-    drape_step_equation_move(e, d);
-    if (drape_system_breaks_limit(e->system, e->x, e->x_base, e->point.internal))
-        memset(d, 0, e->dofs * sizeof *d);
+    if (!linearizes(s))
+        return DRAPE_OK;
+    N_VSetArrayPointer(s->search.trial, s->unknown);
+    drape_step_equation_pull(e, s->search.trial, s->step);
+    for (size_t i = 0; i < e->dofs; i++)
+        s->right[i] = -s->step[i];
+    drape_status status = assemble(s, s->search.trial, false);
+    if (!status)
+        status = factor(s);
+    if (!status)
+        status = solve(s, s->right, s->tolerance, s->step);
+    if (!status && drape_step_equation_is_finite(e, s->step))
+        memcpy(d, s->step, e->dofs * sizeof *d);
+    s->positive = s->indefinite = false;
+    drape_step_equation_begin(e);
+    return status < 0 ? status : DRAPE_OK;
 }
 
 /* ---- Residual ---- */
@@ -198,30 +326,18 @@ static bool is_rounding(drape_newton *s, const double *d, bool *finite)
     return rounding;
 }
 
-/* Contact may couple new nodes: then the linear solver is created again, and the islands may be others, which
- * begin anew. */
-static drape_status extend_pattern(drape_newton *s, const drape_point *point)
-{
-    bool changed;
-    drape_status status = drape_system_extend_pattern(s->equation->system, point, &changed);
-    const drape_pattern *pattern = drape_system_pattern(s->equation->system);
-    s->linear->stale |= changed;
-    if (!status && s->linear->stale)
-        status = drape_sun_linear_extend_pattern(s->linear, pattern);
-    if (!status && changed && s->searches && drape_islands_find(&s->islands, pattern))
-        drape_stopping_begin(&s->stopping);
-    return status;
-}
-
 /* Which islands are done at the last evaluation of F; contact there may couple those that were to others. A
  * state that would be rejected for what has become of an element is solved to the residual. *done: all are.
- * */
+ */
 static drape_status judge_islands(drape_newton *s, bool *done)
 {
     const drape_step_equation *e = s->equation;
-    const drape_status status = s->fraction ? extend_pattern(s, &e->point) : DRAPE_OK;
     const char *reason;
     drape_diagnostic diagnostic;
+    bool changed;
+    const drape_status status =
+        s->fraction ? drape_system_extend_pattern(e->system, &e->point, &changed) : DRAPE_OK;
+    find_islands(s);
     *done = !status && drape_stopping_test_residual(&s->stopping, max_norm_bound(s));
     if (*done && s->stopping.ended_by_error &&
         drape_system_check(e->system, e->x, e->x_start, e->point.internal, &reason, &diagnostic)) {
@@ -230,6 +346,19 @@ static drape_status judge_islands(drape_newton *s, bool *done)
         *done = drape_stopping_test_residual(&s->stopping, max_norm_bound(s));
     }
     return status;
+}
+
+/* Whether there is no time for another iteration like the last one. */
+static bool is_late(drape_newton *s)
+{
+    if (s->effort.deadline == INFINITY)
+        return false;
+    const double now = drape_clock_seconds();
+    if (s->corrections > 0)
+        s->seconds = now - s->begun;
+    s->further += s->corrections > s->effort.least ? s->seconds : 0;
+    return s->corrections >= (is_in_contact(s) ? MIN_IN_CONTACT : s->effort.least) &&
+           now + s->seconds > s->effort.deadline;
 }
 
 /* KINSOL must never get a NaN: its norms ignore it, so it would look like convergence. After a line search
@@ -246,123 +375,16 @@ static int residual(N_Vector d_vector, N_Vector f, void *user)
         s->search.evaluated = false;
         finite = drape_step_equation_evaluate(e, d);
     }
+    s->left = drape_step_equation_dot(e, e->f, e->f);
+    s->start = isnan(s->start) ? s->left : s->start;
     const drape_status status = s->searches && finite ? judge_islands(s, &done) : DRAPE_OK;
     done = done || (finite && (s->near_enough || is_rounding(s, d, &finite)));
+    s->spent = finite && !done && is_late(s);
     for (size_t i = 0; i < e->dofs; i++)
-        out[i] = done || e->weight[i / 3] == 0 ? 0 : e->f[i];
+        out[i] = done || s->spent || e->weight[i / 3] == 0 ? 0 : e->f[i];
     if (status || drape_system_status(e->system))
         return return_status(s, status < 0 ? status : -1);
     return finite ? 0 : 1;
-}
-
-/* ---- Jacobian ---- */
-
-/* Excludes contact and the new analysis in extend_pattern, which are timed separately. */
-static double jacobian_clock(const drape_newton *s)
-{
-    return drape_system_clock(s->equation->system) - s->linear->factor_seconds;
-}
-
-/* J(d), with the positive parts of its elements or without, into the values of the linear solver; if J is
- * unsymmetric, a symmetric matrix near it, which is corrected for J. */
-static drape_status assemble(drape_newton *s, const double *d, bool positive)
-{
-    drape_step_equation *e = s->equation;
-    const double share = positive || s->values[DRAPE_NEWTON_PROJECT] != 0 ? 1 : 0;
-    double start = jacobian_clock(s);
-    s->search.evaluated = false;
-    s->positive = positive;
-    drape_step_equation_move(e, d);
-    drape_status status = extend_pattern(s, &e->point);
-    if (status)
-        return status;
-    drape_sun_linear_set_positions(s->linear, e->x, e->model->node_of_free);
-    drape_step_equation_jacobian(e, drape_stress_predictor_stress(&s->predictor), share, s->linear->values);
-    drape_sun_linear_forget_exact(s->linear);
-    if (s->linear->near && (s->terms_unsymmetric || (s->contact_unsymmetric && share < 1))) {
-        drape_sun_linear_keep_exact(s->linear);
-        drape_step_equation_symmetrize(e, share, s->linear->values);
-    }
-    e->work.jacobian_seconds += jacobian_clock(s) - start;
-    return DRAPE_OK;
-}
-
-static int jacobian(N_Vector d, N_Vector f, SUNMatrix matrix, void *user, N_Vector scratch1,
-                    N_Vector scratch2)
-{
-    (void)f, (void)matrix, (void)scratch1, (void)scratch2;
-    drape_newton *s = user;
-    const bool positive = s->positive || (s->searches && s->indefinite);
-    return return_status(s, assemble(s, N_VGetArrayPointer(d), positive));
-}
-
-/* ---- Factor ---- */
-
-/* Factors the assembled matrix; definite: only if it is positive definite, else DRAPE_RETRY_LINEAR. */
-static drape_status factor_matrix(drape_newton *s, bool definite)
-{
-    drape_status status = drape_sun_linear_factor(s->linear, definite);
-    s->factored = !status;
-    s->factored_mass_weight = s->equation->mass_weight;
-    if (status == DRAPE_E_STOPPED)
-        drape_system_cancelled(s->equation->system); /* so that the step ends as cancelled */
-    return status;
-}
-
-/* Assembles and factors the matrix with the positive parts at the present iterate. */
-static drape_status factor_positive(drape_newton *s)
-{
-    const drape_status status = assemble(s, N_VGetArrayPointer(s->unknown), true);
-    s->indefinite = true;
-    return status ? status : factor_matrix(s, false);
-}
-
-/* An indefinite matrix gives useless directions. Those of the matrix with the positive parts descend. */
-static int factor(SUNLinearSolver solver, SUNMatrix matrix)
-{
-    (void)matrix;
-    drape_newton *s = ((drape_sun_linear *)solver->content)->owner;
-    const bool definite = s->searches && !s->positive;
-    const drape_status status = factor_matrix(s, definite);
-    return return_status(s, status == DRAPE_RETRY_LINEAR && definite ? factor_positive(s) : status);
-}
-
-/* ---- Guess where pins move ---- */
-
-/* Whether the solve begins with the linearized equation. Its solution knows of no contact to come. */
-static bool linearizes(const drape_newton *s)
-{
-    const drape_step_equation *e = s->equation;
-    return e->pins_pull && s->searches && !s->fraction && e->x_start &&
-           s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT &&
-           s->values[DRAPE_NEWTON_PREDICTOR] == DRAPE_NEWTON_PREDICTOR_INERTIAL &&
-           drape_step_equation_pins_move(e);
-}
-
-/* Where a pin takes a sheet along, nodes that keep their velocity stay behind. The elements at the pin are
- * stretched by as much, and it takes many corrections until their forces have reached the rest of a stiff
- * sheet. The linearized equation takes the pull of the pins to all nodes at once: d = -J^-1 (F + dF/dpins
- * times their displacement), with F and J at the start of the step, J repaired where it is indefinite. A
- * guess needs no exact derivative: the pull is a difference. */
-static drape_status guess_linearized(drape_newton *s, double *d)
-{
-    drape_step_equation *e = s->equation;
-    if (!linearizes(s))
-        return DRAPE_OK;
-    N_VSetArrayPointer(s->search.trial, s->unknown);
-    drape_step_equation_pull(e, s->search.trial, s->step);
-    for (size_t i = 0; i < e->dofs; i++)
-        s->right[i] = -s->step[i];
-    drape_status status = assemble(s, s->search.trial, false);
-    if (!status)
-        status = factor(s->linear->solver, NULL);
-    if (!status)
-        status = drape_sun_linear_solve(s->linear, s->right, s->step);
-    if (!status && drape_step_equation_is_finite(e, s->step))
-        memcpy(d, s->step, e->dofs * sizeof *d);
-    s->positive = s->indefinite = false;
-    drape_step_equation_begin(e);
-    return status < 0 ? status : DRAPE_OK;
 }
 
 /* ---- Correct ---- */
@@ -375,7 +397,7 @@ static drape_status ensure_descent(drape_newton *s, drape_status status, const d
     if (status < 0 || descends || s->positive)
         return status;
     status = factor_positive(s);
-    return status ? status : drape_sun_linear_solve(s->linear, minus_f, p);
+    return status ? status : solve(s, minus_f, s->tolerance, p);
 }
 
 /* If many corrections have not led to a solution, the sheet is buckling: then forces extrapolated along the
@@ -384,7 +406,7 @@ static void predict_stress(drape_newton *s, const double *p)
 {
     drape_step_equation *e = s->equation;
     double start = drape_system_clock(e->system);
-    if (++s->corrections <= MAX_PREDICTION)
+    if (s->corrections <= MAX_PREDICTION)
         drape_stress_predictor_correct(&s->predictor, &e->point, p);
     else
         drape_stress_predictor_forget(&s->predictor);
@@ -403,7 +425,7 @@ static double longest(const drape_step_equation *e, const double *p)
 /* How much of the residual iterative linear solvers leave in the next correction. */
 static void choose_forcing(drape_newton *s, const double *minus_f)
 {
-    const double before = s->forcing_norm, last = s->linear->tolerance;
+    const double before = s->forcing_norm, last = s->tolerance;
     if (s->values[DRAPE_NEWTON_FORCING] == DRAPE_NEWTON_FORCING_CONSTANT)
         return;
     s->forcing_norm = sqrt(drape_step_equation_dot(s->equation, minus_f, minus_f));
@@ -411,30 +433,69 @@ static void choose_forcing(drape_newton *s, const double *minus_f)
     double forcing = isnan(ratio) ? FORCING_FIRST : FORCING_GAMMA * ratio * ratio;
     if (!isnan(ratio) && least > FORCING_SAFEGUARD)
         forcing = fmax(forcing, least);
-    s->linear->tolerance = fmin(fmax(forcing, FORCING_MIN), FORCING_MAX);
+    s->tolerance = fmin(fmax(forcing, FORCING_MIN), FORCING_MAX);
 }
 
-/* A chord step: if a whole correction p has lowered the residual so far that lowering it by the same factor
- * once more would end the solve, the rest is corrected with the factors that gave p, at a tenth of the cost
- * of an iteration. F is known at d + p. A chord step that is not feasible is not made, and one that does not
- * end the solve is undone. */
-static drape_status add_chord(drape_newton *s, const double *d, double *p)
+/* ---- Estimate ---- */
+
+/* p2 = -A^-1 F at d + p, where F is known, by the factors that gave p, into s->step; s->right: d + p. Sets
+ * what p2 says of what p has left. False: there is none. */
+static bool correct_again(drape_newton *s, const double *d, const double *p, drape_status *status)
 {
     drape_step_equation *e = s->equation;
-    const double bound = max_norm_bound(s), now = drape_step_equation_norm(e, DRAPE_NORM_MAX);
-    if (!(now > bound && now / s->residual * now <= bound))
-        return DRAPE_OK;
     for (size_t i = 0; i < e->dofs; i++)
         s->right[i] = e->weight[i / 3] == 0 ? 0 : -e->f[i];
-    const drape_status status = drape_sun_linear_solve(s->linear, s->right, s->step);
-    if (status || drape_step_equation_make_feasible(e, s->step) < 1)
-        return status < 0 ? status : DRAPE_OK;
+    const double tolerance = s->matrix->ops->direct ? s->tolerance : fmax(s->tolerance, ESTIMATE);
+    *status = solve(s, s->right, tolerance, s->step);
+    if (*status || !drape_step_equation_is_finite(e, s->step))
+        return false;
     for (size_t i = 0; i < e->dofs; i++)
-        s->search.trial[i] = d[i] + (p[i] + s->step[i]);
-    s->search.evaluated = drape_step_equation_evaluate(e, s->search.trial) &&
-                          drape_step_equation_norm(e, DRAPE_NORM_MAX) <= bound;
-    for (size_t i = 0; i < e->dofs && s->search.evaluated; i++)
-        p[i] += s->step[i];
+        s->right[i] = d[i] + p[i];
+    drape_stopping_estimate(&s->stopping, s->right, s->step);
+    const double length = rms(e, s->step);
+    s->error = length / (1 - fmin(length / s->error, MAX_CONTRACTION));
+    return true;
+}
+
+/* What p has left, by the simplified Newton correction (Deuflhard 2011, 2.1), which costs a tenth of an
+ * iteration. Where it gains little beside the local error of the step, it ends the solve
+ *     - if the matrix is exact, and nothing is in contact, whose forces change too much along it,
+ *     - if it and those that would follow, by their contraction (Hairer & Wanner 1996, IV.8), are as short as
+ *       an effort asks. (Conjugate gradients leave stiff directions, in which little length has much energy:
+ *       by them the length alone counts.)
+ * It also does where one or two of them would lower the residual below its bound. Then they are made, as far
+ * as that is feasible, unless they take conjugate gradients. */
+static drape_status estimate(drape_newton *s, const double *d, bool definite, double *p)
+{
+    drape_step_equation *e = s->equation;
+    const drape_newton_effort *effort = &s->effort;
+    const bool direct = s->matrix->ops->direct, may = s->corrections >= effort->least && !s->stopping.strict,
+               by_gain = may && effort->by_error && definite && s->matrix->ops->exact && e->expected &&
+                         !is_in_contact(s),
+               by_error = may && effort->error > 0;
+    const double bound = max_norm_bound(s);
+    double before = s->residual;
+    for (int more = e->x_ahead ? 1 : MAX_CHORDS; more > 0; more--) {
+        const double now = drape_step_equation_norm(e, DRAPE_NORM_MAX), ratio = now / before;
+        const bool by_residual =
+            direct && s->tolerance <= EXACT && now * (more > 1 ? ratio * ratio : ratio) <= bound;
+        drape_status status = DRAPE_OK;
+        if (!(now > bound) || !(by_residual || by_gain || by_error) || !correct_again(s, d, p, &status))
+            return status < 0 ? status : DRAPE_OK;
+        const bool small = drape_stopping_is_small(&s->stopping), ends = by_gain && small;
+        s->near_enough = by_error && s->error <= effort->error && (small || !direct);
+        if (ends)
+            drape_stopping_finish(&s->stopping);
+        if (!direct || !(ends || s->near_enough || by_residual) ||
+            drape_step_equation_make_feasible(e, s->step) < 1)
+            return DRAPE_OK;
+        drape_line_search_along(&s->search, d, p, 1, s->step);
+        for (size_t i = 0; i < e->dofs; i++)
+            p[i] += s->step[i];
+        if (ends || s->near_enough || !s->search.evaluated || s->search.shortest < 1)
+            return DRAPE_OK;
+        before = now;
+    }
     return DRAPE_OK;
 }
 
@@ -443,23 +504,23 @@ static drape_status add_chord(drape_newton *s, const double *d, double *p)
 static drape_status advance(drape_newton *s, const double *d, bool whole, double *p)
 {
     const drape_step_equation *e = s->equation;
-    const bool exact = !s->positive && s->values[DRAPE_NEWTON_PROJECT] == 0 &&
-                       s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT &&
-                       s->linear->tolerance <= EXACT;
+    const bool definite = !s->positive && s->values[DRAPE_NEWTON_PROJECT] == 0 &&
+                          s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT &&
+                          s->tolerance <= EXACT;
     const double longest = !s->positive ? 1 : e->x_ahead ? MAX_LENGTH : INFINITY;
     const double tolerance = s->values[DRAPE_NEWTON_CORRECTION_TOLERANCE];
-    double error, left;
     predict_stress(s, p);
-    drape_line_search_along(&s->search, d, longest, p);
+    drape_line_search_along(&s->search, d, NULL, longest, p);
+    s->error = rms(e, p);
     const bool at_once = s->search.evaluated && s->search.shortest == 1 && s->search.longest == 1;
-    drape_stopping_test_error(&s->stopping, s->search.lengths, d, p, exact, whole);
-    drape_stopping_report(&s->stopping, &error, &left);
+    drape_stopping_test_error(&s->stopping, s->search.lengths, d, p, definite && s->matrix->ops->exact,
+                              whole && s->corrections >= s->effort.least);
     s->near_enough = e->x_start && whole && s->search.shortest >= 1 &&
-                     error * sqrt(3 * e->all_nodes / e->all_dofs) <= tolerance;
-    s->positive = s->search.shortest < SHORT_STEP && !(s->contact_unsymmetric && s->positive);
+                     s->error * sqrt(3 * e->all_nodes / e->all_dofs) <= tolerance;
+    s->positive = s->search.shortest < SHORT_STEP && !(s->friction && s->positive);
     if (s->search.shortest < 1 || s->search.longest > 1)
         drape_stress_predictor_forget(&s->predictor);
-    return at_once ? add_chord(s, d, p) : DRAPE_OK;
+    return at_once && !s->near_enough ? estimate(s, d, definite, p) : DRAPE_OK;
 }
 
 /* Turns p into the step that is taken from the present iterate d. A p that is not finite is left to KINSOL,
@@ -468,12 +529,14 @@ static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
 {
     drape_step_equation *e = s->equation;
     choose_forcing(s, minus_f);
-    drape_status status = drape_sun_linear_solve(s->linear, minus_f, p);
+    drape_status status = solve(s, minus_f, s->tolerance, p);
     if (s->searches)
         status = ensure_descent(s, status, minus_f, p);
     if (status || !drape_step_equation_is_finite(e, p))
         return status;
     s->indefinite = s->indefinite && longest(e, p) > SMALL_STEP * s->edge;
+    if (s->corrections++ == 0)
+        s->first = rms(e, p);
     if (s->searches)
         drape_step_equation_predict_contact(e, p);
     const bool whole = drape_step_equation_make_feasible(e, p) == 1;
@@ -484,7 +547,7 @@ static int correct(SUNLinearSolver solver, SUNMatrix matrix, N_Vector p, N_Vecto
                    sunrealtype tolerance)
 {
     (void)matrix, (void)tolerance;
-    drape_newton *s = ((drape_sun_linear *)solver->content)->owner;
+    drape_newton *s = solver->content;
     return return_status(s, make_step(s, N_VGetArrayPointer(minus_f), N_VGetArrayPointer(p)));
 }
 
@@ -528,20 +591,29 @@ static drape_status status_of(int code, const char **reason)
     }
 }
 
-/* What is left is less than the last corrections, where these contract; without one it is less than if
- * nothing but inertia resisted F. Pseudo-transient steps, which have no start, are no motion. */
+/* What is left is less than the last correction, or what follows the estimate, where these contract; without
+ * one it is less than if nothing but inertia resisted F. Pseudo-transient steps, which have no start, are no
+ * motion. */
 static void estimate_left(drape_newton *s, const double *d, drape_solve_report *report)
 {
     const drape_step_equation *e = s->equation;
-    double error, left;
+    double left;
     if (!s->searches || !e->x_start || isnan(report->residual))
         return;
     report->own = drape_step_equation_local_error(e, d);
     report->error = drape_step_equation_inertial_error(e, &report->left);
-    if (!drape_stopping_report(&s->stopping, &error, &left))
+    if (!drape_stopping_left(&s->stopping, &left))
         return;
-    report->error = fmin(report->error, error);
+    report->error = fmin(report->error, s->error);
     report->left = fmin(report->left, left);
+}
+
+/* Whether an effort that is spent has come nearer than the guess was, and not further off than the scene is
+ * large. */
+static bool is_nearer(const drape_newton *s)
+{
+    return s->effort.keeps && (s->left < s->start || s->error < s->first) &&
+           !(s->error > s->equation->model->length);
 }
 
 /* Whether F at d is small enough. If KINSOL converged, its last evaluation was at d; otherwise it may have
@@ -573,9 +645,15 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
         report->tolerance = rounding;
         return DRAPE_OK;
     }
-    if (!status) { /* unreachable if KINSOL tests what its documentation says */
+    if (finite && status >= 0 && is_nearer(s)) {
+        report->reason = drape_reason_name(DRAPE_REASON_ITERATIONS);
+        report->tolerance = NAN;
+        report->solved = false;
+        return DRAPE_OK;
+    }
+    if (!status || s->effort.keeps) { /* else unreachable if KINSOL tests what its documentation says */
         report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
-        status = DRAPE_RETRY_NONLINEAR;
+        status = status < 0 ? status : DRAPE_RETRY_NONLINEAR;
     }
     report->usable = report->lenient && finite && status > 0;
     return finite && status != DRAPE_RETRY_NONFINITE ? status
@@ -598,7 +676,7 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     drape_status status = status_of(code, &report->reason);
     KINGetNumNonlinSolvIters(s->kin, &iterations); /* of this solve: KINSol resets its counters */
     report->iterations = (int)iterations;
-    report->laborious = (double)iterations > fmax(EASY, EASY_SHARE * s->values[DRAPE_NEWTON_MAX_ITERATIONS]);
+    report->laborious = !s->effort.keeps && (double)iterations > fmax(EASY, EASY_SHARE * s->effort.most);
     e->work.newton_iterations += iterations;
     if (s->searches && is_settled(s, status, d))
         status = DRAPE_OK;
@@ -613,14 +691,17 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     }
     if (status)
         drape_newton_forget_factors(s);
+    report->further_seconds = s->further;
+    report->solved = true;
     status = judge(s, status, d, report);
-    report->solved = !status;
+    report->solved &= !status;
     return status;
 }
 
 /* ---- A solve ---- */
 
-drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *report)
+drape_status drape_newton_solve(drape_newton *s, const drape_newton_effort *effort, double *d,
+                                drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
     *report =
@@ -629,9 +710,12 @@ drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *
                              .left = NAN,
                              .own = NAN,
                              .lenient = s->values[DRAPE_NEWTON_ON_FAILURE] == DRAPE_NEWTON_FAILURE_ACCEPT};
+    s->effort = effort ? *effort : s->own_effort;
+    s->tolerance = s->effort.linear_tolerance;
     begin(s);
     if (e->dofs == 0) {
         drape_step_equation_evaluate(e, d);
+        report->error = report->left = report->own = 0;
         report->solved = true;
         return DRAPE_OK;
     }
@@ -642,10 +726,11 @@ drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *
         report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
         return status;
     }
-    improve_guess(s, d);
+    drape_guess_make_feasible(e, d, s->right, s->fraction);
     bool keeps_factors = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_MODIFIED && s->factored &&
                          s->factored_mass_weight == e->mass_weight;
     KINSetNoInitSetup(s->kin, keeps_factors);
+    KINSetNumMaxIters(s->kin, s->effort.most);
     N_VSetArrayPointer(d, s->unknown);
     int strategy =
         s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_LINE_SEARCH ? KIN_LINESEARCH : KIN_NONE;
@@ -660,27 +745,24 @@ static bool configure(drape_newton *s)
     bool exact = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT;
     DRAPE_KINSOL_QUIET(s->kin);
     return !KINInit(s->kin, residual, s->unknown) && !KINSetUserData(s->kin, s) &&
-           !KINSetLinearSolver(s->kin, s->linear->solver, s->linear->matrix) &&
-           !KINSetJacFn(s->kin, jacobian) && !KINSetFuncNormTol(s->kin, max_norm_bound(s)) &&
+           !KINSetLinearSolver(s->kin, s->shell.solver, s->shell.matrix) && !KINSetJacFn(s->kin, jacobian) &&
+           !KINSetFuncNormTol(s->kin, max_norm_bound(s)) &&
            !KINSetScaledStepTol(s->kin, STEP_TOLERANCE * length) &&
            !KINSetMaxNewtonStep(s->kin, MAX_NEWTON_STEP * length * sqrt(n)) &&
-           !KINSetNumMaxIters(s->kin, (long)s->values[DRAPE_NEWTON_MAX_ITERATIONS]) &&
            !KINSetMaxSetupCalls(s->kin, exact ? SETUPS_EXACT : SETUPS_MODIFIED) &&
            !KINSetNoResMon(s->kin, exact) && !KINSetResMonConstValue(s->kin, MAX_RESIDUAL_RATIO) &&
            !KINSetMaxBetaFails(s->kin, MAX_BETA_FAIL);
 }
 
-/* by_error: a solve may end by the local error of the step. */
-static drape_status create_search(drape_arena *arena, drape_newton *s, bool by_error)
+static drape_status create_search(drape_arena *arena, drape_newton *s)
 {
     drape_step_equation *e = s->equation;
     s->step = drape_arena_take(arena, e->dofs, sizeof *s->step);
-    s->right = drape_arena_take(arena, e->dofs, sizeof *s->right);
     drape_status status = drape_islands_init(arena, e->dofs / 3, &s->islands);
     if (!status)
         status = drape_line_search_init(arena, e, &s->islands, &s->search);
     if (!status)
-        status = drape_stopping_init(arena, e, &s->islands, by_error, &s->stopping);
+        status = drape_stopping_init(arena, e, &s->islands, &s->stopping);
     return status ? status : drape_stress_predictor_init(arena, e->system, &s->predictor);
 }
 
@@ -699,23 +781,23 @@ static drape_status create_vectors(drape_arena *arena, drape_newton *s)
     return DRAPE_OK;
 }
 
-static drape_status create_solver(drape_arena *arena, drape_newton *s)
+static drape_status create_solver(drape_arena *arena, drape_newton *s, const drape_matrix_choice *choice)
 {
     drape_system *system = s->equation->system;
-    drape_status status = drape_sun_linear_create(
-        arena, s->sun, drape_linear_of(s->equation->ranks, (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]),
-        drape_system_pattern(system), drape_system_pool(system), drape_system_cancel_flag(system),
-        &s->linear);
+    drape_status status;
+    if (choice) {
+        status = drape_matrix_choose(arena, system, choice, &s->usual, &s->cheap);
+    } else {
+        s->usual.ops = &drape_exact_jacobian_ops;
+        status = drape_exact_jacobian_create(
+            arena, system, s->sun,
+            drape_linear_of(s->equation->ranks, (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]), s->searches,
+            s->values[DRAPE_NEWTON_PROJECT] != 0, (drape_exact_jacobian **)&s->usual.self);
+    }
+    if (!status)
+        status = drape_sun_shell_create(arena->ctx, s->sun, s, setup, correct, &s->shell);
     if (status)
         return status;
-    if (s->searches && (s->contact_unsymmetric || s->terms_unsymmetric) &&
-        (status =
-             drape_sun_linear_use_near(s->linear, s->contact_unsymmetric ? FRICTION_CORRECTION : CORRECTION)))
-        return status;
-    s->linear->tolerance = s->values[DRAPE_NEWTON_LINEAR_TOLERANCE];
-    s->linear->owner = s;
-    s->linear->solver->ops->setup = factor;
-    s->linear->solver->ops->solve = correct;
     return configure(s) ? DRAPE_OK
                         : drape_fail(arena->ctx, DRAPE_E_MEMORY,
                                      "out of memory: KINSOL cannot be set up for %lld unknowns",
@@ -723,28 +805,33 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s)
 }
 
 drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equation, const double *values,
-                                 drape_newton **out)
+                                 const drape_matrix_choice *choice, drape_newton **out)
 {
     drape_newton *s = *out = drape_arena_take(arena, 1, sizeof *s);
     if (drape_ranks_agree_memory(equation->ranks, arena->ctx, s))
         return DRAPE_E_MEMORY;
     s->equation = equation;
+    s->version = -1;
     s->edge = drape_model_mean_edge(equation->model);
     memcpy(s->values, values, sizeof s->values);
+    s->right = drape_arena_take(arena, equation->dofs, sizeof *s->right);
     if (equation->x_ahead)
         s->fraction = drape_arena_take(arena, equation->nodes / 3, sizeof *s->fraction);
     if (s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_AUTO)
         s->values[DRAPE_NEWTON_GLOBALIZATION] = DRAPE_NEWTON_GLOBAL_WORK;
     s->searches = s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_WORK;
-    s->contact_unsymmetric = !drape_system_is_symmetric(equation->system);
-    s->terms_unsymmetric = !drape_system_has_symmetric_terms(equation->system);
+    s->friction = !drape_system_is_symmetric(equation->system);
+    s->own_effort = (drape_newton_effort){.most = (int)values[DRAPE_NEWTON_MAX_ITERATIONS],
+                                          .by_error = isnan(values[DRAPE_NEWTON_TOLERANCE]),
+                                          .deadline = INFINITY,
+                                          .linear_tolerance = values[DRAPE_NEWTON_LINEAR_TOLERANCE]};
     drape_status status =
         drape_residual_bound_set(equation, (drape_norm)values[DRAPE_NEWTON_NORM],
                                  values[DRAPE_NEWTON_TOLERANCE], &s->values[DRAPE_NEWTON_TOLERANCE]);
     if (!status)
         status = drape_arena_status(arena);
     if (!status && s->searches)
-        status = create_search(arena, s, isnan(values[DRAPE_NEWTON_TOLERANCE]));
+        status = create_search(arena, s);
     drape_reserve reserve = {.used = false};
     if (!status)
         status = drape_reserve_open(&reserve, arena->ctx, equation->dofs);
@@ -752,8 +839,14 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
     if (!status)
         status = drape_ranks_agree(equation->ranks, arena->ctx, create_vectors(arena, s));
     if (!status && equation->dofs > 0)
-        status = create_solver(arena, s);
+        status = create_solver(arena, s, choice);
     return drape_reserve_close(&reserve, arena->ctx, status);
+}
+
+static void destroy_matrix(drape_matrix *matrix)
+{
+    if (matrix->ops)
+        matrix->ops->destroy(matrix->self);
 }
 
 void drape_newton_destroy(drape_newton **newton)
@@ -762,7 +855,9 @@ void drape_newton_destroy(drape_newton **newton)
     if (!s)
         return;
     KINFree(&s->kin);
-    drape_sun_linear_destroy(&s->linear);
+    destroy_matrix(&s->usual);
+    destroy_matrix(&s->cheap);
+    drape_sun_shell_destroy(&s->shell);
     N_VDestroy(s->unknown);
     N_VDestroy(s->ones);
     N_VDestroy(s->weights);
@@ -776,13 +871,7 @@ drape_status drape_newton_matrix(drape_newton *s, const drape_point *point, doub
                                  const drape_pattern **pattern, const double **values)
 {
     drape_newton_forget_factors(s);
-    drape_status status = extend_pattern(s, point);
-    if (status)
-        return status;
-    drape_system_jacobian(s->equation->system, point, mass_weight, 0, s->linear->values);
-    *pattern = drape_system_pattern(s->equation->system);
-    *values = s->linear->values;
-    return DRAPE_OK;
+    return drape_exact_jacobian_at(s->usual.self, point, mass_weight, pattern, values);
 }
 
 const double *drape_newton_values(const drape_newton *s)
@@ -812,18 +901,12 @@ void drape_newton_archive(drape_newton *s, drape_archive *a)
     drape_archive_bool(a, &s->factored);
     drape_archive_double(a, &s->factored_mass_weight);
     drape_work_archive(&e->work, a);
-    if (e->dofs == 0)
-        return;
-    if (drape_archive_has_read(a))
-        drape_archive_note(a, drape_sun_linear_ensure_pattern(s->linear, drape_system_pattern(e->system)));
-    drape_sun_linear_archive(s->linear, a, modified && s->factored);
-    if (modified && !drape_kinsol_archive(s->kin, a) && a->reading)
+    if (s->usual.ops)
+        s->usual.ops->archive(s->usual.self, a, modified && s->factored);
+    if (s->cheap.ops)
+        s->cheap.ops->archive(s->cheap.self, a, false);
+    if (e->dofs > 0 && modified && !drape_kinsol_archive(s->kin, a) && a->reading)
         drape_newton_forget_factors(s);
-}
-
-drape_work drape_newton_work(const drape_newton *s)
-{
-    return drape_work_with_linear(s->equation->work, s->linear);
 }
 
 #define KINSOL_VECTORS 8 /* six of its own, and two of weights */
@@ -831,5 +914,6 @@ drape_work drape_newton_work(const drape_newton *s)
 size_t drape_newton_bytes(const drape_newton *s)
 {
     return KINSOL_VECTORS * s->equation->dofs * sizeof(double) +
-           (s->linear ? drape_sun_linear_bytes(s->linear) : 0);
+           (s->usual.ops ? s->usual.ops->bytes(s->usual.self) : 0) +
+           (s->cheap.ops ? s->cheap.ops->bytes(s->cheap.self) : 0);
 }

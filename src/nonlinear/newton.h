@@ -6,6 +6,7 @@
 #define DRAPE_NONLINEAR_NEWTON_H
 
 #include "base/param.h"
+#include "nonlinear/matrix.h"
 #include "nonlinear/step_equation.h"
 #include "solvers/linear.h"
 
@@ -105,18 +106,37 @@ enum { DRAPE_NEWTON_FORCING_CONSTANT, DRAPE_NEWTON_FORCING_EISENSTAT_WALKER };
 
 typedef struct drape_newton drape_newton;
 
-/* values: of the parameters. The equation and the arena must outlive it. Errors: DRAPE_E_MEMORY,
+/* What a solve may cost, and which rules end it besides that of the residual. */
+typedef struct drape_newton_effort {
+    int least, most; /* corrections before an error ends it; at which it ends in any case */
+    bool by_error;   /* it ends by the local error of the step, where the equation has one (stopping.h) */
+    /* [m] it also ends when what is left is estimated as at most this, RMS over all nodes, and as small
+     * beside the local error; 0: no */
+    double error;
+    double deadline; /* [s of drape_clock_seconds] after which no correction is begun beyond the least and, in
+                        contact, some more; INFINITY: none */
+    bool keeps;      /* when all is spent, what is nearer than the guess is accepted */
+    double linear_tolerance; /* relative residual that iterative solvers leave in a correction */
+    /* Of a matrix of matrix.h: iterations of conjugate gradients; whether the cheap one corrects, without
+     * friction. */
+    int linear_iterations;
+    bool cheap;
+} drape_newton_effort;
+
+/* values: of the parameters; choice: the matrix, NULL: the exact Jacobian. The equation and the arena must
+ * outlive it. Errors: DRAPE_E_MEMORY,
  * DRAPE_E_SOLVER; even then drape_newton_destroy must be called, to free what SUNDIALS and the linear
  * solver took. */
 drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equation, const double *values,
-                                 drape_newton **out);
+                                 const drape_matrix_choice *choice, drape_newton **out);
 void drape_newton_destroy(drape_newton **newton);
 
-/* Solves the equation for d (free DOFs; on entry the guess). DRAPE_OK: the residual at d is within the
- * tolerance, in the requested norm, or one of the other rules of stopping.h and the settings holds, which the
- * report names. > 0: none does, and the report says why; report->usable if the settings ask to continue
- * nevertheless. In both cases the equation was evaluated last at d. */
-drape_status drape_newton_solve(drape_newton *newton, double *d, drape_solve_report *report);
+/* Solves the equation for d (free DOFs; on entry the guess). effort NULL: as the parameters say. DRAPE_OK:
+ * the residual at d is within the tolerance, in the requested norm, or one of the other rules of stopping.h
+ * and the settings holds, which the report names. > 0: none does, and the report says why; report->usable if
+ * the settings ask to continue nevertheless. In both cases the equation was evaluated last at d. */
+drape_status drape_newton_solve(drape_newton *newton, const drape_newton_effort *effort, double *d,
+                                drape_solve_report *report);
 
 /* J at a point with the given mass weight, in the pattern that the system has there; valid until the next
  * solve. The factors are discarded. Errors: DRAPE_E_MEMORY. */
@@ -135,7 +155,6 @@ void drape_newton_forget_factors(drape_newton *newton);
 /* Archives what is kept between solves, and the equation's work. */
 void drape_newton_archive(drape_newton *newton, drape_archive *a);
 
-drape_work drape_newton_work(const drape_newton *newton);
 size_t drape_newton_bytes(const drape_newton *newton); /* outside of its arena */
 
 #endif

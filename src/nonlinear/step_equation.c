@@ -85,31 +85,6 @@ bool drape_step_equation_evaluate(drape_step_equation *s, const double *d)
     return drape_system_agree_finite(s->system, s->f, s->dofs);
 }
 
-bool drape_step_equation_try(drape_step_equation *s, const double *d, double a, const double *p,
-                             double *trial, double *work)
-{
-    for (size_t i = 0; i < s->dofs; i++)
-        trial[i] = d[i] + a * p[i];
-    bool finite = drape_step_equation_evaluate(s, trial);
-    *work = finite ? drape_step_equation_dot(s, s->f, p) : INFINITY;
-    return finite;
-}
-
-void drape_step_equation_jacobian(drape_step_equation *s, const double *stress, double positive_share,
-                                  double *values)
-{
-    drape_point point = s->point;
-    point.stress = stress;
-    point.contact = DRAPE_CONTACT_SYMMETRIC;
-    drape_system_jacobian(s->system, &point, s->mass_weight, positive_share, values);
-    s->work.jacobians++;
-}
-
-void drape_step_equation_symmetrize(drape_step_equation *s, double positive_share, double *values)
-{
-    drape_system_symmetrize(s->system, &s->point, positive_share, values);
-}
-
 double drape_step_equation_make_feasible(drape_step_equation *s, double *p)
 {
     if (!s->x_ahead)

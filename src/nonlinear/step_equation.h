@@ -15,8 +15,7 @@
  * falls, and zero where that energy is smallest. A step is feasible if no two pieces pass through each
  * other on it.
  *
- * The solvers are newton.h (to a tolerance or to the local error) and inexact_newton.h (a fixed number of
- * iterations).
+ * newton.h solves it.
  */
 #ifndef DRAPE_NONLINEAR_STEP_EQUATION_H
 #define DRAPE_NONLINEAR_STEP_EQUATION_H
@@ -45,7 +44,9 @@ typedef struct drape_step_equation {
     const double *x_start; /* nodes: the beginning of the step or stage; NULL: no stress prediction
                                 (stress_predictor.h) */
 
-    bool pins_pull; /* the guess takes the pull of moved pins to all nodes (newton.c) */
+    /* [m] largest coordinate by which moved pins are ahead of their motion at the start, which the guess
+     * follows; 0: it need not follow them further (newton.c) */
+    double pins_ahead;
 
     /* Where it was evaluated last: after a solve that returned a state, at the solution. */
     double *x, *v, *g; /* nodes: g(x, v) [N] */
@@ -79,19 +80,6 @@ void drape_step_equation_move(drape_step_equation *equation, const double *d);
 
 /* Moves to d and evaluates F; false if F is not finite. */
 bool drape_step_equation_evaluate(drape_step_equation *equation, const double *d);
-
-/* The same at trial = d + a p, with its merit *work = F(trial) . p [J]; INFINITY if F is not finite. */
-bool drape_step_equation_try(drape_step_equation *equation, const double *d, double a, const double *p,
-                             double *trial, double *work);
-
-/* J at the last point, into values. stress: see drape_point; NULL: the forces at that point.
- * positive_share, 0 to 1: the share of the difference between each element's Hessian and its positive
- * semidefinite part that is added. */
-void drape_step_equation_jacobian(drape_step_equation *equation, const double *stress, double positive_share,
-                                  double *values);
-
-/* Makes J at the last point with that share of the positive parts symmetric: drape_system_symmetrize. */
-void drape_step_equation_symmetrize(drape_step_equation *equation, double positive_share, double *values);
 
 /* Shortens a step p from the last point to its largest feasible fraction, which it returns. */
 double drape_step_equation_make_feasible(drape_step_equation *equation, double *p);

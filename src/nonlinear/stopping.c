@@ -4,11 +4,14 @@
 #include <math.h>
 #include <string.h>
 
+#define SHARE (DRAPE_LOCAL_ERROR_SHARE * DRAPE_LOCAL_ERROR_SHARE)
+
 drape_status drape_stopping_init(drape_arena *arena, drape_step_equation *equation,
-                                 const drape_islands *islands, bool by_error, drape_stopping *s)
+                                 const drape_islands *islands, drape_stopping *s)
 {
-    *s = (drape_stopping){.equation = equation, .islands = islands, .by_error = by_error};
+    *s = (drape_stopping){.equation = equation, .islands = islands};
     s->progress = drape_arena_take(arena, equation->dofs / 3 + 1, sizeof *s->progress);
+    s->work = drape_arena_take(arena, equation->dofs / 3 + 1, sizeof *s->work);
     s->weight = drape_arena_take(arena, equation->dofs / 3, sizeof *s->weight);
     if (drape_arena_status(arena))
         return drape_arena_status(arena);
@@ -57,34 +60,29 @@ bool drape_stopping_test_residual(drape_stopping *s, double bound)
     return leave_done(s);
 }
 
-/* Sets what depends on the nodes of each island that is not done: its local error at d + p, and the length of
- * p. */
+/* Sets the local error at d + p of each island that is not done. */
 static void measure(drape_stopping *s, const double *d, const double *p)
 {
     const drape_step_equation *e = s->equation;
     for (int32_t k = 0; k < s->islands->count; k++)
         if (!s->progress[k].done)
-            s->progress[k].own = s->progress[k].squares = 0;
+            s->progress[k].own = 0;
     for (size_t i = 0; i < e->dofs; i++) {
         drape_progress *q = &s->progress[s->islands->of[i / 3]];
-        if (q->done)
-            continue;
-        q->own += drape_step_equation_own_error(e, i, d[i] + p[i]);
-        q->squares += p[i] * p[i];
+        if (!q->done)
+            q->own += drape_step_equation_own_error(e, i, d[i] + p[i]);
     }
     s->progress[0].own = drape_ranks_sum(e->ranks, s->progress[0].own);
-    s->progress[0].squares = drape_ranks_sum(e->ranks, s->progress[0].squares);
 }
 
 void drape_stopping_test_error(drape_stopping *s, const drape_length *lengths, const double *d,
                                const double *p, bool exact, bool whole)
 {
-    const double share = DRAPE_LOCAL_ERROR_SHARE * DRAPE_LOCAL_ERROR_SHARE;
     measure(s, d, p);
     for (int32_t k = 0; k < s->islands->count; k++) {
         drape_progress *q = &s->progress[k];
         const drape_length *l = &lengths[k];
-        const double bound = share * q->own, last = q->decrease;
+        const double bound = SHARE * q->own, last = q->decrease;
         if (q->done)
             continue;
         const bool descends = l->start < 0 && l->found && isfinite(l->end);
@@ -97,17 +95,44 @@ void drape_stopping_test_error(drape_stopping *s, const drape_length *lengths, c
     leave_done(s);
 }
 
-bool drape_stopping_report(const drape_stopping *s, double *error, double *left)
+void drape_stopping_estimate(drape_stopping *s, const double *d, const double *p)
 {
-    double squares = 0;
+    const drape_step_equation *e = s->equation;
+    double *work = s->work;
+    measure(s, d, p);
+    memset(work, 0, (size_t)s->islands->count * sizeof *work);
+    for (size_t i = 0; i < e->dofs; i++)
+        work[s->islands->of[i / 3]] -= e->f[i] * p[i];
+    work[0] = drape_ranks_sum(e->ranks, work[0]);
+    for (int32_t k = 0; k < s->islands->count; k++)
+        if (!s->progress[k].done)
+            s->progress[k].gain = fmax(work[k], 0);
+}
+
+bool drape_stopping_is_small(const drape_stopping *s)
+{
+    bool small = true;
+    for (int32_t k = 0; k < s->islands->count; k++)
+        small &= s->progress[k].done || s->progress[k].gain <= SHARE * s->progress[k].own;
+    return small;
+}
+
+void drape_stopping_finish(drape_stopping *s)
+{
+    for (int32_t k = 0; k < s->islands->count; k++)
+        s->progress[k].done = true;
+    s->ended_by_error = true;
+    leave_done(s);
+}
+
+bool drape_stopping_left(const drape_stopping *s, double *left)
+{
     bool corrected = false;
     *left = 0;
     for (int32_t k = 0; k < s->islands->count; k++)
         if (!isnan(s->progress[k].gain)) {
-            squares += s->progress[k].squares;
             *left += s->progress[k].gain;
             corrected = true;
         }
-    *error = sqrt(squares / s->equation->all_nodes);
     return corrected;
 }

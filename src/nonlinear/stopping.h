@@ -35,7 +35,6 @@ typedef struct drape_progress {
     bool done;
     double largest;  /* [N] weighted component of F */
     double gain;     /* [J] -F . p of the last correction; NaN: there was none */
-    double squares;  /* [m2] sum of |p|^2 over the nodes */
     double decrease; /* [J] of the energy by it; INFINITY: not known, or there was none */
     double own;      /* [J] m_w sum m |e|^2 */
 } drape_progress;
@@ -44,16 +43,16 @@ typedef struct drape_stopping {
     drape_step_equation *equation;
     const drape_islands *islands;
     drape_progress *progress; /* (islands) */
+    double *work;             /* (islands) scratch [J] */
     double *weight;           /* free nodes: of their residual in norms */
-    bool by_error;            /* the second rule counts */
+    bool by_error;            /* the second rule counts; set by the caller */
     bool ended_by_error;      /* it was needed in this solve */
     bool strict;              /* it does not count in the rest of this solve */
 } drape_stopping;
 
-/* by_error: whether the rule of the local error counts, in solves of an equation that has `expected`. Errors:
- * DRAPE_E_MEMORY. */
+/* Errors: DRAPE_E_MEMORY. */
 drape_status drape_stopping_init(drape_arena *arena, drape_step_equation *equation,
-                                 const drape_islands *islands, bool by_error, drape_stopping *stopping);
+                                 const drape_islands *islands, drape_stopping *stopping);
 
 /* Begins a solve, or begins again because the islands have changed. Nodes of islands that are done have no
  * weight in norms of F until drape_stopping_end. */
@@ -68,8 +67,17 @@ bool drape_stopping_test_residual(drape_stopping *stopping, double bound);
 void drape_stopping_test_error(drape_stopping *stopping, const drape_length *lengths, const double *d,
                                const double *p, bool exact, bool whole);
 
-/* The last corrections of all islands: their root mean square over all nodes [m] and -F . p [J]. False if
- * there was none. */
-bool drape_stopping_report(const drape_stopping *stopping, double *error, double *left);
+/* At d, where F was evaluated last, of a correction p that is not made: takes it for the last one, by the
+ * factors of which it is. */
+void drape_stopping_estimate(drape_stopping *stopping, const double *d, const double *p);
+
+/* Whether the last corrections of all islands gain little beside their local error. */
+bool drape_stopping_is_small(const drape_stopping *stopping);
+
+/* Ends all islands by their local error. */
+void drape_stopping_finish(drape_stopping *stopping);
+
+/* -F . p of the last corrections of all islands [J]; false if there was none. */
+bool drape_stopping_left(const drape_stopping *stopping, double *left);
 
 #endif

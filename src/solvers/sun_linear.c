@@ -36,6 +36,35 @@ static int keep_solver(SUNLinearSolver solver)
     return 0;
 }
 
+drape_status drape_sun_shell_create(drape_context *ctx, SUNContext sun, void *content,
+                                    int (*setup)(SUNLinearSolver, SUNMatrix),
+                                    int (*solve)(SUNLinearSolver, SUNMatrix, N_Vector, N_Vector, sunrealtype),
+                                    drape_sun_shell *shell)
+{
+    shell->solver = SUNLinSolNewEmpty(sun);
+    shell->matrix = SUNMatNewEmpty(sun);
+    if (!shell->solver || !shell->matrix)
+        return drape_fail_memory(ctx, sizeof *shell->solver);
+    shell->solver->content = content;
+    shell->solver->ops->gettype = solver_type;
+    shell->solver->ops->getid = solver_id;
+    shell->solver->ops->initialize = keep_solver;
+    shell->solver->ops->setup = setup;
+    shell->solver->ops->solve = solve;
+    shell->matrix->ops->getid = matrix_id;
+    shell->matrix->ops->zero = keep_matrix;
+    return DRAPE_OK;
+}
+
+void drape_sun_shell_destroy(drape_sun_shell *shell)
+{
+    if (shell->solver)
+        SUNLinSolFreeEmpty(shell->solver);
+    if (shell->matrix)
+        SUNMatFreeEmpty(shell->matrix);
+    *shell = (drape_sun_shell){0};
+}
+
 drape_status drape_sun_linear_factor(drape_sun_linear *linear, bool definite)
 {
     double start = drape_clock_seconds();
@@ -127,21 +156,16 @@ static drape_status create_state(drape_sun_linear *linear, const drape_pattern *
     return status;
 }
 
-static drape_status begin(drape_sun_linear *linear, drape_arena *arena, SUNContext sun)
-{
-    linear->arena = drape_arena_within(arena);
-    linear->solver = SUNLinSolNewEmpty(sun);
-    linear->matrix = SUNMatNewEmpty(sun);
-    return linear->solver && linear->matrix ? DRAPE_OK
-                                            : drape_fail_memory(arena->ctx, sizeof *linear->solver);
-}
-
 drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const drape_linear_ops *ops,
                                      const drape_pattern *pattern, drape_pool *pool,
                                      const atomic_bool *const *cancel, drape_sun_linear **out)
 {
     drape_sun_linear *linear = *out = drape_arena_take(arena, 1, sizeof *linear);
-    drape_status status = linear ? begin(linear, arena, sun) : DRAPE_E_MEMORY;
+    drape_status status = DRAPE_E_MEMORY;
+    if (linear) {
+        linear->arena = drape_arena_within(arena);
+        status = drape_sun_shell_create(arena->ctx, sun, linear, setup, solve, &linear->shell);
+    }
     status = drape_ranks_agree(pattern->ranks, arena->ctx, status);
     if (!status) {
         linear->ops = ops;
@@ -149,19 +173,9 @@ drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const d
         linear->cancel = cancel;
         status = create_state(linear, pattern);
     }
-    if (status) {
+    if (status)
         drape_sun_linear_destroy(out);
-        return status;
-    }
-    linear->solver->content = linear;
-    linear->solver->ops->gettype = solver_type;
-    linear->solver->ops->getid = solver_id;
-    linear->solver->ops->initialize = keep_solver;
-    linear->solver->ops->setup = setup;
-    linear->solver->ops->solve = solve;
-    linear->matrix->ops->getid = matrix_id;
-    linear->matrix->ops->zero = keep_matrix;
-    return DRAPE_OK;
+    return status;
 }
 
 drape_status drape_sun_linear_use_near(drape_sun_linear *linear, double tolerance)
@@ -238,10 +252,7 @@ void drape_sun_linear_destroy(drape_sun_linear **out)
         return;
     drape_linear_destroy(linear->ops, &linear->state);
     drape_arena_free(&linear->arena);
-    if (linear->solver)
-        SUNLinSolFreeEmpty(linear->solver);
-    if (linear->matrix)
-        SUNMatFreeEmpty(linear->matrix);
+    drape_sun_shell_destroy(&linear->shell);
     *out = NULL;
 }
 

@@ -14,6 +14,19 @@
 #include <sundials/sundials_linearsolver.h>
 #include <sundials/sundials_matrix.h>
 
+/* A SUNLinearSolver and a SUNMatrix of which SUNDIALS calls the setup and the solve alone. */
+typedef struct drape_sun_shell {
+    SUNLinearSolver solver;
+    SUNMatrix matrix;
+} drape_sun_shell;
+
+/* Errors: DRAPE_E_MEMORY; even then it must be destroyed. */
+drape_status drape_sun_shell_create(drape_context *ctx, SUNContext sun, void *content,
+                                    int (*setup)(SUNLinearSolver, SUNMatrix),
+                                    int (*solve)(SUNLinearSolver, SUNMatrix, N_Vector, N_Vector, sunrealtype),
+                                    drape_sun_shell *shell);
+void drape_sun_shell_destroy(drape_sun_shell *shell);
+
 typedef struct drape_sun_linear {
     drape_arena arena; /* holds values and state */
     const drape_linear_ops *ops;
@@ -30,8 +43,7 @@ typedef struct drape_sun_linear {
     double correction_tolerance; /* of |b|, left in the residual of a corrected solve */
     drape_refine refine;         /* the workspace of these solves */
     int64_t nonzeros;
-    SUNLinearSolver solver;
-    SUNMatrix matrix;
+    drape_sun_shell shell;
     drape_pool *pool;                   /* NULL: one thread */
     const atomic_bool *const *cancel;   /* see drape_linear_ops.watch */
     double tolerance;                   /* relative residual that iterative solvers may leave; 0: none */

@@ -30,7 +30,7 @@ static void write_frames(const frames_folder *f, const char *name, int frames, c
     " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"                                \
     " 'terms': ['stretch.cst', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 0.002}]}],"               \
     " 'gravity': [0, -9.81, 0], 'contact': {'distance': 0.01, 'stiffness': 340}, 'colliders': [%s],"         \
-    " 'integrator': {'method': 'be', 'dt': 0.01}, 'duration': 1}"
+    " 'integrator': {'method': 'be', 'dt': 0.01, 'tolerance': 1e-9}, 'duration': 1}"
 
 static scene open_sheet(const char *format, ...)
 {
@@ -43,7 +43,9 @@ static scene open_sheet(const char *format, ...)
 }
 
 /* The ball of radius 0.2 rises by 0.1 m in 0.2 s and rests; as a rigid mesh on a track, and as frames. Both
- * meet the cloth by the same pairs, in the same order, and their points differ by rounding. */
+ * meet the cloth by the same pairs, in the same order, and their points differ by rounding; guesses are put
+ * aside by other rules, so that positions differ by what the tolerance leaves: 1e-9 N moves a node of 1e-3 kg
+ * by 1e-10 m in a step. */
 START_TEST(rigid_motion_as_frames)
 {
     const frames_folder f = frames_folder_make();
@@ -62,15 +64,15 @@ START_TEST(rigid_motion_as_frames)
     for (int32_t i = 0; i < 3 * rigid.model->node_count; i++)
         largest = fmax(largest, fabs(x[i] - y[i]));
     ck_assert_double_gt(x[1 + 3 * 40], 0.28); /* the middle was lifted */
-    ck_assert_double_lt(largest, 1e-12);
+    ck_assert_double_lt(largest, 1e-8);
     ck_assert_int_eq(drape_sim_collider_force(rigid.sim, 0, force[0]), DRAPE_OK);
     ck_assert_int_eq(drape_sim_collider_force(frames.sim, 0, force[1]), DRAPE_OK);
     ck_assert_double_gt(-force[0][1], 0.1);
-    ck_assert_double_eq_tol(force[0][1], force[1][1], 1e-9 * fabs(force[0][1]));
+    ck_assert_double_eq_tol(force[0][1], force[1][1], 1e-6 * fabs(force[0][1]));
     /* what is left of the balance has the work of the collider in it: 0.01 J of lifting and pushing */
     const drape_energy a = drape_sim_energy(rigid.sim), b = drape_sim_energy(frames.sim);
     ck_assert_double_gt(a.gravity + a.elastic + a.kinetic, 0.01);
-    ck_assert_double_eq_tol(a.numerical, b.numerical, 1e-12);
+    ck_assert_double_eq_tol(a.numerical, b.numerical, 1e-8);
     scene_close(&rigid);
     scene_close(&frames);
     frames_folder_remove(&f);

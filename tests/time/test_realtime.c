@@ -46,7 +46,7 @@ static drape_realtime advance(scene *s, double frame, double budget)
  * than half. */
 START_TEST(few_iterations_are_near_the_converged_step)
 {
-    scene exact = scene_open(HUNG, "", "be", "");
+    scene exact = scene_open(HUNG, "", "be", ", 'tolerance': 1e-7");
     scene_advance(&exact, 0.5);
     double errors[2];
     for (int k = 1; k <= 2; k++) {
@@ -155,7 +155,7 @@ START_TEST(measured_fabrics_fall)
     static const char *const fabrics[] = {"wang2011_denim", "wang2011_tablecloth"};
     static const char *const pins[] = {"0, 12", "0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12"};
     for (int c = 0; c < 4; c++) {
-        scene exact = scene_open(FABRIC, fabrics[c / 2], pins[c % 2], "be", "");
+        scene exact = scene_open(FABRIC, fabrics[c / 2], pins[c % 2], "be", ", 'tolerance': 1e-7");
         scene_advance(&exact, 0.5);
         double before = 0.02;
         for (int k = 1; k <= 4; k *= 2) {

@@ -1,0 +1,26 @@
+/* matrix.c: see matrix.h. */
+#include "nonlinear/matrix.h"
+
+#include "nonlinear/approx_jacobian.h"
+#include "nonlinear/factored_jacobian.h"
+
+drape_status drape_matrix_choose(drape_arena *arena, drape_system *system, const drape_matrix_choice *choice,
+                                 drape_matrix *usual, drape_matrix *cheap)
+{
+    bool factored = choice->kind == DRAPE_MATRIX_FACTORED, only = true;
+    drape_status status = DRAPE_OK;
+    if (choice->kind == DRAPE_MATRIX_AUTO)
+        status = drape_factored_jacobian_is_better(system, choice->dt, &factored, &only);
+    only |= !drape_system_contact(system);
+    drape_matrix *approximate = factored ? cheap : usual;
+    if (!status && factored) {
+        usual->ops = &drape_factored_jacobian_ops;
+        status = drape_factored_jacobian_create(arena, system, choice->dt,
+                                                (drape_factored_jacobian **)&usual->self);
+    }
+    if (status || (factored && only))
+        return status;
+    approximate->ops = &drape_approx_jacobian_ops;
+    return drape_approx_jacobian_create(arena, system, choice->coarse_spacing,
+                                        (drape_approx_jacobian **)&approximate->self);
+}
