@@ -15,9 +15,8 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
                "accepted: the residual is above the default `tolerance`, but what is left is small beside "
                "the step's own error"),
     [DRAPE_REASON_CORRECTION] =
-        REASON("correction", "Newton",
-               "accepted: the residual is above `tolerance`, but a correction was within "
-               "`correction_tolerance` or, of newton_k, what is left within `error`"),
+        REASON("correction", "newton_k",
+               "accepted: the residual is above `tolerance`, but what is left is estimated within `error`"),
     [DRAPE_REASON_ITERATIONS] =
         REASON("iterations", "newton_k",
                "accepted after the given number of iterations, with a residual above `tolerance`"),

@@ -269,11 +269,10 @@ void drape_implicit_audit_dissipation(drape_implicit *s, const double *from, con
 
 /* ---- For the table ---- */
 
-/* One-step methods keep nothing between steps except factors. */
+/* One-step methods keep nothing between steps. */
 void drape_implicit_restart(void *state, const drape_state *from)
 {
-    (void)from;
-    drape_newton_forget_factors(((drape_implicit *)state)->newton);
+    (void)state, (void)from;
 }
 
 const double *drape_implicit_residual(const void *state)

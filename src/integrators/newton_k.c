@@ -33,7 +33,6 @@ enum {
     PARAM_EXTRAPOLATION,
     PARAM_LINEAR_TOLERANCE,
     PARAM_LINEAR_ITERATIONS,
-    PARAM_COARSE_SPACING,
     PARAM_CORRECTIONS,
     PARAM_COUNT
 };
@@ -68,9 +67,6 @@ static const drape_param params[PARAM_COUNT] = {
                                             "fraction at steps of 1/60 s; proportional to the step"),
     [PARAM_LINEAR_ITERATIONS] = DRAPE_INTEGER("max_linear_iterations", "1", 60, 1, 100000,
                                               "iterations of conjugate gradients for each correction"),
-    [PARAM_COARSE_SPACING] =
-        DRAPE_INTEGER("coarse_spacing", "1", 0, 0, 100,
-                      "edges between the centres of the coarse functions; 0: by the number of nodes"),
     [PARAM_CORRECTIONS] = DRAPE_CHOICE(
         "corrections", DRAPE_MATRIX_AUTO, corrections,
         "conjugate_gradients: a matrix with edges and springs, and one number for each pair of nodes of all "
@@ -130,8 +126,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
         drape_param_default(&drape_newton_params[i], newton + i);
     newton[DRAPE_NEWTON_TOLERANCE] = values[PARAM_TOLERANCE];
     const drape_matrix_choice choice = {.kind = (drape_matrix_kind)values[PARAM_CORRECTIONS],
-                                        .dt = values[PARAM_DT],
-                                        .coarse_spacing = (int)values[PARAM_COARSE_SPACING]};
+                                        .dt = values[PARAM_DT]};
     if (!status)
         status = drape_newton_create(arena, &s->common.equation, newton, &choice, &s->common.newton);
     return status ? status : drape_arena_status(arena);

@@ -349,7 +349,7 @@ static drape_status solve(void *matrix, const double *b, double tolerance, doubl
 
 /* ---- Creation and destruction ---- */
 
-drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *system, int spacing,
+drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *system,
                                           drape_approx_jacobian **out)
 {
     drape_approx_jacobian *s = *out = drape_arena_take(arena, 1, sizeof *s);
@@ -367,7 +367,7 @@ drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *syst
     drape_status status =
         drape_nonsymmetric_init(arena, system, false, s, multiply, solve_symmetric, &s->friction);
     if (!status)
-        status = drape_approx_jacobian_build(s, spacing);
+        status = drape_approx_jacobian_build(s);
     return status ? status : drape_arena_status(arena);
 }
 
@@ -383,10 +383,9 @@ static void destroy(void *matrix)
 
 /* Each solve begins with a new matrix, so the factors themselves are not archived, only the state that later
  * ones depend on. */
-static void archive(void *matrix, drape_archive *a, bool kept)
+static void archive(void *matrix, drape_archive *a)
 {
     drape_approx_jacobian *s = matrix;
-    (void)kept;
     drape_archive_mark(a, "approximate jacobian");
     if (drape_archive_has_read(a))
         drape_archive_note(a, drape_approx_jacobian_extend(s));

@@ -25,10 +25,9 @@ typedef struct drape_approx_jacobian drape_approx_jacobian;
 
 extern const drape_matrix_ops drape_approx_jacobian_ops;
 
-/* For a system with at least one free node. spacing: edges between the centres of the coarse functions; 0:
- * chosen by the number of nodes. The arena must outlive it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER; even
- * then it must be destroyed. */
-drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *system, int spacing,
+/* For a system with at least one free node. The arena must outlive it. Errors: DRAPE_E_MEMORY,
+ * DRAPE_E_SOLVER; even then it must be destroyed. */
+drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *system,
                                           drape_approx_jacobian **out);
 
 /* y = A x, for tests. */

@@ -46,7 +46,7 @@ static void pass_edges(const drape_model *m, int32_t *start, int32_t *neighbor)
     }
 }
 
-static drape_status build_prolong(drape_approx_jacobian *s, int spacing, drape_arena *scratch)
+static drape_status build_prolong(drape_approx_jacobian *s, drape_arena *scratch)
 {
     const drape_model *m = s->model;
     int32_t *start = drape_arena_take(scratch, (size_t)s->nodes + 2, sizeof *start);
@@ -58,8 +58,7 @@ static drape_status build_prolong(drape_approx_jacobian *s, int spacing, drape_a
         start[i + 1] += start[i];
     pass_edges(m, start, neighbor);
     const drape_graph graph = {.count = s->nodes, .start = start, .neighbor = neighbor};
-    return drape_prolong_build(s->arena, &graph, spacing ? spacing : drape_prolong_spacing(s->nodes),
-                               &s->coarse.prolong);
+    return drape_prolong_build(s->arena, &graph, drape_prolong_spacing(s->nodes), &s->coarse.prolong);
 }
 
 /* Couples the coarse functions that overlap on the model's pattern, in pairs. */
@@ -180,11 +179,11 @@ static drape_status build_coarse_pairs(drape_approx_jacobian *s)
     return DRAPE_OK;
 }
 
-static drape_status build_coarse(drape_approx_jacobian *s, int spacing)
+static drape_status build_coarse(drape_approx_jacobian *s)
 {
     coarse_matrix *c = &s->coarse;
     drape_arena scratch = drape_arena_of(s->arena->ctx);
-    drape_status status = build_prolong(s, spacing, &scratch);
+    drape_status status = build_prolong(s, &scratch);
     if (!status)
         status = build_coarse_pattern(s, &scratch);
     drape_arena_free(&scratch);
@@ -238,12 +237,12 @@ static drape_status build_scalar(drape_approx_jacobian *s)
     return status;
 }
 
-drape_status drape_approx_jacobian_build(drape_approx_jacobian *s, int spacing)
+drape_status drape_approx_jacobian_build(drape_approx_jacobian *s)
 {
     drape_status status = list_pairs(s);
     if (!status)
         status = build_scalar(s);
     if (!status)
-        status = build_coarse(s, spacing);
+        status = build_coarse(s);
     return status ? status : drape_approx_jacobian_extend(s);
 }

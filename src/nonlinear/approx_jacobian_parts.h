@@ -55,7 +55,7 @@ struct drape_approx_jacobian {
 };
 
 /* Everything that does not change with the state. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
-drape_status drape_approx_jacobian_build(drape_approx_jacobian *jacobian, int spacing);
+drape_status drape_approx_jacobian_build(drape_approx_jacobian *jacobian);
 
 /* Takes the arrays of R for the system's present pattern. Errors: DRAPE_E_MEMORY. */
 drape_status drape_approx_jacobian_extend(drape_approx_jacobian *jacobian);

@@ -12,18 +12,16 @@ struct drape_exact_jacobian {
     drape_sun_linear *linear;
     int64_t version;                             /* of the pattern */
     bool contact_unsymmetric, terms_unsymmetric; /* the Jacobian of contact, of the terms may be */
-    bool projects;
 };
 
 drape_status drape_exact_jacobian_create(drape_arena *arena, drape_system *system, SUNContext sun,
-                                         const drape_linear_ops *linear, bool near, bool projects,
+                                         const drape_linear_ops *linear, bool near,
                                          drape_exact_jacobian **out)
 {
     drape_exact_jacobian *s = *out = drape_arena_take(arena, 1, sizeof *s);
     if (drape_ranks_agree_memory(drape_model_ranks(drape_system_model(system)), arena->ctx, s))
         return DRAPE_E_MEMORY;
     s->system = system;
-    s->projects = projects;
     s->version = drape_system_pattern_version(system);
     s->contact_unsymmetric = !drape_system_is_symmetric(system);
     s->terms_unsymmetric = !drape_system_has_symmetric_terms(system);
@@ -60,7 +58,7 @@ static drape_status assemble(void *matrix, const drape_point *at, double mass_we
                              drape_work *work)
 {
     drape_exact_jacobian *s = matrix;
-    const double share = positive || s->projects ? 1 : 0;
+    const double share = positive ? 1 : 0;
     const double before = drape_system_clock(s->system) - s->linear->factor_seconds; /* without an analysis */
     drape_point point = *at;
     drape_status status = extend_pattern(s, at);
@@ -111,7 +109,7 @@ drape_status drape_exact_jacobian_at(drape_exact_jacobian *s, const drape_point 
     return DRAPE_OK;
 }
 
-static void archive(void *matrix, drape_archive *a, bool kept)
+static void archive(void *matrix, drape_archive *a)
 {
     drape_exact_jacobian *s = matrix;
     if (drape_archive_has_read(a))
@@ -119,7 +117,7 @@ static void archive(void *matrix, drape_archive *a, bool kept)
     if (drape_archive_has_read(a))
         s->version = drape_system_pattern_version(s->system);
     s->linear->stale |= s->version != drape_system_pattern_version(s->system);
-    drape_sun_linear_archive(s->linear, a, kept);
+    drape_sun_linear_archive(s->linear, a, false);
 }
 
 static size_t bytes(const void *matrix)

@@ -333,6 +333,7 @@ drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *sy
     status = drape_sundials_context(arena->ctx, &s->sun);
     if (status)
         return status;
+    s->version = drape_system_pattern_version(system);
     return drape_sun_linear_create(arena, s->sun, drape_linear_best(3 * (int64_t)m->free_count),
                                    drape_system_pattern(system), drape_system_pool(system),
                                    drape_system_cancel_flag(system), &s->linear);
@@ -350,10 +351,9 @@ static void destroy(void *matrix)
 }
 
 /* Each solve begins with a new matrix, so the factors themselves are not archived. */
-static void archive(void *matrix, drape_archive *a, bool kept)
+static void archive(void *matrix, drape_archive *a)
 {
     drape_factored_jacobian *s = matrix;
-    (void)kept;
     drape_archive_mark(a, "factored jacobian");
     if (drape_archive_has_read(a))
         drape_archive_note(a, take_pattern(s));

@@ -70,10 +70,10 @@ static void shorten(drape_step_equation *e, double *d, double *aside, double *fr
 
 void drape_guess_make_feasible(drape_step_equation *e, double *d, double *aside, double *fraction)
 {
-    if (fraction)
-        shorten(e, d, aside, fraction);
     drape_step_equation_move(e, d);
     /* springs beyond their limit pull with forces far above any others: d = 0 is better */
     if (drape_system_breaks_limit(e->system, e->x, e->x_base, e->point.internal))
         memset(d, 0, e->dofs * sizeof *d);
+    if (fraction)
+        shorten(e, d, aside, fraction);
 }

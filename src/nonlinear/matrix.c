@@ -21,6 +21,5 @@ drape_status drape_matrix_choose(drape_arena *arena, drape_system *system, const
     if (status || (factored && only))
         return status;
     approximate->ops = &drape_approx_jacobian_ops;
-    return drape_approx_jacobian_create(arena, system, choice->coarse_spacing,
-                                        (drape_approx_jacobian **)&approximate->self);
+    return drape_approx_jacobian_create(arena, system, (drape_approx_jacobian **)&approximate->self);
 }

@@ -26,9 +26,8 @@ typedef struct drape_matrix_ops {
      * was, as far as it was seen. */
     drape_status (*solve)(void *matrix, const double *b, double tolerance, double *x, bool *definite,
                           drape_work *work);
-    /* kept: the factors will be used again in the next solve. */
-    void (*archive)(void *matrix, drape_archive *a, bool kept);
-    size_t (*bytes)(const void *matrix); /* outside of its arena */
+    void (*archive)(void *matrix, drape_archive *a); /* each solve begins with a new matrix */
+    size_t (*bytes)(const void *matrix);             /* outside of its arena */
     void (*destroy)(void *matrix);
 } drape_matrix_ops;
 
@@ -43,8 +42,7 @@ typedef enum { DRAPE_MATRIX_AUTO, DRAPE_MATRIX_APPROXIMATE, DRAPE_MATRIX_FACTORE
 
 typedef struct drape_matrix_choice {
     drape_matrix_kind kind;
-    double dt;          /* [s] nominal step */
-    int coarse_spacing; /* see approx_jacobian.h */
+    double dt; /* [s] nominal step */
 } drape_matrix_choice;
 
 /* Makes what newton_k corrects with: `usual`, and `cheap` for the least effort unless that is the same.

@@ -18,8 +18,8 @@
  * that. It adds p to d, counts iterations, and ends the loop when the largest component of F is within its
  * bound, when p is too short to change anything, when p is at its size limit five times in a row, or after
  * max_iterations. An island that is done gives KINSOL an F of 0, which its own test takes as converged, and
- * which keeps the island in its place. With `newton: modified` KINSOL also decides when factors are too old,
- * and with `globalization: line_search` it shortens p itself, by the sum of squares of F.
+ * which keeps the island in its place. With `globalization: line_search` KINSOL shortens p itself, by the sum
+ * of squares of F.
  *
  * Contact and the default globalization, `work`, are implemented here, inside `correct`: the solution that
  * KINSOL gets from its linear solver is the step to be taken. KINSOL's own line search can neither stop at
@@ -45,7 +45,6 @@
 #include "nonlinear/stopping.h"
 #include "nonlinear/stress_predictor.h"
 #include "solvers/sun_linear.h"
-#include "solvers/sundials_memory.h"
 #include "solvers/vector.h"
 
 #include <kinsol/kinsol.h>
@@ -53,24 +52,19 @@
 #include <string.h>
 
 /* KINSOL's settings that no user should need. All are set; none is left to a default. */
-#define SETUPS_EXACT    1     /* iterations between Jacobians: exact Newton */
-#define SETUPS_MODIFIED 10    /* iterations between Jacobians: modified Newton */
-#define STEP_TOLERANCE  1e-15 /* fraction of the scene's size: a shorter correction changes nothing */
+#define SETUPS         1     /* iterations between Jacobians */
+#define STEP_TOLERANCE 1e-15 /* fraction of the scene's size: a shorter correction changes nothing */
 /* Largest correction, in sizes of the scene, for each node: KINSOL's own limit is 1 for the guess d = 0 */
 #define MAX_NEWTON_STEP 1e3
 #define MAX_BETA_FAIL   1000 /* failures of KINSOL's curvature condition: in effect unlimited */
-/* Ratio of two successive residuals above which modified Newton makes a new Jacobian: the largest of those
- * that KINSOL would compute itself, by exp of the C library, whose bits depend on the processor */
-#define MAX_RESIDUAL_RATIO 0.9
-
-#define SHORT_STEP     0.5  /* after a shorter step the next matrix is positive semidefinite */
-#define MAX_LENGTH     2    /* of a correction by positive parts with contact; without, there is no limit */
-#define EXACT          0.1  /* of the residual, that an iterative solver may leave in an exact correction */
-#define SMALL_STEP     0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
-#define MAX_AHEAD      0.1  /* of an edge: pins further ahead of the guess pull it along */
-#define MAX_CHORDS     2    /* simplified corrections after one correction, without contact */
-#define MAX_PREDICTION 8    /* corrections in a solve, after which stress is no longer predicted */
-#define STALLED        0.5  /* of the residual before: if no more is gained, it may be rounding */
+#define SHORT_STEP      0.5  /* after a shorter step the next matrix is positive semidefinite */
+#define MAX_LENGTH      2    /* of a correction by positive parts with contact; without, there is no limit */
+#define EXACT           0.1  /* of the residual, that an iterative solver may leave in an exact correction */
+#define SMALL_STEP      0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
+#define MAX_AHEAD       0.1  /* of an edge: pins further ahead of the guess pull it along */
+#define MAX_CHORDS      2    /* simplified corrections after one correction, without contact */
+#define MAX_PREDICTION  8    /* corrections in a solve, after which stress is no longer predicted */
+#define STALLED         0.5  /* of the residual before: if no more is gained, it may be rounding */
 /* Corrections that contract by less are taken to contract by so much: nine more like the last one follow. */
 #define MAX_CONTRACTION 0.9
 #define ESTIMATE        0.5 /* of the residual, that conjugate gradients leave in an estimate */
@@ -80,16 +74,6 @@
 /* A solve is laborious after more iterations than the larger of these: a number, and a share of the most. */
 #define EASY       10
 #define EASY_SHARE 0.4
-
-/* Forcing terms of Eisenstat & Walker 1996, "Choosing the forcing terms in an inexact Newton method", SIAM
- * J. Sci. Comput. 17, choice 2 with its safeguard, by the constants of KINSOL:
- *     eta = gamma (|F| / |F before|)^2,
- * at least gamma (eta before)^2 where that is above a bound. */
-#define FORCING_FIRST     0.5
-#define FORCING_GAMMA     0.9
-#define FORCING_SAFEGUARD 0.1
-#define FORCING_MIN       1e-4
-#define FORCING_MAX       0.9
 
 struct drape_newton {
     drape_step_equation *equation;
@@ -114,17 +98,12 @@ struct drape_newton {
     double *fraction; /* nodes: scratch of feasibility; NULL without contact */
     double edge;      /* [m] mean length of an edge */
 
-    /* Kept between solves. */
-    bool factored;               /* there are factors, which modified Newton may keep */
-    double factored_mass_weight; /* mass weight of these factors */
-
     /* Kept between the iterations of one solve. */
     drape_newton_effort effort, own_effort; /* of this solve; where the caller has none */
     int corrections;
     double tolerance;    /* relative residual that iterative solvers leave */
     double rounding;     /* of F in its norm, as last estimated; INFINITY: it was not */
     double residual;     /* weighted, largest component, at the last iterate that KINSOL evaluated */
-    double forcing_norm; /* |F| where the last correction was made; NAN: none was */
     double start, left;  /* [N2] |F|^2 at the guess, and where it was evaluated last */
     double first, error; /* [m] RMS of the first correction, and of the last one or its estimate */
     double begun, seconds,
@@ -132,8 +111,7 @@ struct drape_newton {
     bool positive;        /* the present matrix has the positive parts; after a search, the next one has;
                               with `project` every matrix has */
     bool indefinite;      /* the exact matrix was at the last iterate where it was tried */
-    bool near_enough;     /* the last correction was whole and within correction_tolerance */
-    bool spent;           /* the time is */
+    bool near_enough;     /* what is left is as short as the effort asks */
     drape_status failure; /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
 };
 
@@ -176,8 +154,10 @@ static void find_islands(drape_newton *s)
     if (s->version == drape_system_pattern_version(system))
         return;
     s->version = drape_system_pattern_version(system);
+    const bool strict = s->stopping.strict;
     if (drape_islands_find(&s->islands, drape_system_pattern(system)))
         drape_stopping_begin(&s->stopping);
+    s->stopping.strict = strict;
 }
 
 static drape_status assemble(drape_newton *s, const double *d, bool positive)
@@ -206,8 +186,6 @@ static drape_status factor_matrix(drape_newton *s, bool definite)
 {
     drape_step_equation *e = s->equation;
     drape_status status = s->matrix->ops->factor(s->matrix->self, definite, &e->work);
-    s->factored = !status;
-    s->factored_mass_weight = e->mass_weight;
     if (status == DRAPE_E_STOPPED)
         drape_system_cancelled(e->system); /* so that the step ends as cancelled */
     return status;
@@ -256,15 +234,16 @@ static void begin(drape_newton *s)
         s->matrix->ops->begin(s->matrix->self, !s->effort.cheap, s->effort.linear_iterations);
     s->corrections = 0;
     s->residual = s->rounding = INFINITY;
-    s->start = s->left = s->first = s->error = s->forcing_norm = NAN;
+    s->start = s->left = s->first = s->error = NAN;
     s->seconds = s->further = 0;
-    s->positive = s->indefinite = s->near_enough = s->spent = false;
+    s->positive = s->indefinite = s->near_enough = false;
     s->failure = DRAPE_OK;
     drape_step_equation_predict_contact(e, NULL);
     if (!s->searches)
         return;
     s->search.evaluated = false;
     s->stopping.by_error = s->effort.by_error;
+    s->stopping.strict = false;
     find_islands(s);
     drape_stopping_begin(&s->stopping);
     double clock = drape_system_clock(e->system);
@@ -279,7 +258,6 @@ static bool linearizes(const drape_newton *s)
 {
     const drape_step_equation *e = s->equation;
     return s->searches && !s->fraction && e->x_start &&
-           s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT &&
            s->values[DRAPE_NEWTON_PREDICTOR] == DRAPE_NEWTON_PREDICTOR_INERTIAL &&
            e->pins_ahead > MAX_AHEAD * s->edge && drape_step_equation_pins_move(e);
 }
@@ -357,7 +335,8 @@ static bool is_late(drape_newton *s)
     if (s->corrections > 0)
         s->seconds = now - s->begun;
     s->further += s->corrections > s->effort.least ? s->seconds : 0;
-    return s->corrections >= (is_in_contact(s) ? MIN_IN_CONTACT : s->effort.least) &&
+    const int least = s->effort.least;
+    return s->corrections >= (is_in_contact(s) && least < MIN_IN_CONTACT ? MIN_IN_CONTACT : least) &&
            now + s->seconds > s->effort.deadline;
 }
 
@@ -379,9 +358,9 @@ static int residual(N_Vector d_vector, N_Vector f, void *user)
     s->start = isnan(s->start) ? s->left : s->start;
     const drape_status status = s->searches && finite ? judge_islands(s, &done) : DRAPE_OK;
     done = done || (finite && (s->near_enough || is_rounding(s, d, &finite)));
-    s->spent = finite && !done && is_late(s);
+    const bool spent = finite && !done && is_late(s);
     for (size_t i = 0; i < e->dofs; i++)
-        out[i] = done || s->spent || e->weight[i / 3] == 0 ? 0 : e->f[i];
+        out[i] = done || spent || e->weight[i / 3] == 0 ? 0 : e->f[i];
     if (status || drape_system_status(e->system))
         return return_status(s, status < 0 ? status : -1);
     return finite ? 0 : 1;
@@ -422,25 +401,12 @@ static double longest(const drape_step_equation *e, const double *p)
     return sqrt(drape_ranks_largest(e->ranks, squared));
 }
 
-/* How much of the residual iterative linear solvers leave in the next correction. */
-static void choose_forcing(drape_newton *s, const double *minus_f)
-{
-    const double before = s->forcing_norm, last = s->tolerance;
-    if (s->values[DRAPE_NEWTON_FORCING] == DRAPE_NEWTON_FORCING_CONSTANT)
-        return;
-    s->forcing_norm = sqrt(drape_step_equation_dot(s->equation, minus_f, minus_f));
-    const double ratio = s->forcing_norm / before, least = FORCING_GAMMA * last * last;
-    double forcing = isnan(ratio) ? FORCING_FIRST : FORCING_GAMMA * ratio * ratio;
-    if (!isnan(ratio) && least > FORCING_SAFEGUARD)
-        forcing = fmax(forcing, least);
-    s->tolerance = fmin(fmax(forcing, FORCING_MIN), FORCING_MAX);
-}
-
 /* ---- Estimate ---- */
 
 /* p2 = -A^-1 F at d + p, where F is known, by the factors that gave p, into s->step; s->right: d + p. Sets
  * what p2 says of what p has left. False: there is none. */
-static bool correct_again(drape_newton *s, const double *d, const double *p, drape_status *status)
+static bool correct_again(drape_newton *s, const double *d, const double *p, double *length,
+                          drape_status *status)
 {
     drape_step_equation *e = s->equation;
     for (size_t i = 0; i < e->dofs; i++)
@@ -452,8 +418,9 @@ static bool correct_again(drape_newton *s, const double *d, const double *p, dra
     for (size_t i = 0; i < e->dofs; i++)
         s->right[i] = d[i] + p[i];
     drape_stopping_estimate(&s->stopping, s->right, s->step);
-    const double length = rms(e, s->step);
-    s->error = length / (1 - fmin(length / s->error, MAX_CONTRACTION));
+    const double before = *length;
+    *length = rms(e, s->step);
+    s->error = *length / (1 - fmin(*length / before, MAX_CONTRACTION));
     return true;
 }
 
@@ -474,13 +441,14 @@ static drape_status estimate(drape_newton *s, const double *d, bool definite, do
                          !is_in_contact(s),
                by_error = may && effort->error > 0;
     const double bound = max_norm_bound(s);
-    double before = s->residual;
+    double before = s->residual, length = s->error;
     for (int more = e->x_ahead ? 1 : MAX_CHORDS; more > 0; more--) {
         const double now = drape_step_equation_norm(e, DRAPE_NORM_MAX), ratio = now / before;
         const bool by_residual =
             direct && s->tolerance <= EXACT && now * (more > 1 ? ratio * ratio : ratio) <= bound;
         drape_status status = DRAPE_OK;
-        if (!(now > bound) || !(by_residual || by_gain || by_error) || !correct_again(s, d, p, &status))
+        if (!(now > bound) || !(by_residual || by_gain || by_error) ||
+            !correct_again(s, d, p, &length, &status))
             return status < 0 ? status : DRAPE_OK;
         const bool small = drape_stopping_is_small(&s->stopping), ends = by_gain && small;
         s->near_enough = by_error && s->error <= effort->error && (small || !direct);
@@ -499,28 +467,22 @@ static drape_status estimate(drape_newton *s, const double *d, bool definite, do
     return DRAPE_OK;
 }
 
-/* Takes the correction p from d as far as the search says. whole: contact has not shortened it. An iterative
- * solver that leaves much of the residual is no exact matrix. */
-static drape_status advance(drape_newton *s, const double *d, bool whole, double *p)
+/* Takes the correction p, of which contact has left a fraction, from d as far as the search says. An
+ * iterative solver that leaves much of the residual is no exact matrix. */
+static drape_status advance(drape_newton *s, const double *d, double fraction, double *p)
 {
     const drape_step_equation *e = s->equation;
-    const bool definite = !s->positive && s->values[DRAPE_NEWTON_PROJECT] == 0 &&
-                          s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT &&
-                          s->tolerance <= EXACT;
+    const bool definite = !s->positive && (!s->matrix->ops->exact || s->tolerance <= EXACT);
     const double longest = !s->positive ? 1 : e->x_ahead ? MAX_LENGTH : INFINITY;
-    const double tolerance = s->values[DRAPE_NEWTON_CORRECTION_TOLERANCE];
     predict_stress(s, p);
     drape_line_search_along(&s->search, d, NULL, longest, p);
-    s->error = rms(e, p);
     const bool at_once = s->search.evaluated && s->search.shortest == 1 && s->search.longest == 1;
     drape_stopping_test_error(&s->stopping, s->search.lengths, d, p, definite && s->matrix->ops->exact,
-                              whole && s->corrections >= s->effort.least);
-    s->near_enough = e->x_start && whole && s->search.shortest >= 1 &&
-                     s->error * sqrt(3 * e->all_nodes / e->all_dofs) <= tolerance;
+                              fraction);
     s->positive = s->search.shortest < SHORT_STEP && !(s->friction && s->positive);
     if (s->search.shortest < 1 || s->search.longest > 1)
         drape_stress_predictor_forget(&s->predictor);
-    return at_once && !s->near_enough ? estimate(s, d, definite, p) : DRAPE_OK;
+    return at_once ? estimate(s, d, definite, p) : DRAPE_OK;
 }
 
 /* Turns p into the step that is taken from the present iterate d. A p that is not finite is left to KINSOL,
@@ -528,19 +490,19 @@ static drape_status advance(drape_newton *s, const double *d, bool whole, double
 static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
 {
     drape_step_equation *e = s->equation;
-    choose_forcing(s, minus_f);
     drape_status status = solve(s, minus_f, s->tolerance, p);
     if (s->searches)
         status = ensure_descent(s, status, minus_f, p);
     if (status || !drape_step_equation_is_finite(e, p))
         return status;
     s->indefinite = s->indefinite && longest(e, p) > SMALL_STEP * s->edge;
+    s->error = rms(e, p); /* of all of it, however far it is taken */
     if (s->corrections++ == 0)
-        s->first = rms(e, p);
+        s->first = s->error;
     if (s->searches)
         drape_step_equation_predict_contact(e, p);
-    const bool whole = drape_step_equation_make_feasible(e, p) == 1;
-    return s->searches ? advance(s, N_VGetArrayPointer(s->unknown), whole, p) : DRAPE_OK;
+    const double fraction = drape_step_equation_make_feasible(e, p);
+    return s->searches ? advance(s, N_VGetArrayPointer(s->unknown), fraction, p) : DRAPE_OK;
 }
 
 static int correct(SUNLinearSolver solver, SUNMatrix matrix, N_Vector p, N_Vector minus_f,
@@ -624,6 +586,7 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     drape_norm norm = (drape_norm)s->values[DRAPE_NEWTON_NORM];
     double tolerance = s->values[DRAPE_NEWTON_TOLERANCE];
     bool finite = !status || drape_step_equation_evaluate(e, d);
+    s->left = drape_step_equation_dot(e, e->f, e->f);
     report->tolerance = tolerance;
     report->residual = finite ? drape_step_equation_norm(e, norm) : NAN;
     report->diagnostic = drape_step_equation_diagnose(e, tolerance);
@@ -686,11 +649,8 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
         return drape_system_status(e->system);
     if (s->failure) {
         report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
-        drape_newton_forget_factors(s); /* the linear solver may have lost them */
         return s->failure;
     }
-    if (status)
-        drape_newton_forget_factors(s);
     report->further_seconds = s->further;
     report->solved = true;
     status = judge(s, status, d, report);
@@ -727,9 +687,6 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_effort *effo
         return status;
     }
     drape_guess_make_feasible(e, d, s->right, s->fraction);
-    bool keeps_factors = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_MODIFIED && s->factored &&
-                         s->factored_mass_weight == e->mass_weight;
-    KINSetNoInitSetup(s->kin, keeps_factors);
     KINSetNumMaxIters(s->kin, s->effort.most);
     N_VSetArrayPointer(d, s->unknown);
     int strategy =
@@ -742,15 +699,13 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_effort *effo
 static bool configure(drape_newton *s)
 {
     const double length = s->equation->model->length, n = s->equation->all_dofs;
-    bool exact = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT;
     DRAPE_KINSOL_QUIET(s->kin);
     return !KINInit(s->kin, residual, s->unknown) && !KINSetUserData(s->kin, s) &&
            !KINSetLinearSolver(s->kin, s->shell.solver, s->shell.matrix) && !KINSetJacFn(s->kin, jacobian) &&
            !KINSetFuncNormTol(s->kin, max_norm_bound(s)) &&
            !KINSetScaledStepTol(s->kin, STEP_TOLERANCE * length) &&
            !KINSetMaxNewtonStep(s->kin, MAX_NEWTON_STEP * length * sqrt(n)) &&
-           !KINSetMaxSetupCalls(s->kin, exact ? SETUPS_EXACT : SETUPS_MODIFIED) &&
-           !KINSetNoResMon(s->kin, exact) && !KINSetResMonConstValue(s->kin, MAX_RESIDUAL_RATIO) &&
+           !KINSetMaxSetupCalls(s->kin, SETUPS) && !KINSetNoResMon(s->kin, SUNTRUE) &&
            !KINSetMaxBetaFails(s->kin, MAX_BETA_FAIL);
 }
 
@@ -792,7 +747,7 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s, const dra
         status = drape_exact_jacobian_create(
             arena, system, s->sun,
             drape_linear_of(s->equation->ranks, (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]), s->searches,
-            s->values[DRAPE_NEWTON_PROJECT] != 0, (drape_exact_jacobian **)&s->usual.self);
+            (drape_exact_jacobian **)&s->usual.self);
     }
     if (!status)
         status = drape_sun_shell_create(arena->ctx, s->sun, s, setup, correct, &s->shell);
@@ -870,7 +825,6 @@ void drape_newton_destroy(drape_newton **newton)
 drape_status drape_newton_matrix(drape_newton *s, const drape_point *point, double mass_weight,
                                  const drape_pattern **pattern, const double **values)
 {
-    drape_newton_forget_factors(s);
     return drape_exact_jacobian_at(s->usual.self, point, mass_weight, pattern, values);
 }
 
@@ -886,27 +840,15 @@ void drape_newton_set_tolerance(drape_newton *s, double tolerance)
         KINSetFuncNormTol(s->kin, max_norm_bound(s));
 }
 
-void drape_newton_forget_factors(drape_newton *s)
-{
-    s->factored = false;
-}
-
-/* Modified Newton keeps its factors, and monitors the residual relative to that of the previous solve. */
 void drape_newton_archive(drape_newton *s, drape_archive *a)
 {
-    drape_step_equation *e = s->equation;
-    const bool modified = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_MODIFIED;
     drape_archive_mark(a, "newton");
-    drape_archive_doubles(a, e->f, e->dofs);
-    drape_archive_bool(a, &s->factored);
-    drape_archive_double(a, &s->factored_mass_weight);
-    drape_work_archive(&e->work, a);
+    drape_archive_doubles(a, s->equation->f, s->equation->dofs);
+    drape_work_archive(&s->equation->work, a);
     if (s->usual.ops)
-        s->usual.ops->archive(s->usual.self, a, modified && s->factored);
+        s->usual.ops->archive(s->usual.self, a);
     if (s->cheap.ops)
-        s->cheap.ops->archive(s->cheap.self, a, false);
-    if (e->dofs > 0 && modified && !drape_kinsol_archive(s->kin, a) && a->reading)
-        drape_newton_forget_factors(s);
+        s->cheap.ops->archive(s->cheap.self, a);
 }
 
 #define KINSOL_VECTORS 8 /* six of its own, and two of weights */

@@ -18,24 +18,18 @@ enum {
     DRAPE_NEWTON_NORM, /* a drape_norm */
     DRAPE_NEWTON_MAX_ITERATIONS,
     DRAPE_NEWTON_ON_FAILURE,
-    DRAPE_NEWTON_METHOD,
     DRAPE_NEWTON_GLOBALIZATION,
     DRAPE_NEWTON_PREDICTOR,
-    DRAPE_NEWTON_PROJECT,
     DRAPE_NEWTON_LINEAR_SOLVER,
     DRAPE_NEWTON_LINEAR_TOLERANCE,
-    DRAPE_NEWTON_FORCING,
-    DRAPE_NEWTON_CORRECTION_TOLERANCE,
     DRAPE_NEWTON_PARAM_COUNT
 };
 
 /* Their choices, NULL-ended. */
 extern const char *const drape_newton_norms[];
 extern const char *const drape_newton_failures[];
-extern const char *const drape_newton_methods[];
 extern const char *const drape_newton_globalizations[];
 extern const char *const drape_newton_predictors[];
-extern const char *const drape_newton_forcings[];
 
 /* The list of an integrator without parameters of its own. */
 extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
@@ -60,10 +54,6 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
     [DRAPE_NEWTON_ON_FAILURE] =                                                                              \
         DRAPE_CHOICE("on_failure", DRAPE_NEWTON_FAILURE_REJECT, drape_newton_failures,                       \
                      "accept: continue with an unconverged state, as in the DEP report, and log it"),        \
-    [DRAPE_NEWTON_METHOD] =                                                                                  \
-        DRAPE_CHOICE("newton", DRAPE_NEWTON_METHOD_EXACT, drape_newton_methods,                              \
-                     "exact: a Jacobian in each iteration; modified: factors kept for up to 10 iterations "  \
-                     "and across steps"),                                                                    \
     [DRAPE_NEWTON_GLOBALIZATION] = DRAPE_CHOICE(                                                             \
         "globalization", DRAPE_NEWTON_GLOBAL_AUTO, drape_newton_globalizations,                              \
         "none: full Newton steps, failures go to the controller; line_search: steps shortened until the "    \
@@ -74,27 +64,15 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
         "guess; inertial: the nodes keep their velocity or, in be where pins move and no contact is "        \
         "possible, solve the linearized equation; rest: they stay where they are, as in the "                \
         "DEP report"),                                                                                       \
-    [DRAPE_NEWTON_PROJECT] =                                                                                 \
-        DRAPE_BOOLEAN("project", false, "project the Hessian of every element to positive semidefinite"),    \
     [DRAPE_NEWTON_LINEAR_SOLVER] =                                                                           \
         DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver",                     \
                      .aliases = drape_linears_aliases),                                                      \
     [DRAPE_NEWTON_LINEAR_TOLERANCE] =                                                                        \
         DRAPE_NUMBER("linear_tolerance", "1", 1e-2, 1e-14, DRAPE_BELOW(1),                                   \
-                     "relative residual that iterative linear solvers leave in a correction"),               \
-    [DRAPE_NEWTON_FORCING] =                                                                                 \
-        DRAPE_CHOICE("forcing", DRAPE_NEWTON_FORCING_CONSTANT, drape_newton_forcings,                        \
-                     "constant: iterative linear solvers leave linear_tolerance; eisenstat_walker: 0.5 at "  \
-                     "first, then 0.9 times the square of the factor by which the last iteration lowered "   \
-                     "the residual, 1e-4 to 0.9"),                                                           \
-    [DRAPE_NEWTON_CORRECTION_TOLERANCE] = DRAPE_NUMBER(                                                      \
-        "correction_tolerance", "m", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1,                               \
-        "a solve also ends, whatever its residual, after a whole correction whose root mean square over "    \
-        "the free nodes is at most this; static ends by its residual only")
+                     "relative residual that iterative linear solvers leave in a correction")
 
 /* Values of the choices among these parameters. */
 enum { DRAPE_NEWTON_FAILURE_REJECT, DRAPE_NEWTON_FAILURE_ACCEPT };
-enum { DRAPE_NEWTON_METHOD_EXACT, DRAPE_NEWTON_METHOD_MODIFIED };
 enum {
     DRAPE_NEWTON_GLOBAL_LINE_SEARCH,
     DRAPE_NEWTON_GLOBAL_NONE,
@@ -102,7 +80,6 @@ enum {
     DRAPE_NEWTON_GLOBAL_AUTO
 };
 enum { DRAPE_NEWTON_PREDICTOR_INERTIAL, DRAPE_NEWTON_PREDICTOR_REST };
-enum { DRAPE_NEWTON_FORCING_CONSTANT, DRAPE_NEWTON_FORCING_EISENSTAT_WALKER };
 
 typedef struct drape_newton drape_newton;
 
@@ -148,9 +125,6 @@ const double *drape_newton_values(const drape_newton *newton);
 
 /* The bound on the residual of the next solves [N]. */
 void drape_newton_set_tolerance(drape_newton *newton, double tolerance);
-
-/* From now on the factors belong to another equation, so modified Newton must not reuse them. */
-void drape_newton_forget_factors(drape_newton *newton);
 
 /* Archives what is kept between solves, and the equation's work. */
 void drape_newton_archive(drape_newton *newton, drape_archive *a);

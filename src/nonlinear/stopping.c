@@ -29,7 +29,7 @@ void drape_stopping_begin(drape_stopping *s)
     drape_stopping_end(s);
     s->ended_by_error = s->strict = false;
     for (int32_t k = 0; k < s->islands->count; k++)
-        s->progress[k] = (drape_progress){.gain = NAN, .decrease = INFINITY};
+        s->progress[k] = (drape_progress){.gain = NAN};
 }
 
 /* Takes the weight from the nodes of islands that are done. Returns whether all are. */
@@ -76,20 +76,21 @@ static void measure(drape_stopping *s, const double *d, const double *p)
 }
 
 void drape_stopping_test_error(drape_stopping *s, const drape_length *lengths, const double *d,
-                               const double *p, bool exact, bool whole)
+                               const double *p, bool exact, double fraction)
 {
     measure(s, d, p);
     for (int32_t k = 0; k < s->islands->count; k++) {
         drape_progress *q = &s->progress[k];
         const drape_length *l = &lengths[k];
-        const double bound = SHARE * q->own, last = q->decrease;
+        const double bound = SHARE * q->own;
+        const bool before = q->small;
         if (q->done)
             continue;
-        const bool descends = l->start < 0 && l->found && isfinite(l->end);
-        q->gain = fmax(-l->start, 0);
-        q->decrease = descends ? -l->length * (l->start + l->end) / 2 : INFINITY;
-        if (s->by_error && !s->strict && whole && l->length >= 1 && q->gain <= bound &&
-            q->decrease <= bound && (exact || last <= bound))
+        const bool descends = l->start < 0 && l->found && l->end <= -l->start;
+        q->gain = fmax(-l->start, 0) / fraction;
+        q->small = fraction == 1 && l->length >= 1 && descends && q->gain <= bound &&
+                   -l->length * (l->start + l->end) / 2 <= bound;
+        if (s->by_error && !s->strict && q->small && (exact || before))
             q->done = s->ended_by_error = true;
     }
     leave_done(s);

@@ -33,10 +33,10 @@
 /* What is known of an island in a solve. */
 typedef struct drape_progress {
     bool done;
-    double largest;  /* [N] weighted component of F */
-    double gain;     /* [J] -F . p of the last correction; NaN: there was none */
-    double decrease; /* [J] of the energy by it; INFINITY: not known, or there was none */
-    double own;      /* [J] m_w sum m |e|^2 */
+    double largest; /* [N] weighted component of F */
+    double gain;    /* [J] -F . p of all of the last correction; NaN: there was none */
+    bool small;     /* the second rule holds of it, but for the matrix */
+    double own;     /* [J] m_w sum m |e|^2 */
 } drape_progress;
 
 typedef struct drape_stopping {
@@ -62,10 +62,10 @@ void drape_stopping_end(drape_stopping *stopping);
 /* After an evaluation of F: ends islands by their residual. Returns whether all are done, by any rule. */
 bool drape_stopping_test_residual(drape_stopping *stopping, double bound);
 
-/* After a search along a correction, at d + p where it ended: ends islands by their local error. exact: the
- * correction is by the Jacobian, and whole: it was not shortened because of contact. */
+/* After a search along a correction p, of which contact had left a fraction: ends islands by their local
+ * error. exact: it is by the Jacobian. */
 void drape_stopping_test_error(drape_stopping *stopping, const drape_length *lengths, const double *d,
-                               const double *p, bool exact, bool whole);
+                               const double *p, bool exact, double fraction);
 
 /* At d, where F was evaluated last, of a correction p that is not made: takes it for the last one, by the
  * factors of which it is. */

@@ -40,11 +40,3 @@ const double *drape_stress_predictor_stress(const drape_stress_predictor *s)
 {
     return s->valid ? s->stress : NULL;
 }
-
-void drape_stress_predictor_archive(drape_stress_predictor *s, drape_archive *a)
-{
-    drape_archive_bool(a, &s->valid);
-    drape_archive_bool(a, &s->active);
-    if (s->stress)
-        drape_archive_doubles(a, s->stress, (size_t)drape_system_model(s->system)->measure_count);
-}

@@ -15,7 +15,6 @@
 #define DRAPE_NONLINEAR_STRESS_PREDICTOR_H
 
 #include "assemble/system.h"
-#include "base/archive.h"
 
 typedef struct drape_stress_predictor {
     drape_system *system;
@@ -42,8 +41,5 @@ void drape_stress_predictor_forget(drape_stress_predictor *predictor);
 
 /* The value for drape_point.stress; NULL: no prediction. */
 const double *drape_stress_predictor_stress(const drape_stress_predictor *predictor);
-
-/* For predictions that are used in the next solve. */
-void drape_stress_predictor_archive(drape_stress_predictor *predictor, drape_archive *a);
 
 #endif

@@ -16,6 +16,11 @@ typedef struct choice {
 static const choice integrators = {"/integrator", "method", &drape_integrator_registry};
 static const choice controllers = {"/controller", "type", &drape_controller_registry};
 
+/* Former settings of integrators, which made up for what the nonlinear solver now does by itself. The schema
+ * of a scene has them no more. */
+static const char *const retired[] = {"coarse_spacing", "correction_tolerance", "forcing", "newton",
+                                      "project"};
+
 static bool is_listed(const char *const *names, size_t count, const char *name)
 {
     for (size_t i = 0; i < count; i++)
@@ -57,6 +62,10 @@ static drape_status apply(drape_context *ctx, const choice *c, int chosen, const
         if (i == chosen)
             memcpy(values + drape_param_place(entry->params, p), value,
                    (size_t)drape_param_width(&entry->params[p]) * sizeof *value);
+    }
+    if (!known && c == &integrators && is_listed(retired, sizeof retired / sizeof *retired, setting->name)) {
+        drape_log(ctx, DRAPE_LOG_WARNING, "%s: has no effect any more", at);
+        return DRAPE_OK;
     }
     return known ? DRAPE_OK : unknown_key(ctx, c, at, setting->name);
 }

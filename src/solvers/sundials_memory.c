@@ -4,8 +4,7 @@
 #include "solvers/sundials_compat.h"
 
 #if SUNDIALS_VERSION_MAJOR == 6 && defined(__has_include)
-#if __has_include(                                                                                           \
-    <kinsol/kinsol_impl.h>) && __has_include(<ida/ida_impl.h>) && __has_include(<sundials_context_impl.h>)
+#if __has_include(<ida/ida_impl.h>) && __has_include(<sundials_context_impl.h>)
 #define KNOWN
 #endif
 #endif
@@ -13,7 +12,6 @@
 #ifdef KNOWN
 
 #include <ida/ida_impl.h>
-#include <kinsol/kinsol_impl.h>
 
 static void archive_long(drape_archive *a, long *value)
 {
@@ -25,25 +23,6 @@ static void archive_long(drape_archive *a, long *value)
 static void archive_vector(drape_archive *a, N_Vector v)
 {
     drape_archive_doubles(a, N_VGetArrayPointer(v), (size_t)N_VGetLength(v));
-}
-
-/* Each KINSol resets its counters, but not the quantities by which modified Newton monitors the residual. */
-bool drape_kinsol_archive(void *kinsol, drape_archive *a)
-{
-    KINMem k = kinsol;
-    drape_archive_mark(a, "kinsol");
-    drape_archive_int(a, &k->kin_jacCurrent);
-    drape_archive_int(a, &k->kin_retry_nni);
-    drape_archive_int(a, &k->kin_update_fnorm_sub);
-    double *const numbers[] = {&k->kin_eta,     &k->kin_sthrsh,  &k->kin_fnorm,     &k->kin_f1norm,
-                               &k->kin_sFdotJp, &k->kin_sJpnorm, &k->kin_fnorm_sub, &k->kin_omega,
-                               &k->kin_stepl,   &k->kin_stepmul};
-    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
-        drape_archive_double(a, numbers[i]);
-    long *const counts[] = {&k->kin_nni, &k->kin_nfe, &k->kin_nnilset, &k->kin_nnilset_sub, &k->kin_ncscmx};
-    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-        archive_long(a, counts[i]);
-    return true;
 }
 
 /* The index of the last of the difference vectors allocated by IDAInit. */
@@ -120,12 +99,6 @@ bool drape_ida_archive(void *ida, drape_archive *a)
 }
 
 #else
-
-bool drape_kinsol_archive(void *kinsol, drape_archive *a)
-{
-    (void)kinsol, (void)a;
-    return false;
-}
 
 bool drape_ida_archive(void *ida, drape_archive *a)
 {

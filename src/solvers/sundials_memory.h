@@ -1,8 +1,7 @@
 /*
- * sundials_memory.h: archives the state that KINSOL and IDA keep between calls, for checkpoints. SUNDIALS
- * has no function to read or write it, but its private headers, which Debian installs with SUNDIALS 6,
- * declare it. Without these headers nothing is archived: IDA then restarts from the state, which is within
- * its tolerance, and modified Newton with new factors.
+ * sundials_memory.h: archives the state that IDA keeps between calls, for checkpoints. SUNDIALS has no
+ * function to read or write it, but its private headers, which Debian installs with SUNDIALS 6, declare it.
+ * Without these headers nothing is archived: IDA then restarts from the state, which is within its tolerance.
  */
 #ifndef DRAPE_SOLVERS_SUNDIALS_MEMORY_H
 #define DRAPE_SOLVERS_SUNDIALS_MEMORY_H
@@ -11,7 +10,6 @@
 
 /* False if the layout of the memory is unknown: then nothing was archived. When reading, the solver must
  * have all its settings and must not have solved anything yet. */
-bool drape_kinsol_archive(void *kinsol, drape_archive *a);
 bool drape_ida_archive(void *ida, drape_archive *a);
 
 /* Call it once, after IDAInit: sets to 0 what IDA has not written yet, so that no uninitialised memory gets

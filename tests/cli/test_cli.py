@@ -272,6 +272,18 @@ def test_former_linear_solvers():
         equal(result.stdout.splitlines()[:-1], expected.splitlines()[:-1])  # the last line has times
 
 
+def test_former_settings():
+    """settings of integrators that have gone have no effect, and a line says so; other names are refused"""
+    write_scene()
+    expected = good("run", "scene.json")
+    for name in "coarse_spacing", "correction_tolerance", "forcing", "newton", "project":
+        result = drape("run", "scene.json", "--set", f"/integrator/{name}=1")
+        equal(result.returncode, 0, result.stderr)
+        equal(result.stderr.splitlines(True)[0], f"warning: /integrator/{name}: has no effect any more\n")
+        equal(result.stdout.splitlines()[:-1], expected.splitlines()[:-1])  # the last line has times
+    refused("run", "scene.json", "--set", "/controller/project=1", says='unknown key "project"')
+
+
 def read_summary_without_budget():
     good("run", "scene.json", "--summary", "s.json")
     return read_json("s.json")
@@ -915,7 +927,7 @@ def variants():
                             "transform": {"scale": 2, "rotate": [0, 1, 0, 90], "translate": [0, 0, 1]}})
     yield True, scene(pins=[{"nodes": [0, 3]}, {"row": 1}, {"edge": "top"}, {"box": [[0, 0, 0], [1, 1, 1]]},
                             {"nodes": [15], "track": [[0, [0, 0, 0]], [1, [0, 1, 0]]]}])
-    yield True, scene(integrator={"method": "be", "project": True, "norm": "l2", "max_iterations": 6})
+    yield True, scene(integrator={"method": "be", "predictor": "rest", "norm": "l2", "max_iterations": 6})
     ball = {"type": "sphere", "center": [0, -5, 0], "radius": 1}
     for more in ({}, {"friction": 0}, {"friction": 1000, "name": "b", "track": [[0, [0, 0, 0]], [1, [0, 1, 0]]]}):
         yield True, scene(colliders=[{**ball, **more}])

@@ -128,10 +128,10 @@ static drape_status take_step(stepper *s, double h, drape_step_info *info)
     return s->ops->step(s->state, &s->in, &s->out, h, info);
 }
 
-/* Any value of these would replace the bound on residuals, or on errors, which is tested here. */
+/* Any value of it would replace the bound on errors, which is tested here. */
 static bool replaces_a_bound(const drape_param *param)
 {
-    return strcmp(param->name, "correction_tolerance") == 0 || strcmp(param->name, "fixed_step") == 0;
+    return strcmp(param->name, "fixed_step") == 0;
 }
 
 static void defaults(const drape_integrator_ops *ops, double *values)

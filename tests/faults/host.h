@@ -222,16 +222,9 @@ static inline void host_check_message(const host_sim *s, const char *reason)
 
 /* The settings of Newton's method that its reaction to faults depends on. The line search by work is not
  * among them: if a matrix is singular or not finite, it asks for another one and gets a good one. */
-static const char *const host_settings[] = {
-    ", 'globalization': 'none'",
-    ", 'globalization': 'line_search'",
-    ", 'newton': 'modified', 'globalization': 'none'",
-    ", 'newton': 'modified', 'globalization': 'line_search'",
-    ", 'linear_solver': 'dense', 'globalization': 'none'",
-    ", 'predictor': 'rest', 'project': true, 'globalization': 'none'"};
-enum {
-    HOST_SETTINGS = 6,
-    HOST_UNPROJECTED = 5
-}; /* the last one projects: there negative Hessians are not a fault */
+static const char *const host_settings[] = {", 'globalization': 'none'", ", 'globalization': 'line_search'",
+                                            ", 'linear_solver': 'dense', 'globalization': 'none'",
+                                            ", 'predictor': 'rest', 'globalization': 'none'"};
+enum { HOST_SETTINGS = 4 };
 
 #endif

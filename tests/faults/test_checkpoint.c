@@ -178,7 +178,7 @@ START_TEST(forged_ones_crash_nothing)
     for (size_t i = 0; drape_integrators[i]; i++)
         if (!drape_integrators[i]->steady_state)
             forge(drape_integrators[i]->entry.name, "", i + 1);
-    forge("be", ", 'newton': 'modified', 'linear_solver': 'klu'", 99);
+    forge("be", ", 'linear_solver': 'klu'", 99);
 }
 END_TEST
 
@@ -249,7 +249,7 @@ END_TEST
 /* Each allocation of restoring, and of saving to a file, fails once. */
 START_TEST(without_memory_it_is_as_before)
 {
-    const char *const settings = ", 'newton': 'modified', 'linear_solver': 'pcg'";
+    const char *const settings = ", 'linear_solver': 'pcg'";
     char path[] = "/tmp/drape-memory-XXXXXX";
     int fd = mkstemp(path);
     ck_assert_int_ge(fd, 0);

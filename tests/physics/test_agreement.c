@@ -61,21 +61,9 @@ START_TEST(linear_solvers_agree)
 }
 END_TEST
 
-START_TEST(exact_and_modified_newton_agree)
-{
-    agree(", 'newton': 'exact'", ", 'newton': 'modified'");
-}
-END_TEST
-
 START_TEST(line_search_and_full_steps_agree)
 {
     agree(", 'globalization': 'line_search'", ", 'globalization': 'none'");
-}
-END_TEST
-
-START_TEST(projected_and_full_hessians_agree)
-{
-    agree(", 'project': true", ", 'project': false");
 }
 END_TEST
 
@@ -170,7 +158,6 @@ START_TEST(runs_repeat_bit_for_bit)
 }
 END_TEST
 
-SUITE("agreement", linear_solvers_agree, exact_and_modified_newton_agree, line_search_and_full_steps_agree,
-      projected_and_full_hessians_agree, predictors_agree, threads_do_not_change_a_bit,
-      frames_do_not_change_a_bit, one_advance_or_sixty, advances_that_cut_steps_end_in_time,
-      runs_repeat_bit_for_bit)
+SUITE("agreement", linear_solvers_agree, line_search_and_full_steps_agree, predictors_agree,
+      threads_do_not_change_a_bit, frames_do_not_change_a_bit, one_advance_or_sixty,
+      advances_that_cut_steps_end_in_time, runs_repeat_bit_for_bit)

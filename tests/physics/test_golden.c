@@ -27,10 +27,8 @@ END_TEST
 START_TEST(four_nodes_by_other_solvers)
 {
     compare(", 'linear_solver': 'dense'");
-    compare(", 'newton': 'modified'");
     compare(", 'globalization': 'line_search'");
     compare(", 'predictor': 'rest'");
-    compare(", 'project': true");
 }
 END_TEST
 

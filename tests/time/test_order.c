@@ -232,57 +232,6 @@ START_TEST(kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_fir
 }
 END_TEST
 
-/* ---- A solve that ends before its residual is small ---- */
-
-static drape_status note_tolerance(void *user, const drape_event *event)
-{
-    if (event->kind == DRAPE_EVENT_ATTEMPT)
-        *(double *)user = event->attempt->tolerance;
-    return DRAPE_OK;
-}
-
-/* Positions after a step of 20 ms of be; *matrices: that it took. Returns its bound on the residual. */
-static double turned(double correction_tolerance, double *x, int64_t *matrices)
-{
-    const drape_setting setting = {"correction_tolerance", correction_tolerance, NULL};
-    double tolerance = -1;
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
-    def.integrator = "be";
-    def.controller = "fixed";
-    def.dt = 1;
-    def.integrator_settings = &setting;
-    def.integrator_setting_count = isnan(correction_tolerance) ? 0 : 1;
-    scene s = sheet(DASHPOTS, HUNG, &def);
-    ck_assert_int_eq(drape_sim_observe(s.sim, note_tolerance, &tolerance), DRAPE_OK);
-    scene_advance(&s, 0.02);
-    memcpy(x, drape_sim_positions(s.sim), 3 * (size_t)s.model->node_count * sizeof *x);
-    *matrices = drape_sim_statistics(s.sim).jacobians;
-    scene_close(&s);
-    return tolerance;
-}
-
-/* A correction that contracts by half or better is at least half as long as what is left before it. A bound
- * on it ends the solve with no more matrices; the residual of that step has none. */
-START_TEST(correction_tolerance_bounds_what_a_solve_leaves)
-{
-    double exact[60], near[60];
-    int64_t most, matrices;
-    assert_below(turned(NAN, exact, &most), 1e-11);
-    for (double bound = 1e-2; bound > 1e-6; bound /= 100) {
-        double squared = 0;
-        const double tolerance = turned(bound, near, &matrices);
-        ck_assert(isnan(tolerance) || tolerance < 1e-11); /* a chord step may have ended it by the residual */
-        for (int i = 0; i < 60; i++)
-            squared += (near[i] - exact[i]) * (near[i] - exact[i]);
-        printf("# correction_tolerance %g m: %g m, %lld of %lld matrices\n", bound, sqrt(squared / 18),
-               (long long)matrices, (long long)most);
-        assert_below(sqrt(squared / 18), 2 * bound); /* 18 of 20 nodes are free */
-        ck_assert_int_le(matrices, most);
-    }
-}
-END_TEST
-
 /* ---- The error controller ---- */
 
 typedef struct step_log {
@@ -463,8 +412,8 @@ START_TEST(the_estimate_for_backward_euler_is_its_local_error)
 END_TEST
 
 SUITE("order", every_integrator_converges_with_the_order_it_declares, dirk_converges_with_each_of_its_orders,
-      correction_tolerance_bounds_what_a_solve_leaves, steps_of_changing_size_keep_the_order,
-      kinks_at_ends_of_steps_leave_the_order, kinks_without_dashpots_leave_the_order_too,
+      steps_of_changing_size_keep_the_order, kinks_at_ends_of_steps_leave_the_order,
+      kinks_without_dashpots_leave_the_order_too,
       kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_first,
       error_falls_with_the_controllers_rtol, steps_of_the_error_controller_change_gently,
       the_estimate_for_backward_euler_is_its_local_error)

@@ -222,7 +222,7 @@ static state open_state(int side, const char *terms)
     q.arena = drape_arena_create(q.s.ctx);
     ck_assert_int_eq(drape_system_create(q.arena, m, 1, &q.system), DRAPE_OK);
     ck_assert_int_eq(drape_state_create(q.arena, m, &q.at), DRAPE_OK);
-    ck_assert_int_eq(drape_approx_jacobian_create(q.arena, q.system, 0, &q.jacobian), DRAPE_OK);
+    ck_assert_int_eq(drape_approx_jacobian_create(q.arena, q.system, &q.jacobian), DRAPE_OK);
     q.point = (drape_point){.x = q.at.x, .v = q.at.v, .internal = q.at.internal, .weight = 60};
     q.x = calloc(q.n, sizeof *q.x);
     q.y = calloc(q.n, sizeof *q.y);
