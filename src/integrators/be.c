@@ -1,9 +1,10 @@
 /*
  * be: backward Euler, first order and L-stable. It damps oscillations that it cannot resolve: each step
- * multiplies an oscillator's energy by 1/(1 + (w h)^2). As in Baraff & Witkin 1998, but solved to a
- * tolerance instead of by one linear solve.
+ * multiplies an oscillator's energy by 1/(1 + (w h)^2). As in Baraff & Witkin 1998, but solved to a tolerance
+ * instead of by one linear solve.
  *     v1 = (x1 - x0)/h,  M (v1 - v0)/h + g(x1, v1) = 0,  q' = (q(x1) - q(x0))/h
- * With d = x1 - x0:  M (d - h v0)/h^2 + g(x0 + d, d/h) = 0.
+ * With d = x1 - x0:  M (d - h v0)/h^2 + g(x0 + d, d/h) = 0. The local error is h^2 a/2, half of d - h v0:
+ * that is q and C of nonlinear/stopping.h.
  */
 #include "integrators/implicit.h"
 

@@ -50,7 +50,9 @@ static const drape_param params[PARAM_COUNT] = {
         "error", "m", DRAPE_DERIVED("1e-3 times the diagonal of the rest bounding box"), DRAPE_ABOVE(0), 1e9,
         "further iterations follow until the estimated distance to the converged step, RMS over the nodes, "
         "is "
-        "at most this; not a bound on an accepted state"),
+        "at most this and, with factors, small beside the local error of the step; not a bound on an "
+        "accepted "
+        "state"),
     [PARAM_TOLERANCE] =
         DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,
                      "residual of the free nodes, largest component, below which no iteration is made, at "

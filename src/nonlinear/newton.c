@@ -16,10 +16,10 @@
  * KINSOL calls the stages between guess and conclude in each iteration: residual as its system function,
  * matrix as its Jacobian function and the setup of its linear solver, correct and estimate as the solve of
  * that. It adds p to d, counts iterations, and ends the loop when the largest component of F is within its
- * bound, when p is too short to change anything, when p is at its size limit five times in a row, or after
- * max_iterations. An island that is done gives KINSOL an F of 0, which its own test takes as converged, and
- * which keeps the island in its place. With `globalization: line_search` KINSOL shortens p itself, by the sum
- * of squares of F.
+ * bound (a guess: of 1 % of it), when p is too short to change anything, when p is at its size limit five
+ * times in a row, or after max_iterations. An island that is done gives KINSOL an F of 0, which its own test
+ * takes as converged, and which keeps the island in its place. With `globalization: line_search` KINSOL
+ * shortens p itself, by the sum of squares of F.
  *
  * Contact and the default globalization, `work`, are implemented here, inside `correct`: the solution that
  * KINSOL gets from its linear solver is the step to be taken. KINSOL's own line search can neither stop at
@@ -249,7 +249,8 @@ static void begin(drape_newton *s)
     double clock = drape_system_clock(e->system);
     drape_point start = e->point;
     start.x = e->x_start;
-    drape_stress_predictor_begin(&s->predictor, start.x ? &start : NULL);
+    drape_stress_predictor_begin(&s->predictor,
+                                 start.x && s->matrix->ops && s->matrix->ops->direct ? &start : NULL);
     e->work.jacobian_seconds += drape_system_clock(e->system) - clock;
 }
 
@@ -420,7 +421,7 @@ static bool correct_again(drape_newton *s, const double *d, const double *p, dou
     drape_stopping_estimate(&s->stopping, s->right, s->step);
     const double before = *length;
     *length = rms(e, s->step);
-    s->error = *length / (1 - fmin(*length / before, MAX_CONTRACTION));
+    s->error = s->matrix->ops->direct ? *length / (1 - fmin(*length / before, MAX_CONTRACTION)) : *length;
     return true;
 }
 
@@ -430,8 +431,8 @@ static bool correct_again(drape_newton *s, const double *d, const double *p, dou
  *     - if it and those that would follow, by their contraction (Hairer & Wanner 1996, IV.8), are as short as
  *       an effort asks. (Conjugate gradients leave stiff directions, in which little length has much energy:
  *       by them the length alone counts.)
- * It also does where one or two of them would lower the residual below its bound. Then they are made, as far
- * as that is feasible, unless they take conjugate gradients. */
+ * Then it is made, as far as it is feasible, unless it took conjugate gradients. Where one or two of them are
+ * likely to lower the residual below its bound they are made, too, and the residual decides. */
 static drape_status estimate(drape_newton *s, const double *d, bool definite, double *p)
 {
     drape_step_equation *e = s->equation;
