@@ -12,7 +12,7 @@
 #define END     0.5 /* [s] */
 #define REPEATS 3
 #define LONG    1.0 /* [s] CPU: longer runs are not repeated */
-#define POINTS 192 /* at most */
+#define POINTS  192 /* at most */
 
 typedef struct point {
     const char *integrator, *controller, *knob; /* knob: "dt" or "rtol" */
