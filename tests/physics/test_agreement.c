@@ -64,6 +64,7 @@ END_TEST
 START_TEST(line_search_and_full_steps_agree)
 {
     agree(", 'globalization': 'line_search'", ", 'globalization': 'none'");
+    agree(", 'globalization': 'work'", ", 'globalization': 'line_search'");
 }
 END_TEST
 
