@@ -321,6 +321,12 @@ const drape_contact *drape_system_contact(const drape_system *system)
     return system->contact;
 }
 
+bool drape_system_touches(const drape_system *system)
+{
+    double gap;
+    return system->contact && drape_contact_active(system->contact, &gap) > 0;
+}
+
 double drape_system_clock(const drape_system *system)
 {
     return drape_clock_seconds() - drape_contact_seconds(system->contact);

@@ -116,6 +116,9 @@ const atomic_bool *const *drape_system_cancel_flag(const drape_system *system);
 drape_status drape_system_add_contact(drape_system *system);
 const drape_contact *drape_system_contact(const drape_system *system); /* NULL: there is none */
 
+/* Whether a pair of contact was active where forces or a matrix were computed last; of this rank. */
+bool drape_system_touches(const drape_system *system);
+
 /* [s] A clock that stops during contact queries, which are timed separately: an interval measured by it
  * does not include contact. */
 double drape_system_clock(const drape_system *system);

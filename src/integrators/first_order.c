@@ -698,5 +698,5 @@ size_t drape_first_order_bytes(const void *state)
     if (s->n == 0)
         return 0;
     const size_t vectors = 8 + (size_t)s->solver->vectors(s); /* allocated here; by the library */
-    return 2 * (size_t)s->n * vectors * sizeof(double) + (s->linear ? drape_sun_linear_bytes(s->linear) : 0);
+    return 2 * (size_t)s->n * vectors * sizeof(double) + drape_sun_linear_bytes(s->linear);
 }

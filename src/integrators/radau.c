@@ -569,9 +569,7 @@ static void diagnose(radau_state *s, drape_step_info *info)
 static drape_status begin(radau_state *s, const drape_state *in, double stop)
 {
     const size_t nodes = 3 * (size_t)s->model->node_count;
-    const drape_contact *contact = drape_system_contact(s->system);
     polynomial *p = &s->next;
-    double gap;
     memcpy(s->x, in->x, nodes * sizeof *s->x);
     memcpy(s->v, in->v, nodes * sizeof *s->v);
     s->internal = in->internal;
@@ -590,7 +588,7 @@ static drape_status begin(radau_state *s, const drape_state *in, double stop)
     drape_system_force(s->system, &point, s->g);
     s->work.residuals++;
     s->nonfinite = !drape_all_finite(s->g, nodes);
-    s->touches = contact && drape_contact_active(contact, &gap) > 0;
+    s->touches = drape_system_touches(s->system);
     for (int64_t k = 0; k < s->n; k++)
         s->g0[k] = s->g[node_at(s, k)];
     if (drape_system_status(s->system))

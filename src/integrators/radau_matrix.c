@@ -319,5 +319,5 @@ void drape_radau_matrix_archive(drape_radau_matrix *m, drape_archive *a)
 
 size_t drape_radau_matrix_bytes(const drape_radau_matrix *m)
 {
-    return m->linear ? drape_sun_linear_bytes(m->linear) : 0;
+    return drape_sun_linear_bytes(m->linear);
 }

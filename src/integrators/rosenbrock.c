@@ -508,7 +508,7 @@ static void archive(void *state, drape_archive *a)
 static size_t bytes(const void *state)
 {
     const rosenbrock_state *s = state;
-    return s->linear ? drape_sun_linear_bytes(s->linear) : 0;
+    return drape_sun_linear_bytes(s->linear);
 }
 
 const drape_integrator_ops drape_integrator_rosenbrock = {

@@ -122,8 +122,7 @@ static void archive(void *matrix, drape_archive *a)
 
 static size_t bytes(const void *matrix)
 {
-    const drape_exact_jacobian *s = matrix;
-    return s->linear ? drape_sun_linear_bytes(s->linear) : 0;
+    return drape_sun_linear_bytes(((const drape_exact_jacobian *)matrix)->linear);
 }
 
 const drape_matrix_ops drape_exact_jacobian_ops = {.exact = true,

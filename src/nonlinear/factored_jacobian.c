@@ -362,8 +362,7 @@ static void archive(void *matrix, drape_archive *a)
 
 static size_t bytes(const void *matrix)
 {
-    const drape_factored_jacobian *s = matrix;
-    return s->linear ? drape_sun_linear_bytes(s->linear) : 0;
+    return drape_sun_linear_bytes(((const drape_factored_jacobian *)matrix)->linear);
 }
 
 const drape_matrix_ops drape_factored_jacobian_ops = {.direct = true,

@@ -104,12 +104,11 @@ struct drape_newton {
     double tolerance;    /* relative residual that iterative solvers leave */
     double rounding;     /* of F in its norm, as last estimated; INFINITY: it was not */
     double residual;     /* weighted, largest component, at the last iterate that KINSOL evaluated */
-    double start, left;  /* [N2] |F|^2 at the guess, and where it was evaluated last */
+    double start, left;  /* [N2] |F|^2 at the guess, and where it was evaluated last; if the effort keeps */
     double first, error; /* [m] RMS of the first correction, and of the last one or its estimate */
     double begun, seconds,
         further;          /* [s] when the last iteration began, what it took, of those beyond the least */
-    bool positive;        /* the present matrix has the positive parts; after a search, the next one has;
-                              with `project` every matrix has */
+    bool positive;        /* the present matrix has the positive parts; after a search, the next one has */
     bool indefinite;      /* the exact matrix was at the last iterate where it was tried */
     bool near_enough;     /* what is left is as short as the effort asks */
     drape_status failure; /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
@@ -133,10 +132,7 @@ static double max_norm_bound(const drape_newton *s)
 
 static bool is_in_contact(const drape_newton *s)
 {
-    double gap;
-    return s->fraction &&
-           drape_ranks_any(s->equation->ranks,
-                           drape_contact_active(drape_system_contact(s->equation->system), &gap) > 0);
+    return s->fraction && drape_ranks_any(s->equation->ranks, drape_system_touches(s->equation->system));
 }
 
 /* RMS over all nodes; pinned ones do not move. */
@@ -154,10 +150,8 @@ static void find_islands(drape_newton *s)
     if (s->version == drape_system_pattern_version(system))
         return;
     s->version = drape_system_pattern_version(system);
-    const bool strict = s->stopping.strict;
     if (drape_islands_find(&s->islands, drape_system_pattern(system)))
         drape_stopping_begin(&s->stopping);
-    s->stopping.strict = strict;
 }
 
 static drape_status assemble(drape_newton *s, const double *d, bool positive)
@@ -355,8 +349,10 @@ static int residual(N_Vector d_vector, N_Vector f, void *user)
         s->search.evaluated = false;
         finite = drape_step_equation_evaluate(e, d);
     }
-    s->left = drape_step_equation_dot(e, e->f, e->f);
-    s->start = isnan(s->start) ? s->left : s->start;
+    if (s->effort.keeps) {
+        s->left = drape_step_equation_dot(e, e->f, e->f);
+        s->start = isnan(s->start) ? s->left : s->start;
+    }
     const drape_status status = s->searches && finite ? judge_islands(s, &done) : DRAPE_OK;
     done = done || (finite && (s->near_enough || is_rounding(s, d, &finite)));
     const bool spent = finite && !done && is_late(s);
@@ -587,7 +583,8 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     drape_norm norm = (drape_norm)s->values[DRAPE_NEWTON_NORM];
     double tolerance = s->values[DRAPE_NEWTON_TOLERANCE];
     bool finite = !status || drape_step_equation_evaluate(e, d);
-    s->left = drape_step_equation_dot(e, e->f, e->f);
+    if (s->effort.keeps)
+        s->left = drape_step_equation_dot(e, e->f, e->f);
     report->tolerance = tolerance;
     report->residual = finite ? drape_step_equation_norm(e, norm) : NAN;
     report->diagnostic = drape_step_equation_diagnose(e, tolerance);

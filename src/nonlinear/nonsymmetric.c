@@ -75,10 +75,8 @@ static void list_blocks(drape_nonsymmetric *s)
  * them half a second after they had parted, in one of the pinches of the tests, and in none without. */
 static bool has_contact(const drape_system *system)
 {
-    double gap;
-    const drape_contact *contact = drape_system_contact(system);
-    return contact && drape_system_has_friction(system) && drape_contact_relaxed(contact)->count == 0 &&
-           drape_contact_active(contact, &gap) > 0;
+    return drape_system_has_friction(system) &&
+           drape_contact_relaxed(drape_system_contact(system))->count == 0 && drape_system_touches(system);
 }
 
 drape_status drape_nonsymmetric_update(drape_nonsymmetric *s, const drape_point *point, const double *terms)

@@ -27,7 +27,7 @@ void drape_stopping_end(drape_stopping *s)
 void drape_stopping_begin(drape_stopping *s)
 {
     drape_stopping_end(s);
-    s->ended_by_error = s->strict = false;
+    s->ended_by_error = false;
     for (int32_t k = 0; k < s->islands->count; k++)
         s->progress[k] = (drape_progress){.gain = NAN};
 }

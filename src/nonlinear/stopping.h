@@ -47,7 +47,7 @@ typedef struct drape_stopping {
     double *weight;           /* free nodes: of their residual in norms */
     bool by_error;            /* the second rule counts; set by the caller */
     bool ended_by_error;      /* it was needed in this solve */
-    bool strict;              /* it does not count in the rest of this solve */
+    bool strict;              /* it does not count in the rest of this solve; set by the caller, likewise */
 } drape_stopping;
 
 /* Errors: DRAPE_E_MEMORY. */

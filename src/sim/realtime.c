@@ -106,13 +106,6 @@ static double longest_step(const drape_realtime_memory *m)
     return m->touches || m->meets ? m->dt : m->longest;
 }
 
-static bool is_in_contact(const drape_sim *sim)
-{
-    const drape_contact *contact = drape_system_contact(sim->system);
-    double gap;
-    return contact && drape_contact_active(contact, &gap) > 0;
-}
-
 /* Steps at the lowest level of effort, longer than dt: as many as fit into the budget. If not even one
  * fits, one step for so many frames that it costs no more than their budgets together, and no step before
  * that many frames are owed. */
@@ -217,7 +210,7 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
         const double end = drape_clock_seconds();
         learn(sim, end - start - sim->further_seconds);
         learn_ending(&sim->realtime, end - sim->solved_at);
-        sim->realtime.touches = is_in_contact(sim);
+        sim->realtime.touches = drape_system_touches(sim->system);
         sim->realtime.unchecked |= attempt.accepted && pins_move_apart(sim);
         report->attempts++;
         report->rejected += !attempt.accepted;

@@ -258,5 +258,5 @@ void drape_sun_linear_destroy(drape_sun_linear **out)
 
 size_t drape_sun_linear_bytes(const drape_sun_linear *linear)
 {
-    return drape_linear_bytes(linear->ops, linear->state);
+    return linear ? drape_linear_bytes(linear->ops, linear->state) : 0;
 }

@@ -77,7 +77,7 @@ void drape_sun_linear_set_positions(drape_sun_linear *linear, const double *x, c
 
 void drape_sun_linear_destroy(drape_sun_linear **linear); /* call it before the arena is freed */
 
-/* Bytes that libraries took outside the arena. */
+/* Bytes that libraries took outside the arena; 0 for NULL. */
 size_t drape_sun_linear_bytes(const drape_sun_linear *linear);
 
 /* Archives the counted work and the state of the solver; `factors`: the present factors will be used again.
