@@ -441,8 +441,7 @@ static drape_status estimate(drape_newton *s, const double *d, bool definite, do
     double before = s->residual, length = s->error;
     for (int more = e->x_ahead ? 1 : MAX_CHORDS; more > 0; more--) {
         const double now = drape_step_equation_norm(e, DRAPE_NORM_MAX), ratio = now / before;
-        const bool by_residual =
-            direct && s->tolerance <= EXACT && now * (more > 1 ? ratio * ratio : ratio) <= bound;
+        const bool by_residual = direct && now * (more > 1 ? ratio * ratio : ratio) <= bound;
         drape_status status = DRAPE_OK;
         if (!(now > bound) || !(by_residual || by_gain || by_error) ||
             !correct_again(s, d, p, &length, &status))
