@@ -1,6 +1,7 @@
 /* sun_newton.c: see sun_newton.h. */
 #include "integrators/sun_newton.h"
 #include "base/elementary.h"
+#include "nonlinear/line_search.h"
 
 #include <math.h>
 #include <string.h>
@@ -14,10 +15,6 @@
 
 /* Of the damped iteration. */
 #define MAX_CORRECTIONS 20
-#define MAX_TRIALS      8   /* of a line search */
-#define WORK_FRACTION   0.5 /* a correction is long enough where the residual's work is this of its start */
-#define SHORTEST        0.1 /* factors between two trials of a line search */
-#define LONGEST         0.5
 #define CHORD_RATE      0.5 /* factors are used again while each correction is at most this of the last one */
 
 static SUNNonlinearSolverContent_Newton content_of(const drape_sun_newton *newton)
@@ -111,25 +108,24 @@ static double work_along(const drape_sun_newton *newton, N_Vector correction)
     return drape_ranks_sum(newton->ranks, work);
 }
 
-/* Moves y along the correction, as far as contact allows and as the residual does not push back by more
- * than a share of what it pushed at first. */
+/* Moves y along the correction by the rule of nonlinear/line_search.h, with the work of the residual of
+ * M v' + g, and as far as contact allows. */
 static int search(drape_sun_newton *newton, N_Vector y, N_Vector correction, void *library)
 {
-    const double before = work_along(newton, correction);
-    double fraction = 1;
-    for (int trial = 0; trial < MAX_TRIALS && before < 0; trial++) {
-        N_VLinearSum(1, y, fraction, correction, newton->trial);
-        int code = content_of(newton)->Sys(newton->trial, newton->residual, library);
+    drape_length l = drape_length_begin(work_along(newton, correction));
+    if (l.found)
+        return SUN_NLS_CONV_RECVR;
+    for (int trial = 0; trial < DRAPE_LENGTH_TRIALS && !l.found; trial++) {
+        N_VLinearSum(1, y, l.length, correction, newton->trial);
+        const int code = content_of(newton)->Sys(newton->trial, newton->residual, library);
         if (code < 0)
             return code;
-        double after = code ? INFINITY : work_along(newton, correction);
-        if (after <= -WORK_FRACTION * before) {
-            N_VScale(1, newton->trial, y);
-            return 0;
-        }
-        fraction *= fmax(SHORTEST, fmin(LONGEST, before / (before - after)));
+        l.end = code ? INFINITY : work_along(newton, correction);
+        drape_length_judge(&l, false);
     }
-    return SUN_NLS_CONV_RECVR;
+    if (l.found)
+        N_VScale(1, newton->trial, y);
+    return l.found ? 0 : SUN_NLS_CONV_RECVR;
 }
 
 /* Its factors serve for the next correction while corrections contract. A correction within the bound is the

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #define WORK_FRACTION 0.5 /* of the work at the start, which the residual may do at the end */
-#define MAX_TRIALS    8   /* points of a search */
 
 drape_status drape_line_search_init(drape_arena *arena, drape_step_equation *equation,
                                     const drape_islands *islands, drape_line_search *s)
@@ -47,8 +46,12 @@ static void try_lengths(drape_line_search *s, const double *d, const double *bef
         s->lengths[k].end = INFINITY;
 }
 
-/* After a trial: whether the length is found, else the next one. */
-static void judge(drape_length *l, bool lengthens)
+drape_length drape_length_begin(double start)
+{
+    return (drape_length){.length = 1, .start = start, .high = INFINITY, .found = !(start < 0)};
+}
+
+void drape_length_judge(drape_length *l, bool lengthens)
 {
     const double a = l->length;
     l->found = l->found || fabs(l->end) <= -WORK_FRACTION * l->start || (l->end < 0 && a == 1 && !lengthens);
@@ -71,13 +74,13 @@ static bool judge_all(drape_line_search *s, bool joint, bool lengthens)
         all.end += s->lengths[k].end;
     }
     if (joint)
-        judge(&all, lengthens);
+        drape_length_judge(&all, lengthens);
     for (int32_t k = 0; k < s->islands->count; k++) {
         drape_length *l = &s->lengths[k];
         if (joint)
             *l = (drape_length){all.length, l->start, l->end, all.low, all.high, all.found};
         else
-            judge(l, lengthens);
+            drape_length_judge(l, lengthens);
         found &= l->found;
     }
     return found;
@@ -107,11 +110,11 @@ void drape_line_search_along(drape_line_search *s, const double *d, const double
         start += s->lengths[k].end;
     for (int32_t k = 0; k < count; k++) {
         const double own = s->lengths[k].end;
-        s->lengths[k] = (drape_length){
-            .length = 1, .start = own, .high = INFINITY, .found = !((joint ? start : own) < 0)};
+        s->lengths[k] = drape_length_begin(joint ? start : own);
+        s->lengths[k].start = own;
     }
     bool found = false;
-    for (int trial = 0; trial < MAX_TRIALS && !found; trial++) {
+    for (int trial = 0; trial < DRAPE_LENGTH_TRIALS && !found; trial++) {
         s->evaluated = false;
         if (!stays_feasible(s, d, p, longest))
             break;

@@ -20,6 +20,15 @@ typedef struct drape_length {
     bool found;
 } drape_length;
 
+#define DRAPE_LENGTH_TRIALS 8 /* of a search */
+
+/* start: the work at a = 0, where a = 1 is tried first. */
+drape_length drape_length_begin(double start);
+
+/* After a trial of its length, with `end` set: whether it is found, else the next one. lengthens: lengths
+ * above 1 are tried, too. */
+void drape_length_judge(drape_length *length, bool lengthens);
+
 typedef struct drape_line_search {
     drape_step_equation *equation;
     const drape_islands *islands;
