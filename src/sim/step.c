@@ -53,8 +53,9 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
         return DRAPE_RETRY_NONLINEAR;
     }
     const drape_state *before = drape_sim_state(sim);
-    drape_status status =
-        drape_system_check_contact(sim->system, next->x, next->t, &info->reason, &info->diagnostic);
+    drape_status status = drape_system_agree(sim->system); /* of contact as its energy was measured */
+    if (!status)
+        status = drape_system_check_contact(sim->system, next->x, next->t, &info->reason, &info->diagnostic);
     if (status || info->lenient)
         return status;
     return drape_system_check(sim->system, next->x, before->x, before->internal, &info->reason,
