@@ -176,7 +176,7 @@ static void set_equation(alpha_state *s, const drape_state *in, double h, const 
         const double v = in->v[at], a = s->a0[at], mass = e->model->mass[at / 3];
         e->v_base[at] = (1 - k->c / k->b) * v + h * (1 - k->c / (2 * k->b)) * a;
         e->inertia[i] = h * v + h * h * (0.5 - k->b) * a - (k->m * a + k->f * s->g0[at] / mass) / share;
-        common->d[i] = common->inertial_guess ? h * v : 0;
+        common->d[i] = h * v;
     }
 }
 

@@ -26,7 +26,6 @@ drape_status drape_implicit_init_newton(drape_arena *arena, drape_system *system
 {
     drape_status status = drape_ranks_agree(drape_model_ranks(drape_system_model(system)), arena->ctx,
                                             drape_implicit_init(arena, system, s));
-    s->inertial_guess = values[DRAPE_NEWTON_PREDICTOR] == DRAPE_NEWTON_PREDICTOR_INERTIAL;
     return status ? status : drape_newton_create(arena, &s->equation, values, NULL, &s->newton);
 }
 
@@ -145,9 +144,7 @@ void drape_implicit_measure(const drape_implicit *s, double t, const double *x, 
 
 drape_status drape_implicit_solve(drape_implicit *s, drape_step_info *info)
 {
-    const drape_step_equation *e = &s->equation;
-    for (size_t i = 0; i < e->dofs; i++)
-        s->d[i] = s->inertial_guess ? e->inertia[i] : 0;
+    memcpy(s->d, s->equation.inertia, s->equation.dofs * sizeof *s->d);
     return drape_implicit_solve_from(s, info);
 }
 

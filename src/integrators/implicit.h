@@ -17,7 +17,6 @@ typedef struct drape_implicit {
     double *history;      /* measures; NULL if no law needs rates */
     double *dissipated;   /* nodes; NULL if nothing dissipates */
     double *momentum[2];  /* nodes: at the beginning and at the end of a stage; NULL if no term has any */
-    bool inertial_guess;  /* d = p; else d = 0 */
 } drape_implicit;
 
 /* For integrators that embed it: without a solver, or with Newton's. Errors: as for drape_newton_create. */
@@ -73,7 +72,7 @@ void drape_implicit_set_momenta(drape_implicit *implicit, double rate, double a,
 /* Computes q (measures) at t, x in the step, if a law needs rates. */
 void drape_implicit_measure(const drape_implicit *implicit, double t, const double *x, double *q);
 
-/* Solves for d by Newton's method, from the guess chosen by the parameters, or from the present d. Adds the
+/* Solves for d by Newton's method, from the guess d = p, or from the present d. Adds the
  * iterations to info. */
 drape_status drape_implicit_solve(drape_implicit *implicit, drape_step_info *info);
 drape_status drape_implicit_solve_from(drape_implicit *implicit, drape_step_info *info);

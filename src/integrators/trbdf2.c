@@ -74,7 +74,7 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
         double flight = 2 / w * in->v[at];
         e->v_base[at] = -in->v[at];
         e->inertia[i] = flight - s->g0[at] / (e->model->mass[at / 3] * w * w);
-        c->d[i] = c->inertial_guess ? flight : 0;
+        c->d[i] = flight;
     }
     drape_implicit_momentum(c, in->t, in->x, in->v, s->p0);
     drape_implicit_set_momenta(c, w, 1, s->p0, 0, NULL);
@@ -88,8 +88,7 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
 }
 
 /* The second stage, to out. Pins get their velocity from the same formula, which is that of their track
- * unless there is a kink in the step. The guess of predictor rest is d = 0: x1 from xg and x0, with zero
- * velocity. */
+ * unless there is a kink in the step. */
 static drape_status differentiate(trbdf2_state *s, const drape_state *in, double h, double w,
                                   drape_state *out, drape_step_info *info)
 {
@@ -106,7 +105,7 @@ static drape_status differentiate(trbdf2_state *s, const drape_state *in, double
         size_t at = drape_step_equation_at(e, i);
         e->x_base[at] = A1 * s->xg[at] - A0 * in->x[at];
         e->inertia[i] = (A1 * s->vg[at] - A0 * in->v[at]) / w;
-        c->d[i] = c->inertial_guess ? e->inertia[i] : 0;
+        c->d[i] = e->inertia[i];
     }
     if (s->p0)
         memcpy(c->momentum[0], c->momentum[1], e->nodes * sizeof *s->p0);

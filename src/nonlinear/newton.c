@@ -252,9 +252,8 @@ static void begin(drape_newton *s)
 static bool linearizes(const drape_newton *s)
 {
     const drape_step_equation *e = s->equation;
-    return s->searches && !s->fraction && e->x_start &&
-           s->values[DRAPE_NEWTON_PREDICTOR] == DRAPE_NEWTON_PREDICTOR_INERTIAL &&
-           e->pins_ahead > MAX_AHEAD * s->edge && drape_step_equation_pins_move(e);
+    return s->searches && !s->fraction && e->x_start && e->pins_ahead > MAX_AHEAD * s->edge &&
+           drape_step_equation_pins_move(e);
 }
 
 /* Where a pin takes a sheet along, nodes that keep their velocity stay behind. The elements at the pin are

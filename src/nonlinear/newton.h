@@ -19,7 +19,6 @@ enum {
     DRAPE_NEWTON_MAX_ITERATIONS,
     DRAPE_NEWTON_ON_FAILURE,
     DRAPE_NEWTON_GLOBALIZATION,
-    DRAPE_NEWTON_PREDICTOR,
     DRAPE_NEWTON_LINEAR_SOLVER,
     DRAPE_NEWTON_LINEAR_TOLERANCE,
     DRAPE_NEWTON_PARAM_COUNT
@@ -29,7 +28,6 @@ enum {
 extern const char *const drape_newton_norms[];
 extern const char *const drape_newton_failures[];
 extern const char *const drape_newton_globalizations[];
-extern const char *const drape_newton_predictors[];
 
 /* The list of an integrator without parameters of its own. */
 extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
@@ -59,11 +57,6 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
         "none: full Newton steps, failures go to the controller; line_search: steps shortened until the "    \
         "residual falls; work: steps shortened until the work of the residual along them falls, with "       \
         "positive matrices after short steps and where the exact one is indefinite; auto: work"),            \
-    [DRAPE_NEWTON_PREDICTOR] = DRAPE_CHOICE(                                                                 \
-        "predictor", DRAPE_NEWTON_PREDICTOR_INERTIAL, drape_newton_predictors,                               \
-        "guess; inertial: the nodes keep their velocity or, in be where pins move and no contact is "        \
-        "possible, solve the linearized equation; rest: they stay where they are, as in the "                \
-        "DEP report"),                                                                                       \
     [DRAPE_NEWTON_LINEAR_SOLVER] =                                                                           \
         DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver",                     \
                      .aliases = drape_linears_aliases),                                                      \
@@ -79,7 +72,6 @@ enum {
     DRAPE_NEWTON_GLOBAL_WORK,
     DRAPE_NEWTON_GLOBAL_AUTO
 };
-enum { DRAPE_NEWTON_PREDICTOR_INERTIAL, DRAPE_NEWTON_PREDICTOR_REST };
 
 typedef struct drape_newton drape_newton;
 

@@ -927,7 +927,7 @@ def variants():
                             "transform": {"scale": 2, "rotate": [0, 1, 0, 90], "translate": [0, 0, 1]}})
     yield True, scene(pins=[{"nodes": [0, 3]}, {"row": 1}, {"edge": "top"}, {"box": [[0, 0, 0], [1, 1, 1]]},
                             {"nodes": [15], "track": [[0, [0, 0, 0]], [1, [0, 1, 0]]]}])
-    yield True, scene(integrator={"method": "be", "predictor": "rest", "norm": "l2", "max_iterations": 6})
+    yield True, scene(integrator={"method": "be", "norm": "l2", "max_iterations": 6})
     ball = {"type": "sphere", "center": [0, -5, 0], "radius": 1}
     for more in ({}, {"friction": 0}, {"friction": 1000, "name": "b", "track": [[0, [0, 0, 0]], [1, [0, 1, 0]]]}):
         yield True, scene(colliders=[{**ball, **more}])

@@ -253,8 +253,7 @@ END_TEST
 START_TEST(every_newton_variant_resumes)
 {
     static const char *const settings[] = {", 'globalization': 'none'", ", 'globalization': 'line_search'",
-                                           ", 'on_failure': 'accept', 'max_iterations': 1",
-                                           ", 'predictor': 'rest'"};
+                                           ", 'on_failure': 'accept', 'max_iterations': 1"};
     static const char *const methods[] = {"be", "bdf2", "trbdf2"};
     for (size_t i = 0; i < sizeof settings / sizeof *settings; i++)
         for (size_t k = 0; k < sizeof methods / sizeof *methods; k++) {

@@ -223,8 +223,7 @@ static inline void host_check_message(const host_sim *s, const char *reason)
 /* The settings of Newton's method that its reaction to faults depends on. The line search by work is not
  * among them: if a matrix is singular or not finite, it asks for another one and gets a good one. */
 static const char *const host_settings[] = {", 'globalization': 'none'", ", 'globalization': 'line_search'",
-                                            ", 'linear_solver': 'dense', 'globalization': 'none'",
-                                            ", 'predictor': 'rest', 'globalization': 'none'"};
-enum { HOST_SETTINGS = 4 };
+                                            ", 'linear_solver': 'dense', 'globalization': 'none'"};
+enum { HOST_SETTINGS = 3 };
 
 #endif

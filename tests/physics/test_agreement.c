@@ -68,12 +68,6 @@ START_TEST(line_search_and_full_steps_agree)
 }
 END_TEST
 
-START_TEST(predictors_agree)
-{
-    agree(", 'predictor': 'inertial'", ", 'predictor': 'rest'");
-}
-END_TEST
-
 static uint64_t hash_after(const drape_sim_def *def, double t)
 {
     scene s = hung("");
@@ -159,6 +153,6 @@ START_TEST(runs_repeat_bit_for_bit)
 }
 END_TEST
 
-SUITE("agreement", linear_solvers_agree, line_search_and_full_steps_agree, predictors_agree,
-      threads_do_not_change_a_bit, frames_do_not_change_a_bit, one_advance_or_sixty,
-      advances_that_cut_steps_end_in_time, runs_repeat_bit_for_bit)
+SUITE("agreement", linear_solvers_agree, line_search_and_full_steps_agree, threads_do_not_change_a_bit,
+      frames_do_not_change_a_bit, one_advance_or_sixty, advances_that_cut_steps_end_in_time,
+      runs_repeat_bit_for_bit)

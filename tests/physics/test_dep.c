@@ -31,7 +31,7 @@ START_TEST(the_reports_own_mode_never_claims_convergence)
                                   1e5,
                                   "report",
                                   ", 'max_iterations': 6, 'on_failure': 'accept', 'globalization': 'none',"
-                                  "'predictor': 'rest', 'norm': 'l1', 'tolerance': 9.62e-7"};
+                                  "'norm': 'l1', 'tolerance': 9.62e-7"};
     dep_log log = {.honest = true, .converged = true};
     scene s = dep_scene(&mode);
     ck_assert_int_eq(drape_sim_observe(s.sim, dep_note, &log), DRAPE_OK);

@@ -28,7 +28,6 @@ START_TEST(four_nodes_by_other_solvers)
 {
     compare(", 'linear_solver': 'dense'");
     compare(", 'globalization': 'line_search'");
-    compare(", 'predictor': 'rest'");
 }
 END_TEST
 
