@@ -1183,7 +1183,8 @@ typedef struct drape_energy {
     double elastic; /* [J] of all terms that have an energy, and of drape_sim_set_drag_spring */
     double gravity; /* [J] of the weight, zero at the origin, and of loads with a potential, such as -p V of
                           load.pressure, or that of steady wind on air.added_mass */
-    double contact; /* [J] of pairs that are closer than their activation distance */
+    double contact; /* [J] of pairs that are closer than their activation distance; NaN, and `numerical` too:
+                       there was no memory to find them */
     double dissipated; /* [J] work taken by damping and drag terms since t = 0 or drape_sim_set_state */
     double numerical;  /* [J] the rest of the balance, after the work of moving pins and colliders and of
                           drape_sim_push: the integrator's own dissipation; negative: a gain */

@@ -1015,7 +1015,7 @@ double drape_system_contact_energy(drape_system *system, const drape_point *poin
     if (!system->contact)
         return 0;
     const bool found = evaluate_contact(system, point);
-    return drape_ranks_all(system->ranks, found) ? drape_contact_potential(system->contact) : 0;
+    return drape_ranks_all(system->ranks, found) ? drape_contact_potential(system->contact) : NAN;
 }
 
 /* ---- One part alone ---- */

@@ -252,7 +252,8 @@ void drape_system_dissipation(drape_system *system, const drape_point *point, do
  * drape_system_dissipation (collider_count), with the sign of g; NULL without contact. */
 const drape_load *drape_system_on_colliders(const drape_system *system);
 
-/* Energies of the terms, elastic and gravitational [J]; energy of contact [J]. */
+/* Energies of the terms, elastic and gravitational [J]; energy of contact [J], NaN where drape_system_status
+ * says why it is not known. */
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity);
 double drape_system_contact_energy(drape_system *system, const drape_point *point);
 

@@ -2,10 +2,10 @@
  * newton_k: backward Euler with a few inexact Newton iterations in each step, for real time (Dembo, Eisenstat
  * & Steihaug 1982). be.c solves the same equation by the same kernel, nonlinear/newton.h; here
  *     - the matrix is only near the Jacobian, and cheaper (nonlinear/matrix.h),
- *     - a solve also ends when the estimated error is within a bound in metres, and after a number of
- *       iterations, or when its time is spent, in any case. If then neither the residual nor the estimate is
- *       below that of the guess, the step is refused, so that the controller halves it: no step is accepted
- *       unchecked.
+ *     - a solve also ends when the estimated error is within a bound in metres and, by factors, what is left
+ *       small beside the local error of the step; and after a number of iterations, or when its time is
+ *       spent, in any case. If then neither the residual nor the estimate is below that of the guess, the
+ *       step is refused, so that the controller halves it: no step is accepted unchecked.
  *
  * The guess extrapolates the motion, with a share s of the last change of velocity,
  *     d = h v0 + s h^2 (v0 - v-1)/h0

@@ -426,7 +426,8 @@ static bool correct_again(drape_newton *s, const double *d, const double *p, dou
  *     - if it and those that would follow, by their contraction (Hairer & Wanner 1996, IV.8), are as short as
  *       an effort asks. (Conjugate gradients leave stiff directions, in which little length has much energy:
  *       by them the length alone counts.)
- * Then it is made, as far as it is feasible, unless it took conjugate gradients. Where one or two of them are
+ * By the first of these islands end each by itself. Then it is made, as far as the search says, if it is
+ * feasible, unless it took conjugate gradients. Where one or two of them are
  * likely to lower the residual below its bound they are made, too, and the residual decides. */
 static drape_status estimate(drape_newton *s, const double *d, bool definite, double *p)
 {
@@ -445,17 +446,19 @@ static drape_status estimate(drape_newton *s, const double *d, bool definite, do
         if (!(now > bound) || !(by_residual || by_gain || by_error) ||
             !correct_again(s, d, p, &length, &status))
             return status < 0 ? status : DRAPE_OK;
-        const bool small = drape_stopping_is_small(&s->stopping), ends = by_gain && small;
-        s->near_enough = by_error && s->error <= effort->error && (small || !direct);
-        if (ends)
-            drape_stopping_finish(&s->stopping);
-        if (!direct || !(ends || s->near_enough || by_residual) ||
-            drape_step_equation_make_feasible(e, s->step) < 1)
+        const bool near =
+            by_error && s->error <= effort->error && (drape_stopping_is_small(&s->stopping) || !direct);
+        const bool made =
+            direct && (near || by_residual || (by_gain && drape_stopping_keep_small(&s->stopping, s->step)));
+        s->near_enough = near;
+        if (by_gain)
+            drape_stopping_finish_small(&s->stopping);
+        if (!made || drape_step_equation_make_feasible(e, s->step) < 1)
             return DRAPE_OK;
         drape_line_search_along(&s->search, d, p, 1, s->step);
         for (size_t i = 0; i < e->dofs; i++)
             p[i] += s->step[i];
-        if (ends || s->near_enough || !s->search.evaluated || s->search.shortest < 1)
+        if (!by_residual || near || !s->search.evaluated || s->search.shortest < 1)
             return DRAPE_OK;
         before = now;
     }

@@ -110,19 +110,34 @@ void drape_stopping_estimate(drape_stopping *s, const double *d, const double *p
             s->progress[k].gain = fmax(work[k], 0);
 }
 
+static bool is_small(const drape_progress *q)
+{
+    return q->done || q->gain <= SHARE * q->own;
+}
+
 bool drape_stopping_is_small(const drape_stopping *s)
 {
     bool small = true;
     for (int32_t k = 0; k < s->islands->count; k++)
-        small &= s->progress[k].done || s->progress[k].gain <= SHARE * s->progress[k].own;
+        small &= is_small(&s->progress[k]);
     return small;
 }
 
-void drape_stopping_finish(drape_stopping *s)
+bool drape_stopping_keep_small(const drape_stopping *s, double *p)
+{
+    bool any = false;
+    for (int32_t k = 0; k < s->islands->count; k++)
+        any |= !s->progress[k].done && is_small(&s->progress[k]);
+    for (size_t i = 0; i < s->equation->dofs; i++)
+        p[i] = is_small(&s->progress[s->islands->of[i / 3]]) ? p[i] : 0;
+    return any;
+}
+
+void drape_stopping_finish_small(drape_stopping *s)
 {
     for (int32_t k = 0; k < s->islands->count; k++)
-        s->progress[k].done = true;
-    s->ended_by_error = true;
+        if (!s->progress[k].done && is_small(&s->progress[k]))
+            s->progress[k].done = s->ended_by_error = true;
     leave_done(s);
 }
 

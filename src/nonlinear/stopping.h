@@ -1,6 +1,7 @@
 /*
  * stopping.h: when a solve is good enough. Every island is judged by itself, and keeps its place once it is
- * done; the solve ends when all are. An island is done by one of two rules:
+ * done; the solve ends when all are. An island is done by one of two rules (newton.c has the others, which
+ * look at all islands together: rounding, and what an effort asks):
  *
  *     residual     no weighted component of F is above the bound
  *     local error  a correction p gains little beside the error that the step has even if its equation is
@@ -74,8 +75,11 @@ void drape_stopping_estimate(drape_stopping *stopping, const double *d, const do
 /* Whether the last corrections of all islands gain little beside their local error. */
 bool drape_stopping_is_small(const drape_stopping *stopping);
 
-/* Ends all islands by their local error. */
-void drape_stopping_finish(drape_stopping *stopping);
+/* Leaves of that correction only the parts of islands where that is so; false if all of them are done. */
+bool drape_stopping_keep_small(const drape_stopping *stopping, double *p);
+
+/* Ends these by their local error. */
+void drape_stopping_finish_small(drape_stopping *stopping);
 
 /* -F . p of the last corrections of all islands [J]; false if there was none. */
 bool drape_stopping_left(const drape_stopping *stopping, double *left);

@@ -87,7 +87,7 @@ drape_energy drape_sim_energy(drape_sim *sim)
     const drape_state *state = drape_sim_state(sim);
     if (!sim->energy_known)
         sim->energy = measure(sim, state, state->internal, sim->audit.dissipated, sim->audit.pin_work);
-    sim->energy_known = true;
+    sim->energy_known = !isnan(sim->energy.contact);
     return sim->energy;
 }
 

@@ -44,7 +44,14 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
         return DRAPE_OK;
     sim->attempted_known = false;
     drape_sim_settle_residual(sim, next, info);
-    if (!info->lenient && drape_sim_ran_away(sim, next, info)) {
+    const bool away = !info->lenient && drape_sim_ran_away(sim, next, info);
+    const drape_status measured = drape_system_agree(sim->system);
+    if (measured) {
+        info->reason =
+            drape_reason_name(measured == DRAPE_E_STOPPED ? DRAPE_REASON_CANCELLED : DRAPE_REASON_MEMORY);
+        return measured;
+    }
+    if (away) {
         info->reason = drape_reason_name(DRAPE_REASON_ENERGY);
         return DRAPE_RETRY_REJECTED;
     }
@@ -53,9 +60,8 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
         return DRAPE_RETRY_NONLINEAR;
     }
     const drape_state *before = drape_sim_state(sim);
-    drape_status status = drape_system_agree(sim->system); /* of contact as its energy was measured */
-    if (!status)
-        status = drape_system_check_contact(sim->system, next->x, next->t, &info->reason, &info->diagnostic);
+    const drape_status status =
+        drape_system_check_contact(sim->system, next->x, next->t, &info->reason, &info->diagnostic);
     if (status || info->lenient)
         return status;
     return drape_system_check(sim->system, next->x, before->x, before->internal, &info->reason,
@@ -310,6 +316,7 @@ static bool must_repeat(drape_sim *sim, const double memory[2], drape_step_info 
     drape_event_verdict verdict = drape_events_examine(sim, next_state(sim), stop);
     if (verdict == DRAPE_EVENTS_REPEAT && cut_on_dense_output(sim, info))
         verdict = drape_events_examine(sim, next_state(sim), stop);
+    *stop = *stop ? *stop : drape_system_status(sim->system);
     if (verdict == DRAPE_EVENTS_PASS)
         return false;
     memcpy(sim->scratch, memory, sizeof sim->scratch);

@@ -531,7 +531,8 @@ static scene sliding(const char *matrix, double rtol)
 }
 
 /* The equations are the same for both matrices, and so is the error, up to the difference between two
- * sequences of steps, a factor of 2. Work: the symmetric part needs at most a quarter more iterations. */
+ * sequences of steps, a factor of 2. Work: the symmetric part saves half of the factorisation, and so may
+ * take up to half more iterations. */
 START_TEST(half_of_the_matrix_does_as_well)
 {
     scene reference = sliding("exact", 1e-7), exact = sliding("exact", 1e-4),
@@ -548,7 +549,7 @@ START_TEST(half_of_the_matrix_does_as_well)
            work_of_part);
     ck_assert(drape_sim_hash(exact.sim) != drape_sim_hash(part.sim));
     assert_below(error_of_part, 2 * error);
-    assert_below(work_of_part, 1.25 * work);
+    assert_below(work_of_part, 1.5 * work);
     scene_close(&reference);
     scene_close(&exact);
     scene_close(&part);

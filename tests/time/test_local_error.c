@@ -81,22 +81,35 @@ START_TEST(solves_end_at_the_same_iteration_in_all_units)
 END_TEST
 
 /* A heavy cloth in free fall has far more energy of inertia, and takes two iterations, fewer than the sheet
- * takes. The positions may differ by rounding, as the factorisation has another order. */
+ * takes; one that hangs takes more in some steps. The positions may differ by rounding, as the factorisation
+ * has another order. */
 START_TEST(a_stranger_changes_no_end)
 {
-    static const char stranger[] =
-        ", {'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 2, 'height': 2, 'transform':"
-        "{'translate': [100, 0, 0]}}, 'material': {'young_modulus': 1e6, 'thickness': 1e-3,"
-        "'areal_density': 1000}, 'terms': ['stretch.cst'], 'velocity': [300, 0, 0]}";
+    static const char *const strangers[] = {"'thickness': 1e-3, 'areal_density': 1000}, 'terms': "
+                                            "['stretch.cst'], 'velocity': [300, 0, 0]}",
+                                            "'thickness': 1e-3, 'areal_density': 0.3}, 'terms': "
+                                            "['stretch.cst'], 'pins': [{'nodes': [0]}]}"};
     static course alone, beside;
     for (size_t m = 0; m < sizeof methods / sizeof *methods; m++) {
+        int later = 0;
         run(metres, methods[m], "", "", &alone);
-        run(metres, methods[m], "", stranger, &beside);
-        for (int i = 0; i < STEPS; i++)
-            ck_assert_int_eq(alone.iterations[i] > 2 ? alone.iterations[i] : 2,
-                             beside.iterations[i] > 2 ? beside.iterations[i] : 2);
-        for (int i = 0; i < 3 * SIDE * SIDE; i++)
-            ck_assert_double_eq_tol(alone.x[i], beside.x[i], 1e-9);
+        for (size_t k = 0; k < sizeof strangers / sizeof *strangers; k++) {
+            char stranger[400];
+            snprintf(stranger, sizeof stranger,
+                     ", {'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 2, 'height': 2, "
+                     "'transform': {'translate': [100, 0, 0]}}, 'material': {'young_modulus': 1e9, %s",
+                     strangers[k]);
+            run(metres, methods[m], "", stranger, &beside);
+            for (int i = 0; i < STEPS; i++) {
+                ck_assert(k == 1 || beside.iterations[i] <= 2 || beside.iterations[i] == alone.iterations[i]);
+                ck_assert_int_ge(beside.iterations[i], alone.iterations[i]);
+                later += k == 1 && beside.iterations[i] > alone.iterations[i];
+            }
+            for (int i = 0; i < 3 * SIDE * SIDE; i++)
+                ck_assert_double_eq_tol(alone.x[i], beside.x[i], 1e-9);
+        }
+        printf("# %s: %d steps end later beside a sheet that hangs\n", methods[m], later);
+        ck_assert_int_gt(later, 0);
     }
 }
 END_TEST
