@@ -29,8 +29,6 @@ enum {
     PARAM_ITERATIONS,
     PARAM_ERROR,
     PARAM_TOLERANCE,
-    PARAM_RESCUE_ITERATIONS,
-    PARAM_EXTRAPOLATION,
     PARAM_LINEAR_TOLERANCE,
     PARAM_LINEAR_ITERATIONS,
     PARAM_CORRECTIONS,
@@ -48,20 +46,14 @@ static const drape_param params[PARAM_COUNT] = {
         DRAPE_INTEGER("iterations", "1", 1, 1, 1000, "least number of inexact Newton iterations in a step"),
     [PARAM_ERROR] = DRAPE_NUMBER(
         "error", "m", DRAPE_DERIVED("1e-3 times the diagonal of the rest bounding box"), DRAPE_ABOVE(0), 1e9,
-        "further iterations follow until the estimated distance to the converged step, RMS over the nodes, "
-        "is at most this and, with factors, small beside the local error of the step; not a bound on an "
-        "accepted state"),
+        "up to 20 further iterations follow until the estimated distance to the converged step, RMS over the "
+        "nodes, is at most this and, with factors, small beside the local error of the step; not a bound on "
+        "an accepted state, but one that is not nearer than the guess, or further off than the scene is "
+        "large, is rejected"),
     [PARAM_TOLERANCE] =
         DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,
                      "residual of the free nodes, largest component, below which no iteration is made, at "
                      "most 1 % of their load; not a bound on an accepted state"),
-    [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 20, 0, 100000,
-                                              "up to so many further iterations; a step that then is not "
-                                              "nearer than the guess, or further off than "
-                                              "the scene is large, is rejected"),
-    [PARAM_EXTRAPOLATION] =
-        DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
-                     "largest fraction of the last change of velocity that is added to the guess"),
     [PARAM_LINEAR_TOLERANCE] = DRAPE_NUMBER("linear_tolerance", "1", 0.1, 1e-14, DRAPE_BELOW(1),
                                             "conjugate gradients reduce the residual of a correction to this "
                                             "fraction at steps of 1/60 s; proportional to the step"),
@@ -76,6 +68,8 @@ static const drape_param params[PARAM_COUNT] = {
 };
 
 #define ERROR_SHARE         1e-3     /* default of error, of the size of the scene */
+#define MOST_FURTHER        20       /* iterations beyond the least */
+#define MOST_EXTRAPOLATED   0.5      /* of the last change of velocity */
 #define SHORTER             0.999999 /* of a step: not by the rounding of its time */
 #define NOMINAL_RATE        60.      /* [1/s] linear_tolerance applies to steps of 1/60 s */
 #define MAX_LINEAR_RESIDUAL 0.5      /* relative residual left at any step size */
@@ -175,7 +169,7 @@ static void guess(newton_k *s, const drape_state *in, double h)
     if (before < SHORTER * h)
         before = h;
     if (!isnan(before) && !s->touched)
-        share = fmin(s->values[PARAM_EXTRAPOLATION], correlation(s, in)) * h * h / before;
+        share = fmin(MOST_EXTRAPOLATED, correlation(s, in)) * h * h / before;
     for (size_t i = 0; i < e->dofs; i++) {
         size_t at = drape_step_equation_at(e, i);
         s->common.d[i] = e->inertia[i];
@@ -208,7 +202,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     const int least = iterations ? iterations : (int)s->values[PARAM_ITERATIONS];
     const drape_newton_effort effort = {
         .least = least,
-        .most = least + (int)s->values[PARAM_RESCUE_ITERATIONS],
+        .most = least + MOST_FURTHER,
         .error = s->values[PARAM_ERROR],
         .deadline = s->deadline,
         .keeps = true,

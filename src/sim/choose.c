@@ -19,7 +19,8 @@ static const choice controllers = {"/controller", "type", &drape_controller_regi
 /* Former settings of integrators, which made up for what the nonlinear solver now does by itself. The schema
  * of a scene has them no more. */
 static const char *const retired[] = {
-    "coarse_spacing", "correction_tolerance", "forcing", "newton", "predictor", "project"};
+    "coarse_spacing", "correction_tolerance", "extrapolation", "forcing", "newton", "predictor",
+    "project",        "rescue_iterations"};
 
 static bool is_listed(const char *const *names, size_t count, const char *name)
 {

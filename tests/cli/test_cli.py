@@ -276,7 +276,7 @@ def test_former_settings():
     """settings of integrators that have gone have no effect, and a line says so; other names are refused"""
     write_scene()
     expected = good("run", "scene.json")
-    for name in "coarse_spacing", "correction_tolerance", "forcing", "newton", "predictor", "project":
+    for name in "coarse_spacing", "correction_tolerance", "extrapolation", "forcing", "newton", "predictor", "project", "rescue_iterations":
         result = drape("run", "scene.json", "--set", f"/integrator/{name}=1")
         equal(result.returncode, 0, result.stderr)
         equal(result.stderr.splitlines(True)[0], f"warning: /integrator/{name}: has no effect any more\n")
