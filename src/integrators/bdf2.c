@@ -98,14 +98,17 @@ static void expect(bdf2_state *s, const drape_state *in, double h, double r)
     drape_step_equation *e = &s->common.equation;
     e->expected = r > 0 ? s->expected : e->inertia;
     e->error_share = 0.5;
-    if (!(r > 0))
+    if (!(r > 0)) {
+        drape_implicit_carry(&s->common, in, h, NULL, h);
         return;
+    }
     const double c = (1 + r) * (1 + r) / (6 * r * (1 + 2 * r));
     e->error_share = c / (c + 1 / 6. + 1 / (4 * r));
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
         s->expected[i] = h * in->v[at] + h * h / 2 * s->past.dv[at] / s->past.h;
     }
+    drape_implicit_carry(&s->common, in, h, s->past.dv, s->past.h);
 }
 
 /* Computes what the next step needs if this one is accepted. */

@@ -12,6 +12,7 @@ drape_status drape_implicit_init(drape_arena *arena, drape_system *system, drape
     *s = (drape_implicit){.motion = drape_system_motion(system)};
     drape_status status = drape_step_equation_init(arena, system, &s->equation);
     s->d = drape_arena_take(arena, 3 * (size_t)m->free_count, sizeof *s->d);
+    s->carried = drape_arena_take(arena, 3 * (size_t)m->free_count, sizeof *s->carried);
     if (m->has_laws)
         s->history = drape_arena_take(arena, (size_t)m->measure_count, sizeof *s->history);
     if (m->has_dissipation)
@@ -83,6 +84,7 @@ void drape_implicit_backward_euler(drape_implicit *s, const drape_state *in, dou
     e->error_share = 0.5; /* the local error is h^2 a / 2, and d - h v0 is h^2 a */
     for (size_t i = 0; i < e->dofs; i++)
         e->inertia[i] = h * in->v[drape_step_equation_at(e, i)];
+    drape_implicit_carry(s, in, h, NULL, h);
     drape_implicit_momentum(s, in->t, in->x, in->v, s->momentum[0]);
     drape_implicit_set_momenta(s, 1 / h, 1, s->momentum[0], 0, NULL);
     e->point.history = s->history;
@@ -91,6 +93,44 @@ void drape_implicit_backward_euler(drape_implicit *s, const drape_state *in, dou
     drape_implicit_measure(s, in->t, in->x, s->history);
     for (int64_t i = 0; i < e->model->measure_count; i++)
         s->history[i] /= -h;
+}
+
+/* How far the moved pins among the nodes of a cloth get ahead, in the mean. */
+static void mean_ahead(const drape_implicit *s, const drape_cloth *cloth, const drape_state *in, double h,
+                       const double *dv, double before, double mean[3])
+{
+    const drape_step_equation *e = &s->equation;
+    double count = 0, sum[3] = {0};
+    for (int32_t i = 0; i < s->motion->moved_count; i++) {
+        const int32_t node = s->motion->moved_node[i] - cloth->first_node;
+        if (node < 0 || node >= cloth->mesh.node_count)
+            continue;
+        count++;
+        for (size_t k = 0; k < 3; k++) {
+            const size_t at = 3 * (size_t)s->motion->moved_node[i] + k;
+            sum[k] += e->x_base[at] - in->x[at] - h * in->v[at] - (dv ? h * h / 2 * dv[at] / before : 0);
+        }
+    }
+    count = drape_ranks_sum(e->ranks, count);
+    for (int k = 0; k < 3; k++)
+        mean[k] = count > 0 ? drape_ranks_sum(e->ranks, sum[k]) / count : 0;
+}
+
+void drape_implicit_carry(drape_implicit *s, const drape_state *in, double h, const double *dv, double before)
+{
+    drape_step_equation *e = &s->equation;
+    const drape_model *m = e->model;
+    e->carried = drape_ranks_any(e->ranks, s->motion->moved_count > 0) ? s->carried : NULL;
+    for (int32_t c = 0; e->carried && c < m->cloth_count; c++) {
+        const drape_cloth *cloth = &m->cloths[c];
+        double mean[3];
+        mean_ahead(s, cloth, in, h, dv, before, mean);
+        for (int32_t i = 0; i < cloth->mesh.node_count; i++) {
+            const int32_t free = m->free_of_node[cloth->first_node + i];
+            for (size_t k = 0; free >= 0 && k < 3; k++)
+                s->carried[3 * (size_t)free + k] = e->expected[3 * (size_t)free + k] + mean[k];
+        }
+    }
 }
 
 double drape_implicit_pins_ahead(const drape_implicit *s, const drape_state *in, double h)

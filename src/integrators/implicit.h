@@ -14,6 +14,7 @@ typedef struct drape_implicit {
     const drape_motion *motion;
     drape_newton *newton; /* NULL in integrators with another solver */
     double *d;            /* free DOFs: the unknown */
+    double *carried;      /* free DOFs: the equation's */
     double *history;      /* measures; NULL if no law needs rates */
     double *dissipated;   /* nodes; NULL if nothing dissipates */
     double *momentum[2];  /* nodes: at the beginning and at the end of a stage; NULL if no term has any */
@@ -51,6 +52,12 @@ void drape_implicit_base(drape_implicit *implicit, const drape_state *in, double
 /* Sets the equation of backward Euler: base, v1 = (x1 - x0)/h, q' = (q1 - q0)/h. mass_weight: 1/h^2. */
 void drape_implicit_backward_euler(drape_implicit *implicit, const drape_state *in, double t, double h,
                                    double mass_weight);
+
+/* Once the equation has its `expected`, sets what is carried: that, and for the nodes of each cloth the mean
+ * displacement by which its moved pins get ahead of theirs, h v0 or, with dv (nodes), the change of velocity
+ * in the step of `before`, h v0 + h^2/2 dv/before. */
+void drape_implicit_carry(drape_implicit *implicit, const drape_state *in, double h, const double *dv,
+                          double before);
 
 /* How far moved pins get in a step of h from `in` ahead of where their velocity would take them: the largest
  * coordinate [m]. */

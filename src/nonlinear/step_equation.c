@@ -260,10 +260,11 @@ double drape_step_equation_inertial_error(const drape_step_equation *s, double *
 
 double drape_step_equation_local_error(const drape_step_equation *s, const double *d)
 {
-    double sum = s->expected ? 0 : NAN;
+    double sum[2] = {0, 0};
     for (size_t i = 0; i < s->dofs; i++)
-        sum += drape_step_equation_own_error(s, i, d[i]);
-    return drape_ranks_sum(s->ranks, sum);
+        drape_step_equation_add_own_error(s, i, d[i], sum);
+    const double expected = drape_ranks_sum(s->ranks, sum[0]), carried = drape_ranks_sum(s->ranks, sum[1]);
+    return s->expected ? fmin(expected, carried) : NAN;
 }
 
 drape_diagnostic drape_step_equation_diagnose(const drape_step_equation *s, double tolerance)

@@ -35,9 +35,10 @@ typedef struct drape_step_equation {
     double *x_base, *v_base; /* nodes: at d = 0; pinned nodes as at the end of the step */
     double *inertia;         /* free DOFs: p [m] */
     double mass_weight;      /* m_w [1/s2] */
-    /* free DOFs [m], and C: the local error of the method is about C (d - expected) (stopping.h); NULL: there
-     * is no estimate of it */
-    const double *expected;
+    /* free DOFs [m], and C: the local error of the method is about C (d - expected) or, of cloth that goes
+     * where its pins take it, C (d - carried), whichever is less (stopping.h); NULL: there is no estimate of
+     * it, and no pin that moves */
+    const double *expected, *carried;
     double error_share;
     double *momentum;      /* nodes: added to g, the const of point.momentum [N]; NULL: no term has one */
     drape_point point;     /* w, history, internal variables, time; its x and v are those below */
@@ -128,12 +129,19 @@ void drape_step_equation_shift(double *nodes, size_t n);
  * for forces with a convex potential more than it. *left: F' M^-1 F / m_w [J] likewise; may be NULL. */
 double drape_step_equation_inertial_error(const drape_step_equation *equation, double *left);
 
-/* m_w m |C (d - expected)|^2 of free DOF i [J], which counts for the local error; 0 without an estimate. */
-static inline double drape_step_equation_own_error(const drape_step_equation *equation, size_t i, double d)
+/* Adds m_w m |C (d - q)|^2 of free DOF i [J], which counts for the local error, for both q: expected and
+ * carried. Nothing without an estimate. */
+static inline void drape_step_equation_add_own_error(const drape_step_equation *equation, size_t i, double d,
+                                                     double sum[2])
 {
-    const double error = equation->expected ? equation->error_share * (d - equation->expected[i]) : 0;
-    return equation->mass_weight * equation->model->mass[drape_step_equation_at(equation, i) / 3] * error *
-           error;
+    if (!equation->expected)
+        return;
+    const double weight =
+                     equation->mass_weight * equation->model->mass[drape_step_equation_at(equation, i) / 3],
+                 error = equation->error_share * (d - equation->expected[i]),
+                 other = equation->carried ? equation->error_share * (d - equation->carried[i]) : error;
+    sum[0] += weight * error * error;
+    sum[1] += weight * other * other;
 }
 
 /* Its sum, the local error by the measure of stopping.h; NaN without an estimate. */

@@ -11,7 +11,7 @@ drape_status drape_stopping_init(drape_arena *arena, drape_step_equation *equati
 {
     *s = (drape_stopping){.equation = equation, .islands = islands};
     s->progress = drape_arena_take(arena, equation->dofs / 3 + 1, sizeof *s->progress);
-    s->work = drape_arena_take(arena, equation->dofs / 3 + 1, sizeof *s->work);
+    s->work = drape_arena_take(arena, 2 * (equation->dofs / 3 + 1), sizeof *s->work);
     s->weight = drape_arena_take(arena, equation->dofs / 3, sizeof *s->weight);
     if (drape_arena_status(arena))
         return drape_arena_status(arena);
@@ -64,15 +64,14 @@ bool drape_stopping_test_residual(drape_stopping *s, double bound)
 static void measure(drape_stopping *s, const double *d, const double *p)
 {
     const drape_step_equation *e = s->equation;
+    memset(s->work, 0, 2 * (size_t)s->islands->count * sizeof *s->work);
+    for (size_t i = 0; i < e->dofs; i++)
+        drape_step_equation_add_own_error(e, i, d[i] + p[i], s->work + 2 * (size_t)s->islands->of[i / 3]);
+    for (int i = 0; i < 2; i++)
+        s->work[i] = drape_ranks_sum(e->ranks, s->work[i]);
     for (int32_t k = 0; k < s->islands->count; k++)
         if (!s->progress[k].done)
-            s->progress[k].own = 0;
-    for (size_t i = 0; i < e->dofs; i++) {
-        drape_progress *q = &s->progress[s->islands->of[i / 3]];
-        if (!q->done)
-            q->own += drape_step_equation_own_error(e, i, d[i] + p[i]);
-    }
-    s->progress[0].own = drape_ranks_sum(e->ranks, s->progress[0].own);
+            s->progress[k].own = fmin(s->work[2 * k], s->work[2 * k + 1]);
 }
 
 void drape_stopping_test_error(drape_stopping *s, const drape_length *lengths, const double *d,

@@ -18,6 +18,10 @@
  * Radau IIA by the error of the step likewise; Deuflhard 2011, Newton Methods for Nonlinear Problems, 3.3,
  * measures by energy.
  *
+ * Where pins move, much of d + p - q is not the method's error: a sheet goes where they take it, however
+ * large the steps are. So e is, of each island, the less of that and of C (d + p - q - a), where a is the
+ * mean displacement by which the moved pins of a node's cloth get ahead of their own q.
+ *
  * The correction must not have been shortened, by contact or by the line search, and the energy must not have
  * fallen by more than the bound, either, by the trapezoidal rule -a (F(d) + F(d + a p)) . p / 2. A matrix
  * with positive parts, or an old one, is stiffer than J, and -F . p is less than what is left: then the same
@@ -44,7 +48,7 @@ typedef struct drape_stopping {
     drape_step_equation *equation;
     const drape_islands *islands;
     drape_progress *progress; /* (islands) */
-    double *work;             /* (islands) scratch [J] */
+    double *work;             /* (2 x islands) scratch [J] */
     double *weight;           /* free nodes: of their residual in norms */
     bool by_error;            /* the second rule counts; set by the caller */
     bool ended_by_error;      /* it was needed in this solve */
