@@ -133,6 +133,18 @@ void drape_implicit_carry(drape_implicit *s, const drape_state *in, double h, co
     }
 }
 
+double drape_implicit_pins_ahead(const drape_implicit *s, const drape_state *in, double h)
+{
+    const drape_step_equation *e = &s->equation;
+    double most = 0;
+    for (int32_t i = 0; i < s->motion->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            const size_t at = 3 * (size_t)s->motion->moved_node[i] + k;
+            most = fmax(most, fabs(e->x_base[at] - in->x[at] - h * in->v[at]));
+        }
+    return drape_ranks_largest(e->ranks, most);
+}
+
 void drape_implicit_force_at_start(const drape_implicit *s, const drape_state *in, double *v, double *g)
 {
     const drape_step_equation *e = &s->equation;

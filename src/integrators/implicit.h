@@ -59,6 +59,10 @@ void drape_implicit_backward_euler(drape_implicit *implicit, const drape_state *
 void drape_implicit_carry(drape_implicit *implicit, const drape_state *in, double h, const double *dv,
                           double before);
 
+/* How far moved pins get in a step of h from `in` ahead of where their velocity would take them: the largest
+ * coordinate [m]. */
+double drape_implicit_pins_ahead(const drape_implicit *implicit, const drape_state *in, double h);
+
 /* g (nodes) at the state `in`, where the base of the equation begins; v (nodes): velocities, whose free
  * nodes are set to those of `in`. */
 void drape_implicit_force_at_start(const drape_implicit *implicit, const drape_state *in, double *v,

@@ -196,6 +196,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
               linear_iterations = efforts[s->effort].linear_iterations;
     drape_solve_report report;
     drape_implicit_backward_euler(&s->common, in, out->t, h, 1 / h * (1 / h));
+    e->pins_ahead = drape_implicit_pins_ahead(&s->common, in, h);
     remember(s, in, out->t);
     guess(s, in, h);
     const int least = iterations ? iterations : (int)s->values[PARAM_ITERATIONS];

@@ -1,7 +1,8 @@
 /*
  * newton.c: see newton.h. A solve runs through these stages, whose functions follow in this order:
  *
- *     guess      the caller's d, made feasible (guess.h)
+ *     guess      the caller's d or, where pins jerk, that of the equation linearized at the start of the
+ *                step; made feasible (guess.h)
  *     residual   F(d), and which islands of the cloth are done by it (stopping.h)
  *     matrix     A near J(d), in a pattern that includes the contacts there, and its factors (matrix.h);
  *                where it is indefinite, that with the positive parts of all elements
@@ -60,6 +61,7 @@
 #define MAX_LENGTH      2    /* of a correction by positive parts with contact; without, there is no limit */
 #define EXACT           0.1  /* of the residual, that an iterative solver may leave in an exact correction */
 #define SMALL_STEP      0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
+#define MAX_AHEAD       0.1  /* of an edge: pins further ahead of the guess pull it along */
 #define MAX_CHORDS      2    /* simplified corrections after one correction, without contact */
 #define MAX_PREDICTION  8    /* corrections in a solve, after which stress is no longer predicted */
 #define STALLED         0.5  /* of the residual before: if no more is gained, it may be rounding */
@@ -244,6 +246,40 @@ static void begin(drape_newton *s)
     drape_stress_predictor_begin(&s->predictor,
                                  start.x && s->matrix->ops && s->matrix->ops->direct ? &start : NULL);
     e->work.jacobian_seconds += drape_system_clock(e->system) - clock;
+}
+
+/* Whether the solve begins with the linearized equation. Its solution knows of no contact to come. */
+static bool linearizes(const drape_newton *s)
+{
+    const drape_step_equation *e = s->equation;
+    return s->searches && !s->fraction && e->x_start && e->pins_ahead > MAX_AHEAD * s->edge &&
+           drape_step_equation_pins_move(e);
+}
+
+/* Where a pin takes a sheet along, nodes that keep their velocity stay behind. The elements at the pin are
+ * stretched by as much, and it takes many corrections until their forces have reached the rest of a stiff
+ * sheet. The linearized equation takes the pull of the pins to all nodes at once: d = -A^-1 (F + dF/dpins
+ * times their displacement), with F and A at the start of the step. A guess needs no exact derivative: the
+ * pull is a difference. */
+static drape_status guess_linearized(drape_newton *s, double *d)
+{
+    drape_step_equation *e = s->equation;
+    if (!linearizes(s))
+        return DRAPE_OK;
+    N_VSetArrayPointer(s->search.trial, s->unknown);
+    drape_step_equation_pull(e, s->search.trial, s->step);
+    for (size_t i = 0; i < e->dofs; i++)
+        s->right[i] = -s->step[i];
+    drape_status status = assemble(s, s->search.trial, false);
+    if (!status)
+        status = factor(s);
+    if (!status)
+        status = solve(s, s->right, s->tolerance, s->step);
+    if (!status && drape_step_equation_is_finite(e, s->step))
+        memcpy(d, s->step, e->dofs * sizeof *d);
+    s->positive = s->indefinite = false;
+    drape_step_equation_begin(e);
+    return status < 0 ? status : DRAPE_OK;
 }
 
 /* ---- Residual ---- */
@@ -641,6 +677,13 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_effort *effo
         report->error = report->left = report->own = 0;
         report->solved = true;
         return DRAPE_OK;
+    }
+    drape_status status = guess_linearized(s, d);
+    if (drape_system_agree(e->system))
+        return drape_system_status(e->system);
+    if (status) {
+        report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
+        return status;
     }
     drape_guess_make_feasible(e, d, s->right, s->fraction);
     KINSetNumMaxIters(s->kin, s->effort.most);

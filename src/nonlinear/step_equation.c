@@ -7,8 +7,9 @@
 #include <math.h>
 #include <string.h>
 
-#define FAR_FROM_ROUNDING 1e3 /* times the last estimate of a solve */
-#define MAX_PASSES        3   /* of shortening a displacement at nodes */
+#define FAR_FROM_ROUNDING 1e3  /* times the last estimate of a solve */
+#define MAX_PASSES        3    /* of shortening a displacement at nodes */
+#define PROBED            1e-6 /* of the displacement of pins: their pull is a difference over that much */
 
 drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, drape_step_equation *s)
 {
@@ -148,6 +149,29 @@ void drape_step_equation_follow_pins(const drape_step_equation *s, double *d)
         }
     for (size_t i = 0; i < s->dofs; i++)
         d[i] = mean[drape_step_equation_at(s, i) % 3];
+}
+
+/* F at d = 0 with the pins where a share of their displacement takes them. */
+static void evaluate_with_pins(drape_step_equation *s, const double *zero, double share)
+{
+    const drape_motion *motion = drape_system_motion(s->system);
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            const size_t at = 3 * (size_t)motion->moved_node[i] + k;
+            s->x[at] = s->x_start[at] + share * (s->x_base[at] - s->x_start[at]);
+            s->v[at] = share * s->v_base[at];
+        }
+    drape_step_equation_evaluate(s, zero);
+}
+
+void drape_step_equation_pull(drape_step_equation *s, double *zero, double *f)
+{
+    memset(zero, 0, s->dofs * sizeof *zero);
+    evaluate_with_pins(s, zero, PROBED);
+    memcpy(f, s->f, s->dofs * sizeof *f);
+    evaluate_with_pins(s, zero, 0);
+    for (size_t i = 0; i < s->dofs; i++)
+        f[i] = s->f[i] + (f[i] - s->f[i]) / PROBED;
 }
 
 typedef struct norms {

@@ -45,6 +45,10 @@ typedef struct drape_step_equation {
     const double *x_start; /* nodes: the beginning of the step or stage; NULL: no stress prediction
                                 (stress_predictor.h) */
 
+    /* [m] largest coordinate by which moved pins are ahead of their motion at the start, which the guess
+     * follows; 0: it need not follow them further (newton.c) */
+    double pins_ahead;
+
     /* Where it was evaluated last: after a solve that returned a state, at the solution. */
     double *x, *v, *g; /* nodes: g(x, v) [N] */
     double *f;         /* free DOFs: F [N] */
@@ -95,6 +99,11 @@ bool drape_step_equation_pins_move(const drape_step_equation *equation);
 
 /* d by which all free nodes follow the mean displacement of the moved pins in the step. */
 void drape_step_equation_follow_pins(const drape_step_equation *s, double *d);
+
+/* Moves to the start of the step, pins too, and sets f (free DOFs) to F there plus its derivative by the
+ * positions of pins times their displacement, a difference: then -J^-1 f is the displacement that the
+ * linearized equation gives. zero (free DOFs) becomes 0. */
+void drape_step_equation_pull(drape_step_equation *equation, double *zero, double *f);
 
 /* The weighted norm of F. */
 double drape_step_equation_norm(const drape_step_equation *equation, drape_norm norm);

@@ -394,7 +394,18 @@ START_TEST(estimates_are_those_of_a_restored_sim)
 }
 END_TEST
 
+/* Where pins jump to 2 m/s, by a third of an edge in the first step, the linearized equation leads to a guess
+ * from which two iterations are enough, and a third shows it, because one of them is shortened. */
+START_TEST(pins_that_jump_take_the_sheet_along)
+{
+    drape_statistics done;
+    ck_assert_double_lt(off_after(&denim, "", 1, &done), 1e-3 * SIZE);
+    ck_assert_int_le(done.newton_iterations, 3);
+}
+END_TEST
+
 SUITE("estimate", the_estimate_is_near_the_true_error, a_jerk_is_followed, a_turn_of_pins_is_followed,
       iterations_follow_while_it_is_above_the_bound, the_default_bound_is_a_thousandth_of_the_size,
       a_budget_limits_the_iterations, a_step_that_is_lost_is_rejected, an_inaccurate_run_has_a_warning,
-      steps_without_contact_take_one_iteration, estimates_are_those_of_a_restored_sim)
+      steps_without_contact_take_one_iteration, estimates_are_those_of_a_restored_sim,
+      pins_that_jump_take_the_sheet_along)
