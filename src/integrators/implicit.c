@@ -103,7 +103,7 @@ static void mean_ahead(const drape_implicit *s, int32_t first, int32_t nodes, co
     double count = 0, sum[3] = {0};
     for (int32_t i = 0; i < s->motion->moved_count; i++) {
         const int32_t node = s->motion->moved_node[i] - first;
-        if (node < 0 || node >= nodes)
+        if (node < 0 || node >= nodes || (e->model->part && !e->model->part->own[node]))
             continue;
         count++;
         for (size_t k = 0; k < 3; k++) {
@@ -122,14 +122,14 @@ void drape_implicit_carry(drape_implicit *s, const drape_state *in, double h, co
     const drape_model *m = e->model;
     e->carried = drape_ranks_any(e->ranks, s->motion->moved_count > 0) ? s->carried : NULL;
     for (int32_t c = 0; e->carried && c < m->cloth_count; c++) {
-        /* a rank has a part of the nodes of its cloth, whose meshes are whole */
+        /* a rank has a part of the nodes, and copies of others, which come after its own free ones */
         const int32_t first = m->part ? 0 : m->cloths[c].first_node,
                       nodes = m->part ? m->node_count : m->cloths[c].mesh.node_count;
         double mean[3];
         mean_ahead(s, first, nodes, in, h, dv, before, mean);
         for (int32_t i = 0; i < nodes; i++) {
             const int32_t free = m->free_of_node[first + i];
-            for (size_t k = 0; free >= 0 && k < 3; k++)
+            for (size_t k = 0; free >= 0 && free < m->free_count && k < 3; k++)
                 s->carried[3 * (size_t)free + k] = e->expected[3 * (size_t)free + k] + mean[k];
         }
     }
