@@ -95,7 +95,7 @@ void drape_implicit_backward_euler(drape_implicit *s, const drape_state *in, dou
         s->history[i] /= -h;
 }
 
-/* How far the moved pins among some nodes, from `first` on get ahead, in the mean. */
+/* How far the moved pins among so many nodes, from `first` on, get ahead, in the mean. */
 static void mean_ahead(const drape_implicit *s, int32_t first, int32_t nodes, const drape_state *in, double h,
                        const double *dv, double before, double mean[3])
 {

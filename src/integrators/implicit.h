@@ -79,8 +79,8 @@ void drape_implicit_set_momenta(drape_implicit *implicit, double rate, double a,
 /* Computes q (measures) at t, x in the step, if a law needs rates. */
 void drape_implicit_measure(const drape_implicit *implicit, double t, const double *x, double *q);
 
-/* Solves for d by Newton's method, from the guess d = p, or from the present d. Adds the
- * iterations to info. */
+/* Solves for d by Newton's method, from the guess d = p, or from the present d. Adds the iterations to
+ * info. */
 drape_status drape_implicit_solve(drape_implicit *implicit, drape_step_info *info);
 drape_status drape_implicit_solve_from(drape_implicit *implicit, drape_step_info *info);
 

@@ -36,8 +36,8 @@ typedef struct drape_step_equation {
     double *inertia;         /* free DOFs: p [m] */
     double mass_weight;      /* m_w [1/s2] */
     /* free DOFs [m], and C: the local error of the method is about C (d - expected) or, of cloth that goes
-     * where its pins take it, C (d - carried), whichever is less (stopping.h); NULL: there is no estimate of
-     * it, and no pin that moves */
+     * where its pins take it, C (d - carried), whichever is less (stopping.h). NULL: of the first, there is
+     * no estimate of it; of the second, no pin moves */
     const double *expected, *carried;
     double error_share;
     double *momentum;      /* nodes: added to g, the const of point.momentum [N]; NULL: no term has one */

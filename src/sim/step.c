@@ -316,9 +316,9 @@ static bool must_repeat(drape_sim *sim, const double memory[2], drape_step_info 
     drape_event_verdict verdict = drape_events_examine(sim, next_state(sim), stop);
     if (verdict == DRAPE_EVENTS_REPEAT && cut_on_dense_output(sim, info))
         verdict = drape_events_examine(sim, next_state(sim), stop);
-    *stop = *stop ? *stop : drape_system_status(sim->system);
     if (verdict == DRAPE_EVENTS_PASS)
         return false;
+    *stop = *stop ? *stop : drape_system_status(sim->system);
     memcpy(sim->scratch, memory, sizeof sim->scratch);
     if (sim->chosen.integrator->own_steps) /* it has accepted the step already */
         sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));

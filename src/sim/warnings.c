@@ -381,8 +381,8 @@ static bool is_inaccurate(drape_sim *sim, char *text, size_t size)
     snprintf(
         text, size,
         "%s: %lld of %lld steps%s ended further from the solution of their equation than \"error\", %.3g m, "
-        "by estimate up to %.3g m: a smaller dt comes nearer, with a budget "
-        "more time a frame; \"be\" converges",
+        "by estimate up to %.3g m: a smaller dt comes nearer, with a budget more time a "
+        "frame; \"be\" converges",
         sim->chosen.integrator->entry.name, (long long)s.steps_above_error, (long long)s.steps_accepted,
         last ? ", the last among them," : "", s.error_bound, s.error_max);
     return true;
