@@ -16,14 +16,13 @@ QUALITIES = [("REALTIME", "Real Time", "newton_k, at least 60 steps a second: ba
              ("CUSTOM", "Custom", "Any method, with its steps or its tolerance")]
 
 METHODS = [("be", "Backward Euler", "First order, robust"), ("bdf2", "BDF2", "Second order, two steps"), ("trbdf2", "TR-BDF2", "Second order, in one step"),
-           ("generalized_alpha", "Generalized Alpha", "Second order, damps only what steps do not resolve"),
            ("midpoint", "Midpoint", "Second order, no damping: for soft cloth without contact"),
            ("newton_k", "Newton K", "Backward Euler by few iterations, for real time"), ("verlet", "Verlet", "Explicit; only for soft cloth, and with its own rules of contact"),
-           ("ida", "IDA", "Variable order and step, by the tolerance"), ("cvode", "CVODE", "Variable order and step, by the tolerance"),
+           ("ida", "IDA", "Variable order and step, by the tolerance"),
            ("dirk", "DIRK", "Runge-Kutta of order 3 or 5, step by the tolerance"), ("rosenbrock", "Rosenbrock", "Order 4, step by the tolerance"),
            ("radau", "Radau", "Order 5, step by the tolerance")]
 
-BY_TOLERANCE = {"ida", "cvode", "dirk", "rosenbrock", "radau"}
+BY_TOLERANCE = {"ida", "dirk", "rosenbrock", "radau"}
 """methods that choose their own steps"""
 
 

@@ -392,8 +392,7 @@ static drape_status prepare(drape_first_order *s, const drape_state *in, double 
         measure_powers(s, in->t, s->powers);
         return DRAPE_OK;
     }
-    if (s->reached != in->t || drape_motion_at_kink(s->motion, in->t) ||
-        (s->solver->must_begin && s->solver->must_begin(s))) {
+    if (s->reached != in->t || drape_motion_at_kink(s->motion, in->t)) {
         drape_status status = start(s, in, h < end - in->t ? h : 0, info);
         if (status)
             return status;

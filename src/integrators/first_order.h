@@ -105,7 +105,6 @@ typedef struct drape_first_order_solver {
     void (*destroy_vectors)(drape_first_order *f); /* of the entry; NULL: it has none */
     /* Restarts at t from y, y' in f->y, f->rate with a first step of h at most; 0: it chooses. */
     bool (*begin)(drape_first_order *f, double t, double h);
-    bool (*must_begin)(const drape_first_order *f); /* it has to restart; NULL: never by itself */
     /* One step towards end, at most to f->span[1]. *t: where it ended, y there in f->y. */
     drape_first_order_outcome (*step)(drape_first_order *f, double end, double *t);
     int (*last_step)(void *memory, sunrealtype *h);
@@ -185,7 +184,7 @@ static inline double drape_first_order_max_step(const drape_first_order *f)
     const double max = f->values[DRAPE_FIRST_ORDER_MAX_STEP];
     return max > 0 ? max : 0; /* none is NaN */
 }
-/* y' = (v, -M^-1 g): a callback of CVODE and ARKODE; user: the drape_first_order. */
+/* y' = (v, -M^-1 g): a callback of ARKODE; user: the drape_first_order. */
 int drape_first_order_rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user);
 /* Weighted root mean square of a vector: 1 is the tolerance. */
 double drape_first_order_norm(const drape_first_order *f, N_Vector vector);

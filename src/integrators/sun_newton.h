@@ -1,8 +1,8 @@
 /*
- * sun_newton.h: the Newton iteration in a step of IDA, CVODE or ARKODE: when it has converged, and what
+ * sun_newton.h: the Newton iteration in a step of IDA or ARKODE: when it has converged, and what
  * to do where it fails.
  *
- * IDA estimates, like the others, the rate at which the iteration with old factors contracts from the
+ * IDA estimates, like ARKODE, the rate at which the iteration with old factors contracts from the
  * last step that took two iterations. While c_j does not change, that may be thousands of steps ago, and
  * each step since has ended after one correction, however inaccurate the matrix had become. The residual
  * that such a step leaves is below the tolerance, but it has the same effect in every step, and makes
@@ -18,7 +18,7 @@
  * of that of friction, by which corrections do not overshoot (drape_friction_bound). The step is shortened
  * only where this fails, too.
  *
- * The residual of IDA is F = (x' - v, M v' + g). That of CVODE and ARKODE is gamma (x' - v, v' + M^-1 g),
+ * The residual of IDA is F = (x' - v, M v' + g). That of ARKODE is gamma (x' - v, v' + M^-1 g),
  * from which gamma and the masses make the first.
  */
 #ifndef DRAPE_INTEGRATORS_SUN_NEWTON_H
@@ -43,7 +43,7 @@ typedef struct drape_sun_newton {
     bool strict; /* a tenth of the tolerance is used: the run has gained energy */
     bool failed; /* the undamped iteration, with the last new matrix that it had */
     bool bounds; /* the matrix that is requested now is for the damped iteration */
-    /* Of CVODE and ARKODE: the masses of x (n), and the function that returns gamma. NULL: IDA. */
+    /* Of ARKODE: the masses of x (n), and the function that returns gamma. NULL: IDA. */
     const double *mass;
     int (*gamma)(void *solver, sunrealtype *gamma);
     /* Whether the iteration begins with new factors. NULL: the solver decides. */
@@ -56,7 +56,7 @@ typedef struct drape_sun_newton {
 bool drape_sun_newton_create(drape_sun_newton *newton, N_Vector like, int64_t n, const drape_ranks *ranks,
                              SUNContext sun);
 
-/* To be called after newton->solver has been given to IDA, CVODE or ARKODE, which put their own test of
+/* To be called after newton->solver has been given to IDA or ARKODE, which put their own test of
  * convergence into it. False: refused. */
 bool drape_sun_newton_set_test(drape_sun_newton *newton);
 

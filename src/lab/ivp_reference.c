@@ -35,8 +35,8 @@ typedef struct family {
 
 static const family families[] = {
     {"Radau", "radau", 1e-6, 0.1, NULL, 0, 1},      {"BDF", "ida", 1e-8, 0.1, "max_order", 5, 1},
-    {"BDF", "cvode", 1e-8, 0.1, "max_order", 5, 1}, {"SDIRK", "dirk", 1e-6, 0.1, "order", 5, 1},
-    {"SDIRK", "trbdf2", 0, 0.5, NULL, 0, 1},        {"Verlet", "verlet", 0, 0.5, "substeps", 1, 2},
+    {"SDIRK", "dirk", 1e-6, 0.1, "order", 5, 1},    {"SDIRK", "trbdf2", 0, 0.5, NULL, 0, 1},
+    {"Verlet", "verlet", 0, 0.5, "substeps", 1, 2},
 };
 #define FAMILIES ((int)(sizeof families / sizeof *families))
 

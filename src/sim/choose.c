@@ -11,16 +11,23 @@
 typedef struct choice {
     const char *pointer, *key; /* "/integrator", "method" */
     const drape_registry *registry;
+    bool quiet; /* no warnings */
 } choice;
 
-static const choice integrators = {"/integrator", "method", &drape_integrator_registry};
-static const choice controllers = {"/controller", "type", &drape_controller_registry};
+/* Former settings of integrators, which made up for what the nonlinear solver now does by itself, or were
+ * those of methods that are gone. The schema of a scene has them no more. */
+static const char *const retired[] = {"alpha",          "beta",
+                                      "coarse_spacing", "correction_tolerance",
+                                      "extrapolation",  "family",
+                                      "forcing",        "gamma",
+                                      "newton",         "predictor",
+                                      "project",        "rescue_iterations",
+                                      "rho_inf",        "stability_detection"};
 
-/* Former settings of integrators, which made up for what the nonlinear solver now does by itself. The schema
- * of a scene has them no more. */
-static const char *const retired[] = {
-    "coarse_spacing", "correction_tolerance", "extrapolation", "forcing", "newton", "predictor",
-    "project",        "rescue_iterations"};
+/* Former methods, and those that scenes which name them are run by. */
+static const struct {
+    const char *name, *by;
+} replaced[] = {{"cvode", "ida"}, {"generalized_alpha", "bdf2"}};
 
 static bool is_listed(const char *const *names, size_t count, const char *name)
 {
@@ -64,8 +71,10 @@ static drape_status apply(drape_context *ctx, const choice *c, int chosen, const
             memcpy(values + drape_param_place(entry->params, p), value,
                    (size_t)drape_param_width(&entry->params[p]) * sizeof *value);
     }
-    if (!known && c == &integrators && is_listed(retired, sizeof retired / sizeof *retired, setting->name)) {
-        drape_log(ctx, DRAPE_LOG_WARNING, "%s: has no effect any more", at);
+    if (!known && c->registry == &drape_integrator_registry &&
+        is_listed(retired, sizeof retired / sizeof *retired, setting->name)) {
+        if (!c->quiet)
+            drape_log(ctx, DRAPE_LOG_WARNING, "%s: has no effect any more", at);
         return DRAPE_OK;
     }
     return known ? DRAPE_OK : unknown_key(ctx, c, at, setting->name);
@@ -82,13 +91,28 @@ static drape_status apply_all(drape_context *ctx, const choice *c, int chosen, c
     return status;
 }
 
+/* The name of the method to run by, which is another one if that of this name is gone. */
+static const char *present_name(drape_context *ctx, const choice *c, const char *at, const char *name)
+{
+    for (size_t i = 0; c->registry == &drape_integrator_registry && i < sizeof replaced / sizeof *replaced;
+         i++)
+        if (strcmp(replaced[i].name, name) == 0) {
+            if (!c->quiet)
+                drape_log(ctx, DRAPE_LOG_WARNING, "%s: there is no \"%s\" any more; \"%s\" runs in its place",
+                          at, name, replaced[i].by);
+            return replaced[i].by;
+        }
+    return name;
+}
+
 /* Chooses by name, or else as the scene does, and applies the scene's and then the given settings. */
 static drape_status choose(drape_context *ctx, const choice *c, const char *name, const drape_choice *scene,
                            const drape_setting *settings, size_t setting_count, double *values, int *chosen)
 {
     char at[64];
     snprintf(at, sizeof at, "%s/%s", c->pointer, c->key);
-    drape_status status = drape_registry_choose(ctx, c->registry, at, name ? name : scene->type, chosen);
+    name = present_name(ctx, c, at, name ? name : scene->type);
+    drape_status status = drape_registry_choose(ctx, c->registry, at, name, chosen);
     if (status)
         return status;
     const drape_entry *entry = c->registry->entries[*chosen];
@@ -142,6 +166,8 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
     drape_sim_def none;
     drape_sim_def_init(&none, sizeof none);
     const drape_sim_def *d = def ? def : &none;
+    const choice integrators = {"/integrator", "method", &drape_integrator_registry, !def},
+                 controllers = {"/controller", "type", &drape_controller_registry, !def};
     int i = 0, c = 0;
     drape_status status = choose(ctx, &integrators, d->integrator, &model->integrator, d->integrator_settings,
                                  d->integrator_setting_count, chosen->integrator_values, &i);

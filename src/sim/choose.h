@@ -12,7 +12,8 @@ typedef struct drape_chosen {
     double integrator_values[DRAPE_MAX_PARAMS], controller_values[DRAPE_MAX_PARAMS];
 } drape_chosen;
 
-/* The scene's choices, overridden by def if it is not NULL. Errors are reported at "/integrator/..." and
+/* The scene's choices, overridden by def. NULL: they are only checked, without the
+ * warnings that a sim gives of what is gone. Errors are reported at "/integrator/..." and
  * "/controller/...". */
 drape_status drape_choose(drape_context *ctx, const drape_model *model, const drape_sim_def *def,
                           drape_chosen *chosen);

@@ -33,7 +33,6 @@ static inline int drape_sundials_create(SUNContext *out)
 }
 #define DRAPE_KINSOL_QUIET(kin) ((void)0)
 #define DRAPE_IDA_QUIET(ida)    ((void)0)
-#define DRAPE_CVODE_QUIET(cv)   ((void)0)
 #define DRAPE_ARKODE_QUIET(ark) ((void)0)
 #else
 static inline int drape_sundials_create(SUNContext *out)
@@ -47,7 +46,6 @@ static inline void drape_sundials_quiet(int code, const char *module, const char
 }
 #define DRAPE_KINSOL_QUIET(kin) KINSetErrHandlerFn(kin, drape_sundials_quiet, NULL)
 #define DRAPE_IDA_QUIET(ida)    IDASetErrHandlerFn(ida, drape_sundials_quiet, NULL)
-#define DRAPE_CVODE_QUIET(cv)   CVodeSetErrHandlerFn(cv, drape_sundials_quiet, NULL)
 #define DRAPE_ARKODE_QUIET(ark) ARKStepSetErrHandlerFn(ark, drape_sundials_quiet, NULL)
 #endif
 

@@ -276,12 +276,25 @@ def test_former_settings():
     """settings of integrators that have gone have no effect, and a line says so; other names are refused"""
     write_scene()
     expected = good("run", "scene.json")
-    for name in "coarse_spacing", "correction_tolerance", "extrapolation", "forcing", "newton", "predictor", "project", "rescue_iterations":
+    for name in ("alpha", "beta", "coarse_spacing", "correction_tolerance", "extrapolation", "family", "forcing", "gamma", "newton", "predictor",
+                 "project", "rescue_iterations", "rho_inf", "stability_detection"):
         result = drape("run", "scene.json", "--set", f"/integrator/{name}=1")
         equal(result.returncode, 0, result.stderr)
         equal(result.stderr.splitlines(True)[0], f"warning: /integrator/{name}: has no effect any more\n")
         equal(result.stdout.splitlines()[:-1], expected.splitlines()[:-1])  # the last line has times
     refused("run", "scene.json", "--set", "/controller/project=1", says='unknown key "project"')
+
+
+def test_former_methods():
+    """a scene that names a method that has gone is run by another one, and one line says by which"""
+    write_scene()
+    for name, by in ("cvode", "ida"), ("generalized_alpha", "bdf2"):
+        expected = drape("run", "scene.json", "--integrator", by)
+        result = drape("run", "scene.json", "--integrator", name)
+        equal(result.returncode, 0, result.stderr)
+        equal(result.stderr, f'warning: /integrator/method: there is no "{name}" any more; "{by}" runs in its place\n' + expected.stderr)
+        equal(result.stdout.splitlines()[:-1], expected.stdout.splitlines()[:-1])  # the last line has times
+    refused("run", "scene.json", "--integrator", "cvod", says='there is no integrator "cvod"')
 
 
 def read_summary_without_budget():

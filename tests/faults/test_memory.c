@@ -356,7 +356,7 @@ static long grow_lists(const drape_model *model, const char *integrator, int32_t
 
 START_TEST(contacts_without_memory)
 {
-    static const char *const integrators[] = {"be", "ida", "cvode", "dirk"};
+    static const char *const integrators[] = {"be", "ida", "dirk"};
     drape_context *ctx = NULL;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     drape_model *model = folding_model(ctx);

@@ -188,7 +188,7 @@ static const char text[] = "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"s
 NAMES
 int main(void)
 {
-    static const char *const methods[] = {"be", "ida", "cvode", "dirk"};
+    static const char *const methods[] = {"be", "ida", "dirk"};
     drape_context *ctx = NULL;
     drape_scene *scene = NULL;
     drape_status status = drape_context_create(NULL, &ctx);
@@ -267,7 +267,7 @@ def documentation_is_installed(tree):
     assert not os.path.exists(os.path.join(folder, "docs", "make"))
     with open(os.path.join(folder, "licences", "third-party.txt")) as file:
         notices = file.read()
-    for name in ("KINSOL", "ARKODE", "CVODE", "KLU and BTF", "AMD, COLAMD", "jansson", "GNU Scientific Library"):
+    for name in ("KINSOL", "ARKODE", "KLU and BTF", "AMD, COLAMD", "jansson", "GNU Scientific Library"):
         assert name in notices, name
     count = 0
     for at, _, names in os.walk(folder):

@@ -100,8 +100,8 @@ static double slide_of(const sliding *p, scene *s, double t)
     return mean_along(p, s, drape_sim_positions(s->sim), INFINITY) - before;
 }
 
-static const char *const methods[] = {
-    "be", "bdf2", "midpoint", "trbdf2", "ida", "rosenbrock", "generalized_alpha", "cvode", "dirk", "radau"};
+static const char *const methods[] = {"be",  "bdf2",       "midpoint", "trbdf2",
+                                      "ida", "rosenbrock", "dirk",     "radau"};
 #define METHODS (sizeof methods / sizeof *methods)
 
 /* Whether a method bounds the errors of its steps, not residuals. */

@@ -81,13 +81,10 @@ END_TEST
  * the energy U at once, sum g (1 - exp(-2 t/time)). */
 START_TEST(stress_relaxes_by_the_prony_series)
 {
-    static const char *const methods[] = {"{'method': 'be', 'dt': 0.05}",
-                                          "{'method': 'bdf2', 'dt': 0.05}",
-                                          "{'method': 'trbdf2', 'dt': 0.05}",
-                                          "{'method': 'midpoint', 'dt': 0.05}",
-                                          "{'method': 'generalized_alpha', 'dt': 0.05}",
-                                          "{'method': 'newton_k', 'dt': 0.05}",
-                                          "{'method': 'verlet', 'dt': 0.05}"};
+    static const char *const methods[] = {
+        "{'method': 'be', 'dt': 0.05}",       "{'method': 'bdf2', 'dt': 0.05}",
+        "{'method': 'trbdf2', 'dt': 0.05}",   "{'method': 'midpoint', 'dt': 0.05}",
+        "{'method': 'newton_k', 'dt': 0.05}", "{'method': 'verlet', 'dt': 0.05}"};
     for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
         scene s = held(methods[i]);
         stretch(&s, STRAIN);
@@ -281,7 +278,7 @@ END_TEST
 
 START_TEST(integrators_with_steps_of_their_own_refuse_it)
 {
-    static const char *const methods[] = {"ida", "cvode", "radau", "dirk", "rosenbrock"};
+    static const char *const methods[] = {"ida", "radau", "dirk", "rosenbrock"};
     for (size_t i = 0; i < sizeof methods / sizeof *methods; i++)
         refused("'fraction_1': 0.3, 'time_1': 1", methods[i],
                 "chooses its own steps, over which Maxwell branches");

@@ -97,13 +97,6 @@ START_TEST(dirk_has_the_order_that_is_set)
 }
 END_TEST
 
-START_TEST(cvode_has_the_order_that_is_set)
-{
-    for (int order = 2; order <= 5; order++)
-        check_order("cvode", "max_order", order);
-}
-END_TEST
-
 /* Thousands of steps end within their rounding errors of the end, but the run ends there, to the last
  * bit; so do parts of it. */
 START_TEST(runs_end_at_their_ends)
@@ -216,6 +209,5 @@ START_TEST(energy_factor_of_tr_bdf2)
 }
 END_TEST
 
-SUITE("first_order", they_agree_at_tight_tolerances, dirk_has_the_order_that_is_set,
-      cvode_has_the_order_that_is_set, runs_end_at_their_ends, the_energy_balance_is_kept,
-      energy_factor_of_tr_bdf2)
+SUITE("first_order", they_agree_at_tight_tolerances, dirk_has_the_order_that_is_set, runs_end_at_their_ends,
+      the_energy_balance_is_kept, energy_factor_of_tr_bdf2)

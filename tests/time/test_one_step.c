@@ -193,117 +193,6 @@ START_TEST(rosenbrock_has_its_order)
 }
 END_TEST
 
-/* ---- generalized_alpha ---- */
-
-/* The oscillator of physics/test_oscillator.c: the centre of a hexagon of springs of 3 K in all. */
-#define LENGTH 0.1
-#define STEPS  20
-enum { CENTRE = 4 };
-static const double stiffness = 3 * 0.8660254037844386 * 1e3; /* E h = 1e3 N/m */
-
-static scene hexagon(double dt, double speed, double beta, const char *settings)
-{
-    const double centre[3] = {1.5 * LENGTH, 0, -0.8660254037844386 * LENGTH};
-    return scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 2, 'edge_length': %g,"
-                      "'transform': {'translate': [%.17g, 0, %.17g]}},"
-                      "'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'areal_density': 0.2},"
-                      "'terms': [{'type': 'damp.kelvin_voigt', 'beta': %.17g}, 'stretch.edge'], 'velocity': "
-                      "[%.17g, 0, %.17g],"
-                      "'pins': [{'nodes': [0, 1, 2, 3, 5, 6, 7, 8]}]}],"
-                      "'gravity': [0, 0, 0], 'integrator': {'method': 'generalized_alpha', 'dt': %.17g, "
-                      "'tolerance': 1e-12 %s}, "
-                      "'controller': {'type': 'fixed'},"
-                      "'duration': 1}",
-                      LENGTH, -centre[0], -centre[2], beta, 0.8 * speed, 0.6 * speed, dt, settings);
-}
-
-/* m a = -3 K (x + beta v): (x, v, a)_{n+1} is linear in (x, v, a)_n by the formulas of the method. Errors of
- * steps: nonlinearity of size e^2, rounding of strains and the residual, as in physics/test_oscillator.c; the
- * dashpots multiply forces by 1 + beta/h, and a2 by 1/h^2 what d has. No family expands an error. */
-START_TEST(generalized_alpha_follows_its_amplification_matrix)
-{
-    static const struct {
-        const char *settings;
-        double m, f, b, c;
-    } families[] = {{", 'rho_inf': 0.8", 0.6 / 1.8, 0.8 / 1.8, 0, 0},
-                    {", 'rho_inf': 0", -1, 0, 0, 0},
-                    {", 'rho_inf': 1", 0.5, 0.5, 0, 0},
-                    {", 'family': 'hht', 'alpha': -0.3", 0, 0.3, 0, 0},
-                    {", 'family': 'newmark'", 0, 0, 0.25, 0.5},
-                    {", 'family': 'newmark', 'beta': 0.4, 'gamma': 0.7", 0, 0, 0.4, 0.7}};
-    static const double phases[] = {0.1, 0.7, 3}, ratios[] = {0, 0.3}; /* w h, w beta */
-    const double mass = 0.2 * sqrt(3.0) / 2 * LENGTH * LENGTH, w = sqrt(stiffness / mass),
-                 amplitude = 1e-5 * LENGTH;
-    for (size_t k = 0; k < sizeof families / sizeof *families; k++)
-        for (int i = 0; i < 6; i++) {
-            const double h = phases[i / 2] / w, beta = ratios[i % 2] / w, m = families[k].m,
-                         f = families[k].f, c = families[k].c > 0 ? families[k].c : 0.5 - m + f,
-                         b = families[k].b > 0 ? families[k].b : (1 - m + f) * (1 - m + f) / 4;
-            scene s = hexagon(h, amplitude * w, beta, families[k].settings);
-            scene_watch(&s);
-            double x = 0, v = amplitude * w, a = -w * w * beta * v, worst = 0;
-            for (int n = 1; n <= STEPS; n++) {
-                const double before = w * w * (x + beta * v);
-                scene_advance(&s, n * h);
-                x += h * v + h * h * (0.5 - b) * a;
-                v += h * (1 - c) * a;
-                const double a1 = -(m * a + (1 - f) * w * w * (x + beta * v) + f * before) /
-                                  (1 - m + (1 - f) * w * w * h * (b * h + beta * c));
-                x += h * h * b * a1;
-                v += h * c * a1;
-                a = a1;
-                const double *now = scene_state(&s)->x + 3 * CENTRE, *speed = scene_state(&s)->v + 3 * CENTRE;
-                worst = fmax(worst, hypot(now[0] - 0.8 * x, now[2] - 0.6 * x) / amplitude);
-                worst = fmax(worst, hypot(speed[0] - 0.8 * v, speed[2] - 0.6 * v) / (amplitude * w));
-            }
-            ck_assert_int_eq(s.accepted, STEPS);
-            const double e = amplitude / LENGTH, noise = force_noise(stiffness / 3, LENGTH),
-                         each = e * e + 4 * DBL_EPSILON / e + (s.residual + noise) / (stiffness * amplitude);
-            assert_below(worst, STEPS * (1 + beta / h) * (1 + w * h) * each);
-            scene_close(&s);
-        }
-}
-END_TEST
-
-/* Both are the trapezoidal rule: the energy of the oscillator stays, at any step, except for its
- * nonlinearity. */
-START_TEST(without_damping_the_energy_stays)
-{
-    static const char *const settings[] = {", 'rho_inf': 1", ", 'family': 'newmark'", ", 'rho_inf': 0.9"};
-    const double mass = 0.2 * sqrt(3.0) / 2 * LENGTH * LENGTH, w = sqrt(stiffness / mass), h = 2 / w;
-    for (size_t k = 0; k < 3; k++) {
-        scene s = hexagon(h, 1e-6 * w, 0, settings[k]);
-        const double before = drape_sim_energy(s.sim).kinetic;
-        for (int n = 1; n <= 100; n++)
-            scene_advance(&s, n * h);
-        const drape_energy e = drape_sim_energy(s.sim);
-        const double change = (e.kinetic + e.elastic) / before - 1;
-        printf("# %s: %.3g\n", settings[k], change);
-        if (k < 2) /* each step: 1e-10 of nonlinearity, 4 DBL_EPSILON/1e-5 of rounding, twice in energies */
-            assert_below(fabs(change), 100 * 4 * (1e-10 + 1e-10));
-        else
-            ck_assert_double_lt(change, -0.1);
-        scene_close(&s);
-    }
-}
-END_TEST
-
-START_TEST(newmark_below_gamma_half_is_refused)
-{
-    const drape_setting settings[] = {{"family", 0, "newmark"}, {"beta", 0.2, NULL}};
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
-    def.integrator = "generalized_alpha";
-    def.integrator_settings = settings;
-    def.integrator_setting_count = 2;
-    scene s = scene_model(SHEET, HUNG);
-    ck_assert_int_eq(drape_sim_create(s.ctx, s.model, &def, &s.sim), DRAPE_E_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "/integrator/beta"));
-    ck_assert_ptr_null(strchr(drape_context_message(s.ctx), '\n'));
-    scene_close(&s);
-}
-END_TEST
-
 /* ---- The error control ---- */
 
 #define POWER 4
@@ -484,6 +373,6 @@ START_TEST(the_work_is_bounded)
 END_TEST
 
 SUITE("one_step", rodas_has_its_orders_and_is_l_stable, rosenbrock_has_its_order,
-      generalized_alpha_follows_its_amplification_matrix, without_damping_the_energy_stays,
+
       newmark_below_gamma_half_is_refused, the_norm_is_the_weighted_root_mean_square, sizes_follow_the_errors,
       steps_end_at_kinks_and_at_the_end_without_slivers, a_cut_step_keeps_the_proposal, the_work_is_bounded)
