@@ -1,6 +1,6 @@
 /*
- * test_one_step.c: the coefficients of `rosenbrock` and its orders; `generalized_alpha` against its
- * amplification matrix; and the error control that one-step methods share.
+ * test_one_step.c: the coefficients of `rosenbrock` and its orders, and the error control that one-step methods
+ * share.
  */
 #include "integrators/local_error.h"
 #include "integrators/rosenbrock.h"
@@ -373,6 +373,5 @@ START_TEST(the_work_is_bounded)
 END_TEST
 
 SUITE("one_step", rodas_has_its_orders_and_is_l_stable, rosenbrock_has_its_order,
-
-      newmark_below_gamma_half_is_refused, the_norm_is_the_weighted_root_mean_square, sizes_follow_the_errors,
+      the_norm_is_the_weighted_root_mean_square, sizes_follow_the_errors,
       steps_end_at_kinks_and_at_the_end_without_slivers, a_cut_step_keeps_the_proposal, the_work_is_bounded)
