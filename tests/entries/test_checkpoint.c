@@ -270,7 +270,7 @@ START_TEST(every_linear_solver_resumes)
 {
     static const char *const methods[] = {"be", "ida", "dirk"};
     for (int i = 0; drape_linears[i]; i++)
-        for (size_t k = 0; k < 4; k++) {
+        for (size_t k = 0; k < sizeof methods / sizeof *methods; k++) {
             char settings[100];
             snprintf(settings, sizeof settings, ", 'linear_solver': '%s'", drape_linears[i]->entry.name);
             if (k > 0 && !in_sample((size_t)i, k, 3))

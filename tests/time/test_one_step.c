@@ -1,6 +1,6 @@
 /*
- * test_one_step.c: the coefficients of `rosenbrock` and its orders, and the error control that one-step methods
- * share.
+ * test_one_step.c: the coefficients of `rosenbrock` and its orders, and the error control that one-step
+ * methods share.
  */
 #include "integrators/local_error.h"
 #include "integrators/rosenbrock.h"
