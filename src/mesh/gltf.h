@@ -1,6 +1,7 @@
 /*
- * gltf.h: a glTF 2.0 file in its binary form, GLB: its JSON, and the numbers of its accessors, which are
- * checked against the bytes that are there. glTF 2.0 specification, Khronos Group 2021, sections 3.6 and 4.
+ * gltf.h: binary glTF 2.0, GLB: the names and numbers of the format, which the reader here and the writer in
+ * io/export_glb.c share; a file that is read: its JSON, and the numbers of its accessors, which are checked
+ * against the bytes that are there. glTF 2.0 specification, Khronos Group 2021, sections 3.6 and 4.
  */
 #ifndef DRAPE_MESH_GLTF_H
 #define DRAPE_MESH_GLTF_H
@@ -9,20 +10,50 @@
 
 #include <jansson.h>
 
+/* The container: a header of 12 bytes, and chunks, each with a header of 8. */
+#define DRAPE_GLTF_MAGIC "glTF"
+#define DRAPE_GLTF_JSON  "JSON"
+#define DRAPE_GLTF_BIN   "BIN" /* and a 0 */
+enum { DRAPE_GLTF_VERSION = 2, DRAPE_GLTF_HEADER = 12, DRAPE_GLTF_CHUNK = 8 };
+
+/* Component types of accessors, the mode of primitives that are triangles, and targets of buffer views. */
+enum {
+    DRAPE_GLTF_TRIANGLES = 4,
+    DRAPE_GLTF_INT8 = 5120,
+    DRAPE_GLTF_UINT8,
+    DRAPE_GLTF_INT16,
+    DRAPE_GLTF_UINT16,
+    DRAPE_GLTF_UINT32 = 5125,
+    DRAPE_GLTF_FLOAT,
+    DRAPE_GLTF_VERTICES = 34962,
+    DRAPE_GLTF_INDICES
+};
+
+/* The type of an accessor whose elements have that many numbers: "VEC3". */
+extern const char *const drape_gltf_types[17];
+
+/* The first failure of a reader stays in its status. All functions below may be called after it: they take
+ * and report nothing more, and return empty arrays, and indices that are -1 or in range. */
 typedef struct drape_gltf {
-    drape_context *ctx;
+    drape_arena *arena;            /* of all that is read */
     const drape_mesh_source *file; /* for messages */
-    json_t *root;                  /* an object */
-    const char *bytes;             /* of buffer 0 */
+    drape_status status;
+    json_t *root;      /* an object */
+    const char *bytes; /* of buffer 0 */
     size_t size;
 } drape_gltf;
 
-/* Opens the bytes of a file, which must outlive it; drape_gltf_close in any case. Faults are reported as
- * those of a mesh (drape_mesh_fail). The caller has switched to the C locale. Errors: DRAPE_E_PARSE,
- * DRAPE_E_MEMORY. */
-drape_status drape_gltf_open(drape_context *ctx, const drape_mesh_source *file, const char *data, size_t size,
-                             drape_gltf *out);
+/* Reports a fault of the file, as those of a mesh, if it is the first failure. */
+#define DRAPE_GLTF_FAIL(g, ...)                                                                              \
+    ((g)->status = (g)->status ? (g)->status : drape_mesh_fail((g)->arena->ctx, (g)->file, 0, __VA_ARGS__))
+
+/* Opens the bytes of a file, which must outlive it; arena and file are set, and drape_gltf_close is called in
+ * any case. The caller has switched to the C locale. Errors: DRAPE_E_PARSE, DRAPE_E_MEMORY. */
+void drape_gltf_open(drape_gltf *gltf, const char *data, size_t size);
 void drape_gltf_close(drape_gltf *gltf);
+
+/* Memory of the arena; NULL after a failure. */
+void *drape_gltf_take(drape_gltf *gltf, size_t count, size_t size);
 
 /* How many objects an array of the root has, such as "nodes"; 0 if there is none. */
 int32_t drape_gltf_count(const drape_gltf *gltf, const char *array);
@@ -30,31 +61,35 @@ const json_t *drape_gltf_item(const drape_gltf *gltf, const char *array, int32_t
 
 /* An index of `limit` things that an object has at a key; -1 if it has none. owner names the object in
  * messages. */
-drape_status drape_gltf_index(const drape_gltf *gltf, const char *owner, const json_t *object,
-                              const char *key, int32_t limit, int32_t *index);
+int32_t drape_gltf_index(drape_gltf *gltf, const char *owner, const json_t *object, const char *key,
+                         int32_t limit);
 /* The same for a value that must be an index. */
-drape_status drape_gltf_index_of(const drape_gltf *gltf, const char *owner, const json_t *value,
-                                 int32_t limit, int32_t *index);
+int32_t drape_gltf_index_of(drape_gltf *gltf, const char *owner, const json_t *value, int32_t limit);
 
-/* The numbers of an array of an object; they keep their values if it has none. */
-drape_status drape_gltf_numbers(const drape_gltf *gltf, const char *owner, const json_t *object,
-                                const char *key, size_t count, double *out);
+/* Refuses numbers that are not finite or beyond 1e9; what: of the owner, in messages. */
+#define DRAPE_GLTF_LARGEST 1e9
+void drape_gltf_check_finite(drape_gltf *gltf, const char *owner, const char *what, size_t count,
+                             const double *number);
+
+/* The numbers of an array of an object, which are finite; they keep their values if it has none. */
+void drape_gltf_numbers(drape_gltf *gltf, const char *owner, const json_t *object, const char *key,
+                        size_t count, double *out);
 
 typedef struct drape_gltf_array {
     int64_t count;
     int width;     /* numbers of each element */
-    double *value; /* (count x width) integers that are normalized are within -1 to 1 */
+    double *value; /* (count x width) integers that are normalized are within -1 to 1; NULL: none */
 } drape_gltf_array;
 
-/* Reads an accessor into the arena. purpose: what it is, in messages: "POSITION"; type: "VEC3" ...;
- * integer: its numbers must be integers that are not normalized; else they must be floats or normalized
- * integers; expected: count, -1: any. */
+/* Reads the accessor that an object has at a key, if it has one. */
 typedef struct drape_gltf_want {
-    const char *purpose, *type;
-    bool integer;
-    int64_t expected;
+    const char *key;
+    const char *purpose; /* in messages; NULL: the key */
+    int width;
+    bool integer;     /* its numbers must be integers that are not normalized; else floats or normalized */
+    int64_t expected; /* count; -1: any, and it must have a buffer view */
 } drape_gltf_want;
-drape_status drape_gltf_read(const drape_gltf *gltf, drape_arena *arena, int32_t accessor,
-                             const drape_gltf_want *want, drape_gltf_array *out);
+drape_gltf_array drape_gltf_read(drape_gltf *gltf, const char *owner, const json_t *object,
+                                 const drape_gltf_want *want);
 
 #endif

@@ -10,13 +10,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#define NEARLY_EQUAL                                                                                         \
-    1e-6 /* [rad] quaternions nearer than this are interpolated linearly: the difference is below
-                             1e-18 */
-
-#define LARGEST 1e9 /* of a number; of times in s */
-
-#define FAIL(g, ...) drape_mesh_fail((g)->ctx, (g)->file, 0, __VA_ARGS__)
+#define NEARLY_EQUAL 1e-6  /* [rad] below this, quaternions are interpolated linearly, to 1e-18 */
+#define LEAST_TURN   1e-12 /* squared length of a quaternion that is a rotation */
+#define FAIL         DRAPE_GLTF_FAIL
 
 /* Places of a transform in drape_gltf_node.rest. */
 enum { TRANSLATION = 0, ROTATION = 3, SCALE = 7 };
@@ -84,117 +80,80 @@ static drape_gltf_map map_of(const double at[10])
 
 /* ---- Nodes ---- */
 
-static drape_status check_transform(const drape_gltf *g, const char *owner, const double at[10])
+static double squared_length(const double *q)
 {
-    double turn = 0;
-    bool finite = true;
-    for (int i = 0; i < 10; i++)
-        finite = finite && fabs(at[i]) <= LARGEST;
-    for (int i = 0; i < 4; i++)
-        turn += at[ROTATION + i] * at[ROTATION + i];
-    if (!finite)
-        return FAIL(g, "%s: numbers must be finite and within 1e9", owner);
-    return turn > 1e-12 ? DRAPE_OK : FAIL(g, "%s: a rotation must not be 0", owner);
+    return q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
 }
 
-drape_status drape_gltf_check_finite(const drape_gltf *g, const char *owner, const char *what, size_t count,
-                                     const double *number)
+static void read_transform(drape_gltf *g, const char *owner, const json_t *object, drape_gltf_node *n)
 {
-    for (size_t i = 0; i < count; i++)
-        if (!(fabs(number[i]) <= LARGEST))
-            return FAIL(g, "%s: number %zu of its %s is %g; it must be finite and within %g", owner, i, what,
-                        number[i], LARGEST);
-    return DRAPE_OK;
-}
-
-static drape_status read_transform(const drape_gltf *g, const char *owner, const json_t *object,
-                                   drape_gltf_node *n)
-{
-    double matrix[16];
+    double matrix[16] = {0};
     const double rest[10] = {0, 0, 0, 0, 0, 0, 1, 1, 1, 1};
     memcpy(n->rest, rest, sizeof rest);
     n->fixed = json_object_get(object, "matrix");
     if (n->fixed && (json_object_get(object, "translation") || json_object_get(object, "rotation") ||
                      json_object_get(object, "scale")))
-        return FAIL(g, "%s: it has \"matrix\" beside \"translation\", \"rotation\" or \"scale\"", owner);
-    drape_status status = drape_gltf_numbers(g, owner, object, "matrix", 16, matrix);
-    if (!status && n->fixed)
-        status = drape_gltf_check_finite(g, owner, "matrix", 16, matrix);
-    if (!status)
-        status = drape_gltf_numbers(g, owner, object, "translation", 3, n->rest + TRANSLATION);
-    if (!status)
-        status = drape_gltf_numbers(g, owner, object, "rotation", 4, n->rest + ROTATION);
-    if (!status)
-        status = drape_gltf_numbers(g, owner, object, "scale", 3, n->rest + SCALE);
-    if (!status && n->fixed)
-        n->local = drape_gltf_map_of(matrix);
-    return status ? status : check_transform(g, owner, n->rest);
+        FAIL(g, "%s: it has \"matrix\" beside \"translation\", \"rotation\" or \"scale\"", owner);
+    drape_gltf_numbers(g, owner, object, "matrix", 16, matrix);
+    drape_gltf_numbers(g, owner, object, "translation", 3, n->rest + TRANSLATION);
+    drape_gltf_numbers(g, owner, object, "rotation", 4, n->rest + ROTATION);
+    drape_gltf_numbers(g, owner, object, "scale", 3, n->rest + SCALE);
+    n->local = drape_gltf_map_of(matrix);
+    if (!(squared_length(n->rest + ROTATION) > LEAST_TURN))
+        FAIL(g, "%s: a rotation must not be 0", owner);
 }
 
 /* As many weights as the first primitive of its mesh has morph targets; the node's own replace those of the
  * mesh. */
-static drape_status read_weights(const drape_gltf_scene *s, const char *owner, const json_t *object,
-                                 drape_gltf_node *n)
+static void read_weights(drape_gltf *g, const char *owner, const json_t *object, drape_gltf_node *n)
 {
-    const json_t *mesh = n->mesh >= 0 ? drape_gltf_item(s->gltf, "meshes", n->mesh) : NULL,
+    const json_t *mesh = drape_gltf_item(g, "meshes", n->mesh),
                  *primitive = json_array_get(json_object_get(mesh, "primitives"), 0);
     const size_t count = json_array_size(json_object_get(primitive, "targets"));
     if (count == 0)
-        return DRAPE_OK;
+        return;
     n->weight_count = (int32_t)count;
-    n->weight = drape_arena_take(s->arena, count, sizeof *n->weight);
-    n->now_weight = drape_arena_take(s->arena, count, sizeof *n->now_weight);
-    if (!n->weight || !n->now_weight)
-        return DRAPE_E_MEMORY;
-    const drape_status status = drape_gltf_numbers(s->gltf, owner, mesh, "weights", count, n->weight);
-    return status ? status : drape_gltf_numbers(s->gltf, owner, object, "weights", count, n->weight);
+    n->weight = drape_gltf_take(g, count, sizeof *n->weight);
+    n->now_weight = drape_gltf_take(g, count, sizeof *n->now_weight);
+    if (g->status)
+        return;
+    drape_gltf_numbers(g, owner, mesh, "weights", count, n->weight);
+    drape_gltf_numbers(g, owner, object, "weights", count, n->weight);
 }
 
-static drape_status read_children(const drape_gltf_scene *s, const char *owner, const json_t *object,
-                                  int32_t parent)
+static void read_node(const drape_gltf_scene *s, int32_t index)
 {
-    const json_t *child;
-    size_t i;
-    int32_t index;
-    json_array_foreach(json_object_get(object, "children"), i, child)
-    {
-        const drape_status status = drape_gltf_index_of(s->gltf, owner, child, s->node_count, &index);
-        if (status)
-            return status;
-        if (s->nodes[index].parent >= 0)
-            return FAIL(s->gltf, "node %d is the child of nodes %d and %d", (int)index,
-                        (int)s->nodes[index].parent, (int)parent);
-        s->nodes[index].parent = parent;
-    }
-    return DRAPE_OK;
-}
-
-static drape_status read_node(const drape_gltf_scene *s, int32_t index)
-{
-    const drape_gltf *g = s->gltf;
-    const json_t *object = drape_gltf_item(g, "nodes", index);
+    drape_gltf *g = s->gltf;
+    const json_t *object = drape_gltf_item(g, "nodes", index), *child;
     drape_gltf_node *n = &s->nodes[index];
     char owner[64];
+    size_t i;
     snprintf(owner, sizeof owner, "node %d", (int)index);
-    drape_status status = drape_gltf_index(g, owner, object, "mesh", drape_gltf_count(g, "meshes"), &n->mesh);
-    if (!status)
-        status = drape_gltf_index(g, owner, object, "skin", drape_gltf_count(g, "skins"), &n->skin);
-    if (!status)
-        status = read_transform(g, owner, object, n);
-    if (!status)
-        status = read_weights(s, owner, object, n);
+    n->mesh = drape_gltf_index(g, owner, object, "mesh", drape_gltf_count(g, "meshes"));
+    n->skin = drape_gltf_index(g, owner, object, "skin", drape_gltf_count(g, "skins"));
+    read_transform(g, owner, object, n);
+    read_weights(g, owner, object, n);
     snprintf(owner, sizeof owner, "node %d: \"children\"", (int)index);
-    return status ? status : read_children(s, owner, object, index);
+    json_array_foreach(json_object_get(object, "children"), i, child)
+    {
+        const int32_t number = drape_gltf_index_of(g, owner, child, s->node_count);
+        if (number < 0)
+            return;
+        if (s->nodes[number].parent >= 0)
+            FAIL(g, "node %d is the child of nodes %d and %d", (int)number, (int)s->nodes[number].parent,
+                 (int)index);
+        s->nodes[number].parent = index;
+    }
 }
 
 /* Roots first, then children of what is listed; what is never listed is its own ancestor. */
-static drape_status sort_nodes(drape_gltf_scene *s)
+static void sort_nodes(drape_gltf_scene *s)
 {
-    int32_t listed = 0, next = 0;
+    int32_t listed = 0;
     for (int32_t i = 0; i < s->node_count; i++)
         if (s->nodes[i].parent < 0)
             s->order[listed++] = i;
-    while (next < listed) {
+    for (int32_t next = 0; next < listed; next++) {
         const json_t *child;
         size_t i;
         json_array_foreach(json_object_get(drape_gltf_item(s->gltf, "nodes", s->order[next]), "children"), i,
@@ -202,36 +161,32 @@ static drape_status sort_nodes(drape_gltf_scene *s)
         {
             s->order[listed++] = (int32_t)json_number_value(child);
         }
-        next++;
     }
-    return listed == s->node_count ? DRAPE_OK : FAIL(s->gltf, "a node is its own ancestor");
+    if (listed < s->node_count)
+        FAIL(s->gltf, "a node is its own ancestor");
 }
 
 /* What the default scene shows, or, without scenes, all. */
-static drape_status mark_drawn(drape_gltf_scene *s)
+static void mark_drawn(drape_gltf_scene *s)
 {
-    const int32_t scenes = drape_gltf_count(s->gltf, "scenes");
-    int32_t shown, index;
+    const int32_t scenes = drape_gltf_count(s->gltf, "scenes"),
+                  shown = drape_gltf_index(s->gltf, "the file", s->gltf->root, "scene", scenes);
     const json_t *root;
     size_t k;
-    drape_status status = drape_gltf_index(s->gltf, "the file", s->gltf->root, "scene", scenes, &shown);
-    if (status)
-        return status;
     for (int32_t i = 0; i < s->node_count; i++)
         s->nodes[i].drawn = scenes == 0;
     json_array_foreach(json_object_get(drape_gltf_item(s->gltf, "scenes", shown < 0 ? 0 : shown), "nodes"), k,
                        root)
     {
-        status = drape_gltf_index_of(s->gltf, "\"scenes\": a node", root, s->node_count, &index);
-        if (status)
-            return status;
+        const int32_t index = drape_gltf_index_of(s->gltf, "\"scenes\": a node", root, s->node_count);
+        if (index < 0)
+            return;
         s->nodes[index].drawn = true;
     }
     for (int32_t i = 0; i < s->node_count; i++) {
         drape_gltf_node *n = &s->nodes[s->order[i]];
         n->drawn = n->drawn || (n->parent >= 0 && s->nodes[n->parent].drawn);
     }
-    return DRAPE_OK;
 }
 
 /* ---- The animation ---- */
@@ -245,32 +200,20 @@ static drape_status find_path(const drape_gltf_scene *s, const char *owner, cons
     } paths[] = {
         {"translation", TRANSLATION, 3}, {"rotation", ROTATION, 4}, {"scale", SCALE, 3}, {"weights", -1, 0}};
     const char *path = json_string_value(json_object_get(target, "path"));
-    for (size_t i = 0; path && i < sizeof paths / sizeof *paths; i++)
-        if (strcmp(path, paths[i].name) == 0) {
-            c->place = paths[i].place;
-            if (c->place >= 0 && s->nodes[c->node].fixed)
-                return FAIL(s->gltf, "%s: node %d has a \"matrix\": its %s cannot be animated", owner,
-                            (int)c->node, path);
-            c->width = c->place < 0 ? s->nodes[c->node].weight_count : paths[i].width;
-            return c->width > 0 ? DRAPE_OK
-                                : FAIL(s->gltf, "%s: node %d has no morph targets", owner, (int)c->node);
-        }
+    const drape_gltf_node *node = &s->nodes[c->node];
+    for (size_t i = 0; path && i < sizeof paths / sizeof *paths; i++) {
+        if (strcmp(path, paths[i].name) != 0)
+            continue;
+        c->place = paths[i].place;
+        c->width = c->place < 0 ? node->weight_count : paths[i].width;
+        if (c->place >= 0 && node->fixed)
+            FAIL(s->gltf, "%s: node %d has a \"matrix\": its %s cannot be animated", owner, (int)c->node,
+                 path);
+        return c->width > 0 ? s->gltf->status
+                            : FAIL(s->gltf, "%s: node %d has no morph targets", owner, (int)c->node);
+    }
     return FAIL(s->gltf, "%s: its path is %.30s; translation, rotation, scale or weights is needed", owner,
                 path ? path : "missing");
-}
-
-static drape_status check_keys(const drape_gltf_scene *s, const char *owner, const drape_gltf_channel *c)
-{
-    const int64_t count = c->time.count, each = (c->kind == CUBIC ? 3 : 1) * (int64_t)c->width;
-    for (int64_t k = 0; k < count; k++)
-        if (!(fabs(c->time.value[k]) <= LARGEST) || (k > 0 && !(c->time.value[k] > c->time.value[k - 1])))
-            return FAIL(s->gltf, "%s: key %" PRId64 " is at %g s; times must be within %g s and increase",
-                        owner, k, c->time.value[k], LARGEST);
-    for (int64_t i = 0; i < count * each; i++)
-        if (!(fabs(c->value[i]) <= LARGEST))
-            return FAIL(s->gltf, "%s: key %" PRId64 ": %g; values must be finite and within 1e9", owner,
-                        i / each, c->value[i]);
-    return DRAPE_OK;
 }
 
 /* The values of a rotation are VEC4, of others VEC3, of weights numbers, as many as targets for each key. */
@@ -278,104 +221,88 @@ static drape_status read_sampler(const drape_gltf_scene *s, const char *owner, c
                                  drape_gltf_channel *c)
 {
     static const char *const names[] = {[STEP] = "STEP", [LINEAR] = "LINEAR", [CUBIC] = "CUBICSPLINE"};
+    drape_gltf *g = s->gltf;
     const char *name = json_string_value(json_object_get(sampler, "interpolation"));
-    const int32_t accessors = drape_gltf_count(s->gltf, "accessors");
-    int32_t input, output;
-    drape_gltf_array value;
     for (c->kind = STEP; name && c->kind < CUBIC && strcmp(names[c->kind], name) != 0;)
         c->kind++;
     c->kind = name ? c->kind : LINEAR;
     if (name && strcmp(names[c->kind], name) != 0)
-        return FAIL(s->gltf, "%s: its interpolation is %.30s; LINEAR, STEP or CUBICSPLINE is needed", owner,
-                    name);
-    drape_status status = drape_gltf_index(s->gltf, owner, sampler, "input", accessors, &input);
-    if (!status)
-        status = drape_gltf_index(s->gltf, owner, sampler, "output", accessors, &output);
-    if (!status && (input < 0 || output < 0))
-        status = FAIL(s->gltf, "%s: its sampler needs \"input\" and \"output\"", owner);
-    if (!status)
-        status = drape_gltf_read(s->gltf, s->arena, input, &(drape_gltf_want){"times", "SCALAR", false, -1},
-                                 &c->time);
-    if (status)
-        return status;
+        return FAIL(g, "%s: its interpolation is %.30s; LINEAR, STEP or CUBICSPLINE is needed", owner, name);
+    c->time =
+        drape_gltf_read(g, owner, sampler,
+                        &(drape_gltf_want){.key = "input", .purpose = "times", .width = 1, .expected = -1});
     const int64_t keys = c->time.count * (c->kind == CUBIC ? 3 : 1);
-    const drape_gltf_want want = {"values of an animation",
-                                  c->place < 0           ? "SCALAR"
-                                  : c->place == ROTATION ? "VEC4"
-                                                         : "VEC3",
-                                  false, c->place < 0 ? keys * c->width : keys};
-    status = drape_gltf_read(s->gltf, s->arena, output, &want, &value);
-    c->value = value.value;
-    return status ? status : check_keys(s, owner, c);
+    const drape_gltf_want want = {.key = "output",
+                                  .purpose = "values of an animation",
+                                  .width = c->place < 0 ? 1 : c->width,
+                                  .expected = c->place < 0 ? keys * c->width : keys};
+    c->value = drape_gltf_read(g, owner, sampler, &want).value;
+    if (!c->time.value || !c->value)
+        return FAIL(g, "%s: its sampler needs \"input\" and \"output\"", owner);
+    for (int64_t k = 0; k < c->time.count; k++)
+        if (!(fabs(c->time.value[k]) <= DRAPE_GLTF_LARGEST) ||
+            (k > 0 && !(c->time.value[k] > c->time.value[k - 1])))
+            return FAIL(g, "%s: key %" PRId64 " is at %g s; times must be within %g s and increase", owner, k,
+                        c->time.value[k], DRAPE_GLTF_LARGEST);
+    drape_gltf_check_finite(g, owner, "values", (size_t)(keys * c->width), c->value);
+    return g->status;
 }
 
 /* Channels without a node are for extensions. */
-static drape_status read_channel(drape_gltf_scene *s, const json_t *animation, const json_t *object,
-                                 int number)
+static void read_channel(drape_gltf_scene *s, const json_t *animation, const json_t *object, int number)
 {
-    const json_t *samplers = json_object_get(animation, "samplers"),
-                 *target = json_object_get(object, "target");
+    drape_gltf *g = s->gltf;
+    const json_t *samplers = json_object_get(animation, "samplers");
     const size_t count = json_array_size(samplers);
     drape_gltf_channel *c = &s->channels[s->channel_count];
-    int32_t sampler;
     char owner[64];
     snprintf(owner, sizeof owner, "animation 0, channel %d", number);
-    drape_status status = drape_gltf_index(s->gltf, owner, target, "node", s->node_count, &c->node);
-    if (status || c->node < 0)
-        return status;
-    status = drape_gltf_index(s->gltf, owner, object, "sampler",
-                              count > INT32_MAX ? INT32_MAX : (int32_t)count, &sampler);
-    if (!status && sampler < 0)
-        status = FAIL(s->gltf, "%s has no sampler", owner);
-    if (!status)
-        status = find_path(s, owner, target, c);
-    if (!status)
-        status = read_sampler(s, owner, json_array_get(samplers, (size_t)sampler), c);
-    if (status)
-        return status;
+    const json_t *target = json_object_get(object, "target");
+    c->node = drape_gltf_index(g, owner, target, "node", s->node_count);
+    if (c->node < 0)
+        return;
+    const int32_t sampler =
+        drape_gltf_index(g, owner, object, "sampler", count > INT32_MAX ? INT32_MAX : (int32_t)count);
+    if (sampler < 0)
+        FAIL(g, "%s has no sampler", owner);
+    if (find_path(s, owner, target, c) ||
+        read_sampler(s, owner, json_array_get(samplers, (size_t)sampler), c))
+        return;
     const double first = c->time.value[0], last = c->time.value[c->time.count - 1];
     s->start = s->channel_count == 0 ? first : fmin(s->start, first);
     s->end = s->channel_count == 0 ? last : fmax(s->end, last);
     s->channel_count++;
-    return DRAPE_OK;
 }
 
-static drape_status read_animation(drape_gltf_scene *s)
+static void read_animation(drape_gltf_scene *s)
 {
     const json_t *animation = drape_gltf_item(s->gltf, "animations", 0),
                  *channels = json_object_get(animation, "channels"), *channel;
     size_t i;
-    drape_status status = DRAPE_OK;
     if (animation && json_array_size(channels) == 0)
-        return FAIL(s->gltf, "animation 0, which is the one that is read, has no channels");
-    s->channels = drape_arena_take(s->arena, json_array_size(channels), sizeof *s->channels);
-    if (!s->channels)
-        return DRAPE_E_MEMORY;
+        FAIL(s->gltf, "animation 0, which is the one that is read, has no channels");
+    s->channels = drape_gltf_take(s->gltf, json_array_size(channels), sizeof *s->channels);
     json_array_foreach(channels, i, channel)
     {
-        if (!status)
-            status = read_channel(s, animation, channel, (int)i);
+        if (!s->gltf->status)
+            read_channel(s, animation, channel, (int)i);
     }
-    return status;
 }
 
-drape_status drape_gltf_scene_read(const drape_gltf *gltf, drape_arena *arena, drape_gltf_scene *s)
+void drape_gltf_scene_read(drape_gltf *g, drape_gltf_scene *s)
 {
-    *s = (drape_gltf_scene){.gltf = gltf, .arena = arena, .node_count = drape_gltf_count(gltf, "nodes")};
-    s->nodes = drape_arena_take(arena, (size_t)s->node_count, sizeof *s->nodes);
-    s->order = drape_arena_take(arena, (size_t)s->node_count, sizeof *s->order);
-    if (!s->nodes || !s->order)
-        return DRAPE_E_MEMORY;
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; i < s->node_count; i++)
+    *s = (drape_gltf_scene){.gltf = g, .node_count = drape_gltf_count(g, "nodes")};
+    s->nodes = drape_gltf_take(g, (size_t)s->node_count, sizeof *s->nodes);
+    s->order = drape_gltf_take(g, (size_t)s->node_count, sizeof *s->order);
+    for (int32_t i = 0; !g->status && i < s->node_count; i++)
         s->nodes[i].parent = -1;
-    for (int32_t i = 0; !status && i < s->node_count; i++)
-        status = read_node(s, i);
-    if (!status)
-        status = sort_nodes(s);
-    if (!status)
-        status = mark_drawn(s);
-    return status ? status : read_animation(s);
+    for (int32_t i = 0; !g->status && i < s->node_count; i++)
+        read_node(s, i);
+    if (!g->status)
+        sort_nodes(s);
+    if (!g->status)
+        mark_drawn(s);
+    read_animation(s);
 }
 
 /* ---- A pose ---- */
@@ -383,12 +310,9 @@ drape_status drape_gltf_scene_read(const drape_gltf *gltf, drape_arena *arena, d
 /* The rotation between two others by the smaller angle, at constant speed (Shoemake 1985). */
 static void interpolate_rotation(const double *a, const double *b, double s, double *out)
 {
-    double sine[3], cosine, dot = 0, size[2] = {0};
-    for (int k = 0; k < 4; k++) {
-        dot += a[k] * b[k];
-        size[0] += a[k] * a[k];
-        size[1] += b[k] * b[k];
-    }
+    const double dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3],
+                 size[2] = {squared_length(a), squared_length(b)};
+    double sine[3], cosine;
     const double length = sqrt(size[0] * size[1]), sign = dot < 0 ? -1 : 1;
     double across = 0, weight[2] = {1 - s, s * sign};
     for (int k = 0; k < 4; k++) {
@@ -449,16 +373,9 @@ static void interpolate(const drape_gltf_channel *c, double t, double *out)
             out[k] = a[k] + s * (a[each + (size_t)k] - a[k]);
 }
 
-/* A rotation that an animation lets vanish is none. */
-static void keep_rotation(double *q)
-{
-    const double none[4] = {0, 0, 0, 1};
-    if (!(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] > 1e-12))
-        memcpy(q, none, sizeof none);
-}
-
 void drape_gltf_scene_pose(drape_gltf_scene *s, double t)
 {
+    static const double no_rotation[4] = {0, 0, 0, 1};
     for (int32_t i = 0; i < s->node_count; i++) {
         drape_gltf_node *n = &s->nodes[i];
         memcpy(n->now, n->rest, sizeof n->now);
@@ -472,7 +389,8 @@ void drape_gltf_scene_pose(drape_gltf_scene *s, double t)
     }
     for (int32_t i = 0; i < s->node_count; i++) {
         drape_gltf_node *n = &s->nodes[s->order[i]];
-        keep_rotation(n->now + ROTATION);
+        if (!(squared_length(n->now + ROTATION) > LEAST_TURN)) /* an animation lets it vanish */
+            memcpy(n->now + ROTATION, no_rotation, sizeof no_rotation);
         if (!n->fixed)
             n->local = map_of(n->now);
         n->world = n->parent < 0 ? n->local : drape_gltf_map_product(&s->nodes[n->parent].world, &n->local);

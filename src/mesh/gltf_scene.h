@@ -28,8 +28,7 @@ typedef struct drape_gltf_node {
 typedef struct drape_gltf_channel drape_gltf_channel;
 
 typedef struct drape_gltf_scene {
-    const drape_gltf *gltf;
-    drape_arena *arena;
+    drape_gltf *gltf;
     drape_gltf_node *nodes;
     int32_t *order; /* (node_count) parents before children */
     int32_t node_count;
@@ -38,8 +37,8 @@ typedef struct drape_gltf_scene {
     double start, end; /* [s] of the animation; 0 and 0 if there is none */
 } drape_gltf_scene;
 
-/* Reads nodes and the animation into the arena. Errors: DRAPE_E_PARSE, DRAPE_E_MEMORY. */
-drape_status drape_gltf_scene_read(const drape_gltf *gltf, drape_arena *arena, drape_gltf_scene *out);
+/* Reads nodes and the animation into the arena of the file, whose status says whether that failed. */
+void drape_gltf_scene_read(drape_gltf *gltf, drape_gltf_scene *out);
 
 /* Moves the nodes to where they are at a time [s]. */
 void drape_gltf_scene_pose(drape_gltf_scene *scene, double t);
@@ -49,10 +48,6 @@ drape_gltf_map drape_gltf_map_product(const drape_gltf_map *a, const drape_gltf_
 
 /* Negative: it mirrors. */
 double drape_gltf_map_determinant(const drape_gltf_map *map);
-
-/* Refuses numbers that are not finite or beyond 1e9; what: of the owner, in messages. */
-drape_status drape_gltf_check_finite(const drape_gltf *gltf, const char *owner, const char *what,
-                                     size_t count, const double *number);
 
 /* The map of the 16 numbers of a matrix, column by column, whose last row is 0 0 0 1. */
 drape_gltf_map drape_gltf_map_of(const double matrix[16]);

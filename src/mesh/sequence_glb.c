@@ -15,12 +15,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TRIANGLES   4      /* the mode of a primitive */
-#define MODES       7      /* of primitives */
-#define ENOUGH      1e-6   /* of a frame, by which the last may be behind the end of the animation */
-#define MOST_FRAMES 1e15   /* for a conversion to int64; far more than are allowed */
-#define POSE        32     /* operations for a node, a joint or a channel in a frame */
-#define MAX_WORK    0x1p34 /* operations for all frames */
+#define MODES        7      /* of primitives */
+#define ENOUGH       1e-6   /* of a frame, by which the last may be behind the end of the animation */
+#define MOST_FRAMES  1e15   /* for a conversion to int64; far more than are allowed */
+#define POSE         32     /* operations for a node, a joint or a channel in a frame */
+#define MAX_WORK     0x1p34 /* operations for all frames */
+#define FAIL(r, ...) DRAPE_GLTF_FAIL(&(r)->gltf, __VA_ARGS__)
 
 /* The joints of a skin. */
 typedef struct skin {
@@ -43,79 +43,53 @@ typedef struct part {
 
 typedef struct reader {
     const drape_sequence_source *source;
-    drape_arena arena; /* of what is read */
     drape_gltf gltf;
     drape_gltf_scene scene;
     skin *skins;
     part *parts;
-    int32_t part_count, part_room;
     int32_t *corner; /* (triangle_count x 3) */
-    int64_t point_count, triangle_count, triangle_room;
+    int64_t part_count, part_room, point_count, triangle_count, triangle_room;
     double work; /* operations for a frame */
 } reader;
 
-#define FAIL(r, ...) drape_mesh_fail((r)->source->ctx, &(r)->source->file, 0, __VA_ARGS__)
-
 /* ---- Skins ---- */
 
-static drape_status read_skin(reader *r, int32_t index)
+static void read_skin(reader *r, int32_t index)
 {
-    const json_t *object = drape_gltf_item(&r->gltf, "skins", index),
-                 *joints = json_object_get(object, "joints");
+    static const double none[16] = {[0] = 1, [5] = 1, [10] = 1, [15] = 1};
+    drape_gltf *g = &r->gltf;
+    const json_t *object = drape_gltf_item(g, "skins", index), *joints = json_object_get(object, "joints");
     skin *s = &r->skins[index];
     char owner[48];
-    int32_t matrices;
-    drape_gltf_array inverse = {.count = 0};
     snprintf(owner, sizeof owner, "skin %d", (int)index);
     s->count = (int32_t)json_array_size(joints);
     if (s->count == 0)
-        return FAIL(r, "%s has no joints", owner);
+        FAIL(r, "%s has no joints", owner);
     r->work += POSE * (double)s->count;
-    s->joint = drape_arena_take(&r->arena, (size_t)s->count, sizeof *s->joint);
-    s->inverse = drape_arena_take(&r->arena, (size_t)s->count, sizeof *s->inverse);
-    s->now = drape_arena_take(&r->arena, (size_t)s->count, sizeof *s->now);
-    drape_status status = drape_gltf_index(&r->gltf, owner, object, "inverseBindMatrices",
-                                           drape_gltf_count(&r->gltf, "accessors"), &matrices);
-    if (!s->joint || !s->inverse || !s->now)
-        return DRAPE_E_MEMORY;
-    if (!status && matrices >= 0)
-        status =
-            drape_gltf_read(&r->gltf, &r->arena, matrices,
-                            &(drape_gltf_want){"inverse bind matrices", "MAT4", false, s->count}, &inverse);
-    if (!status && inverse.value)
-        status = drape_gltf_check_finite(&r->gltf, owner, "inverse bind matrices", 16 * (size_t)s->count,
-                                         inverse.value);
-    for (int32_t k = 0; !status && k < s->count; k++) {
-        static const double none[16] = {[0] = 1, [5] = 1, [10] = 1, [15] = 1};
-        s->inverse[k] = drape_gltf_map_of(inverse.value ? inverse.value + 16 * (size_t)k : none);
-        status = drape_gltf_index_of(&r->gltf, owner, json_array_get(joints, (size_t)k), r->scene.node_count,
-                                     &s->joint[k]);
+    s->joint = drape_gltf_take(g, (size_t)s->count, sizeof *s->joint);
+    s->inverse = drape_gltf_take(g, (size_t)s->count, sizeof *s->inverse);
+    s->now = drape_gltf_take(g, (size_t)s->count, sizeof *s->now);
+    const double *inverse = drape_gltf_read(g, owner, object,
+                                            &(drape_gltf_want){"inverseBindMatrices", "inverse bind matrices",
+                                                               16, false, s->count})
+                                .value;
+    if (inverse)
+        drape_gltf_check_finite(g, owner, "inverse bind matrices", 16 * (size_t)s->count, inverse);
+    for (int32_t k = 0; !g->status && k < s->count; k++) {
+        s->inverse[k] = drape_gltf_map_of(inverse ? inverse + 16 * (size_t)k : none);
+        s->joint[k] = drape_gltf_index_of(g, owner, json_array_get(joints, (size_t)k), r->scene.node_count);
     }
-    return status;
 }
 
-static drape_status read_skins(reader *r)
+static void read_skins(reader *r)
 {
     const int32_t count = drape_gltf_count(&r->gltf, "skins");
-    drape_status status = DRAPE_OK;
-    r->skins = drape_arena_take(&r->arena, (size_t)count, sizeof *r->skins);
-    for (int32_t i = 0; r->skins && !status && i < count; i++)
-        status = read_skin(r, i);
-    return r->skins ? status : DRAPE_E_MEMORY;
+    r->skins = drape_gltf_take(&r->gltf, (size_t)count, sizeof *r->skins);
+    for (int32_t i = 0; !r->gltf.status && i < count; i++)
+        read_skin(r, i);
 }
 
 /* ---- Primitives ---- */
-
-/* One of the attributes of a primitive; NULL if it has none of this name. */
-static drape_status read_attribute(reader *r, const char *owner, const json_t *attributes, const char *name,
-                                   const drape_gltf_want *want, drape_gltf_array *out)
-{
-    int32_t accessor;
-    const drape_status status = drape_gltf_index(&r->gltf, owner, attributes, name,
-                                                 drape_gltf_count(&r->gltf, "accessors"), &accessor);
-    *out = (drape_gltf_array){.count = 0};
-    return status || accessor < 0 ? status : drape_gltf_read(&r->gltf, &r->arena, accessor, want, out);
-}
 
 /* Weights are scaled to a sum of 1. */
 static drape_status check_influences(reader *r, const char *owner, const part *p)
@@ -126,7 +100,7 @@ static drape_status check_influences(reader *r, const char *owner, const part *p
         for (int k = 0; k < 4 * p->sets; k++) {
             const double joint = p->joint[k / 4][4 * i + (size_t)(k % 4)],
                          w = p->weight[k / 4][4 * i + (size_t)(k % 4)];
-            if (!(w >= 0 && w <= 1e9))
+            if (!(w >= 0 && w <= DRAPE_GLTF_LARGEST))
                 return FAIL(r, "%s: point %zu: weight %g; weights must be finite and not negative", owner, i,
                             w);
             if (w > 0 && !(joint < joints))
@@ -153,158 +127,131 @@ static int32_t count_sets(const json_t *attributes, const char *start)
 }
 
 /* Sets are numbered from 0 on without a gap. */
-static drape_status read_influences(reader *r, const char *owner, const json_t *attributes, part *p)
+static void read_influences(reader *r, const char *owner, const json_t *attributes, part *p)
 {
+    drape_gltf *g = &r->gltf;
+    const int32_t weights = count_sets(attributes, "WEIGHTS_");
     p->sets = count_sets(attributes, "JOINTS_");
     if (p->sets == 0)
-        return FAIL(r, "%s: its node has a skin, and it has no JOINTS_0 and WEIGHTS_0", owner);
-    if (count_sets(attributes, "WEIGHTS_") != p->sets)
-        return FAIL(r, "%s: it has %d sets of joints, and %d of weights", owner, (int)p->sets,
-                    (int)count_sets(attributes, "WEIGHTS_"));
-    p->joint = drape_arena_take(&r->arena, (size_t)p->sets, sizeof *p->joint);
-    p->weight = drape_arena_take(&r->arena, (size_t)p->sets, sizeof *p->weight);
-    if (!p->joint || !p->weight)
-        return DRAPE_E_MEMORY;
-    for (int32_t k = 0; k < p->sets; k++) {
-        drape_gltf_array joint, weight;
+        FAIL(r, "%s: its node has a skin, and it has no JOINTS_0 and WEIGHTS_0", owner);
+    if (weights != p->sets)
+        FAIL(r, "%s: it has %d sets of joints, and %d of weights", owner, (int)p->sets, (int)weights);
+    p->joint = drape_gltf_take(g, (size_t)p->sets, sizeof *p->joint);
+    p->weight = drape_gltf_take(g, (size_t)p->sets, sizeof *p->weight);
+    for (int32_t k = 0; !g->status && k < p->sets; k++) {
         char name[2][24];
         snprintf(name[0], sizeof name[0], "JOINTS_%d", (int)k);
         snprintf(name[1], sizeof name[1], "WEIGHTS_%d", (int)k);
-        drape_status status = read_attribute(r, owner, attributes, name[0],
-                                             &(drape_gltf_want){name[0], "VEC4", true, p->count}, &joint);
-        if (!status)
-            status = read_attribute(r, owner, attributes, name[1],
-                                    &(drape_gltf_want){name[1], "VEC4", false, p->count}, &weight);
-        if (!status && (!joint.value || !weight.value))
-            status = FAIL(r, "%s: of %d sets of joints and weights it has no %s", owner, (int)p->sets,
-                          joint.value ? name[1] : name[0]);
-        if (status)
-            return status;
-        p->joint[k] = joint.value;
-        p->weight[k] = weight.value;
+        p->joint[k] =
+            drape_gltf_read(g, owner, attributes, &(drape_gltf_want){name[0], NULL, 4, true, p->count}).value;
+        p->weight[k] =
+            drape_gltf_read(g, owner, attributes, &(drape_gltf_want){name[1], NULL, 4, false, p->count})
+                .value;
+        if (!p->joint[k] || !p->weight[k])
+            FAIL(r, "%s: of %d sets of joints and weights it has no %s", owner, (int)p->sets,
+                 name[p->joint[k] != NULL]);
     }
-    return check_influences(r, owner, p);
+    if (!g->status)
+        check_influences(r, owner, p);
 }
 
-static drape_status read_targets(reader *r, const char *owner, const json_t *primitive, part *p)
+static void read_targets(reader *r, const char *owner, const json_t *primitive, part *p)
 {
     const json_t *targets = json_object_get(primitive, "targets");
-    const int32_t weights = r->scene.nodes[p->node].weight_count;
-    drape_status status = DRAPE_OK;
-    if ((int32_t)json_array_size(targets) != weights)
-        return FAIL(r, "%s: %zu morph targets; the first primitive of the mesh has %d", owner,
-                    json_array_size(targets), (int)weights);
-    p->targets = weights;
-    p->target = drape_arena_take(&r->arena, (size_t)weights, sizeof *p->target);
-    for (int32_t k = 0; p->target && !status && k < weights; k++) {
-        drape_gltf_array moves;
-        status =
-            read_attribute(r, owner, json_array_get(targets, (size_t)k), "POSITION",
-                           &(drape_gltf_want){"POSITION of a morph target", "VEC3", false, p->count}, &moves);
-        p->target[k] = moves.value;
-    }
-    return p->target ? status : DRAPE_E_MEMORY;
+    p->targets = r->scene.nodes[p->node].weight_count;
+    if (json_array_size(targets) != (size_t)p->targets)
+        FAIL(r, "%s: %zu morph targets; the first primitive of the mesh has %d", owner,
+             json_array_size(targets), (int)p->targets);
+    p->target = drape_gltf_take(&r->gltf, (size_t)p->targets, sizeof *p->target);
+    for (int32_t k = 0; !r->gltf.status && k < p->targets; k++)
+        p->target[k] =
+            drape_gltf_read(&r->gltf, owner, json_array_get(targets, (size_t)k),
+                            &(drape_gltf_want){"POSITION", "POSITION of a morph target", 3, false, p->count})
+                .value;
 }
 
-static drape_status reserve_triangles(reader *r, int64_t more)
+/* Memory for `needed` items, of which there is room for *room; NULL after a failure. */
+static void *grow(reader *r, void *items, int64_t needed, int64_t *room, size_t size)
 {
-    if (r->triangle_count + more > DRAPE_MAX_TRIANGLES)
-        return FAIL(r, "more than %d triangles", DRAPE_MAX_TRIANGLES);
-    if (r->triangle_count + more <= r->triangle_room)
-        return DRAPE_OK;
-    r->triangle_room = 2 * r->triangle_room + more;
-    int32_t *corner = drape_arena_resize(&r->arena, r->corner, (size_t)r->triangle_room, 3 * sizeof *corner);
-    if (!corner)
-        return DRAPE_E_MEMORY;
-    r->corner = corner;
-    return DRAPE_OK;
+    if (r->gltf.status || needed <= *room)
+        return items;
+    *room = *room + needed;
+    void *grown = drape_arena_resize(r->gltf.arena, items, (size_t)*room, size);
+    if (!grown)
+        r->gltf.status = DRAPE_E_MEMORY;
+    return grown ? grown : items;
 }
 
 /* Without indices, each three points are a triangle. */
-static drape_status read_triangles(reader *r, const char *owner, const json_t *primitive, const part *p)
+static drape_status read_triangles(reader *r, const char *owner, const json_t *primitive, part *p)
 {
-    drape_gltf_array index;
-    drape_status status = read_attribute(r, owner, primitive, "indices",
-                                         &(drape_gltf_want){"indices", "SCALAR", true, -1}, &index);
-    if (status)
-        return status;
+    const drape_gltf_array index =
+        drape_gltf_read(&r->gltf, owner, primitive, &(drape_gltf_want){"indices", NULL, 1, true, -1});
     const int64_t corners = index.value ? index.count : p->count;
+    p->triangles = corners / 3;
     if (corners % 3 != 0)
-        return FAIL(r, "%s: %lld corners of triangles; they must be a multiple of 3", owner,
-                    (long long)corners);
-    status = reserve_triangles(r, corners / 3);
-    for (int64_t i = 0; !status && i < corners; i++) {
+        FAIL(r, "%s: %lld corners of triangles; they must be a multiple of 3", owner, (long long)corners);
+    if (r->triangle_count + p->triangles > DRAPE_MAX_TRIANGLES)
+        FAIL(r, "more than %d triangles", DRAPE_MAX_TRIANGLES);
+    r->corner =
+        grow(r, r->corner, r->triangle_count + p->triangles, &r->triangle_room, 3 * sizeof *r->corner);
+    for (int64_t i = 0; !r->gltf.status && i < corners; i++) {
         const double at = index.value ? index.value[i] : (double)i;
         if (!(at < p->count))
             return FAIL(r, "%s: index %.0f; it has points 0 to %d", owner, at, (int)p->count - 1);
         r->corner[3 * r->triangle_count + i] = p->first + (int32_t)at;
     }
-    r->triangle_count += status ? 0 : corners / 3;
-    return status;
+    return r->gltf.status;
 }
 
 static drape_status read_primitive(reader *r, int32_t node, int32_t mesh, const json_t *primitive, int number)
 {
+    drape_gltf *g = &r->gltf;
     const json_t *attributes = json_object_get(primitive, "attributes");
     part p = {.node = node, .first = (int32_t)r->point_count, .triangle = r->triangle_count};
-    int32_t mode;
-    drape_gltf_array x;
     char owner[80];
     snprintf(owner, sizeof owner, "mesh %d, primitive %d", (int)mesh, number);
-    drape_status status = drape_gltf_index(&r->gltf, owner, primitive, "mode", MODES, &mode);
-    if (!status && mode > TRIANGLES)
-        status =
-            FAIL(r, "%s: its mode is %d; triangles, 4, are read, and no strips and fans", owner, (int)mode);
-    if (status || (mode >= 0 && mode < TRIANGLES))
-        return status; /* points and lines show no triangles */
-    status = read_attribute(r, owner, attributes, "POSITION",
-                            &(drape_gltf_want){"POSITION", "VEC3", false, -1}, &x);
-    if (status)
-        return status;
+    const int32_t mode = drape_gltf_index(g, owner, primitive, "mode", MODES);
+    if (mode > DRAPE_GLTF_TRIANGLES)
+        FAIL(r, "%s: its mode is %d; triangles, 4, are read, and no strips and fans", owner, (int)mode);
+    if (mode >= 0 && mode < DRAPE_GLTF_TRIANGLES)
+        return g->status; /* points and lines show no triangles */
+    const drape_gltf_array x =
+        drape_gltf_read(g, owner, attributes, &(drape_gltf_want){"POSITION", NULL, 3, false, -1});
     if (!x.value)
         return FAIL(r, "%s has no POSITION", owner);
     if (r->point_count + x.count > DRAPE_MAX_NODES)
         return FAIL(r, "more than %d points", DRAPE_MAX_NODES);
     p.x = x.value;
     p.count = (int32_t)x.count;
-    status = read_triangles(r, owner, primitive, &p);
-    p.triangles = r->triangle_count - p.triangle;
-    if (!status)
-        status = read_targets(r, owner, primitive, &p);
-    if (!status && r->scene.nodes[node].skin >= 0)
-        status = read_influences(r, owner, attributes, &p);
-    if (status)
-        return status;
-    if (r->part_count == r->part_room) {
-        r->part_room = 2 * r->part_room + 8;
-        part *parts = drape_arena_resize(&r->arena, r->parts, (size_t)r->part_room, sizeof *parts);
-        if (!parts)
-            return DRAPE_E_MEMORY;
-        r->parts = parts;
-    }
+    read_triangles(r, owner, primitive, &p);
+    read_targets(r, owner, primitive, &p);
+    if (r->scene.nodes[node].skin >= 0)
+        read_influences(r, owner, attributes, &p);
+    r->parts = grow(r, r->parts, r->part_count + 1, &r->part_room, sizeof *r->parts);
+    if (g->status)
+        return g->status;
     r->parts[r->part_count++] = p;
+    r->triangle_count += p.triangles;
     r->point_count += p.count;
     r->work += (double)p.count * (1.0 + p.targets + 4.0 * p.sets);
     return DRAPE_OK;
 }
 
-static drape_status read_parts(reader *r)
+static void read_parts(reader *r)
 {
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < r->scene.node_count; i++) {
+    for (int32_t i = 0; !r->gltf.status && i < r->scene.node_count; i++) {
         const drape_gltf_node *node = &r->scene.nodes[i];
-        const json_t *primitive;
+        const json_t *mesh = drape_gltf_item(&r->gltf, "meshes", node->mesh), *primitive;
         size_t k;
-        if (!node->drawn || node->mesh < 0)
-            continue;
-        json_array_foreach(json_object_get(drape_gltf_item(&r->gltf, "meshes", node->mesh), "primitives"), k,
-                           primitive)
+        json_array_foreach(json_object_get(mesh, "primitives"), k, primitive)
         {
-            if (!status)
-                status = read_primitive(r, i, node->mesh, primitive, (int)k);
+            if (node->drawn && !r->gltf.status)
+                read_primitive(r, i, node->mesh, primitive, (int)k);
         }
     }
-    return status || r->triangle_count > 0 ? status : FAIL(r, "its scene shows no triangles");
+    if (r->triangle_count == 0)
+        FAIL(r, "its scene shows no triangles");
 }
 
 /* ---- Frames ---- */
@@ -361,7 +308,7 @@ static bool is_mirrored(const reader *r, const part *p)
  * same. That must hold in all frames: triangles do not change between them. */
 static drape_status check_mirrors(reader *r, int32_t frame, drape_mesh *mesh)
 {
-    for (int32_t k = 0; k < r->part_count; k++) {
+    for (int64_t k = 0; k < r->part_count; k++) {
         part *p = &r->parts[k];
         const bool mirrored = is_mirrored(r, p);
         if (frame > 0 && mirrored != p->mirrored)
@@ -402,7 +349,7 @@ static drape_status sample(reader *r, drape_mesh *mesh, drape_sequence *out)
         pose(r, fmin(scene->start + f / rate, scene->end));
         status = drape_check_cancel_after(r->source->ctx, (size_t)work);
         status = status ? status : check_mirrors(r, f, mesh);
-        for (int32_t k = 0; k < r->part_count && !status; k++)
+        for (int64_t k = 0; k < r->part_count && !status; k++)
             for (int32_t i = 0; i < r->parts[k].count; i++)
                 place_point(r, &r->parts[k], (size_t)i, x + 3 * (size_t)(r->parts[k].first + i));
         const drape_mesh frame = {.node_count = mesh->node_count, .x = x};
@@ -502,8 +449,8 @@ static void drop_points(drape_mesh *mesh, drape_sequence *frames, int32_t *numbe
 
 static drape_status weld(reader *r, drape_mesh *mesh, drape_sequence *frames)
 {
-    int32_t *number = drape_arena_take(&r->arena, (size_t)mesh->node_count, sizeof *number);
-    const drape_status status = number ? find_same(&r->arena, frames, number) : DRAPE_E_MEMORY;
+    int32_t *number = drape_gltf_take(&r->gltf, (size_t)mesh->node_count, sizeof *number);
+    const drape_status status = number ? find_same(r->gltf.arena, frames, number) : r->gltf.status;
     if (status)
         return status;
     weld_triangles(mesh, number);
@@ -511,32 +458,26 @@ static drape_status weld(reader *r, drape_mesh *mesh, drape_sequence *frames)
     return mesh->triangle_count > 0 ? DRAPE_OK : FAIL(r, "all its triangles are degenerate");
 }
 
-static drape_status read_all(reader *r, const char *data, size_t size, drape_mesh *mesh, drape_sequence *out)
-{
-    drape_status status = drape_gltf_open(r->source->ctx, &r->source->file, data, size, &r->gltf);
-    if (!status)
-        status = drape_gltf_scene_read(&r->gltf, &r->arena, &r->scene);
-    if (!status)
-        status = read_skins(r);
-    if (!status)
-        status = read_parts(r);
-    if (!status)
-        status = sample(r, mesh, out);
-    if (!status)
-        status = weld(r, mesh, out);
-    drape_gltf_close(&r->gltf);
-    return status;
-}
-
 static drape_status read_glb(const drape_sequence_source *source, drape_mesh *mesh, drape_sequence *out)
 {
-    reader r = {.source = source, .arena = drape_arena_of(source->ctx)};
+    drape_arena arena = drape_arena_of(source->ctx);
+    reader r = {.source = source, .gltf = {.arena = &arena, .file = &source->file}};
     drape_contents whole = {0};
     drape_status status =
-        drape_contents_read(&r.arena, source->file.pointer, source->folder, source->file.file, &whole);
+        drape_contents_read(&arena, source->file.pointer, source->folder, source->file.file, &whole);
+    if (!status) {
+        drape_gltf_open(&r.gltf, whole.data, whole.size);
+        drape_gltf_scene_read(&r.gltf, &r.scene);
+        read_skins(&r);
+        read_parts(&r);
+        status = r.gltf.status;
+    }
     if (!status)
-        status = read_all(&r, whole.data, whole.size, mesh, out);
-    drape_arena_free(&r.arena);
+        status = sample(&r, mesh, out);
+    if (!status)
+        status = weld(&r, mesh, out);
+    drape_gltf_close(&r.gltf);
+    drape_arena_free(&arena);
     return status;
 }
 
