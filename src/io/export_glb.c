@@ -35,10 +35,12 @@
 #include "base/vec3.h"
 #include "io/export.h"
 #include "io/json.h"
+#include "mesh/gltf.h"
 #include "model/model.h"
+#include "model/normals.h"
 
 #define FILE_NAME      "positions.glb"
-#define JSON_OFFSET    20
+#define JSON_OFFSET    (DRAPE_GLTF_HEADER + DRAPE_GLTF_CHUNK)
 #define MAX_FRAMES     16384                  /* their weights take 1 GiB */
 #define MAX_BYTES      (UINT32_MAX - 65535.0) /* lengths have 32 bits */
 #define FIXED_ROOM     4096                   /* JSON without the parts of each frame */
@@ -47,43 +49,33 @@
 #define BODY_ROOM      2048
 #define PLACE_ROOM     256 /* ,"translation":[...],"rotation":[...] */
 #define CHANNEL_ROOM   128 /* a channel or a sampler */
+#define LIST_HEAD      12  /* ,"targets":[ and ,"weights":[ */
 #define TARGET_WIDTH   36  /* ,{"POSITION":32769,"NORMAL":32770} */
 #define WEIGHT_WIDTH   2   /* ,0 */
-#define BOUND_WIDTH    17  /* -1.17549435e-38 and a comma */
-#define OPEN_WIDTH     11  /* ,"targets":[ and ,"weights":[ */
 #define LENGTH_WIDTH   10
-#define ACCESSOR_HEAD                                                                                        \
-    ",{\"bufferView\":1,\"byteOffset\":%u,\"componentType\":5126,\"count\":%u,\"type\":\"VEC3\","
-#define BOUNDS_ROOM   (120 + 6 * BOUND_WIDTH)
-#define NORMALS_ROOM  100
-#define ACCESSOR_ROOM (BOUNDS_ROOM + NORMALS_ROOM) /* both accessors of a frame */
-#define TIMES_ROOM    640
+#define POSITIONS_ROOM 222 /* the accessor of the positions of a frame, with bounds such as -1.17549435e-38 */
+#define ACCESSOR_ROOM  322 /* and that of the normals */
+#define TIMES_ROOM     320 /* two accessors of the animation */
 
-/* The triangles of one material. */
+/* The triangles of one material, or of a collider. */
 typedef struct primitive {
-    char *material; /* its name, as a text of JSON */
-    bool is_default;
-    uint32_t first, count;                       /* of the triangles */
-    size_t targets_open, targets, targets_close; /* blanks in the JSON */
+    const char *name;      /* of the material; "": faces without one, first in the order of names */
+    char *quoted;          /* as a text of JSON */
+    uint32_t first, count; /* of the triangles */
+    size_t targets;        /* their list in the JSON */
 } primitive;
 
-/* A mesh with morph targets: all cloths, or a collider that deforms. */
+/* A node of the scene and its mesh: all cloths in one, a collider that deforms, or a rigid one. */
 typedef struct object {
-    char *name;                    /* as a text of JSON */
-    const drape_export_body *body; /* NULL: the cloths */
-    uint32_t first_vertex, vertices, first_point, points, first_primitive, primitives;
-    size_t weights_open, weights, weights_close; /* blanks in the JSON */
+    char *name;                      /* as a text of JSON */
+    const drape_export_body *body;   /* NULL: the cloths */
+    uint32_t first_vertex, vertices; /* among those of all that deform, or of all rigid ones */
+    uint32_t first_point, points;    /* of what deforms */
+    uint32_t first_primitive, primitives;
+    size_t weights; /* their list in the JSON */
+    size_t place;   /* blanks in the JSON for where a rigid one is first */
+    float *moves;   /* (room x 7) translation and rotation of a rigid one; NULL: it stays */
 } object;
-
-/* A rigid collider. */
-typedef struct solid {
-    char *name; /* as a text of JSON */
-    const drape_export_body *body;
-    int32_t collider;
-    uint32_t first_vertex, first_triangle; /* among those of all solids; among all triangles */
-    float *moves;                          /* (room x 7) translation and rotation; NULL: it stays */
-    size_t place;                          /* blanks in the JSON: where it is first */
-} solid;
 
 /* Positions of the blanks in the JSON, counted from its beginning. */
 typedef struct blanks {
@@ -93,324 +85,281 @@ typedef struct blanks {
 typedef struct glb_state {
     const drape_export_def *def;
     drape_file file;
-    uint32_t room;   /* number of frames for which there is room */
-    uint32_t frames; /* complete frames in the file */
-    bool live;       /* the file ends with these frames and can be continued */
-    char *json;      /* for the beginning of the file; not used after that is written */
+    drape_status status; /* the first failure of what is written into blanks */
+    uint32_t room;       /* number of frames for which there is room */
+    uint32_t frames;     /* complete frames in the file */
+    bool live;           /* the file ends with these frames and can be continued */
+    char *json;          /* of the beginning of the file, with all blanks but those of the first frame */
     size_t json_size, used;
     blanks at;
-    uint32_t vertices; /* of all objects */
-    int32_t *node;     /* (vertices) the point of each */
+    primitive *primitive;
+    uint32_t primitives, triangles;
+    object *object; /* the cloths, then colliders that deform, then rigid ones */
+    uint32_t objects, deforming;
+    uint32_t vertices, rigid_vertices, points, moving;
+    uint32_t uv_bytes, rigid_bytes, fixed_bytes, frame_bytes; /* fixed: all that comes before the frames */
+    int32_t *node;                                            /* (vertices) the point of each */
     const double **uv; /* (vertices of the cloths) texture coordinates; NULL: no cloth has any */
-    uint32_t *corner;  /* (triangles x 3) vertices of the object or solid, in the order of the primitives */
-    primitive *primitive; /* (primitives) of all objects */
-    uint32_t primitives, triangles, points;
-    object *object; /* (objects) the first one is the cloths */
-    uint32_t objects;
-    solid *solid; /* (solids) */
-    uint32_t solids, solid_vertices, moving;
-    float *base;    /* (points x 3) positions of the first frame: nodes of cloth, points of colliders */
-    float *upright; /* (points x 3) normals of the first frame */
-    double *x;      /* (points x 3) positions of the present frame, if there are points of colliders */
-    double *normal; /* (points x 3) normals of the present frame */
-    float *times;   /* (room) */
+    uint32_t *corner;  /* (triangles x 3) vertices of the object, in the order of the primitives */
+    double *x;         /* (points x 3) positions of the frame, if there are points of colliders */
+    double *normal;    /* (points x 3) normals of the frame */
+    float *base[2];    /* (points x 3) positions and normals of the first frame: nodes, points of colliders */
+    float *moved[2];   /* (points x 3) their differences from these in the frame; the first one has its own */
+    float *times;      /* (room) */
 } glb_state;
 
-/* ---- Sizes ---- */
+/* ---- Accessors and views ---- */
 
-static uint32_t triangle_bytes(const glb_state *glb)
+typedef struct accessor {
+    uint32_t view;
+    int64_t offset; /* -1: none is written, which means 0 */
+    int component, width;
+    uint32_t count;
+    const float *bounds; /* (width x 2) least and largest; NULL: none are written */
+} accessor;
+
+/* Writes an accessor into text (ACCESSOR_ROOM), which it returns. */
+static const char *describe(accessor a, char *text)
 {
-    return 12 * glb->triangles;
+    int used = snprintf(text, ACCESSOR_ROOM, "{\"bufferView\":%u", a.view);
+    if (a.offset >= 0)
+        used += snprintf(text + used, (size_t)(ACCESSOR_ROOM - used), ",\"byteOffset\":%" PRId64, a.offset);
+    used += snprintf(text + used, (size_t)(ACCESSOR_ROOM - used),
+                     ",\"componentType\":%d,\"count\":%u,\"type\":\"%s\"", a.component, a.count,
+                     drape_gltf_types[a.width]);
+    for (int k = 0; a.bounds && k < 2 * a.width; k++) {
+        const char *before = k == 0 ? ",\"min\":[" : k == a.width ? "],\"max\":[" : ",";
+        used += snprintf(text + used, (size_t)(ACCESSOR_ROOM - used), "%s%.9g", before, a.bounds[k]);
+    }
+    snprintf(text + used, (size_t)(ACCESSOR_ROOM - used), a.bounds ? "]}" : "}");
+    return text;
 }
 
-static uint32_t uv_bytes(const glb_state *glb)
+/* Those of the triangles of each primitive are first; then that of the texture coordinates; positions and
+ * normals of each rigid object; and for each frame those of each other one. Returns the positions'. */
+static uint32_t accessor_of(const glb_state *glb, uint32_t number, uint32_t frame)
 {
-    return glb->uv ? 8 * glb->object[0].vertices : 0;
+    const uint32_t first = glb->primitives + (glb->uv != NULL), rigid = glb->objects - glb->deforming;
+    return number >= glb->deforming ? first + 2 * (number - glb->deforming)
+                                    : first + 2 * (rigid + frame * glb->deforming + number);
 }
 
-static uint32_t solid_bytes(const glb_state *glb)
+/* The views: triangles, frames, texture coordinates, rigid objects, and the times and what is animated. */
+static uint32_t rigid_view(const glb_state *glb)
 {
-    return 24 * glb->solid_vertices;
+    return 2 + (glb->uv != NULL);
 }
 
-/* What comes before the frames. */
-static uint32_t fixed_bytes(const glb_state *glb)
+static void find_bounds(const float *value, size_t stride, size_t count, float bounds[6])
 {
-    return triangle_bytes(glb) + uv_bytes(glb) + solid_bytes(glb);
-}
-
-/* Positions and normals of one frame. */
-static uint32_t frame_bytes(const glb_state *glb)
-{
-    return 24 * glb->vertices;
-}
-
-/* The accessors of the triangles are first, those of the objects' primitives and of the solids; then that of
- * the texture coordinates; positions and normals of each solid; and for each frame those of each object. */
-static uint32_t uv_accessor(const glb_state *glb)
-{
-    return glb->primitives + glb->solids;
-}
-
-static uint32_t solid_accessor(const glb_state *glb, uint32_t number)
-{
-    return uv_accessor(glb) + (glb->uv != NULL) + 2 * number;
-}
-
-/* That of the positions; that of the normals follows. */
-static uint32_t accessor_of(const glb_state *glb, uint32_t frame, uint32_t number)
-{
-    return solid_accessor(glb, glb->solids) + 2 * (frame * glb->objects + number);
-}
-
-/* The view of the times and of what is animated. */
-static uint32_t last_view(const glb_state *glb)
-{
-    return 2 + (glb->uv != NULL) + (glb->solids > 0);
+    for (int k = 0; k < 3; k++) {
+        bounds[k] = FLT_MAX;
+        bounds[3 + k] = -FLT_MAX;
+    }
+    for (size_t i = 0; i < count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            bounds[k] = fminf(bounds[k], value[stride * i + k]);
+            bounds[3 + k] = fmaxf(bounds[3 + k], value[stride * i + k]);
+        }
 }
 
 /* ---- Vertices and primitives ---- */
 
-/* A material of one cloth; all cloths share those of the same name. */
-typedef struct material {
-    const char *name;
-    int32_t cloth, number; /* of the cloth; -1: triangles without one */
-    uint32_t triangles, primitive;
-} material;
-
-static int compare_materials(const void *left, const void *right)
+static const char *material_of(const drape_faces *faces, int32_t face)
 {
-    const material *a = left, *b = right;
-    const int order = strcmp(a->name, b->name);
-    if (order)
-        return order;
-    return a->cloth != b->cloth ? (a->cloth > b->cloth) - (a->cloth < b->cloth)
-                                : (a->number > b->number) - (a->number < b->number);
+    return faces->count > 0 && faces->material[face] >= 0 ? faces->name[faces->material[face]] : "";
 }
 
-static int compare_places(const void *left, const void *right)
+static uint32_t triangles_of(const drape_faces *faces, int32_t face)
 {
-    const material *a = left, *b = right;
-    return a->cloth != b->cloth ? (a->cloth > b->cloth) - (a->cloth < b->cloth)
-                                : (a->number > b->number) - (a->number < b->number);
+    return faces->count > 0 ? (uint32_t)(faces->first[face + 1] - faces->first[face] - 2) : 1;
 }
 
-/* Lists the materials of all cloths, those that triangles lack first; first (cloth_count) receives where
- * those of each cloth begin. */
-static material *list_materials(drape_arena *scratch, const drape_render_surface *surface, size_t *first,
-                                size_t *count)
+static int32_t face_count(const drape_mesh *mesh)
 {
-    *count = 0;
-    for (int32_t c = 0; c < surface->cloth_count; c++)
-        *count += (size_t)surface->cloths[c].mesh->faces.material_count + 1;
-    material *list = drape_arena_take(scratch, *count, sizeof *list);
-    size_t at = 0;
-    for (int32_t c = 0; list && c < surface->cloth_count; c++) {
-        const drape_faces *faces = &surface->cloths[c].mesh->faces;
-        first[c] = at;
-        for (int32_t m = -1; m < faces->material_count; m++)
-            list[at++] = (material){.name = m < 0 ? "" : faces->name[m], .cloth = c, .number = m};
-        if (faces->count == 0)
-            list[first[c]].triangles = (uint32_t)surface->cloths[c].mesh->triangle_count;
-        for (int32_t f = 0; f < faces->count; f++)
-            list[first[c] + (size_t)(faces->material[f] + 1)].triangles +=
-                (uint32_t)(faces->first[f + 1] - faces->first[f] - 2);
-    }
-    return list;
+    return mesh->faces.count > 0 ? mesh->faces.count : mesh->triangle_count;
+}
+
+static int compare_names(const void *left, const void *right)
+{
+    return strcmp(((const primitive *)left)->name, ((const primitive *)right)->name);
+}
+
+static primitive *find_primitive(const glb_state *glb, const char *name)
+{
+    return bsearch(&(primitive){.name = name}, glb->primitive, glb->primitives, sizeof *glb->primitive,
+                   compare_names);
 }
 
 /* A text of JSON; quotes around it. */
-static drape_status quote(drape_arena *arena, const char *name, char **out)
+static char *quote(drape_arena *arena, const char *name)
 {
     json_t *text = drape_json_text(name);
     char *dumped = text ? json_dumps(text, JSON_ENCODE_ANY) : NULL;
     json_decref(text);
+    char *out = dumped ? drape_arena_text(arena, dumped) : NULL;
     if (!dumped)
-        return drape_fail(arena->ctx, DRAPE_E_MEMORY, "not enough memory for the name of a material");
-    *out = drape_arena_text(arena, dumped);
+        drape_fail(arena->ctx, DRAPE_E_MEMORY, "not enough memory for the name of a material");
     free(dumped);
-    return drape_arena_status(arena);
+    return out;
 }
 
-/* One for each name that triangles have, in the order of the names; those without one come first. */
-static drape_status make_primitives(glb_state *glb, material *list, size_t count)
+/* One for each name that triangles have, in the order of the names. */
+static drape_status make_primitives(glb_state *glb)
 {
-    drape_status status = DRAPE_OK;
-    qsort(list, count, sizeof *list, compare_materials);
-    glb->primitive =
-        drape_arena_take(glb->def->arena, count + (size_t)glb->def->body_count, sizeof *glb->primitive);
+    const drape_render_surface *surface = &glb->def->model->surface;
+    drape_arena *arena = glb->def->arena;
+    size_t count = 0, listed = 1;
+    for (int32_t c = 0; c < surface->cloth_count; c++)
+        count += (size_t)surface->cloths[c].mesh->faces.material_count;
+    glb->primitive = drape_arena_take(arena, count + 1 + (size_t)glb->def->body_count, sizeof(primitive));
     if (!glb->primitive)
         return DRAPE_E_MEMORY;
-    const char *last = NULL;
-    for (size_t i = 0; i < count && !status; i++) {
-        if (list[i].triangles == 0)
-            continue;
-        if (!last || strcmp(last, list[i].name) != 0) {
-            primitive *p = &glb->primitive[glb->primitives++];
-            last = list[i].name;
-            p->is_default = !*last;
-            p->first = glb->triangles;
-            status = quote(glb->def->arena, *last ? last : DRAPE_NO_MATERIAL, &p->material);
+    glb->primitive[0].name = "";
+    for (int32_t c = 0; c < surface->cloth_count; c++)
+        for (int32_t m = 0; m < surface->cloths[c].mesh->faces.material_count; m++)
+            glb->primitive[listed++].name = surface->cloths[c].mesh->faces.name[m];
+    qsort(glb->primitive, listed, sizeof *glb->primitive, compare_names);
+    for (size_t i = 0; i < listed; i++) /* each name once */
+        if (i == 0 || compare_names(&glb->primitive[glb->primitives - 1], &glb->primitive[i]) != 0)
+            glb->primitive[glb->primitives++].name = glb->primitive[i].name;
+    for (int32_t c = 0; c < surface->cloth_count; c++)
+        for (int32_t f = 0; f < face_count(surface->cloths[c].mesh); f++) {
+            const drape_faces *faces = &surface->cloths[c].mesh->faces;
+            find_primitive(glb, material_of(faces, f))->count += triangles_of(faces, f);
         }
-        list[i].primitive = glb->primitives - 1;
-        glb->primitive[list[i].primitive].count += list[i].triangles;
-        glb->triangles += list[i].triangles;
+    listed = glb->primitives;
+    glb->primitives = 0;
+    for (size_t i = 0; i < listed; i++) {
+        if (glb->primitive[i].count == 0)
+            continue;
+        primitive *p = &glb->primitive[glb->primitives++];
+        *p = glb->primitive[i];
+        p->first = glb->triangles;
+        p->quoted = quote(arena, *p->name ? p->name : DRAPE_NO_MATERIAL);
+        if (!p->quoted)
+            return DRAPE_E_MEMORY;
+        glb->triangles += p->count;
     }
-    qsort(list, count, sizeof *list, compare_places);
-    return status;
+    return DRAPE_OK;
 }
 
-/* Puts the triangles of one cloth where their primitives have them; next (primitives): the place of the next
+/* Its vertices, and its triangles where their primitives have them; next (primitives): the place of the next
  * triangle of each. */
-static void put_corners(glb_state *glb, const drape_render_cloth *cloth, const material *own,
-                        const drape_vertices *vertices, uint32_t *next)
+static drape_status add_cloth(glb_state *glb, const drape_render_cloth *cloth, uint32_t *next)
 {
     const drape_faces *faces = &cloth->mesh->faces;
-    const int32_t *at = vertices->at;
-    const int32_t count = faces->count > 0 ? faces->count : cloth->mesh->triangle_count;
-    for (int32_t f = 0; f < count; f++) {
-        const int32_t triangles = faces->count > 0 ? faces->first[f + 1] - faces->first[f] - 2 : 1;
-        const int32_t number = faces->count > 0 ? faces->material[f] : -1;
-        uint32_t *to = &next[own[number + 1].primitive];
-        for (int32_t k = 0; k < 3 * triangles; k++)
-            glb->corner[3 * (size_t)*to + (size_t)k] = glb->vertices + (uint32_t)*at++;
-        *to += (uint32_t)triangles;
-    }
-}
-
-static drape_status add_cloth(glb_state *glb, const drape_render_cloth *cloth, const material *own,
-                              uint32_t *next)
-{
     drape_arena scratch = drape_arena_of(glb->def->arena->ctx);
     drape_vertices vertices;
     const drape_status status = drape_faces_vertices(&scratch, cloth->mesh, &vertices);
+    const int32_t *at = vertices.at;
     for (int32_t i = 0; !status && i < vertices.count; i++) {
         const size_t to = (size_t)glb->vertices + (size_t)i;
         glb->node[to] = cloth->first_node + vertices.node[i];
         if (glb->uv)
-            glb->uv[to] = vertices.uv[i] < 0 ? NULL : cloth->mesh->faces.uv + 2 * (size_t)vertices.uv[i];
+            glb->uv[to] = vertices.uv[i] < 0 ? NULL : faces->uv + 2 * (size_t)vertices.uv[i];
     }
-    if (!status) {
-        put_corners(glb, cloth, own, &vertices, next);
-        glb->vertices += (uint32_t)vertices.count;
+    for (int32_t f = 0; !status && f < face_count(cloth->mesh); f++) {
+        uint32_t *to = &next[find_primitive(glb, material_of(faces, f)) - glb->primitive];
+        for (uint32_t k = 0; k < 3 * triangles_of(faces, f); k++)
+            glb->corner[3 * (size_t)*to + k] = glb->vertices + (uint32_t)*at++;
+        *to += triangles_of(faces, f);
     }
+    glb->vertices += status ? 0 : (uint32_t)vertices.count;
     drape_arena_free(&scratch);
     return status;
 }
 
-static drape_status add_cloths(glb_state *glb, drape_arena *scratch)
+static drape_status add_cloths(glb_state *glb)
 {
     const drape_render_surface *surface = &glb->def->model->surface;
-    size_t count, room = 0;
+    const drape_export_def *def = glb->def;
+    size_t own = 0, room = 0, triangles = (size_t)surface->triangle_count;
     bool has_uvs = false;
-    size_t *first = drape_arena_take(scratch, (size_t)surface->cloth_count, sizeof *first);
-    material *list = first ? list_materials(scratch, surface, first, &count) : NULL;
-    drape_status status = list ? make_primitives(glb, list, count) : DRAPE_E_MEMORY;
-    if (status)
-        return status;
     for (int32_t c = 0; c < surface->cloth_count; c++) {
         const drape_mesh *mesh = surface->cloths[c].mesh;
         has_uvs = has_uvs || mesh->faces.uv_count > 0;
-        room += (size_t)(mesh->faces.uv_count > 0 ? 3 * mesh->triangle_count : mesh->node_count);
+        own += (size_t)(mesh->faces.uv_count > 0 ? 3 * mesh->triangle_count : mesh->node_count);
     }
-    uint32_t *next = drape_arena_take(scratch, glb->primitives, sizeof *next);
-    size_t triangles = (size_t)surface->triangle_count;
-    const size_t own = room;
-    for (int32_t b = 0; b < glb->def->body_count; b++) {
-        triangles += (size_t)glb->def->bodies[b].triangle_count;
-        room += glb->def->bodies[b].deforms ? (size_t)glb->def->bodies[b].vertex_count : 0;
+    for (int32_t b = 0; b < def->body_count; b++) {
+        triangles += (size_t)def->bodies[b].triangle_count;
+        room += def->bodies[b].deforms ? (size_t)def->bodies[b].vertex_count : 0;
     }
-    glb->corner = drape_arena_take(glb->def->arena, triangles, 3 * sizeof *glb->corner);
-    glb->node = drape_arena_take(glb->def->arena, room, sizeof *glb->node);
+    glb->corner = drape_arena_take(def->arena, triangles, 3 * sizeof *glb->corner);
+    glb->node = drape_arena_take(def->arena, own + room, sizeof *glb->node);
     if (has_uvs)
-        glb->uv = drape_arena_take(glb->def->arena, own, sizeof *glb->uv);
-    if (drape_arena_status(glb->def->arena) || !next)
-        return DRAPE_E_MEMORY;
-    for (uint32_t p = 0; p < glb->primitives; p++)
+        glb->uv = drape_arena_take(def->arena, own, sizeof *glb->uv);
+    uint32_t *next = drape_arena_take(def->arena, glb->primitives, sizeof *next);
+    drape_status status = drape_arena_status(def->arena);
+    for (uint32_t p = 0; !status && p < glb->primitives; p++)
         next[p] = glb->primitive[p].first;
-    for (int32_t c = 0; c < surface->cloth_count && !status; c++)
-        status = add_cloth(glb, &surface->cloths[c], list + first[c], next);
+    for (int32_t c = 0; !status && c < surface->cloth_count; c++)
+        status = add_cloth(glb, &surface->cloths[c], next);
+    drape_arena_release(def->arena, next);
     return status;
 }
 
-static void put_body_corners(glb_state *glb, const drape_export_body *body)
-{
-    uint32_t *to = glb->corner + 3 * (size_t)glb->triangles;
-    for (size_t i = 0; i < 3 * (size_t)body->triangle_count; i++)
-        to[i] = (uint32_t)body->triangle[i];
-    glb->triangles += (uint32_t)body->triangle_count;
-}
-
-/* Those that deform are objects, after the cloths; the others are solids, whose triangles follow theirs. */
-static drape_status add_bodies(glb_state *glb)
+/* Those that deform come before the rigid ones. */
+static void add_bodies(glb_state *glb, bool rigid)
 {
     const drape_export_def *def = glb->def;
     for (int32_t b = 0; b < def->body_count; b++) {
         const drape_export_body *body = &def->bodies[b];
-        if (!body->deforms)
+        const uint32_t vertices = (uint32_t)body->vertex_count, triangles = (uint32_t)body->triangle_count;
+        if (body->deforms == rigid)
             continue;
-        glb->object[glb->objects++] = (object){.body = body,
-                                               .first_vertex = glb->vertices,
-                                               .vertices = (uint32_t)body->vertex_count,
-                                               .first_point = glb->points,
-                                               .points = (uint32_t)body->vertex_count,
-                                               .first_primitive = glb->primitives,
-                                               .primitives = 1};
-        glb->primitive[glb->primitives++] =
-            (primitive){.first = glb->triangles, .count = (uint32_t)body->triangle_count};
-        put_body_corners(glb, body);
-        for (int32_t i = 0; i < body->vertex_count; i++)
+        object *o = &glb->object[glb->objects++];
+        *o = (object){.body = body,
+                      .first_vertex = rigid ? glb->rigid_vertices : glb->vertices,
+                      .vertices = vertices,
+                      .first_point = glb->points,
+                      .points = rigid ? 0 : vertices,
+                      .first_primitive = glb->primitives,
+                      .primitives = 1};
+        glb->primitive[glb->primitives++] = (primitive){.first = glb->triangles, .count = triangles};
+        memcpy(glb->corner + 3 * (size_t)glb->triangles, body->triangle, 12 * (size_t)triangles);
+        glb->triangles += triangles;
+        glb->rigid_vertices += rigid ? vertices : 0;
+        for (uint32_t i = 0; i < o->points; i++)
             glb->node[glb->vertices++] = (int32_t)glb->points++;
+        if (body->moves && rigid) {
+            o->moves = drape_arena_take(def->arena, glb->room, 7 * sizeof *o->moves);
+            glb->moving++;
+        }
     }
-    for (int32_t b = 0; b < def->body_count; b++) {
-        const drape_export_body *body = &def->bodies[b];
-        if (body->deforms)
-            continue;
-        solid *s = &glb->solid[glb->solids++];
-        *s = (solid){.body = body,
-                     .collider = b,
-                     .first_vertex = glb->solid_vertices,
-                     .first_triangle = glb->triangles};
-        put_body_corners(glb, body);
-        glb->solid_vertices += (uint32_t)body->vertex_count;
-        glb->moving += body->moves;
-        if (body->moves)
-            s->moves = drape_arena_take(def->arena, glb->room, 7 * sizeof *s->moves);
-    }
-    return drape_arena_status(def->arena);
 }
 
-static drape_status make_vertices(glb_state *glb)
+static drape_status make_objects(glb_state *glb)
 {
-    const size_t bodies = (size_t)glb->def->body_count;
-    drape_arena scratch = drape_arena_of(glb->def->arena->ctx);
-    glb->object = drape_arena_take(glb->def->arena, bodies + 1, sizeof *glb->object);
-    glb->solid = drape_arena_take(glb->def->arena, bodies, sizeof *glb->solid);
-    drape_status status = glb->object && glb->solid ? DRAPE_OK : DRAPE_E_MEMORY;
+    drape_arena *arena = glb->def->arena;
+    drape_status status = make_primitives(glb);
     if (!status)
-        status = add_cloths(glb, &scratch);
-    drape_arena_free(&scratch);
+        status = add_cloths(glb);
     if (status)
         return status;
+    glb->object = drape_arena_take(arena, (size_t)glb->def->body_count + 1, sizeof *glb->object);
+    if (!glb->object)
+        return DRAPE_E_MEMORY;
     glb->points = (uint32_t)glb->def->model->surface.node_count;
     glb->objects = 1;
     glb->object[0] =
         (object){.vertices = glb->vertices, .points = glb->points, .primitives = glb->primitives};
-    status = add_bodies(glb);
-    for (uint32_t i = 0; i < glb->objects && !status; i++)
-        status = quote(glb->def->arena, i ? glb->object[i].body->name : "cloth", &glb->object[i].name);
-    for (uint32_t i = 0; i < glb->solids && !status; i++)
-        status = quote(glb->def->arena, glb->solid[i].body->name, &glb->solid[i].name);
-    return status;
+    add_bodies(glb, false);
+    glb->deforming = glb->objects;
+    add_bodies(glb, true);
+    for (uint32_t i = 0; i < glb->objects; i++) {
+        glb->object[i].name = quote(arena, i ? glb->object[i].body->name : "cloth");
+        if (!glb->object[i].name)
+            return DRAPE_E_MEMORY;
+    }
+    glb->uv_bytes = glb->uv ? 8 * glb->object[0].vertices : 0;
+    glb->rigid_bytes = 24 * glb->rigid_vertices;
+    glb->fixed_bytes = 12 * glb->triangles + glb->uv_bytes + glb->rigid_bytes;
+    glb->frame_bytes = 24 * glb->vertices;
+    return drape_arena_status(arena);
 }
 
 /* ---- JSON ---- */
-
-static void format_bounds(const float bounds[6], char *text, size_t size)
-{
-    snprintf(text, size, "\"min\":[%.9g,%.9g,%.9g],\"max\":[%.9g,%.9g,%.9g]}", bounds[0], bounds[1],
-             bounds[2], bounds[3], bounds[4], bounds[5]);
-}
 
 static void add(glb_state *glb, const char *format, ...) DRAPE_PRINTF(2, 3);
 static void add(glb_state *glb, const char *format, ...)
@@ -430,96 +379,78 @@ static size_t add_blanks(glb_state *glb, size_t count)
     return at;
 }
 
-static void add_triangles(glb_state *glb, uint32_t first, uint32_t count)
+/* Adds blanks for a list of texts of one width, each for a frame after the first. */
+static size_t add_list(glb_state *glb, size_t width)
 {
-    add(glb, "%s{\"bufferView\":0,", first ? "," : "");
-    if (first > 0)
-        add(glb, "\"byteOffset\":%" PRIu32 ",", 12 * first);
-    add(glb, "\"componentType\":5125,\"count\":%" PRIu32 ",\"type\":\"SCALAR\"}", 3 * count);
+    return add_blanks(glb, LIST_HEAD + glb->room * width + 1);
 }
 
-static void add_solid_accessors(glb_state *glb, const solid *s)
-{
-    const uint32_t view = 2 + (glb->uv != NULL), count = (uint32_t)s->body->vertex_count;
-    float bounds[6] = {FLT_MAX, FLT_MAX, FLT_MAX, -FLT_MAX, -FLT_MAX, -FLT_MAX};
-    char text[BOUNDS_ROOM];
-    for (size_t i = 0; i < 3 * (size_t)count; i++) {
-        const float value = s->body->vertex[i / 3 * 6 + i % 3];
-        bounds[i % 3] = fminf(bounds[i % 3], value);
-        bounds[3 + i % 3] = fmaxf(bounds[3 + i % 3], value);
-    }
-    format_bounds(bounds, text, sizeof text);
-    for (uint32_t normals = 0; normals < 2; normals++)
-        add(glb,
-            ",{\"bufferView\":%" PRIu32 ",\"byteOffset\":%" PRIu32
-            ",\"componentType\":5126,\"count\":%" PRIu32 ",\"type\":\"VEC3\"%s%s",
-            view, 24 * s->first_vertex + 12 * count * normals, count, normals ? "" : ",",
-            normals ? "}" : text);
-}
-
-/* Bytes of JSON for the accessors of the animation: of times, weights, and of each solid that moves. */
+/* Bytes of JSON for the accessors of the animation: of times and weights, and of each solid that moves. */
 static size_t times_room(const glb_state *glb)
 {
-    return TIMES_ROOM / 2 + glb->moving * TIMES_ROOM / 2;
+    return TIMES_ROOM * (1 + (size_t)glb->moving);
 }
 
 /* And for the animation itself: channels and samplers. */
 static size_t animation_room(const glb_state *glb)
 {
-    return (3 + glb->objects + 4 * (size_t)glb->moving) * CHANNEL_ROOM;
+    return (3 + glb->deforming + 4 * (size_t)glb->moving) * CHANNEL_ROOM;
 }
 
-/* Positions and normals of the frames are in view 1. */
-static void add_buffers(glb_state *glb)
+static void add_views(glb_state *glb)
 {
+    static const char vertices[] =
+        ",{\"buffer\":0,\"byteOffset\":%u,\"byteStride\":%d,\"target\":%d,\"byteLength\":";
+    const uint32_t triangle_bytes = 12 * glb->triangles;
     add(glb, "\"buffers\":[{\"byteLength\":");
     glb->at.buffer_length = add_blanks(glb, LENGTH_WIDTH);
-    add(glb, "}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":%" PRIu32 ",\"target\":34963}",
-        triangle_bytes(glb));
-    add(glb, ",{\"buffer\":0,\"byteOffset\":%" PRIu32 ",\"byteStride\":12,\"target\":34962,\"byteLength\":",
-        fixed_bytes(glb));
+    add(glb, "}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":%u,\"target\":%d}", triangle_bytes,
+        DRAPE_GLTF_INDICES);
+    add(glb, vertices, glb->fixed_bytes, 12, DRAPE_GLTF_VERTICES);
     glb->at.view_length = add_blanks(glb, LENGTH_WIDTH);
     add(glb, "}");
-    if (glb->uv)
-        add(glb,
-            ",{\"buffer\":0,\"byteOffset\":%" PRIu32
-            ",\"byteStride\":8,\"target\":34962,\"byteLength\":%" PRIu32 "}",
-            triangle_bytes(glb), uv_bytes(glb));
-    if (glb->solids > 0)
-        add(glb,
-            ",{\"buffer\":0,\"byteOffset\":%" PRIu32
-            ",\"byteStride\":12,\"target\":34962,\"byteLength\":%" PRIu32 "}",
-            triangle_bytes(glb) + uv_bytes(glb), solid_bytes(glb));
-    glb->at.views = add_blanks(glb, TIMES_ROOM / 2);
-    add(glb, "],\"accessors\":[");
-    for (uint32_t p = 0; p < glb->primitives; p++)
-        add_triangles(glb, glb->primitive[p].first, glb->primitive[p].count);
-    for (uint32_t i = 0; i < glb->solids; i++)
-        add_triangles(glb, glb->solid[i].first_triangle, (uint32_t)glb->solid[i].body->triangle_count);
-    if (glb->uv)
-        add(glb, ",{\"bufferView\":2,\"componentType\":5126,\"count\":%" PRIu32 ",\"type\":\"VEC2\"}",
-            glb->object[0].vertices);
-    for (uint32_t i = 0; i < glb->solids; i++)
-        add_solid_accessors(glb, &glb->solid[i]);
-    glb->at.accessors = add_blanks(glb, (size_t)glb->room * glb->objects * ACCESSOR_ROOM);
-    glb->at.times = add_blanks(glb, times_room(glb));
-    add(glb, "]");
+    if (glb->uv) {
+        add(glb, vertices, triangle_bytes, 8, DRAPE_GLTF_VERTICES);
+        add(glb, "%u}", glb->uv_bytes);
+    }
+    if (glb->objects > glb->deforming) {
+        add(glb, vertices, triangle_bytes + glb->uv_bytes, 12, DRAPE_GLTF_VERTICES);
+        add(glb, "%u}", glb->rigid_bytes);
+    }
+    glb->at.views = add_blanks(glb, TIMES_ROOM);
+    add(glb, "],");
 }
 
-static void add_primitive(glb_state *glb, const object *o, uint32_t number)
+static void add_accessors(glb_state *glb)
 {
-    const uint32_t position = accessor_of(glb, 0, (uint32_t)(o - glb->object));
-    primitive *p = &glb->primitive[o->first_primitive + number];
-    add(glb, "%s{\"attributes\":{\"POSITION\":%" PRIu32 ",\"NORMAL\":%" PRIu32, number ? "," : "", position,
-        position + 1);
-    if (glb->uv && !o->body)
-        add(glb, ",\"TEXCOORD_0\":%" PRIu32, uv_accessor(glb));
-    add(glb, "},\"indices\":%" PRIu32 ",\"material\":%" PRIu32, o->first_primitive + number,
-        o->body ? glb->object[0].primitives : number);
-    p->targets_open = add_blanks(glb, OPEN_WIDTH + 1);
-    p->targets = add_blanks(glb, (size_t)glb->room * TARGET_WIDTH);
-    p->targets_close = add_blanks(glb, 1);
-    add(glb, "}");
+    char text[ACCESSOR_ROOM];
+    float bounds[6];
+    add(glb, "\"accessors\":[");
+    for (uint32_t i = 0; i < glb->primitives; i++) {
+        const primitive *p = &glb->primitive[i];
+        add(glb, "%s%s", i ? "," : "",
+            describe((accessor){.offset = p->first ? 12 * (int64_t)p->first : -1,
+                                .component = DRAPE_GLTF_UINT32,
+                                .count = 3 * p->count,
+                                .width = 1},
+                     text));
+    }
+    if (glb->uv)
+        add(glb, ",%s",
+            describe((accessor){2, -1, DRAPE_GLTF_FLOAT, 2, glb->object[0].vertices, NULL}, text));
+    for (uint32_t i = glb->deforming; i < glb->objects; i++) {
+        const object *o = &glb->object[i];
+        accessor a = {rigid_view(glb), 24 * (int64_t)o->first_vertex, DRAPE_GLTF_FLOAT, 3, o->vertices,
+                      bounds};
+        find_bounds(o->body->vertex, 6, o->vertices, bounds);
+        add(glb, ",%s", describe(a, text));
+        a.offset += 12 * (int64_t)o->vertices;
+        a.bounds = NULL;
+        add(glb, ",%s", describe(a, text));
+    }
+    glb->at.accessors = add_blanks(glb, (size_t)glb->room * glb->deforming * ACCESSOR_ROOM);
+    glb->at.times = add_blanks(glb, times_room(glb));
+    add(glb, "]");
 }
 
 static void add_meshes(glb_state *glb)
@@ -527,21 +458,24 @@ static void add_meshes(glb_state *glb)
     add(glb, ",\"meshes\":[");
     for (uint32_t i = 0; i < glb->objects; i++) {
         object *o = &glb->object[i];
+        const uint32_t positions = accessor_of(glb, i, 0);
         add(glb, "%s{\"name\":%s,\"primitives\":[", i ? "," : "", o->name);
-        for (uint32_t p = 0; p < o->primitives; p++)
-            add_primitive(glb, o, p);
+        for (uint32_t k = 0; k < o->primitives; k++) {
+            add(glb, "%s{\"attributes\":{\"POSITION\":%u,\"NORMAL\":%u", k ? "," : "", positions,
+                positions + 1);
+            if (glb->uv && !o->body)
+                add(glb, ",\"TEXCOORD_0\":%u", glb->primitives);
+            add(glb, "},\"indices\":%u,\"material\":%u", o->first_primitive + k,
+                o->body ? glb->object[0].primitives : k);
+            if (i < glb->deforming)
+                glb->primitive[o->first_primitive + k].targets = add_list(glb, TARGET_WIDTH);
+            add(glb, "}");
+        }
         add(glb, "]");
-        o->weights_open = add_blanks(glb, OPEN_WIDTH + 1);
-        o->weights = add_blanks(glb, (size_t)glb->room * WEIGHT_WIDTH);
-        o->weights_close = add_blanks(glb, 1);
+        if (i < glb->deforming)
+            o->weights = add_list(glb, WEIGHT_WIDTH);
         add(glb, "}");
     }
-    for (uint32_t i = 0; i < glb->solids; i++)
-        add(glb,
-            ",{\"name\":%s,\"primitives\":[{\"attributes\":{\"POSITION\":%" PRIu32 ",\"NORMAL\":%" PRIu32
-            "},\"indices\":%" PRIu32 ",\"material\":%" PRIu32 "}]}",
-            glb->solid[i].name, solid_accessor(glb, i), solid_accessor(glb, i) + 1, glb->primitives + i,
-            glb->object[0].primitives);
     add(glb, "]");
 }
 
@@ -553,36 +487,30 @@ static void add_materials(glb_state *glb)
         "\"metallicFactor\":0,\"roughnessFactor\":0.85}}";
     add(glb, "\"materials\":[");
     for (uint32_t p = 0; p < glb->object[0].primitives; p++)
-        add(glb, format, p ? "," : "", glb->primitive[p].material,
-            glb->primitive[p].is_default ? "0.55,0.16,0.13" : "0.8,0.8,0.8");
+        add(glb, format, p ? "," : "", glb->primitive[p].quoted,
+            *glb->primitive[p].name ? "0.8,0.8,0.8" : "0.55,0.16,0.13");
     if (glb->def->body_count > 0)
         add(glb, format, ",", "\"collider\"", "0.35,0.37,0.4");
     add(glb, "],");
 }
 
-/* A node of glTF for each object and solid. */
-static void add_nodes(glb_state *glb)
+static void make_json(glb_state *glb)
 {
-    add(glb, "\"scene\":0,\"scenes\":[{\"nodes\":[0");
-    for (uint32_t i = 1; i < glb->objects + glb->solids; i++)
-        add(glb, ",%" PRIu32, i);
-    add(glb, "]}],\"nodes\":[");
+    add(glb,
+        "{\"asset\":{\"version\":\"2.0\",\"generator\":\"Drape %s\"},\"scene\":0,\"scenes\":[{\"nodes\":[",
+        drape_version());
     for (uint32_t i = 0; i < glb->objects; i++)
-        add(glb, "%s{\"name\":%s,\"mesh\":%" PRIu32 "}", i ? "," : "", glb->object[i].name, i);
-    for (uint32_t i = 0; i < glb->solids; i++) {
-        add(glb, ",{\"name\":%s,\"mesh\":%" PRIu32, glb->solid[i].name, glb->objects + i);
-        glb->solid[i].place = add_blanks(glb, PLACE_ROOM);
+        add(glb, "%s%u", i ? "," : "", i);
+    add(glb, "]}],\"nodes\":[");
+    for (uint32_t i = 0; i < glb->objects; i++) {
+        add(glb, "%s{\"name\":%s,\"mesh\":%u", i ? "," : "", glb->object[i].name, i);
+        glb->object[i].place = add_blanks(glb, i < glb->deforming ? 0 : PLACE_ROOM);
         add(glb, "}");
     }
     add(glb, "],");
-}
-
-static void make_json(glb_state *glb)
-{
-    add(glb, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"Drape %s\"},", drape_version());
-    add_nodes(glb);
     add_materials(glb);
-    add_buffers(glb);
+    add_views(glb);
+    add_accessors(glb);
     add_meshes(glb);
     glb->at.animation = add_blanks(glb, animation_room(glb));
     add(glb, "}");
@@ -632,22 +560,22 @@ static drape_status allocate(const drape_export_def *def, glb_state *glb)
     drape_arena *arena = def->arena;
     glb->def = def;
     glb->room = (uint32_t)def->most_frames;
-    drape_status status = make_vertices(glb);
+    drape_status status = make_objects(glb);
     if (status)
         return status;
     glb->json_size = FIXED_ROOM + (size_t)glb->room * (size_t)frame_room(glb->objects, glb->primitives);
     for (uint32_t p = 0; p < glb->object[0].primitives; p++)
-        glb->json_size += PRIMITIVE_ROOM + strlen(glb->primitive[p].material);
+        glb->json_size += PRIMITIVE_ROOM + strlen(glb->primitive[p].quoted);
     for (uint32_t i = 1; i < glb->objects; i++)
         glb->json_size += BODY_ROOM + 2 * strlen(glb->object[i].name);
-    for (uint32_t i = 0; i < glb->solids; i++)
-        glb->json_size += BODY_ROOM + 2 * strlen(glb->solid[i].name);
     glb->json = drape_arena_take(arena, glb->json_size, 1);
-    size_t count = 3 * (size_t)glb->points;
-    glb->base = drape_arena_take(arena, count, sizeof *glb->base);
-    glb->upright = drape_arena_take(arena, count, sizeof *glb->upright);
+    const size_t count = 3 * (size_t)glb->points;
     glb->normal = drape_arena_take(arena, count, sizeof *glb->normal);
-    if (glb->objects > 1)
+    for (int part = 0; part < 2; part++) {
+        glb->base[part] = drape_arena_take(arena, count, sizeof **glb->base);
+        glb->moved[part] = drape_arena_take(arena, count, sizeof **glb->moved);
+    }
+    if (glb->deforming > 1)
         glb->x = drape_arena_take(arena, count, sizeof *glb->x);
     glb->times = drape_arena_take(arena, glb->room, sizeof *glb->times);
     if (drape_arena_status(arena))
@@ -662,138 +590,140 @@ static drape_status glb_open(drape_context *ctx, const drape_export_def *def, vo
     return status ? status : drape_export_begin(ctx, def->folder, FILE_NAME, &((glb_state *)state)->file);
 }
 
-/* ---- Normals and bounds ---- */
-
-/* Positions of the points of all objects. */
-static const double *positions_of(glb_state *glb, const drape_frame *frame)
-{
-    const size_t nodes = 3 * (size_t)glb->def->model->surface.node_count;
-    if (!glb->x)
-        return frame->positions;
-    memcpy(glb->x, frame->positions, nodes * sizeof *glb->x);
-    memcpy(glb->x + nodes, frame->points, (3 * (size_t)glb->points - nodes) * sizeof *glb->x);
-    return glb->x;
-}
-
-static void add_normals(glb_state *glb, const double *x, const int32_t *node, size_t triangles,
-                        uint32_t first)
-{
-    for (size_t t = 0; t < triangles; t++, node += 3) {
-        const double *p[3];
-        double ab[3], ac[3], n[3];
-        for (int k = 0; k < 3; k++)
-            p[k] = x + 3 * ((size_t)first + (size_t)node[k]);
-        vec3_sub(p[1], p[0], ab);
-        vec3_sub(p[2], p[0], ac);
-        vec3_cross(ab, ac, n);
-        for (int k = 0; k < 3; k++)
-            vec3_add_scaled(1, n, glb->normal + 3 * ((size_t)first + (size_t)node[k]));
-    }
-}
-
-/* The mean of the normals of the triangles around each point, weighted by area; upwards if they cancel. */
-static void find_normals(glb_state *glb, const double *x)
-{
-    const drape_render_surface *surface = &glb->def->model->surface;
-    memset(glb->normal, 0, 3 * (size_t)glb->points * sizeof *glb->normal);
-    add_normals(glb, x, surface->triangle, (size_t)surface->triangle_count, 0);
-    for (uint32_t i = 1; i < glb->objects; i++)
-        add_normals(glb, x, glb->object[i].body->triangle, (size_t)glb->object[i].body->triangle_count,
-                    glb->object[i].first_point);
-    for (size_t i = 0; i < (size_t)glb->points; i++) {
-        double *n = glb->normal + 3 * i, length = vec3_norm(n);
-        for (int k = 0; k < 3; k++)
-            n[k] = length > 0 ? n[k] / length : k == 1;
-    }
-}
-
-static void find_bounds(const glb_state *glb, const object *o, const double *x, bool relative,
-                        float bounds[6])
-{
-    for (int k = 0; k < 3; k++) {
-        bounds[k] = FLT_MAX;
-        bounds[3 + k] = -FLT_MAX;
-    }
-    for (size_t i = 3 * (size_t)o->first_point; i < 3 * (size_t)(o->first_point + o->points); i++) {
-        float value = relative ? (float)(x[i] - (double)glb->base[i]) : (float)x[i];
-        bounds[i % 3] = fminf(bounds[i % 3], value);
-        bounds[3 + i % 3] = fmaxf(bounds[3 + i % 3], value);
-    }
-}
-
-/* The accessors of an object's positions and normals in a frame. */
-static void format_accessors(const glb_state *glb, const object *o, uint32_t frame, const float bounds[6],
-                             char positions[ACCESSOR_ROOM + 1], char normals[NORMALS_ROOM])
-{
-    const uint32_t at = frame * frame_bytes(glb) + 24 * o->first_vertex;
-    const int head = snprintf(positions, ACCESSOR_ROOM + 1, ACCESSOR_HEAD, at, o->vertices);
-    format_bounds(bounds, positions + head, (size_t)(ACCESSOR_ROOM + 1 - head));
-    const int length = snprintf(normals, NORMALS_ROOM, ACCESSOR_HEAD, at + 12 * o->vertices, o->vertices);
-    normals[length - 1] = '}'; /* instead of the comma */
-}
-
 /* ---- Changes to the beginning of the file ---- */
 
-static drape_status fill(glb_state *glb, size_t at, const char *format, ...) DRAPE_PRINTF(3, 4);
-static drape_status fill(glb_state *glb, size_t at, const char *format, ...)
+/* Writes bytes of the JSON: of that in memory before the file appears with its first frame. */
+static void overwrite(glb_state *glb, size_t at, const char *text, size_t size)
 {
-    char text[TIMES_ROOM];
-    va_list values;
-    va_start(values, format);
-    int length = vsnprintf(text, sizeof text, format, values);
-    va_end(values);
-    return drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + at), text, (size_t)length);
+    if (glb->frames == 0)
+        memcpy(glb->json + at, text, size);
+    else if (!glb->status)
+        glb->status = drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + at), text, size);
 }
 
-static drape_status write_word(glb_state *glb, off_t at, uint32_t word)
+static void fill(glb_state *glb, size_t at, const char *format, ...) DRAPE_PRINTF(3, 4);
+static void fill(glb_state *glb, size_t at, const char *format, ...)
+{
+    char text[2 * TIMES_ROOM];
+    va_list values;
+    va_start(values, format);
+    const int length = vsnprintf(text, sizeof text, format, values);
+    va_end(values);
+    overwrite(glb, at, text, (size_t)length);
+}
+
+/* Adds the text of this frame to a list; that of the first target comes with the key. */
+static void fill_list(glb_state *glb, size_t list, size_t width, const char *key, const char *text)
+{
+    const size_t target = glb->frames - 1;
+    if (target == 0) {
+        fill(glb, list + LIST_HEAD + glb->room * width, "]");
+        fill(glb, list, ",\"%s\":[%s", key, text);
+    } else {
+        fill(glb, list + LIST_HEAD + target * width, ",%s", text);
+    }
+}
+
+static void write_word(glb_state *glb, off_t at, uint32_t word)
 {
     unsigned char bytes[4];
     for (int b = 0; b < 4; b++)
         bytes[b] = (unsigned char)(word >> 8 * b);
-    return drape_file_overwrite(&glb->file, at, bytes, sizeof bytes);
+    if (!glb->status)
+        glb->status = drape_file_overwrite(&glb->file, at, bytes, sizeof bytes);
 }
 
 /* Writes all lengths as they are now. positions: bytes of positions and normals. */
 static drape_status write_lengths(glb_state *glb, uint32_t positions)
 {
-    off_t binary = JSON_OFFSET + (off_t)glb->json_size;
-    uint32_t size = (uint32_t)glb->file.kept, length = size - (uint32_t)binary - 8;
-    drape_status status = write_word(glb, binary, length);
-    if (!status)
-        status = write_word(glb, 8, size);
-    if (!status)
-        status = fill(glb, glb->at.buffer_length, "%10" PRIu32, length);
-    return status ? status : fill(glb, glb->at.view_length, "%10" PRIu32, positions);
+    const uint32_t binary = JSON_OFFSET + (uint32_t)glb->json_size, size = (uint32_t)glb->file.kept,
+                   length = size - binary - DRAPE_GLTF_CHUNK;
+    write_word(glb, binary, length);
+    write_word(glb, 8, size);
+    fill(glb, glb->at.buffer_length, "%*u", LENGTH_WIDTH, length);
+    fill(glb, glb->at.view_length, "%*u", LENGTH_WIDTH, positions);
+    return glb->status;
 }
 
 /* ---- Frames ---- */
 
-static void put_vertices(glb_state *glb, const object *o, const float *of_points)
+/* Finds the differences of positions and normals from those of the first frame. A normal is the mean of those
+ * of the triangles around a point, weighted by area; upwards if they cancel. */
+static void find_differences(glb_state *glb, const drape_frame *frame)
 {
-    for (size_t i = 0; i < o->vertices; i++)
+    const drape_render_surface *surface = &glb->def->model->surface;
+    const size_t nodes = 3 * (size_t)surface->node_count, numbers = 3 * (size_t)glb->points;
+    const double *x = frame->positions;
+    if (glb->x) {
+        memcpy(glb->x, x, nodes * sizeof *x);
+        memcpy(glb->x + nodes, frame->points, (numbers - nodes) * sizeof *x);
+        x = glb->x;
+    }
+    memset(glb->normal, 0, numbers * sizeof *glb->normal);
+    drape_add_normals(x, surface->triangle, (size_t)surface->triangle_count, glb->normal);
+    for (uint32_t i = 1; i < glb->deforming; i++) {
+        const object *o = &glb->object[i];
+        const size_t first = 3 * (size_t)o->first_point;
+        drape_add_normals(x + first, o->body->triangle, (size_t)o->body->triangle_count, glb->normal + first);
+    }
+    for (double *n = glb->normal; n < glb->normal + numbers; n += 3) {
+        const double length = vec3_norm(n);
+        for (int k = 0; k < 3; k++)
+            n[k] = length > 0 ? n[k] / length : k == 1;
+    }
+    for (size_t i = 0; i < numbers; i++) {
+        glb->moved[0][i] = (float)(x[i] - (double)glb->base[0][i]);
+        glb->moved[1][i] = (float)(glb->normal[i] - (double)glb->base[1][i]);
+    }
+}
+
+/* The accessors of each object in this frame and, after the first one, its target and weight. */
+static void fill_frame(glb_state *glb)
+{
+    for (uint32_t number = 0; number < glb->deforming; number++) {
+        const object *o = &glb->object[number];
+        const uint32_t positions = accessor_of(glb, number, glb->frames);
+        const size_t at = glb->at.accessors + (glb->frames * (size_t)glb->deforming + number) * ACCESSOR_ROOM;
+        float bounds[6];
+        char text[ACCESSOR_ROOM];
+        accessor a = {1,
+                      glb->frames * (int64_t)glb->frame_bytes + 24 * (int64_t)o->first_vertex,
+                      DRAPE_GLTF_FLOAT,
+                      3,
+                      o->vertices,
+                      bounds};
+        find_bounds(glb->moved[0] + 3 * (size_t)o->first_point, 3, o->points, bounds);
+        fill(glb, at, ",%s", describe(a, text));
+        a.offset += 12 * (int64_t)o->vertices;
+        a.bounds = NULL;
+        fill(glb, at + POSITIONS_ROOM, ",%s", describe(a, text));
+        if (glb->frames == 0)
+            continue;
+        snprintf(text, sizeof text, "{\"POSITION\":%u,\"NORMAL\":%u}", positions, positions + 1);
+        for (uint32_t i = 0; i < o->primitives; i++)
+            fill_list(glb, glb->primitive[o->first_primitive + i].targets, TARGET_WIDTH, "targets", text);
+        fill_list(glb, o->weights, WEIGHT_WIDTH, "weights", "0");
+    }
+}
+
+/* node (count): the vectors that vertices have; NULL: one for each. */
+static void put_vectors(glb_state *glb, const float *value, size_t stride, const int32_t *node, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
         for (size_t k = 0; k < 3; k++)
-            drape_file_put_float(&glb->file, of_points[3 * (size_t)glb->node[o->first_vertex + i] + k]);
+            drape_file_put_float(&glb->file, value[stride * (node ? (size_t)node[i] : i) + k]);
 }
 
-static void put_differences(glb_state *glb, const object *o, const double *of_points, const float *base)
+static void put_frame(glb_state *glb)
 {
-    for (size_t i = 0; i < o->vertices; i++)
-        for (size_t k = 0; k < 3; k++) {
-            const size_t at = 3 * (size_t)glb->node[o->first_vertex + i] + k;
-            drape_file_put_float(&glb->file, (float)(of_points[at] - (double)base[at]));
-        }
+    for (uint32_t i = 0; i < glb->deforming; i++)
+        for (int part = 0; part < 2; part++)
+            put_vectors(glb, glb->moved[part], 3, glb->node + glb->object[i].first_vertex,
+                        glb->object[i].vertices);
 }
 
-static void put_solid(glb_state *glb, const solid *s)
-{
-    for (size_t part = 0; part < 6; part += 3)
-        for (size_t i = 0; i < (size_t)s->body->vertex_count; i++)
-            for (size_t k = 0; k < 3; k++)
-                drape_file_put_float(&glb->file, s->body->vertex[6 * i + part + k]);
-}
-
-/* Translation and rotation, a quaternion x, y, z, w; of the two of a rotation that nearer to the one before.
- * */
+/* Translation and rotation, a quaternion x, y, z, w; of the two of a rotation that nearer to the one
+ * before. */
 static void find_place(const drape_collider_pose *pose, const float *before, float place[7])
 {
     double q[4] = {1, 0, 0, 0}, sign = 1;
@@ -810,145 +740,81 @@ static void find_place(const drape_collider_pose *pose, const float *before, flo
     place[6] = (float)(sign * q[0]);
 }
 
+/* Where rigid objects are in this frame; the first one is where the scene shows them. */
 static void keep_places(glb_state *glb, const drape_frame *frame)
 {
-    for (uint32_t i = 0; i < glb->solids; i++)
-        if (glb->solid[i].moves) {
-            float *to = glb->solid[i].moves + 7 * (size_t)glb->frames;
-            find_place(&frame->poses[glb->solid[i].collider], glb->frames ? to - 7 : NULL, to);
-        }
-}
-
-static void place_solids(glb_state *glb, const drape_frame *frame)
-{
-    for (uint32_t i = 0; i < glb->solids; i++) {
-        float p[7];
-        char text[PLACE_ROOM];
-        find_place(&frame->poses[glb->solid[i].collider], NULL, p);
-        const int length = snprintf(text, sizeof text,
-                                    ",\"translation\":[%.9g,%.9g,%.9g],\"rotation\":[%.9g,%.9g,%.9g,%.9g]",
-                                    p[0], p[1], p[2], p[3], p[4], p[5], p[6]);
-        memcpy(glb->json + glb->solid[i].place, text, (size_t)length);
+    for (uint32_t i = glb->deforming; i < glb->objects; i++) {
+        const object *o = &glb->object[i];
+        const drape_collider_pose *pose = &frame->poses[o->body - glb->def->bodies];
+        float first[7], *p = o->moves ? o->moves + 7 * (size_t)glb->frames : first;
+        if (o->moves || glb->frames == 0)
+            find_place(pose, glb->frames ? p - 7 : NULL, p);
+        if (glb->frames == 0)
+            fill(glb, o->place, ",\"translation\":[%.9g,%.9g,%.9g],\"rotation\":[%.9g,%.9g,%.9g,%.9g]", p[0],
+                 p[1], p[2], p[3], p[4], p[5], p[6]);
     }
 }
 
 /* The file appears with its first frame, since a file without positions would not be valid. */
-static drape_status write_first(glb_state *glb, const drape_frame *frame)
+static drape_status write_first(glb_state *glb)
 {
-    float bounds[6];
-    char accessor[ACCESSOR_ROOM + 1], normals[NORMALS_ROOM];
-    const double *x = positions_of(glb, frame);
-    uint32_t length = fixed_bytes(glb) + frame_bytes(glb);
-    for (uint32_t i = 0; i < glb->objects; i++) {
-        char *to = glb->json + glb->at.accessors + (size_t)i * ACCESSOR_ROOM;
-        find_bounds(glb, &glb->object[i], x, false, bounds);
-        format_accessors(glb, &glb->object[i], 0, bounds, accessor, normals);
-        memcpy(to, accessor, strlen(accessor));
-        memcpy(to + BOUNDS_ROOM, normals, strlen(normals));
-    }
-    place_solids(glb, frame);
-    snprintf(accessor, sizeof accessor, "%10" PRIu32, length);
-    memcpy(glb->json + glb->at.buffer_length, accessor, LENGTH_WIDTH);
-    snprintf(accessor, sizeof accessor, "%10" PRIu32, frame_bytes(glb));
-    memcpy(glb->json + glb->at.view_length, accessor, LENGTH_WIDTH);
+    const uint32_t length = glb->fixed_bytes + glb->frame_bytes;
+    fill_frame(glb);
+    fill(glb, glb->at.buffer_length, "%*u", LENGTH_WIDTH, length);
+    fill(glb, glb->at.view_length, "%*u", LENGTH_WIDTH, glb->frame_bytes);
 
-    drape_file_put_text(&glb->file, "glTF");
-    drape_file_put_word(&glb->file, 2);
-    drape_file_put_word(&glb->file, (uint32_t)(JSON_OFFSET + glb->json_size + 8 + length));
+    drape_file_put_text(&glb->file, DRAPE_GLTF_MAGIC);
+    drape_file_put_word(&glb->file, DRAPE_GLTF_VERSION);
+    drape_file_put_word(&glb->file, (uint32_t)(JSON_OFFSET + glb->json_size + DRAPE_GLTF_CHUNK + length));
     drape_file_put_word(&glb->file, (uint32_t)glb->json_size);
-    drape_file_put_text(&glb->file, "JSON");
+    drape_file_put_text(&glb->file, DRAPE_GLTF_JSON);
     drape_file_put(&glb->file, glb->json, glb->json_size);
     drape_file_put_word(&glb->file, length);
-    drape_file_put(&glb->file, "BIN", 4); /* with its terminating 0 */
-    for (size_t i = 0; i < triangle_bytes(glb) / 4; i++)
+    drape_file_put(&glb->file, DRAPE_GLTF_BIN, 4); /* with its terminating 0 */
+    for (size_t i = 0; i < 3 * (size_t)glb->triangles; i++)
         drape_file_put_word(&glb->file, glb->corner[i]);
     for (size_t i = 0; glb->uv && i < glb->object[0].vertices; i++) {
         drape_file_put_float(&glb->file, glb->uv[i] ? (float)glb->uv[i][0] : 0);
         drape_file_put_float(&glb->file, glb->uv[i] ? (float)(1 - glb->uv[i][1]) : 0);
     }
-    for (uint32_t i = 0; i < glb->solids; i++)
-        put_solid(glb, &glb->solid[i]);
-    find_normals(glb, x);
-    for (size_t i = 0; i < 3 * (size_t)glb->points; i++) {
-        glb->base[i] = (float)x[i];
-        glb->upright[i] = (float)glb->normal[i];
-    }
-    for (uint32_t i = 0; i < glb->objects; i++) {
-        put_vertices(glb, &glb->object[i], glb->base);
-        put_vertices(glb, &glb->object[i], glb->upright);
-    }
+    for (uint32_t i = glb->deforming; i < glb->objects; i++)
+        for (size_t part = 0; part < 6; part += 3)
+            put_vectors(glb, glb->object[i].body->vertex + part, 6, NULL, glb->object[i].vertices);
+    put_frame(glb);
+    for (int part = 0; part < 2; part++)
+        memcpy(glb->base[part], glb->moved[part], 3 * (size_t)glb->points * sizeof **glb->base);
     return drape_file_publish(&glb->file);
 }
 
-/* Adds the frame's accessors, target and weight of an object; the first target also opens the lists. */
-static drape_status add_target(glb_state *glb, uint32_t number, const double *x)
+static drape_status write_next(glb_state *glb)
 {
-    const object *o = &glb->object[number];
-    uint32_t target = glb->frames - 1, accessor = accessor_of(glb, glb->frames, number);
-    float bounds[6];
-    char positions[ACCESSOR_ROOM + 1], normals[NORMALS_ROOM];
-    find_bounds(glb, o, x, true, bounds);
-    format_accessors(glb, o, glb->frames, bounds, positions, normals);
-    size_t at = glb->at.accessors + ((size_t)glb->frames * glb->objects + number) * ACCESSOR_ROOM;
-    drape_status status = fill(glb, at, "%s", positions);
-    if (!status)
-        status = fill(glb, at + BOUNDS_ROOM, "%s", normals);
-    for (uint32_t i = 0; i < o->primitives && !status; i++) {
-        const primitive *p = &glb->primitive[o->first_primitive + i];
-        if (target == 0)
-            status = fill(glb, p->targets_close, "]");
-        if (!status)
-            status = fill(glb, target ? p->targets + (size_t)target * TARGET_WIDTH : p->targets_open,
-                          "%s{\"POSITION\":%" PRIu32 ",\"NORMAL\":%" PRIu32 "}",
-                          target ? "," : ",\"targets\":[", accessor, accessor + 1);
-    }
-    if (!status && target == 0)
-        status = fill(glb, o->weights_close, "]");
-    if (!status)
-        status = fill(glb, target ? o->weights + (size_t)target * WEIGHT_WIDTH : o->weights_open, "%s0",
-                      target ? "," : ",\"weights\":[");
-    return status;
-}
-
-static drape_status write_next(glb_state *glb, const drape_frame *frame)
-{
-    off_t before = glb->file.kept;
-    const double *x = positions_of(glb, frame);
-    find_normals(glb, x);
-    for (uint32_t i = 0; i < glb->objects; i++) {
-        put_differences(glb, &glb->object[i], x, glb->base);
-        put_differences(glb, &glb->object[i], glb->normal, glb->upright);
-    }
+    const off_t before = glb->file.kept;
+    put_frame(glb);
     drape_status status = drape_file_keep(&glb->file);
     if (status)
         return status;
-    status = write_lengths(glb, (glb->frames + 1) * frame_bytes(glb));
-    if (status)
+    if (write_lengths(glb, (glb->frames + 1) * glb->frame_bytes))
         drape_file_cut(&glb->file, before);
-    for (uint32_t i = 0; i < glb->objects && !status; i++)
-        status = add_target(glb, i, x);
-    return status;
+    fill_frame(glb);
+    return glb->status;
 }
 
-/* The frame's time; the times of an animation must strictly increase, in float32. */
-static float time_of(const glb_state *glb, const drape_frame *frame)
-{
-    float time = (float)frame->time;
-    if (glb->frames > 0 && !(time > glb->times[glb->frames - 1]))
-        time = nextafterf(glb->times[glb->frames - 1], FLT_MAX);
-    return time;
-}
-
+/* The times of an animation must strictly increase, in float32. */
 static drape_status glb_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
     glb_state *glb = state;
     if (glb->frames == glb->room)
         return drape_fail(ctx, DRAPE_E_FILE,
-                          "\"%.300s/%.200s\" has room for %" PRIu32 " frames, those of the scene's duration",
+                          "\"%.300s/%.200s\" has room for %u frames, those of the scene's duration",
                           drape_folder_path(glb->file.folder), glb->file.path, glb->room);
-    glb->times[glb->frames] = time_of(glb, frame);
+    float *time = &glb->times[glb->frames];
+    *time = (float)frame->time;
+    if (glb->frames > 0 && !(*time > time[-1]))
+        *time = nextafterf(time[-1], FLT_MAX);
+    glb->status = DRAPE_OK;
     keep_places(glb, frame);
-    drape_status status = glb->frames == 0 ? write_first(glb, frame) : write_next(glb, frame);
+    find_differences(glb, frame);
+    drape_status status = glb->frames == 0 ? write_first(glb) : write_next(glb);
     if (!status)
         glb->frames++;
     glb->live = glb->frames > 0;
@@ -957,72 +823,47 @@ static drape_status glb_write(drape_context *ctx, void *state, const drape_frame
 
 /* ---- Animation and end ---- */
 
-/* The number of bytes of the animation: times, weights, and places of the solids that move. */
-static uint32_t animation_bytes(const glb_state *glb)
+/* The view and the accessors of times, weights, and translations and rotations of the objects that move. */
+static void fill_accessors(glb_state *glb)
 {
-    return 4 * glb->frames * (glb->frames + 7 * glb->moving);
+    const uint32_t n = glb->frames, view = rigid_view(glb) + (glb->objects > glb->deforming);
+    const float bounds[2] = {glb->times[0], glb->times[n - 1]};
+    char first[ACCESSOR_ROOM], second[ACCESSOR_ROOM];
+    fill(glb, glb->at.views, ",{\"buffer\":0,\"byteOffset\":%u,\"byteLength\":%u}",
+         glb->fixed_bytes + n * glb->frame_bytes, 4 * n * (n + 7 * glb->moving));
+    fill(glb, glb->at.times, ",%s,%s", describe((accessor){view, -1, DRAPE_GLTF_FLOAT, 1, n, bounds}, first),
+         describe((accessor){view, 4 * (int64_t)n, DRAPE_GLTF_FLOAT, 1, n * (n - 1), NULL}, second));
+    for (uint32_t i = 0; i < glb->moving; i++) {
+        const int64_t offset = 4 * (int64_t)n * (n + 7 * i);
+        fill(glb, glb->at.times + (1 + i) * (size_t)TIMES_ROOM, ",%s,%s",
+             describe((accessor){view, offset, DRAPE_GLTF_FLOAT, 3, n, NULL}, first),
+             describe((accessor){view, offset + 12 * n, DRAPE_GLTF_FLOAT, 4, n, NULL}, second));
+    }
 }
 
-/* Accessors of translation and rotation of the solids that move, after those of times and weights. */
-static drape_status add_places(glb_state *glb, size_t at)
+/* A channel for the weights of each object, all by one sampler, and two for each one that moves. */
+static void fill_channels(glb_state *glb)
 {
-    uint32_t n = glb->frames, view = last_view(glb), offset = 4 * n * n;
-    drape_status status = DRAPE_OK;
-    for (uint32_t i = 0; i < glb->moving && !status; i++, at += TIMES_ROOM / 2, offset += 28 * n)
-        status = fill(glb, at,
-                      ",{\"bufferView\":%" PRIu32 ",\"byteOffset\":%" PRIu32
-                      ",\"componentType\":5126,\"count\":%" PRIu32
-                      ",\"type\":\"VEC3\"},{\"bufferView\":%" PRIu32 ",\"byteOffset\":%" PRIu32
-                      ",\"componentType\":5126,\"count\":%" PRIu32 ",\"type\":\"VEC4\"}",
-                      view, offset, n, view, offset + 12 * n, n);
-    return status;
-}
-
-/* A channel for the weights of each object, all by one sampler, and two for each solid that moves. */
-static drape_status add_channels(glb_state *glb, uint32_t times)
-{
+    const uint32_t times = accessor_of(glb, 0, glb->frames);
     size_t at = glb->at.animation;
     uint32_t sampler = 1;
-    drape_status status = fill(glb, at, ",\"animations\":[{\"name\":\"run\",\"channels\":[");
+    fill(glb, at, ",\"animations\":[{\"name\":\"run\",\"channels\":[");
     at += CHANNEL_ROOM;
-    for (uint32_t i = 0; i < glb->objects && !status; i++, at += CHANNEL_ROOM)
-        status = fill(glb, at, "%s{\"sampler\":0,\"target\":{\"node\":%" PRIu32 ",\"path\":\"weights\"}}",
-                      i ? "," : "", i);
-    for (uint32_t i = 0; i < glb->solids; i++)
-        for (int turns = 0; turns < 2 && glb->solid[i].moves && !status; turns++, at += CHANNEL_ROOM)
-            status =
-                fill(glb, at, ",{\"sampler\":%" PRIu32 ",\"target\":{\"node\":%" PRIu32 ",\"path\":\"%s\"}}",
-                     sampler++, glb->objects + i, turns ? "rotation" : "translation");
-    if (!status)
-        status = fill(glb, at, "],\"samplers\":[");
+    for (uint32_t i = 0; i < glb->deforming; i++, at += CHANNEL_ROOM)
+        fill(glb, at, "%s{\"sampler\":0,\"target\":{\"node\":%u,\"path\":\"weights\"}}", i ? "," : "", i);
+    for (uint32_t i = glb->deforming; i < glb->objects; i++)
+        for (int turns = 0; turns < 2 && glb->object[i].moves; turns++, at += CHANNEL_ROOM)
+            fill(glb, at, ",{\"sampler\":%u,\"target\":{\"node\":%u,\"path\":\"%s\"}}", sampler++, i,
+                 turns ? "rotation" : "translation");
+    fill(glb, at, "],\"samplers\":[");
     at += CHANNEL_ROOM / 2;
-    for (uint32_t i = 0; i < sampler && !status; i++, at += CHANNEL_ROOM)
-        status =
-            fill(glb, at, "%s{\"input\":%" PRIu32 ",\"interpolation\":\"LINEAR\",\"output\":%" PRIu32 "}",
-                 i ? "," : "", times, times + 1 + i);
-    return status ? status : fill(glb, at, "]}]");
+    for (uint32_t i = 0; i < sampler; i++, at += CHANNEL_ROOM)
+        fill(glb, at, "%s{\"input\":%u,\"interpolation\":\"LINEAR\",\"output\":%u}", i ? "," : "", times,
+             times + 1 + i);
+    fill(glb, at, "]}]");
 }
 
-static drape_status add_animation(glb_state *glb)
-{
-    uint32_t n = glb->frames, offset = fixed_bytes(glb) + n * frame_bytes(glb);
-    uint32_t view = last_view(glb), times = accessor_of(glb, n, 0);
-    drape_status status =
-        fill(glb, glb->at.views, ",{\"buffer\":0,\"byteOffset\":%" PRIu32 ",\"byteLength\":%" PRIu32 "}",
-             offset, animation_bytes(glb));
-    if (!status)
-        status = fill(glb, glb->at.times,
-                      ",{\"bufferView\":%" PRIu32 ",\"componentType\":5126,\"count\":%" PRIu32
-                      ",\"type\":\"SCALAR\",\"min\":[%.9g],\"max\":[%.9g]},{\"bufferView\":%" PRIu32
-                      ",\"byteOffset\":%" PRIu32 ",\"componentType\":5126,\"count\":%" PRIu32
-                      ",\"type\":\"SCALAR\"}",
-                      view, n, glb->times[0], glb->times[n - 1], view, 4 * n, n * (n - 1));
-    if (!status)
-        status = add_places(glb, glb->at.times + TIMES_ROOM / 2);
-    return status ? status : add_channels(glb, times);
-}
-
-/* Times and weights, n + n (n - 1) numbers, then 7 n of each solid that moves. */
+/* Times and weights, n + n (n - 1) numbers, then 7 n of each object that moves. */
 static drape_status write_animation(glb_state *glb)
 {
     for (uint32_t i = 0; i < glb->frames; i++)
@@ -1030,17 +871,19 @@ static drape_status write_animation(glb_state *glb)
     for (uint32_t frame = 0; frame < glb->frames; frame++)
         for (uint32_t target = 1; target < glb->frames; target++)
             drape_file_put_float(&glb->file, frame == target);
-    for (uint32_t i = 0; i < glb->solids; i++) {
-        const float *moves = glb->solid[i].moves;
+    for (uint32_t i = 0; i < glb->objects; i++) {
+        const float *moves = glb->object[i].moves;
         for (uint32_t k = 0; moves && k < 3 * glb->frames; k++)
             drape_file_put_float(&glb->file, moves[k / 3 * 7 + k % 3]);
         for (uint32_t k = 0; moves && k < 4 * glb->frames; k++)
             drape_file_put_float(&glb->file, moves[k / 4 * 7 + 3 + k % 4]);
     }
-    drape_status status = drape_file_keep(&glb->file);
-    if (!status)
-        status = write_lengths(glb, glb->frames * frame_bytes(glb));
-    return status ? status : add_animation(glb);
+    glb->status = drape_file_keep(&glb->file);
+    if (!glb->status)
+        write_lengths(glb, glb->frames * glb->frame_bytes);
+    fill_accessors(glb);
+    fill_channels(glb);
+    return glb->status;
 }
 
 static drape_status glb_close(drape_context *ctx, void *state)
@@ -1070,11 +913,11 @@ static void glb_archive(void *state, drape_archive *a)
         return;
     glb->frames = (uint32_t)frames;
     drape_export_archive_file(a, &glb->file);
-    drape_archive_bytes(a, glb->base, 3 * (size_t)glb->points * sizeof *glb->base);
-    drape_archive_bytes(a, glb->upright, 3 * (size_t)glb->points * sizeof *glb->upright);
-    for (uint32_t i = 0; i < glb->solids; i++)
-        if (glb->solid[i].moves)
-            drape_archive_bytes(a, glb->solid[i].moves, glb->frames * 7 * sizeof *glb->solid[i].moves);
+    drape_archive_bytes(a, glb->base[0], 3 * (size_t)glb->points * sizeof **glb->base);
+    drape_archive_bytes(a, glb->base[1], 3 * (size_t)glb->points * sizeof **glb->base);
+    for (uint32_t i = 0; i < glb->objects; i++)
+        if (glb->object[i].moves)
+            drape_archive_bytes(a, glb->object[i].moves, glb->frames * 7 * sizeof *glb->object[i].moves);
     drape_archive_bytes(a, glb->times, glb->frames * sizeof *glb->times);
 }
 
@@ -1093,69 +936,49 @@ static drape_status glb_resume(drape_context *ctx, const drape_export_def *def, 
     return drape_export_reopen(ctx, def->folder, FILE_NAME, &glb->file);
 }
 
-/* Blanks bytes of the JSON. */
-static drape_status blank_bytes(glb_state *glb, size_t begin, size_t end)
+/* Writes bytes of the JSON as they were at first, which after resuming are blanks. */
+static void restore(glb_state *glb, size_t begin, size_t end)
 {
-    char blank[1024];
-    drape_status status = DRAPE_OK;
-    memset(blank, ' ', sizeof blank);
-    while (!status && begin < end) {
-        size_t part = end - begin < sizeof blank ? end - begin : sizeof blank;
-        status = drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + begin), blank, part);
-        begin += part;
-    }
-    return status;
+    overwrite(glb, begin, glb->json + begin, end - begin);
 }
 
-/* Blanks a list of texts of one width, each for a frame after the first, from that of frame `frames` on;
- * with it the bracket before it, in which its first item is, and that after it. */
-static drape_status blank_list(glb_state *glb, size_t open, size_t list, size_t width, size_t close)
+/* Restores a list from the text of frame `frames` on. */
+static void restore_list(glb_state *glb, size_t list, size_t width)
 {
-    const uint32_t n = glb->frames, items = n > 0 ? n - 1 : 0;
-    drape_status status = n > 1 ? DRAPE_OK : blank_bytes(glb, open, list);
-    if (!status)
-        status = blank_bytes(glb, list + items * width, n > 1 ? close : close + 1);
-    return status;
-}
-
-/* Blanks everything that later frames and the animation wrote. */
-static drape_status blank_rest(glb_state *glb)
-{
-    const blanks *at = &glb->at;
-    const size_t frame = (size_t)glb->objects * ACCESSOR_ROOM;
-    drape_status status = blank_bytes(glb, at->views, at->views + TIMES_ROOM / 2);
-    if (!status)
-        status = blank_bytes(glb, at->times, at->times + times_room(glb));
-    if (!status)
-        status = blank_bytes(glb, at->animation, at->animation + animation_room(glb));
-    if (!status)
-        status = blank_bytes(glb, at->accessors + glb->frames * frame, at->accessors + glb->room * frame);
-    for (uint32_t i = 0; i < glb->primitives && !status; i++) {
-        const primitive *p = &glb->primitive[i];
-        status = blank_list(glb, p->targets_open, p->targets, TARGET_WIDTH, p->targets_close);
-    }
-    for (uint32_t i = 0; i < glb->objects && !status; i++) {
-        const object *o = &glb->object[i];
-        status = blank_list(glb, o->weights_open, o->weights, WEIGHT_WIDTH, o->weights_close);
-    }
-    return status;
+    const size_t close = list + LIST_HEAD + glb->room * width;
+    if (glb->frames > 1)
+        restore(glb, list + LIST_HEAD + (glb->frames - 1) * width, close);
+    else
+        restore(glb, list, close + 1);
 }
 
 /* Removes the animation and targets before the data that they refer to. */
 static drape_status glb_cut(drape_context *ctx, void *state, int64_t frames)
 {
     glb_state *glb = state;
+    const blanks *at = &glb->at;
+    const size_t frame = (size_t)glb->deforming * ACCESSOR_ROOM;
     (void)frames;
     const bool rehearses = drape_folder_rehearses(glb->def->folder);
     if (glb->frames == 0)
         return rehearses ? DRAPE_OK : drape_export_begin(ctx, glb->def->folder, FILE_NAME, &glb->file);
-    drape_status status = blank_rest(glb);
-    if (!status)
-        status = write_lengths(glb, glb->frames * frame_bytes(glb));
-    if (!status)
-        status = drape_file_trim(&glb->file);
-    glb->live = !status && !rehearses;
-    return status;
+    glb->status = DRAPE_OK;
+    restore(glb, at->views, at->views + TIMES_ROOM);
+    restore(glb, at->times, at->times + times_room(glb));
+    restore(glb, at->animation, at->animation + animation_room(glb));
+    restore(glb, at->accessors + glb->frames * frame, at->accessors + glb->room * frame);
+    for (uint32_t i = 0; i < glb->deforming; i++) {
+        const object *o = &glb->object[i];
+        for (uint32_t p = 0; p < o->primitives; p++)
+            restore_list(glb, glb->primitive[o->first_primitive + p].targets, TARGET_WIDTH);
+        restore_list(glb, o->weights, WEIGHT_WIDTH);
+    }
+    if (!glb->status)
+        write_lengths(glb, glb->frames * glb->frame_bytes);
+    if (!glb->status)
+        glb->status = drape_file_trim(&glb->file);
+    glb->live = !glb->status && !rehearses;
+    return glb->status;
 }
 
 static drape_status glb_sync(void *state)

@@ -1,19 +1,22 @@
 /* normals.c: normals of nodes. The cross product of two edges of a triangle points along its normal and has
  * the length of twice its area, so the sum around a node is the area-weighted mean. */
+#include "model/normals.h"
 #include "base/vec3.h"
 #include "model/model.h"
 
 #include <math.h>
 #include <string.h>
 
-static void add_triangle(const double *x, const int32_t *node, double *normals)
+void drape_add_normals(const double *x, const int32_t *triangle, size_t count, double *normals)
 {
-    double a[3], b[3], m[3];
-    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], a);
-    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], b);
-    vec3_cross(a, b, m);
-    for (int i = 0; i < 3; i++)
-        vec3_add_scaled(1, m, normals + 3 * (size_t)node[i]);
+    for (const int32_t *node = triangle; node < triangle + 3 * count; node += 3) {
+        double a[3], b[3], m[3];
+        vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], a);
+        vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], b);
+        vec3_cross(a, b, m);
+        for (int i = 0; i < 3; i++)
+            vec3_add_scaled(1, m, normals + 3 * (size_t)node[i]);
+    }
 }
 
 void drape_model_normals(const drape_model *model, const double *x, double *normals)
@@ -21,8 +24,7 @@ void drape_model_normals(const drape_model *model, const double *x, double *norm
     if (!model || !x || !normals)
         return;
     memset(normals, 0, 3 * (size_t)model->node_count * sizeof *normals);
-    for (size_t t = 0; t < (size_t)model->triangle_count; t++)
-        add_triangle(x, model->triangle + 3 * t, normals);
+    drape_add_normals(x, model->triangle, (size_t)model->triangle_count, normals);
     for (size_t i = 0; i < (size_t)model->node_count; i++) {
         double *n = normals + 3 * i, length = vec3_norm(n);
         for (int k = 0; k < 3; k++)
