@@ -19,6 +19,8 @@
 #include "mesh/mesh.h"
 #include "mesh/text.h"
 
+#define FAIL(reader, ...) drape_mesh_fail((reader)->ctx, (reader)->source, (reader)->text.line, __VA_ARGS__)
+
 typedef struct obj_count {
     size_t nodes, uvs, faces, corners, materials; /* materials: statements */
     size_t file_size;                             /* of the names in mtllib, each with its end */
@@ -80,12 +82,10 @@ static drape_status read_node(obj_reader *reader)
     for (int axis = 0; axis < 3; axis++) {
         drape_word word;
         if (!drape_text_next_word(&reader->text, &word))
-            return drape_mesh_fail(reader->ctx, reader->source, reader->text.line,
-                                   "a node with %d coordinates; it needs x, y and z", axis);
+            return FAIL(reader, "a node with %d coordinates; it needs x, y and z", axis);
         if (!drape_word_number(word, &x[axis]))
-            return drape_mesh_fail(reader->ctx, reader->source, reader->text.line,
-                                   "%c of a node is \"%.*s\"; it must be a finite number", "xyz"[axis],
-                                   drape_word_shown(word), word.start);
+            return FAIL(reader, "%c of a node is \"%.*s\"; it must be a finite number", "xyz"[axis],
+                        drape_word_shown(word), word.start);
     }
     return DRAPE_OK;
 }
@@ -121,20 +121,17 @@ static drape_status fail_node(const obj_reader *reader, int64_t number)
     const long long n = (long long)number;
     const int32_t count = number < 0 ? reader->nodes : reader->mesh->node_count;
     if (count == 0)
-        return drape_mesh_fail(reader->ctx, reader->source, reader->text.line,
-                               "there is no node %lld: none was defined", n);
-    return drape_mesh_fail(reader->ctx, reader->source, reader->text.line,
-                           "there is no node %lld; range is %d to %d", n, number < 0 ? -count : 1,
-                           number < 0 ? -1 : count);
+        return FAIL(reader, "there is no node %lld: none was defined", n);
+    return FAIL(reader, "there is no node %lld; range is %d to %d", n, number < 0 ? -count : 1,
+                number < 0 ? -1 : count);
 }
 
 static drape_status read_corner(const obj_reader *reader, drape_word word, int32_t *node, int32_t *uv)
 {
     int64_t number[3] = {0};
     if (!corner_numbers(word, number))
-        return drape_mesh_fail(reader->ctx, reader->source, reader->text.line,
-                               "a corner is \"%.*s\"; it must be v, v/vt, v//vn or v/vt/vn",
-                               drape_word_shown(word), word.start);
+        return FAIL(reader, "a corner is \"%.*s\"; it must be v, v/vt, v//vn or v/vt/vn",
+                    drape_word_shown(word), word.start);
     const int64_t index = number[0] < 0 ? reader->nodes + number[0] : number[0] - 1;
     if (index < 0 || index >= reader->mesh->node_count)
         return fail_node(reader, number[0]);
@@ -161,12 +158,10 @@ static drape_status read_polygon(obj_reader *reader)
     while (end - first > 1 && faces->node[end - 1] == faces->node[first])
         end--;
     if (given < 3)
-        return drape_mesh_fail(reader->ctx, reader->source, reader->text.line,
-                               "a face with %d corners; it needs at least 3", given);
+        return FAIL(reader, "a face with %d corners; it needs at least 3", given);
     if (end - first < 3)
-        return drape_mesh_fail(reader->ctx, reader->source, reader->text.line,
-                               "a face with corners at %d nodes; it needs at least 3; remedy: delete it",
-                               end - first);
+        return FAIL(reader, "a face with corners at %d nodes; it needs at least 3; remedy: delete it",
+                    end - first);
     reader->corners = end;
     faces->material[reader->faces++] = reader->materials - 1;
     faces->first[reader->faces] = reader->corners;

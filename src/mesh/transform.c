@@ -1,6 +1,7 @@
 /* transform.c: transforms a mesh: x' = R (s x) + t, with componentwise scale s, rotation R by an angle about
  * an axis, and translation t. */
 #include "base/elementary.h"
+#include "base/finite.h"
 #include "mesh/mesh.h"
 
 #include <math.h>
@@ -8,19 +9,11 @@
 
 #include "base/vec3.h"
 
-static bool all_finite(const double *values, int count)
-{
-    for (int i = 0; i < count; i++)
-        if (!isfinite(values[i]))
-            return false;
-    return true;
-}
-
 drape_status drape_mesh_check_transform(drape_context *ctx, const char *pointer, const double scale[3],
                                         const double rotate[4], const double translate[3])
 {
     char place[sizeof ctx->pointer];
-    if (!all_finite(scale, 3) || scale[0] <= 0 || scale[1] <= 0 || scale[2] <= 0) {
+    if (!drape_all_finite(scale, 3) || scale[0] <= 0 || scale[1] <= 0 || scale[2] <= 0) {
         snprintf(place, sizeof place, "%s/transform/scale", pointer);
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
                              "%g %g %g; each must be finite and > 0, a mirror "
@@ -28,14 +21,14 @@ drape_status drape_mesh_check_transform(drape_context *ctx, const char *pointer,
                              scale[0], scale[1], scale[2]);
     }
     snprintf(place, sizeof place, "%s/transform/rotate", pointer);
-    if (!all_finite(rotate, 4))
+    if (!drape_all_finite(rotate, 4))
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "%g %g %g %g; axis and angle must be finite",
                              rotate[0], rotate[1], rotate[2], rotate[3]);
     if (rotate[3] != 0 && rotate[0] == 0 && rotate[1] == 0 && rotate[2] == 0)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
                              "the axis of a rotation by %g degrees is 0 0 0; it must not be zero", rotate[3]);
     snprintf(place, sizeof place, "%s/transform/translate", pointer);
-    if (!all_finite(translate, 3))
+    if (!drape_all_finite(translate, 3))
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "%g %g %g; each must be finite", translate[0],
                              translate[1], translate[2]);
     return DRAPE_OK;

@@ -140,8 +140,8 @@ typedef struct course {
     const double *start; /* of a pin; NULL: displacements are asked for */
 } course;
 
-static void pose_without_rates(const drape_motion *motion, int32_t collider, double t,
-                               drape_collider_pose *pose);
+static void pose_of(const drape_motion *motion, int32_t collider, double t, double within, bool rates,
+                    drape_collider_pose *pose);
 
 /* Where a collider has a pin that it carries. */
 static void position_on_ride(const drape_motion *motion, const drape_ride *ride, double t, double x[3])
@@ -149,7 +149,7 @@ static void position_on_ride(const drape_motion *motion, const drape_ride *ride,
     const drape_collider *collider = &motion->model->colliders[ride->collider];
     drape_collider_pose pose;
     double corner[9];
-    pose_without_rates(motion, ride->collider, t, &pose);
+    pose_of(motion, ride->collider, t, t, false, &pose);
     memcpy(x, ride->own, 3 * sizeof *x);
     if (ride->triangle >= 0) {
         drape_deformation_corners(&motion->deformation[ride->collider],
@@ -263,37 +263,37 @@ static bool arrives_at_rest(const course *c)
     return rests(c->path->v[1]) && (!c->turn || rests(c->turn->rate[1]));
 }
 
-/* The end of a path is a kink unless it comes to rest there; its beginning is one unless it continues
- * smoothly. */
-static double next_kink_of(const course *c, double t, double end)
+/* Looks for the first kink after t and before `end`, which it becomes, and for one at t. */
+typedef struct kink_search {
+    double t, end;
+    bool at;
+} kink_search;
+
+static void meet_kink(kink_search *s, double time)
 {
-    const drape_path *path = c->path;
-    for (int i = 0; path->given && i < 2; i++)
-        if (path->t[i] > t && path->t[i] < end && !(i == 0 ? path->smooth : arrives_at_rest(c)))
-            end = path->t[i];
-    for (size_t i = 0; !path->given && !c->ride && c->track && i < c->track->key_count; i++)
-        if (c->track->keys[i].time > t && c->track->keys[i].time < end)
-            end = c->track->keys[i].time;
-    for (size_t i = 0; !path->given && !c->ride && c->turns && i < c->turns->key_count; i++)
-        if (c->turns->keys[i].time > t && c->turns->keys[i].time < end)
-            end = c->turns->keys[i].time;
-    return end;
+    s->at = s->at || time == s->t;
+    if (time > s->t && time < s->end)
+        s->end = time;
 }
 
-static bool at_kink_of(const course *c, double t)
+/* The end of a path is a kink unless it comes to rest there; its beginning is one unless it continues
+ * smoothly. Those of a ride are those of its collider, but for its beginning. */
+static void meet_kinks(const course *c, kink_search *s)
 {
     const drape_path *path = c->path;
-    if (path->given)
-        return (t == path->t[0] && !path->smooth) || (t == path->t[1] && !arrives_at_rest(c));
-    if (c->ride)
-        return t == c->ride->since; /* those of its collider come with the colliders */
-    for (size_t i = 0; c->track && i < c->track->key_count; i++)
-        if (c->track->keys[i].time == t)
-            return true;
-    for (size_t i = 0; c->turns && i < c->turns->key_count; i++)
-        if (c->turns->keys[i].time == t)
-            return true;
-    return false;
+    if (path->given) {
+        if (!path->smooth)
+            meet_kink(s, path->t[0]);
+        if (!arrives_at_rest(c))
+            meet_kink(s, path->t[1]);
+    } else if (c->ride) {
+        s->at = s->at || c->ride->since == s->t;
+    } else {
+        for (size_t i = 0; c->track && i < c->track->key_count; i++)
+            meet_kink(s, c->track->keys[i].time);
+        for (size_t i = 0; c->turns && i < c->turns->key_count; i++)
+            meet_kink(s, c->turns->keys[i].time);
+    }
 }
 
 /* Writes the velocity that leads to the position at t. Returns whether it is known: it is not at a key of a
@@ -449,7 +449,7 @@ void drape_motion_ride_from(const drape_motion *motion, int32_t collider, int32_
     double corner[9];
     *ride = drape_ride_none();
     ride->collider = collider;
-    pose_without_rates(motion, collider, t, &pose);
+    pose_of(motion, collider, t, t, false, &pose);
     drape_pose_own(&pose, x, ride->own);
     if (on->frames.frame_count == 0)
         return;
@@ -561,33 +561,27 @@ void drape_motion_spin(const drape_motion *motion, int32_t collider, double t, d
     spin_on(&c, t, within, w);
 }
 
-void drape_motion_pose(const drape_motion *motion, int32_t collider, double t, double within,
-                       drape_collider_pose *pose)
+static void pose_of(const drape_motion *motion, int32_t collider, double t, double within, bool rates,
+                    drape_collider_pose *pose)
 {
     const course c = collider_course(motion, collider);
-    double displacement[3], v[3], rotation[9], w[3];
+    double displacement[3], v[3] = {0}, rotation[9], w[3] = {0};
     *pose = (drape_collider_pose){.t = t};
     if (!drape_motion_moves_collider(motion, collider))
         return;
     position_on(&c, t, displacement);
-    velocity_on(&c, t, within, v);
     rotation_on(&c, t, rotation);
-    spin_on(&c, t, within, w);
+    if (rates) {
+        velocity_on(&c, t, within, v);
+        spin_on(&c, t, within, w);
+    }
     drape_pose_about(pose, motion->model->colliders[collider].pivot, rotation, displacement, v, w);
 }
 
-static void pose_without_rates(const drape_motion *motion, int32_t collider, double t,
-                               drape_collider_pose *pose)
+void drape_motion_pose(const drape_motion *motion, int32_t collider, double t, double within,
+                       drape_collider_pose *pose)
 {
-    static const double zero[3];
-    const course c = collider_course(motion, collider);
-    double displacement[3], rotation[9];
-    *pose = (drape_collider_pose){.t = t};
-    if (!drape_motion_moves_collider(motion, collider))
-        return;
-    position_on(&c, t, displacement);
-    rotation_on(&c, t, rotation);
-    drape_pose_about(pose, motion->model->colliders[collider].pivot, rotation, displacement, zero, zero);
+    pose_of(motion, collider, t, within, true, pose);
 }
 
 void drape_motion_mean_pose(const drape_motion *motion, int32_t collider, double t, const double span[2],
@@ -993,26 +987,36 @@ static course clamp_course(const drape_motion *motion, int32_t track)
     return (course){.path = &none, .turns = of->clamps ? &of->turns : NULL};
 }
 
-double drape_motion_next_kink(const drape_motion *motion, double t, double end)
+/* All but those of histories. */
+static kink_search find_kinks(const drape_motion *motion, double t, double end)
 {
+    const drape_model *m = motion->model;
+    kink_search s = {.t = t, .end = end};
     for (int32_t i = 0; i < motion->moved_count; i++) {
         const course c = pin_course(motion, i);
-        end = next_kink_of(&c, t, end);
+        meet_kinks(&c, &s);
     }
-    for (int32_t i = 0; i < motion->model->collider_count; i++) {
+    for (int32_t i = 0; i < m->collider_count; i++) {
         const course c = collider_course(motion, i);
-        end = next_kink_of(&c, t, end);
-        end = drape_deformation_next_kink(&motion->deformation[i], t, end);
+        meet_kinks(&c, &s);
+        s.end = drape_deformation_next_kink(&motion->deformation[i], t, s.end);
+        s.at = s.at || drape_deformation_at_kink(&motion->deformation[i], t);
     }
-    for (int32_t i = 0; i < motion->model->support_count; i++)
-        for (int d = 0; d < motion->model->supports[i].count; d++) {
+    for (int32_t i = 0; i < m->support_count; i++)
+        for (int d = 0; d < m->supports[i].count; d++) {
             const course c = support_course(motion, i, d);
-            end = next_kink_of(&c, t, end);
+            meet_kinks(&c, &s);
         }
-    for (int32_t i = 0; i < motion->model->track_count; i++) {
+    for (int32_t i = 0; i < m->track_count; i++) {
         const course c = clamp_course(motion, i);
-        end = next_kink_of(&c, t, end);
+        meet_kinks(&c, &s);
     }
+    return s;
+}
+
+double drape_motion_next_kink(const drape_motion *motion, double t, double end)
+{
+    end = find_kinks(motion, t, end).end;
     for (int32_t i = 0; i < motion->model->history_count; i++)
         if (motion->model->histories[i].used)
             end = drape_history_next_kink(&motion->model->histories[i], t, end);
@@ -1021,22 +1025,5 @@ double drape_motion_next_kink(const drape_motion *motion, double t, double end)
 
 bool drape_motion_at_kink(const drape_motion *motion, double t)
 {
-    bool found = false;
-    for (int32_t i = 0; !found && i < motion->moved_count; i++) {
-        const course c = pin_course(motion, i);
-        found = at_kink_of(&c, t);
-    }
-    for (int32_t i = 0; !found && i < motion->model->collider_count; i++) {
-        const course c = collider_course(motion, i);
-        found = at_kink_of(&c, t) || drape_deformation_at_kink(&motion->deformation[i], t);
-    }
-    for (int32_t i = 0; !found && i < 2 * motion->model->support_count; i++) {
-        const course c = support_course(motion, i / 2, i % 2);
-        found = i % 2 < motion->model->supports[i / 2].count && at_kink_of(&c, t);
-    }
-    for (int32_t i = 0; !found && i < motion->model->track_count; i++) {
-        const course c = clamp_course(motion, i);
-        found = at_kink_of(&c, t);
-    }
-    return found;
+    return find_kinks(motion, t, t).at;
 }

@@ -25,21 +25,6 @@
 
 /* ---- Numbering of edges and points ---- */
 
-/* Edges are ordered by (lower, higher) node over the whole surface. */
-static int32_t find_edge(const drape_skin *s, int32_t a, int32_t b)
-{
-    int32_t lower = a < b ? a : b, higher = a < b ? b : a, first = 0, last = s->edge_count - 1;
-    while (first < last) {
-        int32_t middle = first + (last - first) / 2;
-        const int32_t *edge = s->edges + 2 * (size_t)middle;
-        if (edge[0] < lower || (edge[0] == lower && edge[1] < higher))
-            first = middle + 1;
-        else
-            last = middle;
-    }
-    return first;
-}
-
 static size_t inner_points(int level)
 {
     return (size_t)(level - 1) * (size_t)(level - 2) / 2;
@@ -308,7 +293,7 @@ drape_status drape_skin_create(drape_arena *arena, const drape_model *model, dra
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < 3 * triangles; i++) {
         int32_t a = skin->triangle[i], b = skin->triangle[i - i % 3 + (i + 1) % 3];
-        int32_t e = find_edge(skin, a, b);
+        int32_t e = drape_edge_between(skin->edges, skin->edge_count, a, b);
         skin->triangle_edge[i] = a < b ? e : -1 - e;
     }
     make_indices(skin);
