@@ -4,6 +4,7 @@
  * collider depend on each other, and all rules that depend on a mesh.
  */
 #include "cli/schema.h"
+#include "cli/form.h"
 #include "cli/keys.h"
 
 #include "colliders/colliders.h"
@@ -23,13 +24,7 @@
 
 static json_t *typed(const char *type)
 {
-    return drape_json_with(json_object(), "type", json_string(type));
-}
-
-/* An integer if the value is one: 3 rather than 3.0. */
-static json_t *number(double value)
-{
-    return value == floor(value) && fabs(value) < 1e15 ? json_integer((json_int_t)value) : json_real(value);
+    return json_pack("{s:s}", "type", type);
 }
 
 static json_t *array_of(json_t *items, size_t min, size_t max)
@@ -47,12 +42,7 @@ static json_t *numbers(size_t min, size_t max)
 
 static json_t *any_of(json_t *a, json_t *b)
 {
-    return drape_json_with(json_object(), "anyOf", drape_json_append(drape_json_append(json_array(), a), b));
-}
-
-static json_t *word(void)
-{
-    return drape_json_with(typed("string"), "minLength", json_integer(1));
+    return json_pack("{s:[o, o]}", "anyOf", a, b);
 }
 
 static json_t *words(const char *const *names)
@@ -63,23 +53,12 @@ static json_t *words(const char *const *names)
     return array;
 }
 
-static json_t *one_of_words(const char *const *names)
-{
-    return drape_json_with(json_object(), "enum", words(names));
-}
-
-static json_t *that_requires(json_t *names)
-{
-    return drape_json_with(json_object(), "required", names);
-}
-
 /* { "required": [name] } for each name. */
 static json_t *each_required(const char *const *names)
 {
     json_t *cases = json_array();
     for (int i = 0; names[i]; i++)
-        cases =
-            drape_json_append(cases, that_requires(drape_json_append(json_array(), json_string(names[i]))));
+        cases = drape_json_append(cases, json_pack("{s:[s]}", "required", names[i]));
     return cases;
 }
 
@@ -88,11 +67,10 @@ static json_t *exactly_one(json_t *object, const char *const *names)
     return drape_json_with(object, "oneOf", each_required(names));
 }
 
-static json_t *at_most_one(json_t *object, const char *const *names)
+static json_t *at_most_one(const char *const *names)
 {
-    json_t *none =
-        drape_json_with(json_object(), "not", drape_json_with(json_object(), "anyOf", each_required(names)));
-    return drape_json_with(object, "oneOf", drape_json_append(each_required(names), none));
+    json_t *none = json_pack("{s:{s:o}}", "not", "anyOf", each_required(names));
+    return json_pack("{s:o}", "oneOf", drape_json_append(each_required(names), none));
 }
 
 /* All of the keys, or none. */
@@ -106,31 +84,18 @@ static json_t *all_or_none(json_t *object, const char *const *names)
 
 /* ---- Parameters and keys ---- */
 
-static json_t *three(const double *values)
+/* An integer if the value is one: 3 rather than 3.0. */
+static json_t *number(double value)
 {
-    return drape_json_append(
-        drape_json_append(drape_json_append(json_array(), number(values[0])), number(values[1])),
-        number(values[2]));
+    return value == floor(value) && fabs(value) < 1e15 ? json_integer((json_int_t)value) : json_real(value);
 }
 
 static json_t *default_of(const drape_param *p, const double *values)
 {
-    switch (p->kind) {
-    case DRAPE_PARAM_BOOLEAN:
-        return json_boolean(*values != 0);
-    case DRAPE_PARAM_CHOICE:
-        return json_string(p->choices[(int)*values]);
-    case DRAPE_PARAM_VECTOR:
-    case DRAPE_PARAM_TURN:
-        return three(values);
-    case DRAPE_PARAM_TEXT:
-        return json_string(p->derived);
-    case DRAPE_PARAM_POINTS: /* they have no default */
-    case DRAPE_PARAM_NUMBER:
-    case DRAPE_PARAM_INTEGER:
-        break;
-    }
-    return number(*values);
+    if (drape_param_width(p) > 1)
+        return json_pack("[o, o, o]", number(values[0]), number(values[1]), number(values[2]));
+    return p->kind == DRAPE_PARAM_NUMBER || p->kind == DRAPE_PARAM_INTEGER ? number(*values)
+                                                                           : cli_value_json(p, values, NULL);
 }
 
 static json_t *bounded(const char *type, const drape_param *p)
@@ -153,18 +118,17 @@ static json_t *value_of(const drape_param *p)
 {
     switch (p->kind) {
     case DRAPE_PARAM_BOOLEAN: /* the reader takes numbers too */
-        return drape_json_with(json_object(), "enum", json_pack("[bbii]", 1, 0, 1, 0));
+        return json_pack("{s:[b, b, i, i]}", "enum", true, false, 1, 0);
     case DRAPE_PARAM_CHOICE:
-        return one_of_words(p->choices);
+        return json_pack("{s:o}", "enum", words(p->choices));
     case DRAPE_PARAM_TEXT:
-        return word();
+        return json_pack("{s:s, s:i}", "type", "string", "minLength", 1);
     case DRAPE_PARAM_VECTOR:
         return vector_of(p);
     case DRAPE_PARAM_TURN:
         return numbers(3, 4);
     case DRAPE_PARAM_POINTS:
-        return drape_json_with(drape_json_with(typed("array"), "items", numbers(2, 2)), "minItems",
-                               json_integer(1));
+        return array_of(numbers(2, 2), 1, 0);
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
         break;
@@ -187,8 +151,7 @@ static json_t *described(json_t *value, const drape_scene_key *key, bool is_one_
     if (is_one_of || (isnan(*defaults) && !key->literal))
         return value;
     json_t *one = default_of(p, key->vector ? key->vector : defaults);
-    return drape_json_with(value, "default",
-                           key->shape == DRAPE_SCENE_LIST ? drape_json_append(json_array(), one) : one);
+    return drape_json_with(value, "default", key->shape == DRAPE_SCENE_LIST ? json_pack("[o]", one) : one);
 }
 
 static json_t *param(const drape_param *p)
@@ -207,8 +170,7 @@ static json_t *with_param(json_t *properties, const drape_param *p)
         json_decref(schema);
         return properties;
     }
-    json_t *both = drape_json_append(drape_json_append(json_array(), json_incref(before)), schema);
-    return drape_json_with(properties, p->name, drape_json_with(json_object(), "allOf", both));
+    return drape_json_with(properties, p->name, json_pack("{s:[O, o]}", "allOf", before, schema));
 }
 
 static json_t *with_params(json_t *properties, const drape_entry *entry)
@@ -248,7 +210,7 @@ static json_t *entry_names(const drape_registry *table, bool alone)
     for (int i = 0; (entry = table->entries[i]) != NULL; i++)
         if (!is_implied(table, i) && !(alone && needs_params(entry)))
             names = drape_json_append(names, json_string(entry->name));
-    return drape_json_with(json_object(), "enum", names);
+    return json_pack("{s:o}", "enum", names);
 }
 
 /* ---- Where a scene names entries of tables ---- */
@@ -319,17 +281,15 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
     case DRAPE_SCENE_LIST:
         return array_of(names_of(object, key), key->at_least, key->at_most);
     case DRAPE_SCENE_VERSION:
-        return drape_json_with(json_object(), "const", json_integer(DRAPE_SCENE_FORM));
+        return json_pack("{s:i}", "const", DRAPE_SCENE_FORM);
     case DRAPE_SCENE_REMARK:
         return typed("string");
     case DRAPE_SCENE_BOX:
         return array_of(numbers(3, 3), 2, 2);
-    case DRAPE_SCENE_TRACK: {
-        json_t *pair = drape_json_append(drape_json_append(json_array(), typed("number")), numbers(3, 3));
-        json_t *item = drape_json_with(drape_json_with(typed("array"), "prefixItems", pair), "minItems",
-                                       json_integer(2));
-        return array_of(drape_json_with(item, "maxItems", json_integer(2)), key->at_least, key->at_most);
-    }
+    case DRAPE_SCENE_TRACK:
+        return array_of(json_pack("{s:s, s:[o, o], s:i, s:i}", "type", "array", "prefixItems",
+                                  typed("number"), numbers(3, 3), "minItems", 2, "maxItems", 2),
+                        key->at_least, key->at_most);
     case DRAPE_SCENE_QUATERNION:
         return numbers(4, 4);
     case DRAPE_SCENE_OBJECT:
@@ -397,8 +357,7 @@ static json_t *closed(json_t *properties, json_t *required)
 /* An object in which `key` names the entry. */
 static json_t *entry_schema(const drape_scene_object *object, const char *key, const drape_entry *entry)
 {
-    json_t *name = drape_json_with(drape_json_with(json_object(), "const", json_string(entry->name)),
-                                   "description", json_string(entry->summary));
+    json_t *name = json_pack("{s:s, s:s}", "const", entry->name, "description", entry->summary);
     json_t *properties = drape_json_with(properties_of(object, key), key, name);
     json_t *required = required_of(object);
     bool named = false;
@@ -429,7 +388,7 @@ static json_t *entries_schema(const drape_scene_object *object, const struct ope
     for (int i = 0; (entry = opening->table->entries[i]) != NULL; i++)
         if (!is_implied(opening->table, i))
             forms = drape_json_append(forms, entry_schema(object, opening->key, entry));
-    return drape_json_with(json_object(), "anyOf", with_closed_forms(forms, object));
+    return json_pack("{s:o}", "anyOf", with_closed_forms(forms, object));
 }
 
 /* Parameters of all entries of the table; for a table of one entry without a name, its own. */
@@ -448,16 +407,12 @@ static json_t *table_schema(const drape_scene_object *object, const struct openi
 /* The first choice of the preset, "none", means that no preset is used. */
 static json_t *with_preset(json_t *schema, const struct opening *opening)
 {
-    json_t *none = drape_json_with(json_object(), "const", json_string("none"));
-    json_t *word =
-        drape_json_with(json_object(), opening->preset, drape_json_with(json_object(), "not", none));
-    json_t *named = drape_json_with(
-        that_requires(drape_json_append(json_array(), json_string(opening->preset))), "properties", word);
+    json_t *named = json_pack("{s:[s], s:{s:{s:{s:s}}}}", "required", opening->preset, "properties",
+                              opening->preset, "not", "const", "none");
     schema = drape_json_with(schema, "if", named);
-    schema = drape_json_with(schema, "then",
-                             all_or_none(at_most_one(json_object(), opening->one_of), opening->all_of));
-    return drape_json_with(schema, "else",
-                           exactly_one(that_requires(words(opening->all_of)), opening->one_of));
+    schema = drape_json_with(schema, "then", all_or_none(at_most_one(opening->one_of), opening->all_of));
+    json_t *all = json_pack("{s:o}", "required", words(opening->all_of));
+    return drape_json_with(schema, "else", exactly_one(all, opening->one_of));
 }
 
 static json_t *object_schema(const drape_scene_object *object)
@@ -475,14 +430,12 @@ static json_t *object_schema(const drape_scene_object *object)
 
 json_t *cli_schema(void)
 {
-    json_t *schema = json_object();
-    schema = drape_json_with(schema, "$schema", json_string("https://json-schema.org/draft/2020-12/schema"));
-    schema = drape_json_with(schema, "title", json_string("A scene of Drape"));
+    json_t *schema = json_pack("{s:s, s:s}", "$schema", "https://json-schema.org/draft/2020-12/schema",
+                               "title", "A scene of Drape");
     json_t *form = object_schema(&drape_form_scene);
-    if (form && schema)
-        json_object_update(schema, form);
-    else
-        schema = (json_decref(schema), NULL);
+    const bool whole = form && json_object_update(schema, form) == 0;
     json_decref(form);
-    return schema;
+    if (!whole)
+        json_decref(schema);
+    return whole ? schema : NULL;
 }
