@@ -381,9 +381,7 @@ static drape_status watch(void *user, const drape_event *event)
     run *r = user;
     if (event->kind != DRAPE_EVENT_ATTEMPT)
         return DRAPE_OK;
-    if (r->progress.on)
-        cli_progress_show(&r->progress, drape_sim_time(event->sim),
-                          drape_sim_statistics(event->sim).steps_rejected);
+    cli_progress_show(&r->progress, event->sim);
     return cli_interrupted() ? DRAPE_E_STOPPED : DRAPE_OK;
 }
 
@@ -393,7 +391,7 @@ static void advance(run *r)
     note(r, drape_sim_observe(r->in.sim, watch, r));
     if (r->status)
         return;
-    cli_progress_begin(&r->progress, drape_sim_time(r->in.sim), end);
+    cli_progress_begin(&r->progress, r->in.sim, end);
     cli_signals_cancel(r->in.sim);
     drape_status status =
         r->request->realtime ? cli_realtime_run(&r->realtime, &r->in) : drape_sim_advance(r->in.sim, end);
@@ -569,19 +567,18 @@ static int run_on_ranks(const void *command)
 static const cli_option options[] = {
     {"out", CLI_TEXT, "DIR",
      "folder for frames, steps.csv, energy.csv, summary.json and scene.json; created if necessary",
-     offsetof(run_request, out), 0, NULL},
-    {"summary", CLI_TEXT, "FILE", "write the summary to this file too", offsetof(run_request, summary), 0,
-     NULL},
+     offsetof(run_request, out)},
+    {"summary", CLI_TEXT, "FILE", "write the summary to this file too", offsetof(run_request, summary)},
     {"checkpoint-every", CLI_NUMBER, "N", "save the run in DIR/checkpoint.drape with every N-th frame",
-     offsetof(run_request, checkpoint_every), INT_MAX, NULL},
+     offsetof(run_request, checkpoint_every), INT_MAX},
     {"resume", CLI_FLAG, NULL,
      "resume from the checkpoint in DIR, of the same scene; without one, start from the beginning",
-     offsetof(run_request, resume), 0, NULL},
+     offsetof(run_request, resume)},
     {"realtime", CLI_FLAG, NULL,
      "give each frame its duration, 1/frame_rate, as time budget, by newton_k unless a method is named; "
      "report how "
      "long frames took",
-     offsetof(run_request, realtime), 0, NULL},
+     offsetof(run_request, realtime)},
 };
 
 const drape_verb drape_verb_run = {

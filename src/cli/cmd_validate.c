@@ -244,7 +244,7 @@ static int run_references(drape_context *ctx, const validate_request *request, c
         status = lab_records_open(ctx, request->out, r.records, r.count, &r.folder, &r.file);
     if (!status) {
         fputs(style->begin, stdout);
-        cli_progress_begin(&r.progress, 0, 0);
+        cli_progress_begin(&r.progress, NULL, 0);
         status = run_cases(&r, style, counts);
         style->end(counts);
         fflush(stdout);

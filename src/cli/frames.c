@@ -3,13 +3,26 @@
 
 #include "cli/progress.h"
 #include "cli/signals.h"
+#include "render/shading.h"
 
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
+#define DEFAULT_SHADE "linen"
+
 /* ---- Opening ---- */
+
+int cli_find_shading(const cli_command *command, const char *name, int *index)
+{
+    char text[DRAPE_UNKNOWN_SIZE];
+    *index = drape_registry_find(&drape_shading_registry, NULL, name ? name : DEFAULT_SHADE);
+    if (*index >= 0)
+        return CLI_GO_ON;
+    drape_registry_unknown(&drape_shading_registry, NULL, name, text);
+    return cli_misuse(command->verb, "--shade: %s", text);
+}
 
 /* "runs/be/" -> "be", "a/sphere_drape.json" -> "sphere_drape" */
 static void make_label(const char *operand, char *label, size_t size)
@@ -114,9 +127,7 @@ static drape_status observe(void *user, const drape_event *event)
 {
     watch *w = user;
     if (event->kind == DRAPE_EVENT_ATTEMPT) {
-        if (w->progress.on)
-            cli_progress_show(&w->progress, drape_sim_time(event->sim),
-                              drape_sim_statistics(event->sim).steps_rejected);
+        cli_progress_show(&w->progress, event->sim);
         if (!cli_interrupted())
             return DRAPE_OK;
         drape_context_set_message(w->source->in.ctx, "t=%.9g: interrupted", drape_sim_time(event->sim));
@@ -138,7 +149,7 @@ static int simulate(const cli_frames_def *def, cli_source *s)
     watch w = {.def = def, .source = s};
     double end = drape_model_duration(s->in.model), t;
     drape_status status = drape_sim_observe(s->in.sim, observe, &w);
-    cli_progress_begin(&w.progress, 0, end);
+    cli_progress_begin(&w.progress, s->in.sim, end);
     if (!status)
         status = drape_sim_advance(s->in.sim, end);
     cli_progress_clear(&w.progress);

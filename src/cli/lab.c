@@ -153,7 +153,7 @@ int cli_lab_run(const cli_lab_request *request, int default_jobs, double default
         cli_progress progress;
         drape_lab_outcome outcome;
         def.user = &progress;
-        cli_progress_begin(&progress, 0, 0);
+        cli_progress_begin(&progress, NULL, 0);
         progress.logs = !progress.on;
         drape_status status = drape_lab_run(command->ctx, command->verb, &def, &outcome);
         cli_progress_clear(&progress);

@@ -37,20 +37,23 @@ static void draw(const cli_progress *p, const char *line)
     fputs(padded, stderr);
 }
 
-void cli_progress_begin(cli_progress *p, double from, double end)
+void cli_progress_begin(cli_progress *p, const drape_sim *sim, double end)
 {
-    *p = (cli_progress){.on = isatty(STDERR_FILENO), .from = from, .end = end, .shown = -INFINITY};
+    *p = (cli_progress){.on = isatty(STDERR_FILENO),
+                        .from = sim ? drape_sim_time(sim) : 0,
+                        .end = end,
+                        .start = drape_clock_seconds(),
+                        .shown = -INFINITY};
     if (!p->on) {
-        p->shown = drape_clock_seconds(); /* short sweeps leave no line in a log */
+        p->shown = p->start; /* short sweeps leave no line in a log */
         return;
     }
     struct winsize size;
     int columns =
         ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : DEFAULT_WIDTH;
     p->width = columns > MAX_WIDTH ? MAX_WIDTH : columns - 1; /* a terminal may wrap after its last column */
-    p->start = drape_clock_seconds();
-    if (end > 0)
-        cli_progress_show(p, from, 0);
+    if (sim)
+        cli_progress_show(p, sim);
 }
 
 static void fill_bar(double share, char bar[BAR + 1])
@@ -61,62 +64,51 @@ static void fill_bar(double share, char bar[BAR + 1])
     bar[BAR] = 0;
 }
 
-/* Whether PERIOD has passed since the last update. */
-static bool is_due(cli_progress *p, double *now)
+/* Whether a period has passed since the last update, which is now then. */
+static bool is_due(cli_progress *p, double period)
 {
-    *now = p->on ? drape_clock_seconds() : 0;
-    if (!p->on || *now - p->shown < PERIOD)
-        return false;
-    p->shown = *now;
-    return true;
+    const double now = drape_clock_seconds();
+    const bool due = now - p->shown >= period;
+    p->shown = due ? now : p->shown;
+    return due;
 }
 
-void cli_progress_show(cli_progress *p, double time, int64_t rejected)
+void cli_progress_show(cli_progress *p, const drape_sim *sim)
 {
     char bar[BAR + 1], eta[24], line[256];
-    double now;
-    if (!is_due(p, &now))
+    if (!p->on || !is_due(p, PERIOD))
         return;
-    double share = time / p->end, wall = now - p->start, made = time - p->from;
+    const double time = drape_sim_time(sim), share = time / p->end, wall = p->shown - p->start,
+                 made = time - p->from;
     fill_bar(share, bar);
     time_text(made > 0 ? wall * (p->end - time) / made : INFINITY, eta, sizeof eta);
     snprintf(line, sizeof line, "[%s] %3.0f %%  %.4g of %.4g s  %.3gx real time  ETA %s  %lld rejected", bar,
-             100 * share, time, p->end, wall > 0 ? made / wall : 0.0, eta, (long long)rejected);
+             100 * share, time, p->end, wall > 0 ? made / wall : 0.0, eta,
+             (long long)drape_sim_statistics(sim).steps_rejected);
     draw(p, line);
-}
-
-/* A line now and then, where stderr is a file: a sweep of hours must not be silent there. */
-static void log_count(cli_progress *p, int64_t done, int64_t total, double seconds_left)
-{
-    char eta[24];
-    const double now = drape_clock_seconds();
-    if (now - p->shown < LOG_PERIOD)
-        return;
-    p->shown = now;
-    time_text(isnan(seconds_left) ? INFINITY : seconds_left, eta, sizeof eta);
-    if (total > 0)
-        fprintf(stderr, "%lld of %lld cases, about %s left\n", (long long)done, (long long)total, eta);
-    else
-        fprintf(stderr, "the reference\n");
 }
 
 void cli_progress_count(cli_progress *p, int64_t done, int64_t total, double seconds_left)
 {
     char bar[BAR + 1], eta[24], line[256];
-    double now, share = total > 0 ? (double)done / (double)total : 0;
-    if (p->logs)
-        log_count(p, done, total, seconds_left);
-    if (total > 0 && !is_due(p, &now))
-        return;
+    const double share = total > 0 ? (double)done / (double)total : 0;
+    const long long counted = done, all = total;
     fill_bar(share, bar);
     time_text(isnan(seconds_left) ? INFINITY : seconds_left, eta, sizeof eta);
+    if (p->logs && is_due(p, LOG_PERIOD)) { /* a sweep of hours must not be silent in a file */
+        if (total > 0)
+            fprintf(stderr, "%lld of %lld cases, about %s left\n", counted, all, eta);
+        else
+            fputs("the reference\n", stderr);
+    }
+    if (!p->on || (total > 0 && !is_due(p, PERIOD)))
+        return;
     if (total > 0)
-        snprintf(line, sizeof line, "[%s] %3.0f %%  %lld of %lld cases  ETA %s", bar, 100 * share,
-                 (long long)done, (long long)total, eta);
+        snprintf(line, sizeof line, "[%s] %3.0f %%  %lld of %lld cases  ETA %s", bar, 100 * share, counted,
+                 all, eta);
     else
         snprintf(line, sizeof line, "[%s] the reference", bar);
-    if (p->on)
-        draw(p, line);
+    draw(p, line);
 }
 
 void cli_progress_hide(cli_progress *p)

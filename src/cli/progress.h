@@ -3,6 +3,8 @@
 #ifndef DRAPE_CLI_PROGRESS_H
 #define DRAPE_CLI_PROGRESS_H
 
+#include "drape/drape.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -14,10 +16,10 @@ typedef struct cli_progress {
     int width;           /* columns of the line */
 } cli_progress;
 
-/* end: 0 for a sweep, whose progress is a number of cases. */
-void cli_progress_begin(cli_progress *progress, double from, double end);
+/* Of a run of the sim up to the simulated time `end`; NULL: of a sweep, whose progress is a number of cases. */
+void cli_progress_begin(cli_progress *progress, const drape_sim *sim, double end);
 /* Shows the simulated time; updates at most ten times a second, as cli_progress_count does. */
-void cli_progress_show(cli_progress *progress, double time, int64_t rejected);
+void cli_progress_show(cli_progress *progress, const drape_sim *sim);
 /* Shows the number of cases; total 0: their reference is being computed. */
 void cli_progress_count(cli_progress *progress, int64_t done, int64_t total, double seconds_left);
 /* Erases the line until it is shown again, for other output on the terminal; or for good. */
