@@ -35,6 +35,12 @@ static int print_comparisons(const drape_check_result *rows, int count)
     return failed ? CLI_FAILED : CLI_DONE;
 }
 
+static void print_first(const drape_intersections *found)
+{
+    printf("; the first: edge %d %d, triangle %d %d %d", (int)found->edge[0], (int)found->edge[1],
+           (int)found->triangle[0], (int)found->triangle[1], (int)found->triangle[2]);
+}
+
 /* Prints where cloth passes through cloth at the start. It is not a failure, as a scene without self-contact
  * may have it. */
 static drape_status print_intersections(const cli_scene *in)
@@ -45,8 +51,7 @@ static drape_status print_intersections(const cli_scene *in)
         return status;
     printf("%lld edge-face intersections at the start", (long long)found.count);
     if (found.count > 0)
-        printf("; the first: edge %d %d, triangle %d %d %d", (int)found.edge[0], (int)found.edge[1],
-               (int)found.triangle[0], (int)found.triangle[1], (int)found.triangle[2]);
+        print_first(&found);
     putchar('\n');
     return DRAPE_OK;
 }
@@ -83,11 +88,10 @@ static drape_status check_cloth(const tally *t, int64_t frame, double time, cons
     if (status || found.count == 0)
         return status;
     *sum += found.count;
-    printf(
-        "frame %lld, t=%.9g: %lld edge-face intersections of the cloth with itself; the first: edge %d %d, "
-        "triangle %d %d %d\n",
-        (long long)frame, time, (long long)found.count, (int)found.edge[0], (int)found.edge[1],
-        (int)found.triangle[0], (int)found.triangle[1], (int)found.triangle[2]);
+    printf("frame %lld, t=%.9g: %lld edge-face intersections of the cloth with itself", (long long)frame,
+           time, (long long)found.count);
+    print_first(&found);
+    putchar('\n');
     return DRAPE_OK;
 }
 
@@ -149,39 +153,28 @@ static int check_frames(const check_request *request, const cli_scene *in, const
     return t.crossed > 0 ? CLI_FAILED : CLI_DONE;
 }
 
-static int check_run(const check_request *request)
+static int run(const void *command)
 {
+    const check_request *request = command;
+    const cli_command *common = &request->command;
+    const bool finished = cli_is_folder(common->operand);
     cli_scene in = {0};
     drape_record record = {.positions = -1};
-    int code = request->seed ? cli_misuse("check", "--seed is for a scene, and %s is a finished run",
-                                          CLI_SHOWN(request->command.operand))
-                             : cli_run_load(&request->command, request->command.operand, &in, &record);
+    if (finished && request->seed)
+        return cli_misuse("check", "--seed is for a scene, and %s is a finished run",
+                          CLI_SHOWN(common->operand));
+    int code = finished ? cli_run_load(common, common->operand, &in, &record)
+                        : cli_scene_load(common, common->operand, &in);
     if (code == CLI_GO_ON)
-        code = check_frames(request, &in, &record);
+        code = finished ? check_frames(request, &in, &record) : check(request, &in);
     drape_record_close(&record);
     cli_scene_free(&in);
     return code;
 }
 
-static int check_scene(const check_request *request)
-{
-    cli_scene in;
-    int code = cli_scene_load(&request->command, request->command.operand, &in);
-    if (code == CLI_GO_ON)
-        code = check(request, &in);
-    cli_scene_free(&in);
-    return code;
-}
-
-static int run(const void *command)
-{
-    const check_request *request = command;
-    return cli_is_folder(request->command.operand) ? check_run(request) : check_scene(request);
-}
-
 static const cli_option options[] = {
     {"seed", CLI_NUMBER, "N", "seed of the deformation, rotation and motion (default 1)",
-     offsetof(check_request, seed), MAX_SEED, NULL},
+     offsetof(check_request, seed), MAX_SEED},
 };
 
 const drape_verb drape_verb_check = {

@@ -355,8 +355,8 @@ static int print_request(const void *command)
 }
 
 static const cli_option options[] = {
-    {"markdown", CLI_FLAG, NULL, "print Markdown tables", offsetof(list_request, markdown), 0, NULL},
-    {"schema", CLI_FLAG, NULL, "print the JSON Schema of a scene", offsetof(list_request, schema), 0, NULL},
+    {"markdown", CLI_FLAG, NULL, "print Markdown tables", offsetof(list_request, markdown)},
+    {"schema", CLI_FLAG, NULL, "print the JSON Schema of a scene", offsetof(list_request, schema)},
 };
 
 const drape_verb drape_verb_list = {

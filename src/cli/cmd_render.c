@@ -17,7 +17,6 @@
 
 #define DEFAULT_WIDTH  1280
 #define DEFAULT_HEIGHT 720
-#define DEFAULT_SHADE  "linen"
 #define MAX_SLOW       1000
 #define MAX_FINE       4  /* largest --fine */
 #define TURN_ANGLES    24 /* at which a turntable is framed */
@@ -73,15 +72,10 @@ static bool read_numbers(const char *text, double *values, int min, int max)
 
 static int read_shade(render *r)
 {
-    const char *name = r->request->shade ? r->request->shade : DEFAULT_SHADE;
-    const int i = drape_registry_find(&drape_shading_registry, NULL, name);
-    if (i < 0) {
-        char text[DRAPE_UNKNOWN_SIZE];
-        drape_registry_unknown(&drape_shading_registry, NULL, name, text);
-        return cli_misuse("render", "--shade: %s", text);
-    }
-    r->shading = drape_shadings[i];
-    return CLI_GO_ON;
+    int index;
+    const int code = cli_find_shading(&r->request->command, r->request->shade, &index);
+    r->shading = code == CLI_GO_ON ? drape_shadings[index] : NULL;
+    return code;
 }
 
 static int read_size(render *r)
@@ -544,31 +538,28 @@ static int run(const void *command)
 static const cli_option options[] = {
     {"out", CLI_TEXT, "FILE|DIR",
      "x.png: one frame; x.mp4, x.webm, x.gif, x.apng: a film, by ffmpeg; no ending: a folder of frames",
-     AT(out), 0, NULL},
-    {"frame", CLI_TEXT, "N", "the frame of a picture, from 0 (default: the last)", AT(frame), 0, NULL},
-    {"every", CLI_NUMBER, "N", "every Nth frame in a film or folder", AT(every), 1000000, NULL},
+     AT(out)},
+    {"frame", CLI_TEXT, "N", "the frame of a picture, from 0 (default: the last)", AT(frame)},
+    {"every", CLI_NUMBER, "N", "every Nth frame in a film or folder", AT(every), 1000000},
     {"shade", CLI_TEXT, "NAME", "how cloth is coloured (default linen); `drape list shadings` shows all",
-     AT(shade), 0, NULL},
-    {"size", CLI_TEXT, "WxH", "pixels (default 1280x720)", AT(size), 0, NULL},
+     AT(shade)},
+    {"size", CLI_TEXT, "WxH", "pixels (default 1280x720)", AT(size)},
     {"camera", CLI_TEXT, "A,E[,Z]",
-     "azimuth and elevation in degrees, zoom (default 32,24,1, which shows all)", AT(camera), 0, NULL},
+     "azimuth and elevation in degrees, zoom (default 32,24,1, which shows all)", AT(camera)},
     {"range", CLI_TEXT, "LOW,HIGH",
-     "range of a field's colours, in the legend's unit (default: that of its values)", AT(range), 0, NULL},
-    {"slow", CLI_NUMBER, "N", "make a film that runs N times slower than the scene", AT(slow), MAX_SLOW,
-     NULL},
-    {"turntable", CLI_FLAG, NULL, "turn the camera once around during a film", AT(turntable), 0, NULL},
+     "range of a field's colours, in the legend's unit (default: that of its values)", AT(range)},
+    {"slow", CLI_NUMBER, "N", "make a film that runs N times slower than the scene", AT(slow), MAX_SLOW},
+    {"turntable", CLI_FLAG, NULL, "turn the camera once around during a film", AT(turntable)},
     {"fine", CLI_NUMBER, "N",
      "draw N x N pixels for each and average them (default 2 for a picture, 1 for films and folders)",
-     AT(fine), MAX_FINE, NULL},
-    {"compare", CLI_FLAG, NULL, "draw several scenes or runs side by side, at equal times", AT(compare), 0,
-     NULL},
-    {"texture", CLI_TEXT, "PNG", "picture on the cloth", AT(texture), 0, NULL},
+     AT(fine), MAX_FINE},
+    {"compare", CLI_FLAG, NULL, "draw several scenes or runs side by side, at equal times", AT(compare)},
+    {"texture", CLI_TEXT, "PNG", "picture on the cloth", AT(texture)},
     {"height", CLI_TEXT, "PNG",
-     "height map for bump, displacement and pbr: red is the height, alpha the metal of pbr", AT(height), 0,
-     NULL},
+     "height map for bump, displacement and pbr: red is the height, alpha the metal of pbr", AT(height)},
     {"environment", CLI_TEXT, "PNG", "surroundings for mirror, refraction and pbr, longitude by latitude",
-     AT(environment), 0, NULL},
-    {"small", CLI_FLAG, NULL, "smaller PNG files, slower", AT(small), 0, NULL},
+     AT(environment)},
+    {"small", CLI_FLAG, NULL, "smaller PNG files, slower", AT(small)},
 };
 
 const drape_verb drape_verb_render = {

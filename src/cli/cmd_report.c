@@ -1,6 +1,5 @@
 /* cmd_report.c: `drape report`: make one animated HTML page of a finished run. */
 #include "cli/cli.h"
-#include "cli/signals.h"
 
 #include "report/report.h"
 
@@ -17,10 +16,10 @@ typedef struct report_request {
 
 static const cli_option options[] = {
     {"out", CLI_TEXT, "FILE", "the page; default report.html in the folder of the run",
-     offsetof(report_request, out), 0, NULL},
+     offsetof(report_request, out)},
     {"megabytes", CLI_NUMBER, "N",
      "room for frames in the page (default 48); if they need more, some are left out at equal intervals",
-     offsetof(report_request, megabytes), MAX_MEGABYTES, NULL},
+     offsetof(report_request, megabytes), MAX_MEGABYTES},
 };
 
 static int run(const void *command)
@@ -33,8 +32,6 @@ static int run(const void *command)
         .out = request->out,
         .max_bytes = (size_t)(request->megabytes ? request->megabytes : DEFAULT_MEGABYTES) * 1000000};
     drape_status status = drape_report_write(request->command.ctx, &def, &result, &input);
-    if (status == DRAPE_E_STOPPED)
-        return cli_report_interrupted(request->command.verb);
     if (status)
         return cli_report(&request->command, input ? CLI_BAD_INPUT : CLI_FAILED);
     printf("report    %s, %.3g MB, %lld of %lld frames\n", CLI_SHOWN(result.path), (double)result.bytes / 1e6,

@@ -1,4 +1,5 @@
 /* cmd_view.c: `drape view`: a window that shows a running scene. */
+#include "cli/frames.h"
 #include "cli/signals.h"
 #include "cli/view.h"
 
@@ -171,9 +172,9 @@ static void put_lines(const window_view *w, char lines[LINES][LINE])
     snprintf(lines[n++], LINE, "energy\t%.4g J", e.kinetic + e.elastic + e.gravity + e.contact);
     snprintf(lines[n++], LINE, "\tkinetic %.3g, elastic %.3g, gravity %.3g, contact %.3g", e.kinetic,
              e.elastic, e.gravity, e.contact);
-    snprintf(lines[n++], LINE, "stiffness\tx %.3g", v->stiffness);
-    snprintf(lines[n++], LINE, "damping\tx %.3g", v->damping);
-    snprintf(lines[n++], LINE, "gravity\tx %.3g", v->gravity);
+    snprintf(lines[n++], LINE, "stiffness\tx %.3g", v->factors[VIEW_STIFFNESS]);
+    snprintf(lines[n++], LINE, "damping\tx %.3g", v->factors[VIEW_DAMPING]);
+    snprintf(lines[n++], LINE, "gravity\tx %.3g", v->factors[VIEW_GRAVITY]);
     snprintf(lines[n++], LINE, "shading\t%s", shading_of(w)->entry.name);
     if (v->movable_count > 0)
         snprintf(lines[n++], LINE, "arrows\tmove %s", v->movables[v->moved].name);
@@ -296,21 +297,18 @@ static void next_shading(window_view *w, int step)
 /* Keys that scale a value and keys that move a collider or pin. */
 static void scale_or_move(window_view *w, int key, double factor)
 {
-    static const struct {
-        int key;
-        bool (*scale)(cli_view *v, double factor);
-    } scales[] = {{'D', view_scale_dt},
-                  {'K', view_scale_stiffness},
-                  {'B', view_scale_damping},
-                  {'G', view_scale_gravity}};
+    static const char scales[VIEW_SCALES] = {
+        [VIEW_STIFFNESS] = 'K', [VIEW_DAMPING] = 'B', [VIEW_GRAVITY] = 'G'};
     static const struct {
         int key, axis;
         double sign;
     } moves[] = {{DRAPE_KEY_LEFT, 0, -1}, {DRAPE_KEY_RIGHT, 0, 1},   {DRAPE_KEY_UP, 2, -1},
                  {DRAPE_KEY_DOWN, 2, 1},  {DRAPE_KEY_PAGE_UP, 1, 1}, {DRAPE_KEY_PAGE_DOWN, 1, -1}};
-    for (size_t i = 0; i < sizeof scales / sizeof *scales; i++)
-        if (scales[i].key == key)
-            redraw(w, scales[i].scale(&w->v, factor));
+    if (key == 'D')
+        redraw(w, view_scale_dt(&w->v, factor));
+    for (view_value i = 0; i < VIEW_SCALES; i++)
+        if (scales[i] == key)
+            redraw(w, view_scale(&w->v, i, factor));
     for (size_t i = 0; i < sizeof moves / sizeof *moves; i++)
         if (moves[i].key == key) {
             double displacement[3] = {0};
@@ -517,17 +515,6 @@ static drape_status set_up(window_view *w, int width, int height)
     return status;
 }
 
-static int read_shade(window_view *w)
-{
-    const char *name = w->request->shade ? w->request->shade : "linen";
-    char text[DRAPE_UNKNOWN_SIZE];
-    w->shading = drape_registry_find(&drape_shading_registry, NULL, name);
-    if (w->shading >= 0)
-        return CLI_GO_ON;
-    drape_registry_unknown(&drape_shading_registry, NULL, name, text);
-    return cli_misuse("view", "--shade: %s", text);
-}
-
 static int show(window_view *w)
 {
     int width = WIDTH, height = HEIGHT;
@@ -537,7 +524,7 @@ static int show(window_view *w)
          width > DRAPE_MAX_PICTURE || height > DRAPE_MAX_PICTURE))
         return cli_misuse("view", "--size \"%.60s\": must be WIDTHxHEIGHT, from 160x120 to %d a side",
                           w->request->size, DRAPE_MAX_PICTURE);
-    int code = read_shade(w);
+    int code = cli_find_shading(&w->request->command, w->request->shade, &w->shading);
     if (code == CLI_GO_ON)
         code = view_open(&w->request->command, &w->v);
     if (code != CLI_GO_ON)
@@ -551,7 +538,8 @@ static int show(window_view *w)
     printf("t = %.6g s, %s, dt = %.6g s, %lld steps, %lld rejected, shade %s, stiffness x %.4g, gravity x "
            "%.4g\n",
            drape_sim_time(w->v.in.sim), view_integrator(&w->v), view_dt(&w->v), (long long)s.steps_accepted,
-           (long long)s.steps_rejected, shading_of(w)->entry.name, w->v.stiffness, w->v.gravity);
+           (long long)s.steps_rejected, shading_of(w)->entry.name, w->v.factors[VIEW_STIFFNESS],
+           w->v.factors[VIEW_GRAVITY]);
     return cli_interrupted() ? cli_report_interrupted("view") : CLI_DONE;
 }
 
@@ -570,10 +558,9 @@ static int run(const void *command)
 
 static const cli_option options[] = {
     {"shade", CLI_TEXT, "NAME", "how cloth is coloured (default linen); `drape list shadings` shows all",
-     offsetof(view_request, shade), 0, NULL},
-    {"size", CLI_TEXT, "WxH", "pixels of the window (default 1280x720)", offsetof(view_request, size), 0,
-     NULL},
-    {"running", CLI_FLAG, NULL, "start running, not paused", offsetof(view_request, running), 0, NULL},
+     offsetof(view_request, shade)},
+    {"size", CLI_TEXT, "WxH", "pixels of the window (default 1280x720)", offsetof(view_request, size)},
+    {"running", CLI_FLAG, NULL, "start running, not paused", offsetof(view_request, running)},
 };
 
 const drape_verb drape_verb_view = {

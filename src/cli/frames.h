@@ -27,6 +27,10 @@ typedef struct cli_source {
     bool incomplete;  /* the simulation stopped early: the reel has the frames up to then */
 } cli_source;
 
+/* Finds a shading by its name; NULL: the default one. Returns CLI_GO_ON, or CLI_BAD_INPUT after the error was
+ * printed. */
+int cli_find_shading(const cli_command *command, const char *name, int *index);
+
 /* Opens a scene or a run. Returns CLI_GO_ON, or CLI_BAD_INPUT after the error was printed. The caller calls
  * cli_source_free in either case. */
 int cli_source_open(const cli_command *command, const char *operand, const cli_frames_def *def,

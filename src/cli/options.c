@@ -17,8 +17,7 @@
 
 /* The options of every verb that takes a scene. Those with a pointer are short forms of --set. */
 static const cli_option scene_options[] = {
-    {"set", CLI_SET, "/POINTER=VALUE", "set a value of the scene by its JSON pointer; may be repeated", 0, 0,
-     NULL},
+    {"set", CLI_SET, "/POINTER=VALUE", "set a value of the scene by its JSON pointer; may be repeated"},
     {"duration", CLI_VALUE, "SECONDS", "simulated time", 0, 0, "/duration"},
     {"frame-rate", CLI_VALUE, "RATE", "frames per simulated second", 0, 0, "/frame_rate"},
     {"format", CLI_LIST, "A,B", "frame formats, instead of the scene's", 0, 0, "/output/formats"},
@@ -28,7 +27,7 @@ static const cli_option scene_options[] = {
     {"linear-solver", CLI_VALUE, "NAME", "linear solver", 0, 0, "/integrator/linear_solver", true},
     {"controller", CLI_VALUE, "NAME", "step controller", 0, 0, "/controller/type"},
     {"threads", CLI_NUMBER, "N", "number of threads; the result does not depend on it",
-     offsetof(cli_command, threads), 256, NULL},
+     offsetof(cli_command, threads), 256},
 };
 
 /* The options of a verb: its own, then the scene's. */

@@ -58,8 +58,7 @@ static void list_movables(cli_view *v)
 
 int view_open(const cli_command *command, cli_view *v)
 {
-    *v = (cli_view){
-        .command = command, .stiffness = 1, .damping = 1, .gravity = 1, .dragged = -1, .paused = true};
+    *v = (cli_view){.command = command, .factors = {1, 1, 1}, .dragged = -1, .paused = true};
     int code = cli_scene_load(command, command->operand, &v->in);
     if (code == CLI_GO_ON)
         list_movables(v);
@@ -209,32 +208,22 @@ static drape_status set_gravity(cli_view *v, double factor, int *changed)
     return drape_scene_set(v->in.scene, "/gravity", text);
 }
 
-/* Multiplies values of the present model by a factor; product is that of all factors so far. */
-static bool scale(cli_view *v, drape_status (*set)(cli_view *v, double factor, int *changed), double factor,
-                  const char *what, double *product)
+bool view_scale(cli_view *v, view_value value, double factor)
 {
+    static const struct {
+        drape_status (*set)(cli_view *v, double factor, int *changed); /* factor: on the present values */
+        const char *name;
+    } values[] = {[VIEW_STIFFNESS] = {set_stiffness, "stiffness"},
+                  [VIEW_DAMPING] = {set_damping, "damping"},
+                  [VIEW_GRAVITY] = {set_gravity, "gravity"}};
     int changed = 0;
-    drape_status status = set(v, factor, &changed);
-    bool good = commit(v, status, changed, what);
-    if (!good)
-        set(v, 1, &changed);
-    *product *= good ? factor : 1;
+    drape_status status = values[value].set(v, factor, &changed);
+    const bool good = commit(v, status, changed, values[value].name);
+    if (good)
+        v->factors[value] *= factor;
+    else
+        values[value].set(v, 1, &changed);
     return good;
-}
-
-bool view_scale_stiffness(cli_view *v, double factor)
-{
-    return scale(v, set_stiffness, factor, "stiffness", &v->stiffness);
-}
-
-bool view_scale_damping(cli_view *v, double factor)
-{
-    return scale(v, set_damping, factor, "damping", &v->damping);
-}
-
-bool view_scale_gravity(cli_view *v, double factor)
-{
-    return scale(v, set_gravity, factor, "gravity", &v->gravity);
 }
 
 double view_dt(const cli_view *v)

@@ -7,6 +7,9 @@
 
 #define VIEW_MOVABLES 64
 
+/* Values that keys scale. */
+typedef enum view_value { VIEW_STIFFNESS, VIEW_DAMPING, VIEW_GRAVITY, VIEW_SCALES } view_value;
+
 /* A collider or a pin of the scene that keys can move. */
 typedef struct view_movable {
     char pointer[64]; /* of its track */
@@ -17,7 +20,7 @@ typedef struct view_movable {
 typedef struct cli_view {
     const cli_command *command;
     cli_scene in;
-    double stiffness, damping, gravity; /* factors on the values of the scene */
+    double factors[VIEW_SCALES]; /* on the values of the scene */
     view_movable movables[VIEW_MOVABLES];
     int movable_count, moved; /* moved: the one that keys move */
     int32_t dragged;          /* node on the drag spring; -1: none */
@@ -40,9 +43,7 @@ void view_reset(cli_view *v);
 
 /* Change the scene: true if the model is now a new one, in the same state. A change that the scene refuses
  * leaves everything as it was, with a message. */
-bool view_scale_stiffness(cli_view *v, double factor);
-bool view_scale_damping(cli_view *v, double factor);
-bool view_scale_gravity(cli_view *v, double factor);
+bool view_scale(cli_view *v, view_value value, double factor);
 bool view_scale_dt(cli_view *v, double factor);
 bool view_next_integrator(cli_view *v, int step);
 bool view_move(cli_view *v, const double by[3]); /* the chosen movable [m], over a tenth of a second */
