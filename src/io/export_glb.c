@@ -62,6 +62,7 @@ typedef struct primitive {
     const char *name;      /* of the material; "": faces without one, first in the order of names */
     char *quoted;          /* as a text of JSON */
     uint32_t first, count; /* of the triangles */
+    uint32_t filled;       /* those that have their corners already */
     size_t targets;        /* their list in the JSON */
 } primitive;
 
@@ -133,6 +134,15 @@ static const char *describe(accessor a, char *text)
     }
     snprintf(text + used, (size_t)(ACCESSOR_ROOM - used), a.bounds ? "]}" : "}");
     return text;
+}
+
+/* Writes the accessors of positions, which have bounds, and of the normals that follow them. */
+static void describe_vertices(accessor a, char *positions, char *normals)
+{
+    describe(a, positions);
+    a.offset += 12 * (int64_t)a.count;
+    a.bounds = NULL;
+    describe(a, normals);
 }
 
 /* Those of the triangles of each primitive are first; then that of the texture coordinates; positions and
@@ -244,9 +254,8 @@ static drape_status make_primitives(glb_state *glb)
     return DRAPE_OK;
 }
 
-/* Its vertices, and its triangles where their primitives have them; next (primitives): the place of the next
- * triangle of each. */
-static drape_status add_cloth(glb_state *glb, const drape_render_cloth *cloth, uint32_t *next)
+/* Its vertices, and its triangles where their primitives have them. */
+static drape_status add_cloth(glb_state *glb, const drape_render_cloth *cloth)
 {
     const drape_faces *faces = &cloth->mesh->faces;
     drape_arena scratch = drape_arena_of(glb->def->arena->ctx);
@@ -260,10 +269,11 @@ static drape_status add_cloth(glb_state *glb, const drape_render_cloth *cloth, u
             glb->uv[to] = vertices.uv[i] < 0 ? NULL : faces->uv + 2 * (size_t)vertices.uv[i];
     }
     for (int32_t f = 0; !status && f < face_count(cloth->mesh); f++) {
-        uint32_t *to = &next[find_primitive(glb, material_of(faces, f)) - glb->primitive];
+        primitive *p = find_primitive(glb, material_of(faces, f));
+        uint32_t *corner = glb->corner + 3 * ((size_t)p->first + p->filled);
+        p->filled += triangles_of(faces, f);
         for (uint32_t k = 0; k < 3 * triangles_of(faces, f); k++)
-            glb->corner[3 * (size_t)*to + k] = glb->vertices + (uint32_t)*at++;
-        *to += triangles_of(faces, f);
+            *corner++ = glb->vertices + (uint32_t)*at++;
     }
     glb->vertices += status ? 0 : (uint32_t)vertices.count;
     drape_arena_free(&scratch);
@@ -289,13 +299,9 @@ static drape_status add_cloths(glb_state *glb)
     glb->node = drape_arena_take(def->arena, own + room, sizeof *glb->node);
     if (has_uvs)
         glb->uv = drape_arena_take(def->arena, own, sizeof *glb->uv);
-    uint32_t *next = drape_arena_take(def->arena, glb->primitives, sizeof *next);
     drape_status status = drape_arena_status(def->arena);
-    for (uint32_t p = 0; !status && p < glb->primitives; p++)
-        next[p] = glb->primitive[p].first;
     for (int32_t c = 0; !status && c < surface->cloth_count; c++)
-        status = add_cloth(glb, &surface->cloths[c], next);
-    drape_arena_release(def->arena, next);
+        status = add_cloth(glb, &surface->cloths[c]);
     return status;
 }
 
@@ -423,7 +429,7 @@ static void add_views(glb_state *glb)
 
 static void add_accessors(glb_state *glb)
 {
-    char text[ACCESSOR_ROOM];
+    char text[ACCESSOR_ROOM], normals[ACCESSOR_ROOM];
     float bounds[6];
     add(glb, "\"accessors\":[");
     for (uint32_t i = 0; i < glb->primitives; i++) {
@@ -440,13 +446,11 @@ static void add_accessors(glb_state *glb)
             describe((accessor){2, -1, DRAPE_GLTF_FLOAT, 2, glb->object[0].vertices, NULL}, text));
     for (uint32_t i = glb->deforming; i < glb->objects; i++) {
         const object *o = &glb->object[i];
-        accessor a = {rigid_view(glb), 24 * (int64_t)o->first_vertex, DRAPE_GLTF_FLOAT, 3, o->vertices,
-                      bounds};
         find_bounds(o->body->vertex, 6, o->vertices, bounds);
-        add(glb, ",%s", describe(a, text));
-        a.offset += 12 * (int64_t)o->vertices;
-        a.bounds = NULL;
-        add(glb, ",%s", describe(a, text));
+        describe_vertices((accessor){rigid_view(glb), 24 * (int64_t)o->first_vertex, DRAPE_GLTF_FLOAT, 3,
+                                     o->vertices, bounds},
+                          text, normals);
+        add(glb, ",%s,%s", text, normals);
     }
     glb->at.accessors = add_blanks(glb, (size_t)glb->room * glb->deforming * ACCESSOR_ROOM);
     glb->at.times = add_blanks(glb, times_room(glb));
@@ -685,18 +689,14 @@ static void fill_frame(glb_state *glb)
         const uint32_t positions = accessor_of(glb, number, glb->frames);
         const size_t at = glb->at.accessors + (glb->frames * (size_t)glb->deforming + number) * ACCESSOR_ROOM;
         float bounds[6];
-        char text[ACCESSOR_ROOM];
-        accessor a = {1,
-                      glb->frames * (int64_t)glb->frame_bytes + 24 * (int64_t)o->first_vertex,
-                      DRAPE_GLTF_FLOAT,
-                      3,
-                      o->vertices,
-                      bounds};
+        char text[ACCESSOR_ROOM], normals[ACCESSOR_ROOM];
         find_bounds(glb->moved[0] + 3 * (size_t)o->first_point, 3, o->points, bounds);
-        fill(glb, at, ",%s", describe(a, text));
-        a.offset += 12 * (int64_t)o->vertices;
-        a.bounds = NULL;
-        fill(glb, at + POSITIONS_ROOM, ",%s", describe(a, text));
+        describe_vertices((accessor){1,
+                                     glb->frames * (int64_t)glb->frame_bytes + 24 * (int64_t)o->first_vertex,
+                                     DRAPE_GLTF_FLOAT, 3, o->vertices, bounds},
+                          text, normals);
+        fill(glb, at, ",%s", text);
+        fill(glb, at + POSITIONS_ROOM, ",%s", normals);
         if (glb->frames == 0)
             continue;
         snprintf(text, sizeof text, "{\"POSITION\":%u,\"NORMAL\":%u}", positions, positions + 1);

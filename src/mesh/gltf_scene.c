@@ -1,8 +1,9 @@
-/* gltf_scene.c: see gltf_scene.h. */
-#include "mesh/gltf_scene.h"
+/* gltf_scene.c: see gltf.h; interpolation as in appendix C of the specification. */
+#include "mesh/gltf.h"
 
 #include "base/elementary.h"
 #include "base/rotation.h"
+#include "base/search.h"
 #include "base/vec3.h"
 
 #include <inttypes.h>
@@ -347,16 +348,8 @@ static void interpolate_cubic(const drape_gltf_channel *c, int64_t key, double s
 static void interpolate(const drape_gltf_channel *c, double t, double *out)
 {
     const double *time = c->time.value;
-    int64_t low = 0, high = c->time.count - 1;
-    while (low + 1 < high) { /* the key at or before t, if there is one */
-        const int64_t middle = low + (high - low) / 2;
-        if (time[middle] <= t)
-            low = middle;
-        else
-            high = middle;
-    }
-    if (c->time.count > 1 && t >= time[high])
-        low = high;
+    int64_t low = drape_last_time(time, sizeof *time, c->time.count, t);
+    low = low < 0 ? 0 : low;
     const size_t each = (size_t)c->width * (c->kind == CUBIC ? 3 : 1),
                  shift = c->kind == CUBIC ? (size_t)c->width : 0;
     const double *a = c->value + (size_t)low * each + shift;

@@ -7,7 +7,7 @@
 #include "base/hash.h"
 #include "base/vec3.h"
 #include "mesh/contents.h"
-#include "mesh/gltf_scene.h"
+#include "mesh/gltf.h"
 #include "mesh/sequence.h"
 
 #include <math.h>
@@ -91,6 +91,12 @@ static void read_skins(reader *r)
 
 /* ---- Primitives ---- */
 
+/* Joint or weight k of a point, of all of its sets. */
+static double *influence(double *const *set, size_t point, int k)
+{
+    return &set[k / 4][4 * point + (size_t)(k % 4)];
+}
+
 /* Weights are scaled to a sum of 1. */
 static drape_status check_influences(reader *r, const char *owner, const part *p)
 {
@@ -98,8 +104,7 @@ static drape_status check_influences(reader *r, const char *owner, const part *p
     for (size_t i = 0; i < (size_t)p->count; i++) {
         double sum = 0;
         for (int k = 0; k < 4 * p->sets; k++) {
-            const double joint = p->joint[k / 4][4 * i + (size_t)(k % 4)],
-                         w = p->weight[k / 4][4 * i + (size_t)(k % 4)];
+            const double joint = *influence(p->joint, i, k), w = *influence(p->weight, i, k);
             if (!(w >= 0 && w <= DRAPE_GLTF_LARGEST))
                 return FAIL(r, "%s: point %zu: weight %g; weights must be finite and not negative", owner, i,
                             w);
@@ -111,7 +116,7 @@ static drape_status check_influences(reader *r, const char *owner, const part *p
         if (!(sum > 0))
             return FAIL(r, "%s: point %zu has no weights", owner, i);
         for (int k = 0; k < 4 * p->sets; k++)
-            p->weight[k / 4][4 * i + (size_t)(k % 4)] /= sum;
+            *influence(p->weight, i, k) /= sum;
     }
     return DRAPE_OK;
 }
@@ -265,24 +270,30 @@ static void pose(reader *r, double t)
                 drape_gltf_map_product(&r->scene.nodes[r->skins[i].joint[k]].world, &r->skins[i].inverse[k]);
 }
 
+/* The map of joint k of a point, and its weight; NULL if that is 0: then the joint is any number. */
+static const drape_gltf_map *joint_of(const reader *r, const part *p, size_t point, int k, double *weight)
+{
+    *weight = *influence(p->weight, point, k);
+    return *weight > 0 ? &r->skins[r->scene.nodes[p->node].skin].now[(int32_t)*influence(p->joint, point, k)]
+                       : NULL;
+}
+
 /* The node of a skinned mesh does not move it. */
 static void place_point(const reader *r, const part *p, size_t point, double *out)
 {
     const drape_gltf_node *node = &r->scene.nodes[p->node];
-    double x[3] = {p->x[3 * point], p->x[3 * point + 1], p->x[3 * point + 2]}, y[3], sum[3] = {0};
+    double x[3] = {p->x[3 * point], p->x[3 * point + 1], p->x[3 * point + 2]}, y[3], sum[3] = {0}, weight;
     for (int32_t k = 0; k < p->targets; k++)
         for (size_t axis = 0; p->target[k] && node->now_weight[k] != 0 && axis < 3; axis++)
             x[axis] += node->now_weight[k] * p->target[k][3 * point + axis];
     if (p->sets == 0)
         drape_gltf_map_point(&node->world, x, sum);
     for (int k = 0; k < 4 * p->sets; k++) {
-        const double weight = p->weight[k / 4][4 * point + (size_t)(k % 4)];
-        if (!(weight > 0))
+        const drape_gltf_map *map = joint_of(r, p, point, k, &weight);
+        if (!map)
             continue;
-        drape_gltf_map_point(&r->skins[node->skin].now[(int32_t)p->joint[k / 4][4 * point + (size_t)(k % 4)]],
-                             x, y);
-        for (int axis = 0; axis < 3; axis++)
-            sum[axis] += weight * y[axis];
+        drape_gltf_map_point(map, x, y);
+        vec3_add_scaled(weight, y, sum);
     }
     for (int axis = 0; axis < 3; axis++)
         out[axis] = sum[axis] + 0.0; /* no -0, so that equal points have equal bytes */
@@ -293,13 +304,13 @@ static bool is_mirrored(const reader *r, const part *p)
 {
     const drape_gltf_node *node = &r->scene.nodes[p->node];
     drape_gltf_map map = {.column = {{0}}};
+    double weight;
     if (p->sets == 0)
         return drape_gltf_map_determinant(&node->world) < 0;
     for (int k = 0; k < 4 * p->sets; k++) {
-        const double weight = p->weight[k / 4][k % 4];
-        for (int i = 0; weight > 0 && i < 3; i++)
-            vec3_add_scaled(weight, r->skins[node->skin].now[(int32_t)p->joint[k / 4][k % 4]].column[i],
-                            map.column[i]);
+        const drape_gltf_map *of = joint_of(r, p, 0, k, &weight);
+        for (int i = 0; of && i < 3; i++)
+            vec3_add_scaled(weight, of->column[i], map.column[i]);
     }
     return drape_gltf_map_determinant(&map) < 0;
 }

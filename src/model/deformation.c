@@ -2,6 +2,7 @@
 #include "model/deformation.h"
 
 #include "base/finite.h"
+#include "base/search.h"
 #include "model/track.h"
 
 #include <string.h>
@@ -33,12 +34,7 @@ bool drape_deformation_moves(const drape_deformation *d)
 /* The last frame at or before t; -1 if t is before the first. */
 static int32_t frame_before(const drape_sequence *frames, double t)
 {
-    int32_t low = -1, high = frames->frame_count;
-    while (high - low > 1) {
-        const int32_t middle = low + (high - low) / 2;
-        *(frames->time[middle] <= t ? &low : &high) = middle;
-    }
-    return low;
+    return (int32_t)drape_last_time(frames->time, sizeof *frames->time, frames->frame_count, t);
 }
 
 static const double *frame_at(const drape_sequence *frames, int32_t frame)

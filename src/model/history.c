@@ -1,6 +1,8 @@
 /* history.c: see history.h. */
 #include "model/history.h"
 
+#include "base/search.h"
+
 #include <math.h>
 
 #define LEAST 1e-6 /* of the largest factor */
@@ -8,15 +10,7 @@
 /* Returns the number of keys at or before t. */
 static size_t keys_until(const drape_history *h, double t)
 {
-    size_t low = 0, high = h->key_count;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (h->time[middle] <= t)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
+    return (size_t)(drape_last_time(h->time, sizeof *h->time, (int64_t)h->key_count, t) + 1);
 }
 
 double drape_history_factor(const drape_history *h, double t)

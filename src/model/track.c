@@ -2,6 +2,7 @@
 #include "model/track.h"
 
 #include "base/rotation.h"
+#include "base/search.h"
 #include "base/vec3.h"
 #include "mesh/mesh.h"
 
@@ -11,15 +12,7 @@
 
 int64_t drape_track_key_before(const drape_track_key *keys, size_t key_count, double t)
 {
-    int64_t low = -1, high = (int64_t)key_count;
-    while (high - low > 1) {
-        int64_t middle = low + (high - low) / 2;
-        if (keys[middle].time <= t)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
+    return drape_last_time(keys, sizeof *keys, (int64_t)key_count, t);
 }
 
 void drape_track_displacement(const drape_track_key *keys, size_t key_count, double t, double displacement[3])
@@ -51,11 +44,8 @@ void drape_track_velocity(const drape_track_key *keys, size_t key_count, double 
 /* Returns the last key at or before t, at least the first, and how much of the time to the next has gone. */
 static const drape_turn *turn_before(const drape_turns *turns, double t, double *share)
 {
-    const drape_turn *key = turns->keys, *last = turns->keys + turns->key_count - 1;
-    for (const drape_turn *end = last + 1; end - key > 1;) {
-        const drape_turn *middle = key + (end - key) / 2;
-        *(middle->time <= t ? &key : &end) = middle;
-    }
+    const int64_t k = drape_last_time(&turns->keys->time, sizeof *turns->keys, (int64_t)turns->key_count, t);
+    const drape_turn *key = turns->keys + (k < 0 ? 0 : k), *last = turns->keys + turns->key_count - 1;
     *share = key < last && t > key->time ? (t - key->time) / (key[1].time - key->time) : 0;
     return key;
 }
