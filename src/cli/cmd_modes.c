@@ -59,9 +59,8 @@ static int frames_of(const modes_request *request)
 static drape_status write_table(const job *j, drape_folder *folder)
 {
     drape_file file = {0};
-    drape_status status =
-        drape_csv_open(j->in.ctx, folder, TABLE,
-                       "mode,kind,value,frequency,mass,residual,error,first_frame\n", false, &file);
+    drape_status status = drape_csv_open(
+        j->in.ctx, folder, TABLE, "mode,kind,value,frequency,mass,residual,error,first_frame\n", &file);
     for (int32_t k = 0; !status && k < j->modes.count; k++) {
         const drape_mode *mode = &j->modes.modes[k];
         drape_file_print(&file, "%d", (int)k + 1);

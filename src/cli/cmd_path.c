@@ -91,7 +91,7 @@ static drape_status open_table(job *j)
         used += (size_t)snprintf(columns + used, sizeof columns - used, ",u%d_x,u%d_y,u%d_z", (int)j->node[i],
                                  (int)j->node[i], (int)j->node[i]);
     snprintf(columns + used, sizeof columns - used, "\n");
-    return drape_csv_open(j->in.ctx, drape_recorder_folder(j->recorder), TABLE, columns, false, &j->table);
+    return drape_csv_open(j->in.ctx, drape_recorder_folder(j->recorder), TABLE, columns, &j->table);
 }
 
 static void print_point(const job *j, const drape_path_point *point)

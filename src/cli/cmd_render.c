@@ -442,7 +442,7 @@ static drape_status write_into_folder(render *r, size_t k, void *folder)
 static bool is_picture(const void *user, const char *name)
 {
     (void)user;
-    return drape_frame_files_name(name, PICTURE_DIGITS, "png", NULL);
+    return drape_frame_is_name(name, PICTURE_DIGITS, "png");
 }
 
 /* Pictures of an earlier call are removed, so that those of two runs do not mix. */

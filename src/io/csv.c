@@ -21,27 +21,27 @@ void drape_csv_put_number(drape_file *file, double value)
         drape_file_print(file, ",%.17g", value);
 }
 
+void drape_csv_put_quoted(drape_file *file, const char *text)
+{
+    for (; *text; text++)
+        drape_file_put(file, *text == '"' ? "\"\"" : text, *text == '"' ? 2 : 1);
+}
+
 /* RFC 4180, section 2, items 6 and 7. */
 void drape_csv_put_text(drape_file *file, const char *text)
 {
-    drape_file_put_text(file, ",");
-    if (!text)
-        return;
-    if (!strpbrk(text, ",\"\r\n")) {
+    const char *quote = text && strpbrk(text, ",\"\r\n") ? "\"" : "";
+    drape_file_print(file, ",%s", quote);
+    if (*quote)
+        drape_csv_put_quoted(file, text);
+    else if (text)
         drape_file_put_text(file, text);
-        return;
-    }
-    drape_file_put_text(file, "\"");
-    for (; *text; text++)
-        drape_file_put(file, *text == '"' ? "\"\"" : text, *text == '"' ? 2 : 1);
-    drape_file_put_text(file, "\"");
+    drape_file_put_text(file, quote);
 }
 
 drape_status drape_csv_open(drape_context *ctx, drape_folder *folder, const char *name, const char *columns,
-                            bool resumes, drape_file *file)
+                            drape_file *file)
 {
-    if (resumes)
-        return drape_export_reopen(ctx, folder, name, file);
     drape_status status = drape_export_begin(ctx, folder, name, file);
     if (status)
         return status;

@@ -11,10 +11,12 @@ void drape_csv_put_number(drape_file *file, double value);
 /* In quotes if necessary; NULL is an empty field. */
 void drape_csv_put_text(drape_file *file, const char *text);
 
-/* Takes the memory for the table folder/NAME and opens it, with the line of column names. resumes: continues
- * the file as drape_export_reopen does. Destroy the file even after a failure. Errors: DRAPE_E_MEMORY,
- * DRAPE_E_FILE. */
+/* The text within quotes. */
+void drape_csv_put_quoted(drape_file *file, const char *text);
+
+/* Takes the memory for the table folder/NAME and begins it with the line of column names. Destroy the file
+ * even after a failure. Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
 drape_status drape_csv_open(drape_context *ctx, drape_folder *folder, const char *name, const char *columns,
-                            bool resumes, drape_file *file);
+                            drape_file *file);
 
 #endif

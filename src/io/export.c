@@ -8,7 +8,30 @@
 
 #include "model/model.h"
 
-#define FRAME_WORD "frame_"
+/* The digits of the frame in a name that ends in _000000.ENDING, at least so many; NULL: it does not. */
+static const char *find_digits(const char *name, size_t least, const char *ending)
+{
+    const char *line = strrchr(name, '_'), *digits = line ? line + 1 : "";
+    const size_t count = strspn(digits, "0123456789");
+    return count >= least && digits[count] == '.' && strcmp(digits + count + 1, ending) == 0 ? digits : NULL;
+}
+
+bool drape_frame_is_name(const char *name, size_t least, const char *ending)
+{
+    return strncmp(name, "frame_", 6) == 0 && find_digits(name, least, ending) == name + 6;
+}
+
+bool drape_export_names(const drape_exporter_ops *ops, const char *name)
+{
+    return (ops->ending && drape_frame_is_name(name, DRAPE_FRAME_DIGITS, ops->ending)) ||
+           (ops->names && ops->names(name));
+}
+
+int64_t drape_export_frame_of(const drape_exporter_ops *ops, const char *name)
+{
+    const char *digits = ops->ending ? find_digits(name, DRAPE_FRAME_DIGITS, ops->ending) : NULL;
+    return digits && drape_export_names(ops, name) ? (int64_t)strtoll(digits, NULL, 10) : -1;
+}
 
 void drape_export_body_vertex(const drape_frame *frame, const drape_export_body *body, int32_t number,
                               int32_t vertex, double x[3])
@@ -20,119 +43,46 @@ void drape_export_body_vertex(const drape_frame *frame, const drape_export_body 
         drape_pose_point(&frame->poses[number], x, x);
 }
 
-/* ---- One file ---- */
+/* ---- Files ---- */
 
 drape_status drape_export_begin(drape_context *ctx, drape_folder *folder, const char *name, drape_file *file)
 {
-    drape_status status = drape_file_create_in(ctx, folder, file);
+    return drape_export_open(ctx, &(drape_export_def){.folder = folder}, name, file);
+}
+
+drape_status drape_export_open(drape_context *ctx, const drape_export_def *def, const char *name,
+                               drape_file *file)
+{
+    drape_status status = drape_file_create_in(ctx, def->folder, file);
     if (status)
         return status;
     drape_file_name(file, "%s", name);
-    return drape_file_begin(file);
+    return def->resumes ? DRAPE_OK : drape_file_begin(file);
 }
 
-void drape_export_archive_file(drape_archive *a, drape_file *file)
+drape_status drape_export_count(drape_file *file, off_t offset, const void *number, size_t size)
 {
-    int64_t bytes = file->kept, sum = (int64_t)file->kept_sum.sum;
-    drape_archive_int64(a, &bytes);
-    drape_archive_int64(a, &sum);
-    if (drape_archive_has_read(a)) {
-        file->kept = (off_t)bytes;
-        file->expected = (uint64_t)sum;
-    }
-}
-
-drape_status drape_export_reopen(drape_context *ctx, drape_folder *folder, const char *name, drape_file *file)
-{
-    const off_t kept = file->kept;
-    const uint64_t expected = file->expected;
-    drape_status status = drape_file_create_in(ctx, folder, file);
+    const off_t before = file->kept;
+    drape_status status = drape_file_keep(file);
     if (status)
         return status;
-    file->kept = kept;
-    file->expected = expected;
-    drape_file_name(file, "%s", name);
-    return drape_file_reopen(file);
-}
-
-/* ---- One file for each frame ---- */
-
-bool drape_frame_files_name(const char *name, size_t digits, const char *ending, int64_t *frame)
-{
-    const size_t word = strlen(FRAME_WORD);
-    if (strncmp(name, FRAME_WORD, word) != 0)
-        return false;
-    const size_t found = strspn(name + word, "0123456789");
-    const char *rest = name + word + found;
-    if (frame)
-        *frame = (int64_t)strtoll(name + word, NULL, 10);
-    return found >= digits && *rest == '.' && strcmp(rest + 1, ending) == 0;
-}
-
-drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
-                                    drape_frame_files *frames)
-{
-    frames->surface = &def->model->surface;
-    frames->folder = def->folder;
-    frames->ending = ending;
-    drape_status status = drape_file_create_in(ctx, def->folder, &frames->file);
-    frames->file.durable = def->durable;
+    status = drape_file_overwrite(file, offset, number, size);
+    if (status)
+        drape_file_cut(file, before);
     return status;
 }
 
-drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def *def, const char *ending,
-                                      int64_t count, drape_frame_files *frames)
-{
-    drape_status status = drape_frame_files_open(ctx, def, ending, frames);
-    for (int64_t k = 0; !status && k < count; k++) {
-        drape_file_name(&frames->file, DRAPE_FRAME_NAME, k, ending);
-        status = drape_folder_verify(def->folder, frames->file.path);
-    }
-    return status;
-}
-
-/* The frames from a number on. */
-typedef struct late {
-    const char *ending;
-    int64_t from;
-} late;
-
-static bool is_late(const void *user, const char *name)
-{
-    const late *l = user;
-    int64_t frame;
-    return drape_frame_files_name(name, DRAPE_FRAME_DIGITS, l->ending, &frame) && frame >= l->from;
-}
-
-drape_status drape_frame_files_cut(drape_context *ctx, void *state, int64_t frames)
-{
-    const drape_frame_files *files = state;
-    const late l = {files->ending, frames};
-    (void)ctx;
-    return drape_folder_remove(files->folder, is_late, &l);
-}
-
-void drape_frame_files_archive(void *state, drape_archive *a)
-{
-    (void)state, (void)a;
-}
-
-drape_status drape_frame_files_begin(drape_frame_files *frames, int64_t frame)
-{
-    drape_file_name(&frames->file, DRAPE_FRAME_NAME, frame, frames->ending);
-    return drape_file_begin(&frames->file);
-}
-
-drape_status drape_frame_files_end(drape_frame_files *frames)
-{
-    return drape_file_finish(&frames->file);
-}
-
-drape_status drape_frame_files_close(drape_context *ctx, void *state)
+drape_status drape_frames_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
     (void)ctx;
-    drape_file_destroy(&((drape_frame_files *)state)->file);
+    ((drape_frames *)state)->def = def;
     return DRAPE_OK;
+}
+
+drape_status drape_frames_begin(const drape_export_def *def, const drape_frame *frame, const char *ending)
+{
+    drape_file_name(def->whole, DRAPE_FRAME_NAME, frame->index, ending);
+    return drape_file_begin(def->whole);
 }
 
 /* ---- OBJ ---- */

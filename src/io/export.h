@@ -16,6 +16,8 @@ typedef struct drape_export_def {
     double frame_rate;   /* [1/s] */
     int64_t most_frames; /* frames that a run of the scene's duration writes, including the one at its end */
     bool durable;        /* a checkpoint may claim that each frame is on the disk */
+    bool resumes;        /* an earlier run is continued */
+    drape_file *whole;   /* for files that are written at once, one after the other */
     const drape_export_body *bodies; /* (body_count) of formats that want them: the colliders */
     int32_t body_count;
 } drape_export_def;
@@ -38,23 +40,26 @@ typedef struct drape_frame {
 } drape_frame;
 
 /*
- * A format. The recorder zeroes state_size bytes, calls open once, write for each frame, and close once,
- * even after a failure of open or write. All are called in the C locale. Only open may take memory. After a
- * failure, the frames before it are complete and readable.
+ * A format. The recorder zeroes state_size bytes, calls open once, write for each frame, and close once if
+ * open succeeded, even after a failure of write. All are called in the C locale. Only open may take memory.
+ * After a failure, the frames before it are complete and readable.
  */
 typedef struct drape_exporter_ops {
     drape_entry entry; /* summary: which files it writes; reference: definition of the format */
     size_t state_size;
     bool wants_fields, wants_bodies;
-    bool y_up; /* the format has y up: its frames are never rotated */
+    bool y_up;          /* the format has y up: its frames are never rotated */
+    const char *ending; /* of a file for each frame, frame_000000.ENDING; NULL: none */
 
     /* Optional: refuses, with an error at pointer, a run that the format cannot hold, before anything is
      * written. def->folder is NULL. Errors: DRAPE_E_ARGUMENT. */
     drape_status (*check)(drape_context *ctx, const char *pointer, const drape_export_def *def);
 
-    /* Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+    /* Takes the memory, and begins the files that grow, by drape_export_open. Errors: DRAPE_E_FILE,
+     * DRAPE_E_MEMORY. */
     drape_status (*open)(drape_context *ctx, const drape_export_def *def, void *state);
-    /* Whether the format writes a file of this name. */
+    /* Whether the format writes a file of this name, beside those with its ending; NULL: none. One for a
+     * frame ends in _000000.ENDING. */
     bool (*names)(const char *name);
 
     /* Errors: DRAPE_E_FILE. */
@@ -66,18 +71,18 @@ typedef struct drape_exporter_ops {
     drape_file *(*shared)(void *state);
     drape_status (*settle)(void *state, int error, uint64_t sum);
 
-    /* For checkpoints. archive, called between frames: archives what the format needs to know of the frames
-     * so far. resume, called instead of open to continue a run: takes the memory, reads what archive wrote
-     * and checks that the `frames` frames exist, without changing any file. cut: then removes everything
-     * after these frames. sync: waits until everything written is on the disk; NULL: with def->durable it
-     * already is. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
-    void (*archive)(void *state, drape_archive *a);
-    drape_status (*resume)(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
-                           drape_archive *a);
-    drape_status (*cut)(drape_context *ctx, void *state, int64_t frames);
-    drape_status (*sync)(void *state);
+    /* The files that grow, by number; NULL: there are no more, or the format has none. The recorder archives,
+     * resumes, syncs and closes them. */
+    drape_file *(*file)(void *state, size_t number);
 
-    /* Errors: DRAPE_E_FILE; everything is released even then. */
+    /* For checkpoints, optional. archive, called between frames: archives what the format needs to know of
+     * the frames so far. cut, after open and archive have continued a run, and before its files that grow are
+     * trimmed: overwrites in them what frames after the first `frames` ones have changed, and checks its
+     * other files. Errors: DRAPE_E_FILE, DRAPE_E_PARSE, DRAPE_E_MEMORY. */
+    void (*archive)(void *state, drape_archive *a);
+    drape_status (*cut)(drape_context *ctx, void *state, int64_t frames);
+
+    /* Optional: writes the end of the files that grow. Errors: DRAPE_E_FILE. */
     drape_status (*close)(drape_context *ctx, void *state);
 } drape_exporter_ops;
 extern const drape_exporter_ops *const drape_exporters[]; /* NULL-ended */
@@ -87,53 +92,40 @@ extern const drape_registry drape_exporter_registry;
 void drape_export_body_vertex(const drape_frame *frame, const drape_export_body *body, int32_t number,
                               int32_t vertex, double x[3]);
 
-/* ---- For formats with one file, folder/NAME ---- */
+/* Whether a format writes a file of this name. */
+bool drape_export_names(const drape_exporter_ops *ops, const char *name);
 
-/* Takes the memory and begins the file; call drape_file_destroy in any case. Errors: DRAPE_E_FILE,
- * DRAPE_E_MEMORY. */
+/* The frame of which a file is, by its name; -1: it is none of one frame. */
+int64_t drape_export_frame_of(const drape_exporter_ops *ops, const char *name);
+
+/* ---- Files ---- */
+
+/* Takes the memory for a file of a folder and begins it; call drape_file_destroy in any case. Errors:
+ * DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_export_begin(drape_context *ctx, drape_folder *folder, const char *name, drape_file *file);
 
-/* Archives the number of bytes to keep of a file, and their checksum. */
-void drape_export_archive_file(drape_archive *a, drape_file *file);
+/* The same for one of a format that grows: it is not begun where a run is continued. */
+drape_status drape_export_open(drape_context *ctx, const drape_export_def *def, const char *name,
+                               drape_file *file);
 
-/* Takes the memory and reopens the file that an earlier run left, as drape_file_reopen does, after
- * drape_export_archive_file has read it. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
-drape_status drape_export_reopen(drape_context *ctx, drape_folder *folder, const char *name,
-                                 drape_file *file);
+/* Ends a record of a file, then overwrites the number of its records. After a failure the file is as before.
+ * Errors: DRAPE_E_FILE. */
+drape_status drape_export_count(drape_file *file, off_t offset, const void *number, size_t size);
 
-/* ---- For formats with one file for each frame, folder/frame_000000.ENDING ---- */
+/* The state of a format that has no other, and its open. */
+typedef struct drape_frames {
+    const drape_export_def *def;
+} drape_frames;
+drape_status drape_frames_open(drape_context *ctx, const drape_export_def *def, void *state);
 
-#define DRAPE_FRAME_NAME "frame_%06" PRId64 ".%s"
-
-typedef struct drape_frame_files {
-    const drape_render_surface *surface;
-    drape_folder *folder;
-    const char *ending; /* "obj" */
-    drape_file file;
-} drape_frame_files;
-
+#define DRAPE_FRAME_NAME   "frame_%06" PRId64 ".%s"
 #define DRAPE_FRAME_DIGITS 6 /* minimum number of digits in these names */
 
-/* Whether a file is named by this pattern, with at least that many digits. *frame (may be NULL): its
- * number. */
-bool drape_frame_files_name(const char *name, size_t digits, const char *ending, int64_t *frame);
-/* Takes the memory. Errors: DRAPE_E_MEMORY. */
-drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
-                                    drape_frame_files *frames);
-/* The same if `count` frames exist already, with the bytes that were written. Errors: DRAPE_E_FILE (a frame
- * is missing), DRAPE_E_PARSE (a frame is damaged), DRAPE_E_MEMORY. */
-drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def *def, const char *ending,
-                                      int64_t count, drape_frame_files *frames);
-/* archive, cut and close for a state that begins with a drape_frame_files. The first archives nothing,
- * because the number of frames is enough; the second removes the frames after the first `frames`. */
-void drape_frame_files_archive(void *state, drape_archive *a);
-drape_status drape_frame_files_cut(drape_context *ctx, void *state, int64_t frames);
-drape_status drape_frame_files_close(drape_context *ctx, void *state);
-/* Begins the file of one frame; the caller writes its content and ends it by drape_frame_files_end. Errors:
- * DRAPE_E_FILE. */
-drape_status drape_frame_files_begin(drape_frame_files *frames, int64_t frame);
-/* Gives the frame's file its name and closes it. Errors: DRAPE_E_FILE; then the frame does not exist. */
-drape_status drape_frame_files_end(drape_frame_files *frames);
+/* Whether a name is one of these, with at least so many digits. */
+bool drape_frame_is_name(const char *name, size_t least, const char *ending);
+
+/* Begins def->whole as the file of a frame; end it by drape_file_finish. Errors: DRAPE_E_FILE. */
+drape_status drape_frames_begin(const drape_export_def *def, const drape_frame *frame, const char *ending);
 
 /* ---- Pieces of OBJ ---- */
 

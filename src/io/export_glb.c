@@ -89,7 +89,6 @@ typedef struct glb_state {
     drape_status status; /* the first failure of what is written into blanks */
     uint32_t room;       /* number of frames for which there is room */
     uint32_t frames;     /* complete frames in the file */
-    bool live;           /* the file ends with these frames and can be continued */
     char *json;          /* of the beginning of the file, with all blanks but those of the first frame */
     size_t json_size, used;
     blanks at;
@@ -591,7 +590,7 @@ static drape_status allocate(const drape_export_def *def, glb_state *glb)
 static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
     drape_status status = allocate(def, state);
-    return status ? status : drape_export_begin(ctx, def->folder, FILE_NAME, &((glb_state *)state)->file);
+    return status ? status : drape_export_open(ctx, def, FILE_NAME, &((glb_state *)state)->file);
 }
 
 /* ---- Changes to the beginning of the file ---- */
@@ -817,7 +816,6 @@ static drape_status glb_write(drape_context *ctx, void *state, const drape_frame
     drape_status status = glb->frames == 0 ? write_first(glb) : write_next(glb);
     if (!status)
         glb->frames++;
-    glb->live = glb->frames > 0;
     return status;
 }
 
@@ -890,10 +888,7 @@ static drape_status glb_close(drape_context *ctx, void *state)
 {
     glb_state *glb = state;
     (void)ctx;
-    drape_status status = glb->frames > 1 && glb->live ? write_animation(glb) : DRAPE_OK;
-    drape_status closing = drape_file_close(&glb->file);
-    drape_file_destroy(&glb->file);
-    return status ? status : closing;
+    return glb->frames > 1 ? write_animation(glb) : DRAPE_OK;
 }
 
 /* ---- Checkpoints ---- */
@@ -912,28 +907,12 @@ static void glb_archive(void *state, drape_archive *a)
     if (a->status)
         return;
     glb->frames = (uint32_t)frames;
-    drape_export_archive_file(a, &glb->file);
     drape_archive_bytes(a, glb->base[0], 3 * (size_t)glb->points * sizeof **glb->base);
     drape_archive_bytes(a, glb->base[1], 3 * (size_t)glb->points * sizeof **glb->base);
     for (uint32_t i = 0; i < glb->objects; i++)
         if (glb->object[i].moves)
             drape_archive_bytes(a, glb->object[i].moves, glb->frames * 7 * sizeof *glb->object[i].moves);
     drape_archive_bytes(a, glb->times, glb->frames * sizeof *glb->times);
-}
-
-/* Before the first frame there is no file. */
-static drape_status glb_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
-                               drape_archive *a)
-{
-    glb_state *glb = state;
-    (void)frames;
-    drape_status status = allocate(def, glb);
-    if (status)
-        return status;
-    glb_archive(glb, a);
-    if (a->status || glb->frames == 0)
-        return a->status;
-    return drape_export_reopen(ctx, def->folder, FILE_NAME, &glb->file);
 }
 
 /* Writes bytes of the JSON as they were at first, which after resuming are blanks. */
@@ -952,16 +931,15 @@ static void restore_list(glb_state *glb, size_t list, size_t width)
         restore(glb, list, close + 1);
 }
 
-/* Removes the animation and targets before the data that they refer to. */
+/* Removes the animation and targets. */
 static drape_status glb_cut(drape_context *ctx, void *state, int64_t frames)
 {
     glb_state *glb = state;
     const blanks *at = &glb->at;
     const size_t frame = (size_t)glb->deforming * ACCESSOR_ROOM;
-    (void)frames;
-    const bool rehearses = drape_folder_rehearses(glb->def->folder);
+    (void)ctx, (void)frames;
     if (glb->frames == 0)
-        return rehearses ? DRAPE_OK : drape_export_begin(ctx, glb->def->folder, FILE_NAME, &glb->file);
+        return DRAPE_OK;
     glb->status = DRAPE_OK;
     restore(glb, at->views, at->views + TIMES_ROOM);
     restore(glb, at->times, at->times + times_room(glb));
@@ -975,16 +953,12 @@ static drape_status glb_cut(drape_context *ctx, void *state, int64_t frames)
     }
     if (!glb->status)
         write_lengths(glb, glb->frames * glb->frame_bytes);
-    if (!glb->status)
-        glb->status = drape_file_trim(&glb->file);
-    glb->live = !glb->status && !rehearses;
     return glb->status;
 }
 
-static drape_status glb_sync(void *state)
+static drape_file *glb_file(void *state, size_t number)
 {
-    glb_state *glb = state;
-    return glb->frames > 0 ? drape_file_sync(&glb->file) : DRAPE_OK;
+    return number == 0 ? &((glb_state *)state)->file : NULL;
 }
 
 const drape_exporter_ops drape_exporter_glb = {
@@ -1000,9 +974,8 @@ const drape_exporter_ops drape_exporter_glb = {
     .open = glb_open,
     .names = glb_names,
     .write = glb_write,
+    .file = glb_file,
     .archive = glb_archive,
-    .resume = glb_resume,
     .cut = glb_cut,
-    .sync = glb_sync,
     .close = glb_close,
 };

@@ -9,41 +9,25 @@
 #include "io/export.h"
 #include "model/model.h"
 
-static bool obj_names(const char *name)
-{
-    return drape_frame_files_name(name, DRAPE_FRAME_DIGITS, "obj", NULL);
-}
-
-static drape_status obj_open(drape_context *ctx, const drape_export_def *def, void *state)
-{
-    return drape_frame_files_open(ctx, def, "obj", state);
-}
-
 static drape_status obj_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
-    drape_frame_files *frames = state;
+    const drape_export_def *def = ((drape_frames *)state)->def;
+    const drape_render_surface *surface = &def->model->surface;
+    drape_obj obj = {.file = def->whole};
     (void)ctx;
-    drape_status status = drape_frame_files_begin(frames, frame->index);
+    drape_status status = drape_frames_begin(def, frame, "obj");
     if (status)
         return status;
-    drape_file_print(&frames->file, "# Drape frame %" PRId64 ", t = %.17g s\n", frame->index, frame->time);
-    drape_obj_put_material_files(&frames->file, frames->surface);
-    drape_obj obj = {.file = &frames->file};
-    for (int32_t i = 0; i < frames->surface->cloth_count; i++) {
-        const drape_render_cloth *cloth = &frames->surface->cloths[i];
-        drape_obj_put_name(&frames->file, "o", cloth->name);
-        drape_obj_put_nodes(&frames->file, frame->positions + 3 * (size_t)cloth->first_node,
+    drape_file_print(obj.file, "# Drape frame %" PRId64 ", t = %.17g s\n", frame->index, frame->time);
+    drape_obj_put_material_files(obj.file, surface);
+    for (int32_t i = 0; i < surface->cloth_count; i++) {
+        const drape_render_cloth *cloth = &surface->cloths[i];
+        drape_obj_put_name(obj.file, "o", cloth->name);
+        drape_obj_put_nodes(obj.file, frame->positions + 3 * (size_t)cloth->first_node,
                             cloth->mesh->node_count);
-        drape_obj_put_faces(&obj, frames->surface, i);
+        drape_obj_put_faces(&obj, surface, i);
     }
-    return drape_frame_files_end(frames);
-}
-
-static drape_status obj_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
-                               drape_archive *a)
-{
-    (void)a;
-    return drape_frame_files_resume(ctx, def, "obj", frames, state);
+    return drape_file_finish(obj.file);
 }
 
 const drape_exporter_ops drape_exporter_obj = {
@@ -53,12 +37,8 @@ const drape_exporter_ops drape_exporter_obj = {
              "frame_000000.obj ...: a Wavefront OBJ file for each frame, an object for each cloth, with its "
              "polygons, texture coordinates and materials, 17 digits",
          .reference = "Wavefront Advanced Visualizer manual, appendix B1"},
-    .state_size = sizeof(drape_frame_files),
-    .open = obj_open,
-    .names = obj_names,
+    .state_size = sizeof(drape_frames),
+    .ending = "obj",
+    .open = drape_frames_open,
     .write = obj_write,
-    .archive = drape_frame_files_archive,
-    .resume = obj_resume,
-    .cut = drape_frame_files_cut,
-    .close = drape_frame_files_close,
 };

@@ -18,8 +18,7 @@
 
 typedef struct pc2_state {
     const drape_export_def *def;
-    drape_file file, mesh;
-    int32_t samples; /* complete samples in the file */
+    drape_file file;
 } pc2_state;
 
 static bool pc2_names(const char *name)
@@ -41,102 +40,64 @@ static drape_status pc2_open(drape_context *ctx, const drape_export_def *def, vo
 {
     pc2_state *pc2 = state;
     pc2->def = def;
-    drape_status status = drape_export_begin(ctx, def->folder, FILE_NAME, &pc2->file);
-    if (status)
+    drape_status status = drape_export_open(ctx, def, FILE_NAME, &pc2->file);
+    if (status || def->resumes)
         return status;
     put_header(pc2);
-    status = drape_file_publish(&pc2->file);
-    if (!status)
-        status = drape_export_begin(ctx, def->folder, MESH_NAME, &pc2->mesh);
-    pc2->mesh.durable = def->durable;
-    return status;
+    return drape_file_publish(&pc2->file);
 }
 
-static drape_status write_mesh(pc2_state *pc2, const drape_frame *frame)
+static drape_status write_mesh(const drape_export_def *def, const drape_frame *frame)
 {
-    const drape_render_surface *surface = &pc2->def->model->surface;
-    drape_obj obj = {.file = &pc2->mesh};
-    drape_file_put_text(&pc2->mesh, "# the mesh that " FILE_NAME " moves\n");
-    drape_obj_put_material_files(&pc2->mesh, surface);
-    drape_file_put_text(&pc2->mesh, "o cloth\n");
-    drape_obj_put_nodes(&pc2->mesh, frame->positions, surface->node_count);
+    const drape_render_surface *surface = &def->model->surface;
+    drape_obj obj = {.file = def->whole};
+    drape_file_name(obj.file, MESH_NAME);
+    drape_status status = drape_file_begin(obj.file);
+    if (status)
+        return status;
+    drape_file_put_text(obj.file, "# the mesh that " FILE_NAME " moves\n");
+    drape_obj_put_material_files(obj.file, surface);
+    drape_file_put_text(obj.file, "o cloth\n");
+    drape_obj_put_nodes(obj.file, frame->positions, surface->node_count);
     for (int32_t c = 0; c < surface->cloth_count; c++)
         drape_obj_put_faces(&obj, surface, c);
-    return drape_file_finish(&pc2->mesh);
+    return drape_file_finish(obj.file);
 }
 
-static drape_status write_count(pc2_state *pc2, int32_t samples)
+static void format_count(int64_t samples, unsigned char bytes[4])
 {
-    unsigned char bytes[4];
     for (int b = 0; b < 4; b++)
         bytes[b] = (unsigned char)((uint32_t)samples >> 8 * b);
-    return drape_file_overwrite(&pc2->file, COUNT_OFFSET, bytes, sizeof bytes);
 }
 
 static drape_status pc2_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
     pc2_state *pc2 = state;
-    off_t before = pc2->file.kept;
-    size_t count = 3 * (size_t)pc2->def->model->surface.node_count;
+    const size_t count = 3 * (size_t)pc2->def->model->surface.node_count;
+    unsigned char bytes[4];
     (void)ctx;
-    drape_status status = frame->index == 0 ? write_mesh(pc2, frame) : DRAPE_OK;
-    for (size_t i = 0; !status && i < count; i++)
-        drape_file_put_float(&pc2->file, (float)frame->positions[i]);
-    if (!status)
-        status = drape_file_keep(&pc2->file);
+    drape_status status = frame->index == 0 ? write_mesh(pc2->def, frame) : DRAPE_OK;
     if (status)
         return status;
-    status = write_count(pc2, pc2->samples + 1);
-    if (status)
-        drape_file_cut(&pc2->file, before);
-    else
-        pc2->samples++;
-    return status;
+    for (size_t i = 0; i < count; i++)
+        drape_file_put_float(&pc2->file, (float)frame->positions[i]);
+    format_count(frame->index + 1, bytes);
+    return drape_export_count(&pc2->file, COUNT_OFFSET, bytes, sizeof bytes);
 }
 
-static void pc2_archive(void *state, drape_archive *a)
+static drape_file *pc2_file(void *state, size_t number)
 {
-    pc2_state *pc2 = state;
-    drape_archive_int32(a, &pc2->samples);
-    drape_export_archive_file(a, &pc2->file);
+    return number == 0 ? &((pc2_state *)state)->file : NULL;
 }
 
-static drape_status pc2_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
-                               drape_archive *a)
-{
-    pc2_state *pc2 = state;
-    pc2->def = def;
-    pc2_archive(pc2, a);
-    if (drape_archive_good(a) && pc2->samples != frames)
-        drape_archive_fail(a, DRAPE_E_PARSE,
-                           "the checkpoint has %lld frames and another number in " FILE_NAME,
-                           (long long)frames);
-    drape_status status = a->status ? a->status : drape_folder_verify(def->folder, MESH_NAME);
-    return status ? status : drape_export_reopen(ctx, def->folder, FILE_NAME, &pc2->file);
-}
-
-/* First lowers the count: at any moment the file contains at least what its header says. */
 static drape_status pc2_cut(drape_context *ctx, void *state, int64_t frames)
 {
     pc2_state *pc2 = state;
-    (void)ctx, (void)frames;
-    drape_status status = write_count(pc2, pc2->samples);
-    return status ? status : drape_file_trim(&pc2->file);
-}
-
-static drape_status pc2_sync(void *state)
-{
-    return drape_file_sync(&((pc2_state *)state)->file);
-}
-
-static drape_status pc2_close(drape_context *ctx, void *state)
-{
-    pc2_state *pc2 = state;
+    unsigned char bytes[4];
     (void)ctx;
-    drape_status status = drape_file_close(&pc2->file);
-    drape_file_destroy(&pc2->file);
-    drape_file_destroy(&pc2->mesh);
-    return status;
+    format_count(frames, bytes);
+    drape_status status = frames > 0 ? drape_folder_verify(pc2->def->folder, MESH_NAME) : DRAPE_OK;
+    return status ? status : drape_file_overwrite(&pc2->file, COUNT_OFFSET, bytes, sizeof bytes);
 }
 
 const drape_exporter_ops drape_exporter_pc2 = {
@@ -151,9 +112,6 @@ const drape_exporter_ops drape_exporter_pc2 = {
     .open = pc2_open,
     .names = pc2_names,
     .write = pc2_write,
-    .archive = pc2_archive,
-    .resume = pc2_resume,
+    .file = pc2_file,
     .cut = pc2_cut,
-    .sync = pc2_sync,
-    .close = pc2_close,
 };

@@ -8,18 +8,6 @@
 #include "io/export.h"
 #include "model/model.h"
 
-#define FACE_SIZE 13 /* the count 3 in one byte, three nodes in four bytes each */
-
-static bool ply_names(const char *name)
-{
-    return drape_frame_files_name(name, DRAPE_FRAME_DIGITS, "ply", NULL);
-}
-
-static drape_status ply_open(drape_context *ctx, const drape_export_def *def, void *state)
-{
-    return drape_frame_files_open(ctx, def, "ply", state);
-}
-
 static void put_header(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
 {
     drape_file_print(file,
@@ -32,48 +20,31 @@ static void put_header(drape_file *file, const drape_render_surface *surface, co
                      surface->triangle_count);
 }
 
-static void put_face(drape_file *file, const int32_t *node)
-{
-    unsigned char bytes[FACE_SIZE] = {3};
-    for (int i = 0; i < 3; i++)
-        for (int b = 0; b < 4; b++)
-            bytes[1 + 4 * i + b] = (unsigned char)((uint32_t)node[i] >> 8 * b);
-    drape_file_put(file, bytes, sizeof bytes);
-}
-
 static drape_status ply_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
-    drape_frame_files *frames = state;
-    const drape_render_surface *surface = frames->surface;
+    const drape_export_def *def = ((drape_frames *)state)->def;
+    const drape_render_surface *surface = &def->model->surface;
     const int32_t *node = surface->triangle;
     (void)ctx;
-    drape_status status = drape_frame_files_begin(frames, frame->index);
+    drape_status status = drape_frames_begin(def, frame, "ply");
     if (status)
         return status;
-    put_header(&frames->file, surface, frame);
-    drape_file_put_doubles(&frames->file, frame->positions, 3 * (size_t)surface->node_count);
-    for (int32_t i = 0; i < surface->triangle_count; i++, node += 3)
-        put_face(&frames->file, node);
-    return drape_frame_files_end(frames);
-}
-
-static drape_status ply_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
-                               drape_archive *a)
-{
-    (void)a;
-    return drape_frame_files_resume(ctx, def, "ply", frames, state);
+    put_header(def->whole, surface, frame);
+    drape_file_put_doubles(def->whole, frame->positions, 3 * (size_t)surface->node_count);
+    for (int32_t i = 0; i < surface->triangle_count; i++, node += 3) {
+        drape_file_put(def->whole, "\3", 1);
+        for (int k = 0; k < 3; k++)
+            drape_file_put_word(def->whole, (uint32_t)node[k]);
+    }
+    return drape_file_finish(def->whole);
 }
 
 const drape_exporter_ops drape_exporter_ply = {
     .entry = {.name = "ply",
               .summary = "frame_000000.ply ...: a binary PLY file for each frame, double precision",
               .reference = "G. Turk, The PLY Polygon File Format, 1994"},
-    .state_size = sizeof(drape_frame_files),
-    .open = ply_open,
-    .names = ply_names,
+    .state_size = sizeof(drape_frames),
+    .ending = "ply",
+    .open = drape_frames_open,
     .write = ply_write,
-    .archive = drape_frame_files_archive,
-    .resume = ply_resume,
-    .cut = drape_frame_files_cut,
-    .close = drape_frame_files_close,
 };

@@ -66,7 +66,6 @@ typedef struct usd_state {
     material *material; /* (materials) */
     int32_t materials;
     double code; /* time code of the last frame */
-    bool live;   /* the files can be continued */
 } usd_state;
 
 static const drape_mesh *mesh_of(const usd_state *usd, const object *o)
@@ -216,23 +215,28 @@ static drape_status list_objects(usd_state *usd)
     return DRAPE_OK;
 }
 
-static void name_file(object *o)
+/* The file of the object that changes with this number; NULL: there are no more. */
+static drape_file *usd_file(void *state, size_t number)
 {
-    if (o->number == 0)
-        drape_file_name(&o->file, FILE_NAME);
-    else
-        drape_file_name(&o->file, PART_NAME, o->number);
+    usd_state *usd = state;
+    for (int32_t i = 0; i < usd->objects; i++)
+        if (usd->object[i].number == (int32_t)number)
+            return &usd->object[i].file;
+    return NULL;
 }
 
-/* Takes the memory for all files. */
 static drape_status usd_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
     usd_state *usd = state;
     usd->def = def;
     drape_status status = list_objects(usd);
-    for (int32_t i = 0; i < usd->objects && !status; i++)
-        if (usd->object[i].changes)
-            status = drape_file_create_in(ctx, def->folder, &usd->object[i].file);
+    for (int32_t i = 0; i < usd->objects && !status; i++) {
+        char name[NAME_ROOM];
+        object *o = &usd->object[i];
+        snprintf(name, sizeof name, o->number == 0 ? FILE_NAME : PART_NAME, o->number);
+        if (o->changes)
+            status = drape_export_open(ctx, def, name, &o->file);
+    }
     return status;
 }
 
@@ -513,10 +517,6 @@ static drape_status write_first(usd_state *usd, const drape_frame *frame)
         object *o = &usd->object[i];
         if (!o->changes)
             continue;
-        name_file(o);
-        status = drape_file_begin(&o->file);
-        if (status)
-            return status;
         if (i == 0) {
             put_stage(usd, frame);
         } else {
@@ -584,7 +584,6 @@ static drape_status usd_write(drape_context *ctx, void *state, const drape_frame
     for (int32_t i = usd->objects - 1; i >= 0 && frame->index > 0 && !status; i--)
         if (usd->object[i].changes)
             status = write_next(usd, &usd->object[i], frame);
-    usd->live = usd->live || !status;
     return status;
 }
 
@@ -594,7 +593,6 @@ static void usd_archive(void *state, drape_archive *a)
 {
     usd_state *usd = state;
     drape_archive_same(a, "the number of objects in " FILE_NAME, usd->objects);
-    drape_archive_bool(a, &usd->live);
     drape_archive_double(a, &usd->code);
     for (int32_t i = 0; i < usd->objects && !a->status; i++) {
         object *o = &usd->object[i];
@@ -605,32 +603,7 @@ static void usd_archive(void *state, drape_archive *a)
         drape_archive_bytes(a, o->high, sizeof o->high);
         drape_archive_int64(a, &o->extent);
         drape_archive_int64(a, &o->end);
-        drape_export_archive_file(a, &o->file);
     }
-}
-
-/* Before the first frame there are no files. */
-static drape_status usd_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
-                               drape_archive *a)
-{
-    usd_state *usd = state;
-    (void)frames;
-    usd->def = def;
-    drape_status status = list_objects(usd);
-    if (status)
-        return status;
-    usd_archive(usd, a);
-    status = a->status;
-    for (int32_t i = 0; i < usd->objects && !status; i++) {
-        object *o = &usd->object[i];
-        char name[NAME_ROOM];
-        if (!o->changes)
-            continue;
-        snprintf(name, sizeof name, o->number == 0 ? FILE_NAME : PART_NAME, o->number);
-        status = usd->live ? drape_export_reopen(ctx, def->folder, name, &o->file)
-                           : drape_file_create_in(ctx, def->folder, &o->file);
-    }
-    return status;
 }
 
 /* The tail of the last frame to be kept, which a later one made blanks, closes the file again. */
@@ -638,8 +611,8 @@ static drape_status usd_cut(drape_context *ctx, void *state, int64_t frames)
 {
     usd_state *usd = state;
     drape_status status = DRAPE_OK;
-    (void)ctx, (void)frames;
-    for (int32_t i = 0; i < usd->objects && usd->live && !status; i++) {
+    (void)ctx;
+    for (int32_t i = 0; i < usd->objects && frames > 0 && !status; i++) {
         object *o = &usd->object[i];
         const char *tail = tails[o->number > 0];
         if (!o->changes)
@@ -647,34 +620,6 @@ static drape_status usd_cut(drape_context *ctx, void *state, int64_t frames)
         status = write_bounds(usd, o);
         if (!status)
             status = drape_file_overwrite(&o->file, o->file.kept - (off_t)strlen(tail), tail, strlen(tail));
-        if (!status)
-            status = drape_file_trim(&o->file);
-    }
-    return status;
-}
-
-static drape_status usd_sync(void *state)
-{
-    usd_state *usd = state;
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; i < usd->objects && usd->live && !status; i++)
-        if (usd->object[i].changes)
-            status = drape_file_sync(&usd->object[i].file);
-    return status;
-}
-
-static drape_status usd_close(drape_context *ctx, void *state)
-{
-    usd_state *usd = state;
-    drape_status status = DRAPE_OK;
-    (void)ctx;
-    for (int32_t i = 0; i < usd->objects; i++) {
-        object *o = &usd->object[i];
-        if (!o->changes)
-            continue;
-        const drape_status closing = drape_file_close(&o->file);
-        status = status ? status : closing;
-        drape_file_destroy(&o->file);
     }
     return status;
 }
@@ -692,9 +637,7 @@ const drape_exporter_ops drape_exporter_usd = {
     .open = usd_open,
     .names = usd_names,
     .write = usd_write,
+    .file = usd_file,
     .archive = usd_archive,
-    .resume = usd_resume,
     .cut = usd_cut,
-    .sync = usd_sync,
-    .close = usd_close,
 };

@@ -58,25 +58,34 @@ int drape_file_open(drape_context *ctx, const char *path)
     return fd;
 }
 
+int drape_read_at(int fd, void *to, size_t size, off_t offset)
+{
+    for (char *at = to; size > 0;) {
+        const ssize_t n = pread(fd, at, size, offset);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            return n < 0 ? errno : EIO;
+        at += n;
+        offset += n;
+        size -= (size_t)n;
+    }
+    return 0;
+}
+
 drape_status drape_file_take(drape_context *ctx, int fd, const char *path, off_t limit, char **bytes,
                              size_t *size)
 {
     struct stat info;
     int error = fstat(fd, &info) ? errno : info.st_size > limit ? EFBIG : 0;
-    char *to = *bytes = error ? NULL : drape_alloc(ctx, (size_t)info.st_size + 1, 1);
-    for (*size = 0; to && !error && *size < (size_t)info.st_size;) {
-        const ssize_t n = read(fd, to + *size, (size_t)info.st_size - *size);
-        if (n > 0)
-            *size += (size_t)n;
-        else if (n == 0) /* it was shortened meanwhile */
-            error = EIO;
-        else if (errno != EINTR)
-            error = errno;
-    }
+    *size = error ? 0 : (size_t)info.st_size;
+    *bytes = error ? NULL : drape_alloc(ctx, *size + 1, 1);
+    if (*bytes)
+        error = drape_read_at(fd, *bytes, *size, 0);
     close(fd);
     if (!error)
-        return to ? DRAPE_OK : DRAPE_E_MEMORY;
-    drape_free(ctx, to);
+        return *bytes ? DRAPE_OK : DRAPE_E_MEMORY;
+    drape_free(ctx, *bytes);
     *bytes = NULL;
     return drape_file_fail(ctx, "read", path, error);
 }
@@ -88,13 +97,30 @@ drape_status drape_file_read(drape_context *ctx, const char *path, off_t limit, 
     return fd < 0 ? DRAPE_E_FILE : drape_file_take(ctx, fd, path, limit, bytes, size);
 }
 
+/* Bytes of a file that is resumed which will be overwritten. */
+struct drape_patch {
+    drape_patch *next;
+    off_t offset;
+    size_t size;
+    unsigned char bytes[];
+};
+
+static void free_patches(drape_file *file)
+{
+    for (drape_patch *p; (p = file->patches);) {
+        file->patches = p->next;
+        drape_free(file->ctx, p);
+    }
+}
+
 drape_status drape_file_create(drape_context *ctx, size_t path_length, drape_file *file)
 {
-    *file = (drape_file){.ctx = ctx, .dir = -1, .path_size = path_length + 1};
-    file->path = drape_alloc(ctx, file->path_size + BUFFER_SIZE, 1);
+    *file = (drape_file){.ctx = ctx, .room = path_length + DRAPE_PART_SIZE};
+    file->path = drape_alloc(ctx, 2 * file->room + BUFFER_SIZE, 1);
     if (!file->path)
         return DRAPE_E_MEMORY;
-    file->buffer = file->path + file->path_size;
+    file->part = file->path + file->room;
+    file->buffer = file->part + file->room;
     return DRAPE_OK;
 }
 
@@ -102,8 +128,13 @@ drape_status drape_file_create_in(drape_context *ctx, drape_folder *folder, drap
 {
     drape_status status = drape_file_create(ctx, MAX_NAME, file);
     file->folder = folder;
-    file->dir = drape_folder_descriptor(folder);
     return status;
+}
+
+/* What the names of a file are relative to. */
+static int base_of(const drape_file *file)
+{
+    return file->folder ? drape_folder_descriptor(file->folder) : AT_FDCWD;
 }
 
 /* 0 or errno. After EINTR the descriptor is closed, too, and no data were lost. */
@@ -113,17 +144,11 @@ static int close_descriptor(drape_file *file)
     return close(file->fd) && errno != EINTR ? errno : 0;
 }
 
-static const char *name_of(const drape_file *file)
-{
-    const char *slash = strrchr(file->path, '/');
-    return slash ? slash + 1 : file->path;
-}
-
 /* Removes a file that will not be published. */
 static void drop(drape_file *file)
 {
     if (*file->part)
-        unlinkat(file->dir, file->part, 0);
+        unlinkat(base_of(file), file->part, 0);
     *file->part = 0;
 }
 
@@ -135,30 +160,20 @@ void drape_file_abandon(drape_file *file)
     drop(file);
 }
 
-static void leave_folder(drape_file *file)
-{
-    if (!file->folder && file->path && file->dir >= 0)
-        close(file->dir);
-    if (!file->folder)
-        file->dir = -1;
-}
-
 void drape_file_destroy(drape_file *file)
 {
     drape_file_abandon(file);
-    leave_folder(file);
-    if (file->path) {
-        drape_free(file->ctx, file->rehearsed);
+    if (file->path)
         drape_free(file->ctx, file->path);
-    }
-    *file = (drape_file){.dir = -1};
+    free_patches(file);
+    *file = (drape_file){.fd = -1};
 }
 
 void drape_file_name(drape_file *file, const char *format, ...)
 {
     va_list args;
     va_start(args, format);
-    vsnprintf(file->path, file->path_size, format, args);
+    vsnprintf(file->path, file->room, format, args);
     va_end(args);
 }
 
@@ -190,30 +205,23 @@ static int open_device(const char *path)
     return fd;
 }
 
+/* Opens the file under a temporary name, beside its own. */
 static int open_part(drape_file *file)
 {
-    uint64_t token;
-    if (file->folder)
-        drape_folder_part(file->folder, file->part);
-    else if (getrandom(&token, sizeof token, 0) == (ssize_t)sizeof token)
-        snprintf(file->part, sizeof file->part, ".drape-%016" PRIx64 DRAPE_FILE_PART, token);
-    else
+    const char *slash = strrchr(file->path, '/');
+    uint64_t number;
+    if (getrandom(&number, sizeof number, 0) != (ssize_t)sizeof number)
         return -1;
-    int fd = openat(file->dir, file->part, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, (mode_t)0666);
+    if (file->folder)
+        drape_folder_part(file->folder, number, file->part);
+    else
+        snprintf(file->part, file->room, "%.*s.drape-%016" PRIx64 DRAPE_FILE_PART,
+                 slash ? (int)(slash + 1 - file->path) : 0, file->path, number);
+    const int fd =
+        openat(base_of(file), file->part, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, (mode_t)0666);
     if (fd < 0)
         *file->part = 0;
     return fd;
-}
-
-static int open_named(drape_file *file)
-{
-    struct stat info;
-    *file->part = 0;
-    if (stat(file->path, &info) == 0 && !S_ISREG(info.st_mode))
-        return open_device(file->path);
-    leave_folder(file);
-    file->dir = drape_folder_enter(file->path);
-    return file->dir < 0 ? -1 : open_part(file);
 }
 
 drape_status drape_file_begin(drape_file *file)
@@ -222,7 +230,10 @@ drape_status drape_file_begin(drape_file *file)
         return drape_fail(file->ctx, DRAPE_E_FILE,
                           "cannot write \"%.300s\" into the folder \"%.300s\": not the name of a file in it",
                           file->path, drape_folder_path(file->folder));
-    file->fd = file->folder ? open_part(file) : open_named(file);
+    struct stat info;
+    *file->part = 0;
+    const bool device = !file->folder && stat(file->path, &info) == 0 && !S_ISREG(info.st_mode);
+    file->fd = device ? open_device(file->path) : open_part(file);
     if (file->fd < 0)
         return fail(file, "write", errno);
     file->open = true;
@@ -337,22 +348,19 @@ void drape_file_print(drape_file *file, const char *format, ...)
 
 /* ---- Ending ---- */
 
-/* Records the file in its manifest, then gives it its name. Returns 0, or the status of a failure, with its
- * message. */
+/* Records the file in its manifest, then gives it its name. */
 static drape_status give_name(drape_file *file, bool growing)
 {
     drape_status status = DRAPE_OK;
     if (!*file->part)
         return DRAPE_OK;
     if (!file->folder) {
-        if (renameat(file->dir, file->part, file->dir, name_of(file)))
-            status = fail(file, "write", errno);
+        status = rename(file->part, file->path) ? fail(file, "write", errno) : DRAPE_OK;
     } else {
         status = growing ? drape_folder_note_growing(file->folder, file->path, file->fd, file->durable)
                          : drape_folder_note(file->folder, file->path, &file->sum, file->durable);
         if (!status)
-            status = drape_folder_publish(file->folder, file->part, file->path,
-                                          file->last.st_ino ? &file->last : NULL);
+            status = drape_folder_publish(file->folder, file->part, file->path, &file->last);
     }
     if (status)
         drop(file);
@@ -386,39 +394,52 @@ static int sync_descriptor(int fd)
 /* Closes the file before the rename: some file systems report a full disk only on closing. */
 drape_status drape_file_finish(drape_file *file)
 {
-    struct stat info = {0};
+    struct stat info;
     flush(file);
     if (file->durable && !file->error)
         file->error = sync_descriptor(file->fd);
-    if (fstat(file->fd, &info))
-        info = (struct stat){0};
-    int closing = close_descriptor(file), error = file->error ? file->error : closing;
-    if (error) {
+    const bool known = fstat(file->fd, &info) == 0;
+    const int closing = close_descriptor(file), error = file->error ? file->error : closing;
+    if (error)
         drop(file);
-        return fail(file, "write", error);
-    }
-    drape_status status = give_name(file, false);
-    if (!status)
+    const drape_status status = error ? fail(file, "write", error) : give_name(file, false);
+    if (!status && known)
         file->last = info;
     return status;
 }
 
-/* Reads the first bytes of the file for their checksum; 0 or errno. */
+/* Changes what was read from an offset as the patch will change the file. */
+static void apply(const drape_patch *p, off_t offset, unsigned char *bytes, size_t size)
+{
+    const off_t begin = p->offset > offset ? p->offset : offset, last = p->offset + (off_t)p->size,
+                read = offset + (off_t)size, end = last < read ? last : read;
+    if (begin < end)
+        memcpy(bytes + (begin - offset), p->bytes + (begin - p->offset), (size_t)(end - begin));
+}
+
+int drape_file_sum(int fd, off_t size, const drape_patch *patches, drape_checksum *sum)
+{
+    unsigned char bytes[16384];
+    int error = 0;
+    *sum = (drape_checksum){0};
+    while (!error && sum->size < (uint64_t)size) {
+        const uint64_t left = (uint64_t)size - sum->size;
+        const size_t n = left < sizeof bytes ? (size_t)left : sizeof bytes;
+        error = drape_read_at(fd, bytes, n, (off_t)sum->size);
+        for (const drape_patch *p = patches; p; p = p->next)
+            apply(p, (off_t)sum->size, bytes, n);
+        if (!error)
+            drape_checksum_add(sum, bytes, n);
+    }
+    return error;
+}
+
+/* The checksum of the first bytes of the file, as they are; 0 or errno. */
 static int sum_up(drape_file *file, off_t size)
 {
-    unsigned char bytes[PATCHED];
-    drape_checksum sum = {0};
-    while (sum.size < (uint64_t)size) {
-        const uint64_t left = (uint64_t)size - sum.size;
-        ssize_t n = pread(file->fd, bytes, left < PATCHED ? (size_t)left : PATCHED, (off_t)sum.size);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return n < 0 ? errno : EIO;
-        drape_checksum_add(&sum, bytes, (size_t)n);
-    }
-    file->sum = file->kept_sum = sum;
-    return 0;
+    const int error = drape_file_sum(file->fd, size, NULL, &file->sum);
+    file->kept_sum = file->sum;
+    return error;
 }
 
 /* A file that cannot be cut, such as a pipe, stays as it is; the failure that led here is the one to
@@ -446,20 +467,15 @@ drape_status drape_file_keep(drape_file *file)
 }
 
 /* Accounts for at most PATCHED bytes that are about to be overwritten; 0 or errno. */
-static int patch(drape_file *file, off_t offset, const void *data, size_t size)
+static int account(drape_file *file, off_t offset, const void *data, size_t size)
 {
     unsigned char words[PATCHED + 16] = {0};
     const off_t begin = offset / 8 * 8, end = offset + (off_t)size;
     const off_t last = (end + 7) / 8 * 8, was = file->size < last ? file->size : last;
-    for (off_t at = begin; at < was;) {
-        ssize_t n = pread(file->fd, words + (at - begin), (size_t)(was - at), at);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return n < 0 ? errno : EIO;
-        at += n;
-    }
+    const int error = was > begin ? drape_read_at(file->fd, words, (size_t)(was - begin), begin) : 0;
     drape_checksum *sum = &file->sum;
+    if (error)
+        return error;
     if (was > begin)
         sum->sum -= drape_checksum_bytes((uint64_t)begin, words, (size_t)(was - begin));
     memcpy(words + (offset - begin), data, size);
@@ -472,101 +488,57 @@ static int patch(drape_file *file, off_t offset, const void *data, size_t size)
     return 0;
 }
 
-/* Reads the beginning of the file as far as `size`, and takes it out of the checksum: it is added again
- * when it is known how it would be. */
-static drape_status read_beginning(drape_file *file, size_t size)
+static int write_at(int fd, off_t offset, const void *data, size_t size)
 {
-    const size_t had = file->rehearsed_size;
-    unsigned char *grown = drape_alloc(file->ctx, size, 1);
-    if (!grown)
-        return DRAPE_E_MEMORY;
-    if (had)
-        memcpy(grown, file->rehearsed, had);
-    drape_free(file->ctx, file->rehearsed);
-    file->rehearsed = grown;
-    for (size_t at = had; at < size;) {
-        ssize_t n = pread(file->fd, grown + at, size - at, (off_t)at);
+    for (const char *from = data; size > 0;) {
+        const ssize_t n = pwrite(fd, from, size, offset);
         if (n < 0 && errno == EINTR)
             continue;
         if (n <= 0)
-            return fail(file, "continue", n < 0 ? errno : EIO);
-        at += (size_t)n;
-    }
-    file->sum.sum -= drape_checksum_bytes(had, grown + had, size - had);
-    file->rehearsed_size = size;
-    return DRAPE_OK;
-}
-
-/* Overwrites bytes of the file only in memory. */
-static drape_status rehearse(drape_file *file, size_t offset, const void *data, size_t size)
-{
-    const size_t words = (offset + size + 7) / 8 * 8, all = (size_t)file->size;
-    const size_t end = words < all ? words : all;
-    drape_status status = DRAPE_OK;
-    if (offset + size > all)
-        return fail(file, "continue", EINVAL);
-    if (end > file->rehearsed_size)
-        status = read_beginning(file, end);
-    if (!status)
-        memcpy(file->rehearsed + offset, data, size);
-    return status;
-}
-
-/* Before a file is changed that an earlier process completed, the manifest says that it grows again. */
-static drape_status announce(drape_file *file)
-{
-    if (!file->reopened)
-        return DRAPE_OK;
-    file->reopened = false;
-    return drape_folder_note_growing(file->folder, file->path, file->fd, file->durable);
-}
-
-static drape_status write_at(drape_file *file, off_t offset, const char *from, size_t size)
-{
-    while (size > 0) {
-        ssize_t n = pwrite(file->fd, from, size, offset);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return fail(file, "write", n < 0 ? errno : ENOSPC);
+            return n < 0 ? errno : ENOSPC;
         from += n;
         offset += n;
         size -= (size_t)n;
     }
+    return 0;
+}
+
+static drape_status add_patch(drape_file *file, off_t offset, const void *data, size_t size)
+{
+    drape_patch **last = &file->patches;
+    if (offset + (off_t)size > file->size)
+        return fail(file, "continue", EINVAL);
+    while (*last)
+        last = &(*last)->next;
+    *last = drape_alloc(file->ctx, 1, sizeof **last + size);
+    if (!*last)
+        return DRAPE_E_MEMORY;
+    **last = (drape_patch){.offset = offset, .size = size};
+    memcpy((*last)->bytes, data, size);
     return DRAPE_OK;
 }
 
 drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size)
 {
-    const char *from = data;
-    drape_status status = DRAPE_OK;
-    for (size_t part; size > 0 && !status; size -= part, from += part, offset += (off_t)part) {
-        part = size < PATCHED ? size : PATCHED;
-        if (file->folder && drape_folder_rehearses(file->folder)) {
-            status = rehearse(file, (size_t)offset, from, part);
-            continue;
-        }
-        const int error = patch(file, offset, from, part);
+    int error = 0;
+    if (file->resumed)
+        return add_patch(file, offset, data, size);
+    for (const char *from = data; size > 0 && !error;) {
+        const size_t part = size < PATCHED ? size : PATCHED;
+        error = account(file, offset, from, part);
         if (error)
-            return fail(file, "write", error);
-        status = announce(file);
-        if (!status)
-            status = write_at(file, offset, from, part);
-        if (status)
+            break;
+        error = write_at(file->fd, offset, from, part);
+        from += part;
+        offset += (off_t)part;
+        size -= part;
+        if (error)
             sum_up(file, file->kept);
-        if (!status && offset + (off_t)part > file->size)
-            file->size = file->kept = offset + (off_t)part;
+        else if (offset > file->size)
+            file->size = file->kept = offset;
     }
-    if (!status && !file->rehearsed)
-        file->kept_sum = file->sum;
-    return status;
-}
-
-/* Its own failures are ignored: the one that led here is the one to report. */
-void drape_file_restore(drape_file *file, off_t offset, const void *data, size_t size)
-{
-    if (pwrite(file->fd, data, size, offset) == (ssize_t)size)
-        drape_file_cut(file, offset + (off_t)size);
+    file->kept_sum = file->sum;
+    return error ? fail(file, "write", error) : DRAPE_OK;
 }
 
 drape_status drape_file_sync(drape_file *file)
@@ -575,82 +547,94 @@ drape_status drape_file_sync(drape_file *file)
     return error ? fail(file, "write", error) : DRAPE_OK;
 }
 
+/* Opens the folder that a path leads into. Returns -1 with errno. */
+static int open_parent(const char *path)
+{
+    char parent[4096];
+    const char *slash = strrchr(path, '/');
+    const int length = slash ? (int)(slash - path) : 0;
+    snprintf(parent, sizeof parent, "%.*s%s", length, path, slash ? "/" : ".");
+    return open(parent, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+}
+
 /* A folder may be writable without being readable. */
 drape_status drape_file_sync_names(drape_file *file)
 {
     if (file->folder)
         return drape_folder_sync(file->folder);
-    int fd = file->dir < 0 ? -1 : openat(file->dir, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (fd < 0)
-        return file->dir < 0 || errno == EACCES ? DRAPE_OK : fail(file, "write the folder of", errno);
-    int error = sync_descriptor(fd);
-    close(fd);
-    return error ? fail(file, "write the folder of", error) : DRAPE_OK;
+    const int fd = open_parent(file->path);
+    int error = fd < 0 ? errno : sync_descriptor(fd);
+    if (fd >= 0)
+        close(fd);
+    return error && error != EACCES ? fail(file, "write the folder of", error) : DRAPE_OK;
+}
+
+bool drape_folder_has(const char *folder, const char *path)
+{
+    struct stat a, b;
+    const int fd = open_parent(path);
+    const bool known = fd >= 0 && stat(folder, &a) == 0 && fstat(fd, &b) == 0;
+    if (fd >= 0)
+        close(fd);
+    return known && a.st_dev == b.st_dev && a.st_ino == b.st_ino;
 }
 
 /* ---- Continuing ---- */
 
 drape_status drape_file_reopen(drape_file *file)
 {
-    struct stat info;
-    char path[512];
-    snprintf(path, sizeof path, "%.300s/%.200s", drape_folder_path(file->folder), file->path);
     *file->part = 0;
-    file->fd = drape_folder_open_file(file->folder, file->path, O_RDWR);
-    if (file->fd < 0 && errno == EINVAL)
-        return drape_fail(file->ctx, DRAPE_E_FILE, "cannot continue \"%.500s\": it is not a regular file",
-                          path);
-    if (file->fd < 0 || fstat(file->fd, &info))
+    file->fd = drape_open_regular(base_of(file), file->path, O_RDWR | O_NOFOLLOW);
+    if (file->fd < 0)
         return fail(file, "continue", errno);
-    file->open = file->reopened = true;
+    file->open = file->resumed = true;
     file->used = 0;
     file->error = 0;
     file->size = file->kept;
-    file->last = info;
-    if (info.st_size < file->kept)
-        return drape_fail(file->ctx, DRAPE_E_FILE,
-                          "cannot continue \"%.500s\": it has %lld bytes, and had %lld at the checkpoint",
-                          path, (long long)info.st_size, (long long)file->kept);
-    int error = sum_up(file, file->kept);
-    if (!error && lseek(file->fd, file->kept, SEEK_SET) != file->kept)
-        error = errno;
-    return error ? fail(file, "continue", error) : DRAPE_OK;
+    if (fstat(file->fd, &file->last))
+        return fail(file, "continue", errno);
+    if (file->last.st_size < file->kept)
+        return drape_fail(
+            file->ctx, DRAPE_E_FILE,
+            "cannot continue \"%.300s/%.200s\": it has %lld bytes, and had %lld at the checkpoint",
+            drape_folder_path(file->folder), file->path, (long long)file->last.st_size,
+            (long long)file->kept);
+    return lseek(file->fd, file->kept, SEEK_SET) < 0 ? fail(file, "continue", errno) : DRAPE_OK;
 }
 
-/* The rehearsal ends with the checksum of the bytes that are there. */
-static drape_status compare(drape_file *file)
+drape_status drape_file_compare(drape_file *file)
 {
-    const bool same =
-        file->sum.sum + drape_checksum_bytes(0, file->rehearsed, file->rehearsed_size) == file->expected;
-    drape_free(file->ctx, file->rehearsed);
-    file->rehearsed = NULL;
-    file->rehearsed_size = 0;
-    int error = sum_up(file, file->kept);
+    const int error = drape_file_sum(file->fd, file->kept, file->patches, &file->sum);
+    file->kept_sum = file->sum;
     if (error)
         return fail(file, "continue", error);
-    return same ? DRAPE_OK
-                : drape_fail(
-                      file->ctx, DRAPE_E_PARSE,
-                      "cannot continue \"%.300s/%.200s\": it is damaged: its checksum is not that of the "
-                      "checkpoint",
-                      drape_folder_path(file->folder), file->path);
+    return file->sum.sum == file->expected
+               ? DRAPE_OK
+               : drape_fail(
+                     file->ctx, DRAPE_E_PARSE,
+                     "cannot continue \"%.300s/%.200s\": it is damaged: its checksum is not that of the "
+                     "checkpoint",
+                     drape_folder_path(file->folder), file->path);
 }
 
 drape_status drape_file_trim(drape_file *file)
 {
-    if (drape_folder_rehearses(file->folder))
-        return compare(file);
-    drape_status status = announce(file);
-    if (!status && ftruncate(file->fd, file->kept))
-        status = fail(file, "cut", errno);
-    return status;
+    int error = 0;
+    drape_status status = drape_folder_note_growing(file->folder, file->path, file->fd, file->durable);
+    for (const drape_patch *p = file->patches; p && !status && !error; p = p->next)
+        error = write_at(file->fd, p->offset, p->bytes, p->size);
+    if (!status && !error && ftruncate(file->fd, file->kept))
+        error = errno;
+    free_patches(file);
+    file->resumed = false;
+    return error ? fail(file, "continue", error) : status;
 }
 
 drape_status drape_file_close(drape_file *file)
 {
     if (!file->open)
         return DRAPE_OK;
-    const bool published = !*file->part && file->folder;
+    const bool published = !*file->part && file->folder && !file->resumed;
     int error = close_descriptor(file);
     drop(file);
     if (error)

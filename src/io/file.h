@@ -21,14 +21,14 @@
 #define DRAPE_FILE_PART ".part"          /* suffix of temporary names */
 #define DRAPE_MAX_TABLE ((off_t)1 << 32) /* [bytes] of a file with rows or lines that is read */
 
+typedef struct drape_patch drape_patch;
+
 /* A file with all members zero does not exist: closing and destroying it does nothing. */
 typedef struct drape_file {
     drape_context *ctx;
     drape_folder *folder; /* NULL: the user named the file */
-    int dir;              /* descriptor of the folder that it is in; -1: none */
-    char *path;           /* its own name */
-    size_t path_size;
-    char part[DRAPE_PART_SIZE]; /* its name in dir until it is published; "" if it is written in place */
+    char *path, *part;    /* its own name; its temporary one until it is published, "" if it has none */
+    size_t room;          /* for each of these names */
     char *buffer;
     size_t used; /* bytes in the buffer */
     int fd;
@@ -37,11 +37,10 @@ typedef struct drape_file {
     int error;                    /* errno of the first failed write since the last record; 0: none */
     off_t size, kept;             /* bytes written; bytes of complete records */
     drape_checksum sum, kept_sum; /* of these bytes */
-    bool reopened;                /* nothing was changed since it was reopened */
+    bool resumed;                 /* it was reopened, and not trimmed yet */
     uint64_t expected;            /* checksum that the file must have when it is continued */
-    unsigned char *rehearsed;     /* (rehearsed_size) how the file would begin; NULL: as it does */
-    size_t rehearsed_size;
-    struct stat last; /* the file that was last published; st_ino 0: none */
+    drape_patch *patches;         /* what will be overwritten then */
+    struct stat last;             /* the file that was last published; st_ino 0: none */
 } drape_file;
 
 /* Takes all memory for files that the user names, with paths of at most path_length bytes; or for the file of
@@ -93,20 +92,21 @@ drape_status drape_file_keep(drape_file *file);
 /* Overwrites bytes that are already kept. Errors: DRAPE_E_FILE. */
 drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size);
 
-/* Restores bytes after a failed drape_file_overwrite, for which the file already had room, and ends the
- * file with them, as far as possible. */
-void drape_file_restore(drape_file *file, off_t offset, const void *data, size_t size);
-
 /* Cuts a published file to its first size bytes, as far as possible. */
 void drape_file_cut(drape_file *file, off_t size);
 
-/* Reopens a published file of a folder that an earlier process left, to continue it after its first `kept`
- * bytes; it must have at least that many. drape_file_trim then cuts it to that size; call
- * drape_file_overwrite before if necessary. While the folder rehearses, these two change nothing, and
- * drape_file_trim compares the checksum that the file would have with the one in `expected`. Errors:
- * DRAPE_E_FILE, DRAPE_E_PARSE (the file is damaged). */
+/* Resumes a published file of a folder that an earlier process left, after its first `kept` bytes; it must
+ * have at least that many. Until it is trimmed drape_file_overwrite only notes what it would do.
+ * drape_file_compare checks that the file will then have the checksum in `expected`; nothing is changed
+ * before drape_file_trim, which overwrites what was noted and cuts the rest. Errors: DRAPE_E_FILE,
+ * DRAPE_E_MEMORY, DRAPE_E_PARSE (the file is damaged). */
 drape_status drape_file_reopen(drape_file *file);
+drape_status drape_file_compare(drape_file *file);
 drape_status drape_file_trim(drape_file *file);
+
+/* The checksum of the first bytes of a file, as the patches (NULL: none) will change them. Returns 0 or an
+ * errno. */
+int drape_file_sum(int fd, off_t size, const drape_patch *patches, drape_checksum *sum);
 
 /* Waits until everything that a growing file keeps is on the disk. Errors: DRAPE_E_FILE. */
 drape_status drape_file_sync(drape_file *file);
@@ -125,6 +125,9 @@ drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *p
  * EINVAL for anything else, such as a pipe or a device: opening it does not wait. */
 int drape_open_regular(int dir, const char *path, int flags);
 
+/* Reads bytes from an offset on; 0 or errno, which is EIO if the file ends before. */
+int drape_read_at(int fd, void *to, size_t size, off_t offset);
+
 /* Opens a file of a run or an experiment for reading, as all readers do; a failure also sets the message. */
 int drape_file_open(drape_context *ctx, const char *path);
 
@@ -134,6 +137,9 @@ int drape_file_open(drape_context *ctx, const char *path);
 drape_status drape_file_read(drape_context *ctx, const char *path, off_t limit, char **bytes, size_t *size);
 drape_status drape_file_take(drape_context *ctx, int fd, const char *path, off_t limit, char **bytes,
                              size_t *size);
+
+/* Whether a file at path is directly in a folder. */
+bool drape_folder_has(const char *folder, const char *path);
 
 /* Creates a folder and its missing parents, with the mode 0777 & ~umask. path is modified during the call.
  * Errors: DRAPE_E_FILE. */

@@ -8,9 +8,9 @@
  * those that the manifest describes; a file that was still growing when a process was killed is known by
  * its inode and its time of birth instead. All else in the folder is somebody else's, whatever its name is.
  *
- * Files are reached from the descriptor of the folder. They are written under temporary names with a random
- * number, which the manifest has too; they get their names by a rename that replaces nothing, or by one that
- * exchanges a file of ours. Links are not followed, and nothing but regular files is opened.
+ * Files are reached from the descriptor of the folder. They are written under temporary names, which have the
+ * inode of the folder and a random number, and get their names by a rename that replaces nothing but a file of
+ * ours. Links are not followed, and nothing but regular files is opened.
  *
  * The folder is locked (flock on its descriptor) while it is open, so a lock ends with its process.
  */
@@ -71,15 +71,10 @@ drape_status drape_folder_verify(drape_folder *folder, const char *name);
  * again. */
 drape_status drape_folder_verify_all(drape_folder *folder, bool complete, const char *except);
 
-/* A folder rehearses while the files of a run that is resumed are checked: what is then overwritten and
- * trimmed is only accounted for, and drape_folder_remove refuses as drape_folder_check does. */
-void drape_folder_rehearse(drape_folder *folder, bool on);
-bool drape_folder_rehearses(const drape_folder *folder);
-
 /* ---- For io/file.c ---- */
 
-/* A temporary name. */
-void drape_folder_part(drape_folder *folder, char part[DRAPE_PART_SIZE]);
+/* A temporary name with a random number. */
+void drape_folder_part(const drape_folder *folder, uint64_t number, char part[DRAPE_PART_SIZE]);
 
 /* Adds a line for a file: complete, with its checksum; or growing, with the identity of its descriptor.
  * durable: the line is on the disk when this returns. Errors: DRAPE_E_FILE. */
@@ -88,20 +83,9 @@ drape_status drape_folder_note(drape_folder *folder, const char *name, const dra
 drape_status drape_folder_note_growing(drape_folder *folder, const char *name, int fd, bool durable);
 
 /* Renames a temporary file. last: the file that this process wrote under the name before, which it may
- * replace; NULL: none. Errors: DRAPE_E_FILE; then the temporary file is still there. */
+ * replace. Errors: DRAPE_E_FILE; then the temporary file is still there. */
 drape_status drape_folder_publish(drape_folder *folder, const char *part, const char *name,
                                   const struct stat *last);
-
-/* Opens a regular file of the folder. Returns -1 with errno, which is EINVAL for anything else, such as a
- * link or a pipe. */
-int drape_folder_open_file(const drape_folder *folder, const char *name, int flags);
-
-/* Whether a file at path is directly in a folder. */
-bool drape_folder_has(const char *folder, const char *path);
-
-/* Opens the folder of a file at path, which is modified during the call, to reach files from it; readable
- * or not. Returns -1 with errno. */
-int drape_folder_enter(char *path);
 
 /* Waits until manifest and names are on the disk. Errors: DRAPE_E_FILE. */
 drape_status drape_folder_sync(drape_folder *folder);

@@ -1,18 +1,17 @@
 /* recorder.c: see recorder.h. */
 #include "io/recorder.h"
 
-#include <errno.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "base/clock.h"
 #include "io/checkpoint.h"
-#include "io/energy.h"
 #include "io/export.h"
 #include "io/scene_copy.h"
-#include "io/steps.h"
 #include "io/summary.h"
+#include "io/tables.h"
 #include "sim/sim.h"
 
 /* Times closer than this are the same up to rounding: k / frame_rate and a sum of steps. Steps are longer.
@@ -24,7 +23,6 @@
 typedef struct output {
     const drape_exporter_ops *ops;
     void *state;
-    bool open;
 } output;
 
 struct drape_recorder {
@@ -52,16 +50,17 @@ struct drape_recorder {
     drape_collider_pose *poses; /* (2 x body_count) of a frame, and these with z up */
     double *points;             /* (2 x point_count x 3) of those that deform, likewise */
     size_t body_count, point_count;
-    drape_file steps, energies;
-    drape_file checkpoint; /* the file of the checkpoints; without a path none are written */
-    int64_t every;         /* frames between checkpoints; 0: only drape_recorder_checkpoint writes them */
-    double start, wall;    /* [s] clock when the run began; wall time of the run until the last checkpoint */
+    drape_file steps, energies, whole; /* whole: for the formats */
+    drape_file checkpoint;             /* the file of the checkpoints; without a path none are written */
+    int64_t every;      /* frames between checkpoints; 0: only drape_recorder_checkpoint writes them */
+    double start, wall; /* [s] clock when the run began; wall time of the run until the last checkpoint */
     int64_t frames;
     double last_time; /* [s] of the last frame */
     bool moved;       /* a step was accepted after the last frame */
     bool wants_fields;
     bool gathers; /* ranks share the model, and a format is written by rank 0 */
     bool counted; /* the def says how many frames come */
+    bool live;    /* the files can be written */
     bool finished;
     double seconds;
     drape_status failure; /* the first one; DRAPE_OK: none */
@@ -267,10 +266,8 @@ static void write_all(drape_recorder *r, double time, const double *positions, c
     if (r->body_count > 0)
         add_bodies(r, &frame);
     write_outputs(r, &frame);
-    const drape_energy_row row = {
-        .frame = r->frames, .t = time, .t_state = drape_sim_time(r->sim), .energy = *energy};
     if (!r->failure)
-        note(r, drape_energy_write(&r->energies, &row));
+        note(r, drape_energy_write(&r->energies, r->frames, time, drape_sim_time(r->sim), energy));
 }
 
 /* Each rank writes the nodes that it owns behind what rank 0 has in the file. */
@@ -339,7 +336,22 @@ static void archive_duration(drape_recorder *r, drape_archive *a)
                            there, here);
 }
 
-/* Everything except what the formats archive themselves. */
+/* The files that grow: the tables, then those of the formats. NULL: there are no more. */
+static drape_file *growing(drape_recorder *r, size_t number)
+{
+    if (number < 2)
+        return number ? &r->energies : &r->steps;
+    number -= 2;
+    for (size_t i = 0; i < r->output_count; i++) {
+        const output *o = &r->outputs[i];
+        drape_file *file = NULL;
+        for (size_t k = 0; o->ops->file && (file = o->ops->file(o->state, k)); k++)
+            if (number-- == 0)
+                return file;
+    }
+    return NULL;
+}
+
 static void archive_progress(drape_recorder *r, drape_archive *a)
 {
     drape_archive_mark(a, "recorder");
@@ -353,19 +365,33 @@ static void archive_progress(drape_recorder *r, drape_archive *a)
     drape_archive_bool(a, &r->moved);
     drape_archive_double(a, &r->seconds);
     drape_archive_double(a, &r->wall);
-    drape_export_archive_file(a, &r->steps);
-    drape_export_archive_file(a, &r->energies);
+}
+
+/* What the formats remember, then of each file that grows how many bytes to keep, and their checksum. */
+static void archive_files(drape_recorder *r, drape_archive *a)
+{
+    drape_file *file;
+    for (size_t i = 0; i < r->output_count && !a->status; i++)
+        if (r->outputs[i].ops->archive)
+            r->outputs[i].ops->archive(r->outputs[i].state, a);
+    for (size_t k = 0; (file = growing(r, k)); k++) {
+        int64_t bytes = file->kept, sum = (int64_t)file->kept_sum.sum;
+        drape_archive_int64(a, &bytes);
+        drape_archive_int64(a, &sum);
+        if (drape_archive_has_read(a)) {
+            file->kept = (off_t)bytes;
+            file->expected = (uint64_t)sum;
+        }
+    }
 }
 
 /* All frames that a checkpoint counts must be on the disk before the checkpoint is. */
 static drape_status sync_files(drape_recorder *r)
 {
-    drape_status status = drape_file_sync(&r->steps);
-    if (!status)
-        status = drape_file_sync(&r->energies);
-    for (size_t i = 0; i < r->output_count && !status; i++)
-        if (r->outputs[i].ops->sync && r->outputs[i].open)
-            status = r->outputs[i].ops->sync(r->outputs[i].state);
+    drape_status status = DRAPE_OK;
+    drape_file *file;
+    for (size_t k = 0; !status && (file = growing(r, k)); k++)
+        status = drape_file_sync(file);
     return status ? status : drape_folder_sync(r->folder);
 }
 
@@ -380,8 +406,8 @@ static drape_status write_checkpoint(drape_recorder *r)
     drape_sim_archive_identity(r->sim, &c.archive);
     drape_sim_archive(r->sim, &c.archive);
     archive_progress(r, &c.archive);
-    for (size_t i = 0; i < r->output_count && !r->finished && r->writes; i++)
-        r->outputs[i].ops->archive(r->outputs[i].state, &c.archive);
+    if (!r->finished && r->writes)
+        archive_files(r, &c.archive);
     return drape_checkpoint_end(&c);
 }
 
@@ -478,11 +504,10 @@ static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *
             drape_exporters[drape_registry_find(&drape_exporter_registry, NULL, def->formats[i])];
         if (is_chosen(r, ops))
             continue;
-        output *o = &r->outputs[r->output_count++];
-        o->ops = ops;
-        o->state = drape_arena_take(&r->arena, 1, ops->state_size);
-        if (!o->state)
+        void *state = drape_arena_take(&r->arena, 1, ops->state_size);
+        if (!state)
             return DRAPE_E_MEMORY;
+        r->outputs[r->output_count++] = (output){ops, state};
     }
     return DRAPE_OK;
 }
@@ -567,7 +592,7 @@ static bool writes(const void *user, const char *name)
 {
     const drape_recorder *r = user;
     for (size_t i = 0; i < r->output_count; i++)
-        if (r->outputs[i].ops->names(name))
+        if (drape_export_names(r->outputs[i].ops, name))
             return true;
     return is_own_name(r, name);
 }
@@ -576,15 +601,18 @@ static bool writes(const void *user, const char *name)
 static bool clears(const void *user, const char *name)
 {
     for (int i = 0; drape_exporters[i]; i++)
-        if (drape_exporters[i]->names(name))
+        if (drape_export_names(drape_exporters[i], name))
             return true;
     return is_own_name(user, name);
 }
 
-/* A run that is resumed finds its own files, and checks each by itself. */
-static bool nothing(const void *user, const char *name)
+/* A file of a frame that follows those of the checkpoint. */
+static bool is_late(const void *user, const char *name)
 {
-    (void)user, (void)name;
+    const drape_recorder *r = user;
+    for (size_t i = 0; i < r->output_count; i++)
+        if (drape_export_frame_of(r->outputs[i].ops, name) >= r->frames)
+            return true;
     return false;
 }
 
@@ -595,7 +623,7 @@ static drape_status protect(void *user, const char *path, const char *pointer)
 }
 
 /* Nothing is touched by a refusal; only the folder may be new. */
-static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def, bool resumes)
+static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def)
 {
     r->also = def->also;
     r->also_count = def->also_count;
@@ -604,26 +632,28 @@ static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def
         status = drape_folder_protect(r->folder, def->scene);
     if (!status)
         status = drape_scene_files(r->ctx, r->model, def->scene ? def->scene : "", protect, r->folder);
-    return status ? status : drape_folder_check(r->folder, resumes ? nothing : writes, clears, r);
+    return status;
 }
 
-static drape_status prepare_checkpoints(drape_recorder *r, const drape_recorder_def *def)
+static drape_status prepare_files(drape_recorder *r, const drape_recorder_def *def, bool resumes)
 {
-    r->every = def->checkpoint_every;
     r->start = def->start;
-    r->def = def_of(r->sim);
     r->counted = def->frames > 0;
+    r->def = def_of(r->sim);
     if (r->counted)
         r->def.most_frames = def->frames;
     r->def.arena = &r->arena;
     r->def.folder = r->folder;
     r->def.durable = def->checkpoints;
+    r->def.resumes = resumes;
+    r->def.whole = &r->whole;
     r->def.bodies = r->bodies;
     r->def.body_count = (int32_t)r->body_count;
-    if (!def->checkpoints)
-        return DRAPE_OK;
-    drape_status status = drape_file_create_in(r->ctx, r->folder, &r->checkpoint);
-    if (!status)
+    drape_status status = drape_file_create_in(r->ctx, r->folder, &r->whole);
+    r->whole.durable = def->checkpoints;
+    if (!status && def->checkpoints)
+        status = drape_file_create_in(r->ctx, r->folder, &r->checkpoint);
+    if (!status && def->checkpoints)
         drape_file_name(&r->checkpoint, DRAPE_CHECKPOINT_NAME);
     return status;
 }
@@ -634,76 +664,100 @@ static bool is_checkpoint(const void *user, const char *name)
     return strcmp(name, DRAPE_CHECKPOINT_NAME) == 0;
 }
 
-/* Removes a checkpoint of an earlier run first, because it counts frames that are removed next. */
-static drape_status open_files(drape_recorder *r)
+static drape_status open_formats(drape_recorder *r)
 {
-    drape_status status = drape_folder_remove(r->folder, is_checkpoint, r);
-    if (!status)
-        status = drape_folder_begin(r->folder, clears, r);
-    for (size_t i = 0; i < r->output_count && !status; i++) {
-        output *o = &r->outputs[i];
-        o->open = true; /* close must also follow an open that failed */
-        status = o->ops->open(r->ctx, &r->def, o->state);
-    }
-    if (!status)
-        status = drape_steps_open(r->ctx, r->folder, false, &r->steps);
-    return status ? status : drape_energy_open(r->ctx, r->folder, false, &r->energies);
-}
-
-/* Removes what follows the frames of the checkpoint, or rehearses that. */
-static drape_status cut_files(drape_recorder *r)
-{
-    drape_status status = drape_file_trim(&r->steps);
-    if (!status)
-        status = drape_file_trim(&r->energies);
+    drape_status status = DRAPE_OK;
     for (size_t i = 0; i < r->output_count && !status; i++)
-        status = r->outputs[i].ops->cut(r->ctx, r->outputs[i].state, r->frames);
+        status = r->outputs[i].ops->open(r->ctx, &r->def, r->outputs[i].state);
     return status;
 }
 
-/* Files of formats that are not written now belong to another run and stay as they are. */
+/* Nothing is touched by a refusal. A checkpoint of an earlier run is removed first, because it counts frames
+ * that are removed next. */
+static drape_status begin_files(drape_recorder *r)
+{
+    drape_status status = drape_folder_check(r->folder, writes, clears, r);
+    if (!status)
+        status = drape_folder_remove(r->folder, is_checkpoint, r);
+    if (!status)
+        status = drape_folder_begin(r->folder, clears, r);
+    if (!status)
+        status = open_formats(r);
+    if (!status)
+        status = drape_csv_open(r->ctx, r->folder, DRAPE_STEPS_NAME, drape_steps_columns, &r->steps);
+    return status ? status
+                  : drape_csv_open(r->ctx, r->folder, DRAPE_ENERGY_NAME, drape_energy_columns, &r->energies);
+}
+
+/* Opens all files that grow, and reads from the checkpoint how far they do. */
+static drape_status reopen_files(drape_recorder *r, drape_archive *a)
+{
+    drape_file *file;
+    drape_status status = drape_export_open(r->ctx, &r->def, DRAPE_STEPS_NAME, &r->steps);
+    if (!status)
+        status = drape_export_open(r->ctx, &r->def, DRAPE_ENERGY_NAME, &r->energies);
+    if (!status)
+        status = open_formats(r);
+    if (status)
+        return status;
+    archive_files(r, a);
+    status = drape_archive_end(a);
+    for (size_t k = 0; !status && (file = growing(r, k)); k++)
+        if (file->kept > 0)
+            status = drape_file_reopen(file);
+    return status;
+}
+
+/* Whether all files have the bytes that the checkpoint and the manifest describe; nothing is changed. */
+static drape_status check_files(drape_recorder *r)
+{
+    drape_file *file;
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; i < r->output_count && !status; i++) {
+        const output *o = &r->outputs[i];
+        for (int64_t k = 0; o->ops->ending && k < r->frames && !status; k++) {
+            drape_file_name(&r->whole, DRAPE_FRAME_NAME, k, o->ops->ending);
+            status = drape_folder_verify(r->folder, r->whole.path);
+        }
+        if (!status && o->ops->cut)
+            status = o->ops->cut(r->ctx, o->state, r->frames);
+    }
+    for (size_t k = 0; !status && (file = growing(r, k)); k++)
+        if (file->kept > 0)
+            status = drape_file_compare(file);
+    return status ? status : drape_folder_check(r->folder, is_late, clears, r);
+}
+
+/* Removes what follows the frames of the checkpoint. Files of formats that are not written now belong to
+ * another run and stay as they are. */
 static drape_status resume_files(drape_recorder *r, drape_archive *a)
 {
-    archive_progress(r, a);
-    drape_status status = a->status;
-    if (!r->writes)
-        return status;
-    if (!status && r->finished)
-        status = drape_archive_end(a);
+    drape_file *file;
+    drape_status status = r->finished ? drape_archive_end(a) : DRAPE_OK;
     if (!status)
         status = drape_folder_verify_all(r->folder, r->finished, DRAPE_SUMMARY_NAME);
-    if (status || r->finished)
-        return status ? status : drape_folder_begin(r->folder, NULL, r);
-    for (size_t i = 0; i < r->output_count && !status; i++) {
-        output *o = &r->outputs[i];
-        o->open = true;
-        status = o->ops->resume(r->ctx, &r->def, o->state, r->frames, a);
-    }
-    if (!status)
-        status = drape_archive_end(a);
-    if (!status)
-        status = drape_steps_open(r->ctx, r->folder, true, &r->steps);
-    if (!status)
-        status = drape_energy_open(r->ctx, r->folder, true, &r->energies);
-    drape_folder_rehearse(r->folder, true); /* whether all files have the checksums of the checkpoint */
-    if (!status)
-        status = cut_files(r);
-    drape_folder_rehearse(r->folder, false);
+    if (!status && !r->finished)
+        status = reopen_files(r, a);
+    if (!status && !r->finished)
+        status = check_files(r);
     if (!status)
         status = drape_folder_begin(r->folder, NULL, r);
-    return status ? status : cut_files(r);
+    if (status || r->finished)
+        return status;
+    for (size_t k = 0; !status && (file = growing(r, k)); k++)
+        status = file->kept > 0 ? drape_file_trim(file) : drape_file_begin(file);
+    return status ? status : drape_folder_remove(r->folder, is_late, r);
 }
 
 static void close_files(drape_recorder *r)
 {
-    for (size_t i = 0; i < r->output_count; i++) {
-        output *o = &r->outputs[i];
-        if (o->open)
-            note(r, o->ops->close(r->ctx, o->state));
-        o->open = false;
-    }
-    note(r, drape_file_close(&r->steps));
-    note(r, drape_file_close(&r->energies));
+    drape_file *file;
+    for (size_t i = 0; i < r->output_count && r->live; i++)
+        if (r->outputs[i].ops->close)
+            note(r, r->outputs[i].ops->close(r->ctx, r->outputs[i].state));
+    r->live = false;
+    for (size_t k = 0; (file = growing(r, k)); k++)
+        note(r, drape_file_close(file));
 }
 
 /* ---- Creation ---- */
@@ -726,14 +780,19 @@ static drape_status set_up(drape_recorder *r, const drape_recorder_def *def, dra
         status = allocate_arrays(r);
     if (!status)
         status = make_bodies(r);
+    r->every = def->checkpoint_every;
     if (!status && r->writes)
-        status = open_folder(r, def, a != NULL);
+        status = open_folder(r, def);
     if (!status && r->writes)
-        status = prepare_checkpoints(r, def);
-    if (!r->writes)
-        r->every = def->checkpoint_every;
-    if (!status && (r->writes || a))
-        status = a ? resume_files(r, a) : open_files(r);
+        status = prepare_files(r, def, a != NULL);
+    if (!status && a) {
+        archive_progress(r, a);
+        status = a->status;
+    }
+    if (!status && r->writes) {
+        status = a ? resume_files(r, a) : begin_files(r);
+        r->live = !status && !r->finished;
+    }
     status = drape_ranks_agree(r->ranks, r->ctx, status);
     r->start -= r->wall;
     if (!status) /* the last stage, because an observer cannot be removed from a sim */
@@ -812,9 +871,11 @@ void drape_recorder_destroy(drape_recorder **recorder)
     if (!recorder || !*recorder)
         return;
     drape_recorder *r = *recorder;
+    drape_file *file;
     close_files(r);
-    drape_file_destroy(&r->steps);
-    drape_file_destroy(&r->energies);
+    for (size_t k = 0; (file = growing(r, k)); k++)
+        drape_file_destroy(file);
+    drape_file_destroy(&r->whole);
     drape_file_destroy(&r->checkpoint);
     drape_folder_close(&r->folder);
     drape_arena_free(&r->arena);

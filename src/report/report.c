@@ -5,9 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "io/energy.h"
-#include "io/steps.h"
 #include "io/summary.h"
+#include "io/tables.h"
 #include "report/data.h"
 #include "report/page.h"
 

@@ -161,18 +161,19 @@ def test_kill():
     equal([name for name in os.listdir("out") if name.startswith(".") or name.endswith(".obj")], [])
 
 
-def test_lost_manifest():
-    """the manifest that a killed run had not put into its place is removed, in a new folder, too; what only has its name stays"""
-    names = [f".drape-{digit * 16}-0.part" for digit in "1234"]
-    texts = ["", f'{{"manifest":1,"drape":"0.1.0","token":"{"2" * 16}"}}\n', f'{{"manifest":1,"drape":"0.1.0","token":"{"2" * 16}"}}\n', "of the user"]
+def test_temporary_files():
+    """the temporary files of a killed run, which have the inode of the folder in their names, are removed, in a new folder, too; others stay"""
     write_scene()
-    for again in False, True:
-        if not again:
-            os.makedirs("out")
-        for name, text in zip(names, texts):
-            put(os.path.join("out", name), text)
+    os.mkdir("out")
+    inode = os.stat("out").st_ino
+    lost = [f".drape-{inode:016x}-{digit * 16}.part" for digit in "0a"]
+    others = [".drape-" + "1" * 16 + "-0.part", f".drape-{inode + 1:016x}-{'a' * 16}.part", f".drape-{inode:016x}-{'g' * 16}.part",
+              f".drape-{inode:016x}-{'a' * 17}.part", f".drape-{inode:016x}-{'a' * 16}.part.mine"]
+    for text in "", "of the user":
+        for name in lost + others:
+            put("out/" + name, text)
         good(*RUN, "npy")
-        equal(sorted(name for name in os.listdir("out") if name.startswith(".")), names[2:])
+        equal({name for name in os.listdir("out") if name.startswith(".")}, set(others))
 
 
 def test_lock():

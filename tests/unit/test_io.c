@@ -17,8 +17,8 @@
 #include "drape/drape.h"
 #include "io/export.h"
 #include "io/recorder.h"
-#include "io/steps.h"
 #include "io/summary.h"
+#include "io/tables.h"
 #include "support/comma.h"
 
 /* Two cloths; frames of 1/40 s fall on and between the steps of 1/100 s. */
@@ -610,7 +610,7 @@ START_TEST(steps_quotes_and_keeps_digits)
     drape_file file;
     set_up(&w);
     drape_folder *folder = open_folder(&w, w.folder);
-    ck_assert_int_eq(drape_steps_open(w.ctx, folder, false, &file), DRAPE_OK);
+    ck_assert_int_eq(drape_csv_open(w.ctx, folder, DRAPE_STEPS_NAME, drape_steps_columns, &file), DRAPE_OK);
     for (int i = 0; i < 3; i++)
         ck_assert_int_eq(drape_steps_write(&file, attempts[i], &energy, NULL), DRAPE_OK);
     ck_assert_int_eq(drape_file_close(&file), DRAPE_OK);
@@ -870,13 +870,19 @@ static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
     static double strain[TRIANGLES * 2];
     drape_folder *folder = open_folder(w, w->out);
     drape_arena arena = drape_arena_of(w->ctx);
-    const drape_export_def def = {
-        .arena = &arena, .model = w->model, .folder = folder, .frame_rate = RATE, .most_frames = 1000};
+    drape_file whole;
+    const drape_export_def def = {.arena = &arena,
+                                  .model = w->model,
+                                  .folder = folder,
+                                  .frame_rate = RATE,
+                                  .most_frames = 1000,
+                                  .whole = &whole};
     struct rlimit old;
     drape_status status = DRAPE_OK;
     int frames = 0;
     char message[1024];
     void *state = calloc(1, ops->state_size);
+    ck_assert_int_eq(drape_file_create_in(w->ctx, folder, &whole), DRAPE_OK);
     ck_assert_int_eq(ops->open(w->ctx, &def, state), DRAPE_OK);
     fill_disk(size, &old);
     for (; !status && frames < 1000; frames++) {
@@ -892,7 +898,11 @@ static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
         status = ops->write(w->ctx, state, &frame);
     }
     snprintf(message, sizeof message, "%s", drape_context_message(w->ctx));
-    ops->close(w->ctx, state);
+    for (size_t k = 0; ops->file(state, k); k++) {
+        drape_file_close(ops->file(state, k));
+        drape_file_destroy(ops->file(state, k));
+    }
+    drape_file_destroy(&whole);
     drape_folder_close(&folder);
     drape_arena_free(&arena);
     free_disk(&old);

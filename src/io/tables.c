@@ -1,24 +1,21 @@
 /*
- * steps.c: see steps.h. A row is written by one system call, so that a killed run leaves whole rows. If an
+ * tables.c: see tables.h. A row is written by one system call, so that a killed run leaves whole rows. If an
  * attempt has no diagnostic, the worst_ fields are empty; worst_element is empty for a node.
+ *
+ * The energies of interpolated positions would be wrong: stretching is so stiff that an interpolation error
+ * too small to be seen can have as much energy as the motion itself, and interpolated positions have no
+ * consistent velocities. So a row of a frame contains the energies of an accepted state, and its time.
  */
-#include "io/steps.h"
+#include "io/tables.h"
 
 #include <inttypes.h>
 
-#include "io/csv.h"
-
-#define FILE_NAME DRAPE_STEPS_NAME
-
-static const char columns[] = "attempt,t,h,accepted,status,reason,iterations,residual,tolerance,"
-                              "kinetic,elastic,gravity,contact,dissipated,numerical,"
-                              "worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit,"
-                              "error,left,events\n";
-
-drape_status drape_steps_open(drape_context *ctx, drape_folder *folder, bool resumes, drape_file *file)
-{
-    return drape_csv_open(ctx, folder, FILE_NAME, columns, resumes, file);
-}
+const char drape_steps_columns[] = "attempt,t,h,accepted,status,reason,iterations,residual,tolerance,"
+                                   "kinetic,elastic,gravity,contact,dissipated,numerical,"
+                                   "worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit,"
+                                   "error,left,events\n";
+const char drape_energy_columns[] =
+    "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total\n";
 
 static void put_energy(drape_file *file, const drape_energy *energy)
 {
@@ -28,13 +25,6 @@ static void put_energy(drape_file *file, const drape_energy *energy)
     drape_csv_put_number(file, energy->contact);
     drape_csv_put_number(file, energy->dissipated);
     drape_csv_put_number(file, energy->numerical);
-}
-
-static void put_nodes(drape_file *file, const int32_t node[4])
-{
-    drape_file_put_text(file, ",");
-    for (int i = 0; i < 4 && node[i] >= 0; i++)
-        drape_file_print(file, "%s%" PRId32, i ? " " : "", node[i]);
 }
 
 static void put_worst(drape_file *file, const drape_diagnostic *diagnostic)
@@ -49,7 +39,9 @@ static void put_worst(drape_file *file, const drape_diagnostic *diagnostic)
         drape_csv_put_integer(file, diagnostic->element);
     else
         drape_file_put_text(file, ",");
-    put_nodes(file, diagnostic->node);
+    drape_file_put_text(file, ",");
+    for (int i = 0; i < 4 && diagnostic->node[i] >= 0; i++)
+        drape_file_print(file, "%s%" PRId32, i ? " " : "", diagnostic->node[i]);
     drape_csv_put_number(file, diagnostic->value);
     drape_csv_put_number(file, diagnostic->limit);
 }
@@ -64,8 +56,7 @@ static void put_events(drape_file *file, const drape_event_set *events)
     for (int32_t i = events->reported; i < events->pending_count; i++) {
         const drape_pending_root *p = &events->pending[i];
         drape_file_put_text(file, i > events->reported ? ";" : "");
-        for (const char *c = events->watches[p->event].event->name; *c; c++)
-            drape_file_put_text(file, *c == '"' ? "\"\"" : (char[]){*c, 0});
+        drape_csv_put_quoted(file, events->watches[p->event].event->name);
         drape_file_print(file, "@%.17g", p->root.t);
     }
     drape_file_put_text(file, "\"");
@@ -88,6 +79,18 @@ drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, c
     drape_csv_put_number(file, attempt->error);
     drape_csv_put_number(file, attempt->left);
     put_events(file, events);
+    drape_file_put_text(file, "\n");
+    return drape_file_keep(file);
+}
+
+drape_status drape_energy_write(drape_file *file, int64_t frame, double t, double t_state,
+                                const drape_energy *energy)
+{
+    drape_file_print(file, "%" PRId64, frame);
+    drape_csv_put_number(file, t);
+    drape_csv_put_number(file, t_state);
+    put_energy(file, energy);
+    drape_csv_put_number(file, energy->kinetic + energy->elastic + energy->gravity + energy->contact);
     drape_file_put_text(file, "\n");
     return drape_file_keep(file);
 }
