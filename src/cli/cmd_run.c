@@ -34,7 +34,7 @@ typedef struct run {
     const run_request *request;
     cli_scene in;
     drape_recorder *recorder; /* NULL without --out */
-    void *checkpoint;         /* contents of the checkpoint that the run resumes from; NULL: it starts anew */
+    char *checkpoint;         /* contents of the checkpoint that the run resumes from; NULL: it starts anew */
     drape_archive archive;    /* reads the contents */
     cli_progress progress;
     cli_realtime realtime;            /* of --realtime */
@@ -82,27 +82,22 @@ static drape_recorder_def recorder_def(const run *r)
                                 .start = r->start};
 }
 
-static bool is_summary(const void *user, const char *name)
-{
-    (void)user;
-    return strcmp(name, DRAPE_SUMMARY_NAME) == 0;
-}
-
 /* When a run is resumed, the recorder and the copy of the scene exist already; its old summary is removed, as
  * that of an earlier run is when a run starts, since a killed run must not leave it. */
 static drape_status begin_output(run *r)
 {
-    if (!r->request->out || drape_recorder_is_finished(r->recorder))
+    if (!r->request->out || drape_recorder_done(r->recorder).finished)
         return DRAPE_OK;
-    if (r->recorder && !drape_recorder_writes(r->recorder))
+    if (r->recorder && !drape_recorder_done(r->recorder).writes)
         return DRAPE_OK;
     if (r->recorder)
-        return drape_folder_remove(drape_recorder_folder(r->recorder), is_summary, r);
+        return drape_folder_remove(drape_recorder_folder(r->recorder), drape_folder_is_named,
+                                   DRAPE_SUMMARY_NAME);
     const char *path = r->request->command.operand;
     const bool copies = !drape_scene_copy_is(path, r->request->out);
     const drape_recorder_def def = recorder_def(r);
     drape_status status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
-    if (status || !copies || !drape_recorder_writes(r->recorder))
+    if (status || !copies || !drape_recorder_done(r->recorder).writes)
         return status;
     return drape_scene_copy(r->in.ctx, r->in.scene, drape_model_whole(r->in.model), path,
                             drape_recorder_folder(r->recorder));
@@ -116,11 +111,14 @@ static drape_status restore(run *r)
 {
     const drape_ranks *ranks = drape_model_ranks(r->in.model);
     drape_context *ctx = r->in.ctx;
-    bool there = false;
+    bool there;
     size_t size;
     char *path = drape_record_path(ctx, r->request->out, DRAPE_CHECKPOINT_NAME);
     drape_status status =
-        path ? drape_checkpoint_read(ctx, path, &there, &r->checkpoint, &size) : DRAPE_E_MEMORY;
+        path ? drape_file_read(ctx, path, INT64_MAX, &r->checkpoint, &size) : DRAPE_E_MEMORY;
+    there = !status;
+    if (status == DRAPE_E_FILE && (errno == ENOENT || errno == ENOTDIR))
+        status = DRAPE_OK;
     if (!status && there)
         status = drape_archive_read_from(&r->archive, ctx, path, r->checkpoint, size);
     if (drape_ranks_any(ranks, there) && !there && !status)
@@ -128,10 +126,11 @@ static drape_status restore(run *r)
     status = drape_ranks_agree(ranks, ctx, status);
     if (!status && there)
         status = drape_ranks_agree(ranks, ctx, drape_sim_read(r->in.sim, &r->archive));
-    const drape_recorder_def def = recorder_def(r);
+    drape_recorder_def def = recorder_def(r);
+    def.archive = &r->archive;
     if (!status && there)
-        status = drape_recorder_resume(ctx, r->in.sim, &def, &r->archive, &r->recorder);
-    r->start -= drape_recorder_wall(r->recorder);
+        status = drape_recorder_create(ctx, r->in.sim, &def, &r->recorder);
+    r->start -= drape_recorder_done(r->recorder).wall;
     drape_free(ctx, path);
     return status;
 }
@@ -181,9 +180,9 @@ static void write_summary(run *r, drape_folder *folder, const char *path)
 {
     const drape_summary_def def = {.status = r->status,
                                    .message = r->message,
-                                   .frames = drape_recorder_frames(r->recorder),
+                                   .frames = drape_recorder_done(r->recorder).frames,
                                    .wall_total = r->wall,
-                                   .wall_output = drape_recorder_seconds(r->recorder),
+                                   .wall_output = drape_recorder_done(r->recorder).seconds,
                                    .realtime = r->request->realtime ? &r->realtime.result : NULL};
     note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, folder, path));
 }
@@ -353,7 +352,7 @@ static void print_results(run *r)
         cli_realtime_print(&r->realtime);
     if (r->recorder)
         printf("output    %lld frames, steps.csv, energy.csv, summary.json and scene.json in %s\n",
-               (long long)drape_recorder_frames(r->recorder), CLI_SHOWN(r->request->out));
+               (long long)drape_recorder_done(r->recorder).frames, CLI_SHOWN(r->request->out));
 }
 
 /* ---- Warnings, on stderr ---- */
@@ -414,7 +413,7 @@ static void finish(run *r)
         note(r, drape_recorder_finish(r->recorder));
     if (keeps && !r->status)
         note(r, drape_recorder_checkpoint(r->recorder));
-    r->wall = keeps && !r->status ? drape_recorder_wall(r->recorder) : drape_clock_seconds() - r->start;
+    r->wall = keeps && !r->status ? drape_recorder_done(r->recorder).wall : drape_clock_seconds() - r->start;
 }
 
 /* A run that an event stopped has completed, and the summary says why. */
@@ -431,12 +430,12 @@ static void note_event(run *r)
 
 static void simulate(run *r)
 {
-    const bool done = drape_recorder_is_finished(r->recorder);
+    const bool done = drape_recorder_done(r->recorder).finished;
     print_warnings(r);
     if (!done)
         advance(r);
     if (done)
-        r->wall = drape_recorder_wall(r->recorder);
+        r->wall = drape_recorder_done(r->recorder).wall;
     else
         finish(r);
     note_event(r);

@@ -4,24 +4,8 @@
 #include "sim/sim.h"
 
 #include <errno.h>
+#include <stdint.h>
 #include <string.h>
-
-/* ---- Reading ---- */
-
-drape_status drape_checkpoint_read(drape_context *ctx, const char *path, bool *there, void **bytes,
-                                   size_t *size)
-{
-    char *text;
-    *bytes = NULL;
-    const int fd = drape_file_open(ctx, path);
-    if (there)
-        *there = fd >= 0;
-    if (fd < 0)
-        return there && (errno == ENOENT || errno == ENOTDIR) ? DRAPE_OK : DRAPE_E_FILE;
-    const drape_status status = drape_file_take(ctx, fd, path, INT64_MAX, &text, size);
-    *bytes = text;
-    return status;
-}
 
 /* ---- Writing ---- */
 
@@ -125,14 +109,14 @@ drape_status drape_sim_save(drape_sim *sim, const char *path)
 drape_status drape_sim_restore(drape_sim *sim, const char *path)
 {
     drape_archive a;
-    void *bytes;
+    char *bytes;
     size_t size;
     drape_status guarded = drape_sim_guard(sim, "drape_sim_restore");
     if (guarded)
         return guarded;
     if (!path || !*path)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_restore: path is NULL");
-    drape_status status = drape_checkpoint_read(sim->ctx, path, NULL, &bytes, &size);
+    drape_status status = drape_file_read(sim->ctx, path, INT64_MAX, &bytes, &size);
     if (!status)
         status = drape_archive_read_from(&a, sim->ctx, path, bytes, size);
     if (!status)

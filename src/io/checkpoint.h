@@ -8,11 +8,6 @@
 
 #define DRAPE_CHECKPOINT_NAME "checkpoint.drape" /* in the folder of a run */
 
-/* Reads all bytes of a file; *bytes is taken by drape_alloc. *there becomes false, without a failure, if
- * there is no such file; with there NULL that is a failure, too. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
-drape_status drape_checkpoint_read(drape_context *ctx, const char *path, bool *there, void **bytes,
-                                   size_t *size);
-
 /* A checkpoint that is being written. */
 typedef struct drape_checkpoint {
     drape_archive archive;

@@ -53,7 +53,8 @@ drape_status drape_export_begin(drape_context *ctx, drape_folder *folder, const 
 drape_status drape_export_open(drape_context *ctx, const drape_export_def *def, const char *name,
                                drape_file *file)
 {
-    drape_status status = drape_file_create_in(ctx, def->folder, file);
+    drape_status status = def->folder ? drape_file_create_in(ctx, def->folder, file)
+                                      : drape_file_create(ctx, strlen(name), file);
     if (status)
         return status;
     drape_file_name(file, "%s", name);

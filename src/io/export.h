@@ -95,13 +95,13 @@ void drape_export_body_vertex(const drape_frame *frame, const drape_export_body 
 /* Whether a format writes a file of this name. */
 bool drape_export_names(const drape_exporter_ops *ops, const char *name);
 
-/* The frame of which a file is, by its name; -1: it is none of one frame. */
+/* The frame of which a file is, by its name; -1: it is not a file of one frame. */
 int64_t drape_export_frame_of(const drape_exporter_ops *ops, const char *name);
 
 /* ---- Files ---- */
 
-/* Takes the memory for a file of a folder and begins it; call drape_file_destroy in any case. Errors:
- * DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Takes the memory for a file and begins it: of a folder, or (NULL) at a path that the user named; call
+ * drape_file_destroy in any case. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_export_begin(drape_context *ctx, drape_folder *folder, const char *name, drape_file *file);
 
 /* The same for one of a format that grows: it is not begun where a run is continued. */

@@ -76,6 +76,11 @@ bool drape_folder_is_name(const char *name)
     return name && *name && !strchr(name, '/') && strcmp(name, ".") != 0 && strcmp(name, "..") != 0;
 }
 
+bool drape_folder_is_named(const void *user, const char *name)
+{
+    return strcmp(user, name) == 0;
+}
+
 /* A line that cannot be read is left out: what it described is then not ours. */
 static drape_status take_line(drape_folder *f, const char *text, size_t length)
 {
@@ -474,6 +479,8 @@ static drape_status begin_manifest(drape_folder *f)
         return status;
     if (!status)
         status = add_known(f);
+    if (!status && f->known && fdatasync(f->manifest) && errno != EINVAL) /* the old one is lost */
+        status = fail(f, "write", DRAPE_MANIFEST_NAME, errno);
     if (!status && (f->known ? renameat(f->fd, name, f->fd, DRAPE_MANIFEST_NAME)
                              : rename_new(f, name, DRAPE_MANIFEST_NAME)))
         status = fail(f, "write", DRAPE_MANIFEST_NAME, errno);
@@ -491,7 +498,7 @@ drape_status drape_folder_begin(drape_folder *f, drape_folder_claim *clears, con
 drape_status drape_folder_publish(drape_folder *f, const char *part, const char *name,
                                   const struct stat *last)
 {
-    struct stat there;
+    struct stat there = {0};
     if (rename_new(f, part, name) == 0)
         return DRAPE_OK;
     if (errno != EEXIST)

@@ -8,9 +8,9 @@
  * those that the manifest describes; a file that was still growing when a process was killed is known by
  * its inode and its time of birth instead. All else in the folder is somebody else's, whatever its name is.
  *
- * Files are reached from the descriptor of the folder. They are written under temporary names, which have the
- * inode of the folder and a random number, and get their names by a rename that replaces nothing but a file of
- * ours. Links are not followed, and nothing but regular files is opened.
+ * Files are reached from the descriptor of the folder. They are written under temporary names, which have
+ * the inode of the folder and a random number, and get their names by a rename that replaces nothing but a
+ * file of ours. Links are not followed, and nothing but regular files is opened.
  *
  * The folder is locked (flock on its descriptor) while it is open, so a lock ends with its process.
  */
@@ -29,6 +29,9 @@ typedef struct drape_folder drape_folder;
 
 /* Whether a writer may write a file of this name. */
 typedef bool drape_folder_claim(const void *user, const char *name);
+
+/* One of the single name in `user`. */
+bool drape_folder_is_named(const void *user, const char *name);
 
 /* Makes the folder and its missing parents, locks it and reads its manifest. shared: other processes may
  * write other files into it at the same time, if they open it as shared too. Errors: DRAPE_E_ARGUMENT (it

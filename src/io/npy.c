@@ -6,8 +6,7 @@
 #include <string.h>
 
 #define MAGIC      "\x93NUMPY\x01"
-#define MAGIC_SIZE 10  /* magic, version, length; versions 2 and 3 have two more bytes of length */
-#define MAX_DICT   512 /* bytes of the dict that are read: its three keys are at its start */
+#define MAGIC_SIZE 10 /* magic, version, length */
 
 void drape_npy_put_header(int64_t frames, int32_t nodes, char header[DRAPE_NPY_HEADER])
 {
@@ -21,61 +20,6 @@ void drape_npy_put_header(int64_t frames, int32_t nodes, char header[DRAPE_NPY_H
                         frames, nodes);
     header[MAGIC_SIZE + used] = ' ';
     header[DRAPE_NPY_HEADER - 1] = '\n';
-}
-
-/* The text of a key's value in the dict: what follows "'key':". NULL: there is no such key. */
-static const char *value_of(const char *dict, const char *key)
-{
-    char word[32];
-    snprintf(word, sizeof word, "'%s':", key);
-    const char *at = strstr(dict, word);
-    return at ? at + strlen(word) + strspn(at + strlen(word), " ") : NULL;
-}
-
-/* "(6, 81, 3)", "(6,)", "()" */
-static bool read_shape(const char *text, drape_npy *header)
-{
-    int used = 0;
-    if (*text++ != '(')
-        return false;
-    for (text += strspn(text, " "); *text != ')'; text += strspn(text, " ")) {
-        if (header->dims == DRAPE_NPY_DIMS ||
-            sscanf(text, "%" SCNd64 "%n", &header->shape[header->dims], &used) != 1 ||
-            header->shape[header->dims] < 0)
-            return false;
-        header->dims++;
-        text += used;
-        if (*text == ',')
-            text++;
-        else if (*text != ')')
-            return false;
-    }
-    return true;
-}
-
-bool drape_npy_read(const char *bytes, size_t size, drape_npy *header)
-{
-    char dict[MAX_DICT + 1];
-    *header = (drape_npy){.dims = 0};
-    const size_t before = size > 6 && bytes[6] > 1 ? MAGIC_SIZE + 2 : MAGIC_SIZE;
-    if (size < before || memcmp(bytes, MAGIC, 6) != 0 || bytes[6] < 1 || bytes[6] > 3)
-        return false;
-    size_t length = 0;
-    for (size_t i = before; i-- > 8;)
-        length = length << 8 | (unsigned char)bytes[i];
-    header->data = before + length;
-    if (length > MAX_DICT)
-        length = MAX_DICT;
-    if (length > size - before)
-        length = size - before;
-    memcpy(dict, bytes + before, length);
-    dict[length] = 0;
-    const char *type = value_of(dict, "descr"), *order = value_of(dict, "fortran_order"),
-               *shape = value_of(dict, "shape");
-    if (!type || !order || !shape || sscanf(type, "'%15[^']'", header->type) != 1)
-        return false;
-    header->fortran = strncmp(order, "True", 4) == 0;
-    return (header->fortran || strncmp(order, "False", 5) == 0) && read_shape(shape, header);
 }
 
 void drape_npy_shape_text(const drape_npy *header, char *text, size_t size)

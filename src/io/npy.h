@@ -6,28 +6,12 @@
 #ifndef DRAPE_IO_NPY_H
 #define DRAPE_IO_NPY_H
 
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
+#include "mesh/npy_array.h"
 
 #define DRAPE_NPY_HEADER 128 /* bytes: the dict takes at most 92, with counts of 19 and 10 digits */
 
 /* Fills the header: of the same length for any number of frames, so that the count can be raised in place. */
 void drape_npy_put_header(int64_t frames, int32_t nodes, char header[DRAPE_NPY_HEADER]);
-
-#define DRAPE_NPY_DIMS 8 /* that are read; an array of more is not described */
-
-/* What the header of an NPY file, version 1 to 3, says. */
-typedef struct drape_npy {
-    char type[16]; /* as numpy writes it: "<f8" is float64, little endian */
-    bool fortran;  /* the first index runs fastest */
-    int dims;
-    int64_t shape[DRAPE_NPY_DIMS];
-    size_t data; /* where the numbers begin [bytes] */
-} drape_npy;
-
-/* Reads it from the first bytes of a file. Returns whether they begin such a file. */
-bool drape_npy_read(const char *bytes, size_t size, drape_npy *header);
 
 /* The shape as Python writes it: "(6, 81, 3)". */
 void drape_npy_shape_text(const drape_npy *header, char *text, size_t size);

@@ -25,11 +25,6 @@ char *drape_record_path(drape_context *ctx, const char *folder, const char *name
     return path;
 }
 
-static char *path_of(const drape_record *run, const char *name)
-{
-    return drape_record_path(run->ctx, run->folder, name);
-}
-
 drape_status drape_record_scene(drape_context *ctx, const char *folder, char **path)
 {
     *path = drape_record_path(ctx, folder, DRAPE_SCENE_COPY);
@@ -47,60 +42,41 @@ drape_status drape_record_scene(drape_context *ctx, const char *folder, char **p
 
 /* ---- Frames ---- */
 
-static drape_status not_positions(const drape_record *run, const char *path, const char *what)
-{
-    return drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": %s", path, what);
-}
-
 /* An array of frames x nodes x 3, float64, as export_npy.c writes it. */
-static drape_status read_header(drape_record *run, const char *path)
+static drape_status open_positions(drape_record *run, const char *path)
 {
     char header[DRAPE_NPY_HEADER];
     int32_t nodes = 0;
     size_t data = 0;
     struct stat info;
-    ssize_t size = pread(run->positions, header, sizeof header, 0);
+    const char *fault = NULL;
+    run->positions = drape_file_open(run->ctx, path);
+    if (run->positions < 0 && errno == ENOENT)
+        drape_fail(run->ctx, DRAPE_E_FILE,
+                   "cannot read \"%.500s\": there is no such file; a run writes it with the frame format npy",
+                   path);
+    if (run->positions < 0)
+        return DRAPE_E_FILE;
+    const ssize_t size = pread(run->positions, header, sizeof header, 0);
     if (size < 0 || !drape_npy_read_header(header, (size_t)size, &run->frames, &nodes, &data))
-        return not_positions(
-            run, path, "it is not an array of float64, frames x nodes x 3, C order, as a run writes it");
-    run->data = (off_t)data;
-    if (nodes != run->nodes)
+        fault = "it is not an array of float64, frames x nodes x 3, C order, as a run writes it";
+    else if (nodes != run->nodes)
         return drape_fail(run->ctx, DRAPE_E_PARSE,
                           "\"%.500s\": it has %" PRId32 " nodes, the scene of the folder has %" PRId32, path,
                           nodes, run->nodes);
-    if (fstat(run->positions, &info) || run->frames < 1 ||
-        (info.st_size - run->data) / (24 * (off_t)nodes) < run->frames)
-        return not_positions(run, path, "it has no frame, or less data than its header says");
-    return DRAPE_OK;
-}
-
-static drape_status open_positions(drape_record *run)
-{
-    char *path = path_of(run, "positions.npy");
-    if (!path)
-        return DRAPE_E_MEMORY;
-    run->positions = drape_file_open(run->ctx, path);
-    drape_status status = run->positions >= 0 ? read_header(run, path) : DRAPE_E_FILE;
-    if (run->positions < 0 && errno == ENOENT)
-        drape_fail(run->ctx, status,
-                   "cannot read \"%.500s\": there is no such file; a run writes it with the frame format npy",
-                   path);
-    drape_free(run->ctx, path);
-    return status;
+    run->data = (off_t)data;
+    if (!fault && (fstat(run->positions, &info) || run->frames < 1 ||
+                   (info.st_size - run->data) / (24 * (off_t)nodes) < run->frames))
+        fault = "it has no frame, or less data than its header says";
+    return fault ? drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": %s", path, fault) : DRAPE_OK;
 }
 
 drape_status drape_record_read(const drape_record *run, int64_t frame, double *x)
 {
-    size_t size = 24 * (size_t)run->nodes, used = 0;
-    while (used < size) {
-        ssize_t count = pread(run->positions, (char *)x + used, size - used,
-                              run->data + (off_t)frame * (off_t)size + (off_t)used);
-        if (count < 0 && errno == EINTR)
-            continue;
-        if (count <= 0)
-            return drape_file_fail(run->ctx, "read frames of", run->folder, count < 0 ? errno : EIO);
-        used += (size_t)count;
-    }
+    const size_t size = 24 * (size_t)run->nodes;
+    const int error = drape_read_at(run->positions, x, size, run->data + (off_t)frame * (off_t)size);
+    if (error)
+        return drape_file_fail(run->ctx, "read frames of", run->folder, error);
     return drape_all_finite(x, size / 8)
                ? DRAPE_OK
                : drape_fail(run->ctx, DRAPE_E_PARSE,
@@ -135,27 +111,6 @@ static size_t split(char *line, char **cells, size_t room)
 
 #define MAX_CELLS 64 /* in one line */
 
-typedef struct table {
-    const char *const *columns;
-    size_t count;
-    size_t place[DRAPE_MOST_COLUMNS]; /* of each requested column in a line */
-} table;
-
-static const char *find_columns(table *t, char *header)
-{
-    char *names[MAX_CELLS];
-    size_t found = split(header, names, MAX_CELLS);
-    for (size_t i = 0; i < t->count; i++) {
-        size_t k = 0;
-        while (k < found && strcmp(names[k], t->columns[i]) != 0)
-            k++;
-        if (k == found)
-            return t->columns[i];
-        t->place[i] = k;
-    }
-    return NULL;
-}
-
 /* Takes a line from *rest and removes its end; NULL at the end of the text, and for an incomplete line that a
  * killed run left. */
 static char *next_line(char **rest)
@@ -168,45 +123,44 @@ static char *next_line(char **rest)
     return line;
 }
 
-static int64_t read_rows(char *text, const table *t, drape_row_reader *reader, void *user)
+/* The text of a file, which is modified. */
+static drape_status read_rows(const drape_record *run, const char *path, char *text,
+                              const char *const *columns, size_t count, drape_row_reader *reader, void *user,
+                              int64_t *rows)
 {
-    int64_t rows = 0;
-    for (char *line; (line = next_line(&text));) {
-        char *cells[MAX_CELLS], *wanted[DRAPE_MOST_COLUMNS], none[] = "";
-        size_t found = split(line, cells, MAX_CELLS);
-        for (size_t i = 0; i < t->count; i++)
-            wanted[i] = t->place[i] < found ? cells[t->place[i]] : none;
-        reader(user, rows++, wanted);
+    char *cells[MAX_CELLS], *wanted[DRAPE_MOST_COLUMNS], none[] = "";
+    size_t place[DRAPE_MOST_COLUMNS]; /* of each requested column in a line */
+    char *line = next_line(&text);
+    const size_t names = line ? split(line, cells, MAX_CELLS) : 0;
+    for (size_t i = 0; i < count; i++) {
+        for (place[i] = 0; place[i] < names && strcmp(cells[place[i]], columns[i]) != 0; place[i]++)
+            continue;
+        if (place[i] == names)
+            return drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": there is no column \"%s\"", path,
+                              columns[i]);
     }
-    return rows;
-}
-
-static drape_status read_table(const drape_record *run, const char *path, table *t, drape_row_reader *reader,
-                               void *user, int64_t *rows)
-{
-    char *text;
-    size_t size;
-    drape_status status = drape_file_read(run->ctx, path, DRAPE_MAX_TABLE, &text, &size);
-    char *rest = text, *header = status ? NULL : next_line(&rest);
-    const char *missing = header ? find_columns(t, header) : t->columns[0];
-    if (!status && !missing)
-        *rows = read_rows(rest, t, reader, user);
-    else if (!status)
-        status = drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": there is no column \"%s\"", path, missing);
-    drape_free(run->ctx, text);
-    return status;
+    for (*rows = 0; (line = next_line(&text));) {
+        const size_t found = split(line, cells, MAX_CELLS);
+        for (size_t i = 0; i < count; i++)
+            wanted[i] = place[i] < found ? cells[place[i]] : none;
+        reader(user, (*rows)++, wanted);
+    }
+    return DRAPE_OK;
 }
 
 drape_status drape_record_rows(const drape_record *run, const char *name, const char *const *columns,
                                size_t count, drape_row_reader *reader, void *user, int64_t *rows)
 {
-    table t = {.columns = columns, .count = count};
-    char *path = path_of(run, name);
+    char *path = drape_record_path(run->ctx, run->folder, name), *text;
+    size_t size;
     if (!path)
         return DRAPE_E_MEMORY;
     locale_t old = drape_locale_enter();
-    drape_status status = read_table(run, path, &t, reader, user, rows);
+    drape_status status = drape_file_read(run->ctx, path, DRAPE_MAX_TABLE, &text, &size);
+    if (!status)
+        status = read_rows(run, path, text, columns, count, reader, user, rows);
     drape_locale_leave(old);
+    drape_free(run->ctx, text);
     drape_free(run->ctx, path);
     return status;
 }
@@ -248,7 +202,9 @@ drape_status drape_record_open(drape_context *ctx, const char *folder, int32_t n
         return DRAPE_E_MEMORY;
     for (size_t n = strlen(run->folder); n > 1 && run->folder[n - 1] == '/'; n--)
         run->folder[n - 1] = 0;
-    drape_status status = open_positions(run);
+    char *path = drape_record_path(ctx, run->folder, "positions.npy");
+    drape_status status = path ? open_positions(run, path) : DRAPE_E_MEMORY;
+    drape_free(ctx, path);
     return status ? status : read_times(run);
 }
 

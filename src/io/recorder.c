@@ -31,7 +31,6 @@ struct drape_recorder {
     drape_sim *sim;
     const drape_model *model; /* whole, with the pins of the start; the sim's own is freed when pins change */
     const drape_ranks *ranks; /* that share the model; NULL: none. Rank 0 writes all files */
-    bool writes;              /* this process does */
     double *gathered; /* (node_count x 3, three times if fields are wanted, else once) of the whole model,
                                  on rank 0; NULL if all formats are written by the ranks together */
     drape_folder *folder;
@@ -52,17 +51,15 @@ struct drape_recorder {
     size_t body_count, point_count;
     drape_file steps, energies, whole; /* whole: for the formats */
     drape_file checkpoint;             /* the file of the checkpoints; without a path none are written */
-    int64_t every;      /* frames between checkpoints; 0: only drape_recorder_checkpoint writes them */
-    double start, wall; /* [s] clock when the run began; wall time of the run until the last checkpoint */
-    int64_t frames;
+    int64_t every; /* frames between checkpoints; 0: only drape_recorder_checkpoint writes them */
+    double start;  /* [s] clock when the run began */
+    drape_recorder_progress progress;
     double last_time; /* [s] of the last frame */
     bool moved;       /* a step was accepted after the last frame */
     bool wants_fields;
-    bool gathers; /* ranks share the model, and a format is written by rank 0 */
-    bool counted; /* the def says how many frames come */
-    bool live;    /* the files can be written */
-    bool finished;
-    double seconds;
+    bool gathers;         /* ranks share the model, and a format is written by rank 0 */
+    bool counted;         /* the def says how many frames come */
+    bool live;            /* the files can be written */
     drape_status failure; /* the first one; DRAPE_OK: none */
     char message[DRAPE_MESSAGE_SIZE];
 };
@@ -84,7 +81,7 @@ static scope scope_enter(void)
 static void scope_leave(drape_recorder *r, scope s)
 {
     drape_locale_leave(s.locale);
-    r->seconds += r->finished ? 0 : drape_clock_seconds() - s.start;
+    r->progress.seconds += r->progress.finished ? 0 : drape_clock_seconds() - s.start;
 }
 
 /* Keeps the first failure, which is also returned later. */
@@ -118,27 +115,12 @@ static const double *rotate(const double *from, size_t count, double *to)
     return to;
 }
 
-/* The fields at the nodes and triangles of the surface. */
-static void show_fields(drape_recorder *r, drape_frame *frame)
-{
-    const drape_model *model = drape_model_whole(r->sim->model);
-    const size_t nodes = (size_t)model->surface.node_count, triangles = (size_t)model->surface.triangle_count;
-    double *velocities = r->shown, *density = velocities + 3 * nodes, *strain = density + nodes;
-    drape_render_values(model, frame->velocities, 3, velocities);
-    drape_render_values(model, frame->energy_density, 1, density);
-    for (size_t t = 0; t < triangles; t++)
-        memcpy(strain + 2 * t, frame->strain + 2 * (size_t)r->shown_triangle[t], 2 * sizeof *strain);
-    frame->velocities = velocities;
-    frame->strain = strain;
-    frame->energy_density = density;
-    drape_render_pinned(model, r->pinned);
-    frame->pinned = r->pinned;
-}
-
-/* Adds the fields to the frame, if a format wants any; their density of energy is there already. */
+/* Adds the fields to the frame, if a format wants any; their density of energy is there already. With render
+ * meshes they are those at the nodes and triangles of the surface. */
 static void add_fields(drape_recorder *r, const double *velocities, drape_frame *frame)
 {
     const drape_model *model = drape_model_whole(r->sim->model);
+    const size_t nodes = (size_t)model->surface.node_count, triangles = (size_t)model->surface.triangle_count;
     if (!r->fields)
         return;
     double *density = r->fields, *strain = density + model->node_count;
@@ -147,8 +129,18 @@ static void add_fields(drape_recorder *r, const double *velocities, drape_frame 
     frame->strain = strain;
     frame->energy_density = density;
     frame->pinned = model->pinned;
-    if (r->shown)
-        show_fields(r, frame);
+    if (!r->shown)
+        return;
+    double *shown_density = r->shown + 3 * nodes, *shown_strain = shown_density + nodes;
+    drape_render_values(model, velocities, 3, r->shown);
+    drape_render_values(model, density, 1, shown_density);
+    for (size_t t = 0; t < triangles; t++)
+        memcpy(shown_strain + 2 * t, strain + 2 * (size_t)r->shown_triangle[t], 2 * sizeof *strain);
+    drape_render_pinned(model, r->pinned);
+    frame->velocities = r->shown;
+    frame->strain = shown_strain;
+    frame->energy_density = shown_density;
+    frame->pinned = r->pinned;
 }
 
 /* Puts the vertices of render meshes where the nodes carry them. */
@@ -253,21 +245,21 @@ static void find_density(drape_recorder *r)
         return;
     drape_sim_energy_density(r->sim, r->fields);
     gather(r, 2, 1, &density);
-    if (r->ranks && r->writes)
+    if (r->ranks && r->progress.writes)
         memcpy(r->fields, density, (size_t)r->model->node_count * sizeof *density);
 }
 
 static void write_all(drape_recorder *r, double time, const double *positions, const double *velocities,
                       const drape_energy *energy)
 {
-    drape_frame frame = {.index = r->frames, .time = time, .nodes = positions};
+    drape_frame frame = {.index = r->progress.frames, .time = time, .nodes = positions};
     show_positions(r, &frame);
     add_fields(r, velocities, &frame);
     if (r->body_count > 0)
         add_bodies(r, &frame);
     write_outputs(r, &frame);
     if (!r->failure)
-        note(r, drape_energy_write(&r->energies, r->frames, time, drape_sim_time(r->sim), energy));
+        note(r, drape_energy_write(&r->energies, r->progress.frames, time, drape_sim_time(r->sim), energy));
 }
 
 /* Each rank writes the nodes that it owns behind what rank 0 has in the file. */
@@ -276,7 +268,7 @@ static void write_shared(drape_recorder *r, const output *o, const double *posit
     const drape_rows rows = rows_of(r->sim->model, positions, 3);
     const drape_ranks *ranks = r->ranks;
     char path[DRAPE_RANKS_PATH];
-    drape_file *file = r->writes && !r->failure ? o->ops->shared(o->state) : NULL;
+    drape_file *file = r->progress.writes && !r->failure ? o->ops->shared(o->state) : NULL;
     const bool reached = file && drape_file_reach(file, path, sizeof path);
     uint64_t sum = 0;
     int error = ranks->open(ranks, reached ? path : NULL);
@@ -301,11 +293,11 @@ static void write_frame(drape_recorder *r, double time, const double *positions,
     gather(r, 0, 3, &positions);
     if (r->wants_fields)
         gather(r, 1, 3, &velocities);
-    if (r->writes)
+    if (r->progress.writes)
         write_all(r, time, positions, velocities, &energy);
     if (r->failure)
         return;
-    r->frames++;
+    r->progress.frames++;
     r->last_time = time;
     r->moved = false;
 }
@@ -359,12 +351,12 @@ static void archive_progress(drape_recorder *r, drape_archive *a)
     archive_duration(r, a);
     drape_archive_same(a, "whether frames have z up", r->sim->model->z_up);
     drape_archive_same(a, "the number of vertices in frames", r->model->surface.node_count);
-    drape_archive_bool(a, &r->finished);
-    drape_archive_int64(a, &r->frames);
+    drape_archive_bool(a, &r->progress.finished);
+    drape_archive_int64(a, &r->progress.frames);
     drape_archive_double(a, &r->last_time);
     drape_archive_bool(a, &r->moved);
-    drape_archive_double(a, &r->seconds);
-    drape_archive_double(a, &r->wall);
+    drape_archive_double(a, &r->progress.seconds);
+    drape_archive_double(a, &r->progress.wall);
 }
 
 /* What the formats remember, then of each file that grows how many bytes to keep, and their checksum. */
@@ -398,15 +390,15 @@ static drape_status sync_files(drape_recorder *r)
 static drape_status write_checkpoint(drape_recorder *r)
 {
     drape_checkpoint c;
-    drape_status status = r->writes ? sync_files(r) : DRAPE_OK;
+    drape_status status = r->progress.writes ? sync_files(r) : DRAPE_OK;
     if (drape_ranks_any(r->ranks, status != DRAPE_OK))
         return status;
-    r->wall = drape_clock_seconds() - r->start;
-    drape_checkpoint_begin(&c, r->ctx, r->ranks, r->writes ? &r->checkpoint : NULL);
+    r->progress.wall = drape_clock_seconds() - r->start;
+    drape_checkpoint_begin(&c, r->ctx, r->ranks, r->progress.writes ? &r->checkpoint : NULL);
     drape_sim_archive_identity(r->sim, &c.archive);
     drape_sim_archive(r->sim, &c.archive);
     archive_progress(r, &c.archive);
-    if (!r->finished && r->writes)
+    if (!r->progress.finished && r->progress.writes)
         archive_files(r, &c.archive);
     return drape_checkpoint_end(&c);
 }
@@ -415,7 +407,7 @@ drape_status drape_recorder_checkpoint(drape_recorder *r)
 {
     if (r->failure)
         return report(r);
-    if (r->writes && !r->checkpoint.path)
+    if (r->progress.writes && !r->checkpoint.path)
         return drape_fail(r->ctx, DRAPE_E_ARGUMENT, "the recorder was made without checkpoints");
     locale_t old = drape_locale_enter();
     note(r, write_checkpoint(r));
@@ -429,21 +421,21 @@ static void write_attempt(drape_recorder *r, const drape_attempt *attempt)
 {
     drape_energy energy = drape_sim_energy(r->sim);
     r->moved = r->moved || attempt->accepted;
-    if (r->writes)
+    if (r->progress.writes)
         note(r, drape_steps_write(&r->steps, attempt, &energy, &r->sim->events));
 }
 
 /* A rank that could not write the frame has not counted it. */
 static void write_due_checkpoint(drape_recorder *r)
 {
-    if (r->every > 0 && !report(r) && r->frames % r->every == 0)
+    if (r->every > 0 && !report(r) && r->progress.frames % r->every == 0)
         note(r, write_checkpoint(r));
 }
 
 static drape_status observe(void *user, const drape_event *event)
 {
     drape_recorder *r = user;
-    if (r->finished)
+    if (r->progress.finished)
         return DRAPE_OK;
     if (r->failure)
         return report(r);
@@ -483,14 +475,6 @@ drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, cons
     return status || !drape_exporters[i]->check ? status : drape_exporters[i]->check(ctx, pointer, &def);
 }
 
-static bool is_chosen(const drape_recorder *r, const drape_exporter_ops *ops)
-{
-    for (size_t i = 0; i < r->output_count; i++)
-        if (r->outputs[i].ops == ops)
-            return true;
-    return false;
-}
-
 static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *def)
 {
     r->outputs = drape_arena_take(&r->arena, def->format_count, sizeof *r->outputs);
@@ -502,53 +486,48 @@ static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *
             return status;
         const drape_exporter_ops *ops =
             drape_exporters[drape_registry_find(&drape_exporter_registry, NULL, def->formats[i])];
-        if (is_chosen(r, ops))
-            continue;
-        void *state = drape_arena_take(&r->arena, 1, ops->state_size);
-        if (!state)
+        bool chosen = false;
+        for (size_t k = 0; k < r->output_count; k++)
+            chosen = chosen || r->outputs[k].ops == ops;
+        void *state = chosen ? NULL : drape_arena_take(&r->arena, 1, ops->state_size);
+        if (!chosen && !state)
             return DRAPE_E_MEMORY;
-        r->outputs[r->output_count++] = (output){ops, state};
+        if (!chosen)
+            r->outputs[r->output_count++] = (output){ops, state};
     }
-    return DRAPE_OK;
-}
-
-/* What shows render meshes. */
-static drape_status allocate_surface(drape_recorder *r)
-{
-    const drape_model *model = r->model;
-    const drape_render_surface *s = &model->surface;
-    const size_t nodes = (size_t)s->node_count, triangles = (size_t)s->triangle_count;
-    r->normals = drape_arena_take(&r->arena, (size_t)model->node_count, 3 * sizeof *r->normals);
-    r->surface = drape_arena_take(&r->arena, nodes, 3 * sizeof *r->surface);
-    if (r->fields) {
-        r->shown = drape_arena_take(&r->arena, 4 * nodes + 2 * triangles, sizeof *r->shown);
-        r->shown_triangle = drape_arena_take(&r->arena, triangles, sizeof *r->shown_triangle);
-        r->pinned = drape_arena_take(&r->arena, nodes, sizeof *r->pinned);
-    }
-    if (drape_arena_status(&r->arena) || !r->fields)
-        return drape_arena_status(&r->arena);
-    drape_render_triangles(model, r->shown_triangle);
     return DRAPE_OK;
 }
 
 static drape_status allocate_arrays(drape_recorder *r)
 {
     const drape_model *model = r->model;
-    size_t nodes = (size_t)model->node_count, triangles = (size_t)model->triangle_count;
-    bool fields = false, rotates = false;
+    const drape_render_surface *s = &model->surface;
+    const size_t nodes = (size_t)model->node_count, triangles = (size_t)model->triangle_count;
+    const size_t shown = (size_t)s->node_count, faces = (size_t)s->triangle_count;
+    bool rotates = false;
     for (size_t i = 0; i < r->output_count; i++) {
-        fields = fields || r->outputs[i].ops->wants_fields;
+        r->wants_fields = r->wants_fields || r->outputs[i].ops->wants_fields;
         rotates = rotates || (model->z_up && !r->outputs[i].ops->y_up);
         r->gathers = r->gathers || (r->ranks && !is_shared(r, &r->outputs[i]));
     }
-    r->wants_fields = fields;
-    if (r->gathers && r->writes)
-        r->gathered = drape_arena_take(&r->arena, nodes, (fields ? 9 : 3) * sizeof *r->gathered);
-    if (fields)
-        r->fields = drape_arena_take(&r->arena, nodes + 2 * triangles, sizeof *r->fields);
+    if (r->gathers && r->progress.writes)
+        r->gathered = drape_arena_take(&r->arena, nodes, (r->wants_fields ? 9 : 3) * sizeof(double));
+    if (r->wants_fields)
+        r->fields = drape_arena_take(&r->arena, nodes + 2 * triangles, sizeof(double));
     if (rotates)
-        r->rotated = drape_arena_take(&r->arena, 6 * (size_t)model->surface.node_count, sizeof *r->rotated);
-    return model->surface.bound ? allocate_surface(r) : drape_arena_status(&r->arena);
+        r->rotated = drape_arena_take(&r->arena, 6 * shown, sizeof(double));
+    if (s->bound) {
+        r->normals = drape_arena_take(&r->arena, nodes, 3 * sizeof(double));
+        r->surface = drape_arena_take(&r->arena, shown, 3 * sizeof(double));
+    }
+    if (s->bound && r->wants_fields) {
+        r->shown = drape_arena_take(&r->arena, 4 * shown + 2 * faces, sizeof(double));
+        r->shown_triangle = drape_arena_take(&r->arena, faces, sizeof *r->shown_triangle);
+        r->pinned = drape_arena_take(&r->arena, shown, sizeof *r->pinned);
+        if (r->shown_triangle)
+            drape_render_triangles(model, r->shown_triangle);
+    }
+    return drape_arena_status(&r->arena);
 }
 
 static drape_status make_bodies(drape_recorder *r)
@@ -571,20 +550,16 @@ static drape_status make_bodies(drape_recorder *r)
 
 /* ---- Files ---- */
 
-static bool is_also(const drape_recorder *r, const char *name)
+/* A table, the checkpoint, or a file that the caller writes. */
+static bool is_own_name(const drape_recorder *r, const char *name)
 {
     for (size_t i = 0; i < r->also_count; i++) {
         const char *star = strchr(r->also[i], '*');
         if (star ? strncmp(name, r->also[i], (size_t)(star - r->also[i])) == 0 : !strcmp(name, r->also[i]))
             return true;
     }
-    return false;
-}
-
-static bool is_own_name(const drape_recorder *r, const char *name)
-{
     return strcmp(name, DRAPE_STEPS_NAME) == 0 || strcmp(name, DRAPE_ENERGY_NAME) == 0 ||
-           strcmp(name, DRAPE_CHECKPOINT_NAME) == 0 || is_also(r, name);
+           strcmp(name, DRAPE_CHECKPOINT_NAME) == 0;
 }
 
 /* What this run writes. */
@@ -611,7 +586,7 @@ static bool is_late(const void *user, const char *name)
 {
     const drape_recorder *r = user;
     for (size_t i = 0; i < r->output_count; i++)
-        if (drape_export_frame_of(r->outputs[i].ops, name) >= r->frames)
+        if (drape_export_frame_of(r->outputs[i].ops, name) >= r->progress.frames)
             return true;
     return false;
 }
@@ -635,17 +610,15 @@ static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def
     return status;
 }
 
-static drape_status prepare_files(drape_recorder *r, const drape_recorder_def *def, bool resumes)
+static drape_status prepare_files(drape_recorder *r, const drape_recorder_def *def)
 {
-    r->start = def->start;
-    r->counted = def->frames > 0;
     r->def = def_of(r->sim);
     if (r->counted)
         r->def.most_frames = def->frames;
     r->def.arena = &r->arena;
     r->def.folder = r->folder;
     r->def.durable = def->checkpoints;
-    r->def.resumes = resumes;
+    r->def.resumes = def->archive != NULL;
     r->def.whole = &r->whole;
     r->def.bodies = r->bodies;
     r->def.body_count = (int32_t)r->body_count;
@@ -656,12 +629,6 @@ static drape_status prepare_files(drape_recorder *r, const drape_recorder_def *d
     if (!status && def->checkpoints)
         drape_file_name(&r->checkpoint, DRAPE_CHECKPOINT_NAME);
     return status;
-}
-
-static bool is_checkpoint(const void *user, const char *name)
-{
-    (void)user;
-    return strcmp(name, DRAPE_CHECKPOINT_NAME) == 0;
 }
 
 static drape_status open_formats(drape_recorder *r)
@@ -678,7 +645,7 @@ static drape_status begin_files(drape_recorder *r)
 {
     drape_status status = drape_folder_check(r->folder, writes, clears, r);
     if (!status)
-        status = drape_folder_remove(r->folder, is_checkpoint, r);
+        status = drape_folder_remove(r->folder, drape_folder_is_named, DRAPE_CHECKPOINT_NAME);
     if (!status)
         status = drape_folder_begin(r->folder, clears, r);
     if (!status)
@@ -715,12 +682,12 @@ static drape_status check_files(drape_recorder *r)
     drape_status status = DRAPE_OK;
     for (size_t i = 0; i < r->output_count && !status; i++) {
         const output *o = &r->outputs[i];
-        for (int64_t k = 0; o->ops->ending && k < r->frames && !status; k++) {
+        for (int64_t k = 0; o->ops->ending && k < r->progress.frames && !status; k++) {
             drape_file_name(&r->whole, DRAPE_FRAME_NAME, k, o->ops->ending);
             status = drape_folder_verify(r->folder, r->whole.path);
         }
         if (!status && o->ops->cut)
-            status = o->ops->cut(r->ctx, o->state, r->frames);
+            status = o->ops->cut(r->ctx, o->state, r->progress.frames);
     }
     for (size_t k = 0; !status && (file = growing(r, k)); k++)
         if (file->kept > 0)
@@ -733,16 +700,16 @@ static drape_status check_files(drape_recorder *r)
 static drape_status resume_files(drape_recorder *r, drape_archive *a)
 {
     drape_file *file;
-    drape_status status = r->finished ? drape_archive_end(a) : DRAPE_OK;
+    drape_status status = r->progress.finished ? drape_archive_end(a) : DRAPE_OK;
     if (!status)
-        status = drape_folder_verify_all(r->folder, r->finished, DRAPE_SUMMARY_NAME);
-    if (!status && !r->finished)
+        status = drape_folder_verify_all(r->folder, r->progress.finished, DRAPE_SUMMARY_NAME);
+    if (!status && !r->progress.finished)
         status = reopen_files(r, a);
-    if (!status && !r->finished)
+    if (!status && !r->progress.finished)
         status = check_files(r);
     if (!status)
         status = drape_folder_begin(r->folder, NULL, r);
-    if (status || r->finished)
+    if (status || r->progress.finished)
         return status;
     for (size_t k = 0; !status && (file = growing(r, k)); k++)
         status = file->kept > 0 ? drape_file_trim(file) : drape_file_begin(file);
@@ -772,36 +739,34 @@ static drape_status check_def(drape_context *ctx, const drape_sim *sim, const dr
     return DRAPE_OK;
 }
 
-/* a NULL: a run from its beginning; otherwise the run of a checkpoint is continued. */
-static drape_status set_up(drape_recorder *r, const drape_recorder_def *def, drape_archive *a)
+static drape_status set_up(drape_recorder *r, const drape_recorder_def *def)
 {
+    drape_archive *a = def->archive;
     drape_status status = choose_outputs(r, def);
     if (!status)
         status = allocate_arrays(r);
     if (!status)
         status = make_bodies(r);
-    r->every = def->checkpoint_every;
-    if (!status && r->writes)
+    if (!status && r->progress.writes)
         status = open_folder(r, def);
-    if (!status && r->writes)
-        status = prepare_files(r, def, a != NULL);
+    if (!status && r->progress.writes)
+        status = prepare_files(r, def);
     if (!status && a) {
         archive_progress(r, a);
         status = a->status;
     }
-    if (!status && r->writes) {
+    if (!status && r->progress.writes) {
         status = a ? resume_files(r, a) : begin_files(r);
-        r->live = !status && !r->finished;
+        r->live = !status && !r->progress.finished;
     }
     status = drape_ranks_agree(r->ranks, r->ctx, status);
-    r->start -= r->wall;
-    if (!status) /* the last stage, because an observer cannot be removed from a sim */
-        status = drape_sim_observe(r->sim, observe, r);
-    return status;
+    r->start -= r->progress.wall;
+    /* the last stage, because an observer cannot be removed from a sim */
+    return status ? status : drape_sim_observe(r->sim, observe, r);
 }
 
-static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
-                           drape_archive *a, drape_recorder **out)
+drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
+                                   drape_recorder **out)
 {
     if (!out)
         return DRAPE_E_ARGUMENT;
@@ -814,14 +779,17 @@ static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recor
         drape_free(ctx, r);
         return DRAPE_E_MEMORY;
     }
-    r->ctx = ctx;
-    r->arena = drape_arena_of(ctx);
-    r->sim = sim;
-    r->model = drape_model_whole(drape_sim_base_model(sim));
-    r->ranks = drape_model_ranks(sim->model);
-    r->writes = !r->ranks || r->ranks->rank == 0;
+    *r = (drape_recorder){.ctx = ctx,
+                          .arena = drape_arena_of(ctx),
+                          .sim = sim,
+                          .model = drape_model_whole(drape_sim_base_model(sim)),
+                          .ranks = drape_model_ranks(sim->model),
+                          .every = def->checkpoint_every,
+                          .start = def->start,
+                          .counted = def->frames > 0};
+    r->progress.writes = !r->ranks || r->ranks->rank == 0;
     scope s = scope_enter();
-    note(r, set_up(r, def, a));
+    note(r, set_up(r, def));
     scope_leave(r, s);
     r->also_count = 0;
     if (r->failure) {
@@ -833,36 +801,25 @@ static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recor
     return status;
 }
 
-drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
-                                   drape_recorder **out)
-{
-    return create(ctx, sim, def, NULL, out);
-}
-
-drape_status drape_recorder_resume(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
-                                   drape_archive *a, drape_recorder **out)
-{
-    return create(ctx, sim, def, a, out);
-}
-
 /* ---- The end ---- */
 
 static bool last_frame_is_due(const drape_recorder *r)
 {
     double t = drape_sim_time(r->sim);
-    return !r->counted && (r->frames == 0 || r->moved || fabs(t - r->last_time) > SAME_TIME * fabs(t));
+    return !r->counted &&
+           (r->progress.frames == 0 || r->moved || fabs(t - r->last_time) > SAME_TIME * fabs(t));
 }
 
 drape_status drape_recorder_finish(drape_recorder *r)
 {
-    if (r->finished)
+    if (r->progress.finished)
         return report(r);
     scope s = scope_enter();
     if (!r->failure && last_frame_is_due(r))
         write_frame(r, drape_sim_time(r->sim), drape_sim_positions(r->sim), drape_sim_velocities(r->sim));
     close_files(r);
     scope_leave(r, s);
-    r->finished = true;
+    r->progress.finished = true;
     return report(r);
 }
 
@@ -883,34 +840,12 @@ void drape_recorder_destroy(drape_recorder **recorder)
     *recorder = NULL;
 }
 
-/* ---- Queries ---- */
-
-bool drape_recorder_writes(const drape_recorder *recorder)
-{
-    return recorder->writes;
-}
-
 drape_folder *drape_recorder_folder(const drape_recorder *recorder)
 {
     return recorder->folder;
 }
 
-bool drape_recorder_is_finished(const drape_recorder *recorder)
+drape_recorder_progress drape_recorder_done(const drape_recorder *recorder)
 {
-    return recorder && recorder->finished;
-}
-
-double drape_recorder_wall(const drape_recorder *recorder)
-{
-    return recorder ? recorder->wall : 0;
-}
-
-double drape_recorder_seconds(const drape_recorder *recorder)
-{
-    return recorder ? recorder->seconds : 0;
-}
-
-int64_t drape_recorder_frames(const drape_recorder *recorder)
-{
-    return recorder ? recorder->frames : 0;
+    return recorder ? recorder->progress : (drape_recorder_progress){.frames = 0};
 }

@@ -18,7 +18,9 @@ typedef struct drape_recorder_def {
      * drape_recorder_checkpoint; 0: only the latter. */
     bool checkpoints;
     int64_t checkpoint_every;
-    double start;   /* [s] clock when the run began: checkpoints contain how long it took */
+    drape_archive *archive; /* of a checkpoint in the folder, of which the sim's part was read: the run is
+                               continued. NULL: it begins */
+    double start;           /* [s] clock when the run began: checkpoints contain how long it took */
     int64_t frames; /* so many frames come, whatever the scene's duration is, and none at the end; 0: those of
                        the duration */
 } drape_recorder_def;
@@ -36,31 +38,30 @@ drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, cons
  * the recorder is destroyed. Errors: DRAPE_E_ARGUMENT (unknown format, no folder, another process writes
  * into it, it has a file of a name to be written that is not ours or is an input of the model, too many
  * observers), DRAPE_E_FILE, DRAPE_E_MEMORY; those of the first kind are found before anything is written.
- * */
+ *
+ * A run that is continued: all files are compared by their checksums with what they were at the checkpoint,
+ * before what came later is removed. If the run had finished no file is changed. Further errors: those of the
+ * archive, such as other formats. */
 drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
                                    drape_recorder **out);
-
-/* Continues an earlier run in its folder: reads the recorder's part of a checkpoint, after the sim's part
- * was read; checks by their checksums that the files still contain what they did at the checkpoint, and then
- * removes what came later. If the run had finished (drape_recorder_is_finished) no file is changed. Errors:
- * those of create; those of the archive, such as other formats. */
-drape_status drape_recorder_resume(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
-                                   drape_archive *a, drape_recorder **out);
-bool drape_recorder_is_finished(const drape_recorder *recorder);
 
 /* Saves sim and recorder as they are now, even after drape_recorder_finish; a resumed run is then finished,
  * too. What the checkpoint claims about files is on the disk before it. Nothing is allocated. Errors:
  * DRAPE_E_FILE; then the previous checkpoint is unchanged. */
 drape_status drape_recorder_checkpoint(drape_recorder *recorder);
 
-/* Whether this process writes the files: of several ranks, rank 0 does. */
-bool drape_recorder_writes(const drape_recorder *recorder);
-
 /* The folder, in which the caller may write the files of def->also; open until drape_recorder_destroy. */
 drape_folder *drape_recorder_folder(const drape_recorder *recorder);
 
-/* [s] Wall time of the run until the last checkpoint, written or read; 0: there was none. */
-double drape_recorder_wall(const drape_recorder *recorder);
+/* All 0 for NULL. */
+typedef struct drape_recorder_progress {
+    bool writes; /* this process writes the files: of several ranks, rank 0 does */
+    bool finished;
+    int64_t frames; /* written by all exporters */
+    double seconds; /* [s] wall time spent in output */
+    double wall;    /* [s] of the run until the last checkpoint, written or read; 0: there was none */
+} drape_recorder_progress;
+drape_recorder_progress drape_recorder_done(const drape_recorder *recorder);
 
 /* Writes the sim's present state as the last frame, unless the last frame shows it already, and closes all
  * files. What the sim does afterwards is not recorded. After a failed write nothing is added, and that
@@ -69,8 +70,5 @@ drape_status drape_recorder_finish(drape_recorder *recorder);
 
 /* Closes the files without a last frame if drape_recorder_finish was not called, and frees the recorder. */
 void drape_recorder_destroy(drape_recorder **recorder);
-
-double drape_recorder_seconds(const drape_recorder *recorder); /* wall time spent in output */
-int64_t drape_recorder_frames(const drape_recorder *recorder); /* written by all exporters */
 
 #endif

@@ -3,7 +3,7 @@
  */
 #include "io/summary.h"
 
-#include "io/file.h"
+#include "io/export.h"
 #include "io/json.h"
 #include "model/model.h"
 #include "sim/inside.h"
@@ -322,12 +322,7 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
 static drape_status write_json(drape_context *ctx, const json_t *json, drape_folder *folder, const char *path,
                                drape_file *file)
 {
-    drape_status status =
-        folder ? drape_file_create_in(ctx, folder, file) : drape_file_create(ctx, strlen(path), file);
-    if (status)
-        return status;
-    drape_file_name(file, "%s", path);
-    status = drape_file_begin(file);
+    drape_status status = drape_export_begin(ctx, folder, path, file);
     if (status)
         return status;
     drape_json_put(file, json, JSON_INDENT(2) | JSON_REAL_PRECISION(17));

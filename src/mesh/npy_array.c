@@ -7,7 +7,7 @@
 
 #define MAGIC      "\x93NUMPY"
 #define MAGIC_SIZE 6
-#define MAX_HEADER 65536 /* [bytes] */
+#define MAX_DICT   512 /* bytes of the dict that are read: its three keys are at its start */
 
 uint32_t drape_bytes_word(const char *bytes)
 {
@@ -39,70 +39,60 @@ double drape_npy_array_at(const drape_npy_array *array, size_t index)
     return array->item == 4 ? drape_bytes_float32(at) : drape_bytes_float64(at);
 }
 
-/* The text behind 'key': in the dict; NULL: there is no such key. */
-static const char *value_of(const char *header, const char *key)
+/* The text of a key's value in the dict: what follows "'key':". NULL: there is no such key. */
+static const char *value_of(const char *dict, const char *key)
 {
-    char quoted[32];
-    snprintf(quoted, sizeof quoted, "'%s'", key);
-    const char *at = strstr(header, quoted);
-    if (!at)
-        return NULL;
-    at += strlen(quoted);
-    at += strspn(at, " ");
-    if (*at != ':')
-        return NULL;
-    return at + 1 + strspn(at + 1, " ");
+    char word[32];
+    snprintf(word, sizeof word, "'%s':", key);
+    const char *at = strstr(dict, word);
+    return at ? at + strlen(word) + strspn(at + strlen(word), " ") : NULL;
 }
 
-static drape_status read_type(drape_context *ctx, const drape_mesh_source *source, const char *header,
-                              drape_npy_array *out)
+/* "(6, 81, 3)", "(6,)", "()" */
+static bool read_shape(const char *text, drape_npy *header)
 {
-    const char *type = value_of(header, "descr"), *order = value_of(header, "fortran_order");
-    if (type && strncmp(type, "'<f4'", 5) == 0)
-        out->item = 4;
-    else if (type && strncmp(type, "'<f8'", 5) == 0)
-        out->item = 8;
-    else
-        return drape_mesh_fail(ctx, source, 0, "the type of its numbers is %.*s; '<f4' or '<f8' is needed",
-                               type ? (int)strcspn(type, ",}") : 7, type ? type : "missing");
-    if (!order || strncmp(order, "False", 5) != 0)
-        return drape_mesh_fail(ctx, source, 0, "'fortran_order' must be False: the array is in C order");
-    return DRAPE_OK;
-}
-
-static drape_status read_shape(drape_context *ctx, const drape_mesh_source *source, const char *header,
-                               drape_npy_array *out)
-{
-    const char *at = value_of(header, "shape");
     int used = 0;
-    out->shape[0] = out->shape[1] = out->shape[2] = 1;
-    if (!at || *at++ != '(')
-        return drape_mesh_fail(ctx, source, 0, "its header has no 'shape'");
-    while (*(at += strspn(at, " ,")) != ')') {
-        if (out->dimensions == 3)
-            return drape_mesh_fail(ctx, source, 0, "more than 3 dimensions");
-        if (sscanf(at, "%18" SCNd64 "%n", &out->shape[out->dimensions], &used) != 1 ||
-            out->shape[out->dimensions] < 0)
-            return drape_mesh_fail(ctx, source, 0, "its header has no valid 'shape'");
-        out->dimensions++;
-        at += used;
+    if (*text++ != '(')
+        return false;
+    for (text += strspn(text, " "); *text != ')'; text += strspn(text, " ")) {
+        if (header->dims == DRAPE_NPY_DIMS ||
+            sscanf(text, "%18" SCNd64 "%n", &header->shape[header->dims], &used) != 1 ||
+            header->shape[header->dims] < 0)
+            return false;
+        header->dims++;
+        text += used;
+        if (*text == ',')
+            text++;
+        else if (*text != ')')
+            return false;
     }
-    return out->dimensions > 0 ? DRAPE_OK
-                               : drape_mesh_fail(ctx, source, 0, "it is a single number, not an array");
+    return true;
 }
 
-static drape_status parse_header(drape_context *ctx, const drape_mesh_source *source, const char *text,
-                                 size_t length, drape_npy_array *out)
+bool drape_npy_read(const char *bytes, size_t size, drape_npy *header)
 {
-    char *header = drape_alloc(ctx, length + 1, 1);
-    if (!header)
-        return DRAPE_E_MEMORY;
-    memcpy(header, text, length);
-    drape_status status = read_type(ctx, source, header, out);
-    if (!status)
-        status = read_shape(ctx, source, header, out);
-    drape_free(ctx, header);
-    return status;
+    char dict[MAX_DICT + 1];
+    *header = (drape_npy){.dims = 0};
+    const size_t before = size > MAGIC_SIZE && bytes[MAGIC_SIZE] > 1 ? MAGIC_SIZE + 6 : MAGIC_SIZE + 4;
+    if (size < before || memcmp(bytes, MAGIC, MAGIC_SIZE) != 0 || bytes[MAGIC_SIZE] < 1 ||
+        bytes[MAGIC_SIZE] > 3)
+        return false;
+    size_t length = 0;
+    for (size_t i = before; i-- > MAGIC_SIZE + 2;)
+        length = length << 8 | (unsigned char)bytes[i];
+    header->data = before + length;
+    if (length > MAX_DICT)
+        length = MAX_DICT;
+    if (length > size - before)
+        length = size - before;
+    memcpy(dict, bytes + before, length);
+    dict[length] = 0;
+    const char *type = value_of(dict, "descr"), *order = value_of(dict, "fortran_order"),
+               *shape = value_of(dict, "shape");
+    if (!type || !order || !shape || sscanf(type, "'%15[^']'", header->type) != 1)
+        return false;
+    header->fortran = strncmp(order, "True", 4) == 0;
+    return (header->fortran || strncmp(order, "False", 5) == 0) && read_shape(shape, header);
 }
 
 /* The numbers must be as many as the shape says: a file that was cut while it was written has fewer. */
@@ -124,21 +114,24 @@ static drape_status check_size(drape_context *ctx, const drape_mesh_source *sour
 drape_status drape_npy_array_parse(drape_context *ctx, const drape_mesh_source *source, const char *data,
                                    size_t size, drape_npy_array *out)
 {
-    *out = (drape_npy_array){.dimensions = 0};
-    if (size < MAGIC_SIZE + 4 || memcmp(data, MAGIC, MAGIC_SIZE) != 0)
+    drape_npy header;
+    *out = (drape_npy_array){.shape = {1, 1, 1}};
+    if (size < MAGIC_SIZE || memcmp(data, MAGIC, MAGIC_SIZE) != 0)
         return drape_mesh_fail(ctx, source, 0, "it is not an NPY file: it does not begin with \\x93NUMPY");
-    const int version = (unsigned char)data[MAGIC_SIZE];
-    const size_t start = version == 1 ? MAGIC_SIZE + 4 : MAGIC_SIZE + 6;
-    if (version < 1 || version > 3 || size < start)
-        return drape_mesh_fail(ctx, source, 0, "NPY version %d; 1 to 3 can be read", version);
-    const size_t length = version == 1 ? (size_t)(unsigned char)data[MAGIC_SIZE + 2] +
-                                             256 * (size_t)(unsigned char)data[MAGIC_SIZE + 3]
-                                       : drape_bytes_word(data + MAGIC_SIZE + 2);
-    if (length > MAX_HEADER || length > size - start)
-        return drape_mesh_fail(ctx, source, 0, "its header ends behind the end of the file");
-    drape_status status = parse_header(ctx, source, data + start, length, out);
-    if (!status)
-        status = check_size(ctx, source, size - start - length, out);
-    out->data = data + start + length;
-    return status;
+    if (!drape_npy_read(data, size, &header) || header.data > size)
+        return drape_mesh_fail(ctx, source, 0,
+                               "its header is not one of NPY version 1 to 3 of at most %d dimensions",
+                               DRAPE_NPY_DIMS);
+    if (strcmp(header.type, "<f4") != 0 && strcmp(header.type, "<f8") != 0)
+        return drape_mesh_fail(ctx, source, 0, "the type of its numbers is '%s'; '<f4' or '<f8' is needed",
+                               header.type);
+    if (header.fortran)
+        return drape_mesh_fail(ctx, source, 0, "'fortran_order' must be False: the array is in C order");
+    if (header.dims < 1 || header.dims > 3)
+        return drape_mesh_fail(ctx, source, 0, "it has %d dimensions; 1 to 3 can be read", header.dims);
+    out->dimensions = header.dims;
+    out->item = header.type[2] - '0';
+    out->data = data + header.data;
+    memcpy(out->shape, header.shape, (size_t)header.dims * sizeof *out->shape);
+    return check_size(ctx, source, size - header.data, out);
 }

@@ -1,6 +1,8 @@
 /* film.c: see film.h. */
 #include "render/film.h"
 
+#include "io/export.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -150,11 +152,7 @@ drape_status drape_film_begin(drape_context *ctx, const char *path, int width, i
     if (!film)
         return DRAPE_E_MEMORY;
     *film = (drape_film){.ctx = ctx, .pipe = -1, .errors = -1, .bytes = 4 * (size_t)width * (size_t)height};
-    drape_status status = drape_file_create(ctx, strlen(path), &film->file);
-    if (!status) {
-        drape_file_name(&film->file, "%s", path);
-        status = drape_file_begin(&film->file);
-    }
+    drape_status status = drape_export_begin(ctx, NULL, path, &film->file);
     if (!status)
         status = start(film, width, height, rate);
     if (status)

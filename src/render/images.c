@@ -2,7 +2,7 @@
 #include "render/images.h"
 
 #include "base/arena.h"
-#include "io/file.h"
+#include "io/export.h"
 
 #include <math.h>
 #include <png.h>
@@ -38,12 +38,7 @@ drape_status drape_png_write(drape_context *ctx, drape_folder *folder, const cha
     if (!status && !png_image_write_to_memory(&image, data, &size, 0, rgb, 0, NULL))
         status = drape_fail(ctx, DRAPE_E_FILE, "cannot write \"%s\": %s", path, image.message);
     if (!status)
-        status =
-            folder ? drape_file_create_in(ctx, folder, &file) : drape_file_create(ctx, strlen(path), &file);
-    if (!status) {
-        drape_file_name(&file, "%s", path);
-        status = drape_file_begin(&file);
-    }
+        status = drape_export_begin(ctx, folder, path, &file);
     if (!status) {
         drape_file_put(&file, data, size);
         status = drape_file_finish(&file);

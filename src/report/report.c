@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "io/export.h"
 #include "io/summary.h"
 #include "io/tables.h"
 #include "report/data.h"
@@ -45,12 +46,6 @@ static drape_status put_page(const drape_report_data *data, drape_file *file)
     return status;
 }
 
-static bool is_page(const void *user, const char *name)
-{
-    (void)user;
-    return strcmp(name, DEFAULT_NAME) == 0;
-}
-
 /* A page that was not named goes into the folder of the run. One that was must not be a file of the run. */
 static drape_status create_file(const drape_report_source *run, const drape_report_def *def,
                                 drape_folder **folder, drape_file *file)
@@ -64,22 +59,14 @@ static drape_status create_file(const drape_report_source *run, const drape_repo
             snprintf(path, sizeof path, "%s/%s", def->run, inputs[i]);
             status = drape_file_check_named(run->ctx, def->out, path);
         }
-        if (!status)
-            status = drape_file_create(run->ctx, strlen(def->out), file);
-        if (!status)
-            drape_file_name(file, "%s", def->out);
-        return status;
+        return status ? status : drape_export_begin(run->ctx, NULL, def->out, file);
     }
     status = drape_folder_open(run->ctx, def->run, false, folder);
     if (!status)
-        status = drape_folder_check(*folder, is_page, NULL, NULL);
+        status = drape_folder_check(*folder, drape_folder_is_named, NULL, DEFAULT_NAME);
     if (!status)
         status = drape_folder_begin(*folder, NULL, NULL);
-    if (!status)
-        status = drape_file_create_in(run->ctx, *folder, file);
-    if (!status)
-        drape_file_name(file, DEFAULT_NAME);
-    return status;
+    return status ? status : drape_export_begin(run->ctx, *folder, DEFAULT_NAME, file);
 }
 
 /* Reads all of the run before the file is created. */
@@ -96,8 +83,6 @@ static drape_status write_page(const drape_report_source *run, const drape_repor
         status = create_file(run, def, &folder, &file);
         *input = status == DRAPE_E_ARGUMENT;
     }
-    if (!status)
-        status = drape_file_begin(&file);
     if (!status) {
         status = put_page(&data, &file);
         *input = status == DRAPE_E_PARSE || status == DRAPE_E_FILE;

@@ -254,7 +254,7 @@ START_TEST(no_heap_call_for_output)
                                         .checkpoint_every = k % 2 ? 2 : 0};
         ck_assert_int_eq(drape_recorder_create(s.ctx, s.sim, &def, &recorder), DRAPE_OK);
         ck_assert_int_eq(count_steps(&s), 0);
-        ck_assert_int_gt(drape_recorder_frames(recorder), 25);
+        ck_assert_int_gt(drape_recorder_done(recorder).frames, 25);
         drape_recorder_destroy(&recorder);
         scene_close(&s);
         snprintf(command, sizeof command, "rm -rf %s", folder);

@@ -129,7 +129,7 @@ static drape_status record(drape_context *ctx, drape_sim *sim)
     if (!status)
         status = drape_recorder_finish(recorder);
     if (!status) {
-        ck_assert_int_ge(drape_recorder_frames(recorder), 5);
+        ck_assert_int_ge(drape_recorder_done(recorder).frames, 5);
         status = drape_summary_write(ctx, sim, &(drape_summary_def){.frames = 5}, NULL, summary_path);
     }
     drape_recorder_destroy(&recorder);

@@ -64,7 +64,7 @@ static void record(scene *s, const frames_folder *f, const char *format)
     ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
     ck_assert_int_eq(drape_sim_advance(s->sim, .1), DRAPE_OK);
     ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
-    ck_assert_int_eq(drape_recorder_frames(recorder), FRAMES);
+    ck_assert_int_eq(drape_recorder_done(recorder).frames, FRAMES);
     drape_recorder_destroy(&recorder);
 }
 

@@ -162,7 +162,7 @@ static void run(world *w, const char *format, double t_end)
     status = drape_sim_advance(w->sim, t_end);
     ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(w->ctx));
     ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
-    ck_assert(drape_recorder_seconds(recorder) > 0);
+    ck_assert(drape_recorder_done(recorder).seconds > 0);
     drape_recorder_destroy(&recorder);
     ck_assert_ptr_null(recorder);
 }
@@ -292,7 +292,7 @@ START_TEST(npy_is_valid_after_each_frame)
     free(data);
     ck_assert_int_eq(drape_sim_observe(w.sim, read_during_run, &w), DRAPE_OK);
     ck_assert_int_eq(drape_sim_advance(w.sim, 0.21), DRAPE_OK);
-    ck_assert_int_eq(drape_recorder_frames(recorder), 9);
+    ck_assert_int_eq(drape_recorder_done(recorder).frames, 9);
     drape_recorder_destroy(&recorder); /* without a last frame */
     ck_assert_int_eq(read_npy(w.out, &data), 9);
     free(data);
@@ -433,7 +433,7 @@ START_TEST(every_format_writes_the_same_frames)
     ck_assert_int_eq(drape_recorder_create(w.ctx, w.sim, &def, &recorder), DRAPE_OK);
     ck_assert_int_eq(drape_sim_advance(w.sim, 0.03), DRAPE_OK);
     ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
-    ck_assert_int_eq(drape_recorder_frames(recorder), 3);
+    ck_assert_int_eq(drape_recorder_done(recorder).frames, 3);
     ck_assert_int_eq(read_npy(w.out, &data), 3);
     free(data);
     ck_assert_int_eq(count_files(w.out, ".obj"), 3 + 1); /* one is the mesh of the point cache */
@@ -1136,7 +1136,7 @@ START_TEST(each_allocation_may_fail)
     m.left = 0;
     ck_assert_int_eq(drape_sim_advance(w.sim, 0.11), DRAPE_OK);
     ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
-    ck_assert_int_eq(drape_recorder_frames(recorder), 6);
+    ck_assert_int_eq(drape_recorder_done(recorder).frames, 6);
     const drape_summary_def summary = {.status = DRAPE_OK};
     ck_assert_int_eq(drape_summary_write(ctx, w.sim, &summary, NULL, in_folder(w.out, "summary.json")),
                      DRAPE_E_MEMORY);
