@@ -393,8 +393,8 @@ static drape_status add_line(drape_folder *f, const char *line, bool durable)
     return error ? fail(f, "write", DRAPE_MANIFEST_NAME, error) : DRAPE_OK;
 }
 
-/* The name as a string of JSON, as RFC 8259 in section 7 demands. numbers: size and checksum, or inode and
- * time of birth. */
+/* The name as a string of JSON, as RFC 8259 in section 7 demands. first, second: size and checksum, or
+ * inode and time of birth. */
 static drape_status add_file(drape_folder *f, const char *name, bool growing, uint64_t first, uint64_t second,
                              bool durable)
 {

@@ -597,7 +597,7 @@ static drape_status protect(void *user, const char *path, const char *pointer)
     return drape_folder_protect(user, path);
 }
 
-/* Nothing is touched by a refusal; only the folder may be new. */
+/* Only the folder may be new after this. */
 static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def)
 {
     r->also = def->also;
@@ -607,11 +607,15 @@ static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def
         status = drape_folder_protect(r->folder, def->scene);
     if (!status)
         status = drape_scene_files(r->ctx, r->model, def->scene ? def->scene : "", protect, r->folder);
-    return status;
-}
-
-static drape_status prepare_files(drape_recorder *r, const drape_recorder_def *def)
-{
+    if (!status)
+        status = drape_file_create_in(r->ctx, r->folder, &r->whole);
+    if (!status && def->checkpoints)
+        status = drape_file_create_in(r->ctx, r->folder, &r->checkpoint);
+    if (status)
+        return status;
+    if (def->checkpoints)
+        drape_file_name(&r->checkpoint, DRAPE_CHECKPOINT_NAME);
+    r->whole.durable = def->checkpoints;
     r->def = def_of(r->sim);
     if (r->counted)
         r->def.most_frames = def->frames;
@@ -622,13 +626,7 @@ static drape_status prepare_files(drape_recorder *r, const drape_recorder_def *d
     r->def.whole = &r->whole;
     r->def.bodies = r->bodies;
     r->def.body_count = (int32_t)r->body_count;
-    drape_status status = drape_file_create_in(r->ctx, r->folder, &r->whole);
-    r->whole.durable = def->checkpoints;
-    if (!status && def->checkpoints)
-        status = drape_file_create_in(r->ctx, r->folder, &r->checkpoint);
-    if (!status && def->checkpoints)
-        drape_file_name(&r->checkpoint, DRAPE_CHECKPOINT_NAME);
-    return status;
+    return DRAPE_OK;
 }
 
 static drape_status open_formats(drape_recorder *r)
@@ -749,8 +747,6 @@ static drape_status set_up(drape_recorder *r, const drape_recorder_def *def)
         status = make_bodies(r);
     if (!status && r->progress.writes)
         status = open_folder(r, def);
-    if (!status && r->progress.writes)
-        status = prepare_files(r, def);
     if (!status && a) {
         archive_progress(r, a);
         status = a->status;
