@@ -3,6 +3,7 @@
 
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define MAGIC      "\x93NUMPY"
@@ -51,16 +52,16 @@ static const char *value_of(const char *dict, const char *key)
 /* "(6, 81, 3)", "(6,)", "()" */
 static bool read_shape(const char *text, drape_npy *header)
 {
-    int used = 0;
+    char *end;
     if (*text++ != '(')
         return false;
     for (text += strspn(text, " "); *text != ')'; text += strspn(text, " ")) {
-        if (header->dims == DRAPE_NPY_DIMS ||
-            sscanf(text, "%18" SCNd64 "%n", &header->shape[header->dims], &used) != 1 ||
-            header->shape[header->dims] < 0)
+        if (header->dims == DRAPE_NPY_DIMS)
             return false;
-        header->dims++;
-        text += used;
+        const int64_t length = header->shape[header->dims++] = strtoll(text, &end, 10);
+        if (end == text || length < 0)
+            return false;
+        text = end;
         if (*text == ',')
             text++;
         else if (*text != ')')
