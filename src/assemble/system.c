@@ -316,7 +316,7 @@ drape_status drape_system_add_contact(drape_system *system)
     return status;
 }
 
-const drape_contact *drape_system_contact(const drape_system *system)
+drape_contact *drape_system_contact(const drape_system *system)
 {
     return system->contact;
 }
@@ -368,11 +368,6 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
     return drape_ranks_least(system->ranks, fraction);
 }
 
-bool drape_system_may_meet(drape_system *system, const double *x, const double *v, double t, double seconds)
-{
-    return system->contact && drape_contact_may_meet(system->contact, x, v, t, seconds);
-}
-
 void drape_system_set_contact_step(drape_system *system, double dt)
 {
     if (system->contact)
@@ -400,30 +395,6 @@ bool drape_system_crosses(drape_system *system, const double *x, double t, const
         drape_contact_crosses(system->contact, in_space(system, t, x, 0), t, reason, diagnostic);
     return drape_agree(&system->agreed, system->model, crosses ? DRAPE_RETRY_REJECTED : DRAPE_OK, reason,
                        diagnostic) != DRAPE_OK;
-}
-
-void drape_system_expect(drape_system *system, double t1, bool may_relax)
-{
-    if (system->contact)
-        drape_contact_expect(system->contact, t1, may_relax);
-}
-
-drape_status drape_system_relax(drape_system *system, double t1, drape_relax_extent extent, int32_t *added)
-{
-    *added = 0;
-    return system->contact ? drape_contact_relax(system->contact, t1, extent, added) : DRAPE_OK;
-}
-
-drape_status drape_system_lacks_room(drape_system *system, double t1, drape_relax_extent extent, bool *lacks)
-{
-    *lacks = false;
-    return system->contact && !system->ranks ? drape_contact_lacks_room(system->contact, t1, extent, lacks)
-                                             : DRAPE_OK;
-}
-
-drape_status drape_system_let_in(drape_system *system, const double *x, double t1)
-{
-    return system->contact ? drape_contact_let_in(system->contact, x, t1) : DRAPE_OK;
 }
 
 bool drape_system_nearest(drape_system *system, drape_diagnostic *diagnostic)

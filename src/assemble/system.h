@@ -114,7 +114,7 @@ const atomic_bool *const *drape_system_cancel_flag(const drape_system *system);
 
 /* From now on the system contains the forces of contact, if the model has any. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_add_contact(drape_system *system);
-const drape_contact *drape_system_contact(const drape_system *system); /* NULL: there is none */
+drape_contact *drape_system_contact(const drape_system *system); /* NULL: there is none */
 
 /* Whether a pair of contact was active where forces or a matrix were computed last; of this rank. */
 bool drape_system_touches(const drape_system *system);
@@ -138,13 +138,6 @@ drape_status drape_system_begin(drape_system *system, const drape_state *in);
 /* For forces in a state that no step has led to: begins one there, unless that is where one has begun that
  * failed, which must not make contact stiffer, and ends it. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin_reading(drape_system *system, const drape_state *at);
-
-/* drape_contact_expect, drape_contact_relax, drape_contact_lacks_room and drape_contact_let_in; without
- * contact nothing. */
-void drape_system_expect(drape_system *system, double t1, bool may_relax);
-drape_status drape_system_relax(drape_system *system, double t1, drape_relax_extent extent, int32_t *added);
-drape_status drape_system_lacks_room(drape_system *system, double t1, drape_relax_extent extent, bool *lacks);
-drape_status drape_system_let_in(drape_system *system, const double *x, double t1);
 
 /* Ends the step, so that queries between steps leave no trace in the next one. */
 void drape_system_end_step(drape_system *system);
@@ -278,7 +271,6 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
                                   bool again, double *of_node);
 
 /* See contact/contact.h. */
-bool drape_system_may_meet(drape_system *system, const double *x, const double *v, double t, double seconds);
 void drape_system_set_contact_step(drape_system *system, double dt);
 
 /* drape_contact_sweep and drape_contact_carry_layers. */

@@ -61,7 +61,7 @@ static bool is_same(const drape_active_contact *a, const drape_active_contact *b
 {
     int32_t key[3], other[3];
     if (a->pair.collider != b->pair.collider || a->pair.distance != b->pair.distance ||
-        a->gap.closest.points != b->gap.closest.points || a->gentle != b->gentle || a->relaxed != b->relaxed)
+        a->gap.closest.points != b->gap.closest.points || a->gentle != b->gentle || a->exempt != b->exempt)
         return false;
     key_of(a, key);
     key_of(b, other);
@@ -134,7 +134,7 @@ static bool note_near(drape_active_set *set, const drape_pair *pair, double gap)
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
                                    const drape_distances *away, const drape_configuration *at,
                                    const drape_inside_pairs *inside, bool all_inside,
-                                   const drape_relaxed_set *relaxed)
+                                   const drape_exempt *exempt)
 {
     const double rounding = candidates->broad->rounding;
     drape_candidate_cursor cursor = {0};
@@ -148,13 +148,10 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
             continue;
         contact.pair = *pair;
         contact.gentle = false;
-        contact.relaxed = drape_relaxed_factor(relaxed, pair);
-        if (contact.relaxed > 0 && pair->collider >= 0 && drape_pair_points(pair) > 1 &&
-            relaxed->solid[pair->collider])
+        contact.exempt = drape_exempt_factor(exempt, pair);
+        if (contact.exempt > 0 && !exempt->acts(exempt, pair))
             continue;
-        if (contact.relaxed > 0 && drape_relaxed_has_exit(relaxed, pair))
-            continue;
-        if (!(contact.relaxed > 0) && contact.gap.value < DRAPE_BARRIER_GENTLE * pair->distance) {
+        if (!(contact.exempt > 0) && contact.gap.value < DRAPE_BARRIER_GENTLE * pair->distance) {
             contact.gentle = (all_inside && contact.gap.value < drape_pair_least_gap(pair, rounding)) ||
                              drape_inside_has(inside, pair);
             if (!note_near(set, pair, contact.gap.value))

@@ -7,14 +7,14 @@
 #define DRAPE_CONTACT_ACTIVE_H
 
 #include "contact/candidates.h"
+#include "contact/exempt.h"
 #include "contact/inside.h"
-#include "contact/relaxed.h"
 
 typedef struct drape_active_contact {
     drape_pair pair; /* its nodes are the points of the gap; -1 for points that do not exist */
     drape_gap gap;
-    bool gentle;    /* its pairs began below the least gap: see barrier.h */
-    double relaxed; /* factor of the pressure of relaxed pairs (relaxed.h); 0: they are held */
+    bool gentle;   /* its pairs began below the least gap: see barrier.h */
+    double exempt; /* factor of the pressure of exempt pairs (exempt.h); 0: they are held */
 } drape_active_contact;
 
 typedef struct drape_active_set {
@@ -28,12 +28,11 @@ typedef struct drape_active_set {
 
 /* Lists the active contacts of a configuration at these distances from the paths of the candidates. Those of
  * pairs inside are gentle; all_inside: those of all pairs below their least gap are, for outside of steps no
- * others are. Relaxed pairs are not near. Left out are those of a feature without radius, which does not know
- * on which side the cloth belongs. Errors: DRAPE_E_MEMORY. */
+ * others are. Exempt pairs are not near. Errors: DRAPE_E_MEMORY. */
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
                                    const drape_distances *away, const drape_configuration *at,
                                    const drape_inside_pairs *inside, bool all_inside,
-                                   const drape_relaxed_set *relaxed);
+                                   const drape_exempt *exempt);
 
 /* Adds an active contact. Errors: DRAPE_E_MEMORY. */
 drape_status drape_active_set_add(drape_active_set *set, const drape_active_contact *contact);

@@ -6,7 +6,7 @@
  * finite everywhere. For most pairs, low is the least gap that a step may end with (pair.h): the force
  * withstands 1/low times the stiffness there, and the parabola is met only by trial states. For pairs
  * that began below the least gap, low is DRAPE_BARRIER_GENTLE: they are pushed out with a force that is
- * finite in a practical sense, too. Pairs that bodies leave no room (relaxed.h) have another law, the bounded
+ * finite in a practical sense, too. Exempt pairs (exempt.h) have another law, the bounded
  * barrier: with y = 1 - s > 0
  *     b = y^3 / (1 + y)^2,   -b' = (y^3 + 3 y^2) / (1 + y)^3 < 1
  * also C2 at s = 1 and convex, whose force tends to 1 with depth.

@@ -32,10 +32,10 @@ typedef struct path {
     double *of_node;      /* (nodes) the smallest fraction of a pair at each node; NULL: not wanted */
     const double *before; /* (nodes) pairs whose nodes all have 1 limit nothing; NULL: none is known */
     int32_t nodes;
-    const drape_relaxed_set *relaxed; /* their pairs limit nothing */
-    const drape_contact *surfaces;    /* its surfaces limit nodes, too; NULL: they do not */
-    const atomic_bool *cancel;        /* NULL: nothing ends the search early */
-    bool cancelled;                   /* pairs have been left out */
+    const drape_exempt *exempt;    /* its pairs limit nothing */
+    const drape_contact *surfaces; /* its surfaces limit nodes, too; NULL: they do not */
+    const atomic_bool *cancel;     /* NULL: nothing ends the search early */
+    bool cancelled;                /* pairs have been left out */
 } path;
 
 /* The fraction of a pair that limits the displacement, for each of its nodes. */
@@ -102,7 +102,7 @@ static void follow(void *user, const drape_pair *pair)
         return;
     }
     if (drape_bound_is_apart(pair, p->x, p->y, pair->distance + pair->radius + p->stray) ||
-        drape_relaxed_factor(p->relaxed, pair) > 0)
+        drape_exempt_factor(p->exempt, pair) > 0)
         return;
     const double limit = p->of_node ? 1 : fmin((1 + 4 * DBL_EPSILON) * p->fraction, 1);
     const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->swings, p->keep, limit);
@@ -182,7 +182,7 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
               .surface_fraction = 1,
               .surfaces = of_surfaces ? c : NULL,
               .cancel = cancel,
-              .relaxed = &c->relaxed};
+              .exempt = c->exempt};
     drape_distances away;
     drape_candidate_cursor cursor = {0};
     const drape_candidates *candidates = candidates_of(c, straight, longest_move(c, &p), stray, keep, &away);

@@ -12,7 +12,7 @@
 #define KEEP_PATH 0.5 /* of the least gap, or of a smaller one at the beginning of the step */
 #define PATH      "fraction of the step before passing through"
 
-/* The pair that refuses a step may be the one to relax. */
+/* The pair that refuses a step may be one to exempt. */
 static void refuse(drape_contact *c, const drape_pair *pair)
 {
     c->refused = true;
@@ -294,7 +294,7 @@ bool drape_contact_nearest(const drape_contact *c, drape_diagnostic *diagnostic)
     double gap = nearest ? nearest->gap : INFINITY;
     for (int32_t i = 0; !nearest && i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
-        if (!(contact->relaxed > 0) && contact->gap.value < gap) {
+        if (!(contact->exempt > 0) && contact->gap.value < gap) {
             pair = &contact->pair;
             gap = contact->gap.value;
         }

@@ -106,7 +106,6 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     for (size_t i = 0; i < colliders; i++)
         archive_pose(&c->start_pose[i], a);
     drape_inside_archive(&c->inside, a);
-    drape_relaxed_archive(&c->relaxed, a);
     archive_press(c, a);
     archive_couplings(c, a);
     drape_archive_double(a, &c->seconds);

@@ -9,7 +9,7 @@
  *     force.c        energy, gradient and Hessian of an active contact, by the barrier (barrier.h)
  *     restitution.c  the dissipative part of its normal force
  *     friction.c     its friction, with the normal force of now or, lagged, of the beginning of the step
- *     relaxed.c      the nodes that bodies leave no room, and whose pairs are not held; room.c finds them
+ *     exempt.h       the pairs that are not held, said from outside
  *     jacobian.c     dg/dx + w dg/dv of the active set, block by block into the pattern
  *
  * This file has the two configurations that these work on: the beginning of a step, and the one at which
@@ -21,7 +21,6 @@
 #include "base/elementary.h"
 #include "base/vec3.h"
 #include "contact/list.h"
-#include "contact/room.h"
 #include "geometry/mesh_distance.h"
 
 #include <float.h>
@@ -108,7 +107,6 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
                          .mean_edge = drape_model_mean_edge(model)};
     c->active.arena = c->inside.arena = arena;
     c->press = (drape_press){.factor = 1, .widest = 1};
-    c->ahead_t = NAN;
     drape_status status = drape_broad_phase_create(arena, model, &c->broad);
     if (!status)
         status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->step_candidates);
@@ -118,8 +116,6 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
         status = take_arrays(arena, c);
     if (!status)
         status = take_bodies(arena, c);
-    if (!status)
-        status = drape_relaxed_create(arena, model, &c->relaxed);
     if (!status)
         status = drape_predictions_init(arena, c->broad.points, &c->predicted);
     if (!status)
@@ -240,7 +236,6 @@ const drape_collider *const *drape_contact_fit_bodies(const drape_contact *c, co
             continue;
         drape_motion_points(c->motion, i, pose[i].t, c->own);
         drape_deformed_move(c->deformed[i], c->own);
-        drape_relaxed_bound(&c->deformed[i]->collider.shape, c->relaxed.bound + 4 * (size_t)i);
         c->body_t[i] = pose[i].t;
     }
     return c->body;
@@ -353,9 +348,9 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
     if (!candidates)
         return drape_contact_take_failure(c);
     drape_status status =
-        drape_active_set_list(&c->active, candidates, &away, at, &c->inside, !in_step, &c->relaxed);
-    if (!status)
-        status = drape_room_add_surfaces(c, at);
+        drape_active_set_list(&c->active, candidates, &away, at, &c->inside, !in_step, c->exempt);
+    if (!status && c->exempt)
+        status = c->exempt->add(c, at);
     if (!status)
         status = drape_predictions_reserve(&c->predicted, c->active.room);
     return status ? status : drape_predictions_reserve(&c->predicting, c->active.room);
@@ -454,7 +449,7 @@ static double smallest_gap(const drape_contact *c, bool *last)
     *last = false;
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
-        if (contact->gentle || contact->relaxed > 0)
+        if (contact->gentle || contact->exempt > 0)
             continue;
         least = fmin(least, contact->gap.value / contact->pair.distance);
         *last = *last || contact->gap.value < LAST * drape_pair_least_gap(&contact->pair, c->broad.rounding);
@@ -676,30 +671,9 @@ static drape_status lag_at(drape_contact *c, const double *v, double t)
     return drape_contact_lag(c);
 }
 
-/* Looks for room at the end of the step, where some cloth has none already, and holds again what has come
- * out. */
-static drape_status update_relaxed(drape_contact *c, const drape_contact_at *at)
+bool drape_contact_exempts(const drape_contact *c)
 {
-    bool changed = false;
-    int32_t added = 0;
-    if (c->relaxed.count == 0)
-        return DRAPE_OK;
-    drape_status status = drape_room_review(c, at->t, &changed);
-    if (!status && c->ahead_t > at->t)
-        status = drape_room_look_ahead(c, at->x, at->t, c->ahead_t, c->may_relax, &added);
-    c->listed = c->listed && !changed;
-    return status ? status : drape_contact_update(c, at);
-}
-
-void drape_contact_expect(drape_contact *c, double t1, bool may_relax)
-{
-    c->ahead_t = t1;
-    c->may_relax = may_relax;
-}
-
-const drape_relaxed_set *drape_contact_relaxed(const drape_contact *c)
-{
-    return &c->relaxed;
+    return c->exempt && c->exempt->count > 0;
 }
 
 /* A rank that alone is out of memory must not leave the others waiting. */
@@ -708,7 +682,7 @@ static drape_status agree(const drape_contact *c, drape_status status)
     return drape_ranks_agree(c->ranks, c->model->ctx, status);
 }
 
-/* What changes between steps are the laws of contacts: which cloth is relaxed and how hard it is pushed,
+/* What changes between steps are the laws of contacts: which cloth is exempt and how hard it is pushed,
  * activation distances, which pairs are inside, the stiffness. What that adds to the energy of the present
  * contacts, or takes from it, is the work of whoever presses. That energy is the one between steps, in which
  * cloth that was placed into a body is not a barrier that has been passed. */
@@ -721,8 +695,7 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     const double before = status ? 0 : drape_contact_potential(c);
     c->between_steps = false;
     if (!status)
-        status = update_relaxed(c, &at);
-    c->ahead_t = NAN;
+        status = c->exempt ? c->exempt->begin(c, &at) : DRAPE_OK;
     c->refused = false;
     drape_contact_set_rounding(c, c->x);
     drape_distant_update(&c->broad.distant, c->x, c->pose, c->broad.rounding);

@@ -36,33 +36,6 @@ void drape_contact_watch(drape_contact *contact, const atomic_bool *const *cance
 double drape_contact_seconds(const drape_contact *contact);        /* spent in all functions of this header */
 double drape_contact_search_seconds(const drape_contact *contact); /* part of it: in the broad phase */
 
-/* Says that the step that begins next ends at t1, and whether cloth that has no room there may be relaxed
- * (relaxed.h). Without it, no cloth is, and what is relaxed stays so. */
-void drape_contact_expect(drape_contact *contact, double t1, bool may_relax);
-
-/* What is relaxed after a step that failed, if no cloth is found that has no room. */
-typedef enum drape_relax_extent {
-    DRAPE_RELAX_NONE,
-    DRAPE_RELAX_PAIR, /* the pair that refused the step, if it is one with a body */
-    DRAPE_RELAX_NEAR  /* also those whose gaps are hardly above the least; if none of them is one with a body,
-                         those of cloth and pinned cloth */
-} drape_relax_extent;
-
-/* After a step to t1 that failed: relaxes cloth that has no room, or, if there is none, what extent says.
- * *added: nodes that are relaxed from now on; if there are any, the same step may succeed. Errors:
- * DRAPE_E_MEMORY. */
-drape_status drape_contact_relax(drape_contact *contact, double t1, drape_relax_extent extent,
-                                 int32_t *added);
-
-/* After a step that failed: whether drape_contact_relax would relax any cloth in a step to t1. Relaxes none.
- * *lacks stays as it is if no step has begun. Errors: DRAPE_E_MEMORY. */
-drape_status drape_contact_lacks_room(drape_contact *contact, double t1, drape_relax_extent extent,
-                                      bool *lacks);
-
-/* In a step that has begun: relaxes cloth until nothing refuses an end of the step at x, t1 where free nodes
- * are where the step began, as far as pairs can be relaxed. Errors: DRAPE_E_MEMORY. */
-drape_status drape_contact_let_in(drape_contact *contact, const double *x, double t1);
-
 /* The nominal step [s], unless the integrator has none: where the scene gives no activation distance, that of
  * a moving collider grows with its path in such a step. */
 void drape_contact_set_step(drape_contact *contact, double dt);
@@ -78,8 +51,8 @@ drape_status drape_contact_begin(drape_contact *contact, const double *x, const 
  * where they are then. */
 bool drape_contact_has_begun(const drape_contact *contact, const double *x, double t);
 
-/* The relaxed nodes, and what became of the cloth so far at each collider (contact/relaxed.h). */
-const struct drape_relaxed_set *drape_contact_relaxed(const drape_contact *contact);
+/* Whether there is cloth that contact does not hold somewhere (contact/exempt.h). */
+bool drape_contact_exempts(const drape_contact *contact);
 
 /* Ends the step. Queries until the next one have candidates of their own: the next step can continue with
  * those of this one. */
@@ -154,9 +127,9 @@ int32_t drape_contact_list_couplings(drape_contact *contact, const int32_t **nod
 /* The list made by the last drape_contact_list_couplings, or read from an archive. */
 int32_t drape_contact_last_couplings(const drape_contact *contact, const int32_t **nodes);
 
-/* Takes from contact of the same cloth what a step leaves for the next ones: which pairs are inside and which
- * nodes are relaxed, its stiffness and activation distances. before (collider_count): the
- * number that each collider has there; -1: it is new. Errors: DRAPE_E_MEMORY. */
+/* Takes from contact of the same cloth what a step leaves for the next ones: which pairs are inside, its
+ * stiffness and activation distances. before (collider_count): the number that each collider has there; -1:
+ * it is new. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_continue(drape_contact *contact, const drape_contact *from, const int32_t *before);
 
 /* Archives the beginning of the step, from which everything else follows, and the couplings. */

@@ -51,28 +51,6 @@ static drape_status copy_inside(drape_contact *to, const drape_contact *from, co
     return status;
 }
 
-static drape_status copy_relaxed(drape_contact *to, const drape_contact *from, const int32_t *before)
-{
-    drape_status status = DRAPE_OK;
-    int32_t added = 0;
-    to->relaxed.t = from->relaxed.t;
-    for (int32_t c = 0; c < to->model->collider_count; c++)
-        if (before[c] >= 0)
-            to->relaxed.total[c] = from->relaxed.total[before[c]];
-    to->relaxed.total[to->model->collider_count] = from->relaxed.total[from->model->collider_count];
-    for (int32_t i = 0; !status && i < from->relaxed.count; i++) {
-        drape_relaxed_node node = from->relaxed.nodes[i];
-        const int32_t now = node.collider < 0 ? -1 : collider_now(to, before, node.collider);
-        if (node.collider >= 0 && now < 0)
-            continue;
-        node.collider = now;
-        status = drape_relaxed_add(&to->relaxed, now, node.node, node.since, node.until, &added);
-        if (!status)
-            *drape_relaxed_find(&to->relaxed, now, node.node) = node;
-    }
-    return status;
-}
-
 drape_status drape_contact_continue(drape_contact *to, const drape_contact *from, const int32_t *before)
 {
     to->press = from->press;
@@ -85,6 +63,5 @@ drape_status drape_contact_continue(drape_contact *to, const drape_contact *from
             !(to->model->colliders[c].shape.distance > 0))
             to->broad.distance[c] = fmax(to->model->contact.distance, from->broad.distance[before[c]]);
     to->broad.rounding = from->broad.rounding;
-    drape_status status = copy_inside(to, from, before);
-    return status ? status : copy_relaxed(to, from, before);
+    return copy_inside(to, from, before);
 }

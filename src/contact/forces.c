@@ -9,9 +9,9 @@
 
 #define OUT_SPEED 0.2 /* of the size of the scene in a second: at most so fast is cloth pushed out */
 
-/* Pairs that bodies leave no room: a bounded pressure, and no rebound. What pushes cloth out in addition to
- * that, once it has room, does not rub: with friction in proportion it would hold fast what it pushes. */
-static drape_contact_law relaxed_law(const drape_contact *c, const drape_active_contact *contact)
+/* Exempt pairs: a bounded pressure, and no rebound. What pushes cloth out in addition to that does not rub:
+ * with friction in proportion it would hold fast what it pushes. */
+static drape_contact_law exempt_law(const drape_contact *c, const drape_active_contact *contact)
 {
     const drape_contact_def *def = &c->model->contact;
     const drape_pair *pair = &contact->pair;
@@ -19,8 +19,8 @@ static drape_contact_law relaxed_law(const drape_contact *c, const drape_active_
         pair->collider >= 0 ? c->model->colliders[pair->collider].friction : def->self_friction;
     return (drape_contact_law){.distance = pair->distance,
                                .low = DRAPE_BARRIER_BOUNDED,
-                               .stiffness = contact->relaxed * def->relaxed_pressure * pair->area,
-                               .friction = friction / contact->relaxed,
+                               .stiffness = contact->exempt * def->relaxed_pressure * pair->area,
+                               .friction = friction / contact->exempt,
                                .velocity = def->friction_velocity,
                                .damping = 1,
                                .restitution_velocity =
@@ -34,8 +34,8 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
     const drape_contact_def *def = &c->model->contact;
     const drape_pair *pair = &contact->pair;
     const drape_collider *collider = pair->collider >= 0 ? &c->model->colliders[pair->collider] : NULL;
-    if (contact->relaxed > 0)
-        return relaxed_law(c, contact);
+    if (contact->exempt > 0)
+        return exempt_law(c, contact);
     const double e = collider ? collider->restitution : def->self_restitution,
                  least = drape_pair_least_gap(pair, c->broad.rounding) / pair->distance;
     return (drape_contact_law){
@@ -80,7 +80,7 @@ static void add_rolling(const drape_contact *c, const drape_active_contact *cont
             v[a][k] += arm * vec3_dot(pose->gradient + 3 * k, contact->gap.closest.normal);
 }
 
-/* Whether the contact is with the distance of a collider that deforms, as that of relaxed cloth. */
+/* Whether the contact is with the distance of a collider that deforms, as that of exempt cloth. */
 static bool is_on_body(const drape_contact *c, const drape_active_contact *contact)
 {
     return contact->pair.kind == DRAPE_PAIR_SURFACE && c->deformed[contact->pair.collider];

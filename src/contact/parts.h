@@ -1,8 +1,7 @@
 /*
  * parts.h: the struct behind contact.h, and what its files share. contact.c: the configuration and its
  * active set; forces.c: forces and energy; jacobian.c: derivatives and their blocks in a pattern; ccd.c:
- * continuous collision detection; check.c: the end of a step; room.c: cloth that bodies leave no room;
- * checkpoint.c: archives.
+ * continuous collision detection; check.c: the end of a step; checkpoint.c: archives.
  */
 #ifndef DRAPE_CONTACT_PARTS_H
 #define DRAPE_CONTACT_PARTS_H
@@ -59,10 +58,8 @@ struct drape_contact {
                                         at most 0 [m] */
     double *distance_before;         /* (collider_count) scratch: activation distances [m] */
     drape_press press;
-    drape_relaxed_set relaxed;
-    double ahead_t; /* [s] the end of the step that begins next; NAN: unknown. Set before each step */
-    bool may_relax; /* cloth without room there may be relaxed; set with it */
-    bool refused;   /* the last check failed for a pair, since the step began: */
+    drape_exempt *exempt; /* NULL: all pairs are held. Set from outside, where it is archived */
+    bool refused;         /* the last check failed for a pair, since the step began: */
     drape_pair refusing;
     drape_lagged *lagged; /* (lagged_count of lagged_room) lagged friction */
     int32_t lagged_count, lagged_room;
@@ -109,12 +106,12 @@ void drape_contact_fill(const drape_contact *c, const double *nodes, const drape
 /* drape_contact_evaluate_at without its timing. */
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at);
 
-/* Whether a collider lets these nodes of one cloth in: it is ignored, or one of them is relaxed. */
+/* Whether a collider lets these nodes of one cloth in: it is ignored, or one of them is exempt. */
 static inline bool drape_contact_lets_in(const drape_contact *c, int32_t collider, const int32_t *node,
                                          int nodes)
 {
     return drape_model_ignores(c->model, collider, node[0]) ||
-           drape_relaxed_has(&c->relaxed, collider, node, nodes);
+           drape_exempt_has(c->exempt, collider, node, nodes);
 }
 
 /* Computes lagged friction from the active set at the beginning of a step. */

@@ -98,7 +98,7 @@ static double force_at(const drape_gap *gap, const drape_contact_law *law, doubl
     return drape_normal_force(&normal);
 }
 
-/* The force falls with the gap. The bounded barrier of relaxed cloth is near enough to linear. */
+/* The force falls with the gap. The bounded barrier of exempt cloth is near enough to linear. */
 double drape_predicted_stiffness(const drape_gap *gap, const drape_contact_law *law, double weight,
                                  double v[4][3], double force)
 {

@@ -41,7 +41,7 @@ static void meet(void *user, int32_t triangle)
     const drape_contact *c = m->contact;
     const drape_pair pair = pair_of(&c->broad, m->node, triangle);
     if (c->model->colliders[pair.collider].frames.frame_count == 0 ||
-        drape_relaxed_has(&c->relaxed, pair.collider, &m->node, 1))
+        drape_exempt_has(c->exempt, pair.collider, &m->node, 1))
         return;
     const drape_configuration start = {.model = c->model, .x = c->start};
     const double gap = drape_pair_gap_value(&pair, &start), rounding = c->broad.rounding,

@@ -100,14 +100,13 @@ typedef struct drape_integrator_ops {
     double (*tolerance)(const void *state);
     /* The bound on `error` up to which it does more work [m]. NULL: it estimates none. */
     double (*error_bound)(const void *state);
-    /* Work beyond the least that the present effort asks for is not begun after this time [s of
+    /* Work beyond the least is not begun after this time [s of
      * drape_clock_seconds], nor, if it only reduces the error, where it would not end by then; INFINITY, at
      * first: there is no deadline. NULL: it does no such work. */
     void (*set_deadline)(void *state, double seconds);
-    /* The level of effort of a step, if a deadline must be met: from 0, as the parameters say, to efforts -
-     * 1, the cheapest. NULL: there is only one level. */
-    int efforts;
-    void (*set_effort)(void *state, int effort);
+    /* From now on steps are as cheap as they can be, or as the parameters say, as at first. NULL: they are
+     * that already. */
+    void (*set_cheap)(void *state, bool cheap);
     drape_work (*work)(const void *state);
     /* Writes everything that the next steps depend on besides the state that they start from, and the work
      * done, to an archive or, if this was just created for a system of the same model with the same

@@ -74,11 +74,7 @@ static const drape_param params[PARAM_COUNT] = {
 #define NOMINAL_RATE        60.      /* [1/s] linear_tolerance applies to steps of 1/60 s */
 #define MAX_LINEAR_RESIDUAL 0.5      /* relative residual left at any step size */
 
-/* The work of a step at each level of effort: Newton iterations, and conjugate gradient iterations in each.
- * 0: as the parameters say. */
-static const struct {
-    int iterations, linear_iterations;
-} efforts[] = {{0, 0}, {1, 4}};
+#define CHEAP_LINEAR 4 /* iterations of conjugate gradients in a step that is to be cheap */
 
 #define PAST 3 /* velocities that are kept */
 
@@ -88,7 +84,7 @@ typedef struct newton_k {
     double *past[PAST]; /* nodes: velocities at the start of the present step and of those before it */
     double past_time[PAST], past_end; /* [s] of these; end of the last attempt, NAN: there is none */
     bool touches, touched; /* the last attempt, and the step before the present one, ended in contact */
-    int effort;
+    bool cheap;
     double deadline; /* [s of drape_clock_seconds]; not archived: it is set before each step that has one */
 } newton_k;
 
@@ -192,14 +188,12 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
 {
     newton_k *s = state;
     drape_step_equation *e = &s->common.equation;
-    const int iterations = efforts[s->effort].iterations,
-              linear_iterations = efforts[s->effort].linear_iterations;
     drape_solve_report report;
     drape_implicit_backward_euler(&s->common, in, out->t, h, 1 / h * (1 / h));
     e->pins_ahead = drape_implicit_pins_ahead(&s->common, in, h);
     remember(s, in, out->t);
     guess(s, in, h);
-    const int least = iterations ? iterations : (int)s->values[PARAM_ITERATIONS];
+    const int least = s->cheap ? 1 : (int)s->values[PARAM_ITERATIONS];
     const drape_newton_effort effort = {
         .least = least,
         .most = least + MOST_FURTHER,
@@ -207,8 +201,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         .deadline = s->deadline,
         .keeps = true,
         .linear_tolerance = linear_tolerance(s),
-        .cheap = s->effort > 0,
-        .linear_iterations = linear_iterations ? linear_iterations : (int)s->values[PARAM_LINEAR_ITERATIONS]};
+        .cheap = s->cheap,
+        .linear_iterations = s->cheap ? CHEAP_LINEAR : (int)s->values[PARAM_LINEAR_ITERATIONS]};
     drape_status status = drape_newton_solve(s->common.newton, &effort, s->common.d, &report);
     drape_implicit_report(&report, info);
     s->touches = drape_system_touches(e->system);
@@ -220,9 +214,9 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     return DRAPE_OK;
 }
 
-static void set_effort(void *state, int effort)
+static void set_cheap(void *state, bool cheap)
 {
-    ((newton_k *)state)->effort = effort;
+    ((newton_k *)state)->cheap = cheap;
 }
 
 static void set_deadline(void *state, double seconds)
@@ -259,8 +253,7 @@ const drape_integrator_ops drape_integrator_newton_k = {
     .momenta = true,
     .step = step,
     .restart = restart,
-    .efforts = sizeof efforts / sizeof *efforts,
-    .set_effort = set_effort,
+    .set_cheap = set_cheap,
     .tolerance = drape_implicit_tolerance,
     .error_bound = error_bound,
     .set_deadline = set_deadline,

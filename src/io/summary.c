@@ -6,8 +6,8 @@
 #include "io/export.h"
 #include "io/json.h"
 #include "model/model.h"
+#include "realtime/report.h"
 #include "sim/inside.h"
-#include "sim/relaxed.h"
 #include "sim/sim.h"
 #include "sim/warnings.h"
 

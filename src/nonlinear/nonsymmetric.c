@@ -3,7 +3,6 @@
 
 #include "base/finite.h"
 #include "base/vec3.h"
-#include "contact/relaxed.h"
 
 #include <string.h>
 
@@ -75,8 +74,8 @@ static void list_blocks(drape_nonsymmetric *s)
  * them half a second after they had parted, in one of the pinches of the tests, and in none without. */
 static bool has_contact(const drape_system *system)
 {
-    return drape_system_has_friction(system) &&
-           drape_contact_relaxed(drape_system_contact(system))->count == 0 && drape_system_touches(system);
+    return drape_system_has_friction(system) && !drape_contact_exempts(drape_system_contact(system)) &&
+           drape_system_touches(system);
 }
 
 drape_status drape_nonsymmetric_update(drape_nonsymmetric *s, const drape_point *point, const double *terms)

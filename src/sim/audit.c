@@ -8,7 +8,7 @@
  * else would be lost in its rounding error.
  */
 #include "integrators/tolerance.h"
-#include "sim/sim.h"
+#include "sim/rescue.h"
 
 #include <math.h>
 
@@ -261,7 +261,7 @@ bool drape_sim_left_too_much(drape_sim *sim, const drape_state *out, drape_step_
 {
     const drape_energy *e = &sim->attempted;
     const double scale = scene_energy(sim->model) + e->kinetic + fabs(e->elastic);
-    if (info->solved || sim->realtime.active || !(info->left > RUN_GAIN * scale))
+    if (info->solved || (sim->rescue && sim->rescue->takes_any(sim)) || !(info->left > RUN_GAIN * scale))
         return false;
     info->diagnostic =
         gain_at(sim, out->v, "energy left to gain / energy of the motion", info->left / scale, RUN_GAIN);
@@ -317,7 +317,7 @@ void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info
         return;
     drape_energy e = measure(sim, out, drape_sim_state(sim)->internal, audit->dissipated + info->dissipated,
                              audit->pin_work + info->pin_work);
-    if (sim->realtime.active) {
+    if ((sim->rescue && sim->rescue->takes_any(sim))) {
         const double taken =
             take_back(sim->model, fmin(audit->most_lost - e.numerical - e.dissipated, left), out->v);
         e.kinetic -= taken;

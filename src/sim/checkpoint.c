@@ -8,7 +8,7 @@
  */
 #include "base/finite.h"
 #include "model/archive_part.h"
-#include "sim/sim.h"
+#include "sim/rescue.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -16,7 +16,6 @@
 #include <string.h>
 
 #define MAX_LEVELS  60
-#define MAX_SECONDS 1e9 /* [s] the limit of a scene's duration */
 #define REASON_ROOM 64
 #define MEMORY_NAME "checkpoint in memory"
 
@@ -150,11 +149,10 @@ static void archive_statistics(drape_sim *sim, drape_archive *a)
     drape_statistics *s = &sim->statistics;
     int64_t *const counts[] = {&s->steps_accepted,    &s->steps_rejected,  &s->steps_unconverged,
                                &s->steps_above_error, &s->steps_held,      &sim->attempts,
-                               &sim->failed,          &sim->held_up,       &sim->next_frame,
-                               &sim->left.by_error,   &sim->left.above_own};
-    double *const numbers[] = {&sim->held_up_from, &s->h_min,        &s->h_max,          &s->wall_setup,
-                               &s->wall_steps,     &s->wall_contact, &s->strain_min,     &s->strain_max,
-                               &s->error_max,      &s->error_last,   &sim->left.largest, &sim->left.last};
+                               &sim->next_frame,      &sim->left.by_error, &sim->left.above_own};
+    double *const numbers[] = {&s->h_min,        &s->h_max,          &s->wall_setup, &s->wall_steps,
+                               &s->wall_contact, &s->strain_min,     &s->strain_max, &s->error_max,
+                               &s->error_last,   &sim->left.largest, &sim->left.last};
     drape_archive_mark(a, "statistics");
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
         drape_archive_int64(a, counts[i]);
@@ -163,43 +161,6 @@ static void archive_statistics(drape_sim *sim, drape_archive *a)
     archive_reasons(sim, a);
     if (drape_archive_has_read(a) && !is_next_frame(sim))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no frame that could come next");
-}
-
-/* What was logged before a sim was saved is not logged again. */
-static void archive_relaxed_logged(drape_sim *sim, drape_archive *a)
-{
-    drape_archive_mark(a, "logged");
-    for (int32_t i = 0; i <= sim->model->collider_count; i++)
-        drape_archive_bool(a, &sim->relaxed_logged[i]);
-}
-
-static void archive_realtime(drape_sim *sim, drape_archive *a)
-{
-    drape_realtime_memory *m = &sim->realtime;
-    double *const numbers[] = {&m->dt,          &m->longest, &m->debt,     &m->dropped,   &m->behind,
-                               &m->pins_behind, &m->cap,     &m->apart_at, &m->apart_wait};
-    int efforts = sim->chosen.integrator->efforts < 1 ? 1 : sim->chosen.integrator->efforts;
-    drape_archive_mark(a, "realtime");
-    drape_archive_bool(a, &m->active);
-    drape_archive_bool(a, &m->stretched);
-    drape_archive_bool(a, &m->touches);
-    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
-        drape_archive_double(a, numbers[i]);
-    drape_archive_doubles(a, m->cost, DRAPE_MAX_EFFORTS);
-    drape_archive_double(a, &m->ending);
-    drape_archive_int64(a, &m->inaccurate);
-    drape_archive_int64(a, &m->crossings);
-    drape_archive_int64(a, &m->most_crossings);
-    drape_archive_int64(a, &m->crossed);
-    drape_archive_int(a, &m->effort);
-    if (drape_archive_good(a) && !is_place(m->effort, 0, efforts))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an effort %d of %d", m->effort, efforts);
-    if (drape_archive_good(a) && m->active &&
-        !(m->dt > 0 && m->longest >= m->dt && m->longest <= MAX_SECONDS && m->debt >= 0 &&
-          m->debt <= m->longest && m->behind >= 0 && m->pins_behind >= 0 && m->cap > 0))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step for a budget");
-    if (drape_archive_has_read(a) && sim->chosen.integrator->set_effort)
-        sim->chosen.integrator->set_effort(sim->integrator, m->effort);
 }
 
 static void archive_untangling(drape_sim *sim, drape_archive *a)
@@ -259,8 +220,7 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
     archive_schedule(&sim->schedule, a);
     archive_audit(sim, a);
     archive_statistics(sim, a);
-    archive_relaxed_logged(sim, a);
-    archive_realtime(sim, a);
+    drape_realtime_rescue.archive(sim, a);
     archive_untangling(sim, a);
     drape_events_archive(sim, a);
     drape_system_archive(sim->system, a);

@@ -5,6 +5,7 @@
 #include "model/support.h"
 #include "model/track.h"
 #include "sim/attach.h"
+#include "sim/rescue.h"
 
 #include <math.h>
 #include <string.h>
@@ -154,24 +155,16 @@ static drape_status copy_account(drape_sim *to, drape_sim *from)
     return measured(to);
 }
 
-static void copy_logged(drape_sim *to, const drape_sim *from, const int32_t *collider_before)
-{
-    const int32_t count = to->model->collider_count;
-    for (int32_t c = 0; c < count; c++)
-        to->relaxed_logged[c] = collider_before[c] >= 0 && from->relaxed_logged[collider_before[c]];
-    to->relaxed_logged[count] = from->relaxed_logged[from->model->collider_count];
-}
-
-static drape_status copy_driver(drape_sim *to, drape_sim *from)
+static drape_status copy_driver(drape_sim *to, drape_sim *from, const int32_t *before)
 {
     to->schedule = from->schedule;
     to->next_frame = from->next_frame;
     to->attempts = from->attempts;
     to->statistics = from->statistics;
-    to->realtime = from->realtime;
     to->earlier = drape_work_sum(from->chosen.integrator->work(from->integrator), &from->earlier);
-    if (to->chosen.integrator->set_effort)
-        to->chosen.integrator->set_effort(to->integrator, to->realtime.effort);
+    const drape_status status = drape_realtime_rescue.go_on(to, from, before);
+    if (status)
+        return status;
     drape_events_continue(to, from);
     return copy_reasons(to, from);
 }
@@ -203,11 +196,9 @@ static drape_status go_on(drape_sim *to, drape_sim *from)
     if (!status)
         status = hold(to, from);
     if (!status)
-        status = copy_driver(to, from);
+        status = copy_driver(to, from, before);
     if (!status)
         status = copy_account(to, from);
-    if (!status)
-        copy_logged(to, from, before);
     drape_free(to->ctx, before);
     return status;
 }

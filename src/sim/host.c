@@ -6,7 +6,7 @@
 #include "colliders/colliders.h"
 #include "geometry/mesh_distance.h"
 #include "sim/attach.h"
-#include "sim/place.h"
+#include "sim/rescue.h"
 
 #include <math.h>
 #include <string.h>
@@ -66,7 +66,7 @@ drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const int32_t *n
         status = check_pin(sim, nodes[i], positions + 3 * (size_t)i,
                            velocities ? velocities + 3 * (size_t)i : NULL);
     if (!status)
-        status = drape_sim_teleport_pins(sim, count, nodes, seconds, positions, velocities);
+        status = drape_realtime_rescue.send_pins(sim, count, nodes, seconds, positions, velocities);
     for (int32_t i = 0; !status && i < count; i++)
         drape_motion_send_pin(drape_system_steer(sim->system), nodes[i], drape_sim_state(sim)->t, seconds,
                               positions + 3 * (size_t)i, velocities ? velocities + 3 * (size_t)i : NULL);
@@ -119,7 +119,7 @@ static drape_status send_collider(drape_sim *sim, const char *function, int32_t 
             drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                        "%s: displacement and velocity must be within %g m and m/s", function, MAX_DISTANCE);
     if (!status)
-        status = drape_sim_teleport_collider(sim, collider, seconds, to);
+        status = drape_realtime_rescue.send_collider(sim, collider, seconds, to);
     if (!status)
         status = check_spin(sim, function, collider, seconds, to);
     if (!status)

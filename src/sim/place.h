@@ -21,16 +21,9 @@ drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloth
 /* What integrators and controllers remember of earlier steps is of another place. */
 void drape_sim_forget_past(drape_sim *sim);
 
-/* Before pins, or a collider, are sent on: if they are faster than the sim's teleport_speed, places their
- * cloth, or the collider, where they are sent to, as drape_sim_move_pins says. Errors: as
- * drape_sim_place_parts. */
-drape_status drape_sim_teleport_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
-                                     const double *positions, const double *velocities);
 /* Where a collider is sent; velocities may be NULL, and so may the rotation (3 x 3). */
 typedef struct drape_sent {
     const double *displacement, *velocity, *rotation, *angular_velocity;
 } drape_sent;
-drape_status drape_sim_teleport_collider(drape_sim *sim, int32_t collider, double seconds,
-                                         const drape_sent *to);
 
 #endif

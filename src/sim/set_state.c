@@ -6,7 +6,7 @@
 #include "base/elementary.h"
 #include "base/finite.h"
 #include "model/support.h"
-#include "sim/sim.h"
+#include "sim/rescue.h"
 
 #include <math.h>
 #include <string.h>
@@ -154,7 +154,8 @@ static void start_anew(drape_sim *sim, double t_before)
     sim->before = sim->past[0] = sim->past[1] = -1;
     memset(sim->scratch, 0, sizeof sim->scratch);
     sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
-    drape_sim_leave_realtime(sim);
+    if (sim->rescue)
+        sim->rescue->leave(sim);
     drape_events_reset(sim);
     drape_schedule_init(&sim->schedule, sim->schedule.stepping, sim->schedule.dt, t);
     if (t != t_before) /* otherwise the frame at t may have been emitted already */

@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "base/def.h"
 #include "compile/compile.h"
+#include "sim/rescue.h"
 #include "sim/untangle.h"
 
 #include <math.h>
@@ -57,8 +58,6 @@ static drape_status create_states(drape_sim *sim)
     sim->frame = drape_arena_take(sim->arena, n, sizeof *sim->frame);
     sim->frame_velocity = drape_arena_take(sim->arena, n, sizeof *sim->frame_velocity);
     sim->query_scratch = drape_arena_take(sim->arena, n, sizeof *sim->query_scratch);
-    sim->relaxed_logged =
-        drape_arena_take(sim->arena, (size_t)sim->model->collider_count + 1, sizeof *sim->relaxed_logged);
     sim->untangled_move =
         drape_arena_take(sim->arena, (size_t)sim->model->cloth_count, sizeof *sim->untangled_move);
     sim->state_bytes = sizeof *sim + sim->arena->bytes;
@@ -160,7 +159,7 @@ static drape_status open_sim(drape_context *ctx, const drape_model *model, const
                        .model = model,
                        .statistics = {.error_max = NAN, .error_last = NAN},
                        .left = {.largest = NAN, .last = NAN},
-                       .realtime = {.longest_asked = def->realtime_step},
+                       .realtime_step = def->realtime_step,
                        .frame_rate = def->frame_rate > 0 ? def->frame_rate : model->frame_rate,
                        .teleport_speed = def->teleport_speed};
     return sim->arena ? DRAPE_OK : DRAPE_E_MEMORY;
@@ -185,6 +184,8 @@ static drape_status start_sim(drape_sim *sim, int threads)
     status = status ? status : drape_check_cancel(sim->ctx);
     if (!status)
         status = drape_events_create(sim);
+    if (!status && sim->model->contact.no_room == DRAPE_NO_ROOM_RELAX)
+        status = drape_realtime_rescue.open(sim);
     status = agree(sim, status);
     if (status)
         return status;
@@ -222,7 +223,7 @@ drape_status drape_sim_create_like(const drape_sim *like, const drape_model *mod
                                    const double *masses, drape_sim **out)
 {
     const drape_sim_def def = {.frame_rate = like->frame_rate,
-                               .realtime_step = like->realtime.longest_asked,
+                               .realtime_step = like->realtime_step,
                                .teleport_speed = like->teleport_speed};
     drape_status status = open_sim(like->ctx, model, &def, out);
     if (!status && (pinned || masses))
@@ -295,6 +296,7 @@ void drape_sim_destroy(drape_sim **out)
     drape_system_destroy(&sim->system);
     drape_model_destroy(&sim->own_model);
     drape_model_destroy(&sim->kept_model);
+    drape_arena_free(&sim->rescue_arena);
     drape_arena_destroy(&sim->arena);
     drape_free(sim->ctx, sim);
     *out = NULL;

@@ -25,8 +25,8 @@ typedef struct drape_audit {
     double offered;              /* energy at the start plus the magnitudes of all work */
     double lowest;               /* lowest energy of gravity so far */
     double best;                 /* largest numerical dissipation so far */
-    double most_lost;            /* the same with what was dissipated: all that the motion has lost */
     double residual_work;        /* of the residuals that unconverged steps left, so far */
+    double most_lost;            /* the same with what was dissipated: all that the motion has lost */
     double best_unexplained;     /* largest numerical dissipation with that work as a source */
 } drape_audit;
 
@@ -36,31 +36,6 @@ typedef struct drape_warning_cursor {
     size_t check;     /* the test that may find it */
     int64_t attempts; /* made by the sim when this was set: after more of them it is out of date */
 } drape_warning_cursor;
-
-#define DRAPE_MAX_EFFORTS 8
-
-/* The state of advances with a budget, kept between calls. */
-typedef struct drape_realtime_memory {
-    bool active;                    /* the last advance was one with a budget */
-    double dt, longest;             /* [s] nominal step; longest step to keep up with */
-    double longest_asked;           /* [s] the longest step set by the def; 0: not set */
-    double debt, dropped;           /* [s] time left over for the next call; total time dropped */
-    double behind, pins_behind;     /* [s] of motion that a host sends beyond the time simulated (catch_up.h):
-                                       of bodies relative to the pins, and of what all pins have in common */
-    double cost[DRAPE_MAX_EFFORTS]; /* [s] expected for an attempt, by level of effort; 0: unknown */
-    double ending;                  /* [s] expected from the end of the integrator's work in an attempt on */
-    int effort;                     /* the integrator's level of effort; 0 is the best */
-    bool stretched;                 /* steps were longer than dt, or time was left over */
-    bool touches;                   /* the last attempt of a call ended in contact */
-    bool meets;                     /* a longer step of this call might meet something */
-    double cap;                     /* [s] longer steps were rejected recently; INFINITY: no limit */
-    int64_t inaccurate;             /* calls that were not accurate */
-    bool unchecked;                 /* pins have moved apart in this call; not archived: it is read in it */
-    int64_t crossings;              /* edges through triangles of the cloth after the last call, */
-    double apart_at, apart_wait;    /* [s] they are taken apart from then on, after having waited so long */
-    int64_t most_crossings;         /* the largest number of them so far, */
-    int64_t crossed;                /* and the calls with any */
-} drape_realtime_memory;
 
 /* What steps left of the solution of their equation, by estimate (nonlinear/stopping.h). */
 typedef struct drape_left {
@@ -92,33 +67,27 @@ struct drape_sim {
     drape_schedule schedule;
     double max_attempts; /* the controller's max_attempts; INFINITY: it has none */
     double frame_rate;
-    double teleport_speed; /* [m/s] above which the host's pins carry their cloth; 0: never. A setting of the
-                              host, which a restored sim keeps */
+    double realtime_step;  /* [s] the longest step with a time budget; 0: not set. As the next one, a setting
+                              of the host, which a restored sim keeps */
+    double teleport_speed; /* [m/s] above which the host's pins carry their cloth; 0: never */
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
     double *query_scratch;          /* (node_count x 3) for queries between steps */
     drape_bvh query_tree; /* of all triangles, for queries that fit it to the state; branches NULL: not yet
                              made. Not archived: it is the same for all states */
     int64_t attempts;
-    bool *relaxed_logged;   /* (collider_count + 1) the last message was that cloth is relaxed there */
-    int64_t failed;         /* attempts at the present step that failed */
-    int64_t held_up;        /* attempts that failed since held_up_from */
-    double held_up_from;    /* [s] from there on no whole dt was made */
-    bool relaxed_again;     /* after the last attempt cloth was relaxed; not archived: it is read at once */
-    double solved_at;       /* [s of drape_clock_seconds] the integrator's work in the last attempt ended; not
-                               archived: it is read at once */
-    double further_seconds; /* [s] of the last attempt, see drape_step_info; not archived: it is read at
-                                    once */
     drape_statistics statistics; /* counted by the driver; the integrator has the others */
     drape_left left;
     drape_reason_total reasons[DRAPE_MAX_REASONS];
     int reason_count;
     drape_audit audit;
-    drape_realtime_memory realtime;
-    bool untangle_due;           /* the scene asks for it, and the first step was not made yet */
-    bool untangled;              /* `untangling` is known */
-    drape_untangling untangling; /* the last one; its seconds are those of this machine */
-    double *untangled_move;      /* (cloth_count) [m] the largest displacement of a node in it */
+    const struct drape_rescue_ops *rescue;  /* of steps that fail (rescue.h); NULL: there is none */
+    struct drape_realtime_memory *realtime; /* what rescue keeps, */
+    drape_arena rescue_arena;               /* and its memory */
+    bool untangle_due;                      /* the scene asks for it, and the first step was not made yet */
+    bool untangled;                         /* `untangling` is known */
+    drape_untangling untangling;            /* the last one; its seconds are those of this machine */
+    double *untangled_move;                 /* (cloth_count) [m] the largest displacement of a node in it */
     drape_event_set events;
     drape_energy energy, attempted;     /* of the present state; of the last attempted one */
     bool energy_known, attempted_known; /* whether these two are valid */
@@ -261,9 +230,6 @@ drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 
 /* Ends the advance if it was cancelled, and resets the flag: returns DRAPE_E_STOPPED, with its message. */
 drape_status drape_sim_check_cancel(drape_sim *sim);
-
-/* Returns to the scene's own steps and the best level of effort, without left-over time. */
-void drape_sim_leave_realtime(drape_sim *sim);
 
 /* Notifies the observers. 0: continue; otherwise the negative status to stop with. */
 drape_status drape_sim_notify(drape_sim *sim, const drape_event *event);

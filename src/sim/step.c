@@ -8,21 +8,13 @@
 #include "base/reason.h"
 #include "model/support.h"
 #include "sim/dense.h"
-#include "sim/hold.h"
-#include "sim/relaxed.h"
+#include "sim/rescue.h"
 #include "sim/untangle.h"
 
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-
-/* Attempts that fail in a row, or halvings of a step, after which the pairs that hold it up are relaxed:
- * impacts on cloth that has room take some. With a time budget, where each attempt may be that of a frame,
- * also attempts that fail before a whole nominal step is made, whatever was accepted between them: then it is
- * only the pair that refuses the next one. With 3 instead of 6, three capes with self-contact were 23 mm
- * inside of bodies, instead of nowhere, and pinches dropped a tenth less time. */
-#define PATIENCE 6
 
 /* ---- Compute and check ---- */
 
@@ -68,13 +60,6 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
                               &info->diagnostic);
 }
 
-/* Whether cloth that bodies leave no room may be relaxed. */
-static bool may_relax(const drape_sim *sim)
-{
-    const drape_no_room policy = sim->model->contact.no_room;
-    return policy == DRAPE_NO_ROOM_RELAX || (policy == DRAPE_NO_ROOM_AUTO && sim->realtime.active);
-}
-
 /* The work from one state to another of what no integrator counts: the forces of the host, and terms that
  * depend on time, of which *open may be wrong. Adds what of it is dissipated. */
 static double outer_work(const drape_sim *sim, const drape_state *from, const drape_state *to, double *open,
@@ -114,7 +99,8 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     sim->attempted_known = false;
     info->diagnostic =
         (drape_diagnostic){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
-    drape_system_expect(sim->system, t1, may_relax(sim));
+    if (sim->rescue)
+        sim->rescue->begin(sim, t1);
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
     drape_sim_add_contact_work(sim);
     if (drape_system_contact(sim->system) &&
@@ -122,7 +108,8 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
         drape_sim_energy(sim); /* for the check, or a rejection, while contact is where the step begins */
     if (!status)
         status = integrate(sim, next, h, info);
-    sim->solved_at = drape_clock_seconds();
+    if (sim->rescue)
+        sim->rescue->solved(sim, info);
     if (status == DRAPE_E_STOPPED)
         info->reason = drape_reason_name(DRAPE_REASON_CANCELLED);
     if (status && !info->usable)
@@ -157,23 +144,6 @@ static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status s
                            .info = info,
                            .status = status};
     return sim->chosen.controller->judge(sim->chosen.controller_values, trial);
-}
-
-/* For an attempt that failed: relaxes cloth that bodies leave no room at its end and, if the step has
- * failed several times or is not to be tried again, what holds it up. *again: the same step is worth
- * another attempt. Errors: DRAPE_E_MEMORY. */
-static drape_status relax(drape_sim *sim, double t1, drape_status failure, drape_verdict verdict, bool *again)
-{
-    int32_t added = 0;
-    const bool all = verdict == DRAPE_STOP || sim->failed >= PATIENCE || sim->schedule.level >= PATIENCE,
-               one = sim->realtime.active && sim->held_up >= PATIENCE;
-    const drape_relax_extent extent = all ? DRAPE_RELAX_NEAR : one ? DRAPE_RELAX_PAIR : DRAPE_RELAX_NONE;
-    const bool may_help =
-        failure > 0 || failure == DRAPE_E_STEP_TOO_SMALL; /* of integrators with steps of their own */
-    const drape_status status =
-        may_help && may_relax(sim) ? drape_system_relax(sim->system, t1, extent, &added) : DRAPE_OK;
-    *again = sim->relaxed_again = !status && added > 0;
-    return status;
 }
 
 /* ---- Accept and reject ---- */
@@ -229,13 +199,6 @@ static void count_error(drape_sim *sim, const drape_step_info *info)
 static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
 {
     drape_statistics *s = &sim->statistics;
-    sim->failed = 0;
-    /* with a time budget, the steps of the schedule may be smaller than nominal ones */
-    if (!(next_state(sim)->t - sim->held_up_from <
-          (sim->realtime.active ? sim->realtime.dt : sim->schedule.dt))) {
-        sim->held_up = 0;
-        sim->held_up_from = next_state(sim)->t;
-    }
     if (!info->committed)
         drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
     /* what slides or flows leaves the elastic energy, and so stays in the balance */
@@ -250,6 +213,8 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     s->steps_unconverged += info->usable;
     count_error(sim, info);
     drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t, h_next, !info->laborious);
+    if (sim->rescue)
+        sim->rescue->accepted(sim);
 }
 
 static void count_reason(drape_sim *sim, const char *reason)
@@ -277,8 +242,6 @@ static void reject(drape_sim *sim, const drape_step_info *info)
     if (sim->before == sim->next && !sim->chosen.integrator->steady_state)
         sim->before = -1;
     sim->statistics.steps_rejected++;
-    sim->failed++;
-    sim->held_up++;
     count_reason(sim, info->reason);
 }
 
@@ -324,8 +287,6 @@ static bool must_repeat(drape_sim *sim, const double memory[2], drape_step_info 
         sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
     info->reason = drape_reason_name(DRAPE_REASON_EVENT);
     reject(sim, info);
-    sim->failed--;
-    sim->held_up--;
     return true;
 }
 
@@ -371,26 +332,6 @@ static void describe_nearest(const drape_sim *sim, const drape_attempt *attempt,
         describe_diagnostic(sim->model, &nearest, text, size);
 }
 
-/* Whether bodies leave the cloth no room at the end of a step that was too small, and the choice that makes
- * the sim go on. Where contact refused the step, the pairs that hold it up are taken for such. */
-static drape_status describe_room(drape_sim *sim, const drape_attempt *attempt, char *text, size_t size)
-{
-    bool lacks = false;
-    text[0] = 0;
-    if (may_relax(sim) || sim->chosen.integrator->projects_contact)
-        return DRAPE_OK;
-    const bool refused = strcmp(attempt->reason, drape_reason_name(DRAPE_REASON_PENETRATION)) == 0 ||
-                         strcmp(attempt->reason, drape_reason_name(DRAPE_REASON_COLLISION)) == 0;
-    const double t1 = attempt->t + fmax(attempt->h, sim->schedule.dt);
-    const drape_status status =
-        drape_system_lacks_room(sim->system, t1, refused ? DRAPE_RELAX_NEAR : DRAPE_RELAX_NONE, &lacks);
-    if (lacks)
-        snprintf(text, size,
-                 "; bodies leave the cloth no room there: with /contact/no_room \"relax\" they are let into "
-                 "it, and the run goes on");
-    return status;
-}
-
 /* Whether an event, and nothing else, kept an attempt from being accepted. */
 static bool is_event(const drape_attempt *attempt)
 {
@@ -410,7 +351,7 @@ static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
-    char diagnostic[400], nearest[400], residual[100] = "", distortion[200] = "", room[200] = "";
+    char diagnostic[400], nearest[400], residual[100] = "", distortion[200] = "", advice[200] = "";
     if (stop == DRAPE_E_MEMORY || is_event(attempt)) /* the message is set */
         return stop;
     if (stop == DRAPE_E_STOPPED)
@@ -420,7 +361,7 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
     /* a diagnostic that names only a node may not give the cause, which the distortion may */
     if (attempt->diagnostic.element < 0 && !sim->model->part)
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
-    if (stop == DRAPE_E_STEP_TOO_SMALL && describe_room(sim, attempt, room, sizeof room))
+    if (stop == DRAPE_E_STEP_TOO_SMALL && drape_realtime_rescue.advise(sim, attempt, advice, sizeof advice))
         return DRAPE_E_MEMORY;
     /* NAN: integrators that bound errors have no residual */
     if (!isnan(attempt->tolerance) && !isnan(attempt->residual))
@@ -428,19 +369,19 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
                  attempt->tolerance);
     return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s%s%s", attempt->t,
                       attempt->h, attempt->reason, drape_status_name(attempt->status), attempt->iterations,
-                      residual, diagnostic, nearest, distortion, room);
+                      residual, diagnostic, nearest, distortion, advice);
 }
 
 /* An integrator that chooses its own steps has no dt, and a limit of its own. */
 drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 {
-    char diagnostic[400], nearest[400], room[200];
+    char diagnostic[400], nearest[400], advice[200];
     const drape_schedule *s = &sim->schedule;
     if (!(s->dt > 0) || (double)s->tries < sim->max_attempts)
         return DRAPE_OK;
     describe_diagnostic(sim->model, &last->diagnostic, diagnostic, sizeof diagnostic);
     describe_nearest(sim, last, nearest, sizeof nearest);
-    if (describe_room(sim, last, room, sizeof room))
+    if (drape_realtime_rescue.advise(sim, last, advice, sizeof advice))
         return DRAPE_E_MEMORY;
     return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
                       "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64
@@ -448,7 +389,7 @@ drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
                       "max_attempts is %.15g%s%s%s",
                       drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status),
                       last->iterations, s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic,
-                      nearest, room);
+                      nearest, advice);
 }
 
 /* ---- One step, and an advance ---- */
@@ -477,36 +418,6 @@ static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *
                            .left = info->left};
 }
 
-/* After an attempt that failed: holds the cloth, if that is the last resort and possible. The step is then
- * accepted, unless it is to end at an event: then the next attempt ends there. *stop as in try_step. Returns
- * whether the verdict on the attempt was replaced. */
-static bool hold(drape_sim *sim, drape_status failure, bool stopped, drape_step_info *info,
-                 drape_status *stop)
-{
-    drape_step_info held;
-    if (!drape_sim_must_hold(sim, failure, stopped))
-        return false;
-    drape_status status = drape_sim_hold(sim, next_state(sim), &held);
-    drape_system_end_step(sim->system);
-    if (!status && drape_events_examine(sim, next_state(sim), &status) != DRAPE_EVENTS_PASS)
-        status = status ? status : DRAPE_RETRY_REJECTED;
-    if (status < 0)
-        *stop = status;
-    if (status)
-        return false;
-    drape_log(sim->ctx, DRAPE_LOG_WARNING,
-              "t=%.9g h=%.4g: no step can be made (%s), and the cloth is held where it is",
-              drape_sim_time(sim), held.h, info->reason);
-    *info = held;
-    *stop = DRAPE_OK;
-    drape_schedule_cut(&sim->schedule, next_state(sim)->t);
-    accept(sim, info, sim->schedule.dt);
-    drape_events_commit(sim);
-    sim->statistics.steps_held++;
-    sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
-    return true;
-}
-
 /* Makes one attempt, from proposal to verdict. *stop: the negative status that ends the advance; 0:
  * continue. */
 static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status *stop)
@@ -518,28 +429,29 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     const double memory[2] = {sim->scratch[0], sim->scratch[1]};
     drape_status status = compute_next(sim, t1, h, &info);
     drape_verdict verdict = judge(sim, &info, status, &trial);
-    sim->further_seconds = info.further_seconds;
     *stop = DRAPE_OK;
     if (verdict == DRAPE_ACCEPT && must_repeat(sim, memory, &info, stop))
         return record_of(sim, t, &info, DRAPE_RETRY_REJECTED, false);
-    bool again = false;
-    const drape_status relaxed = verdict == DRAPE_ACCEPT ? DRAPE_OK : relax(sim, t1, status, verdict, &again);
-    verdict = again ? DRAPE_RETRY : verdict;
-    bool refused = status == DRAPE_OK && verdict != DRAPE_ACCEPT; /* by the controller alone */
-    *stop = relaxed ? relaxed : verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
-    if (verdict != DRAPE_ACCEPT && !again && !relaxed &&
-        hold(sim, refused ? DRAPE_RETRY_REJECTED : status, verdict == DRAPE_STOP, &info, stop))
-        return record_of(sim, t, &info, refused ? DRAPE_RETRY_REJECTED : status, true);
-    if (verdict == DRAPE_ACCEPT) {
-        accept(sim, &info, trial.h_next);
+    *stop = verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
+    const drape_rescued rescued = verdict != DRAPE_ACCEPT && sim->rescue
+                                      ? sim->rescue->failed(sim, t1, status, &info, stop)
+                                      : DRAPE_RESCUED_NOT;
+    const bool refused = status == DRAPE_OK && verdict != DRAPE_ACCEPT, /* by the controller alone */
+        accepted = verdict == DRAPE_ACCEPT || rescued == DRAPE_RESCUED_BY_STEP;
+    if (rescued == DRAPE_RESCUED_BY_STEP)
+        drape_schedule_cut(&sim->schedule, next_state(sim)->t);
+    if (accepted) {
+        accept(sim, &info, rescued == DRAPE_RESCUED_BY_STEP ? sim->schedule.dt : trial.h_next);
         drape_events_commit(sim);
     } else
         reject(sim, &info);
-    if (again)
+    if (rescued == DRAPE_RESCUED_BY_STEP)
+        sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+    else if (rescued == DRAPE_RESCUED_AGAIN)
         drape_schedule_repeat(&sim->schedule);
     else if (verdict == DRAPE_RETRY && !drape_schedule_retry(&sim->schedule, trial.h_next))
         *stop = DRAPE_E_STEP_TOO_SMALL;
-    return record_of(sim, t, &info, refused ? DRAPE_RETRY_REJECTED : status, verdict == DRAPE_ACCEPT);
+    return record_of(sim, t, &info, refused ? DRAPE_RETRY_REJECTED : status, accepted);
 }
 
 /* Contact time so far, including queries outside steps such as energies for observers. */
@@ -559,8 +471,6 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
     log_rejection(sim, attempt);
-    if (attempt->accepted)
-        drape_sim_log_relaxed(sim);
     drape_status notified = notify_attempt(sim, attempt);
     drape_status reported = drape_events_report(sim);
     drape_status emitted = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
@@ -582,7 +492,8 @@ static drape_status advance(drape_sim *sim, double t_end)
                                        run */
     if (!status)
         status = drape_events_resume(sim);
-    drape_sim_leave_realtime(sim);
+    if (sim->rescue)
+        sim->rescue->leave(sim);
     drape_schedule_aim(&sim->schedule, t_end);
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
         status = drape_sim_check_attempts(sim, &attempt);

@@ -7,8 +7,7 @@
 #include "colliders/deformed.h"
 #include "compile/compile.h"
 #include "sim/inside.h"
-#include "sim/relaxed.h"
-#include "sim/sim.h"
+#include "sim/rescue.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -21,7 +20,6 @@
 #define TOO_MANY 10.0 /* Newton iterations an attempt: smaller steps hardly cost more */
 #define THIN     5.0  /* activation distances in a step of a collider */
 #define LARGE    20.0 /* [m] across */
-#define SLOW     0.1  /* of the simulated time: dropped */
 #define INSIDE   1e-9 /* [m] a node less deep than this is not inside: contact allows it */
 
 /* A cloth of which nothing but its weight is modelled falls like dust. */
@@ -238,32 +236,6 @@ static bool ends_inside(drape_sim *sim, char *text, size_t size)
            describe_inside(sim, drape_sim_positions(sim), false, text, size);
 }
 
-/* Bodies that left cloth no room were let in: where, how long and how deep. */
-static bool had_no_room(drape_sim *sim, char *text, size_t size)
-{
-    int32_t places = 0, most = -1;
-    for (int32_t c = -1; c < sim->model->collider_count; c++) {
-        const drape_relaxed_total *total = drape_sim_relaxed_total(sim, c);
-        places += total->most > 0;
-        if (total->most > 0 && (places == 1 || total->deepest > drape_sim_relaxed_total(sim, most)->deepest))
-            most = c;
-    }
-    if (places == 0)
-        return false;
-    const drape_relaxed_total *total = drape_sim_relaxed_total(sim, most);
-    double deepest;
-    char more[40] = "";
-    if (places > 1)
-        snprintf(more, sizeof more, ", and at %d other%s", (int)places - 1, places == 2 ? "" : "s");
-    snprintf(text, size,
-             "cloth had no room at %s%s: up to %d of its nodes relaxed there, for %.3g s between %.4g and "
-             "%.4g s, up to "
-             "%.3g m deep; %d now",
-             drape_sim_relaxed_name(sim, most), more, (int)total->most, total->seconds, total->first,
-             total->last, total->deepest, (int)drape_sim_relaxed_now(sim, &deepest));
-    return true;
-}
-
 /* The setting that makes steps smaller. */
 static const char *smaller_steps(const drape_chosen *c)
 {
@@ -404,46 +376,6 @@ static bool is_tangled(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
-/* The last resort of advances with a time budget. */
-static bool was_held(drape_sim *sim, char *text, size_t size)
-{
-    const drape_statistics *s = &sim->statistics;
-    if (s->steps_held == 0)
-        return false;
-    snprintf(text, size,
-             "in %lld of %lld steps no size of the step could be made, and the cloth was held where it was, "
-             "or went with its pins: the log says when and why",
-             (long long)s->steps_held, (long long)s->steps_accepted);
-    return true;
-}
-
-/* Steps that let cloth pass through pinned cloth, or began with cloth that passed through itself. */
-static bool passed_through(drape_sim *sim, char *text, size_t size)
-{
-    const drape_realtime_memory *m = &sim->realtime;
-    if (m->crossed == 0)
-        return false;
-    snprintf(
-        text, size,
-        "after %lld calls with a time budget edges of the cloth passed through its triangles, up to %lld of "
-        "them: pins leave the cloth no room, or it began so",
-        (long long)m->crossed, (long long)m->most_crossings);
-    return true;
-}
-
-/* Advances with a time budget that fall behind: the cloth moves in slow motion. */
-static bool drops_time(drape_sim *sim, char *text, size_t size)
-{
-    const double dropped = sim->realtime.dropped, motion = drape_sim_time(sim);
-    if (!(dropped > SLOW * motion))
-        return false;
-    snprintf(text, size,
-             "steps did not fit the time budget: %.3g s of simulated time were dropped, beside %.3g s that "
-             "were simulated: a larger budget, fewer nodes, a thicker cloth or slower bodies keep up",
-             dropped, motion);
-    return true;
-}
-
 /* Bodies that cross the scene's activation distance in a small part of a step accelerate cloth all at once. A
  * hung sheet under newton_k at 1/60 s, swept by a ball at 2 m/s, 33 mm a step, had 58 % strain and 5 rejected
  * steps in 2 s at a distance of 10 mm, and 203 % and 27 at 3 mm. */
@@ -461,28 +393,31 @@ static bool is_contact_thin(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
-static const struct {
-    const char *name;
-    bool (*applies)(drape_sim *sim, char *text, size_t size);
-} checks[] = {{"no_terms", has_no_terms},
-              {"unused_curve", has_unused_curve},
-              {"unused_clamp", has_unused_clamp},
-              {"unused_history", has_unused_history},
-              {"few_steps", has_few_steps},
-              {"large_mesh", has_large_file},
-              {"starts_inside", starts_inside},
-              {"ends_inside", ends_inside},
-              {"tangled", is_tangled},
-              {"no_room", had_no_room},
-              {"numerical_dissipation", dissipates_most},
-              {"energy_gained", gains_energy},
-              {"many_iterations", iterates_long},
-              {"slow_contact", is_contact_slow},
-              {"contact_distance", is_contact_thin},
-              {"inaccurate", is_inaccurate},
-              {"held", was_held},
-              {"crossings", passed_through},
-              {"time_dropped", drops_time}};
+static const drape_warning_check checks[] = {{"no_terms", has_no_terms},
+                                             {"unused_curve", has_unused_curve},
+                                             {"unused_clamp", has_unused_clamp},
+                                             {"unused_history", has_unused_history},
+                                             {"few_steps", has_few_steps},
+                                             {"large_mesh", has_large_file},
+                                             {"starts_inside", starts_inside},
+                                             {"ends_inside", ends_inside},
+                                             {"tangled", is_tangled},
+                                             {"numerical_dissipation", dissipates_most},
+                                             {"energy_gained", gains_energy},
+                                             {"many_iterations", iterates_long},
+                                             {"slow_contact", is_contact_slow},
+                                             {"contact_distance", is_contact_thin},
+                                             {"inaccurate", is_inaccurate}};
+
+/* NULL: there are no more. */
+static const drape_warning_check *check_at(const drape_sim *sim, size_t index)
+{
+    const size_t own = sizeof checks / sizeof *checks;
+    if (index < own)
+        return &checks[index];
+    const drape_warning_check *more = sim->rescue ? &sim->rescue->warnings[index - own] : NULL;
+    return more && more->name ? more : NULL;
+}
 
 bool drape_sim_take_warning_failure(drape_sim *sim)
 {
@@ -499,10 +434,11 @@ bool drape_sim_warning(drape_sim *sim, int index, drape_warning *out)
     if (sim && index > 0 && sim->warning_cursor.index <= index &&
         sim->warning_cursor.attempts == sim->attempts)
         c = sim->warning_cursor;
-    while (sim && out && index >= 0 && c.check < sizeof checks / sizeof *checks) {
-        const size_t i = c.check++;
-        if (checks[i].applies(sim, out->text, sizeof out->text) && c.index++ == index) {
-            out->name = checks[i].name;
+    const drape_warning_check *check;
+    while (sim && out && index >= 0 && (check = check_at(sim, c.check))) {
+        c.check++;
+        if (check->applies(sim, out->text, sizeof out->text) && c.index++ == index) {
+            out->name = check->name;
             drape_make_printable(out->text);
             c.attempts = sim->attempts;
             sim->warning_cursor = c;

@@ -99,7 +99,7 @@ static void check_active(all_pairs *all, drape_active_contact *found)
     const drape_contact *c = all->contact;
     const drape_configuration now = drape_contact_configuration(c);
     ck_assert_int_eq(drape_active_set_list(&all->active, &all->list, &(drape_distances){0}, &now, &c->inside,
-                                           false, &c->relaxed),
+                                           false, c->exempt),
                      DRAPE_OK);
     ck_assert_int_eq(c->active.count, all->active.count);
     if (c->active.count == 0)

@@ -5,11 +5,11 @@
  * scene's, and are not checked. A node that has room again is pushed more and more, until its gap is as
  * large as contact allows.
  */
-#ifndef DRAPE_CONTACT_RELAXED_H
-#define DRAPE_CONTACT_RELAXED_H
+#ifndef DRAPE_REALTIME_RELAXED_H
+#define DRAPE_REALTIME_RELAXED_H
 
 #include "base/archive.h"
-#include "contact/pair.h"
+#include "contact/parts.h"
 
 typedef struct drape_relaxed_node {
     int32_t collider; /* -1: pinned pieces of cloth */
@@ -47,10 +47,11 @@ typedef struct drape_relaxed_total {
 } drape_relaxed_total;
 
 typedef struct drape_relaxed_set {
+    drape_exempt exempt; /* what contact asks; its count is that of the nodes */
     drape_arena *arena;
     const drape_model *model;
-    drape_relaxed_node *nodes; /* (count of room) by increasing collider and node */
-    int32_t count, room;
+    drape_relaxed_node *nodes; /* (exempt.count of room) by increasing collider and node */
+    int32_t room;
     uint8_t *of_node;             /* (node_count) whether it is among them, for any collider */
     double *normal;               /* (node_count x 3) scratch */
     double *reach;                /* (node_count) scratch */
@@ -58,32 +59,32 @@ typedef struct drape_relaxed_set {
     uint8_t *face;                /* (triangle_count) scratch of exit.c, */
     int32_t *parent;              /* (node_count) this, too, */
     drape_relaxed_patch *patches; /* (node_count) and this */
-    double *bound; /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none */
+    double *bound;   /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none; */
+    double *bound_t; /* (collider_count) [s] of those that deform. Not archived: they follow the bodies */
     bool *solid; /* (collider_count) its parts enclose a volume: inside, they push to whichever side the cloth
                     is on, and only the distance from the whole tells where out is */
     drape_relaxed_total *total; /* (collider_count + 1) the last one: of pinned pieces of cloth */
     double t;                   /* [s] of the last update */
-    bool counting; /* nodes that would be relaxed are counted, and nothing changes; during one search */
+    double ahead_t; /* [s] the end of the step that begins next; NAN: unknown. Set before each step */
+    bool may_relax; /* cloth without room there may be relaxed; set with it */
+    bool *logged;   /* (collider_count + 1) the last message was that cloth is relaxed there */
+    bool counting;  /* nodes that would be relaxed are counted, and nothing changes; during one search */
 } drape_relaxed_set;
 
-/* A ball around a shape: center and radius; infinite for one that has no end. */
-void drape_relaxed_bound(const drape_collider_shape *shape, double out[4]);
+/* In an arena; what grows later is in that of contact. Errors: DRAPE_E_MEMORY. */
+drape_status drape_relaxed_create(drape_arena *arena, const drape_contact *contact, drape_relaxed_set **out);
 
-drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, drape_relaxed_set *out);
+/* The set that contact asks. */
+static inline drape_relaxed_set *drape_relaxed_of(const drape_contact *contact)
+{
+    return (drape_relaxed_set *)contact->exempt;
+}
+
+/* The ball around a collider as contact has fitted it. */
+const double *drape_relaxed_bound_of(const drape_contact *contact, int32_t collider);
 
 /* NULL: the node is held. */
 drape_relaxed_node *drape_relaxed_find(const drape_relaxed_set *set, int32_t collider, int32_t node);
-
-/* The largest factor of the nodes by which a pair is relaxed; 0: it is not. A pair of cloth with cloth is
- * relaxed if one piece has a relaxed node and the other one a pinned node. */
-double drape_relaxed_factor(const drape_relaxed_set *set, const drape_pair *pair);
-
-/* Whether any of these nodes is relaxed for the collider; -1 stands for no node. */
-bool drape_relaxed_has(const drape_relaxed_set *set, int32_t collider, const int32_t *node, int nodes);
-
-/* Whether some node of a pair comes out of its collider along a direction of its own: the pair does not
- * act. */
-bool drape_relaxed_has_exit(const drape_relaxed_set *set, const drape_pair *pair);
 
 /* Relaxes a node from time t on, at least until `until`, or says that a relaxed one has no room. *added is
  * raised by 1 if it was not relaxed. Errors: DRAPE_E_MEMORY. */
@@ -103,6 +104,11 @@ double drape_relaxed_since(const drape_relaxed_set *set, int32_t collider);
 /* Removes the nodes for which `leaves` is true. Returns their number. */
 typedef bool drape_relaxed_leaves(void *user, const drape_relaxed_node *node);
 int32_t drape_relaxed_remove(drape_relaxed_set *set, drape_relaxed_leaves *leaves, void *user);
+
+/* Takes what is relaxed, and what became of the cloth so far, from a set of the same cloth. before
+ * (collider_count): the number that each collider has there; -1: it is new. Errors: DRAPE_E_MEMORY. */
+drape_status drape_relaxed_continue(drape_relaxed_set *to, const drape_relaxed_set *from,
+                                    const int32_t *before);
 
 void drape_relaxed_archive(drape_relaxed_set *set, drape_archive *a);
 

@@ -1,5 +1,5 @@
 /* relaxed.c: see relaxed.h. */
-#include "contact/relaxed.h"
+#include "realtime/relaxed.h"
 
 #include "base/elementary.h"
 #include "base/vec3.h"
@@ -11,7 +11,7 @@
 #define DOUBLED 0.02 /* [s] in which the pressure on a node that has room doubles, and falls by half */
 
 /* A shape without points may have no end, as a plane; inscribed ones are inside of it. */
-void drape_relaxed_bound(const drape_collider_shape *shape, double out[4])
+static void bound_of(const drape_collider_shape *shape, double out[4])
 {
     double radius = shape->point_count > 0 && !shape->inscribed ? 0 : INFINITY, to[3];
     memset(out, 0, 3 * sizeof *out);
@@ -35,25 +35,15 @@ static bool is_solid(const drape_collider *collider, const double middle[3])
             drape_collider_distance(collider, &rest, middle, NULL, NULL) < -(1 + DEEPER) * shape->radius);
 }
 
-drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, drape_relaxed_set *set)
+const double *drape_relaxed_bound_of(const drape_contact *c, int32_t collider)
 {
-    const size_t nodes = (size_t)model->node_count, colliders = (size_t)model->collider_count;
-    *set = (drape_relaxed_set){.arena = arena, .model = model};
-    set->of_node = drape_arena_take(arena, nodes, sizeof *set->of_node);
-    set->normal = drape_arena_take(arena, nodes, 3 * sizeof *set->normal);
-    set->reach = drape_arena_take(arena, nodes, sizeof *set->reach);
-    set->face = drape_arena_take(arena, (size_t)model->triangle_count, sizeof *set->face);
-    set->parent = drape_arena_take(arena, nodes, sizeof *set->parent);
-    set->patches = drape_arena_take(arena, nodes, sizeof *set->patches);
-    set->pins = drape_arena_take(arena, colliders, sizeof *set->pins);
-    set->bound = drape_arena_take(arena, colliders, 4 * sizeof *set->bound);
-    set->solid = drape_arena_take(arena, colliders, sizeof *set->solid);
-    set->total = drape_arena_take(arena, colliders + 1, sizeof *set->total);
-    for (size_t i = 0; set->bound && set->solid && i < colliders; i++) {
-        drape_relaxed_bound(&model->colliders[i].shape, set->bound + 4 * i);
-        set->solid[i] = is_solid(&model->colliders[i], set->bound + 4 * i);
+    drape_relaxed_set *set = drape_relaxed_of(c);
+    double *bound = set->bound + 4 * (size_t)collider;
+    if (c->deformed[collider] && set->bound_t[collider] != c->body_t[collider]) {
+        bound_of(&c->deformed[collider]->collider.shape, bound);
+        set->bound_t[collider] = c->body_t[collider];
     }
-    return drape_arena_status(arena);
+    return bound;
 }
 
 /* ---- Queries ---- */
@@ -61,7 +51,7 @@ drape_status drape_relaxed_create(drape_arena *arena, const drape_model *model, 
 /* The place of the first node that is not before this one. */
 static int32_t place_of(const drape_relaxed_set *set, int32_t collider, int32_t node)
 {
-    int32_t low = 0, high = set->count;
+    int32_t low = 0, high = set->exempt.count;
     while (low < high) {
         const int32_t middle = low + (high - low) / 2;
         const drape_relaxed_node *at = &set->nodes[middle];
@@ -75,10 +65,10 @@ static int32_t place_of(const drape_relaxed_set *set, int32_t collider, int32_t 
 
 drape_relaxed_node *drape_relaxed_find(const drape_relaxed_set *set, int32_t collider, int32_t node)
 {
-    if (set->count == 0 || node < 0 || node >= set->model->node_count || !set->of_node[node])
+    if (set->exempt.count == 0 || node < 0 || node >= set->model->node_count || !set->of_node[node])
         return NULL;
     const int32_t at = place_of(set, collider, node);
-    drape_relaxed_node *found = at < set->count ? &set->nodes[at] : NULL;
+    drape_relaxed_node *found = at < set->exempt.count ? &set->nodes[at] : NULL;
     return found && found->collider == collider && found->node == node ? found : NULL;
 }
 
@@ -92,9 +82,11 @@ static double factor_of(const drape_relaxed_set *set, int32_t collider, const in
     return factor;
 }
 
-bool drape_relaxed_has(const drape_relaxed_set *set, int32_t collider, const int32_t *node, int nodes)
+/* ---- What contact asks ---- */
+
+static bool has(const drape_exempt *exempt, int32_t collider, const int32_t *node, int nodes)
 {
-    return set->count > 0 && factor_of(set, collider, node, nodes) > 0;
+    return factor_of((const drape_relaxed_set *)exempt, collider, node, nodes) > 0;
 }
 
 static bool has_pin(const drape_model *model, const int32_t *node, int nodes)
@@ -105,28 +97,63 @@ static bool has_pin(const drape_model *model, const int32_t *node, int nodes)
     return found;
 }
 
-double drape_relaxed_factor(const drape_relaxed_set *set, const drape_pair *pair)
+/* A pair of cloth with cloth is relaxed if one piece has a relaxed node and the other one a pinned node. */
+static double factor(const drape_exempt *exempt, const drape_pair *pair)
 {
-    if (set->count == 0)
-        return 0;
+    const drape_relaxed_set *set = (const drape_relaxed_set *)exempt;
     if (pair->collider >= 0)
         return factor_of(set, pair->collider, pair->node, drape_pair_points(pair));
     const int split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
     const int32_t *one = pair->node, *other = pair->node + split;
-    double factor = has_pin(set->model, other, 4 - split) ? factor_of(set, -1, one, split) : 0;
+    double largest = has_pin(set->model, other, 4 - split) ? factor_of(set, -1, one, split) : 0;
     if (has_pin(set->model, one, split))
-        factor = fmax(factor, factor_of(set, -1, other, 4 - split));
-    return factor;
+        largest = fmax(largest, factor_of(set, -1, other, 4 - split));
+    return largest;
 }
 
-bool drape_relaxed_has_exit(const drape_relaxed_set *set, const drape_pair *pair)
+/* Features of parts that enclose a volume do not know on which side the cloth belongs, and nodes that come
+ * out along a direction of their own are not pushed along another one. */
+static bool acts(const drape_exempt *exempt, const drape_pair *pair)
 {
-    bool goes = false;
-    for (int a = 0; pair->collider >= 0 && a < drape_pair_points(pair); a++) {
+    const drape_relaxed_set *set = (const drape_relaxed_set *)exempt;
+    const int points = drape_pair_points(pair);
+    bool goes = pair->collider >= 0 && points > 1 && set->solid[pair->collider];
+    for (int a = 0; pair->collider >= 0 && a < points && !goes; a++) {
         const drape_relaxed_node *found = drape_relaxed_find(set, pair->collider, pair->node[a]);
-        goes = goes || (found && drape_relaxed_goes_out(found));
+        goes = found && drape_relaxed_goes_out(found);
     }
-    return goes;
+    return !goes;
+}
+
+drape_status drape_relaxed_create(drape_arena *arena, const drape_contact *contact, drape_relaxed_set **out)
+{
+    const drape_model *model = contact->model;
+    const size_t nodes = (size_t)model->node_count, colliders = (size_t)model->collider_count;
+    drape_relaxed_set *set = *out = drape_arena_take(arena, 1, sizeof *set);
+    if (!set)
+        return DRAPE_E_MEMORY;
+    *set = (drape_relaxed_set){.exempt = {.factor = factor, .acts = acts, .has = has},
+                               .arena = contact->arena,
+                               .model = model,
+                               .ahead_t = NAN};
+    set->of_node = drape_arena_take(arena, nodes, sizeof *set->of_node);
+    set->normal = drape_arena_take(arena, nodes, 3 * sizeof *set->normal);
+    set->reach = drape_arena_take(arena, nodes, sizeof *set->reach);
+    set->face = drape_arena_take(arena, (size_t)model->triangle_count, sizeof *set->face);
+    set->parent = drape_arena_take(arena, nodes, sizeof *set->parent);
+    set->patches = drape_arena_take(arena, nodes, sizeof *set->patches);
+    set->pins = drape_arena_take(arena, colliders, sizeof *set->pins);
+    set->bound = drape_arena_take(arena, colliders, 4 * sizeof *set->bound);
+    set->bound_t = drape_arena_take(arena, colliders, sizeof *set->bound_t);
+    set->solid = drape_arena_take(arena, colliders, sizeof *set->solid);
+    set->logged = drape_arena_take(arena, colliders + 1, sizeof *set->logged);
+    set->total = drape_arena_take(arena, colliders + 1, sizeof *set->total);
+    for (size_t i = 0; !drape_arena_status(arena) && i < colliders; i++) {
+        bound_of(&model->colliders[i].shape, set->bound + 4 * i);
+        set->bound_t[i] = NAN;
+        set->solid[i] = is_solid(&model->colliders[i], set->bound + 4 * i);
+    }
+    return drape_arena_status(arena);
 }
 
 /* ---- Changes ---- */
@@ -145,12 +172,12 @@ drape_status drape_relaxed_add(drape_relaxed_set *set, int32_t collider, int32_t
         return DRAPE_OK;
     }
     drape_relaxed_node *nodes =
-        drape_list_grow(set->arena, set->nodes, set->count, &set->room, sizeof *set->nodes);
+        drape_list_grow(set->arena, set->nodes, set->exempt.count, &set->room, sizeof *set->nodes);
     if (!nodes)
         return DRAPE_E_MEMORY;
     set->nodes = nodes;
     const int32_t at = place_of(set, collider, node);
-    memmove(nodes + at + 1, nodes + at, (size_t)(set->count - at) * sizeof *nodes);
+    memmove(nodes + at + 1, nodes + at, (size_t)(set->exempt.count - at) * sizeof *nodes);
     nodes[at] = (drape_relaxed_node){.collider = collider,
                                      .node = node,
                                      .since = t,
@@ -160,7 +187,7 @@ drape_status drape_relaxed_add(drape_relaxed_set *set, int32_t collider, int32_t
                                      .blocked = true,
                                      .fresh = true};
     set->of_node[node] = 1;
-    set->count++;
+    set->exempt.count++;
     (*added)++;
     return DRAPE_OK;
 }
@@ -201,18 +228,19 @@ static void add_to_total(drape_relaxed_set *set, int32_t collider, double t)
 
 void drape_relaxed_update(drape_relaxed_set *set, double t, double max_factor)
 {
-    for (int32_t i = 0; i < set->count; i++)
+    for (int32_t i = 0; i < set->exempt.count; i++)
         set->nodes[i].deepest = fmax(set->nodes[i].deepest, set->nodes[i].depth);
     if (t == set->t)
         return;
-    const double step = fmax(t - set->t, 0), change = set->count > 0 ? drape_pow(2, step / DOUBLED) : 1;
-    for (int32_t i = 0; i < set->count; i++) {
+    const double step = fmax(t - set->t, 0),
+                 change = set->exempt.count > 0 ? drape_pow(2, step / DOUBLED) : 1;
+    for (int32_t i = 0; i < set->exempt.count; i++) {
         drape_relaxed_node *node = &set->nodes[i];
         node->fresh = false;
         node->factor =
             fmax(1, fmin(node->blocked ? node->factor / change : node->factor * change, max_factor));
     }
-    for (int32_t i = -1; set->count > 0 && i < set->model->collider_count; i++)
+    for (int32_t i = -1; set->exempt.count > 0 && i < set->model->collider_count; i++)
         add_to_total(set, i, t);
     set->t = t;
 }
@@ -220,19 +248,49 @@ void drape_relaxed_update(drape_relaxed_set *set, double t, double max_factor)
 int32_t drape_relaxed_remove(drape_relaxed_set *set, drape_relaxed_leaves *leaves, void *user)
 {
     int32_t kept = 0;
-    for (int32_t i = 0; i < set->count; i++)
+    for (int32_t i = 0; i < set->exempt.count; i++)
         if (leaves(user, &set->nodes[i]))
             set->of_node[set->nodes[i].node] = 0;
         else
             set->nodes[kept++] = set->nodes[i];
-    const int32_t removed = set->count - kept;
-    set->count = kept;
+    const int32_t removed = set->exempt.count - kept;
+    set->exempt.count = kept;
     for (int32_t i = 0; i < kept; i++) /* a node may be relaxed for another collider still */
         set->of_node[set->nodes[i].node] = 1;
     return removed;
 }
 
-/* ---- Checkpoints ---- */
+/* ---- Between sims ---- */
+
+drape_status drape_relaxed_continue(drape_relaxed_set *to, const drape_relaxed_set *from,
+                                    const int32_t *before)
+{
+    const int32_t colliders = to->model->collider_count, last = from->model->collider_count;
+    drape_status status = DRAPE_OK;
+    int32_t added = 0;
+    to->t = from->t;
+    for (int32_t c = 0; c <= colliders; c++) {
+        const int32_t had = c < colliders ? before[c] : last;
+        if (had < 0)
+            continue;
+        to->total[c] = from->total[had];
+        to->logged[c] = from->logged[had];
+    }
+    for (int32_t i = 0; !status && i < from->exempt.count; i++) {
+        drape_relaxed_node node = from->nodes[i];
+        bool there = node.collider < 0;
+        for (int32_t c = 0; c < colliders && !there; c++) {
+            there = before[c] == node.collider;
+            node.collider = there ? c : node.collider;
+        }
+        if (!there)
+            continue;
+        status = drape_relaxed_add(to, node.collider, node.node, node.since, node.until, &added);
+        if (!status)
+            *drape_relaxed_find(to, node.collider, node.node) = node;
+    }
+    return status;
+}
 
 static void archive_node(drape_relaxed_node *node, drape_archive *a)
 {
@@ -268,12 +326,14 @@ static bool is_node(const drape_relaxed_set *set, const drape_relaxed_node *node
 
 void drape_relaxed_archive(drape_relaxed_set *set, drape_archive *a)
 {
-    int32_t count = set->count, added = 0;
+    int32_t count = set->exempt.count, added = 0;
     drape_archive_double(a, &set->t);
     archive_totals(set, a);
+    for (int32_t i = 0; i <= set->model->collider_count; i++)
+        drape_archive_bool(a, &set->logged[i]);
     drape_archive_int32(a, &count);
     if (a->reading)
-        set->count = 0;
+        set->exempt.count = 0;
     for (int32_t i = 0; i < count && drape_archive_good(a); i++) {
         drape_relaxed_node node = a->reading ? (drape_relaxed_node){0} : set->nodes[i];
         archive_node(&node, a);

@@ -5,12 +5,10 @@
  * across the cloth, to the side from which less of it has a shorter path out of the body, and as far as the
  * last of it needs. Direction and end of the path move with the body.
  */
-#ifndef DRAPE_CONTACT_EXIT_H
-#define DRAPE_CONTACT_EXIT_H
+#ifndef DRAPE_REALTIME_EXIT_H
+#define DRAPE_REALTIME_EXIT_H
 
-#include "contact/contact.h"
-#include "contact/pair.h"
-#include "contact/relaxed.h"
+#include "realtime/relaxed.h"
 
 /* Whether a segment or triangle of a collider and a face of cloth pass through each other where contact is
  * evaluated. piercing, unless NULL: where, if it is a segment that passes through the face, else a corner

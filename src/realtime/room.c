@@ -1,11 +1,10 @@
 /* room.c: see room.h. */
-#include "contact/room.h"
+#include "realtime/room.h"
 
 #include "base/clock.h"
 #include "base/vec3.h"
 #include "contact/barrier.h"
-#include "contact/exit.h"
-#include "contact/parts.h"
+#include "realtime/exit.h"
 
 #include <string.h>
 
@@ -18,7 +17,7 @@
 static bool may_be_near(const drape_contact *c, const drape_collider_pose *pose, int32_t collider,
                         double margin, const double x[3])
 {
-    const double *bound = c->relaxed.bound + 4 * (size_t)collider;
+    const double *bound = drape_relaxed_bound_of(c, collider);
     double to[3];
     drape_pose_own(&pose[collider], x, to);
     vec3_sub(to, bound, to);
@@ -53,13 +52,13 @@ static drape_status add_face(drape_contact *c, const drape_configuration *at, in
     drape_status status = DRAPE_OK;
     drape_active_contact contact = {.pair = drape_broad_phase_surface(&c->broad, n[0], collider)};
     for (int a = 0; a < 3; a++) {
-        const drape_relaxed_node *found = drape_relaxed_find(&c->relaxed, collider, n[a]);
-        contact.relaxed = fmax(contact.relaxed, found ? found->factor : 0);
+        const drape_relaxed_node *found = drape_relaxed_find(drape_relaxed_of(c), collider, n[a]);
+        contact.exempt = fmax(contact.exempt, found ? found->factor : 0);
         contact.pair.node[a] = n[a];
         blocked = blocked || (found && (found->blocked || drape_relaxed_goes_out(found)));
     }
     contact.pair.area = c->broad.face_area[face] / 7;
-    for (int i = 0; i <= ACROSS_FACE && contact.relaxed > 0 && !blocked; i++)
+    for (int i = 0; i <= ACROSS_FACE && contact.exempt > 0 && !blocked; i++)
         for (int j = 0; !status && i + j <= ACROSS_FACE; j++) {
             const int k = ACROSS_FACE - i - j;
             const double share[3] = {(double)i / ACROSS_FACE, (double)j / ACROSS_FACE,
@@ -71,26 +70,27 @@ static drape_status add_face(drape_contact *c, const drape_configuration *at, in
     return status;
 }
 
-drape_status drape_room_add_surfaces(drape_contact *c, const drape_configuration *given)
+/* Contacts of relaxed cloth that no pair stands for: nodes with colliders without a smooth surface, and
+ * faces, at some points of them, where features of a collider have no radius and their pairs are left out. */
+static drape_status add_surfaces(drape_contact *c, const drape_configuration *given)
 {
     drape_configuration fitted = *given;
     const drape_configuration *at = &fitted;
     drape_status status = DRAPE_OK;
-    fitted.body = c->relaxed.count > 0 ? drape_contact_fit_bodies(c, given->pose) : NULL;
-    for (int32_t i = 0; !status && i < c->relaxed.count; i++) {
-        const drape_relaxed_node *node = &c->relaxed.nodes[i];
+    fitted.body = drape_relaxed_of(c)->exempt.count > 0 ? drape_contact_fit_bodies(c, given->pose) : NULL;
+    for (int32_t i = 0; !status && i < drape_relaxed_of(c)->exempt.count; i++) {
+        const drape_relaxed_node *node = &drape_relaxed_of(c)->nodes[i];
         if (node->collider < 0 || c->model->colliders[node->collider].ops->smooth ||
             c->model->pinned[node->node] || drape_relaxed_goes_out(node))
             continue;
-        drape_active_contact contact = {.pair =
-                                            drape_broad_phase_surface(&c->broad, node->node, node->collider),
-                                        .relaxed = node->factor};
+        drape_active_contact contact = {
+            .pair = drape_broad_phase_surface(&c->broad, node->node, node->collider), .exempt = node->factor};
         if (drape_pair_gap(&contact.pair, at, c->broad.rest, &contact.gap))
             status = drape_active_set_add(&c->active, &contact);
     }
     for (int32_t k = 0; !status && k < c->model->collider_count; k++)
         for (int32_t f = 0; !status && f < c->model->triangle_count; f++)
-            if (c->relaxed.solid[k] && drape_relaxed_count(&c->relaxed, k) > 0)
+            if (drape_relaxed_of(c)->solid[k] && drape_relaxed_count(drape_relaxed_of(c), k) > 0)
                 status = add_face(c, at, k, f);
     return status ? status : drape_exit_add(c, at);
 }
@@ -115,7 +115,7 @@ static cloth_point point_of(const drape_contact *c, const drape_active_contact *
         p.node[p.nodes++] = node;
         sum += weight;
         vec3_add_scaled(weight, c->x + 3 * (size_t)node, p.x);
-        vec3_add_scaled(weight, c->relaxed.normal + 3 * (size_t)node, p.normal);
+        vec3_add_scaled(weight, drape_relaxed_of(c)->normal + 3 * (size_t)node, p.normal);
     }
     const double length = vec3_norm(p.normal);
     for (int k = 0; k < 3; k++) {
@@ -125,7 +125,7 @@ static cloth_point point_of(const drape_contact *c, const drape_active_contact *
     return p;
 }
 
-static double distance_at(const drape_contact *c, int32_t collider, const double *x, double *normal)
+double drape_room_distance(const drape_contact *c, int32_t collider, const double *x, double *normal)
 {
     const drape_configuration now = {.model = c->model, .body = c->body};
     return drape_collider_distance(drape_configuration_body(&now, collider), &c->pose[collider], x, normal,
@@ -137,7 +137,7 @@ static double distance_at(const drape_contact *c, int32_t collider, const double
 static void move_out(const drape_contact *c, int32_t collider, double margin, const cloth_point *p,
                      double q[3], double direction[3])
 {
-    double n[3], gap = distance_at(c, collider, p->x, n);
+    double n[3], gap = drape_room_distance(c, collider, p->x, n);
     const double along = vec3_dot(n, p->normal);
     memcpy(q, p->x, 3 * sizeof *q);
     for (int k = 0; k < 3; k++)
@@ -147,7 +147,7 @@ static void move_out(const drape_contact *c, int32_t collider, double margin, co
         if (!(slope > 0))
             return;
         vec3_add_scaled((margin - gap) / slope, direction, q);
-        gap = distance_at(c, collider, q, n);
+        gap = drape_room_distance(c, collider, q, n);
     }
 }
 
@@ -158,7 +158,7 @@ static bool is_blocked_by(const drape_contact *c, int32_t other, double margin, 
     double n[3];
     if (!may_be_near(c, c->pose, other, margin, q))
         return false;
-    return distance_at(c, other, q, n) < margin * (1 - 1e-6) && vec3_dot(n, direction) < 0;
+    return drape_room_distance(c, other, q, n) < margin * (1 - 1e-6) && vec3_dot(n, direction) < 0;
 }
 
 /* Says that nodes have no room at a collider; -1: at pinned pieces of cloth. */
@@ -168,8 +168,8 @@ static drape_status block(drape_contact *c, int32_t collider, const int32_t *nod
     drape_status status = DRAPE_OK;
     for (int a = 0; !status && a < nodes; a++)
         if (node[a] >= 0 && !(collider >= 0 && drape_model_ignores(c->model, collider, node[a])) &&
-            (may_relax || drape_relaxed_find(&c->relaxed, collider, node[a])))
-            status = drape_relaxed_add(&c->relaxed, collider, node[a], t, until, added);
+            (may_relax || drape_relaxed_find(drape_relaxed_of(c), collider, node[a])))
+            status = drape_relaxed_add(drape_relaxed_of(c), collider, node[a], t, until, added);
     return status;
 }
 
@@ -179,7 +179,7 @@ static void reach_from_pins(const drape_contact *c, int32_t collider, double mar
 {
     const drape_model *m = c->model;
     for (int32_t i = 0; i < m->node_count; i++)
-        reach[i] = m->pinned[i] ? margin - distance_at(c, collider, c->x + 3 * (size_t)i, NULL) : 0;
+        reach[i] = m->pinned[i] ? margin - drape_room_distance(c, collider, c->x + 3 * (size_t)i, NULL) : 0;
     for (bool more = true; more;) {
         more = false;
         for (int32_t e = 0; e < m->edge_count; e++)
@@ -200,8 +200,8 @@ static drape_status block_pins(drape_contact *c, int32_t collider, double margin
 {
     drape_status status = DRAPE_OK;
     const drape_model *m = c->model;
-    const double *reach = c->relaxed.reach;
-    reach_from_pins(c, collider, margin, c->relaxed.reach);
+    const double *reach = drape_relaxed_of(c)->reach;
+    reach_from_pins(c, collider, margin, drape_relaxed_of(c)->reach);
     for (int32_t e = 0; !status && e < m->edge_count; e++) {
         const int32_t *n = m->edge + 2 * (size_t)e; /* pins among pins do not touch anything */
         const bool free = !m->pinned[n[0]] || !m->pinned[n[1]];
@@ -218,7 +218,7 @@ static bool has_pin_inside(const drape_contact *c, int32_t collider, const cloth
     bool found = false;
     for (int a = 0; a < p->nodes; a++)
         found = found || (c->model->pinned[p->node[a]] &&
-                          distance_at(c, collider, c->x + 3 * (size_t)p->node[a], NULL) < margin);
+                          drape_room_distance(c, collider, c->x + 3 * (size_t)p->node[a], NULL) < margin);
     return found;
 }
 
@@ -255,10 +255,10 @@ static drape_status block_pierced(drape_contact *c, int32_t collider, double t, 
                 vec3_add_scaled(shares[i][a], c->x + 3 * (size_t)p.node[a], p.x);
             if (drape_model_ignores(c->model, collider, p.node[0]) ||
                 !may_be_near(c, c->pose, collider, margin, p.x) ||
-                !(distance_at(c, collider, p.x, NULL) < margin))
+                !(drape_room_distance(c, collider, p.x, NULL) < margin))
                 continue;
             for (int a = 0; a < 3; a++)
-                vec3_add_scaled(shares[i][a], c->relaxed.normal + 3 * (size_t)p.node[a], p.normal);
+                vec3_add_scaled(shares[i][a], drape_relaxed_of(c)->normal + 3 * (size_t)p.node[a], p.normal);
             const double length = vec3_norm(p.normal);
             for (int k = 0; k < 3 && length > 0; k++)
                 p.normal[k] /= length;
@@ -272,10 +272,12 @@ static drape_status go_to(drape_contact *c, const double *x, double t)
     return drape_contact_update(c, &(drape_contact_at){.x = x, .t = t, .span = {t, t}});
 }
 
-drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, double t1, bool may_relax,
-                                   int32_t *added)
+/* Looks for cloth without room where the pins and colliders of time t1 meet the nodes x (node_count x 3) of
+ * time t, and relaxes what it finds, if it may: *added nodes. Moves the point of contact. */
+static drape_status look_ahead(drape_contact *c, const double *x, double t, double t1, bool may_relax,
+                               int32_t *added)
 {
-    drape_relaxed_set *relaxed = &c->relaxed;
+    drape_relaxed_set *relaxed = drape_relaxed_of(c);
     const bool between = c->between_steps;
     memcpy(c->to, x, 3 * (size_t)c->model->node_count * sizeof *x);
     drape_motion_place_pins(c->motion, t1, c->to);
@@ -285,7 +287,7 @@ drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, 
     if (status)
         return status;
     drape_contact_fit_bodies(c, c->pose);
-    for (int32_t i = 0; i < relaxed->count && !relaxed->counting; i++)
+    for (int32_t i = 0; i < relaxed->exempt.count && !relaxed->counting; i++)
         relaxed->nodes[i].blocked = t < relaxed->nodes[i].until;
     drape_model_normals(c->model, c->x, relaxed->normal);
     memset(relaxed->pins, 0, (size_t)c->model->collider_count * sizeof *relaxed->pins);
@@ -304,7 +306,7 @@ drape_status drape_room_look_ahead(drape_contact *c, const double *x, double t, 
             status = block_between(c, collider, &p, margin, t, may_relax, added);
     }
     for (int32_t k = 0; !status && k < c->model->collider_count; k++) {
-        if (c->relaxed.solid[k])
+        if (drape_relaxed_of(c)->solid[k])
             status = block_pierced(c, k, t, may_relax, added);
     }
     c->listed = false; /* which faces act depends on what is blocked, and their laws on what is relaxed */
@@ -362,29 +364,19 @@ static drape_status relax_blockers(drape_contact *c, drape_relax_extent extent, 
 
 static drape_status relax(drape_contact *c, double t1, drape_relax_extent extent, int32_t *added)
 {
-    drape_status status = drape_room_look_ahead(c, c->start, c->start_t, t1, true, added);
+    drape_status status = look_ahead(c, c->start, c->start_t, t1, true, added);
     if (!status && *added == 0 && extent != DRAPE_RELAX_NONE)
         status = relax_blockers(c, extent, added);
     c->listed = false;
     return status;
 }
 
-drape_status drape_contact_lacks_room(drape_contact *c, double t1, drape_relax_extent extent, bool *lacks)
-{
-    int32_t found = 0;
-    if (!c->begun)
-        return DRAPE_OK;
-    c->relaxed.counting = true;
-    const drape_status status = relax(c, t1, extent, &found);
-    c->relaxed.counting = false;
-    *lacks = found > 0;
-    return status;
-}
-
-drape_status drape_contact_relax(drape_contact *c, double t1, drape_relax_extent extent, int32_t *added)
+drape_status drape_room_relax(drape_contact *c, double t1, drape_relax_extent extent, int32_t *added)
 {
     const double clock = drape_clock_seconds();
     *added = 0;
+    if (!c)
+        return DRAPE_OK;
     drape_status status = go_to(c, c->start, c->start_t);
     const double before = status ? 0 : drape_contact_potential(c);
     if (!status)
@@ -396,11 +388,13 @@ drape_status drape_contact_relax(drape_contact *c, double t1, drape_relax_extent
 }
 
 /* All that is too near at the end, and then pair by pair what refuses the path to there. */
-drape_status drape_contact_let_in(drape_contact *c, const double *x, double t1)
+drape_status drape_room_let_in(drape_contact *c, const double *x, double t1)
 {
     const char *reason = "";
     drape_diagnostic diagnostic;
     int32_t added = 1;
+    if (!c)
+        return DRAPE_OK;
     drape_status status = go_to(c, c->start, c->start_t);
     const double before = status ? 0 : drape_contact_potential(c);
     if (!status)
@@ -429,24 +423,25 @@ drape_status drape_contact_let_in(drape_contact *c, const double *x, double t1)
 /* Depths and gaps of the relaxed nodes, from the active contacts of their pairs. */
 static void measure(drape_contact *c)
 {
-    drape_relaxed_set *relaxed = &c->relaxed;
-    for (int32_t i = 0; i < relaxed->count; i++) {
+    drape_relaxed_set *relaxed = drape_relaxed_of(c);
+    for (int32_t i = 0; i < relaxed->exempt.count; i++) {
         relaxed->nodes[i].gap = INFINITY;
         relaxed->nodes[i].depth = 0;
     }
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
         const drape_pair *pair = &contact->pair;
-        for (int a = 0; contact->relaxed > 0 && a < contact->gap.closest.points; a++) {
+        for (int a = 0; contact->exempt > 0 && a < contact->gap.closest.points; a++) {
             drape_relaxed_node *node = drape_relaxed_find(relaxed, pair->collider, pair->node[a]);
             if (node && !drape_relaxed_goes_out(node))
                 node->gap = fmin(node->gap, contact->gap.value);
         }
     }
-    for (int32_t i = 0; i < relaxed->count; i++) {
+    for (int32_t i = 0; i < relaxed->exempt.count; i++) {
         drape_relaxed_node *node = &relaxed->nodes[i];
         if (node->collider >= 0 && (c->model->pinned[node->node] || drape_relaxed_goes_out(node)))
-            node->gap = fmin(node->gap, distance_at(c, node->collider, c->x + 3 * (size_t)node->node, NULL));
+            node->gap =
+                fmin(node->gap, drape_room_distance(c, node->collider, c->x + 3 * (size_t)node->node, NULL));
         node->depth = fmax(0, -node->gap);
     }
 }
@@ -487,15 +482,79 @@ static double max_factor(const drape_contact *c)
     return -drape_barrier_log(MARGIN).db * def->stiffness / def->relaxed_pressure;
 }
 
-drape_status drape_room_review(drape_contact *c, double t, bool *changed)
+/* Measures the relaxed nodes at the present point, which is listed, and holds those again that came out.
+ * *changed: some were. */
+static drape_status review(drape_contact *c, double t, bool *changed)
 {
+    drape_relaxed_set *relaxed = drape_relaxed_of(c);
     drape_contact_fit_bodies(c, c->pose);
     measure(c);
-    const double before = c->relaxed.t;
-    drape_relaxed_update(&c->relaxed, t, max_factor(c));
-    *changed = c->relaxed.t != before;
-    if (c->relaxed.count > 0)
+    const double before = relaxed->t;
+    drape_relaxed_update(relaxed, t, max_factor(c));
+    *changed = relaxed->t != before;
+    if (relaxed->exempt.count > 0)
         drape_path_bvh_fit(&c->broad.obstacles, c->x, NULL, NULL, NULL); /* for is_pierced */
-    *changed = drape_relaxed_remove(&c->relaxed, is_out, c) > 0 || *changed;
+    *changed = drape_relaxed_remove(relaxed, is_out, c) > 0 || *changed;
     return drape_exit_find(c, t);
+}
+
+/* Looks for room at the end of the step, where some cloth has none already, and holds again what has come
+ * out. */
+static drape_status begin(drape_contact *c, const drape_contact_at *at)
+{
+    drape_relaxed_set *relaxed = drape_relaxed_of(c);
+    const double t1 = relaxed->ahead_t;
+    bool changed = false;
+    int32_t added = 0;
+    relaxed->ahead_t = NAN;
+    if (relaxed->exempt.count == 0)
+        return DRAPE_OK;
+    drape_status status = review(c, at->t, &changed);
+    if (!status && t1 > at->t)
+        status = look_ahead(c, at->x, at->t, t1, relaxed->may_relax, &added);
+    c->listed = c->listed && !changed;
+    return status ? status : drape_contact_update(c, at);
+}
+
+void drape_room_expect(drape_contact *c, double t1, bool may_relax)
+{
+    if (!c)
+        return;
+    drape_relaxed_of(c)->ahead_t = t1;
+    drape_relaxed_of(c)->may_relax = may_relax;
+}
+
+/* ---- Contact that asks ---- */
+
+drape_status drape_room_open(drape_arena *arena, drape_contact *c)
+{
+    drape_relaxed_set *relaxed;
+    const drape_status status = c ? drape_relaxed_create(arena, c, &relaxed) : DRAPE_OK;
+    if (status || !c)
+        return status;
+    relaxed->exempt.add = add_surfaces;
+    relaxed->exempt.begin = begin;
+    c->exempt = &relaxed->exempt;
+    return DRAPE_OK;
+}
+
+/* Where nothing can be relaxed, contact asks for the time being. */
+drape_status drape_room_lacks(drape_contact *c, double t1, drape_relax_extent extent, bool *lacks)
+{
+    int32_t found = 0;
+    *lacks = false;
+    if (!c || !c->begun)
+        return DRAPE_OK;
+    drape_exempt *const own = c->exempt;
+    drape_arena arena = drape_arena_of(c->model->ctx);
+    drape_status status = own ? DRAPE_OK : drape_room_open(&arena, c);
+    if (!status) {
+        drape_relaxed_of(c)->counting = true;
+        status = relax(c, t1, extent, &found);
+        drape_relaxed_of(c)->counting = false;
+    }
+    c->exempt = own;
+    drape_arena_free(&arena);
+    *lacks = found > 0;
+    return status;
 }

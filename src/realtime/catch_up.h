@@ -9,10 +9,10 @@
  *  - of the rest, relative to that, no more is made than at HURRY times its speed, and no more than at its
  *    own after an attempt that failed. What is left is behind the host, until it has caught up.
  */
-#ifndef DRAPE_SIM_CATCH_UP_H
-#define DRAPE_SIM_CATCH_UP_H
+#ifndef DRAPE_REALTIME_CATCH_UP_H
+#define DRAPE_REALTIME_CATCH_UP_H
 
-#include "sim/sim.h"
+#include "realtime/realtime.h"
 
 /* Whether a host sends anything in a call, and how many times faster than that bodies, relative to the pins,
  * and pins go. */

@@ -1,11 +1,10 @@
 /* catch_up.c: see catch_up.h. */
-#include "sim/catch_up.h"
+#include "realtime/catch_up.h"
 
 #include "base/rotation.h"
 #include "base/vec3.h"
 #include "colliders/colliders.h"
 #include "model/sent.h"
-#include "sim/place.h"
 
 #include <math.h>
 
@@ -63,7 +62,7 @@ static drape_status go_ahead(drape_sim *sim, double end, const double path[3])
 
 drape_status drape_sim_catch_up(drape_sim *sim, double owed, drape_catch_up *rates)
 {
-    drape_realtime_memory *m = &sim->realtime;
+    drape_realtime_memory *m = sim->realtime;
     const drape_state *now = drape_sim_state(sim);
     const drape_motion *motion = drape_system_motion(sim->system);
     drape_sent_part part = {.t = now->t, .end = now->t + owed};
@@ -96,7 +95,7 @@ drape_status drape_sim_catch_up(drape_sim *sim, double owed, drape_catch_up *rat
 
 void drape_sim_fall_behind(drape_sim *sim, const drape_catch_up *rates, double left, double dropped)
 {
-    drape_realtime_memory *m = &sim->realtime;
+    drape_realtime_memory *m = sim->realtime;
     if (!rates->sent)
         return;
     m->behind = fmax(0, m->behind + dropped + (rates->bodies - 1) * left);

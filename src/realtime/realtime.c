@@ -12,13 +12,10 @@
  * the state before it.
  */
 #include "base/clock.h"
-#include "base/elementary.h"
 #include "base/reason.h"
 #include "base/vec3.h"
-#include "contact/relaxed.h"
-#include "sim/catch_up.h"
-#include "sim/relaxed.h"
-#include "sim/sim.h"
+#include "realtime/catch_up.h"
+#include "realtime/report.h"
 #include "sim/untangle.h"
 
 #include <math.h>
@@ -30,22 +27,21 @@
 #define IN_TIME 0.8
 #define RECOVER 0.6  /* fraction of the budget: a better level that is expected to take less is resumed */
 #define LEARN   0.3  /* weight of the last attempt in the expected cost */
-#define CHEAPER 0.7  /* assumed cost relative to the next better level, until it is measured */
+#define CHEAPER 0.7  /* assumed cost of a cheap step, in that of another one, until it is measured */
 #define STRETCH 4    /* longest step, in dt, unless the def sets it */
 #define SWEEPS  8    /* of untangling, in a call */
 #define SAME    1e-9 /* fraction of dt: allowance for rounding in the host's sum of frames */
 
-static int effort_count(const drape_sim *sim)
+static int lowest_effort(const drape_sim *sim)
 {
-    int count = sim->chosen.integrator->efforts;
-    return count < 1 ? 1 : count > DRAPE_MAX_EFFORTS ? DRAPE_MAX_EFFORTS : count;
+    return sim->chosen.integrator->set_cheap ? 1 : 0;
 }
 
-static void set_effort(drape_sim *sim, int effort)
+void drape_realtime_set_effort(drape_sim *sim, int effort)
 {
-    if (sim->chosen.integrator->set_effort)
-        sim->chosen.integrator->set_effort(sim->integrator, effort);
-    sim->realtime.effort = effort;
+    if (sim->chosen.integrator->set_cheap)
+        sim->chosen.integrator->set_cheap(sim->integrator, effort > 0);
+    sim->realtime->effort = effort;
 }
 
 /* ---- What steps cost ---- */
@@ -53,22 +49,18 @@ static void set_effort(drape_sim *sim, int effort)
 /* Expected seconds of an attempt; 0: no attempt was made yet. */
 static double expected(const drape_sim *sim, int effort)
 {
-    const double *cost = sim->realtime.cost;
-    int known = effort;
-    while (known > 0 && cost[known] == 0)
-        known--;
-    return cost[known] * drape_pow(CHEAPER, effort - known);
+    const double *cost = sim->realtime->cost;
+    return effort > 0 && cost[1] == 0 ? CHEAPER * cost[0] : cost[effort];
 }
 
-/* The machine makes all levels of effort slower or faster alike: their ratios are kept. */
-static void learn(drape_sim *sim, double seconds)
+/* The machine makes both levels of effort slower or faster alike: their ratio is kept. */
+static void learn(drape_realtime_memory *m, double seconds)
 {
-    double *cost = sim->realtime.cost, *own = &cost[sim->realtime.effort];
-    double before = *own;
+    double *own = &m->cost[m->effort];
+    const double before = *own;
     *own = before == 0 ? seconds : (1 - LEARN) * before + LEARN * seconds;
-    for (int e = 0; before > 0 && e < effort_count(sim); e++)
-        if (e != sim->realtime.effort)
-            cost[e] *= *own / before;
+    if (before > 0)
+        m->cost[!m->effort] *= *own / before;
 }
 
 /* ---- The level of effort ---- */
@@ -84,13 +76,13 @@ static int64_t steps_of(double owed, double h)
     return (int64_t)fmax(1, ceil(owed / h - SAME));
 }
 
-/* Finds the best level whose steps fit into the budget. It returns to better levels one at a time. */
+/* Finds the best level whose steps fit into the budget. */
 static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *out)
 {
-    int now = sim->realtime.effort;
-    int64_t steps = steps_of(owed, fmin(sim->realtime.dt, sim->realtime.cap));
-    for (int e = now > 0 ? now - 1 : 0; e < effort_count(sim); e++) {
-        double share = e < now || sim->realtime.stretched ? RECOVER : KEEP;
+    int now = sim->realtime->effort;
+    int64_t steps = steps_of(owed, fmin(sim->realtime->dt, sim->realtime->cap));
+    for (int e = 0; e <= lowest_effort(sim); e++) {
+        double share = e < now || sim->realtime->stretched ? RECOVER : KEEP;
         if ((double)steps * expected(sim, e) > share * budget)
             continue;
         *out = (plan){.effort = e, .steps = steps, .h = owed / (double)steps};
@@ -111,13 +103,14 @@ static double longest_step(const drape_realtime_memory *m)
  * that many frames are owed. */
 static plan plan_stretched(drape_sim *sim, double owed, double frame, double budget)
 {
-    drape_realtime_memory *m = &sim->realtime;
+    drape_realtime_memory *m = sim->realtime;
     const drape_state *now = drape_sim_state(sim);
-    int effort = effort_count(sim) - 1;
+    drape_contact *contact = drape_system_contact(sim->system);
+    const int effort = lowest_effort(sim);
     const double fit = KEEP * budget / expected(sim, effort),
                  enough = fit < 1 ? fmax(owed, ceil(1 / fit) * frame) : owed;
-    m->meets = !m->touches && m->longest > m->dt &&
-               drape_system_may_meet(sim->system, now->x, now->v, now->t, fmin(enough, m->longest));
+    m->meets = !m->touches && m->longest > m->dt && contact &&
+               drape_contact_may_meet(contact, now->x, now->v, now->t, fmin(enough, m->longest));
     const double longest = fmin(longest_step(m), m->cap);
     int64_t most = steps_of(owed, m->dt);
     if (fit < 1 && owed < (1 - SAME) * fmin(longest, enough))
@@ -129,7 +122,7 @@ static plan plan_stretched(drape_sim *sim, double owed, double frame, double bud
 static plan make_plan(drape_sim *sim, double owed, double frame, double budget)
 {
     plan p;
-    sim->realtime.meets = false;
+    sim->realtime->meets = false;
     return plan_effort(sim, owed, budget, &p) ? p : plan_stretched(sim, owed, frame, budget);
 }
 
@@ -159,7 +152,7 @@ static void set_deadline(drape_sim *sim, const plan *p, const drape_realtime *re
     const double after = fmax(0, (double)(p->steps - 1 - report->attempts));
     if (sim->chosen.integrator->set_deadline)
         sim->chosen.integrator->set_deadline(
-            sim->integrator, until - sim->realtime.ending - after * expected(sim, sim->realtime.effort));
+            sim->integrator, until - sim->realtime->ending - after * expected(sim, sim->realtime->effort));
 }
 
 /* Whether pins have moved relative to each other in the last step: pairs of pinned pieces alone are not
@@ -198,7 +191,7 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
         double start = drape_clock_seconds();
         /* a step that is to end at an event ends there in this call: the next one would begin anew */
         if (report->attempts > 0 && !sim->schedule.cut &&
-            start + expected(sim, sim->realtime.effort) > deadline)
+            start + expected(sim, sim->realtime->effort) > deadline)
             break;
         status = drape_sim_check_attempts(sim, &attempt);
         if (!status)
@@ -208,15 +201,16 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
         set_deadline(sim, p, report, begun + IN_TIME * budget);
         status = drape_sim_step(sim, t1, h, &attempt);
         const double end = drape_clock_seconds();
-        learn(sim, end - start - sim->further_seconds);
-        learn_ending(&sim->realtime, end - sim->solved_at);
-        sim->realtime.touches = drape_system_touches(sim->system);
-        sim->realtime.unchecked |= attempt.accepted && pins_move_apart(sim);
+        learn(sim->realtime, end - start - sim->realtime->further_seconds);
+        learn_ending(sim->realtime, end - sim->realtime->solved_at);
+        sim->realtime->touches = drape_system_touches(sim->system);
+        sim->realtime->unchecked |= attempt.accepted && pins_move_apart(sim);
         report->attempts++;
         report->rejected += !attempt.accepted;
         report->held += attempt.accepted && attempt.reason == drape_reason_name(DRAPE_REASON_HELD);
         if (!attempt.accepted && !sim->schedule.cut)
-            sim->realtime.cap = sim->relaxed_again ? INFINITY : fmin(sim->realtime.cap, attempt.h / 2);
+            sim->realtime->cap =
+                sim->realtime->relaxed_again ? INFINITY : fmin(sim->realtime->cap, attempt.h / 2);
         report->h = attempt.accepted ? fmax(report->h, attempt.h) : report->h;
         report->residual = attempt.accepted ? fmax(report->residual, attempt.residual) : report->residual;
         report->error = attempt.accepted ? fmax(report->error, attempt.error) : report->error;
@@ -239,14 +233,13 @@ static void bound_steps(drape_realtime_memory *m, const drape_realtime *report)
 /* Whether steps may pass through pinned cloth, and that is why they are not checked there. */
 static bool lets_cloth_pass(const drape_sim *sim)
 {
-    const drape_contact *contact = drape_system_contact(sim->system);
-    return contact && drape_relaxed_count(drape_contact_relaxed(contact), -1) > 0;
+    return drape_sim_relaxed_at(sim, -1) > 0;
 }
 
 /* Counted where a step may have let some pass, or begun with some: all others are checked. */
 static void count_crossings(drape_sim *sim, bool unchecked)
 {
-    drape_realtime_memory *m = &sim->realtime;
+    drape_realtime_memory *m = sim->realtime;
     if (!sim->model->contact.self || (m->crossings == 0 && !unchecked))
         return;
     m->crossings = drape_sim_intersections(sim, -1);
@@ -258,7 +251,7 @@ static void count_crossings(drape_sim *sim, bool unchecked)
  * after twice as long. */
 static drape_status take_apart(drape_sim *sim)
 {
-    drape_realtime_memory *m = &sim->realtime;
+    drape_realtime_memory *m = sim->realtime;
     const int64_t before = m->crossings;
     const double now = drape_sim_time(sim);
     if (before == 0 || lets_cloth_pass(sim) || now < m->apart_at)
@@ -277,11 +270,13 @@ static drape_status take_apart(drape_sim *sim)
 /* What is so whether or not the call made a step. */
 static void report_present(const drape_sim *sim, drape_realtime *report)
 {
-    const drape_realtime_memory *m = &sim->realtime;
+    const drape_realtime_memory *m = sim->realtime;
     report->time = drape_sim_state(sim)->t;
+    report->error_bound = drape_sim_error_bound(sim);
+    if (!m)
+        return;
     report->debt = m->debt;
     report->behind = m->behind;
-    report->error_bound = drape_sim_error_bound(sim);
     report->inaccurate_total = m->inaccurate;
     report->dropped_total = m->dropped;
 }
@@ -289,9 +284,9 @@ static void report_present(const drape_sim *sim, drape_realtime *report)
 /* Time that was not covered is owed to the next call, or dropped. */
 static void settle(drape_sim *sim, double goal, const drape_catch_up *rates, drape_realtime *report)
 {
-    drape_realtime_memory *m = &sim->realtime;
+    drape_realtime_memory *m = sim->realtime;
     double left = goal - drape_sim_state(sim)->t;
-    const double most = longest_step(&sim->realtime);
+    const double most = longest_step(sim->realtime);
     m->debt = left > SAME * m->dt ? fmin(left, most) : 0;
     report->dropped = left > most ? left - most : 0;
     m->dropped += report->dropped;
@@ -309,9 +304,9 @@ static void settle(drape_sim *sim, double goal, const drape_catch_up *rates, dra
 
 static const char *level_name(const drape_sim *sim)
 {
-    if (sim->realtime.stretched)
+    if (sim->realtime->stretched)
         return "larger steps";
-    return sim->realtime.effort > 0 ? "fewer iterations" : "full";
+    return sim->realtime->effort > 0 ? "fewer iterations" : "full";
 }
 
 static drape_status check_arguments(drape_sim *sim, double frame_dt, double budget)
@@ -331,14 +326,14 @@ static drape_status check_arguments(drape_sim *sim, double frame_dt, double budg
 
 static void enter(drape_sim *sim)
 {
-    drape_realtime_memory *m = &sim->realtime;
+    drape_realtime_memory *m = sim->realtime;
     if (m->active)
         return;
     m->active = true;
     m->cap = INFINITY;
     m->crossings = sim->model->contact.self ? drape_sim_intersections(sim, -1) : 0;
     m->dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1 / sim->frame_rate);
-    m->longest = m->longest_asked > 0 ? fmax(m->longest_asked, m->dt) : STRETCH * m->dt;
+    m->longest = sim->realtime_step > 0 ? fmax(sim->realtime_step, m->dt) : STRETCH * m->dt;
 }
 
 drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double budget, drape_realtime *out)
@@ -357,26 +352,29 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
     sim->advancing = true;
     if (!status)
         status = drape_sim_untangle_start(sim);
-    const double owed = sim->realtime.debt + frame_dt;
+    if (!status)
+        status = drape_realtime_rescue.open(sim);
+    double owed = frame_dt;
     drape_catch_up rates = {false, 1, 1};
     if (!status) {
         enter(sim);
+        owed += sim->realtime->debt;
         status = drape_sim_catch_up(sim, owed, &rates);
     }
     if (!status)
         status = take_apart(sim);
     if (!status) {
         const double goal = drape_sim_state(sim)->t + owed;
-        sim->realtime.unchecked = false;
+        sim->realtime->unchecked = false;
         const plan p = make_plan(sim, owed, frame_dt, budget);
-        set_effort(sim, p.effort);
+        drape_realtime_set_effort(sim, p.effort);
         if (p.steps > 0) {
             aim(sim, &p, goal);
             status = take_steps(sim, &p, start, budget, &report);
         }
         settle(sim, goal, &rates, &report);
         report.level = level_name(sim);
-        report.effort = sim->realtime.effort;
+        report.effort = sim->realtime->effort;
         report.relaxed = drape_sim_relaxed_now(sim, &report.deepest_relaxed);
         report.seconds = drape_clock_seconds() - start;
         report.kept = report.seconds <= budget;
@@ -387,14 +385,14 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
     return status;
 }
 
-void drape_sim_leave_realtime(drape_sim *sim)
+void drape_realtime_leave(drape_sim *sim)
 {
-    drape_realtime_memory *m = &sim->realtime;
+    drape_realtime_memory *m = sim->realtime;
     if (!m->active)
         return;
     m->active = m->stretched = false;
     m->debt = m->behind = m->pins_behind = 0;
-    set_effort(sim, 0);
+    drape_realtime_set_effort(sim, 0);
     if (sim->chosen.integrator->set_deadline)
         sim->chosen.integrator->set_deadline(sim->integrator, INFINITY);
     if (sim->schedule.stepping == DRAPE_STEPS_COUNTED)

@@ -1,12 +1,12 @@
-/* relaxed.c: see relaxed.h. */
-#include "sim/relaxed.h"
+/* report.c: see report.h. */
+#include "realtime/report.h"
 
 #include <math.h>
 
-static const drape_relaxed_set *set_of(const drape_sim *sim)
+drape_relaxed_set *drape_realtime_relaxed(const drape_sim *sim)
 {
     const drape_contact *contact = drape_system_contact(sim->system);
-    return contact ? drape_contact_relaxed(contact) : NULL;
+    return contact ? drape_relaxed_of(contact) : NULL;
 }
 
 const char *drape_sim_relaxed_name(const drape_sim *sim, int32_t collider)
@@ -16,8 +16,8 @@ const char *drape_sim_relaxed_name(const drape_sim *sim, int32_t collider)
 
 int32_t drape_sim_relaxed(const drape_sim *sim, int32_t index, drape_relaxed *out)
 {
-    const drape_relaxed_set *set = sim ? set_of(sim) : NULL;
-    const int32_t count = set ? set->count : 0;
+    const drape_relaxed_set *set = sim ? drape_realtime_relaxed(sim) : NULL;
+    const int32_t count = set ? set->exempt.count : 0;
     if (!out || index < 0 || index >= count)
         return count;
     const drape_relaxed_node *node = &set->nodes[index];
@@ -33,23 +33,23 @@ int32_t drape_sim_relaxed(const drape_sim *sim, int32_t index, drape_relaxed *ou
 const drape_relaxed_total *drape_sim_relaxed_total(const drape_sim *sim, int32_t collider)
 {
     static const drape_relaxed_total none = {0};
-    const drape_relaxed_set *set = set_of(sim);
+    const drape_relaxed_set *set = drape_realtime_relaxed(sim);
     return set ? &set->total[collider >= 0 ? collider : sim->model->collider_count] : &none;
 }
 
 int32_t drape_sim_relaxed_at(const drape_sim *sim, int32_t collider)
 {
-    const drape_relaxed_set *set = set_of(sim);
+    const drape_relaxed_set *set = drape_realtime_relaxed(sim);
     return set ? drape_relaxed_count(set, collider) : 0;
 }
 
 int32_t drape_sim_relaxed_now(const drape_sim *sim, double *deepest)
 {
-    const drape_relaxed_set *set = set_of(sim);
+    const drape_relaxed_set *set = drape_realtime_relaxed(sim);
     *deepest = 0;
-    for (int32_t i = 0; set && i < set->count; i++)
+    for (int32_t i = 0; set && i < set->exempt.count; i++)
         *deepest = fmax(*deepest, set->nodes[i].depth);
-    return set ? set->count : 0;
+    return set ? set->exempt.count : 0;
 }
 
 /* With the times of the summary: nodes are relaxed, and held again, at the beginning of a step. */
@@ -59,7 +59,7 @@ static void log_collider(drape_sim *sim, int32_t collider, bool relaxed)
     const char *name = drape_sim_relaxed_name(sim, collider);
     if (relaxed)
         drape_log(sim->ctx, DRAPE_LOG_WARNING, "t=%.9g: no room for the cloth at %s: it is relaxed there",
-                  drape_relaxed_since(set_of(sim), collider), name);
+                  drape_relaxed_since(drape_realtime_relaxed(sim), collider), name);
     else
         drape_log(
             sim->ctx, DRAPE_LOG_INFO,
@@ -69,9 +69,9 @@ static void log_collider(drape_sim *sim, int32_t collider, bool relaxed)
 
 void drape_sim_log_relaxed(drape_sim *sim)
 {
-    const drape_relaxed_set *set = set_of(sim);
+    drape_relaxed_set *set = drape_realtime_relaxed(sim);
     for (int32_t c = -1; set && sim->ctx->def.log && c < sim->model->collider_count; c++) {
-        bool *logged = &sim->relaxed_logged[c >= 0 ? c : sim->model->collider_count];
+        bool *logged = &set->logged[c >= 0 ? c : sim->model->collider_count];
         const bool relaxed = drape_relaxed_count(set, c) > 0;
         if (relaxed != *logged)
             log_collider(sim, c, relaxed);

@@ -7,8 +7,8 @@
  */
 #include "base/rotation.h"
 #include "base/vec3.h"
+#include "realtime/realtime.h"
 #include "sim/attach.h"
-#include "sim/place.h"
 #include "sparse/project.h"
 
 #include <math.h>
@@ -158,8 +158,8 @@ static bool is_sent_too_fast(const drape_sim *sim, const drape_cloth *cloth, int
 
 /* Before any cloth is placed, all placements are checked, so that after an error nothing has changed. That
  * of a cloth does not depend on the others. */
-drape_status drape_sim_teleport_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
-                                     const double *positions, const double *velocities)
+drape_status drape_teleport_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
+                                 const double *positions, const double *velocities)
 {
     const drape_model *m = sim->model;
     const drape_place_list none = {NULL, 0};
@@ -284,8 +284,7 @@ static drape_placement placement_to(const double pivot[3], const double from[3],
     return by;
 }
 
-drape_status drape_sim_teleport_collider(drape_sim *sim, int32_t collider, double seconds,
-                                         const drape_sent *to)
+drape_status drape_teleport_collider(drape_sim *sim, int32_t collider, double seconds, const drape_sent *to)
 {
     const drape_motion *motion = drape_system_motion(sim->system);
     const double t = drape_sim_state(sim)->t;

@@ -1,11 +1,12 @@
 /* hold.c: see hold.h. */
-#include "sim/hold.h"
+#include "realtime/hold.h"
 
 #include "base/finite.h"
 #include "base/reason.h"
 #include "base/vec3.h"
 #include "model/sent.h"
 #include "model/support.h"
+#include "realtime/room.h"
 
 #include <math.h>
 #include <string.h>
@@ -14,11 +15,12 @@
 #define MOST_IN_A_ROW  10
 #define MOST_IN_A_STEP 24
 
-bool drape_sim_must_hold(const drape_sim *sim, drape_status failure, bool stopped)
+static bool must_hold(const drape_sim *sim, drape_status failure, bool stopped)
 {
-    const bool worn_out = stopped || sim->failed >= MOST_IN_A_ROW || sim->held_up >= MOST_IN_A_STEP;
+    const drape_realtime_memory *m = sim->realtime;
+    const bool worn_out = stopped || m->failed >= MOST_IN_A_ROW || m->held_up >= MOST_IN_A_STEP;
     const bool may_help = failure > 0 || failure == DRAPE_E_STEP_TOO_SMALL;
-    return worn_out && may_help && sim->realtime.active && !sim->chosen.integrator->own_steps &&
+    return worn_out && may_help && m->active && !sim->chosen.integrator->own_steps &&
            sim->model->contact.no_room != DRAPE_NO_ROOM_STOP;
 }
 
@@ -26,7 +28,7 @@ bool drape_sim_must_hold(const drape_sim *sim, drape_status failure, bool stoppe
 static double end_of_hold(const drape_sim *sim)
 {
     const drape_schedule *s = &sim->schedule;
-    return fmin(s->now + sim->realtime.dt, s->cut ? s->cut_end : s->end);
+    return fmin(s->now + sim->realtime->dt, s->cut ? s->cut_end : s->end);
 }
 
 /* Free nodes go where the pins of their cloth go as one: otherwise these would be torn from them, and pass
@@ -57,7 +59,8 @@ static double potential(const drape_energy *e)
     return e->elastic + e->gravity + e->contact;
 }
 
-drape_status drape_sim_hold(drape_sim *sim, drape_state *next, drape_step_info *info)
+/* A status > 0: this is not possible either. Errors: DRAPE_E_MEMORY. */
+static drape_status make_step(drape_sim *sim, drape_state *next, drape_step_info *info)
 {
     const drape_state *now = drape_sim_state(sim);
     const drape_model *m = sim->model;
@@ -84,10 +87,11 @@ drape_status drape_sim_hold(drape_sim *sim, drape_state *next, drape_step_info *
     drape_supports_hold(drape_system_motion(sim->system), now->t, now->x, t1, next->x);
     drape_supports_hold_velocity(drape_system_motion(sim->system), (const double[]){now->t, t1}, false,
                                  next->v);
-    drape_system_expect(sim->system, t1, true);
+    drape_contact *contact = drape_system_contact(sim->system);
+    drape_room_expect(contact, t1, true);
     drape_status status = drape_system_begin(sim->system, now);
     if (!status)
-        status = drape_system_let_in(sim->system, next->x, t1);
+        status = drape_room_let_in(contact, next->x, t1);
     drape_sim_add_contact_work(sim);
     const drape_energy before = drape_sim_energy(sim);
     if (!status)
@@ -102,4 +106,27 @@ drape_status drape_sim_hold(drape_sim *sim, drape_state *next, drape_step_info *
     const drape_energy after = drape_sim_energy_of(sim, t1, next->x, next->v);
     info->pin_work = potential(&after) - potential(&before) + fmax(0, after.kinetic - before.kinetic);
     return DRAPE_OK;
+}
+
+bool drape_sim_hold(drape_sim *sim, drape_status failure, drape_step_info *info, drape_status *stop)
+{
+    drape_step_info held;
+    drape_state *next = &sim->states[sim->next];
+    if (!must_hold(sim, failure, *stop != 0))
+        return false;
+    drape_status status = make_step(sim, next, &held);
+    drape_system_end_step(sim->system);
+    if (!status && drape_events_examine(sim, next, &status) != DRAPE_EVENTS_PASS)
+        status = status ? status : DRAPE_RETRY_REJECTED;
+    if (status < 0)
+        *stop = status;
+    if (status)
+        return false;
+    drape_log(sim->ctx, DRAPE_LOG_WARNING,
+              "t=%.9g h=%.4g: no step can be made (%s), and the cloth is held where it is",
+              drape_sim_time(sim), held.h, info->reason);
+    *info = held;
+    *stop = DRAPE_OK;
+    sim->statistics.steps_held++;
+    return true;
 }

@@ -1,11 +1,11 @@
 /* exit.c: see exit.h. */
-#include "contact/exit.h"
+#include "realtime/exit.h"
 
 #include "base/vec3.h"
 #include "contact/barrier.h"
-#include "contact/parts.h"
 #include "geometry/intersect.h"
 #include "geometry/nearest.h"
+#include "realtime/room.h"
 
 #include <string.h>
 
@@ -114,13 +114,6 @@ bool drape_exit_is_pierced(const drape_contact *c, int32_t collider, int32_t fac
     return q.found;
 }
 
-static double distance_at(const drape_contact *c, int32_t collider, const double x[3], double *normal)
-{
-    const drape_configuration now = {.model = c->model, .body = c->body};
-    return drape_collider_distance(drape_configuration_body(&now, collider), &c->pose[collider], x, normal,
-                                   NULL);
-}
-
 /* Points at which a face is looked at: its middle and those of its sides, or where it is pierced. */
 static int sample(const drape_contact *c, int32_t collider, int32_t face, bool *pierced, double x[][3])
 {
@@ -134,7 +127,7 @@ static int sample(const drape_contact *c, int32_t collider, int32_t face, bool *
         memset(x[count], 0, 3 * sizeof(double));
         for (int a = 0; a < 3; a++)
             vec3_add_scaled(share[i][a], c->x + 3 * (size_t)n[a], x[count]);
-        count += distance_at(c, collider, x[count], NULL) < 0;
+        count += drape_room_distance(c, collider, x[count], NULL) < 0;
     }
     return count;
 }
@@ -145,7 +138,7 @@ static bool may_come_out(const drape_contact *c, int32_t collider, int32_t face)
     const int32_t *n = c->model->triangle + 3 * (size_t)face;
     bool relaxed = false, blocked = false;
     for (int a = 0; a < 3; a++) {
-        const drape_relaxed_node *node = drape_relaxed_find(&c->relaxed, collider, n[a]);
+        const drape_relaxed_node *node = drape_relaxed_find(drape_relaxed_of(c), collider, n[a]);
         relaxed = relaxed || node;
         blocked = blocked || c->model->pinned[n[a]] || (node && node->blocked);
     }
@@ -207,7 +200,7 @@ static double path_out(const drape_contact *c, int32_t collider, const double fr
                  longest = FARTHEST * length_of(&c->model->colliders[collider].shape);
     double s = 0, x[3] = {from[0], from[1], from[2]};
     for (int i = 0; i < MARCHES && s < longest; i++) {
-        const double gap = distance_at(c, collider, x, NULL);
+        const double gap = drape_room_distance(c, collider, x, NULL);
         if (!(gap < margin))
             break;
         s += margin - fmin(gap, 0);
@@ -215,7 +208,7 @@ static double path_out(const drape_contact *c, int32_t collider, const double fr
         vec3_add_scaled(s, along, x);
     }
     for (int32_t other = 0; other < c->model->collider_count; other++)
-        if (other != collider && distance_at(c, other, x, NULL) < 0)
+        if (other != collider && drape_room_distance(c, other, x, NULL) < 0)
             return longest;
     return fmin(s, longest);
 }
@@ -254,7 +247,7 @@ static void gather(search *s)
         vec3_add_scaled(sign * area, normal, p->normal);
         for (size_t a = 0; a < 3; a++) {
             const drape_relaxed_node *node =
-                drape_relaxed_find(&s->c->relaxed, s->collider, m->triangle[3 * (size_t)f + a]);
+                drape_relaxed_find(drape_relaxed_of(s->c), s->collider, m->triangle[3 * (size_t)f + a]);
             double kept[3];
             if (!node || !node->exits)
                 continue;
@@ -277,7 +270,7 @@ static bool mark(search *s)
         s->face[f] = 0;
         if (!may_come_out(s->c, s->collider, f) || sample(s->c, s->collider, f, &pierced, x) == 0)
             continue;
-        s->face[f] = pierced ? PIERCED : s->c->relaxed.solid[s->collider] ? INSIDE : 0;
+        s->face[f] = pierced ? PIERCED : drape_relaxed_of(s->c)->solid[s->collider] ? INSIDE : 0;
         any = any || s->face[f];
     }
     return any;
@@ -310,7 +303,7 @@ static bool is_astray(const search *s, int32_t face, const double to[3])
     bool pierced, astray = false;
     const int count = sample(s->c, s->collider, face, &pierced, x);
     for (int i = 0; i < count; i++)
-        astray = astray || (distance_at(s->c, s->collider, x[i], n) < 0 && vec3_dot(n, to) < -KEPT);
+        astray = astray || (drape_room_distance(s->c, s->collider, x[i], n) < 0 && vec3_dot(n, to) < -KEPT);
     return astray || pierced;
 }
 
@@ -367,14 +360,15 @@ static drape_status send(search *s, int32_t node, const drape_relaxed_patch *p, 
     const drape_collider_pose *pose = &s->c->pose[s->collider];
     double to[3], end[3], origin[3] = {0};
     int32_t added = 0;
-    drape_relaxed_node *found = drape_relaxed_find(&s->c->relaxed, s->collider, node);
-    if (!found && !s->c->may_relax)
+    drape_relaxed_node *found = drape_relaxed_find(drape_relaxed_of(s->c), s->collider, node);
+    if (!found && !drape_relaxed_of(s->c)->may_relax)
         return DRAPE_OK;
     if (!found) {
-        const drape_status status = drape_relaxed_add(&s->c->relaxed, s->collider, node, t, t, &added);
+        const drape_status status =
+            drape_relaxed_add(drape_relaxed_of(s->c), s->collider, node, t, t, &added);
         if (status)
             return status;
-        found = drape_relaxed_find(&s->c->relaxed, s->collider, node);
+        found = drape_relaxed_find(drape_relaxed_of(s->c), s->collider, node);
         found->blocked = false;
     }
     direction_of(p, to);
@@ -396,25 +390,25 @@ drape_status drape_exit_find(drape_contact *c, double t)
     for (int32_t k = 0; !status && k < m->collider_count; k++) {
         search s = {.c = c,
                     .collider = k,
-                    .face = c->relaxed.face,
-                    .parent = c->relaxed.parent,
-                    .patches = c->relaxed.patches};
-        bool any = drape_relaxed_count(&c->relaxed, k) > 0 && mark(&s);
+                    .face = drape_relaxed_of(c)->face,
+                    .parent = drape_relaxed_of(c)->parent,
+                    .patches = drape_relaxed_of(c)->patches};
+        bool any = drape_relaxed_count(drape_relaxed_of(c), k) > 0 && mark(&s);
         if (any) {
             gather(&s);
             add_costs(&s);
             any = choose(&s);
         }
-        for (int32_t i = 0; i < c->relaxed.count; i++)
-            if (c->relaxed.nodes[i].collider == k && !any)
-                c->relaxed.nodes[i].exits = false;
+        for (int32_t i = 0; i < drape_relaxed_of(c)->exempt.count; i++)
+            if (drape_relaxed_of(c)->nodes[i].collider == k && !any)
+                drape_relaxed_of(c)->nodes[i].exits = false;
         if (!any)
             continue;
         gather(&s);
         find_ends(&s);
-        for (int32_t i = 0; i < c->relaxed.count; i++)
-            if (c->relaxed.nodes[i].collider == k)
-                c->relaxed.nodes[i].exits = false;
+        for (int32_t i = 0; i < drape_relaxed_of(c)->exempt.count; i++)
+            if (drape_relaxed_of(c)->nodes[i].collider == k)
+                drape_relaxed_of(c)->nodes[i].exits = false;
         for (int32_t f = 0; !status && f < m->triangle_count; f++)
             for (size_t a = 0; s.face[f] && !status && a < 3; a++)
                 status = send(&s, m->triangle[3 * (size_t)f + a], patch_of(&s, f), t);
@@ -427,14 +421,14 @@ drape_status drape_exit_find(drape_contact *c, double t)
 drape_status drape_exit_add(drape_contact *c, const drape_configuration *at)
 {
     drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < c->relaxed.count; i++) {
-        const drape_relaxed_node *node = &c->relaxed.nodes[i];
+    for (int32_t i = 0; !status && i < drape_relaxed_of(c)->exempt.count; i++) {
+        const drape_relaxed_node *node = &drape_relaxed_of(c)->nodes[i];
         double own[3];
         if (!drape_relaxed_goes_out(node))
             continue;
         drape_active_contact contact = {.pair =
                                             drape_broad_phase_surface(&c->broad, node->node, node->collider),
-                                        .relaxed = node->factor,
+                                        .exempt = node->factor,
                                         .gap = {.closest = {.points = 1, .c = {1}}, .m = 1}};
         drape_pose_own(&at->pose[node->collider], at->x + 3 * (size_t)node->node, own);
         contact.gap.value = vec3_dot(node->exit, own) - node->height;

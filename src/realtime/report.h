@@ -1,10 +1,13 @@
-/* relaxed.h: the cloth that bodies leave no room (contact/relaxed.h), as messages, reports and the summary
+/* report.h: the cloth that bodies leave no room (relaxed.h), as messages, reports and the summary
  * see it. */
-#ifndef DRAPE_SIM_RELAXED_H
-#define DRAPE_SIM_RELAXED_H
+#ifndef DRAPE_REALTIME_REPORT_H
+#define DRAPE_REALTIME_REPORT_H
 
-#include "contact/relaxed.h"
-#include "sim/sim.h"
+#include "realtime/realtime.h"
+#include "realtime/relaxed.h"
+
+/* NULL: nothing was ever to be relaxed. */
+drape_relaxed_set *drape_realtime_relaxed(const drape_sim *sim);
 
 /* What became of the cloth so far at a collider; -1: at pinned pieces of cloth. Never NULL; most is 0 if
  * nothing was relaxed there. */
