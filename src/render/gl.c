@@ -59,6 +59,64 @@ GLuint drape_gl_program(drape_context *ctx, const char *name, const char *const 
     return fail(ctx, name, "linked", log);
 }
 
+void drape_gl_use(GLuint program, const drape_gl_unit *units, size_t count)
+{
+    glUseProgram(program);
+    for (size_t i = 0; i < count; i++) {
+        glActiveTexture(GL_TEXTURE0 + (GLenum)i);
+        glBindTexture(GL_TEXTURE_2D, units[i].texture);
+        drape_gl_set_int(program, units[i].name, (int)i);
+    }
+    glActiveTexture(GL_TEXTURE0);
+}
+
+GLuint drape_gl_texture(GLenum format, int width, int height, GLenum pixels, GLenum kind, const void *data,
+                        GLint filter, GLint wrap)
+{
+    GLuint name;
+    glGenTextures(1, &name);
+    glBindTexture(GL_TEXTURE_2D, name);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    glTexImage2D(GL_TEXTURE_2D, 0, (GLint)format, width, height, 0, pixels, kind, data);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, filter);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, filter);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, wrap);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, wrap);
+    return name;
+}
+
+GLuint drape_gl_framebuffer(void)
+{
+    GLuint name;
+    glGenFramebuffers(1, &name);
+    glBindFramebuffer(GL_FRAMEBUFFER, name);
+    return name;
+}
+
+GLuint drape_gl_buffer(int samples, GLenum format, int width, int height, GLenum attachment)
+{
+    GLuint name;
+    glGenRenderbuffers(1, &name);
+    glBindRenderbuffer(GL_RENDERBUFFER, name);
+    glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, width, height);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, attachment, GL_RENDERBUFFER, name);
+    return name;
+}
+
+void drape_gl_flip(uint8_t *pixels, int width, int height)
+{
+    const size_t row = 4 * (size_t)width;
+    uint8_t kept[4096];
+    for (int a = 0, b = height - 1; a < b; a++, b--)
+        for (size_t i = 0; i < row; i += sizeof kept) {
+            size_t size = row - i < sizeof kept ? row - i : sizeof kept;
+            uint8_t *upper = pixels + (size_t)a * row + i, *lower = pixels + (size_t)b * row + i;
+            memcpy(kept, upper, size);
+            memcpy(upper, lower, size);
+            memcpy(lower, kept, size);
+        }
+}
+
 void drape_gl_mesh_create(drape_gl_mesh *mesh, const int *sizes, bool per_instance)
 {
     size_t offset = 0;

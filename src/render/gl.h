@@ -11,6 +11,25 @@
 GLuint drape_gl_program(drape_context *ctx, const char *name, const char *const *vertex,
                         const char *const *fragment);
 
+/* Textures that a program reads, by the names of their uniforms. */
+typedef struct drape_gl_unit {
+    const char *name;
+    GLuint texture;
+} drape_gl_unit;
+
+void drape_gl_use(GLuint program, const drape_gl_unit *units, size_t count);
+
+/* Makes a texture, which is bound. data, of these pixels of this kind: NULL: none yet. */
+GLuint drape_gl_texture(GLenum format, int width, int height, GLenum pixels, GLenum kind, const void *data,
+                        GLint filter, GLint wrap);
+
+/* Makes a framebuffer, which is bound; and a buffer of the bound framebuffer. samples: 0: one a pixel. */
+GLuint drape_gl_framebuffer(void);
+GLuint drape_gl_buffer(int samples, GLenum format, int width, int height, GLenum attachment);
+
+/* Reverses the rows of RGBA pixels, of which OpenGL has the lowest first. */
+void drape_gl_flip(uint8_t *pixels, int width, int height);
+
 /* Vertices with interleaved float attributes, and indices. */
 typedef struct drape_gl_mesh {
     GLuint array, vertices, indices;

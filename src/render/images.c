@@ -76,40 +76,29 @@ drape_status drape_png_read(drape_context *ctx, const char *path, uint8_t **pixe
 
 /* ---- Textures ---- */
 
-static GLuint upload(GLint kind, int width, int height, GLenum type, const void *pixels)
+static GLuint upload(GLenum kind, int width, int height, GLenum type, const void *pixels)
 {
-    GLuint name;
-    glGenTextures(1, &name);
-    glBindTexture(GL_TEXTURE_2D, name);
-    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-    glTexImage2D(GL_TEXTURE_2D, 0, kind, width, height, 0, GL_RGBA, type, pixels);
+    const GLuint name = drape_gl_texture(kind, width, height, GL_RGBA, type, pixels, GL_LINEAR, GL_REPEAT);
     glGenerateMipmap(GL_TEXTURE_2D);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
     return name;
 }
 
 /* A texture of a file, with the bottom row first, as v grows upwards. */
-static drape_status upload_file(drape_context *ctx, const char *path, GLint kind, GLuint *out)
+static drape_status upload_file(drape_context *ctx, const char *path, GLenum kind, GLuint *out)
 {
     uint8_t *pixels;
     int width = 0, height = 0;
     drape_status status = drape_png_read(ctx, path, &pixels, &width, &height);
     if (status)
         return status;
-    size_t row = 4 * (size_t)width;
-    for (size_t a = 0, b = (size_t)height - 1; a < b; a++, b--)
-        for (size_t i = 0; i < row; i++) {
-            uint8_t kept = pixels[a * row + i];
-            pixels[a * row + i] = pixels[b * row + i];
-            pixels[b * row + i] = kept;
-        }
+    drape_gl_flip(pixels, width, height);
     *out = upload(kind, width, height, GL_UNSIGNED_BYTE, pixels);
     drape_free(ctx, pixels);
     return DRAPE_OK;
 }
 
-static drape_status upload_bytes(drape_context *ctx, GLint kind,
+static drape_status upload_bytes(drape_context *ctx, GLenum kind,
                                  void (*paint)(double u, double v, uint8_t *to), GLuint *out)
 {
     uint8_t *pixels = drape_alloc(ctx, (size_t)PATTERN * PATTERN, 4);
@@ -272,14 +261,9 @@ void drape_ramp(double s, float rgb[3])
 GLuint drape_texture_ramp(void)
 {
     float pixels[RAMP][4];
-    GLuint name;
     for (int i = 0; i < RAMP; i++) {
         drape_ramp(i / (RAMP - 1.0), pixels[i]);
         pixels[i][3] = 1;
     }
-    name = upload(GL_RGBA16F, RAMP, 1, GL_FLOAT, pixels);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-    return name;
+    return drape_gl_texture(GL_RGBA16F, RAMP, 1, GL_RGBA, GL_FLOAT, pixels, GL_LINEAR, GL_CLAMP_TO_EDGE);
 }

@@ -143,23 +143,9 @@ static const char average_source[] =
 
 static GLuint texture(GLenum format, int width, int height, GLenum pixels, GLenum kind, GLenum attachment)
 {
-    GLuint name;
-    glGenTextures(1, &name);
-    glBindTexture(GL_TEXTURE_2D, name);
-    glTexImage2D(GL_TEXTURE_2D, 0, (GLint)format, width, height, 0, pixels, kind, NULL);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    const GLuint name =
+        drape_gl_texture(format, width, height, pixels, kind, NULL, GL_NEAREST, GL_CLAMP_TO_EDGE);
     glFramebufferTexture2D(GL_FRAMEBUFFER, attachment, GL_TEXTURE_2D, name, 0);
-    return name;
-}
-
-static GLuint framebuffer(void)
-{
-    GLuint name;
-    glGenFramebuffers(1, &name);
-    glBindFramebuffer(GL_FRAMEBUFFER, name);
     return name;
 }
 
@@ -167,24 +153,21 @@ static bool create_buffers(drape_lighting *v)
 {
     const int w = v->width, h = v->height;
     bool complete = true;
-    v->shadow_buffer = framebuffer();
+    v->shadow_buffer = drape_gl_framebuffer();
     v->shadow = texture(GL_DEPTH_COMPONENT24, SHADOW, SHADOW, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT,
                         GL_DEPTH_ATTACHMENT);
     glDrawBuffer(GL_NONE);
     glReadBuffer(GL_NONE);
-    v->seen = framebuffer();
+    v->seen = drape_gl_framebuffer();
     v->place = texture(GL_RGBA32F, w, h, GL_RGBA, GL_FLOAT, GL_COLOR_ATTACHMENT0);
     v->normal = texture(GL_RGBA16F, w, h, GL_RGBA, GL_FLOAT, GL_COLOR_ATTACHMENT1);
-    glGenRenderbuffers(1, &v->depth);
-    glBindRenderbuffer(GL_RENDERBUFFER, v->depth);
-    glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24, w, h);
-    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, v->depth);
+    v->depth = drape_gl_buffer(0, GL_DEPTH_COMPONENT24, w, h, GL_DEPTH_ATTACHMENT);
     glDrawBuffers(2, (const GLenum[]){GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1});
     complete = complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
-    v->raw_buffer = framebuffer();
+    v->raw_buffer = drape_gl_framebuffer();
     v->raw = texture(GL_RGBA32F, w, h, GL_RGBA, GL_FLOAT, GL_COLOR_ATTACHMENT0);
     complete = complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
-    v->result_buffer = framebuffer();
+    v->result_buffer = drape_gl_framebuffer();
     v->result = texture(GL_RGBA32F, w, h, GL_RGBA, GL_FLOAT, GL_COLOR_ATTACHMENT0);
     return complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
 }
@@ -267,23 +250,10 @@ void drape_lighting_begin_seen(const drape_lighting *v, const drape_lighting_vie
     glClear(GL_DEPTH_BUFFER_BIT);
 }
 
-static void use(GLuint program, const GLuint *textures, const char *const *names)
-{
-    glUseProgram(program);
-    for (int i = 0; i < 3; i++) {
-        glActiveTexture(GL_TEXTURE0 + (GLenum)i);
-        glBindTexture(GL_TEXTURE_2D, textures[i]);
-        drape_gl_set_int(program, names[i], i);
-    }
-    glActiveTexture(GL_TEXTURE0);
-}
-
 void drape_lighting_find(const drape_lighting *v, const drape_lighting_view *view)
 {
-    static const char *const find_names[] = {"places", "normals", "depths"}, *const average_names[] = {
-                                                                                 "places", "normals", "raw"};
-    const GLuint find_textures[] = {v->place, v->normal, v->shadow},
-                 average_textures[] = {v->place, v->normal, v->raw};
+    const drape_gl_unit find[] = {{"places", v->place}, {"normals", v->normal}, {"depths", v->shadow}},
+                        average[] = {{"places", v->place}, {"normals", v->normal}, {"raw", v->raw}};
     const float scale = view->scale / SHARE;
     int panel[4];
     set_panel(view, v, panel);
@@ -291,7 +261,7 @@ void drape_lighting_find(const drape_lighting *v, const drape_lighting_view *vie
     glDisable(GL_DEPTH_TEST);
     glBindFramebuffer(GL_FRAMEBUFFER, v->raw_buffer);
     clip(panel);
-    use(v->find, find_textures, find_names);
+    drape_gl_use(v->find, find, 3);
     glUniform4iv(glGetUniformLocation(v->find, "panel"), 1, panel);
     drape_gl_set_matrix(v->find, "lamp", view->lamp.m);
     drape_gl_set_vec3(v->find, "right", view->right);
@@ -306,7 +276,7 @@ void drape_lighting_find(const drape_lighting *v, const drape_lighting_view *vie
     drape_gl_set_float(v->find, "widest_reach", WIDEST_REACH * (float)(panel[3] - panel[1] + 1));
     glDrawArrays(GL_TRIANGLES, 0, 3);
     glBindFramebuffer(GL_FRAMEBUFFER, v->result_buffer);
-    use(v->average, average_textures, average_names);
+    drape_gl_use(v->average, average, 3);
     glUniform4iv(glGetUniformLocation(v->average, "panel"), 1, panel);
     drape_gl_set_float(v->average, "scale", scale);
     glDrawArrays(GL_TRIANGLES, 0, 3);

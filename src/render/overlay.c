@@ -46,19 +46,6 @@ static const char *const fragment_source[] = {
     "}\n",
     NULL};
 
-static GLuint upload_font(const drape_font *font)
-{
-    GLuint name;
-    glGenTextures(1, &name);
-    glBindTexture(GL_TEXTURE_2D, name);
-    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, font->cell_width * DRAPE_FONT_CELLS, font->cell_height, 0, GL_RED,
-                 GL_UNSIGNED_BYTE, font->alpha);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    return name;
-}
-
 drape_status drape_overlay_create(drape_arena *arena, int width, int height, int fine, drape_overlay *overlay)
 {
     static const int sizes[] = {2, 2, 1, 4, 0};
@@ -74,7 +61,9 @@ drape_status drape_overlay_create(drape_arena *arena, int width, int height, int
         return DRAPE_E_FILE;
     drape_gl_mesh_create(&overlay->mesh, sizes, false);
     overlay->ramp = drape_texture_ramp();
-    overlay->letters = upload_font(&overlay->font);
+    overlay->letters =
+        drape_gl_texture(GL_R8, overlay->font.cell_width * DRAPE_FONT_CELLS, overlay->font.cell_height,
+                         GL_RED, GL_UNSIGNED_BYTE, overlay->font.alpha, GL_LINEAR, GL_REPEAT);
     return DRAPE_OK;
 }
 
@@ -175,14 +164,8 @@ void drape_overlay_draw(drape_overlay *o)
     glDisable(GL_CULL_FACE);
     glEnable(GL_BLEND);
     glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
-    glUseProgram(o->program);
+    drape_gl_use(o->program, (const drape_gl_unit[]){{"letters", o->letters}, {"ramp", o->ramp}}, 2);
     drape_gl_set_vec2(o->program, "size", (float)o->width, (float)o->height);
-    drape_gl_set_int(o->program, "letters", 0);
-    drape_gl_set_int(o->program, "ramp", 1);
-    glActiveTexture(GL_TEXTURE1);
-    glBindTexture(GL_TEXTURE_2D, o->ramp);
-    glActiveTexture(GL_TEXTURE0);
-    glBindTexture(GL_TEXTURE_2D, o->letters);
     drape_gl_mesh_fill(&o->mesh, o->quads, 6 * o->count, true);
     glBindVertexArray(o->mesh.array);
     glDrawArrays(GL_TRIANGLES, 0, (GLsizei)(6 * o->count));

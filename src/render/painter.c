@@ -362,18 +362,10 @@ static void set_box(GLuint program, const char *name, const panel_view *v)
 static void use_surface(const drape_painter *p, GLuint program, const panel_view *v, const drape_matrix *view)
 {
     static const float nowhere[3] = {0};
-    const struct {
-        const char *name;
-        GLuint texture;
-    } units[] = {{"visible", p->lighting.result}, {"picture", p->textures[0]}, {"heights", p->textures[1]},
-                 {"environment", p->textures[2]}, {"ramp", p->ramp},           {"behind", v->behind}};
-    glUseProgram(program);
-    for (int i = 0; i < 6; i++) {
-        glActiveTexture(GL_TEXTURE0 + (GLenum)i);
-        glBindTexture(GL_TEXTURE_2D, units[i].texture);
-        drape_gl_set_int(program, units[i].name, i);
-    }
-    glActiveTexture(GL_TEXTURE0);
+    const drape_gl_unit units[] = {
+        {"visible", p->lighting.result}, {"picture", p->textures[0]}, {"heights", p->textures[1]},
+        {"environment", p->textures[2]}, {"ramp", p->ramp},           {"behind", v->behind}};
+    drape_gl_use(program, units, sizeof units / sizeof *units);
     drape_gl_set_matrix(program, "view", view->m);
     drape_gl_set_vec3(program, "eye", v->view.eye);
     drape_gl_set_vec3(program, "light", v->light.light);
