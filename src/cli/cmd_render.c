@@ -41,7 +41,8 @@ typedef struct render {
     double low, high;                /* range of the field; NaN: that of its values */
     const drape_shading *shading;
     bool film, picture;   /* to be made; neither: a folder of pictures */
-    drape_folder *folder; /* of pictures */
+    drape_folder *folder; /* of pictures; NULL: there is one picture or a film */
+    drape_film *making;   /* NULL: it is not begun */
     cli_source *sources;
     int source_count;
     drape_context *ctx;
@@ -378,16 +379,19 @@ static void average(render *r)
         }
 }
 
-static drape_status write_png(render *r, drape_folder *folder, const char *path)
+/* Writes frame k, which is in r->pixels. */
+static drape_status write_frame(render *r, size_t k)
 {
-    return drape_png_write(r->ctx, folder, path, r->pixels, r->width, r->height, r->request->small);
+    char name[PICTURE_NAME];
+    if (r->making)
+        return drape_film_add(r->making, r->pixels);
+    snprintf(name, sizeof name, "frame_%0*zu.png", PICTURE_DIGITS, k);
+    return drape_png_write(r->ctx, r->folder, r->folder ? name : r->request->out, r->pixels, r->width,
+                           r->height, r->request->small);
 }
 
-/* Writes frame k, which is in r->pixels. */
-typedef drape_status frame_writer(render *r, size_t k, void *user);
-
 /* The driver draws the next frame while this one is written. */
-static drape_status draw_frames(render *r, frame_writer *write, void *user)
+static drape_status draw_frames(render *r)
 {
     size_t count = r->sources[0].reel.count;
     drape_status status = draw(r, 0);
@@ -396,47 +400,10 @@ static drape_status draw_frames(render *r, frame_writer *write, void *user)
         average(r);
         drape_status next = !status && k + 1 < count ? draw(r, k + 1) : DRAPE_OK;
         if (!status)
-            status = write(r, k, user);
+            status = write_frame(r, k);
         status = status ? status : next;
     }
     return status;
-}
-
-static drape_status write_picture(render *r, size_t k, void *user)
-{
-    (void)k;
-    (void)user;
-    return write_png(r, NULL, r->request->out);
-}
-
-static drape_status add_to_film(render *r, size_t k, void *film)
-{
-    (void)r;
-    (void)k;
-    return drape_film_add(film, r->pixels);
-}
-
-static drape_status make_film(render *r)
-{
-    drape_film *film = NULL;
-    double rate = drape_model_frame_rate(r->sources[0].in.model) / r->frames.every /
-                  (r->request->slow ? r->request->slow : 1);
-    drape_status status = drape_film_begin(r->ctx, r->request->out, r->width, r->height, rate, &film);
-    if (!status)
-        status = draw_frames(r, add_to_film, film);
-    if (!status && !cli_interrupted())
-        return drape_film_end(&film);
-    char message[DRAPE_MESSAGE_SIZE];
-    snprintf(message, sizeof message, "%s", drape_context_message(r->ctx));
-    drape_film_abandon(&film);
-    return status ? drape_fail(r->ctx, status, "%s", message) : DRAPE_OK;
-}
-
-static drape_status write_into_folder(render *r, size_t k, void *folder)
-{
-    char name[PICTURE_NAME];
-    snprintf(name, sizeof name, "frame_%0*zu.png", PICTURE_DIGITS, k);
-    return write_png(r, folder, name);
 }
 
 static bool is_picture(const void *user, const char *name)
@@ -445,11 +412,29 @@ static bool is_picture(const void *user, const char *name)
     return drape_frame_is_name(name, PICTURE_DIGITS, "png");
 }
 
-/* Pictures of an earlier call are removed, so that those of two runs do not mix. */
-static drape_status make_folder(render *r)
+/* Pictures of an earlier call are removed from a folder, so that those of two runs do not mix. */
+static drape_status begin_frames(render *r)
 {
-    drape_status status = drape_folder_begin(r->folder, is_picture, NULL);
-    return status ? status : draw_frames(r, write_into_folder, r->folder);
+    double rate = drape_model_frame_rate(r->sources[0].in.model) / r->frames.every /
+                  (r->request->slow ? r->request->slow : 1);
+    if (r->film)
+        return drape_film_begin(r->ctx, r->request->out, r->width, r->height, rate, &r->making);
+    return r->folder ? drape_folder_begin(r->folder, is_picture, NULL) : DRAPE_OK;
+}
+
+static drape_status make_frames(render *r)
+{
+    char message[DRAPE_MESSAGE_SIZE];
+    drape_status status = begin_frames(r);
+    if (!status)
+        status = draw_frames(r);
+    if (!r->making)
+        return status;
+    if (!status && !cli_interrupted())
+        return drape_film_end(&r->making);
+    snprintf(message, sizeof message, "%s", drape_context_message(r->ctx));
+    drape_film_abandon(&r->making);
+    return status ? drape_fail(r->ctx, status, "%s", message) : DRAPE_OK;
 }
 
 /* ---- What must not be replaced ---- */
@@ -494,10 +479,7 @@ static int open_output(render *r)
 static int make(render *r)
 {
     bool incomplete = false;
-    drape_status status = r->film      ? make_film(r)
-                          : r->picture ? draw_frames(r, write_picture, NULL)
-                                       : make_folder(r);
-    if (status)
+    if (make_frames(r))
         return cli_report(&r->request->command, CLI_FAILED);
     if (cli_interrupted() && !r->picture) /* a picture is complete */
         return cli_report_interrupted("render");
