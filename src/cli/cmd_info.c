@@ -1,6 +1,6 @@
-/* cmd_info.c: `drape info`: show what a scene models and what it costs, as JSON or for reading: a line for each
- * value, in the order of the object. Lists are in one line, but those of objects with names. Empty lists are
- * left out. */
+/* cmd_info.c: `drape info`: show what a scene models and what it costs, as JSON or for reading: a line for
+ * each value, in the order of the object. Lists are in one line, but those of objects with names. Empty lists
+ * are left out. */
 #include "cli/form.h"
 #include "cli/info.h"
 

@@ -384,7 +384,8 @@ static json_t *bytes(const info *in)
     return drape_json_with(object, "a_node", drape_json_number((double)sum / in->model->node_count));
 }
 
-/* At the start, of a step of the integrator's dt, if it has a stability limit. An infinite one becomes null. */
+/* At the start, of a step of the integrator's dt, if it has a stability limit. An infinite one becomes
+ * null. */
 static json_t *with_stability(json_t *object, const info *in)
 {
     drape_stability s;

@@ -16,7 +16,8 @@ typedef struct cli_progress {
     int width;           /* columns of the line */
 } cli_progress;
 
-/* Of a run of the sim up to the simulated time `end`; NULL: of a sweep, whose progress is a number of cases. */
+/* Of a run of the sim up to the simulated time `end`; NULL: of a sweep, whose progress is a number of
+ * cases. */
 void cli_progress_begin(cli_progress *progress, const drape_sim *sim, double end);
 /* Shows the simulated time; updates at most ten times a second, as cli_progress_count does. */
 void cli_progress_show(cli_progress *progress, const drape_sim *sim);
