@@ -11,6 +11,7 @@
 #include "base/param.h"
 #include "lab/figure.h"
 #include "lab/run.h"
+#include "lab/series.h"
 #include "lab/statistics.h"
 #include "lab/text.h"
 #include "model/scene.h"
@@ -30,14 +31,6 @@
 #define MIN_FITTED   3     /* refinements that show that there is one order */
 
 /* ---- The cases ---- */
-
-static drape_status add(lab *l, const char *series, const char *integrator, const char *knob, double value,
-                        json_t *settings)
-{
-    json_t *tags = json_pack("{s:s, s:s, s:s, s:f}", "series", series, "integrator", integrator, "knob", knob,
-                             "value", value);
-    return lab_add_case(l, tags, settings, -1);
-}
 
 /* An integrator that takes as many substeps as its stability limit asks for stays at that limit, whatever dt
  * is, unless the scene fixes the number of substeps. */
@@ -63,28 +56,20 @@ static const char *tolerance_knob(const drape_integrator_ops *integrator, const 
 
 static drape_status add_time(lab *l, const drape_integrator_ops *integrator, const drape_entry_def *given)
 {
-    drape_status status = DRAPE_OK;
-    const char *knob = integrator->own_steps                 ? tolerance_knob(integrator, given)
-                       : has_own_substeps(integrator, given) ? OWN
-                                                             : "dt";
-    const char *pointer = integrator->own_steps ? "/integrator/rtol" : "/integrator/dt";
-    const double ratio = integrator->own_steps ? 0.1 : 0.5;
-    int limits[2];
-    /* Each series has one limit of the order: a line through points of different limits has no meaning. */
-    const size_t count = lab_order_limits(l, integrator, limits);
-    for (size_t i = 0; i < count; i++) {
-        char series[96];
-        double value = integrator->own_steps ? FIRST_RTOL : FIRST_DT;
-        lab_name_series(integrator, limits[i], series, sizeof series);
-        for (int k = 0; k < l->def->levels && !status; k++, value *= ratio) {
-            json_t *settings =
-                json_pack("{s:s, s:f}", "/integrator/method", integrator->entry.name, pointer, value);
-            if (limits[i])
-                json_object_set_new(settings, "/integrator/max_order", json_integer(limits[i]));
-            status = add(l, series, integrator->entry.name, knob, value, settings);
-        }
-    }
-    return status;
+    const bool own = integrator->own_steps;
+    const double ratio = own ? 0.1 : 0.5;
+    lab_level levels[MAX_LEVELS];
+    double value = own ? FIRST_RTOL : FIRST_DT;
+    for (int k = 0; k < l->def->levels; k++, value *= ratio)
+        levels[k] = (lab_level){value, -1};
+    const lab_grid grid = {.knob = own                                   ? tolerance_knob(integrator, given)
+                                   : has_own_substeps(integrator, given) ? OWN
+                                                                         : NULL,
+                           .rtols = levels,
+                           .steps = levels,
+                           .rtol_count = (size_t)l->def->levels,
+                           .step_count = (size_t)l->def->levels};
+    return lab_add_integrator(l, &grid, integrator);
 }
 
 /* A grid with its edges cut into so many parts: counts of nodes n become (n - 1) f + 1, of edges n f. */
@@ -106,7 +91,7 @@ static void refine(const drape_entry_def *grid, size_t cloth, int factor, json_t
 
 static drape_status add_level(lab *l, const drape_scene_def *def, int level)
 {
-    json_t *settings = json_pack("{s:s}", "/integrator/method", SPACE_METHOD);
+    json_t *settings = json_object();
     for (size_t c = 0; c < def->cloth_count; c++) {
         if (!def->cloths[c].mesh.grid.type) {
             json_decref(settings);
@@ -115,7 +100,8 @@ static drape_status add_level(lab *l, const drape_scene_def *def, int level)
         }
         refine(&def->cloths[c].mesh.grid, c, 1 << level, settings);
     }
-    return add(l, SPACE, SPACE_METHOD, "edge", ldexp(1, -level), settings);
+    return lab_add_point(
+        l, &(lab_point){NULL, SPACE, SPACE_METHOD, NULL, "edge", {ldexp(1, -level), -1}, settings});
 }
 
 static drape_status add_cases(lab *l)
@@ -141,11 +127,7 @@ static drape_status plan(lab *l)
     if (l->def->levels < MIN_LEVELS || l->def->levels > MAX_LEVELS)
         return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "levels = %d; must be %d to %d", l->def->levels,
                           MIN_LEVELS, MAX_LEVELS);
-    drape_status status = lab_check_integrators(l);
-    if (!status)
-        status = add_cases(l);
-    json_object_set_new(l->arguments, "case_seconds", json_real(l->def->case_seconds));
-    return status;
+    return add_cases(l);
 }
 
 /* All runs are compared at the nodes of the scene's own mesh. */
@@ -164,6 +146,7 @@ static drape_status prepare(lab *l)
 /* The refinements of one series: how far the end moved from each to the next. */
 typedef struct sequence {
     const char *series, *integrator, *knob;
+    size_t variant;                              /* among those of the integrator over the knob */
     double value[MAX_LEVELS], moved[MAX_LEVELS]; /* of the coarser of two, [m] */
     size_t count;
     size_t fitted; /* the last so many of them, by the line */
@@ -219,15 +202,14 @@ static bool chooses_order(const drape_integrator_ops *integrator)
            drape_param_find(integrator->entry.params, integrator->entry.param_count, "max_order") >= 0;
 }
 
-static void read_sequence(const lab *l, size_t first, sequence *s)
+static void read_sequence(const lab_series *series, const lab_series *before_it, sequence *s)
 {
     const json_t *before = NULL;
-    *s = (sequence){.series = lab_tag_text(l->results[first], "series"),
-                    .integrator = lab_tag_text(l->results[first], "integrator"),
-                    .knob = lab_tag_text(l->results[first], "knob")};
-    for (size_t i = first; i < l->count && strcmp(lab_tag_text(l->results[i], "series"), s->series) == 0;
-         i++) {
-        const json_t *r = l->results[i];
+    *s = (sequence){.series = series->name, .integrator = series->integrator, .knob = series->knob};
+    if (before_it && strcmp(before_it->knob, s->knob) == 0)
+        s->variant = series->variant;
+    for (size_t i = 0; i < series->count; i++) {
+        const json_t *r = series->results[i];
         bool good = lab_is_good(r);
         double moved = before && good ? distance(before, r) : NAN;
         s->failed += !good;
@@ -319,32 +301,22 @@ static void report_order(const sequence *s, FILE *out)
 
 /* ---- The figures and the tables ---- */
 
-static size_t count_before(const sequence *sequences, size_t k)
-{
-    size_t count = 0;
-    for (size_t i = 0; i < k; i++)
-        count += strcmp(sequences[i].integrator, sequences[k].integrator) == 0 &&
-                 strcmp(sequences[i].knob, sequences[k].knob) == 0;
-    return count;
-}
-
 /* The refinements that the line is fitted through are filled markers, or all, if there is none; others are
  * open. Returns whether there are others. */
-static bool draw_sequence(lab_figure *f, const sequence *s, size_t variant)
+static bool draw_sequence(lab_figure *f, const sequence *s)
 {
     char text[96];
-    const lab_style style = lab_style_of(s->integrator, variant), open = lab_style_of(s->integrator, 1);
+    const lab_style style = lab_style_of(s->integrator, s->variant), open = lab_style_of(s->integrator, 1);
     const size_t first = s->fitted ? s->count - s->fitted : 0;
-    for (int fitted = 0; fitted < 2; fitted++) {
-        const size_t block = lab_figure_data(f);
-        for (size_t i = fitted ? first : 0; i < (fitted ? s->count : first); i++)
-            lab_figure_point(f, s->value[i], s->moved[i]);
-        snprintf(text, sizeof text, isnan(s->line.slope) ? "%s" : "%s (%.2f)", s->series, s->line.slope);
-        if (fitted)
-            lab_figure_curve(f, block, style, text);
-        else if (first > 0)
-            lab_figure_curve(f, block, (lab_style){style.colour, 0, open.point}, NULL);
-    }
+    lab_figure_data(f);
+    for (size_t i = 0; i < first; i++)
+        lab_figure_point(f, s->value[i], s->moved[i]);
+    lab_figure_curve(f, (lab_style){style.colour, 0, open.point}, NULL);
+    lab_figure_data(f);
+    for (size_t i = first; i < s->count; i++)
+        lab_figure_point(f, s->value[i], s->moved[i]);
+    snprintf(text, sizeof text, isnan(s->line.slope) ? "%s" : "%s (%.2f)", s->series, s->line.slope);
+    lab_figure_curve(f, style, text);
     return first > 0;
 }
 
@@ -353,29 +325,17 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
 {
     lab_figure f;
     char name[96];
-    size_t points = 0;
     bool others = false;
-    double *xy = drape_arena_take(&l->arena, 2 * MAX_LEVELS * count, sizeof *xy);
     snprintf(name, sizeof name, "converge_%s", knob);
-    if (!xy)
-        return DRAPE_E_MEMORY;
     lab_figure_begin(l, &f, name);
-    for (size_t k = 0; k < count; k++) {
-        const sequence *s = &sequences[k];
-        if (s->count == 0 || strcmp(is_tolerance(s) ? "rtol" : s->knob, knob) != 0)
-            continue;
-        others |= draw_sequence(&f, s, count_before(sequences, k));
-        for (size_t i = 0; i < s->count; i++, points++) {
-            xy[2 * points] = s->value[i];
-            xy[2 * points + 1] = s->moved[i];
-        }
-    }
+    for (const sequence *s = sequences; s < sequences + count; s++)
+        if (strcmp(is_tolerance(s) ? "rtol" : s->knob, knob) == 0)
+            others |= draw_sequence(&f, s);
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", label);
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "change to the next level [m]");
     if (others)
         lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_OPEN_MARKER}, "not fitted");
-    if (points > 0)
-        lab_figure_fit(&f, xy, points, strcmp(knob, "rtol") != 0 ? 2 : 1);
+    lab_figure_fit(&f, strcmp(knob, "rtol") != 0 ? 2 : 1);
     return lab_figure_end(
         l, &f,
         "How far the end moves with each refinement (root mean square); in brackets the slope of a line "
@@ -384,17 +344,16 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
 
 static void write_table(lab *l, const sequence *s)
 {
-    lab_page_heading(l, s->series);
-    fputs("<table><tr><th>", l->page);
-    lab_page_text(l, s->knob);
-    fputs("</th><th>moved [m]</th><th>order</th></tr>\n", l->page);
+    const lab_table t = {.l = l};
+    lab_table_begin(&t, s->series, (const char *const[]){s->knob, "moved [m]", "order", NULL});
     for (size_t i = 0; i < s->count; i++) {
-        fprintf(l->page, "<tr><td>%.6g</td><td>%.4g</td><td>", s->value[i], s->moved[i]);
-        if (i > 0 && !s->unrefined)
-            fprintf(l->page, "%.3f", local_order(s, i));
-        fputs("</td></tr>\n", l->page);
+        lab_table_begin_row(&t);
+        lab_table_put(&t, "%.6g", s->value[i]);
+        lab_table_put(&t, "%.4g", s->moved[i]);
+        lab_table_put(&t, i > 0 && !s->unrefined ? "%.3f" : "", i > 0 ? local_order(s, i) : NAN);
+        lab_table_end_row(&t);
     }
-    fputs("</table>\n", l->page);
+    lab_table_end(&t);
 }
 
 static drape_status report(lab *l)
@@ -403,13 +362,12 @@ static drape_status report(lab *l)
         const char *knob, *label;
     } knobs[] = {{"dt", "dt [s]"}, {"rtol", "rtol"}, {"edge", "edge length / that of the coarsest mesh"}};
     size_t count = 0;
-    sequence *sequences = drape_arena_take(&l->arena, l->count, sizeof *sequences);
-    if (!sequences)
+    const lab_series *series = lab_list_series(l, NULL, &count);
+    sequence *sequences = drape_arena_take(&l->arena, count, sizeof *sequences);
+    if (!series || !sequences)
         return DRAPE_E_MEMORY;
-    for (size_t i = 0; i < l->count; i++)
-        if (i == 0 ||
-            strcmp(lab_tag_text(l->results[i], "series"), lab_tag_text(l->results[i - 1], "series")) != 0)
-            read_sequence(l, i, &sequences[count++]);
+    for (size_t k = 0; k < count; k++)
+        read_sequence(&series[k], k ? &series[k - 1] : NULL, &sequences[k]);
     for (size_t k = 0; k < count; k++)
         report_order(&sequences[k], l->summary);
     drape_status status = DRAPE_OK;

@@ -103,22 +103,8 @@ bool lab_wants_integrator(const lab *l, const char *name, bool fallback)
     return l->def->integrator_count == 0 && fallback;
 }
 
-size_t lab_order_limits(const lab *l, const drape_integrator_ops *integrator, int limits[2])
-{
-    bool chosen = drape_param_find(integrator->entry.params, integrator->entry.param_count, "max_order") < 0;
-    for (size_t i = 0; i < l->def->setting_count; i++)
-        chosen |= strcmp(l->def->settings[i].pointer, "/integrator/max_order") == 0;
-    limits[0] = chosen ? 0 : 2;
-    limits[1] = 5;
-    return chosen ? 1 : 2;
-}
-
-void lab_name_series(const drape_integrator_ops *integrator, int limit, char *text, size_t size)
-{
-    snprintf(text, size, limit ? "%s, order %d" : "%s", integrator->entry.name, limit);
-}
-
-drape_status lab_check_integrators(const lab *l)
+/* Faults of the def: an integrator that does not exist, or that has no steps in time. */
+static drape_status check_integrators(const lab *l)
 {
     for (size_t i = 0; i < l->def->integrator_count; i++) {
         const char *name = l->def->integrators[i];
@@ -150,7 +136,12 @@ static drape_status plan(lab *l)
     l->arguments = json_object_get(l->about, "arguments");
     if (!l->cases || !l->arguments)
         return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "the settings are not UTF-8, or there is no memory");
-    drape_status status = l->experiment->plan(l);
+    drape_status status = check_integrators(l);
+    if (!status)
+        status = l->experiment->plan(l);
+    json_object_set_new(l->arguments, "case_seconds", json_real(l->def->case_seconds));
+    if (l->experiment->compares_costs)
+        json_object_set_new(l->arguments, "repeats", json_integer(l->def->repeats));
     if (!status)
         status = lab_check_about(l->ctx, "the plan", l->about);
     /* Lines of a scene that was changed since do not belong to this experiment. */

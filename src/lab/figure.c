@@ -347,11 +347,10 @@ static void put_value(lab_figure *f, double value)
 }
 
 /* A block begins with the number of its values. */
-size_t lab_figure_data(lab_figure *f)
+void lab_figure_data(lab_figure *f)
 {
     f->block = f->used;
     put_value(f, 0);
-    return f->block;
 }
 
 static void put_values(lab_figure *f, const double *values, size_t count)
@@ -372,31 +371,33 @@ void lab_figure_box(lab_figure *f, double left, double right, double bottom, dou
     put_values(f, (double[]){left, right, bottom, top, fill}, 5);
 }
 
-static void add_element(lab_figure *f, int kind, size_t block, lab_style style)
+/* Of the last block; not without data. */
+static bool add_element(lab_figure *f, int kind, lab_style style)
 {
+    if (f->failed || f->values[f->block] == 0)
+        return false;
     lab_element *elements = grow(f, f->elements, (size_t)f->element_count, sizeof *elements);
     if (!elements)
-        return;
+        return false;
     f->elements = elements;
-    f->elements[f->element_count++] = (lab_element){kind, block, style};
+    f->elements[f->element_count++] = (lab_element){kind, f->block, style};
+    return true;
 }
 
-static void add_entry(lab_figure *f, const lab_entry *entry)
+static void add_entry(lab_figure *f, lab_entry entry, const char *text)
 {
-    if (f->entries < LAB_MAX_ENTRIES)
-        f->legend[f->entries++] = *entry;
-    else
-        snprintf(f->legend[LAB_MAX_ENTRIES - 1].text, sizeof entry->text, "and others");
+    const bool full = f->entries == LAB_MAX_ENTRIES;
+    if (!full)
+        f->legend[f->entries++] = entry;
+    snprintf(f->legend[f->entries - 1].text, sizeof entry.text, "%s", full ? "and others" : text);
 }
 
-void lab_figure_curve(lab_figure *f, size_t block, lab_style style, const char *text)
+bool lab_figure_curve(lab_figure *f, lab_style style, const char *text)
 {
-    add_element(f, CURVE, block, style);
-    if (!text)
-        return;
-    lab_entry entry = {.style = style};
-    snprintf(entry.text, sizeof entry.text, "%s", text);
-    add_entry(f, &entry);
+    const bool there = add_element(f, CURVE, style);
+    if (there && text)
+        lab_figure_marker(f, style, text);
+    return there;
 }
 
 static bool is_in(const lab_entry *entries, int count, const char *text, size_t length)
@@ -408,51 +409,66 @@ static bool is_in(const lab_entry *entries, int count, const char *text, size_t 
     return false;
 }
 
-void lab_figure_series(lab_figure *f, size_t block, const char *integrator, size_t variant, const char *name)
+bool lab_figure_series(lab_figure *f, const char *integrator, size_t variant, const char *name)
 {
     const lab_style style = lab_style_of(integrator, variant);
     const char *comma = strchr(name, ',');
-    if (variant == 0 || !comma || !is_in(f->legend, f->entries, integrator, strlen(integrator))) {
-        lab_figure_curve(f, block, style, name);
-        return;
-    }
-    lab_figure_curve(f, block, style, NULL);
+    if (variant == 0 || !comma || !is_in(f->legend, f->entries, integrator, strlen(integrator)))
+        return lab_figure_curve(f, style, name);
+    if (!lab_figure_curve(f, style, NULL))
+        return false;
     const char *what = comma + 1 + strspn(comma + 1, " ");
     if (f->variant_count == LAB_MAX_VARIANTS || is_in(f->variants, f->variant_count, what, strlen(what)))
-        return;
+        return true;
     lab_entry *entry = &f->variants[f->variant_count++];
     *entry = (lab_entry){.style = {LAB_BLACK, style.dash, LAB_OPEN_MARKER}};
     snprintf(entry->text, sizeof entry->text, "%s", what);
+    return true;
 }
 
-void lab_figure_boxes(lab_figure *f, size_t block)
+void lab_figure_boxes(lab_figure *f)
 {
-    add_element(f, BOXES, block, (lab_style){0});
+    add_element(f, BOXES, (lab_style){0});
 }
 
-void lab_figure_values(lab_figure *f, size_t block)
+void lab_figure_values(lab_figure *f)
 {
-    add_element(f, VALUES, block, (lab_style){0});
+    add_element(f, VALUES, (lab_style){0});
 }
 
-void lab_figure_hatch(lab_figure *f, size_t block, int colour)
+void lab_figure_hatch(lab_figure *f, int colour)
 {
-    add_element(f, HATCH, block, (lab_style){.colour = colour});
+    add_element(f, HATCH, (lab_style){.colour = colour});
 }
 
-void lab_figure_fit(lab_figure *f, const double *xy, size_t count, int orders)
+/* The lowest of all points of curves to the right of `left`. Widens axes to contain all points; NULL: does
+ * not. */
+static double lowest_point(const lab_figure *f, double left, lab_axis axes[2])
+{
+    double lowest = INFINITY;
+    for (int e = 0; e < f->element_count; e++) {
+        const double *xy = f->values + f->elements[e].block + 1, *end = xy + (size_t)xy[-1];
+        for (; xy < end; xy += 2) {
+            lowest = xy[0] > left ? fmin(lowest, xy[1]) : lowest;
+            for (int k = 0; axes && k < 2; k++) {
+                axes[k].from = fmin(axes[k].from, xy[k]);
+                axes[k].to = fmax(axes[k].to, xy[k]);
+            }
+        }
+    }
+    return lowest;
+}
+
+void lab_figure_fit(lab_figure *f, int orders)
 {
     lab_axis *x = &f->axes[0], *y = &f->axes[1];
     const double margin = 0.04;
+    if (f->element_count == 0)
+        return;
     x->log = y->log = true;
     x->from = y->from = INFINITY;
     x->to = y->to = 0;
-    for (size_t i = 0; i < count; i++) {
-        x->from = fmin(x->from, xy[2 * i]);
-        x->to = fmax(x->to, xy[2 * i]);
-        y->from = fmin(y->from, xy[2 * i + 1]);
-        y->to = fmax(y->to, xy[2 * i + 1]);
-    }
+    lowest_point(f, 0, f->axes);
     /* A single value is given a decade. */
     for (lab_axis *a = x; a <= y; a++) {
         const double widen = a->to > a->from ? pow(a->to / a->from, margin) : sqrt(10);
@@ -465,37 +481,32 @@ void lab_figure_fit(lab_figure *f, const double *xy, size_t count, int orders)
      * apart. */
     const double span = fmax(0.15 * ends_ratio(x), 4 / f->plot_height * ends_ratio(y));
     const double right = x->to * pow(10, -0.07 * ends_ratio(x)), left = right * pow(10, -span);
-    double top = INFINITY;
-    for (size_t i = 0; i < count; i++) /* a point to the left counts, too: from there a line may come down */
-        top = xy[2 * i] > left / 2.5 ? fmin(top, xy[2 * i + 1]) : top;
+    /* A point to the left counts, too: from there a line may come down. */
+    const double top = lowest_point(f, left / 2.5, NULL);
     const double space = pow(10, 3.5 / f->plot_height * ends_ratio(y));
     const double low = top / space * pow(10, -orders * span);
     y->from = fmin(y->from, low / space);
     for (int order = 1; order <= orders; order++) {
         const double end = low * pow(10, order * span);
-        const size_t block = lab_figure_data(f);
+        lab_figure_data(f);
         lab_figure_point(f, left, low);
         lab_figure_point(f, right, end);
-        lab_figure_curve(f, block, (lab_style){LAB_GREY, 2, 0},
+        lab_figure_curve(f, (lab_style){LAB_GREY, 2, 0},
                          order > 1     ? NULL
                          : orders == 1 ? "slope 1"
                                        : "slopes 1 and 2");
-        add_element(f, ORDER, block, (lab_style){.point = order});
+        add_element(f, ORDER, (lab_style){.point = order});
     }
 }
 
 void lab_figure_marker(lab_figure *f, lab_style style, const char *text)
 {
-    lab_entry entry = {.style = style};
-    snprintf(entry.text, sizeof entry.text, "%s", text);
-    add_entry(f, &entry);
+    add_entry(f, (lab_entry){.style = style}, text);
 }
 
 void lab_figure_swatch(lab_figure *f, int colour, bool hatched, const char *text)
 {
-    lab_entry entry = {.style = {.colour = colour}, .swatch = true, .hatched = hatched};
-    snprintf(entry.text, sizeof entry.text, "%s", text);
-    add_entry(f, &entry);
+    add_entry(f, (lab_entry){.style = {.colour = colour}, .swatch = true, .hatched = hatched}, text);
 }
 
 /* ---- Layout ---- */
@@ -686,7 +697,7 @@ static drape_status write_figure(lab *l, const lab_figure *f, const char *ending
 drape_status lab_figure_end(lab *l, lab_figure *f, const char *caption)
 {
     for (int i = 0; i < f->variant_count; i++)
-        add_entry(f, &f->variants[i]);
+        add_entry(f, f->variants[i], f->variants[i].text);
     drape_status status = f->failed ? DRAPE_E_MEMORY : drape_check_cancel(l->ctx);
     const bool empty = status || f->element_count == 0;
     if (!empty &&

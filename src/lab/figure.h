@@ -85,29 +85,29 @@ typedef struct lab_figure {
  * characters other than letters, digits and "-_.", and for long names, where a hash tells names apart. */
 void lab_figure_begin(lab *l, lab_figure *f, const char *name);
 
-/* Begins a block of data; returns what names it. */
-size_t lab_figure_data(lab_figure *f);
+/* Begins a block of data, of which the functions below draw the last one; nothing without data. */
+void lab_figure_data(lab_figure *f);
 
 /* Adds a point or a box to the last block. NaN makes a gap in a curve. */
 void lab_figure_point(lab_figure *f, double x, double y);
 void lab_figure_box(lab_figure *f, double left, double right, double bottom, double top, double fill);
 
-/* Points (x, y) of a block, joined by lines. text: in the legend; NULL: not there. */
-void lab_figure_curve(lab_figure *f, size_t block, lab_style style, const char *text);
+/* Points (x, y), joined by lines. text: in the legend; NULL: not there. Returns whether there are any. */
+bool lab_figure_curve(lab_figure *f, lab_style style, const char *text);
 
 /* The curve of a series of an integrator, "be" or "be, error control". In the legend variants share an
  * entry for what they have in common, "error control", in black: a name and a dash tell a series. */
-void lab_figure_series(lab_figure *f, size_t block, const char *integrator, size_t variant, const char *name);
+bool lab_figure_series(lab_figure *f, const char *integrator, size_t variant, const char *name);
 
-/* Boxes of a block, filled with their colours. */
-void lab_figure_boxes(lab_figure *f, size_t block);
+/* Boxes, filled with their colours. */
+void lab_figure_boxes(lab_figure *f);
 
 /* The same with a value of the scale in place of the colour: from dark blue to yellow. Values beyond the
  * ends of the scale have the colours of these. */
-void lab_figure_values(lab_figure *f, size_t block);
+void lab_figure_values(lab_figure *f);
 
-/* Hatches boxes of a block, which may have any fill, with lines of that colour. */
-void lab_figure_hatch(lab_figure *f, size_t block, int colour);
+/* Hatches boxes, which may have any fill, with lines of that colour. */
+void lab_figure_hatch(lab_figure *f, int colour);
 
 /* A marker in the legend, without a line. */
 void lab_figure_marker(lab_figure *f, lab_style style, const char *text);
@@ -115,9 +115,9 @@ void lab_figure_marker(lab_figure *f, lab_style style, const char *text);
 /* A swatch in the legend; hatched in black or plain. */
 void lab_figure_swatch(lab_figure *f, int colour, bool hatched, const char *text);
 
-/* Widens logarithmic axes, on which the curves end, by a margin; orders > 0: makes room below the curves
- * (points: x, y in turn) and draws reference lines of slopes 1 to orders there, 2 at most. */
-void lab_figure_fit(lab_figure *f, const double *points, size_t count, int orders);
+/* Makes both axes logarithmic and as long as the curves so far, with a margin; orders > 0: makes room below the
+ * curves and draws reference lines of slopes 1 to orders there, 2 at most. */
+void lab_figure_fit(lab_figure *f, int orders);
 
 /* Writes name.svg and name.pdf, and adds the figure with its caption to the page. Without an element there
  * is no figure. Frees the memory. Errors: DRAPE_E_PARSE (values without a range), DRAPE_E_FILE,

@@ -5,8 +5,8 @@
  */
 #include "lab/ivp.h"
 #include "base/param.h"
-#include "control/control.h"
 #include "lab/figure.h"
+#include "lab/series.h"
 #include "lab/statistics.h"
 #include "lab/text.h"
 
@@ -18,114 +18,55 @@
 #define LARGEST     0.1  /* of the size: larger errors have no order */
 #define BASE_METHOD "be"
 #define LEVELS      11 /* of dt */
-#define MAX_SERIES  64 /* of a scene */
-#define MAX_POINTS  16 /* of a series */
+#define MAX_POINTS  16 /* of a line */
 
 /* Ranks of dt = interval/2^k: a few points over all of the range first. */
 static const int dt_ranks[LEVELS] = {6, 2, 5, 0, 4, 1, 5, 3, 6, 4, 7};
-static const struct {
-    double rtol;
-    int rank;
-} rtols[] = {{1e-2, 2}, {1e-3, 0}, {1e-4, 3}, {1e-5, 1}, {1e-6, 5}, {1e-7, 4}, {1e-8, 6}, {1e-9, 7}},
-  controlled[] = {{1e-3, 8}, {1e-4, 9}, {1e-5, 8}, {1e-6, 9}};
+static const lab_level rtols[] = {{1e-2, 2}, {1e-3, 0}, {1e-4, 3}, {1e-5, 1},
+                                  {1e-6, 5}, {1e-7, 4}, {1e-8, 6}, {1e-9, 7}};
+static const lab_level controlled[] = {{1e-3, 8}, {1e-4, 9}, {1e-5, 8}, {1e-6, 9}};
 
 /* The scenes while the program runs; a merge has none. */
 typedef struct set {
     lab_ivp *scenes;
     size_t count;
-    size_t *of; /* the scene of a case */
 } set;
 
 /* ---- The cases ---- */
 
-static drape_status add(lab *l, size_t scene, const char *series, const drape_integrator_ops *integrator,
-                        const char *knob, double value, int rank, json_t *more)
+/* The tolerance of Newton's method. Under a controller, whose steps have errors of order p + 1, for the step
+ * that it takes. */
+static void add_tolerance(const void *user, const drape_integrator_ops *integrator, double dt, double rtol,
+                          json_t *settings)
 {
-    set *own = l->own;
-    const size_t index = json_array_size(l->cases);
-    const lab_ivp *s = &own->scenes[scene];
-    char pointer[64];
-    snprintf(pointer, sizeof pointer, "/%s", knob);
-    json_t *settings = json_pack("{s:s, s:f}", "/integrator/method", integrator->entry.name, pointer, value);
-    json_t *tags = json_pack("{s:s, s:s, s:s, s:s, s:f}", "scene", s->name, "series", series, "integrator",
-                             integrator->entry.name, "knob", strrchr(knob, '/') + 1, "value", value);
-    json_object_update(settings, more);
-    json_decref(more);
-    size_t *of = drape_arena_resize(&l->arena, own->of, index + 1, sizeof *of);
-    drape_status status = lab_add_case(l, tags, settings, -1);
-    if (status || !of)
-        return status ? status : DRAPE_E_MEMORY;
-    own->of = of;
-    of[index] = scene;
-    lab_rank_case(l, 2 * rank + (integrator->stability != NULL));
-    return DRAPE_OK;
+    const lab_ivp *s = user;
+    const double h = isnan(dt) ? fmin(pow(rtol, 1.0 / (integrator->order + 1)), 1) * s->interval : dt;
+    if (drape_param_find(integrator->entry.params, integrator->entry.param_count, "tolerance") >= 0)
+        json_object_set_new(settings, "/integrator/tolerance",
+                            json_real(lab_ivp_tolerance(s, integrator->order, h)));
 }
 
-/* Integrators that choose their steps, at every order that they are limited to. */
-static drape_status add_own_steps(lab *l, size_t scene, const drape_integrator_ops *integrator)
+static drape_status add_scene(lab *l, const lab_ivp *s)
 {
-    int limits[2];
+    lab_level steps[LEVELS];
+    const lab_grid grid = {.scene = s->name,
+                           .rtols = rtols,
+                           .rtol_count = sizeof rtols / sizeof *rtols,
+                           .steps = steps,
+                           .step_count = LEVELS,
+                           .controlled = controlled,
+                           .controlled_count = sizeof controlled / sizeof *controlled,
+                           .first_step = s->interval / 64,
+                           .only_if_implicit = true,
+                           .add = add_tolerance,
+                           .user = s};
     drape_status status = DRAPE_OK;
-    const size_t count = lab_order_limits(l, integrator, limits);
-    for (size_t k = 0; k < count; k++) {
-        char series[96];
-        lab_name_series(integrator, limits[k], series, sizeof series);
-        for (size_t i = 0; !status && i < sizeof rtols / sizeof *rtols; i++)
-            status = add(l, scene, series, integrator, "integrator/rtol", rtols[i].rtol, rtols[i].rank,
-                         limits[k] ? json_pack("{s:i}", "/integrator/max_order", limits[k]) : json_object());
-    }
-    return status;
-}
-
-static json_t *tolerance_of(const lab_ivp *s, const drape_integrator_ops *integrator, double dt)
-{
-    const drape_entry *entry = &integrator->entry;
-    return drape_param_find(entry->params, entry->param_count, "tolerance") < 0
-               ? json_object()
-               : json_pack("{s:f}", "/integrator/tolerance", lab_ivp_tolerance(s, integrator->order, dt));
-}
-
-/* Others: over dt, and under each controller that bounds an error, whose steps begin with a 64th of an
- * interval. */
-static drape_status add_fixed(lab *l, size_t scene, const drape_integrator_ops *integrator)
-{
-    const lab_ivp *s = &((set *)l->own)->scenes[scene];
-    drape_status status = DRAPE_OK;
-    for (int k = 0; !status && k < LEVELS; k++) {
-        const double dt = ldexp(s->interval, -k);
-        status = add(l, scene, integrator->entry.name, integrator, "integrator/dt", dt, dt_ranks[k],
-                     tolerance_of(s, integrator, dt));
-    }
-    for (int c = 0; drape_controllers[c] && !integrator->stability; c++) {
-        const drape_controller_ops *controller = drape_controllers[c];
-        char series[96];
-        if (drape_param_find(controller->entry.params, controller->entry.param_count, "rtol") < 0)
-            continue;
-        snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->entry.name);
-        for (size_t i = 0; !status && i < sizeof controlled / sizeof *controlled; i++) {
-            /* The local error is of order p + 1 in the step that the controller takes. */
-            const double h = pow(controlled[i].rtol, 1.0 / (integrator->order + 1)) * s->interval;
-            json_t *more = tolerance_of(s, integrator, fmin(h, s->interval));
-            json_object_set_new(more, "/controller/type", json_string(controller->entry.name));
-            json_object_set_new(more, "/integrator/dt", json_real(s->interval / 64));
-            status = add(l, scene, series, integrator, "controller/rtol", controlled[i].rtol,
-                         controlled[i].rank, more);
-        }
-    }
-    return status;
-}
-
-static drape_status add_scene(lab *l, size_t scene)
-{
-    drape_status status = DRAPE_OK;
-    for (int i = 0; !status && drape_integrators[i]; i++) {
-        const drape_integrator_ops *integrator = drape_integrators[i];
-        if (!lab_wants_integrator(l, integrator->entry.name, true) ||
-            !lab_ivp_admits(&((set *)l->own)->scenes[scene], integrator))
-            continue;
-        status =
-            integrator->own_steps ? add_own_steps(l, scene, integrator) : add_fixed(l, scene, integrator);
-    }
+    for (int k = 0; k < LEVELS; k++)
+        steps[k] = (lab_level){ldexp(s->interval, -k), dt_ranks[k]};
+    for (int i = 0; !status && drape_integrators[i]; i++)
+        if (lab_wants_integrator(l, drape_integrators[i]->entry.name, true) &&
+            lab_ivp_admits(s, drape_integrators[i]))
+            status = lab_add_integrator(l, &grid, drape_integrators[i]);
     return status;
 }
 
@@ -156,12 +97,13 @@ static drape_status plan(lab *l)
 {
     const size_t count = l->def->scene_count ? l->def->scene_count : 1;
     set *own = l->own = drape_arena_take(&l->arena, 1, sizeof *own);
-    drape_status status = lab_check_integrators(l);
+    drape_status status = DRAPE_OK;
     if (own)
         own->scenes = drape_arena_take(&l->arena, count, sizeof *own->scenes);
     if (!own || !own->scenes)
         return DRAPE_E_MEMORY;
-    if (!status && l->def->setting_count)
+    own->count = count;
+    if (l->def->setting_count)
         status = drape_fail(l->ctx, DRAPE_E_ARGUMENT,
                             "ivp takes no settings: the references are of the scenes as they are");
     json_t *scenes = json_array();
@@ -173,12 +115,10 @@ static drape_status plan(lab *l)
                                     own->scenes[i].name);
         if (!status) {
             scenes = drape_json_append(scenes, describe_scene(&own->scenes[i]));
-            status = add_scene(l, i);
+            status = add_scene(l, &own->scenes[i]);
         }
     }
     json_object_set_new(l->arguments, "scenes", scenes);
-    json_object_set_new(l->arguments, "case_seconds", json_real(l->def->case_seconds));
-    json_object_set_new(l->arguments, "repeats", json_integer(l->def->repeats));
     if (!status && json_array_size(l->cases) == 0)
         status =
             drape_fail(l->ctx, DRAPE_E_ARGUMENT, "none of these integrators solves the equations of a scene");
@@ -188,7 +128,10 @@ static drape_status plan(lab *l)
 static void complete_request(const lab *l, size_t index, lab_request *request)
 {
     const set *own = l->own;
-    const lab_ivp *s = &own->scenes[own->of[index]];
+    const char *scene = lab_tag_text(json_array_get(l->cases, index), "scene");
+    const lab_ivp *s = own->scenes;
+    while (strcmp(s->name, scene) != 0)
+        s++;
     request->scene = s->path;
     request->identity = s->hash;
     request->identified = NULL;
@@ -200,12 +143,20 @@ static void complete_request(const lab *l, size_t index, lab_request *request)
 
 /* ---- Reading the results ---- */
 
-/* The cases of a scene and a series, in the order of the plan: from coarse to fine. */
-typedef struct series {
-    const char *scene, *name, *integrator, *knob;
-    const json_t *results[MAX_POINTS];
-    size_t count; /* those that were run */
-} series;
+/* What is known of a scene. */
+typedef struct scene {
+    const json_t *about; /* describe_scene */
+    const char *name;
+    const lab_series *series;
+    size_t count; /* of these */
+} scene;
+
+/* A table, and the scenes. */
+typedef struct tables {
+    lab_table table;
+    const scene *scenes;
+    size_t count;
+} tables;
 
 static double error_of(const json_t *result)
 {
@@ -220,32 +171,9 @@ static double resolved_error(const json_t *result)
     return error > least ? error : NAN;
 }
 
-static size_t list_series(const lab *l, const char *scene, series *list)
-{
-    size_t count = 0;
-    for (size_t i = 0; i < l->count; i++) {
-        const json_t *one = json_array_get(l->cases, i);
-        if (strcmp(lab_tag_text(one, "scene"), scene) != 0)
-            continue;
-        series *s = &list[count ? count - 1 : 0];
-        if (!count || strcmp(s->name, lab_tag_text(one, "series")) != 0) {
-            if (count == MAX_SERIES)
-                break;
-            s = &list[count++];
-            *s = (series){.scene = scene,
-                          .name = lab_tag_text(one, "series"),
-                          .integrator = lab_tag_text(one, "integrator"),
-                          .knob = lab_tag_text(one, "knob")};
-        }
-        if (l->results[i] && s->count < sizeof s->results / sizeof *s->results)
-            s->results[s->count++] = l->results[i];
-    }
-    return count;
-}
-
 /* The least cost at which a series reaches an error: between neighbours of which one is worse and one is
  * better, by interpolation of logarithms; else of the coarsest case that reaches it. NaN: it does not. */
-static double cost_at(const series *s, double error, const json_t **at)
+static double cost_at(const lab_series *s, double error, const json_t **at)
 {
     double least = NAN;
     for (size_t i = 0; i < s->count; i++) {
@@ -266,88 +194,23 @@ static double cost_at(const series *s, double error, const json_t **at)
     return least;
 }
 
-static void knob_text(const json_t *result, char *text, size_t size)
-{
-    const char *knob = lab_tag_text(result, "knob");
-    const double value = lab_tag_number(result, "value");
-    if (strcmp(knob, "dt") == 0)
-        snprintf(text, size, "dt 1/%.4g s", 1 / value);
-    else
-        snprintf(text, size, "%s %.3g", knob, value);
-}
-
-/* ---- The table of the cheapest ---- */
-
-/* A text of the summary, the page and the Markdown file at once. */
-typedef struct table {
-    lab *l;
-    FILE *out;
-} table;
-
-static void begin_row(table *t)
-{
-    fputs("<tr>", t->l->page);
-    fputs("|", t->out);
-}
-
-static void put_cell(table *t, const char *text)
-{
-    fputs("<td>", t->l->page);
-    lab_page_text(t->l, text);
-    fputs("</td>", t->l->page);
-    fputc(' ', t->out);
-    for (; *text; text++) /* a text is neither a cell more nor HTML */
-        fputs(*text == '|' ? "\\|" : *text == '<' ? "&lt;" : (char[]){*text, 0}, t->out);
-    fputs(" |", t->out);
-}
-
-static void end_row(table *t)
-{
-    fputs("</tr>\n", t->l->page);
-    fputs("\n", t->out);
-}
-
-static void begin_table(table *t, const char *title, const char *const *heads, size_t count)
-{
-    lab_page_heading(t->l, title);
-    fputs("<table>", t->l->page);
-    fprintf(t->out, "\n%s\n\n", title);
-    begin_row(t);
-    for (size_t i = 0; i < count; i++)
-        put_cell(t, heads[i]);
-    end_row(t);
-    for (size_t i = 0; i < count; i++)
-        fputs(i ? "---|" : "|---|", t->out);
-    fputs("\n", t->out);
-}
-
-static void end_table(table *t)
-{
-    fputs("</table>\n", t->l->page);
-}
+/* ---- Tables ---- */
 
 /* "ida, order 5; rtol 1e-05; 0.021 s; 1.7 (trbdf2); 12" */
-static void put_cheapest(table *t, const series *list, size_t count, double error)
+static void put_cheapest(const lab_table *t, const lab_series *list, size_t count, double error)
 {
     const json_t *best_at = NULL, *other_at = NULL;
-    const series *best = NULL, *next = NULL;
-    double least = NAN, second = NAN, base = NAN;
-    bool ran = false; /* the base method */
-    char text[160], knob[64];
+    const lab_series *best = NULL, *next = NULL, *base = lab_find_series(list, count, BASE_METHOD);
+    double least = NAN, second = NAN;
+    char knob[64];
     for (size_t i = 0; i < count; i++) {
         const json_t *at = NULL;
         const double cost = cost_at(&list[i], error, &at);
-        if (strcmp(list[i].name, BASE_METHOD) == 0) {
-            base = cost;
-            ran = true;
-        }
-        if (!(cost >= least)) {
-            if (isnan(cost))
-                continue;
-            least = cost;
-            best = &list[i];
-            best_at = at;
-        }
+        if (isnan(cost) || cost >= least)
+            continue;
+        least = cost;
+        best = &list[i];
+        best_at = at;
     }
     for (size_t i = 0; best && i < count; i++) {
         const double cost = cost_at(&list[i], error, &other_at);
@@ -357,47 +220,36 @@ static void put_cheapest(table *t, const series *list, size_t count, double erro
         }
     }
     if (!best) {
-        put_cell(t, "none");
-        put_cell(t, "");
-        put_cell(t, "");
+        lab_table_put(t, "none");
+        lab_table_put(t, "%s", "");
+        lab_table_put(t, "%s", "");
         return;
     }
-    knob_text(best_at, knob, sizeof knob);
-    snprintf(text, sizeof text, "%s, %s (%.2g s)", best->name, knob, least);
-    put_cell(t, text);
-    snprintf(text, sizeof text, next ? "%.2g (%s)" : "", second / least, next ? next->name : "");
-    put_cell(t, text);
-    snprintf(text, sizeof text,
-             !ran          ? "was not run"
-             : isnan(base) ? "does not reach it"
-                           : "%.2g",
-             base / least);
-    put_cell(t, text);
+    lab_knob_text(best_at, knob);
+    lab_table_put(t, "%s, %s (%.2g s)", best->name, knob, least);
+    lab_table_put(t, next ? "%.2g (%s)" : "", second / least, next ? next->name : "");
+    const double cost = base ? cost_at(base, error, &other_at) : NAN;
+    lab_table_put(t, !base ? "was not run" : isnan(cost) ? "does not reach it" : "%.2g", cost / least);
 }
 
-static void tabulate_cheapest(table *t)
+static void tabulate_cheapest(const tables *all)
 {
     static const char *const heads[] = {"scene", "cheapest method", "the next other method costs, times",
-                                        BASE_METHOD " costs, times"};
-    const json_t *scenes = json_object_get(t->l->arguments, "scenes");
-    series list[MAX_SERIES];
+                                        BASE_METHOD " costs, times", NULL};
+    const lab_table *t = &all->table;
     for (int decade = -2; decade >= -4; decade--) {
         char title[96];
         snprintf(title, sizeof title, "At an error of 1e%d of the size", decade);
-        begin_table(t, title, heads, sizeof heads / sizeof *heads);
-        for (size_t i = 0; i < json_array_size(scenes); i++) {
-            const char *scene = lab_text(json_array_get(scenes, i), "name");
-            const size_t count = list_series(t->l, scene, list);
-            begin_row(t);
-            put_cell(t, scene);
-            put_cheapest(t, list, count, pow(10, decade));
-            end_row(t);
+        lab_table_begin(t, title, heads);
+        for (const scene *s = all->scenes; s < all->scenes + all->count; s++) {
+            lab_table_begin_row(t);
+            lab_table_put(t, "%s", s->name);
+            put_cheapest(t, s->series, s->count, pow(10, decade));
+            lab_table_end_row(t);
         }
-        end_table(t);
+        lab_table_end(t);
     }
 }
-
-/* ---- Orders ---- */
 
 /* Whether a case has the fixed steps of its dt, so that it may show an order. */
 static bool has_its_steps(const json_t *r)
@@ -408,10 +260,10 @@ static bool has_its_steps(const json_t *r)
 
 /* The points of the asymptotic range, from the finest on: those whose orders between neighbours are that of
  * the finest. Points within the reference's error, and cases whose steps were cut, are none. */
-static size_t asymptotic_range(const series *s, double *dt, double *error)
+static size_t asymptotic_range(const lab_series *s, double dt[MAX_POINTS], double error[MAX_POINTS])
 {
     size_t count = 0;
-    for (size_t i = s->count; i-- > 0;) {
+    for (size_t i = s->count; i-- > 0 && count < MAX_POINTS;) {
         const json_t *r = s->results[i];
         const double e = resolved_error(r);
         if (isnan(e) && count == 0)
@@ -424,39 +276,33 @@ static size_t asymptotic_range(const series *s, double *dt, double *error)
     return lab_same_order(dt, error, count);
 }
 
-static void tabulate_orders(table *t)
+static void put_order(const lab_table *t, const lab_series *s)
 {
-    static const char *const heads[] = {"scene", "method", "order", "95 % confidence", "dt [s]", "errors"};
-    const json_t *scenes = json_object_get(t->l->arguments, "scenes");
-    series list[MAX_SERIES];
-    begin_table(t, "Observed orders", heads, sizeof heads / sizeof *heads);
-    for (size_t i = 0; i < json_array_size(scenes); i++) {
-        const size_t count = list_series(t->l, lab_text(json_array_get(scenes, i), "name"), list);
-        for (size_t k = 0; k < count; k++) {
-            double dt[MAX_POINTS], error[MAX_POINTS];
-            char text[64];
-            const size_t points = strcmp(list[k].knob, "dt") == 0 ? asymptotic_range(&list[k], dt, error) : 0;
-            if (points < 3)
-                continue;
-            const lab_line line = lab_fit_power(dt, error, points);
-            begin_row(t);
-            put_cell(t, list[k].scene);
-            put_cell(t, list[k].name);
-            snprintf(text, sizeof text, "%.2f", line.slope);
-            put_cell(t, text);
-            snprintf(text, sizeof text, "%.2f to %.2f", line.low, line.high);
-            put_cell(t, text);
-            snprintf(text, sizeof text, "1/%.4g to 1/%.4g", 1 / dt[points - 1], 1 / dt[0]);
-            put_cell(t, text);
-            snprintf(text, sizeof text, "%.1e to %.1e", error[points - 1], error[0]);
-            put_cell(t, text);
-            end_row(t);
-        }
-    }
-    end_table(t);
+    double dt[MAX_POINTS], error[MAX_POINTS];
+    const size_t points = strcmp(s->knob, "dt") == 0 ? asymptotic_range(s, dt, error) : 0;
+    if (points < 3)
+        return;
+    const lab_line line = lab_fit_power(dt, error, points);
+    lab_table_begin_row(t);
+    lab_table_put(t, "%s", s->scene);
+    lab_table_put(t, "%s", s->name);
+    lab_table_put(t, "%.2f", line.slope);
+    lab_table_put(t, "%.2f to %.2f", line.low, line.high);
+    lab_table_put(t, "1/%.4g to 1/%.4g", 1 / dt[points - 1], 1 / dt[0]);
+    lab_table_put(t, "%.1e to %.1e", error[points - 1], error[0]);
+    lab_table_end_row(t);
 }
 
-/* ---- Failures ---- */
+static void tabulate_orders(const tables *all)
+{
+    static const char *const heads[] = {"scene",  "method", "order", "95 % confidence",
+                                        "dt [s]", "errors", NULL};
+    lab_table_begin(&all->table, "Observed orders", heads);
+    for (const scene *s = all->scenes; s < all->scenes + all->count; s++)
+        for (size_t k = 0; k < s->count; k++)
+            put_order(&all->table, &s->series[k]);
+    lab_table_end(&all->table);
+}
 
 /* The reason that was counted most often. */
 static const char *main_reason(const json_t *result)
@@ -474,71 +320,63 @@ static const char *main_reason(const json_t *result)
     return most;
 }
 
-static void tabulate_failures(table *t)
+static void tabulate_failures(const tables *all)
 {
-    static const char *const heads[] = {"scene",  "method", "setting",
-                                        "status", "at [s]", "most frequent reason"};
-    begin_table(t, "Runs that did not complete", heads, sizeof heads / sizeof *heads);
+    static const char *const heads[] = {
+        "scene", "method", "setting", "status", "at [s]", "most frequent reason", NULL};
+    const lab_table *t = &all->table;
+    lab_table_begin(t, "Runs that did not complete", heads);
     for (size_t i = 0; i < t->l->count; i++) {
         const json_t *r = t->l->results[i];
-        char text[64];
+        char knob[64];
         if (!r || lab_is_good(r))
             continue;
-        begin_row(t);
-        put_cell(t, lab_tag_text(r, "scene"));
-        put_cell(t, lab_tag_text(r, "series"));
-        knob_text(r, text, sizeof text);
-        put_cell(t, text);
-        put_cell(t, lab_text(r, "status"));
-        snprintf(text, sizeof text, "%.3g", lab_number(r, "time_s"));
-        put_cell(t, text);
-        put_cell(t, main_reason(r));
-        end_row(t);
+        lab_knob_text(r, knob);
+        lab_table_begin_row(t);
+        lab_table_put(t, "%s", lab_tag_text(r, "scene"));
+        lab_table_put(t, "%s", lab_tag_text(r, "series"));
+        lab_table_put(t, "%s", knob);
+        lab_table_put(t, "%s", lab_text(r, "status"));
+        lab_table_put(t, "%.3g", lab_number(r, "time_s"));
+        lab_table_put(t, "%s", main_reason(r));
+        lab_table_end_row(t);
     }
-    end_table(t);
+    lab_table_end(t);
 }
 
-/* ---- Scenes and references ---- */
-
-static void horizon_text(const json_t *scene, char *text, size_t size)
+static void horizon_text(const json_t *about, char *text, size_t size)
 {
-    const json_t *t_s = json_object_get(scene, "t_s");
+    const json_t *t_s = json_object_get(about, "t_s");
     const double last = json_number_value(json_array_get(t_s, json_array_size(t_s) - 1));
     if (!t_s)
         snprintf(text, size, "not measured");
-    else if (isnan(lab_number(scene, "horizon_s")))
+    else if (isnan(lab_number(about, "horizon_s")))
         snprintf(text, size, "beyond %.3g", last);
     else
-        snprintf(text, size, "%.3g", lab_number(scene, "horizon_s"));
+        snprintf(text, size, "%.3g", lab_number(about, "horizon_s"));
 }
 
-static void tabulate_scenes(table *t)
+static void tabulate_scenes(const tables *all)
 {
-    static const char *const heads[] = {"scene", "nodes", "duration [s]", "horizon [s]",
-                                        "error of the reference"};
-    const json_t *scenes = json_object_get(t->l->arguments, "scenes");
-    series list[MAX_SERIES];
-    begin_table(t, "Scenes", heads, sizeof heads / sizeof *heads);
-    for (size_t i = 0; i < json_array_size(scenes); i++) {
-        const json_t *s = json_array_get(scenes, i);
-        char text[64];
+    static const char *const heads[] = {
+        "scene", "nodes", "duration [s]", "horizon [s]", "error of the reference", NULL};
+    const lab_table *t = &all->table;
+    lab_table_begin(t, "Scenes", heads);
+    for (const scene *s = all->scenes; s < all->scenes + all->count; s++) {
+        char horizon[64];
         double nodes = NAN;
-        const size_t count = list_series(t->l, lab_text(s, "name"), list);
-        for (size_t k = 0; k < count && isnan(nodes); k++)
-            nodes = list[k].count ? lab_number(list[k].results[0], "nodes") : NAN;
-        begin_row(t);
-        put_cell(t, lab_text(s, "name"));
-        snprintf(text, sizeof text, "%.0f", nodes);
-        put_cell(t, text);
-        snprintf(text, sizeof text, "%.3g", lab_number(s, "duration_s"));
-        put_cell(t, text);
-        horizon_text(s, text, sizeof text);
-        put_cell(t, text);
-        snprintf(text, sizeof text, "%.1e", lab_number(s, "reference_error"));
-        put_cell(t, text);
-        end_row(t);
+        for (size_t k = 0; k < s->count && isnan(nodes); k++)
+            nodes = s->series[k].count ? lab_number(s->series[k].results[0], "nodes") : NAN;
+        horizon_text(s->about, horizon, sizeof horizon);
+        lab_table_begin_row(t);
+        lab_table_put(t, "%s", s->name);
+        lab_table_put(t, "%.0f", nodes);
+        lab_table_put(t, "%.3g", lab_number(s->about, "duration_s"));
+        lab_table_put(t, "%s", horizon);
+        lab_table_put(t, "%.1e", lab_number(s->about, "reference_error"));
+        lab_table_end_row(t);
     }
-    end_table(t);
+    lab_table_end(t);
 }
 
 /* ---- Figures ---- */
@@ -554,10 +392,11 @@ static const chart charts[] = {
     {"energy", "CPU [s]", "cpu_s", NULL, true},
 };
 
-/* The points of a series on a chart, added to all: x, y in turn. gained: those where the method gained energy
- * instead of losing it. Returns how many are there then. */
-static size_t take_points(const chart *c, const series *s, bool gained, double *xy, size_t count)
+/* A block of the points of a series on a chart. gained: those where the method gained energy instead of losing
+ * it. */
+static void put_points(lab_figure *f, const chart *c, const lab_series *s, bool gained)
 {
+    lab_figure_data(f);
     for (size_t k = 0; k < s->count; k++) {
         const json_t *r = s->results[k];
         const double drift = lab_is_good(r) ? lab_number(r, "energy_drift") : NAN;
@@ -565,20 +404,9 @@ static size_t take_points(const chart *c, const series *s, bool gained, double *
                      y = c->energy ? (gained ? -drift : drift)
                          : gained  ? NAN
                                    : resolved_error(r);
-        if (!(x > 0) || !(y > 0))
-            continue;
-        xy[2 * count] = x;
-        xy[2 * count++ + 1] = y;
+        if (x > 0 && y > 0)
+            lab_figure_point(f, x, y);
     }
-    return count;
-}
-
-static size_t write_points(lab_figure *f, const double *xy, size_t count)
-{
-    const size_t block = lab_figure_data(f);
-    for (size_t k = 0; k < count; k++)
-        lab_figure_point(f, xy[2 * k], xy[2 * k + 1]);
-    return block;
 }
 
 static void describe_chart(const json_t *about, const chart *c, char *text, size_t size)
@@ -594,64 +422,45 @@ static void describe_chart(const json_t *about, const chart *c, char *text, size
              c->label, lab_number(about, "reference_error"), horizon, lab_number(about, "duration_s"));
 }
 
-static drape_status draw(lab *l, const json_t *about, const chart *c)
+static drape_status draw(lab *l, const scene *of, const chart *c)
 {
-    const char *scene = lab_text(about, "name");
     lab_figure f;
-    series list[MAX_SERIES];
-    const size_t series_count = list_series(l, scene, list);
-    size_t count = 0, variant = 0;
     bool any_gained = false;
-    double *xy = drape_arena_take(&l->arena, 2 * l->count, sizeof *xy);
     char name[300], caption[400];
-    snprintf(name, sizeof name, "%.255s_%s", scene, c->suffix);
-    if (!xy)
-        return DRAPE_E_MEMORY;
+    snprintf(name, sizeof name, "%.255s_%s", of->name, c->suffix);
     lab_figure_begin(l, &f, name);
-    for (size_t i = 0; i < series_count; i++) {
-        const series *s = &list[i];
-        variant = i && strcmp(s->integrator, list[i - 1].integrator) == 0 ? variant + 1 : 0;
+    for (const lab_series *s = of->series; s < of->series + of->count; s++) {
         if (c->knob && strcmp(s->knob, c->knob) != 0)
             continue;
         const lab_style open = lab_style_of(s->integrator, 1);
-        const size_t before = count, lost = take_points(c, s, false, xy, count);
-        count = take_points(c, s, true, xy, lost);
-        any_gained |= count > lost;
-        if (lost > before)
-            lab_figure_series(&f, write_points(&f, xy + 2 * before, lost - before), s->integrator, variant,
-                              s->name);
-        if (count > lost)
-            lab_figure_curve(&f, write_points(&f, xy + 2 * lost, count - lost),
-                             (lab_style){open.colour, 0, open.point},
-                             lost > before || variant > 0 ? NULL : s->name);
+        put_points(&f, c, s, false);
+        const bool lost = lab_figure_series(&f, s->integrator, s->variant, s->name);
+        put_points(&f, c, s, true);
+        any_gained |= lab_figure_curve(&f, (lab_style){open.colour, 0, open.point},
+                                       lost || s->variant > 0 ? NULL : s->name);
     }
-    snprintf(f.title, sizeof f.title, "%.150s", scene);
+    snprintf(f.title, sizeof f.title, "%.150s", of->name);
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->label);
     snprintf(f.axes[1].label, sizeof f.axes[1].label, c->energy ? "|energy_drift|" : "error / size");
     if (any_gained)
         lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_OPEN_MARKER}, "gained");
-    if (count > 0)
-        lab_figure_fit(&f, xy, count, !c->knob ? 0 : strcmp(c->knob, "dt") == 0 ? 2 : 1);
-    describe_chart(about, c, caption, sizeof caption);
-    drape_status status = lab_figure_end(l, &f, caption);
-    drape_arena_release(&l->arena, xy);
-    return status;
+    lab_figure_fit(&f, !c->knob ? 0 : strcmp(c->knob, "dt") == 0 ? 2 : 1);
+    describe_chart(of->about, c, caption, sizeof caption);
+    return lab_figure_end(l, &f, caption);
 }
 
 /* The growth of the perturbation of each scene, over time in units of the duration. */
-static drape_status draw_horizons(lab *l)
+static drape_status draw_horizons(const tables *all)
 {
     static const int palette[] = {LAB_BLUE, LAB_RED, LAB_BLACK, LAB_ORANGE, LAB_PURPLE};
-    const json_t *scenes = json_object_get(l->arguments, "scenes");
+    lab *l = all->table.l;
     lab_figure f;
     double low = 1, high = 1, last = 0;
     lab_figure_begin(l, &f, "horizons");
-    for (size_t i = 0; i < json_array_size(scenes); i++) {
-        const json_t *s = json_array_get(scenes, i), *t = json_object_get(s, "t_s"),
+    for (size_t i = 0; i < all->count; i++) {
+        const json_t *s = all->scenes[i].about, *t = json_object_get(s, "t_s"),
                      *growth = json_object_get(s, "growth");
-        if (json_array_size(t) == 0)
-            continue;
-        const size_t block = lab_figure_data(&f);
+        lab_figure_data(&f);
         for (size_t k = 0; k < json_array_size(t); k++) {
             const double x = json_number_value(json_array_get(t, k)) / lab_number(s, "duration_s"),
                          y = json_number_value(json_array_get(growth, k));
@@ -660,8 +469,7 @@ static drape_status draw_horizons(lab *l)
             last = fmax(last, x);
             lab_figure_point(&f, x, y > 0 ? y : NAN);
         }
-        lab_figure_curve(&f, block, (lab_style){palette[i % 5], 1 + (int)(i / 5 % 5), 0},
-                         lab_text(s, "name"));
+        lab_figure_curve(&f, (lab_style){palette[i % 5], 1 + (int)(i / 5 % 5), 0}, all->scenes[i].name);
     }
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "time / duration of the scene");
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "growth of the perturbation");
@@ -674,18 +482,19 @@ static drape_status draw_horizons(lab *l)
 
 /* ---- The report ---- */
 
-static drape_status tabulate(lab *l)
+static drape_status tabulate(tables *all)
 {
     char *text = NULL;
     size_t size = 0;
-    table t = {l, open_memstream(&text, &size)};
-    if (!t.out)
+    lab *l = all->table.l;
+    FILE *out = all->table.markdown = open_memstream(&text, &size);
+    if (!out)
         return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for tables.md");
-    tabulate_scenes(&t);
-    tabulate_cheapest(&t);
-    tabulate_orders(&t);
-    tabulate_failures(&t);
-    fclose(t.out);
+    tabulate_scenes(all);
+    tabulate_cheapest(all);
+    tabulate_orders(all);
+    tabulate_failures(all);
+    fclose(out);
     fprintf(l->summary, "%s\n", text);
     drape_status status = lab_write_text(l, "tables.md", text, size);
     free(text);
@@ -694,12 +503,22 @@ static drape_status tabulate(lab *l)
 
 static drape_status report(lab *l)
 {
-    const json_t *scenes = json_object_get(l->arguments, "scenes");
-    drape_status status = draw_horizons(l);
-    for (size_t i = 0; !status && i < json_array_size(scenes); i++)
+    const json_t *abouts = json_object_get(l->arguments, "scenes");
+    const size_t count = json_array_size(abouts);
+    scene *scenes = drape_arena_take(&l->arena, count, sizeof *scenes);
+    tables all = {{.l = l}, scenes, count};
+    for (size_t i = 0; scenes && i < count; i++) {
+        scenes[i].about = json_array_get(abouts, i);
+        scenes[i].name = lab_text(scenes[i].about, "name");
+        scenes[i].series = lab_list_series(l, scenes[i].name, &scenes[i].count);
+    }
+    drape_status status = drape_arena_status(&l->arena);
+    if (!status)
+        status = draw_horizons(&all);
+    for (size_t i = 0; !status && i < count; i++)
         for (size_t k = 0; !status && k < sizeof charts / sizeof *charts; k++)
-            status = draw(l, json_array_get(scenes, i), &charts[k]);
-    return status ? status : tabulate(l);
+            status = draw(l, &scenes[i], &charts[k]);
+    return status ? status : tabulate(&all);
 }
 
 const lab_experiment_ops lab_experiment_ivp = {

@@ -32,7 +32,8 @@ struct lab_request;
 typedef struct lab_experiment_ops {
     drape_entry entry;
     bool compares_costs; /* short cases are run several times, of which the cheapest counts */
-    /* Adds cases (lab_add_case) and what else distinguishes the experiment to l->arguments. Errors:
+    /* Adds cases (lab_add_case) and what else distinguishes the experiment to l->arguments. The integrators
+     * of the def are known to exist and to have steps in time. Errors:
      * DRAPE_E_ARGUMENT, DRAPE_E_MEMORY and those of loading the scene. */
     drape_status (*plan)(lab *l);
     /* Faults in what prepare will run, found before there is a folder. NULL: it runs nothing. */
@@ -102,16 +103,6 @@ const drape_integrator_ops *lab_find_integrator(const char *name); /* NULL: ther
 
 /* Whether the integrators that the def names include this one; fallback if it names none. */
 bool lab_wants_integrator(const lab *l, const char *name, bool fallback);
-
-/* The limits of its order that an integrator is run with: 2 and 5 if it has the parameter max_order and
- * the def does not set it; otherwise 0, for none, alone. Returns their number. */
-size_t lab_order_limits(const lab *l, const drape_integrator_ops *integrator, int limits[2]);
-
-/* "ida, order 2", the name of a series */
-void lab_name_series(const drape_integrator_ops *integrator, int limit, char *text, size_t size);
-
-/* Faults of the def: an integrator that does not exist, or that has no steps in time. */
-drape_status lab_check_integrators(const lab *l);
 
 /* Whether an integrator ignores the value at a pointer: "/integrator/..." that is not one of its
  * parameters. */

@@ -254,8 +254,6 @@ static drape_status plan(lab *l)
 {
     space s;
     drape_status status = read_space(l, &s);
-    if (!status)
-        status = lab_check_integrators(l);
     if (status)
         return status;
     json_t *axes = json_array();
@@ -263,7 +261,6 @@ static drape_status plan(lab *l)
         json_array_append_new(axes, json_string(l->def->axes[a]));
     json_object_set_new(l->arguments, "axes", axes);
     json_object_set_new(l->arguments, "strain_limit", json_real(l->def->strain_limit));
-    json_object_set_new(l->arguments, "case_seconds", json_real(l->def->case_seconds));
     status = plan_results(l, &s);
     for (int i = 0; !status && drape_integrators[i]; i++) {
         const drape_integrator_ops *integrator = drape_integrators[i];
@@ -465,12 +462,11 @@ static look look_at(const map *m, layer kind, size_t i)
     }
 }
 
-/* A row of cells, in which neighbours that look alike are one box. Returns the number of boxes. */
-static int write_row(map *m, layer kind, int row)
+/* A row of cells, in which neighbours that look alike are one box. */
+static void write_row(map *m, layer kind, int row)
 {
     const axis *x = &m->s->axes[0];
     double left, right, from = 0, bottom, top;
-    int boxes = 0;
     const size_t first = row_of(m, row, &bottom, &top);
     look before = {0};
     for (int i = 0; i < x->count; i++) {
@@ -480,48 +476,35 @@ static int write_row(map *m, layer kind, int row)
         if (!(before.there && before.fill == here.fill))
             from = left;
         before = here;
-        if (!here.there || (next.there && next.fill == here.fill))
-            continue;
-        lab_figure_box(&m->f, from, right, bottom, top, here.fill);
-        boxes++;
-    }
-    return boxes;
-}
-
-static void write_layer(map *m, layer kind)
-{
-    int boxes = 0;
-    const size_t block = lab_figure_data(&m->f);
-    for (int row = 0; row < m->rows; row++)
-        boxes += write_row(m, kind, row);
-    if (boxes == 0)
-        return;
-    if (kind == FLAT)
-        lab_figure_boxes(&m->f, block);
-    else if (kind == SHADED)
-        lab_figure_values(&m->f, block);
-    else
-        lab_figure_hatch(&m->f, block, kind == HATCHED_DARK ? LAB_BLACK : LAB_WHITE);
-}
-
-static void note_verdicts(map *m)
-{
-    double bottom, top;
-    for (int row = 0; row < m->rows; row++) {
-        const size_t first = row_of(m, row, &bottom, &top);
-        for (size_t i = first; i < first + (size_t)m->s->axes[0].count; i++) {
-            m->seen[judge(m->l, m->l->results[i])] = true;
-            m->seen[SHORT] |= is_short(m->l->results[i]);
-            m->blank |= look_at(m, FLAT, i).there && has_results(judge(m->l, m->l->results[i]));
-        }
+        if (here.there && !(next.there && next.fill == here.fill))
+            lab_figure_box(&m->f, from, right, bottom, top, here.fill);
     }
 }
 
+/* The layers, and what is on the map. */
 static void write_cells(map *m)
 {
-    for (layer kind = FLAT; kind < LAYERS; kind++)
-        write_layer(m, kind);
-    note_verdicts(m);
+    for (layer kind = FLAT; kind < LAYERS; kind++) {
+        lab_figure_data(&m->f);
+        for (int row = 0; row < m->rows; row++)
+            write_row(m, kind, row);
+        if (kind == FLAT)
+            lab_figure_boxes(&m->f);
+        else if (kind == SHADED)
+            lab_figure_values(&m->f);
+        else
+            lab_figure_hatch(&m->f, kind == HATCHED_DARK ? LAB_BLACK : LAB_WHITE);
+    }
+    for (int row = 0; row < m->rows; row++) {
+        double bottom, top;
+        const size_t first = row_of(m, row, &bottom, &top);
+        for (size_t i = first; i < first + (size_t)m->s->axes[0].count; i++) {
+            const verdict v = judge(m->l, m->l->results[i]);
+            m->seen[v] = true;
+            m->seen[SHORT] |= is_short(m->l->results[i]);
+            m->blank |= look_at(m, FLAT, i).there && has_results(v);
+        }
+    }
     if (m->shade.quantity)
         m->f.scale = m->shade.axis;
 }
@@ -544,11 +527,11 @@ static void set_axis(const axis *a, lab_axis *out)
     snprintf(out->label, sizeof out->label, *unit ? "%.80s [%s]" : "%.80s", axis_name(a), unit);
 }
 
-/* A black line on a white one is seen on every colour. */
-static void draw_limit(lab_figure *f, size_t block, bool first)
+/* A black line on a white one is seen on every colour. *limits counts them: one is in the legend. */
+static void draw_limit(lab_figure *f, int *limits)
 {
-    lab_figure_curve(f, block, (lab_style){LAB_WHITE, 1, 0}, NULL);
-    lab_figure_curve(f, block, (lab_style){LAB_BLACK, 2, 0}, first ? "explicit limit 2/omega" : NULL);
+    if (lab_figure_curve(f, (lab_style){LAB_WHITE, 1, 0}, NULL))
+        lab_figure_curve(f, (lab_style){LAB_BLACK, 2, 0}, (*limits)++ ? NULL : "explicit limit 2/omega");
 }
 
 /* The index of the axis that is the step; -1: none is. */
@@ -565,10 +548,9 @@ static void add_limit(map *m)
 {
     const axis *axes = m->s->axes;
     const int step = step_axis(m->s);
-    bool any = false;
     if (step < 0 || step > 1)
         return;
-    const size_t block = lab_figure_data(&m->f);
+    lab_figure_data(&m->f);
     for (size_t cell = 0; cell < m->s->cells; cell++) {
         int index[MAX_AXES];
         const double limit = lab_number(m->l->results[m->first + cell], "explicit_limit_s");
@@ -576,10 +558,8 @@ static void add_limit(map *m)
             continue;
         const double other = axis_value(&axes[1 - step], index[1 - step]);
         lab_figure_point(&m->f, step == 0 ? limit : other, step == 0 ? other : limit);
-        any = true;
     }
-    if (any)
-        draw_limit(&m->f, block, m->limits++ == 0);
+    draw_limit(&m->f, &m->limits);
 }
 
 /* Over a single axis that is the step, the limit of a case is a line from bottom to top, if it is on it. */
@@ -588,10 +568,10 @@ static void add_limit_at(lab_figure *f, const json_t *result, double bottom, dou
     const double limit = lab_number(result, "explicit_limit_s");
     if (!(limit >= f->axes[0].from && limit <= f->axes[0].to))
         return;
-    const size_t line = lab_figure_data(f);
+    lab_figure_data(f);
     lab_figure_point(f, limit, bottom);
     lab_figure_point(f, limit, top);
-    draw_limit(f, line, (*limits)++ == 0);
+    draw_limit(f, limits);
 }
 
 /* The name of a verdict in a legend. */
@@ -715,10 +695,10 @@ static bool is_mark(const lab *l, const shade *sh, mark kind, size_t i)
 
 /* The marks of a kind of one integrator; missing values break the curve. height: of those without results. */
 static int write_marks(lab *l, const space *s, const shade *sh, size_t first, mark kind, double height,
-                       lab_figure *f, size_t *block)
+                       lab_figure *f)
 {
     int count = 0;
-    *block = lab_figure_data(f);
+    lab_figure_data(f);
     for (int k = 0; k < s->axes[0].count; k++) {
         const size_t i = first + (size_t)k;
         if (is_mark(l, sh, kind, i)) {
@@ -731,19 +711,13 @@ static int write_marks(lab *l, const space *s, const shade *sh, size_t first, ma
     return count;
 }
 
-static bool has_curve(const lab *l, const space *s, const shade *sh, size_t first)
+/* Whether an integrator has marks of a kind from `from` to `to`. */
+static bool has_marks(const lab *l, const space *s, const shade *sh, size_t first, mark from, mark to)
 {
     for (size_t i = first; i < first + s->cells; i++)
-        if (is_mark(l, sh, ON_CURVE, i))
-            return true;
-    return false;
-}
-
-static bool lacks_results(const lab *l, const space *s, const shade *sh, size_t first)
-{
-    for (size_t i = first; i < first + s->cells; i++)
-        if (is_mark(l, sh, NO_RESULT, i) || is_mark(l, sh, OVER_BUDGET, i))
-            return true;
+        for (mark kind = from; kind <= to; kind++)
+            if (is_mark(l, sh, kind, i))
+                return true;
     return false;
 }
 
@@ -770,41 +744,38 @@ static lab_style mark_style(const char *integrator, mark kind)
  * and those without a result a row of crosses above the curves. */
 static drape_status draw_curves(lab *l, const space *s, const shade *sh)
 {
-    const size_t rows = l->count / s->cells;
     char name[96], text[96];
     int failed = 0, limits = 0;
-    size_t block;
     bool seen[MARKS] = {false};
     lab_figure f;
     snprintf(name, sizeof name, "curve_%s", sh->quantity->entry.name);
     lab_figure_begin(l, &f, name);
     set_axis(&s->axes[0], &f.axes[0]);
-    for (size_t r = 0; r < rows; r++)
-        failed += lacks_results(l, s, sh, r * s->cells);
+    for (size_t first = 0; first < l->count; first += s->cells)
+        failed += has_marks(l, s, sh, first, NO_RESULT, OVER_BUDGET);
     set_curve_axis(&f, sh, failed);
-    for (size_t r = 0; r < rows && step_axis(s) == 0; r++)
-        add_limit_at(&f, l->results[r * s->cells], f.axes[1].from, f.axes[1].to, &limits);
-    for (size_t r = 0; r < rows; r++) {
-        const size_t first = r * s->cells;
+    for (size_t first = 0; first < l->count && step_axis(s) == 0; first += s->cells)
+        add_limit_at(&f, l->results[first], f.axes[1].from, f.axes[1].to, &limits);
+    for (size_t first = 0; first < l->count; first += s->cells) {
         const char *integrator = lab_tag_text(l->results[first], "integrator");
         const double height = at_height(&f, f.plot_height - FAILED_ROOM * (failed - 0.5));
-        if (!has_curve(l, s, sh, first))
+        if (!has_marks(l, s, sh, first, ON_CURVE, ON_CURVE))
             lab_figure_marker(&f, mark_style(integrator, ON_CURVE), integrator);
-        for (mark kind = ON_CURVE; kind < MARKS; kind++) {
-            if (!write_marks(l, s, sh, first, kind, height, &f, &block))
-                continue;
-            seen[kind] = true;
-            lab_figure_curve(&f, block, mark_style(integrator, kind), kind == ON_CURVE ? integrator : NULL);
-        }
-        failed -= lacks_results(l, s, sh, first);
+        for (mark kind = ON_CURVE; kind < MARKS; kind++)
+            if (write_marks(l, s, sh, first, kind, height, &f)) {
+                seen[kind] = true;
+                lab_figure_curve(&f, mark_style(integrator, kind), kind == ON_CURVE ? integrator : NULL);
+            }
+        failed -= has_marks(l, s, sh, first, NO_RESULT, OVER_BUDGET);
     }
     verdict_text(l, LATE, text);
-    if (seen[FEW_STEPS])
-        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_OPEN_MARKER}, verdicts[SHORT].name);
-    if (seen[NO_RESULT])
-        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_CROSS_MARKER}, blank_name(l, sh));
-    if (seen[OVER_BUDGET])
-        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_PLUS_MARKER}, text);
+    const char *const names[MARKS] = {
+        [FEW_STEPS] = verdicts[SHORT].name, [NO_RESULT] = blank_name(l, sh), [OVER_BUDGET] = text};
+    static const int markers[MARKS] = {
+        [FEW_STEPS] = LAB_OPEN_MARKER, [NO_RESULT] = LAB_CROSS_MARKER, [OVER_BUDGET] = LAB_PLUS_MARKER};
+    for (mark kind = FEW_STEPS; kind < MARKS; kind++)
+        if (seen[kind])
+            lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, markers[kind]}, names[kind]);
     return lab_figure_end(l, &f, sh->quantity->entry.summary);
 }
 

@@ -4,6 +4,7 @@
 #include "io/csv.h"
 #include "io/export.h"
 
+#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -142,6 +143,64 @@ void lab_page_figure(lab *l, const char *svg, size_t size, const char *caption)
     fputs("\"><figcaption>", l->page);
     put_escaped(l->page, caption);
     fputs("</figcaption></figure>\n", l->page);
+}
+
+static void put_cell(const lab_table *t, const char *kind, const char *text)
+{
+    fprintf(t->l->page, "<%s>", kind);
+    put_escaped(t->l->page, text);
+    fprintf(t->l->page, "</%s>", kind);
+    if (!t->markdown)
+        return;
+    fputc(' ', t->markdown);
+    for (; *text; text++)
+        fputs(*text == '|' ? "\\|" : *text == '<' ? "&lt;" : (char[]){*text, 0}, t->markdown);
+    fputs(" |", t->markdown);
+}
+
+void lab_table_begin_row(const lab_table *t)
+{
+    fputs("<tr>", t->l->page);
+    if (t->markdown)
+        fputs("|", t->markdown);
+}
+
+void lab_table_put(const lab_table *t, const char *format, ...)
+{
+    char text[2 * DRAPE_MESSAGE_SIZE];
+    va_list values;
+    va_start(values, format);
+    vsnprintf(text, sizeof text, format, values);
+    va_end(values);
+    put_cell(t, "td", text);
+}
+
+void lab_table_end_row(const lab_table *t)
+{
+    fputs("</tr>\n", t->l->page);
+    if (t->markdown)
+        fputs("\n", t->markdown);
+}
+
+void lab_table_begin(const lab_table *t, const char *title, const char *const *heads)
+{
+    lab_page_heading(t->l, title);
+    fputs("<table>", t->l->page);
+    if (t->markdown)
+        fprintf(t->markdown, "\n%s\n\n", title);
+    lab_table_begin_row(t);
+    for (size_t i = 0; heads[i]; i++)
+        put_cell(t, "th", heads[i]);
+    lab_table_end_row(t);
+    for (size_t i = 0; t->markdown && heads[i]; i++)
+        fputs(i ? "---|" : "|---|", t->markdown);
+    if (t->markdown)
+        fputs("\n", t->markdown);
+}
+
+void lab_table_end(const lab_table *t)
+{
+    fputs("</table>\n", t->l->page);
 }
 
 static const char style[] =

@@ -25,6 +25,19 @@ void lab_page_text(lab *l, const char *text); /* escaped */
 /* Adds a figure with its caption. */
 void lab_page_figure(lab *l, const char *svg, size_t size, const char *caption);
 
+/* A table of the page and, if `markdown` is not NULL, of that text. A text is neither a cell more nor HTML. */
+typedef struct lab_table {
+    lab *l;
+    FILE *markdown;
+} lab_table;
+
+/* heads: NULL-ended. */
+void lab_table_begin(const lab_table *t, const char *title, const char *const *heads);
+void lab_table_begin_row(const lab_table *t);
+void lab_table_put(const lab_table *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void lab_table_end_row(const lab_table *t);
+void lab_table_end(const lab_table *t);
+
 /* report.html of the summary and the body. */
 drape_status lab_write_page(lab *l, const char *title);
 

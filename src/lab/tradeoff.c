@@ -3,10 +3,9 @@
  * under those that bound an error; every linear solver at one dt. Errors are distances from a reference
  * solution whose own error is estimated; an error below 100 times that estimate is listed, but not plotted.
  */
-#include "base/param.h"
-#include "control/control.h"
 #include "lab/figure.h"
 #include "lab/reference.h"
+#include "lab/series.h"
 #include "lab/text.h"
 #include "solvers/linear.h"
 
@@ -17,111 +16,57 @@
 #define BASE_METHOD "be"  /* the usual integrator: others are compared with it */
 #define BASE_DT     (1.0 / 60)
 #define FEWEST      3 /* cases of a series that is compared with others */
-
-/* Values of a knob. If there is a budget, cases of low rank come first: a few points of every integrator,
- * over all of its range, then the points between, then controllers and linear solvers. Among cases of equal
- * rank explicit integrators come last: a stiff sheet makes each of their cases long. */
-typedef struct level {
-    double value;
-    int rank;
-} level;
-
-static const level rates[] = {{30, 3},  {60, 0},  {120, 3}, {240, 1},
-                              {480, 4}, {960, 2}, {1920, 5}}; /* [1/s] */
-static const level rtols[] = {{3e-2, 4}, {1e-2, 2}, {3e-3, 4}, {1e-3, 0},
-                              {3e-4, 4}, {1e-4, 1}, {1e-5, 3}, {1e-6, 5}};
-static const level controlled[] = {{1e-2, 6}, {1e-3, 5}, {1e-4, 7}};
 #define LINEAR_RANK 6
 
 /* ---- The cases ---- */
 
-static drape_status add(lab *l, const char *series, const char *method, const char *knob, level at,
-                        json_t *more)
-{
-    char pointer[64];
-    snprintf(pointer, sizeof pointer, "/%s", knob);
-    json_t *settings = json_pack("{s:s, s:f}", "/integrator/method", method, pointer, at.value);
-    json_t *tags = json_pack("{s:s, s:s, s:s, s:f}", "series", series, "integrator", method, "knob",
-                             strrchr(knob, '/') + 1, "value", at.value);
-    json_object_update(settings, more);
-    json_decref(more);
-    drape_status status = lab_add_case(l, tags, settings, -1);
-    if (!status)
-        lab_rank_case(l, 2 * at.rank + (lab_find_integrator(method)->stability != NULL));
-    return status;
-}
-
-/* Integrators that choose their steps, at every order that they are limited to. */
-static drape_status add_own_steps(lab *l, const drape_integrator_ops *integrator)
-{
-    int limits[2];
-    drape_status status = DRAPE_OK;
-    const size_t count = lab_order_limits(l, integrator, limits);
-    for (size_t k = 0; k < count; k++) {
-        char series[96];
-        lab_name_series(integrator, limits[k], series, sizeof series);
-        for (size_t i = 0; !status && i < sizeof rtols / sizeof *rtols; i++)
-            status = add(l, series, integrator->entry.name, "integrator/rtol", rtols[i],
-                         limits[k] ? json_pack("{s:i}", "/integrator/max_order", limits[k]) : json_object());
-    }
-    return status;
-}
-
-/* Others: over dt, and under each controller that bounds an error. */
-static drape_status add_fixed(lab *l, const drape_integrator_ops *integrator)
-{
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < sizeof rates / sizeof *rates; i++)
-        status = add(l, integrator->entry.name, integrator->entry.name, "integrator/dt",
-                     (level){1 / rates[i].value, rates[i].rank}, json_object());
-    for (int c = 0; drape_controllers[c]; c++) {
-        const drape_controller_ops *controller = drape_controllers[c];
-        char series[96];
-        if (drape_param_find(controller->entry.params, controller->entry.param_count, "rtol") < 0)
-            continue;
-        snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->entry.name);
-        for (size_t i = 0; !status && i < sizeof controlled / sizeof *controlled; i++)
-            status = add(l, series, integrator->entry.name, "controller/rtol", controlled[i],
-                         json_pack("{s:s, s:f}", "/controller/type", controller->entry.name, "/integrator/dt",
-                                   1.0 / 480));
-    }
-    return status;
-}
-
-/* They solve the same equations: only the cost differs. */
-static drape_status add_linear_solvers(lab *l)
-{
-    drape_status status = DRAPE_OK;
-    for (int i = 0; !status && drape_linears[i]; i++) {
-        char series[96];
-        snprintf(series, sizeof series, BASE_METHOD ", linear solver %s", drape_linears[i]->entry.name);
-        status = add(l, series, BASE_METHOD, "integrator/dt", (level){BASE_DT, LINEAR_RANK},
-                     json_pack("{s:s}", "/integrator/linear_solver", drape_linears[i]->entry.name));
-    }
-    return status;
-}
+/* If there is a budget, cases of low rank come first: a few points of every integrator, over all of its range,
+ * then the points between, then controllers and linear solvers. Among cases of equal rank explicit integrators
+ * come last: a stiff sheet makes each of their cases long. */
+static const lab_level steps[] = {{1.0 / 30, 3},  {1.0 / 60, 0},  {1.0 / 120, 3}, {1.0 / 240, 1},
+                                  {1.0 / 480, 4}, {1.0 / 960, 2}, {1.0 / 1920, 5}}; /* [s] */
+static const lab_level rtols[] = {{3e-2, 4}, {1e-2, 2}, {3e-3, 4}, {1e-3, 0},
+                                  {3e-4, 4}, {1e-4, 1}, {1e-5, 3}, {1e-6, 5}};
+static const lab_level controlled[] = {{1e-2, 6}, {1e-3, 5}, {1e-4, 7}};
+static const lab_grid grid = {.rtols = rtols,
+                              .rtol_count = sizeof rtols / sizeof *rtols,
+                              .steps = steps,
+                              .step_count = sizeof steps / sizeof *steps,
+                              .controlled = controlled,
+                              .controlled_count = sizeof controlled / sizeof *controlled,
+                              .first_step = 1.0 / 480};
 
 static drape_status plan(lab *l)
 {
-    drape_status status = lab_check_integrators(l);
-    for (int i = 0; !status && drape_integrators[i]; i++) {
-        const drape_integrator_ops *integrator = drape_integrators[i];
-        if (!lab_wants_integrator(l, integrator->entry.name, !integrator->steady_state))
-            continue;
-        status = integrator->own_steps ? add_own_steps(l, integrator) : add_fixed(l, integrator);
+    drape_status status = DRAPE_OK;
+    for (int i = 0; !status && drape_integrators[i]; i++)
+        if (lab_wants_integrator(l, drape_integrators[i]->entry.name, !drape_integrators[i]->steady_state))
+            status = lab_add_integrator(l, &grid, drape_integrators[i]);
+    /* They solve the same equations: only the cost differs. */
+    for (int i = 0; !status && drape_linears[i] && l->def->integrator_count == 0; i++) {
+        char series[96];
+        snprintf(series, sizeof series, BASE_METHOD ", linear solver %s", drape_linears[i]->entry.name);
+        status = lab_add_point(l, &(lab_point){.series = series,
+                                               .integrator = BASE_METHOD,
+                                               .pointer = "/integrator/dt",
+                                               .level = {BASE_DT, LINEAR_RANK},
+                                               .more = json_pack("{s:s}", "/integrator/linear_solver",
+                                                                 drape_linears[i]->entry.name)});
     }
-    if (!status && l->def->integrator_count == 0)
-        status = add_linear_solvers(l);
-    json_object_set_new(l->arguments, "case_seconds", json_real(l->def->case_seconds));
-    json_object_set_new(l->arguments, "repeats", json_integer(l->def->repeats));
     return status;
 }
 
 /* ---- Reading the results ---- */
 
-static bool is_linear_case(const json_t *result)
+/* All series. */
+typedef struct all {
+    const lab_series *series;
+    size_t count;
+} all;
+
+static bool is_linear(const lab_series *s)
 {
-    return strstr(lab_tag_text(result, "series"), "linear solver") != NULL;
+    return strstr(s->name, "linear solver") != NULL;
 }
 
 /* The error of a case if it can be distinguished from that of the reference; otherwise NaN. */
@@ -131,46 +76,18 @@ static double resolved_error(const json_t *result)
     return lab_is_good(result) && error > RESOLVED * lab_number(result, "reference_error_m") ? error : NAN;
 }
 
-/* Cases that were run of the series of a case, which stand side by side. */
-static int count_beside(const lab *l, size_t i)
-{
-    const char *series = lab_tag_text(json_array_get(l->cases, i), "series");
-    int count = 0;
-    while (i > 0 && strcmp(lab_tag_text(json_array_get(l->cases, i - 1), "series"), series) == 0)
-        i--;
-    for (; i < l->count && strcmp(lab_tag_text(json_array_get(l->cases, i), "series"), series) == 0; i++)
-        count += l->results[i] != NULL;
-    return count;
-}
-
-/* The same of a series by its name. */
-static int count_run(const lab *l, const char *series)
-{
-    for (size_t i = 0; i < l->count; i++)
-        if (strcmp(lab_tag_text(json_array_get(l->cases, i), "series"), series) == 0)
-            return count_beside(l, i);
-    return 0;
-}
-
 /* The cheapest case whose error is at most that; of one series, or NULL of any. Series with
  * too few cases do not count. NULL: there is none. */
-static const json_t *cheapest(const lab *l, double error, const char *series)
+static const json_t *cheapest(all a, double error, const lab_series *only)
 {
     const json_t *best = NULL;
-    const char *counted = "";
-    int count = 0; /* of that series */
-    for (size_t i = 0; i < l->count; i++) {
-        const json_t *r = l->results[i];
-        const char *own = lab_tag_text(r, "series");
-        if (is_linear_case(r) || !(resolved_error(r) <= error) || (series && strcmp(own, series) != 0))
+    for (const lab_series *s = a.series; s < a.series + a.count; s++) {
+        if (is_linear(s) || s->count < FEWEST || (only && s != only))
             continue;
-        if (strcmp(own, counted) != 0)
-            count = count_beside(l, i);
-        counted = own;
-        if (count < FEWEST)
-            continue;
-        if (!best || lab_number(r, "cpu_s") < lab_number(best, "cpu_s"))
-            best = r;
+        for (size_t i = 0; i < s->count; i++)
+            if (resolved_error(s->results[i]) <= error &&
+                (!best || lab_number(s->results[i], "cpu_s") < lab_number(best, "cpu_s")))
+                best = s->results[i];
     }
     return best;
 }
@@ -185,53 +102,40 @@ static void length_text(double metres, char *text, size_t size)
         snprintf(text, size, "%.3g um", 1e6 * metres);
 }
 
-static void knob_text(const json_t *result, char *text, size_t size)
-{
-    double value = lab_tag_number(result, "value");
-    const char *knob = lab_tag_text(result, "knob");
-    if (strcmp(knob, "dt") == 0 && value > 0)
-        snprintf(text, size, "dt 1/%.4g s", 1 / value);
-    else
-        snprintf(text, size, "%s %.3g", knob, value);
-}
-
 /* "At 1 mm error the cheapest is ida, order 2, rtol 0.0003 (0.21 s of CPU); be needs 0.86 s, 4.1 times as
  * much". */
-static void report_cheapest(lab *l, double error)
+static void report_cheapest(lab *l, all a, const lab_series *usual, const json_t *best, double error)
 {
     bool comes_close = false; /* even if that error cannot be distinguished from the reference's */
-    const json_t *best = cheapest(l, error, NULL), *base = cheapest(l, error, BASE_METHOD);
+    const json_t *base = usual ? cheapest(a, error, usual) : NULL;
+    const double cost = lab_number(best, "cpu_s");
     char length[32], knob[64];
-    if (!best)
-        return;
     length_text(error, length, sizeof length);
-    knob_text(best, knob, sizeof knob);
-    double cost = lab_number(best, "cpu_s");
+    lab_knob_text(best, knob);
     fprintf(l->summary, "At %s error the cheapest is %s, %s (%.3g s of CPU)", length,
             lab_tag_text(best, "series"), knob, cost);
-    for (size_t i = 0; i < l->count; i++)
-        comes_close |= strcmp(lab_tag_text(l->results[i], "series"), BASE_METHOD) == 0 &&
-                       lab_is_good(l->results[i]) && lab_number(l->results[i], "error_end_m") <= error;
+    for (size_t i = 0; usual && i < usual->count; i++)
+        comes_close |=
+            lab_is_good(usual->results[i]) && lab_number(usual->results[i], "error_end_m") <= error;
     if (base && base != best)
         fprintf(l->summary, ", %.2g times cheaper than " BASE_METHOD ".\n", lab_number(base, "cpu_s") / cost);
-    else if (comes_close || count_run(l, BASE_METHOD) < FEWEST)
+    else if (comes_close || !usual || usual->count < FEWEST)
         fprintf(l->summary, ".\n");
     else
         fprintf(l->summary, "; " BASE_METHOD " does not come so close in this grid.\n");
 }
 
 /* How far the step sizes that programs usually take are from the converged motion. */
-static void report_headline(lab *l)
+static void report_headline(lab *l, const lab_series *usual)
 {
-    const double usual[] = {BASE_DT, BASE_DT / 16};
+    const double usual_steps[] = {BASE_DT, BASE_DT / 16};
     char errors[2][32];
     for (int k = 0; k < 2; k++) {
         const json_t *found = NULL;
-        for (size_t i = 0; i < l->count && !found; i++)
-            if (strcmp(lab_tag_text(l->results[i], "series"), BASE_METHOD) == 0 &&
-                fabs(lab_tag_number(l->results[i], "value") / usual[k] - 1) < 1e-9 &&
-                lab_is_good(l->results[i]))
-                found = l->results[i];
+        for (size_t i = 0; usual && i < usual->count && !found; i++)
+            if (fabs(lab_tag_number(usual->results[i], "value") / usual_steps[k] - 1) < 1e-9 &&
+                lab_is_good(usual->results[i]))
+                found = usual->results[i];
         if (!found)
             return;
         length_text(lab_number(found, "error_end_m"), errors[k], sizeof errors[k]);
@@ -243,22 +147,16 @@ static void report_headline(lab *l)
 }
 
 /* Names the series of which too few cases were run; those without any are named among what was left out. */
-static void report_sparse(lab *l)
+static void report_sparse(lab *l, all a)
 {
-    const char *before = "";
     bool any = false;
-    for (size_t i = 0; i < l->count; i++) {
-        const json_t *one = json_array_get(l->cases, i);
-        const char *series = lab_tag_text(one, "series");
-        const int count = strcmp(series, before) != 0 && !is_linear_case(one) ? count_beside(l, i) : 0;
-        if (count > 0 && count < FEWEST) {
+    for (const lab_series *s = a.series; s < a.series + a.count; s++)
+        if (!is_linear(s) && s->count > 0 && s->count < FEWEST) {
             if (!any)
                 fprintf(l->summary, "Too few cases for a comparison, which takes %d:", FEWEST);
-            fprintf(l->summary, "%s %s (%d)", any ? "," : "", series, count);
+            fprintf(l->summary, "%s %s (%zu)", any ? "," : "", s->name, s->count);
             any = true;
         }
-        before = series;
-    }
     if (any)
         fprintf(l->summary, ".\n");
 }
@@ -292,116 +190,84 @@ static void report_reference(lab *l)
             unresolved, late);
 }
 
-/* ---- Figures ---- */
+/* ---- Figures and the table ---- */
 
-typedef struct chart {
+static const struct chart {
     const char *file, *x_label, *x_key, *y_label, *y_key;
-} chart;
-
-static const chart charts[] = {
+} charts[] = {
     {"error_cpu", "CPU [s]", "cpu_s", "error at the end, RMS [m]", "error_end_m"},
     {"error_l2_cpu", "CPU [s]", "cpu_s", "error over time, RMS [m]", "error_l2_m"},
     {"error_residuals", "residuals", "residuals", "error at the end, RMS [m]", "error_end_m"},
     {"error_jacobians", "Jacobians", "jacobians", "error at the end, RMS [m]", "error_end_m"},
 };
 
-/* The points of the series that begins with a case, added to all: x, y in turn. Returns how many are there
- * then. */
-static size_t take_points(const lab *l, const chart *c, size_t first, double *xy, size_t count)
-{
-    const char *series = lab_tag_text(json_array_get(l->cases, first), "series");
-    for (size_t i = first;
-         i < l->count && strcmp(lab_tag_text(json_array_get(l->cases, i), "series"), series) == 0; i++) {
-        const json_t *r = l->results[i];
-        const double x = lab_number(r, c->x_key), y = lab_number(r, c->y_key);
-        if (isnan(resolved_error(r)) || !(x > 0) || !(y > 0))
-            continue;
-        xy[2 * count] = x;
-        xy[2 * count++ + 1] = y;
-    }
-    return count;
-}
-
-/* The curves are the series but those of linear solvers; those of an integrator stand together. */
-static drape_status draw(lab *l, const chart *c)
+/* The curves are the series but those of linear solvers. */
+static drape_status draw(lab *l, all a, const struct chart *c)
 {
     lab_figure f;
-    const char *series = "", *integrator = "";
-    size_t count = 0, variant = 0;
-    double *xy = drape_arena_take(&l->arena, 2 * l->count, sizeof *xy);
-    if (!xy)
-        return DRAPE_E_MEMORY;
     lab_figure_begin(l, &f, c->file);
-    for (size_t i = 0; i < l->count; i++) {
-        const json_t *one = json_array_get(l->cases, i);
-        if (strcmp(lab_tag_text(one, "series"), series) == 0 || is_linear_case(one))
+    for (const lab_series *s = a.series; s < a.series + a.count; s++) {
+        if (is_linear(s))
             continue;
-        variant = strcmp(lab_tag_text(one, "integrator"), integrator) == 0 ? variant + 1 : 0;
-        series = lab_tag_text(one, "series");
-        integrator = lab_tag_text(one, "integrator");
-        const size_t before = count;
-        count = take_points(l, c, i, xy, count);
-        if (count == before)
-            continue;
-        const size_t block = lab_figure_data(&f);
-        for (size_t k = before; k < count; k++)
-            lab_figure_point(&f, xy[2 * k], xy[2 * k + 1]);
-        lab_figure_series(&f, block, integrator, variant, series);
+        lab_figure_data(&f);
+        for (size_t i = 0; i < s->count; i++) {
+            const double x = lab_number(s->results[i], c->x_key), y = lab_number(s->results[i], c->y_key);
+            if (!isnan(resolved_error(s->results[i])) && x > 0 && y > 0)
+                lab_figure_point(&f, x, y);
+        }
+        lab_figure_series(&f, s->integrator, s->variant, s->name);
     }
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->x_label);
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "%s", c->y_label);
-    if (count > 0)
-        lab_figure_fit(&f, xy, count, 0);
+    lab_figure_fit(&f, 0);
     return lab_figure_end(l, &f, c->y_label);
 }
 
-/* ---- The table ---- */
-
 static void write_table(lab *l)
 {
-    static const char *const keys[] = {"error_end_m", "error_l2_m",     "energy_drift",     "strain_max",
-                                       "cpu_s",       "accepted",       "rejected",         "residuals",
-                                       "jacobians",   "factorizations", "linear_iterations"};
-    const size_t columns = sizeof keys / sizeof *keys;
-    lab_page_heading(l, "All cases");
-    fputs("<table><tr><th>integrator</th><th>setting</th><th>status</th>", l->page);
-    for (size_t k = 0; k < columns; k++)
-        fprintf(l->page, "<th>%s</th>", keys[k]);
-    fputs("</tr>\n", l->page);
+    static const char *const heads[] = {"integrator",     "setting",           "status",     "error_end_m",
+                                        "error_l2_m",     "energy_drift",      "strain_max", "cpu_s",
+                                        "accepted",       "rejected",          "residuals",  "jacobians",
+                                        "factorizations", "linear_iterations", NULL};
+    const lab_table t = {.l = l};
+    lab_table_begin(&t, "All cases", heads);
     for (size_t i = 0; i < l->count; i++) {
         const json_t *r = l->results[i];
         char knob[64];
         if (!r)
             continue;
-        knob_text(r, knob, sizeof knob);
-        fputs("<tr><td>", l->page);
-        lab_page_text(l, lab_tag_text(r, "series"));
-        fputs("</td><td>", l->page);
-        lab_page_text(l, knob);
-        fputs("</td><td>", l->page);
-        lab_page_text(l, lab_text(r, "status"));
-        fputs("</td>", l->page);
-        for (size_t k = 0; k < columns; k++) {
-            const double value = lab_is_good(r) || k > 2 ? lab_number(r, keys[k]) : NAN;
-            fprintf(l->page, isnan(value) ? "<td></td>" : "<td>%.4g</td>", value);
+        lab_knob_text(r, knob);
+        lab_table_begin_row(&t);
+        lab_table_put(&t, "%s", lab_tag_text(r, "series"));
+        lab_table_put(&t, "%s", knob);
+        lab_table_put(&t, "%s", lab_text(r, "status"));
+        for (size_t k = 3; heads[k]; k++) {
+            const double value = lab_is_good(r) || k > 5 ? lab_number(r, heads[k]) : NAN;
+            lab_table_put(&t, isnan(value) ? "" : "%.4g", value);
         }
-        fputs("</tr>\n", l->page);
+        lab_table_end_row(&t);
     }
-    fputs("</table>\n", l->page);
+    lab_table_end(&t);
 }
 
 static drape_status report(lab *l)
 {
+    all a;
+    a.series = lab_list_series(l, NULL, &a.count);
+    if (!a.series)
+        return DRAPE_E_MEMORY;
+    const lab_series *usual = lab_find_series(a.series, a.count, BASE_METHOD);
     drape_status status = DRAPE_OK;
-    report_headline(l);
-    report_sparse(l);
-    for (int decade = 0; decade >= -7; decade--)
-        if (cheapest(l, pow(10, decade), NULL) &&
-            cheapest(l, pow(10, decade), NULL) != cheapest(l, pow(10, decade + 1), NULL))
-            report_cheapest(l, pow(10, decade));
+    report_headline(l, usual);
+    report_sparse(l, a);
+    for (int decade = 0; decade >= -7; decade--) {
+        const json_t *best = cheapest(a, pow(10, decade), NULL);
+        if (best && best != cheapest(a, pow(10, decade + 1), NULL))
+            report_cheapest(l, a, usual, best, pow(10, decade));
+    }
     report_reference(l);
     for (size_t i = 0; !status && i < sizeof charts / sizeof *charts; i++)
-        status = draw(l, &charts[i]);
+        status = draw(l, a, &charts[i]);
     write_table(l);
     return status;
 }

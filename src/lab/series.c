@@ -1,0 +1,149 @@
+/* series.c: see series.h. */
+#include "lab/series.h"
+
+#include "base/param.h"
+#include "control/control.h"
+
+#include <math.h>
+#include <string.h>
+
+/* ---- Plans ---- */
+
+drape_status lab_add_point(lab *l, const lab_point *p)
+{
+    const char *knob = p->knob ? p->knob : strrchr(p->pointer, '/') + 1;
+    json_t *tags = json_object(), *settings = json_pack("{s:s}", "/integrator/method", p->integrator);
+    if (p->scene)
+        json_object_set_new(tags, "scene", json_string(p->scene));
+    json_object_set_new(tags, "series", json_string(p->series));
+    json_object_set_new(tags, "integrator", json_string(p->integrator));
+    json_object_set_new(tags, "knob", json_string(knob));
+    json_object_set_new(tags, "value", json_real(p->level.value));
+    if (p->pointer)
+        json_object_set_new(settings, p->pointer, json_real(p->level.value));
+    if (p->more)
+        json_object_update(settings, p->more);
+    json_decref(p->more);
+    drape_status status = lab_add_case(l, tags, settings, -1);
+    if (!status && p->level.rank >= 0)
+        lab_rank_case(l, 2 * p->level.rank + (lab_find_integrator(p->integrator)->stability != NULL));
+    return status;
+}
+
+/* The limits of its order that an integrator is run with: 2 and 5 if it has the parameter max_order and the def
+ * does not set it; otherwise 0, for none, alone. Returns their number. */
+static size_t order_limits(const lab *l, const drape_integrator_ops *integrator, int limits[2])
+{
+    bool chosen = drape_param_find(integrator->entry.params, integrator->entry.param_count, "max_order") < 0;
+    for (size_t i = 0; i < l->def->setting_count; i++)
+        chosen |= strcmp(l->def->settings[i].pointer, "/integrator/max_order") == 0;
+    limits[0] = chosen ? 0 : 2;
+    limits[1] = 5;
+    return chosen ? 1 : 2;
+}
+
+/* Each series has one limit of the order: a line through points of different limits has no meaning. */
+static drape_status add_alone(lab *l, const lab_grid *g, const drape_integrator_ops *integrator)
+{
+    const bool own = integrator->own_steps;
+    const lab_level *levels = own ? g->rtols : g->steps;
+    const size_t count = own ? g->rtol_count : g->step_count;
+    int limits[2];
+    drape_status status = DRAPE_OK;
+    const size_t limit_count = order_limits(l, integrator, limits);
+    for (size_t k = 0; k < limit_count; k++) {
+        char series[96];
+        snprintf(series, sizeof series, limits[k] ? "%s, order %d" : "%s", integrator->entry.name, limits[k]);
+        for (size_t i = 0; !status && i < count; i++) {
+            json_t *more = json_object();
+            if (limits[k])
+                json_object_set_new(more, "/integrator/max_order", json_integer(limits[k]));
+            if (!own && g->add)
+                g->add(g->user, integrator, levels[i].value, 0, more);
+            status = lab_add_point(l, &(lab_point){g->scene, series, integrator->entry.name,
+                                                   own ? "/integrator/rtol" : "/integrator/dt", g->knob,
+                                                   levels[i], more});
+        }
+    }
+    return status;
+}
+
+static drape_status add_controlled(lab *l, const lab_grid *g, const drape_integrator_ops *integrator)
+{
+    drape_status status = DRAPE_OK;
+    for (int c = 0; drape_controllers[c]; c++) {
+        const drape_entry *controller = &drape_controllers[c]->entry;
+        char series[96];
+        if (drape_param_find(controller->params, controller->param_count, "rtol") < 0)
+            continue;
+        snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->name);
+        for (size_t i = 0; !status && i < g->controlled_count; i++) {
+            json_t *more = json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt",
+                                     g->first_step);
+            if (g->add)
+                g->add(g->user, integrator, NAN, g->controlled[i].value, more);
+            status = lab_add_point(l, &(lab_point){g->scene, series, integrator->entry.name,
+                                                   "/controller/rtol", NULL, g->controlled[i], more});
+        }
+    }
+    return status;
+}
+
+drape_status lab_add_integrator(lab *l, const lab_grid *g, const drape_integrator_ops *integrator)
+{
+    drape_status status = add_alone(l, g, integrator);
+    if (!status && !integrator->own_steps && !(g->only_if_implicit && integrator->stability))
+        status = add_controlled(l, g, integrator);
+    return status;
+}
+
+/* ---- Results ---- */
+
+lab_series *lab_list_series(lab *l, const char *scene, size_t *count)
+{
+    size_t cases = 0;
+    *count = 0;
+    for (size_t i = 0; i < l->count; i++)
+        cases += !scene || strcmp(lab_tag_text(json_array_get(l->cases, i), "scene"), scene) == 0;
+    lab_series *list = drape_arena_take(&l->arena, cases, sizeof *list), *s = NULL;
+    const json_t **results = drape_arena_take(&l->arena, cases, sizeof *results);
+    for (size_t i = 0; list && results && i < l->count; i++) {
+        const json_t *one = json_array_get(l->cases, i);
+        if (scene && strcmp(lab_tag_text(one, "scene"), scene) != 0)
+            continue;
+        if (!s || strcmp(s->name, lab_tag_text(one, "series")) != 0) {
+            lab_series *before = s;
+            s = &list[(*count)++];
+            *s = (lab_series){.scene = lab_tag_text(one, "scene"),
+                              .name = lab_tag_text(one, "series"),
+                              .integrator = lab_tag_text(one, "integrator"),
+                              .knob = lab_tag_text(one, "knob"),
+                              .results = results};
+            if (before && strcmp(before->integrator, s->integrator) == 0)
+                s->variant = before->variant + 1;
+        }
+        if (l->results[i]) {
+            *results++ = l->results[i];
+            s->count++;
+        }
+    }
+    return results ? list : NULL;
+}
+
+const lab_series *lab_find_series(const lab_series *list, size_t count, const char *name)
+{
+    for (size_t i = 0; i < count; i++)
+        if (strcmp(list[i].name, name) == 0)
+            return &list[i];
+    return NULL;
+}
+
+void lab_knob_text(const json_t *result, char text[64])
+{
+    const char *knob = lab_tag_text(result, "knob");
+    const double value = lab_tag_number(result, "value");
+    if (strcmp(knob, "dt") == 0 && value > 0)
+        snprintf(text, 64, "dt 1/%.4g s", 1 / value);
+    else
+        snprintf(text, 64, "%s %.3g", knob, value);
+}
