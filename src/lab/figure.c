@@ -211,11 +211,22 @@ static double ends_ratio(const lab_axis *a)
     return a->log ? log10(a->to) - log10(a->from) : a->to - a->from;
 }
 
-/* Where a value stands, as a share of the axis; far off the page it is cut. */
-static double share_at(const lab_axis *a, double value)
+double lab_axis_share(const lab_axis *a, double value)
 {
     const double share = (a->log ? log10(value) - log10(a->from) : value - a->from) / ends_ratio(a);
     return isnan(share) ? NAN : fmin(FAR, fmax(-FAR, share));
+}
+
+double lab_axis_value(const lab_axis *a, double share)
+{
+    return a->log ? a->from * pow(a->to / a->from, share) : a->from + share * (a->to - a->from);
+}
+
+void lab_axis_widen(lab_axis *a, double below, double above)
+{
+    const lab_axis before = *a;
+    a->from = lab_axis_value(&before, -below);
+    a->to = lab_axis_value(&before, 1 + above);
 }
 
 /* Whether the ends can be drawn: values of a file may be so large or small that they have no range. */
@@ -235,7 +246,7 @@ typedef struct ruler {
 /* power: of ten, whose exponent is the text. */
 static void put_tick(const ruler *r, double value, const char *text, bool power)
 {
-    const double at = r->length * share_at(r->axis, value), size = *text ? 1 : 0.5;
+    const double at = r->length * lab_axis_share(r->axis, value), size = *text ? 1 : 0.5;
     const double x = r->x + (r->upright ? 0 : at), y = r->y + (r->upright ? at : 0);
     if (r->axis->name_count == 0)
         put_line(r->p, (double[]){x, y, x - r->upright * size, y - !r->upright * size}, 2, LAB_BLACK, THIN,
@@ -596,8 +607,8 @@ static void put_scale(const lab_figure *f, const layout *at, const page *p)
 /* Where a point of the axes is on the page. */
 static void place(const lab_figure *f, const layout *at, double x, double y, double out[2])
 {
-    out[0] = at->left + (WIDTH - RIGHT - at->left) * share_at(&f->axes[0], x);
-    out[1] = at->bottom + f->plot_height * share_at(&f->axes[1], y);
+    out[0] = at->left + (WIDTH - RIGHT - at->left) * lab_axis_share(&f->axes[0], x);
+    out[1] = at->bottom + f->plot_height * lab_axis_share(&f->axes[1], y);
 }
 
 static void draw_element(const lab_figure *f, const layout *at, const lab_element *e, const page *p)
@@ -629,7 +640,7 @@ static void draw_element(const lab_figure *f, const layout *at, const lab_elemen
                 put_hatch(p, low[0], low[1], high[0], high[1], e->style.colour);
             else /* a hair larger, under its neighbours: no gaps */
                 put_box(p, low[0], low[1], high[0] + HAIR, high[1] + HAIR,
-                        e->kind == BOXES ? (int)data[k + 4] : scale_colour(share_at(&f->scale, data[k + 4])));
+                        e->kind == BOXES ? (int)data[k + 4] : scale_colour(data[k + 4]));
         }
     }
 }

@@ -49,6 +49,14 @@ typedef struct lab_axis {
     int name_count;
 } lab_axis;
 
+/* Where a value stands, as a share of the axis: 0 at its low end, 1 at its high end, cut far beyond these; and
+ * the value at a share. */
+double lab_axis_share(const lab_axis *axis, double value);
+double lab_axis_value(const lab_axis *axis, double share);
+
+/* Moves the ends outwards by shares. */
+void lab_axis_widen(lab_axis *axis, double below, double above);
+
 typedef struct lab_entry {
     char text[96];
     lab_style style;
@@ -102,8 +110,7 @@ bool lab_figure_series(lab_figure *f, const char *integrator, size_t variant, co
 /* Boxes, filled with their colours. */
 void lab_figure_boxes(lab_figure *f);
 
-/* The same with a value of the scale in place of the colour: from dark blue to yellow. Values beyond the
- * ends of the scale have the colours of these. */
+/* The same with a share of the scale in place of the colour: from 0, dark blue, to 1, yellow. */
 void lab_figure_values(lab_figure *f);
 
 /* Hatches boxes, which may have any fill, with lines of that colour. */

@@ -24,9 +24,8 @@
 /* "/integrator/dt=1e-4:1e-1:32log" */
 typedef struct axis {
     char pointer[256];
-    double from, to;
+    lab_axis ends; /* the first and the last value */
     int count;
-    bool log;
 } axis;
 
 static drape_status wrong_axis(lab *l, const char *text, const char *why)
@@ -44,39 +43,32 @@ static drape_status read_axis(lab *l, const char *text, axis *a)
         return wrong_axis(l, text, "a pointer is needed");
     memcpy(a->pointer, text, (size_t)(equals - text));
     a->pointer[equals - text] = 0;
-    if (sscanf(equals + 1, "%lf:%lf:%d%n%7s", &a->from, &a->to, &a->count, &used, rest) < 3 || used == 0)
+    lab_axis *ends = &a->ends;
+    if (sscanf(equals + 1, "%lf:%lf:%d%n%7s", &ends->from, &ends->to, &a->count, &used, rest) < 3 ||
+        used == 0)
         return wrong_axis(l, text, "three numbers are needed");
-    a->log = strcmp(rest, "log") == 0;
-    if (*rest && !a->log)
+    ends->log = strcmp(rest, "log") == 0;
+    if (*rest && !ends->log)
         return wrong_axis(l, text, "only log may follow the count");
-    if (!isfinite(a->from) || !isfinite(a->to) || a->from == a->to)
+    if (!isfinite(ends->from) || !isfinite(ends->to) || ends->from == ends->to)
         return wrong_axis(l, text, "from and to must be different numbers");
-    if (a->log && !(a->from > 0 && a->to > 0))
+    if (ends->log && !(ends->from > 0 && ends->to > 0))
         return wrong_axis(l, text, "a logarithmic axis needs positive numbers");
     if (a->count < 2 || a->count > LONGEST)
         return wrong_axis(l, text, "n must be 2 to 1024");
     return DRAPE_OK;
 }
 
-static double axis_value(const axis *a, int k)
+static double axis_value(const axis *a, double k)
 {
-    const double share = (double)k / (a->count - 1);
-    return a->log ? a->from * pow(a->to / a->from, share) : a->from + share * (a->to - a->from);
+    return lab_axis_value(&a->ends, k / (a->count - 1));
 }
 
 /* Half a step to either side, in logarithms on a logarithmic axis. */
 static void cell_bounds(const axis *a, int k, double *low, double *high)
 {
-    const double value = axis_value(a, k);
-    if (a->log) {
-        const double half = sqrt(pow(a->to / a->from, 1.0 / (a->count - 1)));
-        *low = value / half;
-        *high = value * half;
-    } else {
-        const double half = 0.5 * (a->to - a->from) / (a->count - 1);
-        *low = value - half;
-        *high = value + half;
-    }
+    *low = axis_value(a, k - 0.5);
+    *high = axis_value(a, k + 0.5);
 }
 
 /* Whether the scene takes an integer there, as the resolution of a mesh. */
@@ -381,21 +373,11 @@ static shade make_shade(const lab *l, const lab_quantity *quantity)
     return sh;
 }
 
-/* Of LAB_SHADES equal parts of the scale. */
-static int shade_of(const shade *sh, double value)
+/* The middle of one of LAB_SHADES equal parts of the scale, as a share of it. Zeros are at the low end. */
+static double shade_of(const shade *sh, double value)
 {
-    const lab_axis *a = &sh->axis;
-    const double share = !a->log     ? (value - a->from) / (a->to - a->from)
-                         : value > 0 ? log(value / a->from) / log(a->to / a->from)
-                                     : 0;
-    return (int)fmin(LAB_SHADES - 1, fmax(0, floor(LAB_SHADES * share)));
-}
-
-static double shade_value(const shade *sh, int k)
-{
-    const lab_axis *a = &sh->axis;
-    const double share = (k + 0.5) / LAB_SHADES;
-    return a->log ? a->from * pow(a->to / a->from, share) : a->from + share * (a->to - a->from);
+    const double share = value == 0 && sh->axis.log ? 0 : lab_axis_share(&sh->axis, value);
+    return (fmin(LAB_SHADES - 1, fmax(0, floor(LAB_SHADES * share))) + 0.5) / LAB_SHADES;
 }
 
 /* ---- Maps ---- */
@@ -440,7 +422,7 @@ typedef enum layer { FLAT, SHADED, HATCHED_DARK, HATCHED_LIGHT, LAYERS } layer;
 /* How a case looks in a layer: cells that look alike can be one box. */
 typedef struct look {
     bool there;
-    double fill; /* a colour, or a value of the scale */
+    double fill; /* a colour, or a share of the scale */
 } look;
 
 static look look_at(const map *m, layer kind, size_t i)
@@ -448,17 +430,17 @@ static look look_at(const map *m, layer kind, size_t i)
     const verdict v = judge(m->l, m->l->results[i]);
     const double value = m->shade.quantity ? shown_value(m->l, &m->shade, i) : NAN;
     const bool shows = m->shade.quantity && has_results(v), shaded = shows && !isnan(value);
-    const int k = shaded ? shade_of(&m->shade, value) : LAB_SHADES - 1;
+    const double share = shaded ? shade_of(&m->shade, value) : 1;
     switch (kind) {
     case FLAT:
         return (look){!shaded, shows ? LAB_GREY : verdicts[v].colour};
     case SHADED:
-        return (look){shaded, shade_value(&m->shade, k)};
+        return (look){shaded, share};
     case HATCHED_DARK:
-        return (look){is_short(m->l->results[i]) && k >= LAB_SHADES / 2, LAB_BLACK};
+        return (look){is_short(m->l->results[i]) && share > 0.5, LAB_BLACK};
     case HATCHED_LIGHT:
     default:
-        return (look){is_short(m->l->results[i]) && k < LAB_SHADES / 2, LAB_WHITE};
+        return (look){is_short(m->l->results[i]) && share <= 0.5, LAB_WHITE};
     }
 }
 
@@ -517,13 +499,12 @@ static const char *axis_name(const axis *a)
 /* Range, scale and label, as "young_modulus [Pa]". */
 static void set_axis(const axis *a, lab_axis *out)
 {
-    double ends[4];
+    const double half = 0.5 / (a->count - 1);
     const char *unit = lab_unit(a->pointer);
-    cell_bounds(a, 0, &ends[0], &ends[1]);
-    cell_bounds(a, a->count - 1, &ends[2], &ends[3]);
-    out->from = fmin(fmin(ends[0], ends[1]), fmin(ends[2], ends[3]));
-    out->to = fmax(fmax(ends[0], ends[1]), fmax(ends[2], ends[3]));
-    out->log = a->log;
+    *out = a->ends;
+    lab_axis_widen(out, half, half);
+    if (out->from > out->to)
+        *out = (lab_axis){.from = out->to, .to = out->from, .log = out->log};
     snprintf(out->label, sizeof out->label, *unit ? "%.80s [%s]" : "%.80s", axis_name(a), unit);
 }
 
@@ -665,23 +646,7 @@ static void set_curve_axis(lab_figure *f, const shade *sh, int failed)
         y->name_count = 1;
     }
     f->plot_height = CURVE_ROOM + FAILED_ROOM * failed;
-    const double below = 0.04, above = 0.04 + FAILED_ROOM * failed / CURVE_ROOM;
-    if (y->log) {
-        const double ratio = y->to / y->from;
-        y->from /= pow(ratio, below);
-        y->to *= pow(ratio, above);
-    } else {
-        const double span = y->to - y->from;
-        y->from -= below * span;
-        y->to += above * span;
-    }
-}
-
-static double at_height(const lab_figure *f, double mm)
-{
-    const lab_axis *y = &f->axes[1];
-    const double share = mm / f->plot_height;
-    return y->log ? y->from * pow(y->to / y->from, share) : y->from + share * (y->to - y->from);
+    lab_axis_widen(y, 0.04, 0.04 + FAILED_ROOM * failed / CURVE_ROOM);
 }
 
 /* Whether the case belongs to one of the kinds of marks on a curve. */
@@ -758,7 +723,7 @@ static drape_status draw_curves(lab *l, const space *s, const shade *sh)
         add_limit_at(&f, l->results[first], f.axes[1].from, f.axes[1].to, &limits);
     for (size_t first = 0; first < l->count; first += s->cells) {
         const char *integrator = lab_tag_text(l->results[first], "integrator");
-        const double height = at_height(&f, f.plot_height - FAILED_ROOM * (failed - 0.5));
+        const double height = lab_axis_value(&f.axes[1], 1 - FAILED_ROOM * (failed - 0.5) / f.plot_height);
         if (!has_marks(l, s, sh, first, ON_CURVE, ON_CURVE))
             lab_figure_marker(&f, mark_style(integrator, ON_CURVE), integrator);
         for (mark kind = ON_CURVE; kind < MARKS; kind++)
@@ -852,7 +817,8 @@ static drape_status verify(lab *l)
         bool there = strcmp(lab_tag_text(one, "integrator"), lab_tag_text(first, "integrator")) == 0;
         for (int a = 0; a < s.count; a++) {
             const axis *x = &s.axes[a];
-            const double value = axis_value(x, index[a]), size = x->log ? value : fabs(x->to - x->from);
+            const double value = axis_value(x, index[a]),
+                         size = x->ends.log ? value : fabs(x->ends.to - x->ends.from);
             there = there && fabs(lab_tag_number(one, x->pointer) - value) <= 1e-9 * size;
         }
         if (!there)
