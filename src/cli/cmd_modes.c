@@ -36,20 +36,10 @@ typedef struct job {
 
 /* ---- Tables ---- */
 
-static const char *kind_name(drape_mode_kind kind)
-{
-    switch (kind) {
-    case DRAPE_MODE_VIBRATION:
-        return "vibration";
-    case DRAPE_MODE_ZERO:
-        return "zero";
-    case DRAPE_MODE_UNSTABLE:
-        return "unstable";
-    case DRAPE_MODE_BUCKLING:
-        break;
-    }
-    return "buckling";
-}
+static const char *const kinds[] = {[DRAPE_MODE_VIBRATION] = "vibration",
+                                    [DRAPE_MODE_ZERO] = "zero",
+                                    [DRAPE_MODE_UNSTABLE] = "unstable",
+                                    [DRAPE_MODE_BUCKLING] = "buckling"};
 
 static int frames_of(const modes_request *request)
 {
@@ -64,7 +54,7 @@ static drape_status write_table(const job *j, drape_folder *folder)
     for (int32_t k = 0; !status && k < j->modes.count; k++) {
         const drape_mode *mode = &j->modes.modes[k];
         drape_file_print(&file, "%d", (int)k + 1);
-        drape_csv_put_text(&file, kind_name(mode->kind));
+        drape_csv_put_text(&file, kinds[mode->kind]);
         drape_csv_put_number(&file, mode->value);
         drape_csv_put_number(&file, mode->frequency);
         drape_csv_put_number(&file, mode->mass);
@@ -86,25 +76,22 @@ static int print_json(const job *j)
     json_t *list = json_array();
     for (int32_t k = 0; k < j->modes.count; k++) {
         const drape_mode *mode = &j->modes.modes[k];
-        json_t *object = drape_json_with(json_object(), "mode", json_integer(k + 1));
-        object = drape_json_with(object, "kind", json_string(kind_name(mode->kind)));
-        object = drape_json_with(object, "value", drape_json_number(mode->value));
-        object = drape_json_with(object, "frequency", drape_json_number(mode->frequency));
-        object = drape_json_with(object, "mass", drape_json_number(mode->mass));
-        object = drape_json_with(object, "residual", drape_json_number(mode->residual));
-        object = drape_json_with(object, "error", drape_json_number(mode->error));
+        json_t *object =
+            json_pack("{s:i, s:s, s:o, s:o, s:o, s:o, s:o}", "mode", (int)k + 1, "kind", kinds[mode->kind],
+                      "value", drape_json_number(mode->value), "frequency",
+                      drape_json_number(mode->frequency), "mass", drape_json_number(mode->mass), "residual",
+                      drape_json_number(mode->residual), "error", drape_json_number(mode->error));
         list = drape_json_append(list, object);
     }
-    json_t *all = drape_json_with(json_object(), "modes", list);
-    all = drape_json_with(all, "eigenvalues_below", json_integer(j->modes.below));
-    all = drape_json_with(all, "force", drape_json_number(j->modes.force));
+    json_t *all = json_pack("{s:o, s:I, s:o}", "modes", list, "eigenvalues_below", (json_int_t)j->modes.below,
+                            "force", drape_json_number(j->modes.force));
     return cli_print_json(&j->request->command, all, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
 }
 
 static void print_vibration(int32_t number, const drape_mode *mode)
 {
-    printf("%4d  %-9s  %16.9g  %14.9g  %11.5g  %8.1e  %8.1e\n", (int)number, kind_name(mode->kind),
-           mode->value, mode->frequency, mode->mass, mode->residual, mode->error);
+    printf("%4d  %-9s  %16.9g  %14.9g  %11.5g  %8.1e  %8.1e\n", (int)number, kinds[mode->kind], mode->value,
+           mode->frequency, mode->mass, mode->residual, mode->error);
 }
 
 static void print_load(int32_t number, const drape_mode *mode)

@@ -35,20 +35,10 @@ typedef struct job {
 
 /* ---- Points ---- */
 
-static const char *event_name(drape_path_event event)
-{
-    switch (event) {
-    case DRAPE_PATH_LIMIT:
-        return "limit";
-    case DRAPE_PATH_BIFURCATION:
-        return "bifurcation";
-    case DRAPE_PATH_SWITCHED:
-        return "branch";
-    case DRAPE_PATH_REGULAR:
-        break;
-    }
-    return "";
-}
+static const char *const events[] = {[DRAPE_PATH_REGULAR] = "",
+                                     [DRAPE_PATH_LIMIT] = "limit",
+                                     [DRAPE_PATH_BIFURCATION] = "bifurcation",
+                                     [DRAPE_PATH_SWITCHED] = "branch"};
 
 /* The largest distance of a node from where it is at rest [m]. */
 static double largest_displacement(const drape_model *m, const double *x)
@@ -66,7 +56,7 @@ static drape_status write_row(job *j, const drape_path_point *point)
     const double *x = drape_sim_positions(j->in.sim);
     drape_file *file = &j->table;
     drape_file_print(file, "%" PRId64, point->number);
-    drape_csv_put_text(file, event_name(point->event));
+    drape_csv_put_text(file, events[point->event]);
     drape_csv_put_number(file, point->factor);
     drape_csv_put_number(file, point->arc);
     drape_csv_put_number(file, point->elastic);
@@ -100,7 +90,7 @@ static void print_point(const job *j, const drape_path_point *point)
         puts("point          factor  displacement     energy [J]  unstable  iterations  event");
     printf("%5" PRId64 "  %14.9g  %12.6g  %13.6g  %8" PRId64 "  %10d  %s\n", point->number, point->factor,
            largest_displacement(j->in.model, drape_sim_positions(j->in.sim)),
-           point->elastic + point->potential, point->unstable, point->iterations, event_name(point->event));
+           point->elastic + point->potential, point->unstable, point->iterations, events[point->event]);
 }
 
 static drape_status observe(void *user, drape_sim *sim, const drape_path_point *point)
