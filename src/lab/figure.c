@@ -322,7 +322,7 @@ static double ticks_width(const lab_axis *a)
 /* ---- Elements ---- */
 
 /* Kinds of elements, in the order of the page's layers for the same block. */
-enum { CURVE, ORDER /* the number at the end of a line of that order */, BOXES, VALUES, HATCH };
+enum { CURVE, ORDER /* the number at the end of a line of that order */, BOXES /* + lab_fill */ };
 
 /* Room for one more of `count` members; NULL: out of memory, which the end of the figure reports. */
 static void *grow(lab_figure *f, void *memory, size_t count, size_t size)
@@ -437,19 +437,10 @@ bool lab_figure_series(lab_figure *f, const char *integrator, size_t variant, co
     return true;
 }
 
-void lab_figure_boxes(lab_figure *f)
+void lab_figure_boxes(lab_figure *f, lab_fill fill)
 {
-    add_element(f, BOXES, (lab_style){0});
-}
-
-void lab_figure_values(lab_figure *f)
-{
-    add_element(f, VALUES, (lab_style){0});
-}
-
-void lab_figure_hatch(lab_figure *f, int colour)
-{
-    add_element(f, HATCH, (lab_style){.colour = colour});
+    add_element(f, BOXES + (int)fill,
+                (lab_style){.colour = fill == LAB_HATCHED_WHITE ? LAB_WHITE : LAB_BLACK});
 }
 
 /* The lowest of all points of curves to the right of `left`. Widens axes to contain all points; NULL: does
@@ -636,11 +627,11 @@ static void draw_element(const lab_figure *f, const layout *at, const lab_elemen
         for (size_t k = 0; k < count; k += 5) {
             place(f, at, data[k], data[k + 2], low);
             place(f, at, data[k + 1], data[k + 3], high);
-            if (e->kind == HATCH)
+            if (e->kind >= BOXES + LAB_HATCHED_BLACK)
                 put_hatch(p, low[0], low[1], high[0], high[1], e->style.colour);
             else /* a hair larger, under its neighbours: no gaps */
                 put_box(p, low[0], low[1], high[0] + HAIR, high[1] + HAIR,
-                        e->kind == BOXES ? (int)data[k + 4] : scale_colour(data[k + 4]));
+                        e->kind == BOXES + LAB_COLOURED ? (int)data[k + 4] : scale_colour(data[k + 4]));
         }
     }
 }

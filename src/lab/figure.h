@@ -76,7 +76,7 @@ typedef struct lab_figure {
     char name[96];   /* of its files, without their endings */
     char title[160]; /* "": none */
     lab_axis axes[2];
-    lab_axis scale;        /* of the colours of lab_figure_values, drawn below the frame; to <= from: none */
+    lab_axis scale;        /* of the colours of LAB_SCALED boxes, drawn below the frame; to <= from: none */
     double plot_height;    /* [mm] of the frame; default 52 */
     double *values;        /* (used) of all blocks of data; in the arena */
     size_t used, block;    /* block: the last one */
@@ -107,14 +107,15 @@ bool lab_figure_curve(lab_figure *f, lab_style style, const char *text);
  * entry for what they have in common, "error control", in black: a name and a dash tell a series. */
 bool lab_figure_series(lab_figure *f, const char *integrator, size_t variant, const char *name);
 
-/* Boxes, filled with their colours. */
-void lab_figure_boxes(lab_figure *f);
+/* How boxes are drawn. */
+typedef enum lab_fill {
+    LAB_COLOURED, /* their fills are colours */
+    LAB_SCALED,   /* shares of the scale: from 0, dark blue, to 1, yellow */
+    LAB_HATCHED_BLACK,
+    LAB_HATCHED_WHITE
+} lab_fill;
 
-/* The same with a share of the scale in place of the colour: from 0, dark blue, to 1, yellow. */
-void lab_figure_values(lab_figure *f);
-
-/* Hatches boxes, which may have any fill, with lines of that colour. */
-void lab_figure_hatch(lab_figure *f, int colour);
+void lab_figure_boxes(lab_figure *f, lab_fill fill);
 
 /* A marker in the legend, without a line. */
 void lab_figure_marker(lab_figure *f, lab_style style, const char *text);

@@ -154,48 +154,30 @@ drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *
 
 /* ---- Export ---- */
 
-static bool writes(const void *user, const char *name)
-{
-    static const char *const names[] = {"start.obj",  "nodes.csv",     "pins.csv",      "times.csv",
-                                        "scene.json", "reference.npy", "reference.json"};
-    (void)user;
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (strcmp(names[i], name) == 0)
-            return true;
-    return false;
-}
+/* Each writes the contents of a file; v: velocities at the start. */
 
-static drape_status put_start(const lab_ivp *s, drape_folder *folder, drape_file *file)
+static void put_start(const lab_ivp *s, const double *v, drape_file *file)
 {
-    drape_status status = drape_export_begin(s->arena->ctx, folder, "start.obj", file);
-    if (status)
-        return status;
+    (void)v;
     drape_obj_put_nodes(file, drape_model_rest_positions(s->model), drape_model_node_count(s->model));
     drape_obj_put_triangles(file, drape_model_triangles(s->model), drape_model_triangle_count(s->model));
-    return drape_file_finish(file);
 }
 
-static drape_status put_nodes(const lab_ivp *s, const double *v, drape_folder *folder, drape_file *file)
+static void put_nodes(const lab_ivp *s, const double *v, drape_file *file)
 {
     const double *masses = drape_model_masses(s->model), *x = drape_model_rest_positions(s->model);
-    drape_status status = drape_export_begin(s->arena->ctx, folder, "nodes.csv", file);
-    if (status)
-        return status;
     drape_file_print(file, "node,mass_kg,pinned,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s\n");
     for (size_t i = 0; i < (size_t)drape_model_node_count(s->model); i++)
         drape_file_print(file, "%zu,%.17g,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", i, masses[i],
                          drape_model_pinned(s->model)[i], x[3 * i], x[3 * i + 1], x[3 * i + 2], v[3 * i],
                          v[3 * i + 1], v[3 * i + 2]);
-    return drape_file_finish(file);
 }
 
 /* Where pinned nodes are at the times: as the reference has them. */
-static drape_status put_pins(const lab_ivp *s, drape_folder *folder, drape_file *file)
+static void put_pins(const lab_ivp *s, const double *v, drape_file *file)
 {
     const double *x = drape_model_rest_positions(s->model);
-    drape_status status = drape_export_begin(s->arena->ctx, folder, "pins.csv", file);
-    if (status)
-        return status;
+    (void)v;
     drape_file_print(file, "time_s,node,x_m,y_m,z_m\n");
     for (size_t k = 0; k <= s->time_count; k++) {
         for (size_t i = 0; i < (size_t)drape_model_node_count(s->model); i++)
@@ -204,47 +186,60 @@ static drape_status put_pins(const lab_ivp *s, drape_folder *folder, drape_file 
                                  x[3 * i + 1], x[3 * i + 2]);
         x = s->reference.x + s->reference.size * (k < s->time_count ? k : 0);
     }
-    return drape_file_finish(file);
 }
 
-static drape_status put_times(const lab_ivp *s, drape_folder *folder, drape_file *file)
+static void put_times(const lab_ivp *s, const double *v, drape_file *file)
 {
-    drape_status status = drape_export_begin(s->arena->ctx, folder, "times.csv", file);
-    if (status)
-        return status;
+    (void)v;
     drape_file_print(file, "time_s\n");
     for (size_t k = 0; k < s->time_count; k++)
         drape_file_print(file, "%.17g\n", s->times[k]);
-    return drape_file_finish(file);
 }
 
-static drape_status copy(const lab_ivp *s, const char *from, const char *name, drape_folder *folder,
-                         drape_file *file)
+static drape_status copy(const lab_ivp *s, const char *from, drape_file *file)
 {
     char *bytes;
     size_t size;
     drape_status status = from ? lab_read_text(s->arena, NULL, from, &bytes, &size) : DRAPE_E_MEMORY;
     if (!status)
-        status = drape_export_begin(s->arena->ctx, folder, name, file);
-    if (status)
-        return status;
-    drape_file_put(file, bytes, size);
-    return drape_file_finish(file);
+        drape_file_put(file, bytes, size);
+    return status;
+}
+
+/* The files of the folder. */
+static const struct {
+    const char *name;
+    void (*put)(const lab_ivp *s, const double *v, drape_file *file);
+    const char *reference; /* without put: the copy of the reference with this ending; NULL: of the scene */
+} exports[] = {{"start.obj", put_start, NULL},  {"nodes.csv", put_nodes, NULL},
+               {"pins.csv", put_pins, NULL},    {"times.csv", put_times, NULL},
+               {"scene.json", NULL, NULL},      {"reference.npy", NULL, "npy"},
+               {"reference.json", NULL, "json"}};
+#define EXPORTS (sizeof exports / sizeof *exports)
+
+static bool writes(const void *user, const char *name)
+{
+    (void)user;
+    for (size_t i = 0; i < EXPORTS; i++)
+        if (strcmp(exports[i].name, name) == 0)
+            return true;
+    return false;
 }
 
 /* One file after the other; the first failure ends it. */
 static drape_status put_all(const lab_ivp *s, const double *v, drape_folder *folder)
 {
     drape_status status = DRAPE_OK;
-    for (int i = 0; !status && i < 7; i++) {
+    for (size_t i = 0; !status && i < EXPORTS; i++) {
+        const char *ending = exports[i].reference;
         drape_file file = {0};
-        status = i == 0   ? put_start(s, folder, &file)
-                 : i == 1 ? put_nodes(s, v, folder, &file)
-                 : i == 2 ? put_pins(s, folder, &file)
-                 : i == 3 ? put_times(s, folder, &file)
-                 : i == 4 ? copy(s, s->path, "scene.json", folder, &file)
-                 : i == 5 ? copy(s, lab_ivp_file(s, "references", "npy"), "reference.npy", folder, &file)
-                          : copy(s, lab_ivp_file(s, "references", "json"), "reference.json", folder, &file);
+        status = drape_export_begin(s->arena->ctx, folder, exports[i].name, &file);
+        if (!status && exports[i].put)
+            exports[i].put(s, v, &file);
+        else if (!status)
+            status = copy(s, ending ? lab_ivp_file(s, "references", ending) : s->path, &file);
+        if (!status)
+            status = drape_file_finish(&file);
         drape_file_destroy(&file);
     }
     return status;

@@ -1,54 +1,31 @@
 /* quantity.c: see quantity.h. */
 #include "lab/quantity.h"
 
-static const lab_quantity
-    energy_drift = {{.name = "energy_drift",
-                     .summary = "energy that the method gained (negative) or lost / largest kinetic energy"},
-                    ""},
-    energy_numerical = {{.name = "energy_numerical_J",
-                         .summary = "energy that the method gained (negative) or lost"},
-                        "J"},
-    strain_max = {{.name = "strain_max", .summary = "largest strain of an edge"}, ""},
-    strain_min = {{.name = "strain_min", .summary = "smallest strain of an edge"}, ""},
-    accepted = {{.name = "accepted", .summary = "accepted steps"}, ""},
-    rejected = {{.name = "rejected", .summary = "rejected attempts at steps"}, ""},
-    rejected_share = {{.name = "rejected_share", .summary = "rejected attempts / all attempts"}, ""},
-    unconverged = {{.name = "unconverged", .summary = "steps accepted although they had not converged"}, ""},
-    iterations = {{.name = "iterations", .summary = "iterations of Newton's method"}, ""},
-    iterations_per_step = {{.name = "iterations_per_step",
-                            .summary = "iterations of Newton's method / accepted steps"},
-                           ""},
-    residuals = {{.name = "residuals", .summary = "evaluations of the residual"}, ""},
-    jacobians = {{.name = "jacobians", .summary = "Jacobian matrices"}, ""},
-    factorizations = {{.name = "factorizations", .summary = "factorisations"}, ""},
-    linear_iterations = {{.name = "linear_iterations", .summary = "iterations of the linear solver"}, ""},
-    cpu = {{.name = "cpu_s", .summary = "CPU time of the steps"}, "s"},
-    wall = {{.name = "wall_s", .summary = "wall-clock time of the steps"}, "s"},
-    h_min = {{.name = "h_min_s", .summary = "smallest accepted step"}, "s"},
-    h_max = {{.name = "h_max_s", .summary = "largest accepted step"}, "s"},
-    explicit_limit = {
-        {.name = "explicit_limit_s", .summary = "stability limit of an explicit method at the start"}, "s"};
+#define QUANTITY(id, unit_text, text)                                                                        \
+    &((const lab_quantity){.entry = {.name = id, .summary = text}, .unit = unit_text}).entry
 
-static const drape_entry *const entries[] = {&energy_drift.entry,
-                                             &energy_numerical.entry,
-                                             &strain_max.entry,
-                                             &strain_min.entry,
-                                             &accepted.entry,
-                                             &rejected.entry,
-                                             &rejected_share.entry,
-                                             &unconverged.entry,
-                                             &iterations.entry,
-                                             &iterations_per_step.entry,
-                                             &residuals.entry,
-                                             &jacobians.entry,
-                                             &factorizations.entry,
-                                             &linear_iterations.entry,
-                                             &cpu.entry,
-                                             &wall.entry,
-                                             &h_min.entry,
-                                             &h_max.entry,
-                                             &explicit_limit.entry,
-                                             NULL};
+static const drape_entry *const entries[] = {
+    QUANTITY("energy_drift", "", "energy that the method gained (negative) or lost / largest kinetic energy"),
+    QUANTITY("energy_numerical_J", "J", "energy that the method gained (negative) or lost"),
+    QUANTITY("strain_max", "", "largest strain of an edge"),
+    QUANTITY("strain_min", "", "smallest strain of an edge"),
+    QUANTITY("accepted", "", "accepted steps"),
+    QUANTITY("rejected", "", "rejected attempts at steps"),
+    QUANTITY("rejected_share", "", "rejected attempts / all attempts"),
+    QUANTITY("unconverged", "", "steps accepted although they had not converged"),
+    QUANTITY("iterations", "", "iterations of Newton's method"),
+    QUANTITY("iterations_per_step", "", "iterations of Newton's method / accepted steps"),
+    QUANTITY("residuals", "", "evaluations of the residual"),
+    QUANTITY("jacobians", "", "Jacobian matrices"),
+    QUANTITY("factorizations", "", "factorisations"),
+    QUANTITY("linear_iterations", "", "iterations of the linear solver"),
+    QUANTITY("cpu_s", "s", "CPU time of the steps"),
+    QUANTITY("wall_s", "s", "wall-clock time of the steps"),
+    QUANTITY("h_min_s", "s", "smallest accepted step"),
+    QUANTITY("h_max_s", "s", "largest accepted step"),
+    QUANTITY("explicit_limit_s", "s", "stability limit of an explicit method at the start"),
+    NULL,
+};
 
 const drape_registry lab_quantity_registry = {
     .noun = "result", .key = "results", .title = "Results", .place = "", .entries = entries};

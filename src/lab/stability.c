@@ -416,36 +416,33 @@ static size_t row_of(const map *m, int row, double *bottom, double *top)
     return m->first + columns * (size_t)(row + m->third * m->rows);
 }
 
-/* The layers of a map, each a kind of boxes. */
-typedef enum layer { FLAT, SHADED, HATCHED_DARK, HATCHED_LIGHT, LAYERS } layer;
-
-/* How a case looks in a layer: cells that look alike can be one box. */
+/* How a case looks in a layer of the map, the boxes of one kind: cells that look alike can be one box. */
 typedef struct look {
     bool there;
     double fill; /* a colour, or a share of the scale */
 } look;
 
-static look look_at(const map *m, layer kind, size_t i)
+static look look_at(const map *m, lab_fill kind, size_t i)
 {
     const verdict v = judge(m->l, m->l->results[i]);
     const double value = m->shade.quantity ? shown_value(m->l, &m->shade, i) : NAN;
     const bool shows = m->shade.quantity && has_results(v), shaded = shows && !isnan(value);
     const double share = shaded ? shade_of(&m->shade, value) : 1;
     switch (kind) {
-    case FLAT:
+    case LAB_COLOURED:
         return (look){!shaded, shows ? LAB_GREY : verdicts[v].colour};
-    case SHADED:
+    case LAB_SCALED:
         return (look){shaded, share};
-    case HATCHED_DARK:
+    case LAB_HATCHED_BLACK:
         return (look){is_short(m->l->results[i]) && share > 0.5, LAB_BLACK};
-    case HATCHED_LIGHT:
+    case LAB_HATCHED_WHITE:
     default:
         return (look){is_short(m->l->results[i]) && share <= 0.5, LAB_WHITE};
     }
 }
 
 /* A row of cells, in which neighbours that look alike are one box. */
-static void write_row(map *m, layer kind, int row)
+static void write_row(map *m, lab_fill kind, int row)
 {
     const axis *x = &m->s->axes[0];
     double left, right, from = 0, bottom, top;
@@ -466,16 +463,11 @@ static void write_row(map *m, layer kind, int row)
 /* The layers, and what is on the map. */
 static void write_cells(map *m)
 {
-    for (layer kind = FLAT; kind < LAYERS; kind++) {
+    for (lab_fill kind = LAB_COLOURED; kind <= LAB_HATCHED_WHITE; kind++) {
         lab_figure_data(&m->f);
         for (int row = 0; row < m->rows; row++)
             write_row(m, kind, row);
-        if (kind == FLAT)
-            lab_figure_boxes(&m->f);
-        else if (kind == SHADED)
-            lab_figure_values(&m->f);
-        else
-            lab_figure_hatch(&m->f, kind == HATCHED_DARK ? LAB_BLACK : LAB_WHITE);
+        lab_figure_boxes(&m->f, kind);
     }
     for (int row = 0; row < m->rows; row++) {
         double bottom, top;
@@ -484,7 +476,7 @@ static void write_cells(map *m)
             const verdict v = judge(m->l, m->l->results[i]);
             m->seen[v] = true;
             m->seen[SHORT] |= is_short(m->l->results[i]);
-            m->blank |= look_at(m, FLAT, i).there && has_results(v);
+            m->blank |= look_at(m, LAB_COLOURED, i).there && has_results(v);
         }
     }
     if (m->shade.quantity)
