@@ -103,10 +103,10 @@ static drape_status write_scene(drape_context *ctx, drape_folder *folder, const 
 {
     char name[128], text[DRAPE_LAB_TEXT];
     const double p = reference->parameters[index];
-    const drape_reference_case one = {reference, p, reference->high > 0 ? reference->expected(p) : 0};
+    const drape_reference_case one = {reference, p,
+                                      reference->high > 0 ? drape_reference_expected(reference, p) : 0};
     drape_file file = {0};
-    reference->scene(&one, text);
-    drape_reference_quote(text);
+    drape_reference_text(&one, text);
     snprintf(name, sizeof name, SCENE_NAME, reference->entry.name, index);
     drape_status status = drape_export_begin(ctx, folder, name, &file);
     if (!status) {

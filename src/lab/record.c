@@ -29,7 +29,7 @@ static void hash_of(const lab_record *record, char digits[17])
 {
     char text[DRAPE_LAB_TEXT];
     const drape_reference *r = record->reference;
-    r->scene(&(drape_reference_case){r, r->parameters[record->index], 1}, text);
+    drape_reference_text(&(drape_reference_case){r, r->parameters[record->index], 1}, text);
     snprintf(digits, 17, "%016llx",
              (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, text, strlen(text)));
 }

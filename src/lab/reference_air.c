@@ -1,8 +1,7 @@
 /* reference_air.c: sheets in air, by drag.wind and air.added_mass. */
-#include "lab/strip.h"
+#include "lab/sheet.h"
 
 #include <math.h>
-#include <stdio.h>
 
 #define PI 3.14159265358979323846
 
@@ -27,27 +26,23 @@ static double terminal_expected(double how)
 static int terminal_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     const bool edge_on = c->parameter >= FALLS_EDGE_ON;
-    return snprintf(
-        text, DRAPE_LAB_TEXT,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 5, 'rows': 5, 'width': 0.2, "
-        "'height': 0.2, 'orientation': '%s'},\n "
-        "'material': {'young_modulus': 1e6, 'poisson_ratio': 0.3, 'thickness': 0.001, 'areal_density': "
-        "0.1},\n "
-        "'terms': ['stretch.cst', 'bend.midedge', {'type': 'drag.wind', 'law': '%s', '%s': %g}]}],\n "
-        "'gravity': [0, -9.81, 0], 'integrator': {'method': 'trbdf2', 'dt': 0.01, 'tolerance': 1e-10}, "
-        "'duration': 4}",
-        edge_on ? "vertical" : "horizontal", c->parameter < FALLS_PLATE ? "square" : "plate",
-        edge_on ? "friction" : "coefficient", coefficient_of(c->parameter));
+    return SHEET_TEXT(text, .columns = 5, .rows = 5, .width = 0.2, .height = 0.2,
+                      .mesh = edge_on ? "'orientation': 'vertical'" : NULL, .young_modulus = 1e6,
+                      .poisson_ratio = 0.3, .thickness = 0.001, .areal_density = 0.1,
+                      .terms =
+                          SHEET_FORMAT("'stretch.cst', 'bend.midedge', {'type': 'drag.wind', 'law': '%s', "
+                                       "'%s': %g}",
+                                       c->parameter < FALLS_PLATE ? "square" : "plate",
+                                       edge_on ? "friction" : "coefficient", coefficient_of(c->parameter)),
+                      .gravity = {0, -9.81, 0}, .integrator = "'method': 'trbdf2'", .dt = 0.01,
+                      .tolerance = 1e-10, .duration = 4);
 }
 
 /* The mean speed downwards. */
 static drape_status measure_speed(drape_reference_run *run, double *value)
 {
     const drape_status status = lab_advance(run);
-    const int32_t nodes = drape_model_node_count(run->model);
-    *value = 0;
-    for (int32_t i = 0; i < nodes; i++)
-        *value -= drape_sim_velocities(run->sim)[3 * (size_t)i + 1] / nodes;
+    *value = -lab_mean(run, drape_sim_velocities(run->sim), 1);
     return status;
 }
 
@@ -73,27 +68,19 @@ DRAPE_REFERENCE(terminal_velocity, .entry.summary = "speed at which a sheet fall
 #define KAPPA   (0.25 / FLUTTER) /* k [kg/m3]: k U = sqrt(k^2 U^2) = sqrt(k 343) = 0.5 at the onset */
 #define SECONDS 8.0
 #define START   1e-6 /* [m/s]: angles stay below 1e-3 until the strip is seen to flutter */
-
-static double flutter_expected(double unused)
-{
-    (void)unused;
-    return FLUTTER;
-}
+#define RIBBON                                                                                               \
+    .columns = 41, .rows = 3, .width = 1, .height = 0.05, .young_modulus = 12 / (0.02 * 0.02 * 0.02),        \
+    .thickness = 0.02, .dt = 0.01, .tolerance = 1e-12
 
 static int flutter_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return snprintf(
-        text, DRAPE_LAB_TEXT,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 41, 'rows': 3, 'width': 1, "
-        "'height': 0.05},\n "
-        "'material': {'young_modulus': %.17g, 'poisson_ratio': 0, 'thickness': 0.02, "
-        "'areal_density': %g},\n "
-        "'terms': ['stretch.cst', 'bend.midedge', {'type': 'drag.wind', 'law': 'plate', 'density': %.17g, "
-        "'coefficient': 1, 'wind': [%.17g, 0, 0]}],\n "
-        "'pins': [{'edge': 'left'}, {'edge': 'right', 'normal': [0, 1, 0]}]}],\n "
-        "'gravity': [0, 0, 0], 'integrator': {'method': 'midpoint', 'dt': 0.01, 'tolerance': 1e-12}, "
-        "'duration': %g}",
-        12 / (0.02 * 0.02 * 0.02), MASS, 8 * KAPPA / (4 + PI), sqrt(c->load / KAPPA), SECONDS);
+    return SHEET_TEXT(text, RIBBON, .areal_density = MASS,
+                      .terms =
+                          SHEET_FORMAT("'stretch.cst', 'bend.midedge', {'type': 'drag.wind', 'law': 'plate', "
+                                       "'density': %.17g, 'coefficient': 1, 'wind': [%.17g, 0, 0]}",
+                                       8 * KAPPA / (4 + PI), sqrt(c->load / KAPPA)),
+                      .pins = "{'edge': 'left'}, {'edge': 'right', 'normal': [0, 1, 0]}",
+                      .integrator = "'method': 'midpoint'", .duration = SECONDS);
 }
 
 /* Advances; returns the largest deflection of the states that are passed. */
@@ -135,8 +122,8 @@ DRAPE_REFERENCE(strip_flutter,
                 .entry.reference = "Hedgepeth 1957, Flutter of rectangular simply supported panels at high "
                                    "supersonic speeds: 343.36, by linear piston theory, to which the law is "
                                    "equal at small angles",
-                .tolerance = 0.01, .expected = flutter_expected, .scene = flutter_scene,
-                .measure = measure_flutter, .low = 0.85, .high = 1.15);
+                .tolerance = 0.01, DRAPE_KNOWN(FLUTTER), .scene = flutter_scene, .measure = measure_flutter,
+                .low = 0.85, .high = 1.15);
 
 /* ---- Flutter of a flag ----
  *
@@ -148,34 +135,21 @@ DRAPE_REFERENCE(strip_flutter,
  * (here it is that of the sheet). Those at g = 0 are by a Galerkin method with 14 polynomials, which has the
  * published 6.15 and 5.62 of two that hang to all their digits. Here L, B, and m + m_a are 1. */
 
-#define FLAGS 3
-
 static const struct {
-    double mass_ratio, weight, onset, seconds;
-} flags[FLAGS] = {{0.2, 0, 5.5914, 12}, {0.5, 0, 9.3224, 6}, {2.03e-3, 42.4, 5.62, 20}};
-
-static double flag_expected(double which)
-{
-    return flags[(int)which].onset;
-}
+    double mass_ratio, weight, seconds;
+} flags[] = {{0.2, 0, 12}, {0.5, 0, 6}, {2.03e-3, 42.4, 20}};
 
 static int flag_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     const int which = (int)c->parameter;
     const double b = flags[which].mass_ratio;
-    return snprintf(
-        text, DRAPE_LAB_TEXT,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 41, 'rows': 3, 'width': 1, "
-        "'height': 0.05},\n "
-        "'material': {'young_modulus': %.17g, 'poisson_ratio': 0, 'thickness': 0.02, 'areal_density': "
-        "%.17g},\n "
-        "'terms': ['stretch.cst', 'bend.midedge', {'type': 'air.added_mass', 'span': 0.05, 'density': %.17g, "
-        "'wind': [%.17g, 0, 0]}],\n "
-        "'pins': [{'edge': 'left', 'clamp': true}]}],\n "
-        "'gravity': [%.17g, 0, 0], 'integrator': {'method': 'trbdf2', 'dt': 0.01, 'tolerance': 1e-12}, "
-        "'duration': %g}",
-        12 / (0.02 * 0.02 * 0.02), 1 - b, b / (0.05 * PI / 4), c->load / sqrt(b),
-        flags[which].weight / (1 - b), flags[which].seconds);
+    return SHEET_TEXT(text, RIBBON, .areal_density = 1 - b,
+                      .terms = SHEET_FORMAT("'stretch.cst', 'bend.midedge', {'type': 'air.added_mass', "
+                                            "'span': 0.05, 'density': %.17g, 'wind': [%.17g, 0, 0]}",
+                                            b / (0.05 * PI / 4), c->load / sqrt(b)),
+                      .pins = "{'edge': 'left', 'clamp': true}",
+                      .gravity = {flags[which].weight / (1 - b), 0, 0}, .integrator = "'method': 'trbdf2'",
+                      .duration = flags[which].seconds);
 }
 
 DRAPE_REFERENCE(flag_flutter, .entry.summary = "U L sqrt(m_a/B) at which a ribbon flutters in wind along it",
@@ -183,5 +157,5 @@ DRAPE_REFERENCE(flag_flutter, .entry.summary = "U L sqrt(m_a/B) at which a ribbo
                 DRAPE_CASES(0, 1, 2), .model = "stretch.cst, bend.midedge, air.added_mass; irregular; trbdf2",
                 .entry.reference = "slender-body theory, the equation of pipes that convey fluid: Paidoussis "
                                    "1970, Dynamics of tubular cantilevers conveying fluid: 5.62 hanging",
-                .tolerance = 0.01, .expected = flag_expected, .scene = flag_scene, .measure = measure_flutter,
-                .low = 0.9, .high = 1.1);
+                .tolerance = 0.01, DRAPE_KNOWN(5.5914, 9.3224, 5.62), .scene = flag_scene,
+                .measure = measure_flutter, .low = 0.9, .high = 1.1);

@@ -1,12 +1,14 @@
 /* reference_beams.c: strips clamped horizontally at one end, at rest under loads, against rods. Without
  * lateral contraction (nu = 0) strip and rod are the same. */
 #include "lab/rod.h"
-#include "lab/strip.h"
+#include "lab/sheet.h"
 
 #include <math.h>
-#include <stdio.h>
 
 #define BEAM .model = "stretch.cst, bend.midedge; irregular"
+
+/* Most strips: their mesh and thickness. */
+#define NARROW(h) STRIP(h), .columns = 81, .rows = 4, .height = 0.02
 
 /* ---- Under its own weight: a case is G = rho g L^3/B ---- */
 
@@ -21,10 +23,10 @@ static double slope(double weight)
  * the sheet is thin, so that its stretch stays below 1e-4. */
 static int heavy_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    const double tolerance = c->parameter * 1e-13; /* at most a thousandth of the weight of a node */
-    return STRIP_SCENE(text, .columns = c->parameter > 50 ? 201 : 81, .rows = 4, .width = 0.02,
-                       .thickness = c->parameter > 5 ? 0.004 : 0.02,
-                       .gravity = {0, -strip_gravity(c->parameter), 0}, .tolerance = tolerance);
+    const double h = c->parameter > 5 ? 0.004 : 0.02;
+    return SHEET_TEXT(text, STRIP(h), .columns = c->parameter > 50 ? 201 : 81, .rows = 4, .height = 0.02,
+                      .gravity = {0, -lab_strip_gravity(c->parameter), 0},
+                      .tolerance = c->parameter * 1e-13); /* at most a thousandth of the weight of a node */
 }
 
 static drape_status measure_slope(drape_reference_run *run, double *value)
@@ -46,8 +48,8 @@ DRAPE_REFERENCE(
  * degrees. */
 static int chord_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return STRIP_SCENE(text, .columns = 81, .rows = 4, .width = 0.02, .thickness = 0.004,
-                       .gravity = {0, -strip_gravity(c->parameter), 0}, .tolerance = 1e-12);
+    return SHEET_TEXT(text, NARROW(0.004), .gravity = {0, -lab_strip_gravity(c->parameter), 0},
+                      .tolerance = 1e-12);
 }
 
 DRAPE_REFERENCE(bending_length, .entry.summary = "angle of the chord to the end", .unit = "degree",
@@ -66,12 +68,10 @@ static double sinking(double force)
 
 static int force_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    char terms[200];
-    snprintf(terms, sizeof terms,
-             "'bend.midedge', {'type': 'load.line', 'edge': 'right', 'force': [0, %.17g, 0]}",
-             -c->parameter * STRIP_RIGIDITY);
-    return STRIP_SCENE(text, .columns = 81, .rows = 4, .width = 0.02, .thickness = 0.004, .terms = terms,
-                       .tolerance = 1e-12);
+    return SHEET_TEXT(text, NARROW(0.004), .tolerance = 1e-12,
+                      .terms = SHEET_FORMAT("'stretch.cst', 'bend.midedge', {'type': 'load.line', "
+                                            "'edge': 'right', 'force': [0, %.17g, 0]}",
+                                            -c->parameter * STRIP_RIGIDITY));
 }
 
 DRAPE_REFERENCE(
@@ -88,21 +88,12 @@ static double arc_rise(double curvature)
     return (1 - cos(curvature)) / curvature;
 }
 
-static drape_status measure_rise(drape_reference_run *run, double *value)
-{
-    double tip[3];
-    drape_status status = lab_tip(run, tip);
-    *value = tip[1];
-    return status;
-}
-
 static int moment_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    char terms[200];
-    snprintf(terms, sizeof terms, "'bend.midedge', {'type': 'load.moment', 'edge': 'right', 'moment': %.17g}",
-             c->parameter * STRIP_RIGIDITY);
-    return STRIP_SCENE(text, .columns = 81, .rows = 4, .width = 0.02, .thickness = 0.01, .terms = terms,
-                       .tolerance = 1e-11);
+    return SHEET_TEXT(text, NARROW(0.01), .tolerance = 1e-11,
+                      .terms = SHEET_FORMAT("'stretch.cst', 'bend.midedge', {'type': 'load.moment', "
+                                            "'edge': 'right', 'moment': %.17g}",
+                                            c->parameter * STRIP_RIGIDITY));
 }
 
 DRAPE_REFERENCE(end_moment, .entry.summary = "rise of the end w/L", .unit = "1", .parameter = "M L/B",
@@ -110,7 +101,7 @@ DRAPE_REFERENCE(end_moment, .entry.summary = "rise of the end w/L", .unit = "1",
                             4.7123889803846899), /* to three quarters of a circle */
                 .model = "stretch.cst, bend.midedge, load.moment; irregular",
                 .entry.reference = "an arc of curvature M/B", .tolerance = 0.005, .expected = arc_rise,
-                .scene = moment_scene, .measure = measure_rise);
+                .scene = moment_scene, .measure = lab_rise);
 
 /* Two clamps turned against each other by half of the angle each, of which the right one slides along x: the
  * moment and with it the curvature is the same everywhere, and E = B kappa^2 L w/2. */
@@ -122,16 +113,13 @@ static double rolled_energy(double angle)
 static int rolled_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     const double half = c->parameter * 90 / 3.1415926535897932;
-    return snprintf(
-        text, DRAPE_LAB_TEXT,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 41, 'rows': 4, 'width': 1, "
-        "'height': 0.05},\n 'material': {'young_modulus': %g, 'poisson_ratio': 0, 'thickness': 0.01, "
-        "'areal_density': %g}, 'terms': ['stretch.cst', 'bend.midedge'],\n 'pins': [{'edge': 'left', "
-        "'clamp': true, 'turns': [{'time': 0, 'rotate': [0, 0, 1, 0]}, {'time': 1, 'rotate': [0, 0, 1, "
-        "%.17g]}]},\n {'edge': 'right', 'clamp': true, 'axis': [1, 0, 0], 'turns': [{'time': 0, 'rotate': "
-        "[0, 0, 1, 0]}, {'time': 1, 'rotate': [0, 0, 1, %.17g]}]}]}],\n 'gravity': [0, 0, 0], "
-        "'integrator': {'method': 'static', 'tolerance': 1e-10}, 'duration': 1}",
-        STRIP_RIGIDITY * 12 / 1e-6, STRIP_DENSITY, half, -half);
+    return SHEET_TEXT(text, FREE_STRIP(0.01), .columns = 41, .rows = 4, .height = 0.05, .tolerance = 1e-10,
+                      .pins = SHEET_FORMAT("{'edge': 'left', 'clamp': true, 'turns': [{'time': 0, 'rotate': "
+                                           "[0, 0, 1, 0]}, {'time': 1, 'rotate': [0, 0, 1, %.17g]}]},\n "
+                                           "{'edge': 'right', 'clamp': true, 'axis': [1, 0, 0], 'turns': "
+                                           "[{'time': 0, 'rotate': [0, 0, 1, 0]}, {'time': 1, 'rotate': "
+                                           "[0, 0, 1, %.17g]}]}",
+                                           half, -half));
 }
 
 static drape_status measure_rolled(drape_reference_run *run, double *value)
@@ -150,13 +138,13 @@ DRAPE_REFERENCE(rolled_strip, .entry.summary = "energy of a strip between clamps
 /* The strip starts flat. */
 static int curved_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    char terms[100];
-    snprintf(terms, sizeof terms, "{'type': 'bend.midedge', 'curvature': [%.17g, 0, 0]}", c->parameter);
-    return STRIP_SCENE(text, .columns = 81, .rows = 4, .width = 0.02, .thickness = 0.02, .terms = terms,
-                       .tolerance = 1e-12);
+    return SHEET_TEXT(text, NARROW(0.02), .tolerance = 1e-12,
+                      .terms =
+                          SHEET_FORMAT("'stretch.cst', {'type': 'bend.midedge', 'curvature': [%.17g, 0, 0]}",
+                                       c->parameter));
 }
 
 DRAPE_REFERENCE(rest_curvature, .entry.summary = "rise of the end w/L", .unit = "1",
                 .parameter = "curvature L", DRAPE_CASES(1, 3.14159265358979323846), BEAM,
                 .entry.reference = "an arc", .tolerance = 0.005, .expected = arc_rise, .scene = curved_scene,
-                .measure = measure_rise);
+                .measure = lab_rise);

@@ -1,12 +1,11 @@
 /* reference_buckling.c: loads at which strips buckle. Where nothing disturbs them they stay straight, and the
  * signs of the eigenvalues of the Hessian say whether that equilibrium is stable. */
 #include "lab/rod.h"
-#include "lab/strip.h"
+#include "lab/sheet.h"
 
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_multiroots.h>
 #include <math.h>
-#include <stdio.h>
 
 #define UNSTABLE .unit = "1", .measure = lab_unstable_modes
 
@@ -23,8 +22,8 @@ static double greenhill(double unused)
 
 static int upright_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return STRIP_SCENE(text, .columns = 41, .rows = 4, .width = 0.04, .thickness = 0.004,
-                       .gravity = {-strip_gravity(c->load), 0, 0}, .tolerance = 1e-11);
+    return SHEET_TEXT(text, STRIP(0.004), .columns = 41, .rows = 4, .height = 0.04,
+                      .gravity = {-lab_strip_gravity(c->load), 0, 0}, .tolerance = 1e-11);
 }
 
 DRAPE_REFERENCE(self_buckling, .entry.summary = "G = rho g L^3/B at which an upright strip buckles", UNSTABLE,
@@ -50,9 +49,9 @@ static double lateral(double nu)
 /* The sag in the plane of the strip is (h/w)^2 times that of a strip bent about its thin side. */
 static int lateral_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return STRIP_SCENE(text, .columns = 121, .rows = 5, .width = 0.03, .thickness = 0.001,
-                       .poisson = c->parameter, .upright = true, .gravity = {0, -strip_gravity(c->load), 0},
-                       .tolerance = 1e-10);
+    return SHEET_TEXT(text, STRIP(0.001), .columns = 121, .rows = 5, .height = 0.03,
+                      .poisson_ratio = c->parameter, .mesh = "'orientation': 'vertical'",
+                      .gravity = {0, -lab_strip_gravity(c->load), 0}, .tolerance = 1e-10);
 }
 
 DRAPE_REFERENCE(
@@ -83,18 +82,16 @@ static int hinges_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]
     const double edge = 0.035 / EDGES, thickness = 1e-3, poisson = 1.0 / 3, gravity = 9.81;
     const double length =
         (STRIPS - 0.5) * sqrt(3) / 2 * edge; /* two pinned rows clamp the strip between them */
-    const double modulus =
-        12 * (1 - poisson * poisson) * STRIP_RIGIDITY / (thickness * thickness * thickness);
-    return snprintf(
-        text, DRAPE_LAB_TEXT,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': %d, 'strips': %d, "
-        "'edge_length': %.17g,\n 'transform': {'rotate': [0, 0, 1, 90]}},\n "
-        "'material': {'young_modulus': %.17g, 'poisson_ratio': %.17g, 'thickness': %g, "
-        "'areal_density': %.17g},\n "
-        "'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'row': 0}, {'row': 1}]}],\n "
-        "'gravity': [0, %g, 0], 'integrator': {'method': 'static', 'tolerance': 1e-9}, 'duration': 1}",
-        EDGES, STRIPS, edge, modulus, poisson, thickness,
-        c->load * STRIP_RIGIDITY / (gravity * pow(length, 3)), -gravity);
+    return SHEET_TEXT(text, .grid = "equilateral",
+                      .mesh = SHEET_FORMAT("'edges': %d, 'strips': %d, 'edge_length': %.17g, "
+                                           "'transform': {'rotate': [0, 0, 1, 90]}",
+                                           EDGES, STRIPS, edge),
+                      .young_modulus =
+                          12 * (1 - poisson * poisson) * STRIP_RIGIDITY / (thickness * thickness * thickness),
+                      .poisson_ratio = poisson, .thickness = thickness,
+                      .areal_density = c->load * STRIP_RIGIDITY / (gravity * pow(length, 3)),
+                      .terms = "'stretch.edge', 'bend.hinge'", .pins = "{'row': 0}, {'row': 1}",
+                      .gravity = {0, -gravity, 0}, .tolerance = 1e-9);
 }
 
 DRAPE_REFERENCE(lateral_buckling_hinges,
@@ -190,19 +187,18 @@ static double slip_friction(double share)
 /* The strip is in contact with the table from the start, so that the push is that of the track. */
 static int pushed_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return snprintf(
-        text, DRAPE_LAB_TEXT,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 3, 'rows': 41, 'width': 0.05, "
-        "'height': 1, 'orientation': 'vertical'},\n "
-        "'material': {'young_modulus': %.17g, 'poisson_ratio': 0, 'thickness': %g, 'areal_density': %g},\n "
-        "'terms': ['stretch.cst', 'bend.midedge'],\n "
-        "'pins': [{'edge': 'top', 'clamp': true, 'track': [[0, [0, 0, 0]], [1, [0, %.17g, 0]]]}]}],\n "
-        "'gravity': [0, 0, %g], 'colliders': [{'type': 'plane', 'point': [0, %.17g, 0], "
-        "'normal': [0, 1, 0], 'friction': %.17g}],\n "
-        "'contact': {'distance': %g, 'friction_velocity': 1e-4, 'stiffness': %g},\n "
-        "'integrator': {'method': 'be', 'dt': 0.01, 'tolerance': 1e-6}, 'duration': 1.5}",
-        12 * RIGIDITY / (THICKNESS * THICKNESS * THICKNESS), THICKNESS, DENSITY, -c->parameter, ASIDE,
-        -1 - DISTANCE / 2, c->load, DISTANCE, STIFFNESS);
+    return SHEET_TEXT(
+        text, .columns = 3, .rows = 41, .width = 0.05, .height = 1, .mesh = "'orientation': 'vertical'",
+        .young_modulus = 12 * RIGIDITY / (THICKNESS * THICKNESS * THICKNESS), .thickness = THICKNESS,
+        .areal_density = DENSITY,
+        .pins = SHEET_FORMAT("{'edge': 'top', 'clamp': true, 'track': [[0, [0, 0, 0]], [1, [0, %.17g, 0]]]}",
+                             -c->parameter),
+        .gravity = {0, 0, ASIDE}, .integrator = "'method': 'be'", .dt = 0.01, .tolerance = 1e-6,
+        .others = SHEET_FORMAT("'colliders': [{'type': 'plane', 'point': [0, %.17g, 0], 'normal': [0, 1, 0], "
+                               "'friction': %.17g}],\n 'contact': {'distance': %g, "
+                               "'friction_velocity': 1e-4, 'stiffness': %g}",
+                               -1 - DISTANCE / 2, c->load, DISTANCE, STIFFNESS),
+        .duration = 1.5);
 }
 
 /* Returns 1 if the end stays, 0 if it slips. */

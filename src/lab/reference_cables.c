@@ -1,10 +1,9 @@
 /* reference_cables.c: heavy strips that hardly resist bending: a catenary, and a hanging chain. */
 #include "lab/rod.h"
-#include "lab/strip.h"
+#include "lab/sheet.h"
 
 #include <gsl/gsl_sf_bessel.h>
 #include <math.h>
-#include <stdio.h>
 
 #define GRAVITY 9.81
 #define PI      3.14159265358979323846
@@ -30,21 +29,6 @@ static double sag(double unused)
     return a * (cosh(SPAN / (2 * a)) - 1);
 }
 
-static int catenary_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    (void)c;
-    return snprintf(
-        text, DRAPE_LAB_TEXT,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 61, 'rows': 3, 'width': %g, "
-        "'height': 0.04},\n "
-        "'material': {'young_modulus': 1e7, 'poisson_ratio': 0, 'thickness': 1e-3, 'areal_density': 0.1},\n "
-        "'terms': ['stretch.cst', {'type': 'bend.midedge', 'warp': 1e-6, 'weft': 1e-6}],\n "
-        "'pins': [{'edge': 'left'}, {'edge': 'right', 'track': [[0, [0, 0, 0]], [1, [%g, 0, 0]]]}]}],\n "
-        "'gravity': [0, -9.81, 0], 'integrator': {'method': 'be', 'dt': 0.02, 'tolerance': 1e-5}, "
-        "'duration': 1.6}",
-        LENGTH, SPAN - LENGTH);
-}
-
 static drape_status measure_sag(drape_reference_run *run, double *value)
 {
     const size_t nodes = (size_t)drape_model_node_count(run->model);
@@ -61,7 +45,14 @@ static drape_status measure_sag(drape_reference_run *run, double *value)
 DRAPE_REFERENCE(catenary, .entry.summary = "sag of 1.2 m over a span of 1 m", .unit = "m", DRAPE_CASES(0),
                 .model = "stretch.cst, bend.midedge; irregular",
                 .entry.reference = "2 a sinh(s/(2 a)) = L, sag a (cosh(s/(2 a)) - 1)", .tolerance = 0.001,
-                .expected = sag, .scene = catenary_scene, .measure = measure_sag);
+                .expected = sag, .measure = measure_sag,
+                SHEET(.columns = 61, .rows = 3, .width = LENGTH, .height = 0.04, .young_modulus = 1e7,
+                      .thickness = 1e-3, .areal_density = 0.1,
+                      .terms = "'stretch.cst', {'type': 'bend.midedge', 'warp': 1e-6, 'weft': 1e-6}",
+                      .pins = "{'edge': 'left'}, "
+                              "{'edge': 'right', 'track': [[0, [0, 0, 0]], [1, [-0.2, 0, 0]]]}",
+                      .gravity = {0, -GRAVITY, 0}, .integrator = "'method': 'be'", .dt = 0.02,
+                      .tolerance = 1e-5, .duration = 1.6));
 
 /* ---- Frequencies of a hanging chain of 1 m ----
  *
@@ -71,6 +62,10 @@ DRAPE_REFERENCE(catenary, .entry.summary = "sag of 1.2 m over a span of 1 m", .u
 
 #define STEPS 200  /* of a period */
 #define SPEED 1e-2 /* [m/s] of the free end */
+#define CHAIN                                                                                                \
+    .columns = 3, .rows = 81, .width = 0.025, .height = 1, .mesh = "'orientation': 'vertical'",              \
+    .young_modulus = 1e6, .thickness = 1e-3, .areal_density = 0.1, .terms = "'stretch.cst'",                 \
+    .pins = "{'edge': 'top'}", .gravity = {0, -GRAVITY, 0}
 
 /* omega [rad/s]: u = J0(2 omega sqrt(s/g)), s from the free end */
 static double frequency(double mode)
@@ -85,15 +80,8 @@ static double step_size(double mode)
 
 static int chain_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return snprintf(
-        text, DRAPE_LAB_TEXT,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 3, 'rows': 81, 'width': 0.025, "
-        "'height': 1, 'orientation': 'vertical'},\n "
-        "'material': {'young_modulus': 1e6, 'poisson_ratio': 0, 'thickness': 1e-3, 'areal_density': 0.1},\n "
-        "'terms': ['stretch.cst'], 'pins': [{'edge': 'top'}]}],\n "
-        "'gravity': [0, %g, 0], 'integrator': {'method': 'midpoint', 'dt': %.17g, 'tolerance': 1e-10}, "
-        "'controller': {'type': 'fixed'}, 'duration': 1}",
-        -GRAVITY, step_size(c->parameter));
+    return SHEET_TEXT(text, CHAIN, .integrator = "'method': 'midpoint'", .dt = step_size(c->parameter),
+                      .tolerance = 1e-10, .others = "'controller': {'type': 'fixed'}");
 }
 
 /* The amplitude of a mode: other modes are orthogonal to it in the mass matrix. */
@@ -133,3 +121,10 @@ DRAPE_REFERENCE(chain, .entry.summary = "frequency of a hanging chain", .unit = 
                 DRAPE_CASES(1, 2, 3), .model = "stretch.cst; irregular; midpoint",
                 .entry.reference = "omega_n = j_0n/2 sqrt(g/L); D. Bernoulli 1733", .tolerance = 0.005,
                 .expected = frequency, .scene = chain_scene, .measure = measure_frequency);
+
+/* The same by drape_sim_modes, of those that move the chain along z. */
+DRAPE_REFERENCE(chain_modes, .entry.summary = "frequency of a hanging chain, as a mode", .unit = "rad/s",
+                .parameter = "mode", DRAPE_CASES(1, 2, 3), .model = "stretch.cst; irregular; modes",
+                .entry.reference = "omega_n = j_0n/2 sqrt(g/L); D. Bernoulli 1733", .tolerance = 0.005,
+                .expected = frequency, SHEET(CHAIN, .tolerance = 1e-9), .measure = lab_omega,
+                .constants = {3, 16, 1});

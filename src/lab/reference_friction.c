@@ -1,21 +1,24 @@
 /* reference_friction.c: friction of a sheet on a table. */
-#include "lab/strip.h"
+#include "lab/sheet.h"
 
 #include <math.h>
-#include <stdio.h>
 
 #define GRAVITY 9.81
 #define DEGREE  (3.14159265358979323846 / 180)
 
-/* A sheet on a plane with normal y; gravity, distance and friction, velocity, integrator and duration
- * follow. */
-#define SHEET                                                                                                \
-    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 4, 'rows': 3, 'width': 0.3, "          \
-    "'height': 0.2,\n 'transform': {'translate': [0, 0.0095, 0]}},\n "                                       \
-    "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 0.2}, "                          \
-    "'terms': ['stretch.cst', 'bend.midedge']}],\n "                                                         \
-    "'gravity': [%.17g, %.17g, 0], 'colliders': [{'type': 'plane', 'point': [0, 0, 0], "                     \
-    "'normal': [0, 1, 0], 'friction': %.17g}],\n "
+/* A sheet on a plane with normal y. */
+#define TABLE                                                                                                \
+    .columns = 4, .rows = 3, .width = 0.3, .height = 0.2,                                                    \
+    .mesh = "'transform': {'translate': [0, 0.0095, 0]}",                                                    \
+    .material = "'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 0.2", .tolerance = 1e-9
+
+static const char *contact(double friction, double velocity, char text[400])
+{
+    return lab_sheet_format(text,
+                            "'colliders': [{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], "
+                            "'friction': %.17g}],\n 'contact': {'distance': 0.01, 'friction_velocity': %g}",
+                            friction, velocity);
+}
 
 /* ---- The friction above which a sheet stays on a slope ---- */
 
@@ -30,23 +33,18 @@ static double slope(double degrees)
 
 static int slope_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return snprintf(text, DRAPE_LAB_TEXT,
-                    SHEET "'contact': {'distance': 0.01, 'friction_velocity': %g},\n "
-                          "'integrator': {'method': 'be', 'dt': 0.01, 'tolerance': 1e-9}, 'duration': 1}",
-                    GRAVITY * sin(c->parameter * DEGREE), -GRAVITY * cos(c->parameter * DEGREE), c->load,
-                    CREEP);
+    const double angle = c->parameter * DEGREE;
+    return SHEET_TEXT(text, TABLE, .gravity = {GRAVITY * sin(angle), -GRAVITY * cos(angle), 0},
+                      .others = contact(c->load, CREEP, (char[400]){0}), .integrator = "'method': 'be'",
+                      .dt = 0.01);
 }
 
 /* Returns 1 if the sheet stays. With 1e-3 less friction than needed its speed after a second is 1e-3 g sin a,
  * at least 17 times CREEP. */
 static drape_status measure_stays(drape_reference_run *run, double *value)
 {
-    const int32_t nodes = drape_model_node_count(run->model);
-    double speed = 0;
     drape_status status = lab_advance(run);
-    for (int32_t i = 0; i < nodes; i++)
-        speed += drape_sim_velocities(run->sim)[3 * (size_t)i] / nodes;
-    *value = speed < CREEP;
+    *value = lab_mean(run, drape_sim_velocities(run->sim), 0) < CREEP;
     return status;
 }
 
@@ -70,20 +68,9 @@ static double stopping_distance(double mu)
 
 static int slide_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return snprintf(text, DRAPE_LAB_TEXT,
-                    SHEET "'contact': {'distance': 0.01, 'friction_velocity': 1e-3},\n "
-                          "'integrator': {'method': 'trbdf2', 'dt': 0.002, 'tolerance': 1e-9}, "
-                          "'duration': 10}",
-                    0.0, -GRAVITY, c->parameter);
-}
-
-static double mean_x(const drape_reference_run *run)
-{
-    const int32_t nodes = drape_model_node_count(run->model);
-    double sum = 0;
-    for (int32_t i = 0; i < nodes; i++)
-        sum += drape_sim_positions(run->sim)[3 * (size_t)i];
-    return sum / nodes;
+    return SHEET_TEXT(text, TABLE, .gravity = {0, -GRAVITY, 0},
+                      .others = contact(c->parameter, 1e-3, (char[400]){0}),
+                      .integrator = "'method': 'trbdf2'", .dt = 0.002, .duration = 10);
 }
 
 /* Advances twice as long as the sheet takes to stop. */
@@ -94,10 +81,10 @@ static drape_status measure_slide(drape_reference_run *run, double *value)
     for (size_t i = 0; v && i < n; i += 3)
         v[i] = SPEED;
     drape_status status = v ? lab_settle(run, v) : DRAPE_E_MEMORY;
-    const double before = mean_x(run);
+    const double before = lab_mean(run, drape_sim_positions(run->sim), 0);
     if (!status)
         status = drape_sim_advance(run->sim, 2 * SPEED / (run->parameter * GRAVITY));
-    *value = mean_x(run) - before;
+    *value = lab_mean(run, drape_sim_positions(run->sim), 0) - before;
     return status;
 }
 

@@ -2,47 +2,18 @@
  * reference_inflation.c: membranes that are blown up. They bear no compression: all have stretch.tension. The
  * rims lie in planes of symmetry, in which nodes may move.
  */
-#include "lab/strip.h"
+#include "lab/sheet.h"
 
 #include <gsl/gsl_sf_ellint.h>
 #include <math.h>
-#include <stdio.h>
 
-/* Of a mesh, a material and a load; its left, right and bottom edges lie in planes of symmetry. */
-static int inflated_scene(const char *mesh, const char *material, const char *load, const char *pins,
-                          double tolerance, char text[DRAPE_LAB_TEXT])
-{
-    return snprintf(text, DRAPE_LAB_TEXT,
-                    "{'drape': 1, 'cloth': [{'mesh': {%s},\n 'material': {%s, 'areal_density': 1},\n "
-                    "'terms': ['stretch.tension', %s],\n 'pins': [%s]}],\n 'gravity': [0, 0, 0], "
-                    "'integrator': {'method': 'static', 'tolerance': %g, 'max_iterations': 2000}, "
-                    "'duration': 1}",
-                    mesh, material, load, pins, tolerance);
-}
+#define INFLATED .areal_density = 1, .integrator = "'method': 'static', 'max_iterations': 2000"
 
 /* ---- A square airbag ----
  *
  * Two flat squares with a diagonal of 1.2 m, joined along their edges: a quarter of one of them, E = 588 MPa,
  * nu = 0.4, 0.6 mm thick, under 5 kPa. The middle rises by 0.217 m (Contri & Schrefler), 0.216 m (Kang &
  * Im 1997) and to 0.218 m in other papers with a law for wrinkles. */
-
-static double airbag_expected(double unused)
-{
-    (void)unused;
-    return 0.217;
-}
-
-static int airbag_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    (void)c;
-    return inflated_scene("'grid': 'square', 'rows': 25, 'columns': 25, 'width': 0.42426406871192851, "
-                          "'height': 0.42426406871192851",
-                          "'young_modulus': 588e6, 'poisson_ratio': 0.4, 'thickness': 6e-4",
-                          "{'type': 'load.pressure', 'pressure': 5000, 'point': [0, 0, 0]}",
-                          "{'edge': 'left', 'normal': [1, 0, 0]}, {'edge': 'top', 'normal': [0, 0, 1]}, "
-                          "{'edge': 'right', 'normal': [0, 1, 0]}, {'edge': 'bottom', 'normal': [0, 1, 0]}",
-                          1e-4, text);
-}
 
 static drape_status measure_rise(drape_reference_run *run, double *value)
 {
@@ -56,26 +27,27 @@ DRAPE_REFERENCE(airbag_square, .entry.summary = "rise of the middle of a square 
                 .entry.reference =
                     "Contri & Schrefler 1988, A geometrically nonlinear finite element analysis of wrinkled "
                     "membrane surfaces by a no-compression material model",
-                .tolerance = 0.01, .expected = airbag_expected, .scene = airbag_scene,
-                .measure = measure_rise);
+                .tolerance = 0.01, DRAPE_KNOWN(0.217), .measure = measure_rise,
+                SHEET(INFLATED, .grid = "square", .columns = 25, .rows = 25, .width = 0.42426406871192851,
+                      .height = 0.42426406871192851, .young_modulus = 588e6, .poisson_ratio = 0.4,
+                      .thickness = 6e-4, .tolerance = 1e-4,
+                      .terms = "'stretch.tension', "
+                               "{'type': 'load.pressure', 'pressure': 5000, 'point': [0, 0, 0]}",
+                      .pins = "{'edge': 'left', 'normal': [1, 0, 0]}, {'edge': 'top', 'normal': [0, 0, 1]}, "
+                              "{'edge': 'right', 'normal': [0, 1, 0]}, "
+                              "{'edge': 'bottom', 'normal': [0, 1, 0]}"));
 
 /* ---- Round ones ----
  *
  * A quarter of the upper half. The grid has a hole at the pole, whose radius of 1/50 changes the results by
  * its square. */
 
-#define HOLE     "'top_radius': 0.02, 'bottom_radius': 1, 'angle': 90"
-#define MATERIAL "'young_modulus': 1e6, 'poisson_ratio': 0.3, 'thickness': 0.001" /* E h = 1000 N/m */
-#define PLANES                                                                                               \
-    "{'edge': 'left', 'normal': [0, 0, 1]}, {'edge': 'right', 'normal': [1, 0, 0]}, {'edge': 'bottom', "     \
-    "'normal': [0, 1, 0]}"
-
-static int round_scene(const char *mesh, double pressure, char text[DRAPE_LAB_TEXT])
-{
-    char load[100];
-    snprintf(load, sizeof load, "{'type': 'load.follower', 'pressure': %.17g}", pressure);
-    return inflated_scene(mesh, MATERIAL, load, PLANES, 1e-6, text);
-}
+#define HOLE  "'top_radius': 0.02, 'bottom_radius': 1, 'angle': 90"
+#define ROUND /* E h = 1000 N/m */                                                                           \
+    INFLATED, .grid = "revolution", .young_modulus = 1e6, .poisson_ratio = 0.3, .thickness = 0.001,          \
+              .tolerance = 1e-6,                                                                             \
+              .pins = "{'edge': 'left', 'normal': [0, 0, 1]}, {'edge': 'right', 'normal': [1, 0, 0]}, "      \
+                      "{'edge': 'bottom', 'normal': [0, 1, 0]}"
 
 /* Distance of the last node, on the rim, from the axis. */
 static double radius_of(const drape_reference_run *run)
@@ -94,9 +66,10 @@ static double sphere_expected(double pressure)
 
 static int sphere_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return round_scene("'grid': 'revolution', 'rows': 25, 'columns': 25, 'height': 0.999799979995999, "
-                       "'arc_radius': 1, " HOLE,
-                       1000 * c->parameter, text);
+    return SHEET_TEXT(text, ROUND, .columns = 25, .rows = 25,
+                      .mesh = "'height': 0.999799979995999, 'arc_radius': 1, " HOLE,
+                      .terms = SHEET_FORMAT("'stretch.tension', {'type': 'load.follower', 'pressure': %.17g}",
+                                            1000 * c->parameter));
 }
 
 static drape_status measure_radius(drape_reference_run *run, double *value)
@@ -122,13 +95,6 @@ static double mylar_expected(double thickness)
     return sqrt(2) * (thickness > 0 ? second - first / 2 : 1 / first);
 }
 
-/* Strains are some p r/(2 E h) = 5e-5. */
-static int mylar_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    (void)c;
-    return round_scene("'grid': 'revolution', 'rows': 17, 'columns': 17, " HOLE, 0.1, text);
-}
-
 static drape_status measure_mylar(drape_reference_run *run, double *value)
 {
     const drape_status status = lab_advance(run);
@@ -142,5 +108,7 @@ DRAPE_REFERENCE(mylar_balloon, .entry.summary = "shape of two discs that were jo
                 DRAPE_CASES(0, 1), .model = "stretch.tension, load.follower; revolution, 16 x 16 cells",
                 .entry.reference = "Paulsen 1994, What is the shape of a Mylar balloon?; Mladenov & Oprea "
                                    "2003, The Mylar balloon revisited",
-                .tolerance = 0.005, .expected = mylar_expected, .scene = mylar_scene,
-                .measure = measure_mylar);
+                .tolerance = 0.005, .expected = mylar_expected, .measure = measure_mylar,
+                /* Strains are some p r/(2 E h) = 5e-5. */
+                SHEET(ROUND, .columns = 17, .rows = 17, .mesh = HOLE,
+                      .terms = "'stretch.tension', {'type': 'load.follower', 'pressure': 0.1}"));

@@ -1,10 +1,9 @@
 /* reference_integrators.c: the solutions of time integrators for free fall and for a linear oscillation, step
  * by step. */
-#include "lab/strip.h"
+#include "lab/sheet.h"
 
 #include <complex.h>
 #include <math.h>
-#include <stdio.h>
 
 /* ---- Free fall ---- */
 
@@ -19,15 +18,10 @@ static double fallen(double n)
 
 static int fall_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return snprintf(
-        text, DRAPE_LAB_TEXT,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 4, 'rows': 4, 'width': 1, "
-        "'height': 1},\n "
-        "'material': {'young_modulus': 1e4, 'poisson_ratio': 0.3, 'thickness': 1e-3, "
-        "'areal_density': 0.1},\n "
-        "'terms': ['stretch.cst', 'bend.midedge']}],\n 'gravity': [0, %g, 0], "
-        "'integrator': {'method': 'be', 'dt': %.17g, 'tolerance': 1e-12}, 'duration': %g}",
-        -GRAVITY, TIME / c->parameter, TIME);
+    return SHEET_TEXT(text, .columns = 4, .rows = 4, .width = 1, .height = 1, .young_modulus = 1e4,
+                      .poisson_ratio = 0.3, .thickness = 1e-3, .areal_density = 0.1,
+                      .gravity = {0, -GRAVITY, 0}, .integrator = "'method': 'be'", .dt = TIME / c->parameter,
+                      .tolerance = 1e-12, .duration = TIME);
 }
 
 /* The limit allows for Newton's tolerance and rounding. */
@@ -41,24 +35,18 @@ DRAPE_REFERENCE(free_fall, .entry.summary = "distance fallen in 0.5 s", .unit = 
  * Two nodes on an elastic sheet whose other side is fixed: k = E h w/L = 1 N/m, and half of the mass of 1 kg
  * moves, so omega^2 = 2. The sheet starts at rest length; at strains of 1e-5 it is linear to 1e-5. */
 
-#define SPEED           1e-5 /* [m/s] at the start */
-#define OMEGA           1.41421356237309504880
-#define PI              3.14159265358979323846
-#define AMPLITUDE_STEPS 20
-#define PHASE_STEPS     50
+#define SPEED       1e-5 /* [m/s] at the start */
+#define OMEGA       1.41421356237309504880
+#define PI          3.14159265358979323846
+#define PHASE_STEPS 50
 
 static int oscillator(const drape_reference_case *c, double angle, char text[DRAPE_LAB_TEXT])
 {
-    return snprintf(
-        text, DRAPE_LAB_TEXT,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 2, 'rows': 2, 'width': 1, "
-        "'height': 1},\n "
-        "'material': {'young_modulus': 1, 'poisson_ratio': 0, 'thickness': 1, 'areal_density': 1, "
-        "'mass': 'uniform'},\n "
-        "'terms': ['stretch.cst'], 'pins': [{'edge': 'top'}], 'velocity': [0, 0, %g]}],\n "
-        "'gravity': [0, 0, 0], 'integrator': {%s, 'dt': %.17g, 'tolerance': 1e-15},\n "
-        "'controller': {'type': 'fixed'}, 'duration': 1000}",
-        -SPEED, c->reference->members, angle / OMEGA);
+    return SHEET_TEXT(text, .grid = "square", .columns = 2, .rows = 2, .width = 1, .height = 1,
+                      .young_modulus = 1, .thickness = 1, .areal_density = 1, .material = "'mass': 'uniform'",
+                      .terms = "'stretch.cst'", .pins = "{'edge': 'top'}", .velocity = "0, 0, -1e-5",
+                      .integrator = c->reference->integrator, .dt = angle / OMEGA, .tolerance = 1e-15,
+                      .others = "'controller': {'type': 'fixed'}", .duration = 1000);
 }
 
 static int oscillator_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
@@ -77,20 +65,18 @@ static double energy(const drape_reference_run *run)
     return e.kinetic + e.elastic;
 }
 
-/* The factor of the amplitude in a step: from the energies after `from` and after `to` steps. */
-static drape_status measure_between(drape_reference_run *run, int from, int to, double *value)
+/* The factor of the amplitude in a step, from energies. Constants: how many steps come before, and how many
+ * are measured. */
+static drape_status measure_amplitude(drape_reference_run *run, double *value)
 {
+    const int from = (int)run->reference->constants[0];
+    const int steps = (int)run->reference->constants[1];
     drape_status status = from ? advance(run, from) : DRAPE_OK;
     const double before = energy(run);
     if (!status)
-        status = advance(run, to - from);
-    *value = pow(energy(run) / before, 0.5 / (to - from));
+        status = advance(run, steps);
+    *value = pow(energy(run) / before, 0.5 / steps);
     return status;
-}
-
-static drape_status measure_amplitude(drape_reference_run *run, double *value)
-{
-    return measure_between(run, 0, AMPLITUDE_STEPS, value);
 }
 
 /* The angle of a step over omega h: every method that advances x and v by one matrix of determinant 1 has
@@ -113,10 +99,10 @@ static drape_status measure_phase(drape_reference_run *run, double *value)
     return status;
 }
 
-/* members: of the integrator, besides dt and tolerance. */
 #define OSCILLATOR .unit = "1", .parameter = "omega h", .tolerance = 1e-4, .scene = oscillator_scene
-#define AMPLITUDE  OSCILLATOR, .entry.summary = "fraction of the amplitude that a step leaves"
-#define PHASE      OSCILLATOR, .entry.summary = "angle of a step over omega h", .measure = measure_phase
+#define AMPLITUDE                                                                                            \
+    OSCILLATOR, .entry.summary = "fraction of the amplitude that a step leaves", .measure = measure_amplitude
+#define PHASE OSCILLATOR, .entry.summary = "angle of a step over omega h", .measure = measure_phase
 
 /* Backward Euler leaves this factor of the energy in each step. */
 static double euler(double angle)
@@ -133,8 +119,9 @@ static drape_status measure_energy(drape_reference_run *run, double *value)
 
 DRAPE_REFERENCE(oscillator, OSCILLATOR, .entry.summary = "fraction of the energy that a step leaves",
                 DRAPE_CASES(0.1, 0.5, 2), .model = "stretch.cst; square; be",
-                .entry.reference = "1/(1 + omega^2 h^2), of 1/(1 - i omega h)", .members = "'method': 'be'",
-                .expected = euler, .measure = measure_energy);
+                .entry.reference = "1/(1 + omega^2 h^2), of 1/(1 - i omega h)",
+                .integrator = "'method': 'be'", .expected = euler, .measure = measure_energy,
+                .constants = {0, 20});
 
 /* On z' = i omega z the formula 3/2 z1 - 2 z0 + 1/2 z_ = i omega h z1 has the roots (2 +- sqrt(1 + 2 i omega
  * h))/(3 - 2 i omega h). The larger is the factor of the amplitude per step once the other has decayed, to
@@ -145,14 +132,9 @@ static double bdf2(double angle)
     return cabs((2 + csqrt(1 + 2 * z)) / (3 - 2 * z));
 }
 
-static drape_status measure_late(drape_reference_run *run, double *value)
-{
-    return measure_between(run, 15, 25, value);
-}
-
 DRAPE_REFERENCE(oscillator_bdf2, AMPLITUDE, DRAPE_CASES(0.1, 0.5, 2), .model = "stretch.cst; square; bdf2",
                 .entry.reference = "roots of (3/2 - i omega h) r^2 - 2 r + 1/2; .990401 at omega h = .5",
-                .members = "'method': 'bdf2'", .expected = bdf2, .measure = measure_late);
+                .integrator = "'method': 'bdf2'", .expected = bdf2, .constants = {15, 10});
 
 /* The stability function on the imaginary axis: R = (a1 (1 + w)/(1 - w) - a0)/(1 - w) with w = gamma z/2,
  * gamma = 2 - sqrt(2), a1 = 1/(gamma (2 - gamma)), a0 = a1 - 1. */
@@ -166,7 +148,7 @@ static double trbdf2(double angle)
 DRAPE_REFERENCE(oscillator_trbdf2, AMPLITUDE, DRAPE_CASES(0.1, 0.5, 2),
                 .model = "stretch.cst; square; trbdf2",
                 .entry.reference = "stability function; Bank et al. 1985, Hosea & Shampine 1996",
-                .members = "'method': 'trbdf2'", .expected = trbdf2, .measure = measure_amplitude);
+                .integrator = "'method': 'trbdf2'", .expected = trbdf2, .constants = {0, 20});
 
 /* The implicit midpoint rule keeps the amplitude, and is slow: (1 + i w/2)/(1 - i w/2), w = omega h, turns by
  * 2 atan(w/2). */
@@ -177,7 +159,7 @@ static double midpoint(double angle)
 
 DRAPE_REFERENCE(oscillator_midpoint, PHASE, DRAPE_CASES(0.1, 0.5, 2),
                 .model = "stretch.cst; square; midpoint", .entry.reference = "2 atan(omega h/2)",
-                .members = "'method': 'midpoint'", .expected = midpoint);
+                .integrator = "'method': 'midpoint'", .expected = midpoint);
 
 /* Leapfrog keeps the amplitude below omega h = 2, and is fast: sin(angle/2) = omega h/2. */
 static double verlet(double angle)
@@ -186,7 +168,7 @@ static double verlet(double angle)
 }
 
 DRAPE_REFERENCE(oscillator_verlet, PHASE, DRAPE_CASES(0.1, 0.5, 1), .model = "stretch.cst; square; verlet",
-                .entry.reference = "2 asin(omega h/2)", .members = "'method': 'verlet', 'substeps': 1",
+                .entry.reference = "2 asin(omega h/2)", .integrator = "'method': 'verlet', 'substeps': 1",
                 .expected = verlet);
 
 /* Variable order and steps: the velocity after one, or ten, and an eighth oscillations over that at the
@@ -209,9 +191,9 @@ static drape_status measure_velocity(drape_reference_run *run, double *value)
     return status;
 }
 
-DRAPE_REFERENCE(oscillator_ida, .entry.summary = "velocity over that at the start", .unit = "1",
-                .parameter = "turns", DRAPE_CASES(1.125, 10.125),
-                .model = "stretch.cst; square; ida, order 5", .entry.reference = "cos(2 pi turns)",
-                .tolerance = 1e-3,
-                .members = "'method': 'ida', 'rtol': 1e-8, 'max_order': 5, 'atol_x': 1e-13, 'atol_v': 1e-13",
-                .expected = turned, .scene = turning_scene, .measure = measure_velocity);
+DRAPE_REFERENCE(
+    oscillator_ida, .entry.summary = "velocity over that at the start", .unit = "1", .parameter = "turns",
+    DRAPE_CASES(1.125, 10.125), .model = "stretch.cst; square; ida, order 5",
+    .entry.reference = "cos(2 pi turns)", .tolerance = 1e-3,
+    .integrator = "'method': 'ida', 'rtol': 1e-8, 'max_order': 5, 'atol_x': 1e-13, 'atol_v': 1e-13",
+    .expected = turned, .scene = turning_scene, .measure = measure_velocity);

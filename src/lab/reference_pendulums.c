@@ -1,10 +1,9 @@
 /* reference_pendulums.c: the period of two nodes on a stiff sheet that hangs from an axis and is released at
  * an angle. Steps are 1/400 of the period of small swings; the sheet stretches by less than 1e-4. */
-#include "lab/validate.h"
+#include "lab/sheet.h"
 
 #include <gsl/gsl_sf_ellint.h>
 #include <math.h>
-#include <stdio.h>
 
 #define GRAVITY 9.81
 #define PI      3.14159265358979323846
@@ -22,15 +21,13 @@ static double step_size(void)
 
 static int scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return snprintf(
-        text, DRAPE_LAB_TEXT,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 2, 'rows': 2, 'width': 1, "
-        "'height': 1, 'orientation': 'vertical', 'transform': {'rotate': [1, 0, 0, %g]}},\n "
-        "'material': {'young_modulus': 1e7, 'poisson_ratio': 0, 'thickness': 1e-2, 'areal_density': 0.1, "
-        "'mass': 'uniform'},\n "
-        "'terms': ['stretch.cst', 'bend.midedge'], 'pins': [{'edge': 'top'}]}],\n 'gravity': [0, %g, 0], "
-        "'integrator': {%s, 'dt': %.17g}, 'controller': {'type': 'fixed'}, 'duration': 10}",
-        c->parameter, -GRAVITY, c->reference->members, step_size());
+    return SHEET_TEXT(
+        text, .grid = "square", .columns = 2, .rows = 2, .width = 1, .height = 1,
+        .mesh =
+            SHEET_FORMAT("'orientation': 'vertical', 'transform': {'rotate': [1, 0, 0, %g]}", c->parameter),
+        .young_modulus = 1e7, .thickness = 1e-2, .areal_density = 0.1, .material = "'mass': 'uniform'",
+        .pins = "{'edge': 'top'}", .gravity = {0, -GRAVITY, 0}, .integrator = c->reference->integrator,
+        .dt = step_size(), .others = "'controller': {'type': 'fixed'}", .duration = 10);
 }
 
 /* Half a period passes from the first to the second crossing of the vertical. */
@@ -50,7 +47,6 @@ static drape_status measure(drape_reference_run *run, double *value)
     return status;
 }
 
-/* members: of the integrator, besides dt. */
 #define PENDULUM                                                                                             \
     .entry.summary = "period over that of small swings", .unit = "1", .parameter = "degrees",                \
     DRAPE_CASES(30, 90, 150), .entry.reference = "T/T0 = 2/pi K(sin(a/2))", .tolerance = 0.001,              \
@@ -58,16 +54,16 @@ static drape_status measure(drape_reference_run *run, double *value)
 
 /* Slow by (2 pi/400)^2/12 = 2e-5 at small swings. */
 DRAPE_REFERENCE(pendulum, PENDULUM, .model = "stretch.cst, bend.midedge; square; midpoint",
-                .members = "'method': 'midpoint', 'tolerance': 1e-9");
+                .integrator = "'method': 'midpoint', 'tolerance': 1e-9");
 
 /* Slow by (2 pi/400)^2/3 = 8e-5 at small swings. */
 DRAPE_REFERENCE(pendulum_bdf2, PENDULUM, .model = "stretch.cst, bend.midedge; square; bdf2",
-                .members = "'method': 'bdf2', 'tolerance': 1e-9");
+                .integrator = "'method': 'bdf2', 'tolerance': 1e-9");
 
 /* The error is a fraction of that of bdf2. */
 DRAPE_REFERENCE(pendulum_trbdf2, PENDULUM, .model = "stretch.cst, bend.midedge; square; trbdf2",
-                .members = "'method': 'trbdf2', 'tolerance': 1e-9");
+                .integrator = "'method': 'trbdf2', 'tolerance': 1e-9");
 
 /* ida chooses its steps; dt is the interval of observation. */
 DRAPE_REFERENCE(pendulum_ida, PENDULUM, .model = "stretch.cst, bend.midedge; square; ida, order 5",
-                .members = "'method': 'ida', 'rtol': 1e-6, 'max_order': 5");
+                .integrator = "'method': 'ida', 'rtol': 1e-6, 'max_order': 5");

@@ -1,18 +1,16 @@
 /* reference_relaxation.c: stress relaxation and creep of relax.maxwell, in a strip without lateral
  * contraction that is strained alike everywhere. */
-#include "lab/strip.h"
+#include "lab/sheet.h"
 
 #include <math.h>
-#include <stdio.h>
 
 #define SIDE      0.1    /* [m] */
 #define STIFFNESS 1000.0 /* E h [N/m] */
 
-/* The strip along x; material, relaxation, pins and terms follow. */
-#define STRIP                                                                                                \
-    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 5, 'rows': 5, 'width': 0.1, "          \
-    "'height': 0.1},\n 'material': {'young_modulus': 1e6, 'poisson_ratio': 0, 'thickness': 1e-3, "           \
-    "'areal_density': 0.1},\n "
+/* The strip along x. */
+#define PULLED                                                                                               \
+    .columns = 5, .rows = 5, .width = SIDE, .height = SIDE, .young_modulus = 1e6, .thickness = 1e-3,         \
+    .areal_density = 0.1, .integrator = "'method': 'be'"
 
 /* A state at the time 0 in which the strip was stretched at once. */
 static drape_status stretch(drape_reference_run *run, double strain)
@@ -43,40 +41,26 @@ static double prony(double t)
 /* Forty steps: the recurrence is exact in any. */
 static int held(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return snprintf(text, DRAPE_LAB_TEXT,
-                    STRIP "'terms': ['stretch.cst', {'type': 'relax.maxwell', 'fraction_1': %g, 'time_1': "
-                          "%g,\n 'fraction_2': %g, 'time_2': %g, 'fraction_3': %g, 'time_3': %g}],\n "
-                          "'pins': [{'edge': 'left'}, {'edge': 'right', 'track': [[0, [%.17g, 0, 0]]]}]}],\n "
-                          "'gravity': [0, 0, 0], "
-                          "'integrator': {'method': 'be', 'dt': %.17g}, 'duration': %.17g}",
-                    fractions[0], times[0], fractions[1], times[1], fractions[2], times[2], HELD * SIDE,
-                    c->parameter / 40, c->parameter);
-}
-
-/* The force along x of the pins on the right edge [N]. */
-static drape_status pull_of(drape_reference_run *run, double *reactions, double *force)
-{
-    const size_t nodes = (size_t)drape_model_node_count(run->model);
-    const double *rest = drape_model_rest_positions(run->model);
-    const drape_status status = drape_sim_reactions(run->sim, reactions);
-    *force = 0;
-    for (size_t i = 0; !status && i < nodes; i++)
-        *force += fabs(rest[3 * i] - SIDE) < 1e-9 ? reactions[3 * i] : 0;
-    return status;
+    return SHEET_TEXT(text, PULLED,
+                      .terms = "'stretch.cst', {'type': 'relax.maxwell', 'fraction_1': 0.3, 'time_1': 0.1,\n "
+                               "'fraction_2': 0.2, 'time_2': 1, 'fraction_3': 0.1, 'time_3': 10}",
+                      .pins = SHEET_FORMAT("{'edge': 'left'}, "
+                                           "{'edge': 'right', 'track': [[0, [%.17g, 0, 0]]]}",
+                                           HELD * SIDE),
+                      .dt = c->parameter / 40, .duration = c->parameter);
 }
 
 static drape_status measure_relaxation(drape_reference_run *run, double *value)
 {
-    const size_t nodes = (size_t)drape_model_node_count(run->model);
-    double *reactions = drape_arena_take(&run->arena, 3 * nodes, sizeof *reactions), before = 0, after = 0;
-    drape_status status = reactions ? stretch(run, HELD) : DRAPE_E_MEMORY;
+    double before[3] = {0}, after[3] = {0};
+    drape_status status = stretch(run, HELD);
     if (!status)
-        status = pull_of(run, reactions, &before);
+        status = lab_pull(run, 0, SIDE, before);
     if (!status)
         status = lab_advance(run);
     if (!status)
-        status = pull_of(run, reactions, &after);
-    *value = after / before;
+        status = lab_pull(run, 0, SIDE, after);
+    *value = after[0] / before[0];
     return status;
 }
 
@@ -103,13 +87,13 @@ static double compliance(double t)
 /* Steps of TIME/50 take the strain as straight between their ends, which is off by less than 1e-4. */
 static int loaded(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return snprintf(text, DRAPE_LAB_TEXT,
-                    STRIP
-                    "'terms': ['stretch.cst', {'type': 'relax.maxwell', 'fraction_1': %g, 'time_1': %g},\n "
-                    "{'type': 'load.line', 'edge': 'right', 'force': [%.17g, 0, 0]}],\n "
-                    "'pins': [{'edge': 'left'}]}],\n 'gravity': [0, 0, 0], "
-                    "'integrator': {'method': 'be', 'dt': %.17g, 'tolerance': 1e-12}, 'duration': %.17g}",
-                    RELAXING, TIME, STIFFNESS * STRAIN, TIME / 50, c->parameter);
+    return SHEET_TEXT(text, PULLED,
+                      .terms = SHEET_FORMAT("'stretch.cst', {'type': 'relax.maxwell', 'fraction_1': %g, "
+                                            "'time_1': %g},\n {'type': 'load.line', 'edge': 'right', "
+                                            "'force': [%.17g, 0, 0]}",
+                                            RELAXING, TIME, STIFFNESS * STRAIN),
+                      .pins = "{'edge': 'left'}", .dt = TIME / 50, .tolerance = 1e-12,
+                      .duration = c->parameter);
 }
 
 static drape_status measure_creep(drape_reference_run *run, double *value)

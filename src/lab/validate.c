@@ -2,6 +2,7 @@
 #include "lab/validate.h"
 
 #include "base/clock.h"
+#include "lab/sheet.h"
 
 #include <gsl/gsl_errno.h>
 #include <math.h>
@@ -10,10 +11,21 @@
 
 #define BISECTIONS 9 /* of a threshold: 1/512 of the interval that it is sought in */
 
-void drape_reference_quote(char *text)
+double drape_reference_expected(const drape_reference *reference, double parameter)
 {
-    for (char *c = strchr(text, '\''); c; c = strchr(c, '\''))
-        *c = '"';
+    for (int i = 0; i < reference->known_count; i++)
+        if (reference->known_count == 1 || reference->parameters[i] == parameter)
+            return reference->known[i];
+    return reference->expected ? reference->expected(parameter) : NAN;
+}
+
+int drape_reference_text(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    const drape_reference *r = c->reference;
+    const int length = r->scene ? r->scene(c, text) : lab_sheet_text(r->sheet, text);
+    for (char *at = strchr(text, '\''); at; at = strchr(at, '\''))
+        *at = '"';
+    return length;
 }
 
 static drape_status watch(void *user, const drape_event *event)
@@ -24,13 +36,12 @@ static drape_status watch(void *user, const drape_event *event)
 }
 
 /* Runs the scene of a load and measures. */
-static drape_status measure_at(drape_reference_run *run, const drape_reference *reference, double load,
-                               double *value)
+static drape_status measure_at(drape_reference_run *run, double load, double *value)
 {
+    const drape_reference *reference = run->reference;
     char json[DRAPE_LAB_TEXT];
     drape_scene *scene = NULL;
-    reference->scene(&(drape_reference_case){reference, run->parameter, load}, json);
-    drape_reference_quote(json);
+    drape_reference_text(&(drape_reference_case){reference, run->parameter, load}, json);
     drape_status status = drape_scene_parse(run->ctx, json, "reference", &scene);
     if (!status)
         status = drape_scene_compile(scene, &run->model);
@@ -48,14 +59,13 @@ static drape_status measure_at(drape_reference_run *run, const drape_reference *
 }
 
 /* Bisects between a load at which the measure is 0 and one at which it is not. */
-static drape_status search(drape_reference_run *run, const drape_reference *reference, double expected,
-                           double *load)
+static drape_status search(drape_reference_run *run, double expected, double *load)
 {
-    double low = reference->low * expected, high = reference->high * expected, value = 0;
+    double low = run->reference->low * expected, high = run->reference->high * expected, value = 0;
     drape_status status = DRAPE_OK;
     for (int k = 0; !status && k < BISECTIONS; k++) {
         *load = (low + high) / 2;
-        status = measure_at(run, reference, *load, &value);
+        status = measure_at(run, *load, &value);
         if (value > 0)
             high = *load;
         else
@@ -73,7 +83,7 @@ int drape_validate_runs(const drape_reference *reference)
 void drape_validate_judge(const drape_reference *reference, drape_validation *v)
 {
     gsl_set_error_handler_off(); /* the default handler ends the process */
-    v->expected = reference->expected(v->parameter);
+    v->expected = drape_reference_expected(reference, v->parameter);
     v->documented = reference->documented ? reference->documented(v->parameter) : NAN;
     v->error = v->obtained / (reference->documented ? v->documented : v->expected) - 1;
     v->verdict = *v->message                                 ? DRAPE_OUTCOME_STOPPED
@@ -86,16 +96,19 @@ drape_status drape_validate(drape_context *ctx, const drape_reference *reference
                             drape_validate_cancel *cancel, void *user, drape_validation *out)
 {
     const double start = drape_clock_cpu_seconds();
-    drape_reference_run run = {ctx, drape_arena_of(ctx), NULL, NULL, reference->parameters[index], cancel,
-                               user};
+    drape_reference_run run = {.reference = reference,
+                               .ctx = ctx,
+                               .arena = drape_arena_of(ctx),
+                               .parameter = reference->parameters[index],
+                               .cancel = cancel,
+                               .user = user};
     drape_status status;
     *out = (drape_validation){.parameter = run.parameter, .obtained = NAN};
     drape_validate_judge(reference, out);
     if (reference->high > 0)
-        status =
-            search(&run, reference, reference->documented ? out->documented : out->expected, &out->obtained);
+        status = search(&run, reference->documented ? out->documented : out->expected, &out->obtained);
     else
-        status = measure_at(&run, reference, 0, &out->obtained);
+        status = measure_at(&run, 0, &out->obtained);
     out->seconds = drape_clock_cpu_seconds() - start;
     if (status && cancel && cancel(user))
         return drape_fail(ctx, DRAPE_E_STOPPED, "interrupted");

@@ -11,8 +11,12 @@
 /* Whether to stop. Called after every step; it must not use the sim. */
 typedef bool drape_validate_cancel(void *user);
 
+typedef struct drape_reference drape_reference;
+typedef struct lab_sheet lab_sheet;
+
 /* A simulation while a reference is measured in it. */
 typedef struct drape_reference_run {
+    const drape_reference *reference;
     drape_context *ctx;
     drape_arena arena; /* freed after the measurement */
     drape_model *model;
@@ -32,13 +36,13 @@ typedef enum drape_outcome {
 
 /* The case and load that a scene is made for. */
 typedef struct drape_reference_case {
-    const struct drape_reference *reference;
+    const drape_reference *reference;
     double parameter;
     double load; /* trial value of a threshold; 0 in other references */
 } drape_reference_case;
 
 /* A reference. Its cases differ in one parameter. */
-typedef struct drape_reference {
+struct drape_reference {
     drape_entry entry;        /* summary: the quantity; reference: the source of what is expected */
     const char *unit;         /* of the quantity */
     const char *parameter;    /* what the cases differ in; NULL: there is one case */
@@ -46,17 +50,21 @@ typedef struct drape_reference {
     double tolerance;         /* relative; of the documented value where there is one */
     const double *parameters; /* (case_count), see DRAPE_CASES */
     int case_count;
-    double (*expected)(double parameter);
+    double (*expected)(double parameter);   /* NULL: known is given */
+    const double *known;                    /* the expected value of each case, or of all; see DRAPE_KNOWN */
+    int known_count;                        /* case_count, or 1 */
     double (*documented)(double parameter); /* what the model converges to instead; NULL: no model error */
-    /* Writes the text of the scene, in which ' stands for "; returns its length, as snprintf. */
+    const lab_sheet *sheet;                 /* the scene of all cases; NULL: `scene` writes one (sheet.h) */
+    /* Writes the text of the scene of a case, in which ' stands for "; returns its length. */
     int (*scene)(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]);
-    const char *members; /* of the scene, where entries share the function scene */
+    const char *integrator; /* for `scene`, where references differ in it: its members */
+    double constants[4];    /* for `scene` or `measure`, where references differ in them */
     /* Advances the sim and measures. */
     drape_status (*measure)(drape_reference_run *run, double *value);
     /* For thresholds: the quantity is the load above which measure is > 0, sought between these multiples of
      * the expected value. */
     double low, high;
-} drape_reference;
+};
 
 extern const drape_reference *const drape_references[]; /* NULL-ended */
 extern const drape_registry drape_reference_registry;
@@ -65,6 +73,11 @@ extern const drape_registry drape_reference_registry;
 #define DRAPE_CASES(...)                                                                                     \
     .parameters = (const double[]){__VA_ARGS__},                                                             \
     .case_count = sizeof((const double[]){__VA_ARGS__}) / sizeof(double)
+
+/* What is expected, where that is a table, or one value for all cases. */
+#define DRAPE_KNOWN(...)                                                                                     \
+    .known = (const double[]){__VA_ARGS__},                                                                  \
+    .known_count = sizeof((const double[]){__VA_ARGS__}) / sizeof(double)
 
 /* Defines the reference of that name; meson.build puts it into the table. */
 #define DRAPE_REFERENCE(id, ...) const drape_reference drape_reference_##id = {.entry.name = #id, __VA_ARGS__}
@@ -87,8 +100,11 @@ int drape_validate_runs(const drape_reference *reference);
 /* Fills all but parameter, obtained, seconds and message, which are given. */
 void drape_validate_judge(const drape_reference *reference, drape_validation *v);
 
-/* Turns ' into ". */
-void drape_reference_quote(char *text);
+/* What is expected of the case with that parameter. */
+double drape_reference_expected(const drape_reference *reference, double parameter);
+
+/* Writes the scene of a case as JSON. Returns its length; DRAPE_LAB_TEXT or more: it did not fit. */
+int drape_reference_text(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]);
 
 const char *drape_outcome_name(drape_outcome verdict);
 

@@ -1,0 +1,86 @@
+/* sheet.h: what references share: the text of a scene of one cloth, and measurements. */
+#ifndef DRAPE_LAB_SHEET_H
+#define DRAPE_LAB_SHEET_H
+
+#include "drape/lab.h"
+#include "lab/validate.h"
+
+/* A scene of one cloth. Members that are 0 have the defaults given here, or are not in the scene. Texts are
+ * JSON, in which ' stands for ", and go into the text of the scene as they are. */
+struct lab_sheet {
+    const char *grid; /* default: irregular */
+    int columns, rows;
+    double width, height; /* [m] of the grid */
+    const char *mesh;     /* its other members */
+    /* Of the material, all four of them if there is a modulus. */
+    double young_modulus, poisson_ratio, thickness, areal_density;
+    const char *material; /* its other members */
+    const char *terms;    /* default: 'stretch.cst', 'bend.midedge' */
+    const char *pins, *velocity;
+    double gravity[3];
+    const char *integrator; /* its members other than dt and tolerance; default: 'method': 'static' */
+    double dt, tolerance;
+    const char *others; /* other members of the scene */
+    double duration;    /* default: 1 */
+};
+
+/* Writes the text; returns its length. */
+int lab_sheet_text(const lab_sheet *s, char text[DRAPE_LAB_TEXT]);
+#define SHEET_TEXT(text, ...) lab_sheet_text(&(lab_sheet){__VA_ARGS__}, text)
+
+/* The same sheet in all cases, in an initialiser of drape_reference. */
+#define SHEET(...)                                                                                           \
+    .sheet = &(const lab_sheet)                                                                              \
+    {                                                                                                        \
+        __VA_ARGS__                                                                                          \
+    }
+
+/* A member of a sheet with values in it, valid to the end of the block. */
+const char *lab_sheet_format(char text[400], const char *format, ...) __attribute__((format(printf, 2, 3)));
+#define SHEET_FORMAT(...) lab_sheet_format((char[400]){0}, __VA_ARGS__)
+
+/* Members of the sheet of a strip along x, of length 1 m, thickness h and rigidity B = E h^3/12; clamped at its
+ * left end. */
+#define STRIP_RIGIDITY 1e-4 /* [N m] */
+#define STRIP_DENSITY  0.1  /* [kg/m2] */
+#define FREE_STRIP(h)                                                                                        \
+    .width = 1, .young_modulus = 12 * STRIP_RIGIDITY / ((h) * (h) * (h)), .thickness = (h),                  \
+    .areal_density = STRIP_DENSITY
+#define STRIP(h) FREE_STRIP(h), .pins = "{'edge': 'left', 'clamp': true}"
+
+/* The gravity that makes G = rho g L^3/B. */
+double lab_strip_gravity(double weight);
+
+/* Advances to the end of the scene. */
+drape_status lab_advance(drape_reference_run *run);
+
+/* The same, and the mean position of the nodes that had the largest x at rest; its y; its -y; its angle
+ * [degree] below the x axis. */
+drape_status lab_tip(drape_reference_run *run, double tip[3]);
+drape_status lab_rise(drape_reference_run *run, double *value);
+drape_status lab_sinking(drape_reference_run *run, double *value);
+drape_status lab_chord(drape_reference_run *run, double *value);
+
+/* The mean over all nodes of component k of positions or velocities (node_count x 3). */
+double lab_mean(const drape_reference_run *run, const double *values, size_t k);
+
+/* Advances, and measures the displacement of a node along an axis. The constants are pairs, one of each case:
+ * the node, and the axis as 1, 2 or 3, below 0 for the displacement against it. */
+drape_status lab_displacement(drape_reference_run *run, double *value);
+
+/* The sum of the forces of the pins [N] on the nodes whose component k was `at` at rest. */
+drape_status lab_pull(drape_reference_run *run, size_t k, double at, double force[3]);
+
+/* Sets the sim to the equilibrium near its state, found by "static", with velocities v (node_count x 3). */
+drape_status lab_settle(drape_reference_run *run, const double *v);
+
+/* Advances, and counts the unstable modes of the equilibrium that was found; DRAPE_E_SOLVER if that is not
+ * known. */
+drape_status lab_unstable_modes(drape_reference_run *run, double *value);
+
+/* Advances, and measures omega [rad/s] of the mode whose number is the parameter, of those that move the scene
+ * along an axis. Constants: the axis (1, 2 or 3; 0: all modes count), how many modes are computed, and by what
+ * omega is multiplied. */
+drape_status lab_omega(drape_reference_run *run, double *value);
+
+#endif
