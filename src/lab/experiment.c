@@ -3,7 +3,6 @@
 
 #include "base/clock.h"
 #include "base/def.h"
-#include "base/json_read.h"
 #include "base/param.h"
 #include "lab/plan.h"
 #include "lab/run.h"
@@ -207,22 +206,10 @@ static drape_status make_results(lab *l)
 
 static drape_status parse_about(lab *l, const char *folder, json_t **about)
 {
-    char *text;
-    size_t size;
-    json_error_t fault;
-    *about = NULL;
-    drape_status status = lab_read_text(&l->arena, folder, ABOUT, &text, &size);
-    if (status)
-        return status;
-    *about = drape_json_read(text, size, JSON_REJECT_DUPLICATES, &fault);
-    if (!*about && json_error_code(&fault) == json_error_out_of_memory)
-        return drape_fail_memory(l->ctx, size);
-    if (!*about)
-        return drape_fail(l->ctx, DRAPE_E_PARSE, "%.400s/" ABOUT ":%d:%d: %.200s", folder, fault.line,
-                          fault.column, fault.text);
     char path[500];
+    drape_status status = lab_read_json(&l->arena, folder, ABOUT, about);
     snprintf(path, sizeof path, "%.450s/" ABOUT, folder);
-    return lab_check_about(l->ctx, path, *about);
+    return status ? status : lab_check_about(l->ctx, path, *about);
 }
 
 /* Whether the cases are the same: what the figures show may differ. */
@@ -239,13 +226,7 @@ static bool is_same(const json_t *a, const json_t *b)
 
 static drape_status write_about(lab *l)
 {
-    errno = 0;
-    char *text = json_dumps(l->about, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
-    drape_status status = text && !drape_memory_ran_out()
-                              ? lab_write_text(l, ABOUT, text, strlen(text))
-                              : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for " ABOUT);
-    free(text);
-    return status;
+    return lab_write_json(l, ABOUT, json_incref(l->about), JSON_INDENT(1) | JSON_REAL_PRECISION(17));
 }
 
 static bool ends_in(const char *name, const char *ending)

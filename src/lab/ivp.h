@@ -55,6 +55,9 @@ bool lab_ivp_admits(const lab_ivp *s, const drape_integrator_ops *integrator);
 double lab_ivp_tolerance(const lab_ivp *s, int order, double dt);
 double lab_ivp_least_tolerance(const lab_ivp *s); /* near rounding */
 
+/* Compiles the scene with settings {pointer: value}. Errors: those of loading. */
+drape_status lab_ivp_load(const lab_ivp *s, const json_t *settings, drape_model **model);
+
 /* A step of which so many or, of an explicit method, as many times 2^k as keep it below a quarter of its
  * stability limit at the start, make up an interval. Errors: those of running. */
 drape_status lab_ivp_dt(const lab_ivp *s, const drape_integrator_ops *integrator, int steps, double *dt);
@@ -88,6 +91,10 @@ drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *
 drape_status lab_ivp_export(const lab_ivp *s, const char *folder, FILE *out);
 
 /* ---- For the files of the set ---- */
+
+/* The frames (time_count x nodes x 3) in the bytes of an NPY file, which are in the arena, with the start
+ * before them or without; frees the bytes. Errors: DRAPE_E_PARSE, DRAPE_E_MEMORY. */
+drape_status lab_ivp_take_frames(const lab_ivp *s, const char *path, char *bytes, size_t size, double **x);
 
 /* "DIR/KIND/NAME.ENDING" in the arena; NULL: out of memory. */
 char *lab_ivp_file(const lab_ivp *s, const char *kind, const char *ending);

@@ -136,16 +136,12 @@ drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
     const double duration = drape_model_duration(s->model);
     size_t count = 0;
     drape_model *model = NULL;
-    drape_lab_def def;
-    drape_lab_def_init(&def, sizeof def);
-    def.scene = s->path;
     json_t *settings;
     drape_status status = choose_method(s, &settings);
-    const lab_request request = {.def = &def, .settings = settings};
     for (int i = 0; i < SAMPLES; i++)
         t[i] = BEYOND * duration * (i + 1) / SAMPLES;
     if (!status)
-        status = lab_load(s->arena->ctx, &request, &model);
+        status = lab_ivp_load(s, settings, &model);
     if (!status)
         status = measure(s, model, t, growth, &count);
     for (size_t i = 0; i < count && t[i] <= duration * (1 + 1e-9); i++)

@@ -13,7 +13,6 @@
 #include "lab/lab.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define MAX_LEVELS   10

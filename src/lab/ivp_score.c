@@ -41,38 +41,33 @@ static drape_status check_array(const lab_ivp *s, const char *path, const drape_
 }
 
 /* Frames of another program; the start may come before them. */
-static drape_status read_frames(const lab_ivp *s, const char *path, const double **x)
+drape_status lab_ivp_take_frames(const lab_ivp *s, const char *path, char *bytes, size_t size, double **x)
 {
-    char *bytes;
-    size_t size;
+    const size_t numbers = 3 * (size_t)drape_model_node_count(s->model), frame = 8 * numbers;
     drape_npy array;
-    drape_status status = lab_read_text(s->arena, NULL, path, &bytes, &size);
-    if (status)
-        return status;
     if (!drape_npy_read(bytes, size, &array))
         return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
                           "%.400s: not an array as numpy.save writes it: its header cannot be read", path);
-    status = check_array(s, path, &array);
+    drape_status status = check_array(s, path, &array);
     if (status)
         return status;
-    const size_t frame = 24 * (size_t)array.shape[1], before = (size_t)array.shape[0] - s->time_count;
+    const size_t before = (size_t)array.shape[0] - s->time_count;
     if (size != array.data + frame * (size_t)array.shape[0])
         return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
                           "%.400s: its data are not as long as its header says: %zu bytes instead of %zu",
                           path, size - (size < array.data ? size : array.data),
                           frame * (size_t)array.shape[0]);
-    double *copy = drape_arena_take(s->arena, s->time_count, frame);
+    double *copy = *x = drape_arena_take(s->arena, s->time_count, frame);
     if (!copy)
         return DRAPE_E_MEMORY;
     memcpy(copy, bytes + array.data + frame * before, frame * s->time_count);
     drape_arena_release(s->arena, bytes);
-    *x = copy;
-    for (size_t i = 0; i < s->reference.size * s->time_count; i++)
+    for (size_t i = 0; i < numbers * s->time_count; i++)
         if (!(fabs(copy[i]) <= LARGEST))
-            return drape_fail(
-                s->arena->ctx, DRAPE_E_PARSE, "%.400s: frame %zu, at %.9g s, node %zu: %g is %s", path,
-                i / s->reference.size + before, s->times[i / s->reference.size], i % s->reference.size / 3,
-                copy[i], isfinite(copy[i]) ? "too large for a root mean square" : "not a finite number");
+            return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+                              "%.400s: frame %zu, at %.9g s, node %zu: %g is %s", path, i / numbers + before,
+                              s->times[i / numbers], i % numbers / 3, copy[i],
+                              isfinite(copy[i]) ? "too large for a root mean square" : "not a finite number");
     return DRAPE_OK;
 }
 
@@ -127,9 +122,12 @@ static void print_text(const lab_ivp *s, const double *x, const json_t *score, F
 
 drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *out)
 {
-    const double *x = NULL;
-    double worst = 0, error = 0, far;
-    drape_status status = read_frames(s, path, &x);
+    double *x = NULL, worst = 0, error = 0, far;
+    char *bytes;
+    size_t size;
+    drape_status status = lab_read_text(s->arena, NULL, path, &bytes, &size);
+    if (!status)
+        status = lab_ivp_take_frames(s, path, bytes, size, &x);
     if (status)
         return status;
     for (size_t i = 0; i < s->time_count; i++) {

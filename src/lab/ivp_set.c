@@ -1,6 +1,5 @@
 /* ivp_set.c: the scenes of the test set and their files; see ivp.h. */
 #include "base/hash.h"
-#include "io/npy.h"
 #include "lab/ivp.h"
 #include "lab/lab.h"
 #include "lab/text.h"
@@ -120,20 +119,25 @@ double lab_ivp_least_tolerance(const lab_ivp *s)
 
 /* ---- Runs ---- */
 
+drape_status lab_ivp_load(const lab_ivp *s, const json_t *settings, drape_model **model)
+{
+    drape_lab_def def;
+    drape_lab_def_init(&def, sizeof def);
+    def.scene = s->path;
+    return lab_load(s->arena->ctx, &(lab_request){.def = &def, .settings = settings}, model);
+}
+
 drape_status lab_ivp_dt(const lab_ivp *s, const drape_integrator_ops *integrator, int steps, double *dt)
 {
     drape_sim *sim = NULL;
     drape_model *model = NULL;
     drape_stability found = {0};
-    drape_lab_def def;
     *dt = s->interval / steps;
     if (!integrator->stability)
         return DRAPE_OK;
-    drape_lab_def_init(&def, sizeof def);
-    def.scene = s->path;
     json_t *settings =
         json_pack("{s:s, s:f}", "/integrator/method", integrator->entry.name, "/integrator/dt", *dt);
-    drape_status status = lab_load(s->arena->ctx, &(lab_request){.def = &def, .settings = settings}, &model);
+    drape_status status = lab_ivp_load(s, settings, &model);
     if (!status)
         status = drape_sim_create(s->arena->ctx, model, NULL, &sim);
     if (!status)
@@ -238,27 +242,11 @@ json_t *lab_ivp_provenance(const lab_ivp *s)
                      drape_model_node_count(s->model));
 }
 
-static drape_status read_json(const lab_ivp *s, const char *path, json_t **object)
-{
-    char *text;
-    size_t size;
-    json_error_t fault;
-    drape_status status = lab_read_text(s->arena, NULL, path, &text, &size);
-    *object = status ? NULL : json_loadb(text, size, 0, &fault);
-    if (!status && !*object)
-        status = drape_fail(s->arena->ctx, DRAPE_E_PARSE, "%.400s:%d:%d: %.200s", path, fault.line,
-                            fault.column, fault.text);
-    return status;
-}
-
 /* The positions, whose bytes must be those that the JSON describes. */
 static drape_status read_positions(lab_ivp *s, const char *path, const json_t *about)
 {
     char *bytes, digits[17];
-    size_t size, data = 0;
-    int64_t frames = 0;
-    int32_t nodes = 0;
-    const int32_t count = drape_model_node_count(s->model);
+    size_t size;
     drape_status status = lab_read_text(s->arena, NULL, path, &bytes, &size);
     if (status)
         return status;
@@ -268,25 +256,18 @@ static drape_status read_positions(lab_ivp *s, const char *path, const json_t *a
         return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
                           "%.400s: damaged: its bytes are not those that %.60s.json beside it describes",
                           path, s->name);
-    if (!drape_npy_read_header(bytes, size, &frames, &nodes, &data) || nodes != count ||
-        frames != (int64_t)s->time_count || size != data + 24 * (size_t)nodes * (size_t)frames)
-        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
-                          "%.400s: not an array of float64 of shape (%zu, %d, 3), C order", path,
-                          s->time_count, count);
-    s->reference = (lab_trace){.size = 3 * (size_t)nodes, .frames = frames, .room = frames};
-    s->reference.x = drape_arena_take(s->arena, s->reference.size * (size_t)frames, sizeof(double));
-    if (!s->reference.x)
-        return DRAPE_E_MEMORY;
-    memcpy(s->reference.x, bytes + data, size - data);
-    drape_arena_release(s->arena, bytes);
-    return DRAPE_OK;
+    s->reference.frames = s->reference.room = (int64_t)s->time_count;
+    s->reference.size = 3 * (size_t)drape_model_node_count(s->model);
+    status = lab_ivp_take_frames(s, path, bytes, size, &s->reference.x);
+    s->reference.frames = status ? 0 : s->reference.frames;
+    return status;
 }
 
 drape_status lab_ivp_read_reference(lab_ivp *s)
 {
     json_t *about = NULL;
     const char *path = lab_ivp_file(s, "references", "json"), *data = lab_ivp_file(s, "references", "npy");
-    drape_status status = path && data ? read_json(s, path, &about) : DRAPE_E_MEMORY;
+    drape_status status = path && data ? lab_read_json(s->arena, NULL, path, &about) : DRAPE_E_MEMORY;
     if (!status && strcmp(lab_text(about, "scene_hash"), s->hash) != 0)
         status =
             drape_fail(s->arena->ctx, DRAPE_E_PARSE,
@@ -305,7 +286,8 @@ json_t *lab_ivp_read_horizon(const lab_ivp *s)
 {
     json_t *about = NULL;
     const char *path = lab_ivp_file(s, "horizons", "json");
-    if (!path || read_json(s, path, &about) || strcmp(lab_text(about, "scene_hash"), s->hash) == 0)
+    if (!path || lab_read_json(s->arena, NULL, path, &about) ||
+        strcmp(lab_text(about, "scene_hash"), s->hash) == 0)
         return about;
     json_decref(about);
     return NULL;

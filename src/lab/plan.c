@@ -196,12 +196,7 @@ static drape_status write_json(lab *l, const plan *p)
                             (json_int_t)p->sampled, "jobs", p->jobs);
     for (size_t i = 0; i < sizeof reals / sizeof *reals; i++)
         json_object_set_new(all, reals[i].key, drape_json_number(reals[i].value));
-    char *text = json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(6));
-    json_decref(all);
-    drape_status status = text ? lab_write_text(l, "plan.json", text, strlen(text))
-                               : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for plan.json");
-    free(text);
-    return status;
+    return lab_write_json(l, "plan.json", all, JSON_INDENT(1) | JSON_REAL_PRECISION(6));
 }
 
 /* "3.2 hours" */

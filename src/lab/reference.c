@@ -7,7 +7,6 @@
 #include "model/model.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define MAX_LEVELS  6
@@ -105,12 +104,9 @@ static drape_status save(lab *l, const sequence *s, bool chosen, const level *la
                               "knob", s->knob, "value", last->knob, "error_m", drape_json_number(last->error),
                               "frames", (json_int_t)trace->frames, "size", (json_int_t)trace->size, "format",
                               FORMAT, "levels", last->count, "took_s", last->took, "spent_s", last->spent);
-    char *text = about ? json_dumps(about, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
     name_file(l, chosen ? NULL : s, "json", name);
     if (!status)
-        status = text ? lab_write_text(l, name, text, strlen(text))
-                      : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for the reference");
-    free(text);
+        return lab_write_json(l, name, about, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
     json_decref(about);
     return status;
 }
@@ -119,18 +115,18 @@ static drape_status save(lab *l, const sequence *s, bool chosen, const level *la
  * name_file. */
 static bool read_saved(lab *l, const drape_model *model, const sequence *s, level *last)
 {
-    char name[64], *text = NULL, *data = NULL;
-    size_t length = 0, bytes = 0;
+    char name[64], *data = NULL;
+    size_t bytes = 0;
+    json_t *about;
     name_file(l, s, "json", name);
-    bool read = !lab_read_text(&l->arena, l->folder, name, &text, &length);
+    bool read = !lab_read_json(&l->arena, l->folder, name, &about);
     name_file(l, s, "f64", name);
     read = read && !lab_read_text(&l->arena, l->folder, name, &data, &bytes);
-    json_t *about = read ? json_loadb(text, length, 0, NULL) : NULL;
     const size_t size = 3 * (size_t)drape_model_node_count(model), frame = size * sizeof(double);
     const int64_t frames = (int64_t)(bytes / frame);
     const json_int_t levels = json_integer_value(json_object_get(about, "levels"));
     const double error = lab_number(about, "error_m");
-    const bool fits = frames > 0 && bytes % frame == 0 && levels > 0 && levels <= MAX_LEVELS &&
+    const bool fits = read && frames > 0 && bytes % frame == 0 && levels > 0 && levels <= MAX_LEVELS &&
                       json_integer_value(json_object_get(about, "frames")) == frames &&
                       lab_number(about, "value") > 0 && lab_number(about, "took_s") >= 0 &&
                       lab_number(about, "spent_s") >= 0;

@@ -1,9 +1,11 @@
 /* text.c: see text.h. */
 #include "lab/text.h"
 
+#include "base/json_read.h"
 #include "io/csv.h"
 #include "io/export.h"
 
+#include <errno.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,6 +35,33 @@ drape_status lab_read_text(drape_arena *arena, const char *folder, const char *n
         memcpy(*text, bytes, *size + 1);
     drape_free(arena->ctx, bytes);
     return status || *text ? status : DRAPE_E_MEMORY;
+}
+
+drape_status lab_write_json(lab *l, const char *name, json_t *object, size_t flags)
+{
+    errno = 0;
+    char *text = object ? json_dumps(object, flags) : NULL;
+    drape_status status = text && !drape_memory_ran_out()
+                              ? lab_write_text(l, name, text, strlen(text))
+                              : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for %s", name);
+    free(text);
+    json_decref(object);
+    return status;
+}
+
+drape_status lab_read_json(drape_arena *arena, const char *folder, const char *name, json_t **object)
+{
+    char *text;
+    size_t size;
+    json_error_t fault;
+    drape_status status = lab_read_text(arena, folder, name, &text, &size);
+    *object = status ? NULL : drape_json_read(text, size, JSON_REJECT_DUPLICATES, &fault);
+    if (status || *object)
+        return status;
+    if (json_error_code(&fault) == json_error_out_of_memory)
+        return drape_fail_memory(arena->ctx, size);
+    return drape_fail(arena->ctx, DRAPE_E_PARSE, "%.400s%s%.400s:%d:%d: %.200s", folder ? folder : "",
+                      folder ? "/" : "", name, fault.line, fault.column, fault.text);
 }
 
 static void put_field(drape_file *file, const json_t *value)

@@ -7,10 +7,16 @@
 /* Writes a text as a file of l->folder, atomically. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_write_text(lab *l, const char *name, const char *text, size_t size);
 
+/* The same with JSON, whose reference it takes; NULL: out of memory. */
+drape_status lab_write_json(lab *l, const char *name, json_t *object, size_t flags);
+
 /* Reads a file of a folder, or of none (NULL) into an arena; *text ends with a 0 that *size does not count.
  * Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_read_text(drape_arena *arena, const char *folder, const char *name, char **text,
                            size_t *size);
+
+/* The same as JSON, which the caller owns; NULL after a failure. Errors: also DRAPE_E_PARSE. */
+drape_status lab_read_json(drape_arena *arena, const char *folder, const char *name, json_t **object);
 
 /* results.csv: the columns that any result has, tags first. */
 drape_status lab_write_csv(lab *l);
