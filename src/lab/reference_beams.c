@@ -25,7 +25,7 @@ static int heavy_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     const double h = c->parameter > 5 ? 0.004 : 0.02;
     return SHEET_TEXT(text, STRIP(h), .columns = c->parameter > 50 ? 201 : 81, .rows = 4, .height = 0.02,
-                      .gravity = {0, -lab_strip_gravity(c->parameter), 0},
+                      .gravity = {0, -STRIP_GRAVITY(c->parameter), 0},
                       .tolerance = c->parameter * 1e-13); /* at most a thousandth of the weight of a node */
 }
 
@@ -46,16 +46,11 @@ DRAPE_REFERENCE(
 /* ASTM D1388 pushes a strip over an edge until the chord to its end falls to 41.5 degrees, and takes the
  * bending length as half of the overhang: there G = 8, within 0.04 %. The rod's own angle at G = 8 is 41.487
  * degrees. */
-static int chord_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return SHEET_TEXT(text, NARROW(0.004), .gravity = {0, -lab_strip_gravity(c->parameter), 0},
-                      .tolerance = 1e-12);
-}
-
 DRAPE_REFERENCE(bending_length, .entry.summary = "angle of the chord to the end", .unit = "degree",
                 .parameter = "G = rho g L^3/B", DRAPE_CASES(8), BEAM,
                 .entry.reference = "ASTM D1388; Peirce 1930, The handle of cloth as a measurable quantity",
-                .tolerance = 0.005, .expected = drape_rod_chord, .scene = chord_scene, .measure = lab_chord);
+                .tolerance = 0.005, .expected = drape_rod_chord, .measure = lab_chord,
+                SHEET(NARROW(0.004), .tolerance = 1e-12, VARIED(gravity[1], -STRIP_GRAVITY(1))));
 
 /* ---- A force at the end that stays vertical ---- */
 
@@ -66,20 +61,15 @@ static double sinking(double force)
     return drop;
 }
 
-static int force_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return SHEET_TEXT(text, NARROW(0.004), .tolerance = 1e-12,
-                      .terms = SHEET_FORMAT("'stretch.cst', 'bend.midedge', {'type': 'load.line', "
-                                            "'edge': 'right', 'force': [0, %.17g, 0]}",
-                                            -c->parameter * STRIP_RIGIDITY));
-}
-
 DRAPE_REFERENCE(
     end_load, .entry.summary = "deflection of the end w/L", .unit = "1", .parameter = "P L^2/B",
     DRAPE_CASES(1, 2, 4), .model = "stretch.cst, bend.midedge, load.line; irregular",
     .entry.reference =
         "theta'' + P cos theta = 0; Bisshopp & Drucker 1945, Large deflection of cantilever beams",
-    .tolerance = 0.005, .expected = sinking, .scene = force_scene, .measure = lab_sinking);
+    .tolerance = 0.005, .expected = sinking, .measure = lab_sinking,
+    SHEET(NARROW(0.004), .tolerance = 1e-12, .factor = -STRIP_RIGIDITY,
+          .terms = "'stretch.cst', 'bend.midedge', "
+                   "{'type': 'load.line', 'edge': 'right', 'force': [0, @, 0]}"));
 
 /* ---- Strips that become arcs: by a moment at the end, M/B, or by their rest shape ---- */
 
@@ -88,38 +78,21 @@ static double arc_rise(double curvature)
     return (1 - cos(curvature)) / curvature;
 }
 
-static int moment_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return SHEET_TEXT(text, NARROW(0.01), .tolerance = 1e-11,
-                      .terms = SHEET_FORMAT("'stretch.cst', 'bend.midedge', {'type': 'load.moment', "
-                                            "'edge': 'right', 'moment': %.17g}",
-                                            c->parameter * STRIP_RIGIDITY));
-}
-
 DRAPE_REFERENCE(end_moment, .entry.summary = "rise of the end w/L", .unit = "1", .parameter = "M L/B",
                 DRAPE_CASES(0.3, 1, 2, 3.1415926535897932,
                             4.7123889803846899), /* to three quarters of a circle */
                 .model = "stretch.cst, bend.midedge, load.moment; irregular",
                 .entry.reference = "an arc of curvature M/B", .tolerance = 0.005, .expected = arc_rise,
-                .scene = moment_scene, .measure = lab_rise);
+                .measure = lab_rise,
+                SHEET(NARROW(0.01), .tolerance = 1e-11, .factor = STRIP_RIGIDITY,
+                      .terms = "'stretch.cst', 'bend.midedge', "
+                               "{'type': 'load.moment', 'edge': 'right', 'moment': @}"));
 
 /* Two clamps turned against each other by half of the angle each, of which the right one slides along x: the
  * moment and with it the curvature is the same everywhere, and E = B kappa^2 L w/2. */
 static double rolled_energy(double angle)
 {
     return angle * angle / 2;
-}
-
-static int rolled_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    const double half = c->parameter * 90 / 3.1415926535897932;
-    return SHEET_TEXT(text, FREE_STRIP(0.01), .columns = 41, .rows = 4, .height = 0.05, .tolerance = 1e-10,
-                      .pins = SHEET_FORMAT("{'edge': 'left', 'clamp': true, 'turns': [{'time': 0, 'rotate': "
-                                           "[0, 0, 1, 0]}, {'time': 1, 'rotate': [0, 0, 1, %.17g]}]},\n "
-                                           "{'edge': 'right', 'clamp': true, 'axis': [1, 0, 0], 'turns': "
-                                           "[{'time': 0, 'rotate': [0, 0, 1, 0]}, {'time': 1, 'rotate': "
-                                           "[0, 0, 1, %.17g]}]}",
-                                           half, -half));
 }
 
 static drape_status measure_rolled(drape_reference_run *run, double *value)
@@ -129,22 +102,21 @@ static drape_status measure_rolled(drape_reference_run *run, double *value)
     return status;
 }
 
-DRAPE_REFERENCE(rolled_strip, .entry.summary = "energy of a strip between clamps that turn, E L/(B w)",
-                .unit = "1", .parameter = "angle [rad]", DRAPE_CASES(0.5, 1, 2, 3.1415926535897932),
-                .model = "stretch.cst, bend.midedge; irregular", .entry.reference = "an arc: angle^2/2",
-                .tolerance = 0.001, .expected = rolled_energy, .scene = rolled_scene,
-                .measure = measure_rolled);
-
-/* The strip starts flat. */
-static int curved_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return SHEET_TEXT(text, NARROW(0.02), .tolerance = 1e-12,
-                      .terms =
-                          SHEET_FORMAT("'stretch.cst', {'type': 'bend.midedge', 'curvature': [%.17g, 0, 0]}",
-                                       c->parameter));
-}
+DRAPE_REFERENCE(
+    rolled_strip, .entry.summary = "energy of a strip between clamps that turn, E L/(B w)", .unit = "1",
+    .parameter = "angle [rad]", DRAPE_CASES(0.5, 1, 2, 3.1415926535897932),
+    .model = "stretch.cst, bend.midedge; irregular", .entry.reference = "an arc: angle^2/2",
+    .tolerance = 0.001, .expected = rolled_energy, .measure = measure_rolled,
+    SHEET(FREE_STRIP(0.01), .columns = 41, .rows = 4, .height = 0.05, .tolerance = 1e-10,
+          .factor = 90 / 3.1415926535897932,
+          .pins = "{'edge': 'left', 'clamp': true, 'turns': [{'time': 0, 'rotate': [0, 0, 1, 0]}, "
+                  "{'time': 1, 'rotate': [0, 0, 1, @]}]},\n "
+                  "{'edge': 'right', 'clamp': true, 'axis': [1, 0, 0], 'turns': "
+                  "[{'time': 0, 'rotate': [0, 0, 1, 0]}, {'time': 1, 'rotate': [0, 0, -1, @]}]}"));
 
 DRAPE_REFERENCE(rest_curvature, .entry.summary = "rise of the end w/L", .unit = "1",
                 .parameter = "curvature L", DRAPE_CASES(1, 3.14159265358979323846), BEAM,
-                .entry.reference = "an arc", .tolerance = 0.005, .expected = arc_rise, .scene = curved_scene,
-                .measure = lab_rise);
+                .entry.reference = "an arc", .tolerance = 0.005, .expected = arc_rise, .measure = lab_rise,
+                /* It starts flat. */
+                SHEET(NARROW(0.02), .tolerance = 1e-12, .factor = 1,
+                      .terms = "'stretch.cst', {'type': 'bend.midedge', 'curvature': [@, 0, 0]}"));

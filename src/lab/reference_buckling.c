@@ -20,16 +20,12 @@ static double greenhill(double unused)
     return drape_rod_threshold(1, 5, 10);
 }
 
-static int upright_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return SHEET_TEXT(text, STRIP(0.004), .columns = 41, .rows = 4, .height = 0.04,
-                      .gravity = {-lab_strip_gravity(c->load), 0, 0}, .tolerance = 1e-11);
-}
-
 DRAPE_REFERENCE(self_buckling, .entry.summary = "G = rho g L^3/B at which an upright strip buckles", UNSTABLE,
                 DRAPE_CASES(0), .model = "stretch.cst, bend.midedge; irregular",
                 .entry.reference = "theta'' + G t theta = 0; Greenhill 1881", .tolerance = 0.02,
-                .expected = greenhill, .scene = upright_scene, .low = 0.9, .high = 1.1);
+                .expected = greenhill, .low = 0.9, .high = 1.1,
+                SHEET(STRIP(0.004), .columns = 41, .rows = 4, .height = 0.04, .tolerance = 1e-11,
+                      VARIED(gravity[0], -STRIP_GRAVITY(1))));
 
 /* ---- A strip clamped at one end with its width upright buckles sideways ---- */
 
@@ -51,7 +47,7 @@ static int lateral_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT
 {
     return SHEET_TEXT(text, STRIP(0.001), .columns = 121, .rows = 5, .height = 0.03,
                       .poisson_ratio = c->parameter, .mesh = "'orientation': 'vertical'",
-                      .gravity = {0, -lab_strip_gravity(c->load), 0}, .tolerance = 1e-10);
+                      .gravity = {0, -STRIP_GRAVITY(c->load), 0}, .tolerance = 1e-10);
 }
 
 DRAPE_REFERENCE(

@@ -18,26 +18,16 @@
 #define SQUARE .width = SIDE, .height = SIDE
 #define MOVED  .integrator = "'method': 'be'", .dt = 0.1
 
-static const char knit[] = "wang2011_tshirt";
+#define KNIT "wang2011_tshirt"
 
 static double law(double strain)
 {
     int i = 1;
-    while (strcmp(drape_fabrics[i].name, knit) != 0)
+    while (strcmp(drape_fabrics[i].name, KNIT) != 0)
         i++;
     const drape_fabric *f = &drape_fabrics[i];
     const double l = 1 + strain, c = f->tension.warp + 6 * strain * (f->stretched.warp - f->tension.warp);
     return c * l * (l * l - 1) / 2;
-}
-
-static int pulled(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return SHEET_TEXT(text, SQUARE, MOVED, .columns = 5, .rows = 5,
-                      .material = SHEET_FORMAT("'fabric': '%s'", knit),
-                      .terms = "{'type': 'stretch.curve', 'warp_direction': [1, 0, 0]}",
-                      .pins = SHEET_FORMAT("{'edge': 'left'}, {'edge': 'right', "
-                                           "'track': [[0, [0, 0, 0]], [1, [%.17g, 0, 0]]]}",
-                                           SIDE * c->parameter));
 }
 
 static drape_status measure_pull(drape_reference_run *run, double *value)
@@ -50,12 +40,15 @@ static drape_status measure_pull(drape_reference_run *run, double *value)
     return status;
 }
 
-DRAPE_REFERENCE(curve_tension, .entry.summary = "force per width of a strip pulled along the warp",
-                .unit = "N/m",
-                .entry.reference = "the law of Wang, O'Brien & Ramamoorthi 2011; the t-shirt's own",
-                .parameter = "strain", DRAPE_CASES(0.01, 0.03, 0.06, 0.1, 0.125, 0.15),
-                .model = "stretch.curve; irregular", .tolerance = 0.01, .expected = law, .scene = pulled,
-                .measure = measure_pull);
+DRAPE_REFERENCE(
+    curve_tension, .entry.summary = "force per width of a strip pulled along the warp", .unit = "N/m",
+    .entry.reference = "the law of Wang, O'Brien & Ramamoorthi 2011; the t-shirt's own",
+    .parameter = "strain", DRAPE_CASES(0.01, 0.03, 0.06, 0.1, 0.125, 0.15),
+    .model = "stretch.curve; irregular", .tolerance = 0.01, .expected = law, .measure = measure_pull,
+    SHEET(SQUARE, MOVED, .columns = 5, .rows = 5, .material = "'fabric': '" KNIT "'",
+          .terms = "{'type': 'stretch.curve', 'warp_direction': [1, 0, 0]}",
+          .pins = "{'edge': 'left'}, {'edge': 'right', 'track': [[0, [0, 0, 0]], [1, [@, 0, 0]]]}",
+          .factor = SIDE));
 
 /* ---- Tension between rollers: a plane that moves, whose nodes are free to come nearer to each other ----
  *
@@ -67,22 +60,17 @@ static double uniaxial(double strain)
     return 100 * (strain + strain * strain / 2) * (1 + strain);
 }
 
-static int drawn(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return SHEET_TEXT(
-        text, SQUARE, .columns = 5, .rows = 5, .young_modulus = 1e5, .poisson_ratio = 0.3, .thickness = 1e-3,
-        .areal_density = 0.2, .terms = "'stretch.cst'", .tolerance = 1e-10,
-        .pins = SHEET_FORMAT("{'edge': 'left', 'normal': [1, 0, 0]}, {'edge': 'right', 'normal': [1, 0, 0], "
-                             "'track': [[0, [0, 0, 0]], [1, [%.17g, 0, 0]]]},\n "
-                             "{'corner': 'top-left', 'normal': [0, 0, 1]}, "
-                             "{'box': [[-1, -1, -1], [1, 1, 1]], 'normal': [0, 1, 0]}",
-                             SIDE * c->parameter));
-}
-
 DRAPE_REFERENCE(roller_tension, .entry.summary = "force per width of a sheet drawn out between rollers",
                 .unit = "N/m", .entry.reference = "uniaxial tension, Green strain", .parameter = "strain",
                 DRAPE_CASES(0.01, 0.1, 0.3), .model = "stretch.cst; irregular", .tolerance = 1e-6,
-                .expected = uniaxial, .scene = drawn, .measure = measure_pull);
+                .expected = uniaxial, .measure = measure_pull,
+                SHEET(SQUARE, .columns = 5, .rows = 5, .young_modulus = 1e5, .poisson_ratio = 0.3,
+                      .thickness = 1e-3, .areal_density = 0.2, .terms = "'stretch.cst'", .tolerance = 1e-10,
+                      .pins = "{'edge': 'left', 'normal': [1, 0, 0]}, {'edge': 'right', 'normal': [1, 0, 0], "
+                              "'track': [[0, [0, 0, 0]], [1, [@, 0, 0]]]},\n "
+                              "{'corner': 'top-left', 'normal': [0, 0, 1]}, "
+                              "{'box': [[-1, -1, -1], [1, 1, 1]], 'normal': [0, 1, 0]}",
+                      .factor = SIDE));
 
 /* ---- Shear, as KES-FB1 measures it: one edge moves along itself while a force W per length holds the sheet
  * taut ----

@@ -12,13 +12,10 @@
     .mesh = "'transform': {'translate': [0, 0.0095, 0]}",                                                    \
     .material = "'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 0.2", .tolerance = 1e-9
 
-static const char *contact(double friction, double velocity, char text[400])
-{
-    return lab_sheet_format(text,
-                            "'colliders': [{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], "
-                            "'friction': %.17g}],\n 'contact': {'distance': 0.01, 'friction_velocity': %g}",
-                            friction, velocity);
-}
+/* With friction @. */
+#define CONTACT(velocity)                                                                                    \
+    "'colliders': [{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'friction': @}],\n "           \
+    "'contact': {'distance': 0.01, 'friction_velocity': " velocity "}"
 
 /* ---- The friction above which a sheet stays on a slope ---- */
 
@@ -35,8 +32,8 @@ static int slope_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     const double angle = c->parameter * DEGREE;
     return SHEET_TEXT(text, TABLE, .gravity = {GRAVITY * sin(angle), -GRAVITY * cos(angle), 0},
-                      .others = contact(c->load, CREEP, (char[400]){0}), .integrator = "'method': 'be'",
-                      .dt = 0.01);
+                      .others = CONTACT("1e-4" /* CREEP */), .factor = c->load,
+                      .integrator = "'method': 'be'", .dt = 0.01);
 }
 
 /* Returns 1 if the sheet stays. With 1e-3 less friction than needed its speed after a second is 1e-3 g sin a,
@@ -66,13 +63,6 @@ static double stopping_distance(double mu)
     return SPEED * SPEED / (2 * mu * GRAVITY);
 }
 
-static int slide_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return SHEET_TEXT(text, TABLE, .gravity = {0, -GRAVITY, 0},
-                      .others = contact(c->parameter, 1e-3, (char[400]){0}),
-                      .integrator = "'method': 'trbdf2'", .dt = 0.002, .duration = 10);
-}
-
 /* Advances twice as long as the sheet takes to stop. */
 static drape_status measure_slide(drape_reference_run *run, double *value)
 {
@@ -92,4 +82,6 @@ DRAPE_REFERENCE(friction_slide, .entry.summary = "distance that a pushed sheet s
                 .unit = "m", .parameter = "mu", DRAPE_CASES(0.1, 0.3, 0.8),
                 .model = "stretch.cst, bend.midedge; irregular; plane; trbdf2",
                 .entry.reference = "v0^2/(2 mu g)", .tolerance = 0.005, .expected = stopping_distance,
-                .scene = slide_scene, .measure = measure_slide);
+                .measure = measure_slide,
+                SHEET(TABLE, .gravity = {0, -GRAVITY, 0}, .integrator = "'method': 'trbdf2'", .dt = 0.002,
+                      .others = CONTACT("1e-3"), .factor = 1, .duration = 10));

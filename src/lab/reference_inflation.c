@@ -64,14 +64,6 @@ static double sphere_expected(double pressure)
     return (p + sqrt(p * p + 4)) / 2;
 }
 
-static int sphere_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return SHEET_TEXT(text, ROUND, .columns = 25, .rows = 25,
-                      .mesh = "'height': 0.999799979995999, 'arc_radius': 1, " HOLE,
-                      .terms = SHEET_FORMAT("'stretch.tension', {'type': 'load.follower', 'pressure': %.17g}",
-                                            1000 * c->parameter));
-}
-
 static drape_status measure_radius(drape_reference_run *run, double *value)
 {
     const drape_status status = lab_advance(run);
@@ -83,8 +75,10 @@ DRAPE_REFERENCE(inflated_sphere, .entry.summary = "radius of a sphere under pres
                 .unit = "1", .parameter = "p R/(E h)", DRAPE_CASES(0.1, 0.3, 1),
                 .model = "stretch.tension, load.follower; revolution, 24 x 24 cells",
                 .entry.reference = "p R (1 - nu)/(E h) = l - 1/l, law of Saint Venant and Kirchhoff",
-                .tolerance = 0.005, .expected = sphere_expected, .scene = sphere_scene,
-                .measure = measure_radius);
+                .tolerance = 0.005, .expected = sphere_expected, .measure = measure_radius,
+                SHEET(ROUND, .columns = 25, .rows = 25, .factor = 1000,
+                      .mesh = "'height': 0.999799979995999, 'arc_radius': 1, " HOLE,
+                      .terms = "'stretch.tension', {'type': 'load.follower', 'pressure': @}"));
 
 /* Two discs that do not stretch, joined along their edges. With the modulus k = 1/sqrt 2, the radius is
  * sqrt 2/K(k) of theirs, and the thickness sqrt 2 (E(k) - K(k)/2) of the diameter, 0.599. */

@@ -40,20 +40,6 @@ DRAPE_REFERENCE(free_fall, .entry.summary = "distance fallen in 0.5 s", .unit = 
 #define PI          3.14159265358979323846
 #define PHASE_STEPS 50
 
-static int oscillator(const drape_reference_case *c, double angle, char text[DRAPE_LAB_TEXT])
-{
-    return SHEET_TEXT(text, .grid = "square", .columns = 2, .rows = 2, .width = 1, .height = 1,
-                      .young_modulus = 1, .thickness = 1, .areal_density = 1, .material = "'mass': 'uniform'",
-                      .terms = "'stretch.cst'", .pins = "{'edge': 'top'}", .velocity = "0, 0, -1e-5",
-                      .integrator = c->reference->integrator, .dt = angle / OMEGA, .tolerance = 1e-15,
-                      .others = "'controller': {'type': 'fixed'}", .duration = 1000);
-}
-
-static int oscillator_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return oscillator(c, c->parameter, text);
-}
-
 static drape_status advance(drape_reference_run *run, int steps)
 {
     return drape_sim_advance(run->sim, drape_sim_time(run->sim) + steps * run->parameter / OMEGA);
@@ -99,10 +85,18 @@ static drape_status measure_phase(drape_reference_run *run, double *value)
     return status;
 }
 
-#define OSCILLATOR .unit = "1", .parameter = "omega h", .tolerance = 1e-4, .scene = oscillator_scene
-#define AMPLITUDE                                                                                            \
-    OSCILLATOR, .entry.summary = "fraction of the amplitude that a step leaves", .measure = measure_amplitude
-#define PHASE OSCILLATOR, .entry.summary = "angle of a step over omega h", .measure = measure_phase
+#define SPRING(method)                                                                                       \
+    .grid = "square", .columns = 2, .rows = 2, .width = 1, .height = 1, .young_modulus = 1, .thickness = 1,  \
+    .areal_density = 1, .material = "'mass': 'uniform'", .terms = "'stretch.cst'",                           \
+    .pins = "{'edge': 'top'}", .velocity = "0, 0, -1e-5", .integrator = "'method': " method,                 \
+    .tolerance = 1e-15, .others = "'controller': {'type': 'fixed'}", .duration = 1000
+#define OSCILLATOR(method)                                                                                   \
+    .unit = "1", .parameter = "omega h", .tolerance = 1e-4, SHEET(SPRING(method), VARIED(dt, 1 / OMEGA))
+#define AMPLITUDE(method)                                                                                    \
+    OSCILLATOR(method), .entry.summary = "fraction of the amplitude that a step leaves",                     \
+                        .measure = measure_amplitude
+#define PHASE(method)                                                                                        \
+    OSCILLATOR(method), .entry.summary = "angle of a step over omega h", .measure = measure_phase
 
 /* Backward Euler leaves this factor of the energy in each step. */
 static double euler(double angle)
@@ -117,11 +111,10 @@ static drape_status measure_energy(drape_reference_run *run, double *value)
     return status;
 }
 
-DRAPE_REFERENCE(oscillator, OSCILLATOR, .entry.summary = "fraction of the energy that a step leaves",
+DRAPE_REFERENCE(oscillator, OSCILLATOR("'be'"), .entry.summary = "fraction of the energy that a step leaves",
                 DRAPE_CASES(0.1, 0.5, 2), .model = "stretch.cst; square; be",
-                .entry.reference = "1/(1 + omega^2 h^2), of 1/(1 - i omega h)",
-                .integrator = "'method': 'be'", .expected = euler, .measure = measure_energy,
-                .constants = {0, 20});
+                .entry.reference = "1/(1 + omega^2 h^2), of 1/(1 - i omega h)", .expected = euler,
+                .measure = measure_energy, .constants = {0, 20});
 
 /* On z' = i omega z the formula 3/2 z1 - 2 z0 + 1/2 z_ = i omega h z1 has the roots (2 +- sqrt(1 + 2 i omega
  * h))/(3 - 2 i omega h). The larger is the factor of the amplitude per step once the other has decayed, to
@@ -132,9 +125,10 @@ static double bdf2(double angle)
     return cabs((2 + csqrt(1 + 2 * z)) / (3 - 2 * z));
 }
 
-DRAPE_REFERENCE(oscillator_bdf2, AMPLITUDE, DRAPE_CASES(0.1, 0.5, 2), .model = "stretch.cst; square; bdf2",
+DRAPE_REFERENCE(oscillator_bdf2, AMPLITUDE("'bdf2'"), DRAPE_CASES(0.1, 0.5, 2),
+                .model = "stretch.cst; square; bdf2",
                 .entry.reference = "roots of (3/2 - i omega h) r^2 - 2 r + 1/2; .990401 at omega h = .5",
-                .integrator = "'method': 'bdf2'", .expected = bdf2, .constants = {15, 10});
+                .expected = bdf2, .constants = {15, 10});
 
 /* The stability function on the imaginary axis: R = (a1 (1 + w)/(1 - w) - a0)/(1 - w) with w = gamma z/2,
  * gamma = 2 - sqrt(2), a1 = 1/(gamma (2 - gamma)), a0 = a1 - 1. */
@@ -145,10 +139,10 @@ static double trbdf2(double angle)
     return cabs((a1 * (1 + w) / (1 - w) - (a1 - 1)) / (1 - w));
 }
 
-DRAPE_REFERENCE(oscillator_trbdf2, AMPLITUDE, DRAPE_CASES(0.1, 0.5, 2),
+DRAPE_REFERENCE(oscillator_trbdf2, AMPLITUDE("'trbdf2'"), DRAPE_CASES(0.1, 0.5, 2),
                 .model = "stretch.cst; square; trbdf2",
                 .entry.reference = "stability function; Bank et al. 1985, Hosea & Shampine 1996",
-                .integrator = "'method': 'trbdf2'", .expected = trbdf2, .constants = {0, 20});
+                .expected = trbdf2, .constants = {0, 20});
 
 /* The implicit midpoint rule keeps the amplitude, and is slow: (1 + i w/2)/(1 - i w/2), w = omega h, turns by
  * 2 atan(w/2). */
@@ -157,9 +151,9 @@ static double midpoint(double angle)
     return 2 * atan(angle / 2) / angle;
 }
 
-DRAPE_REFERENCE(oscillator_midpoint, PHASE, DRAPE_CASES(0.1, 0.5, 2),
+DRAPE_REFERENCE(oscillator_midpoint, PHASE("'midpoint'"), DRAPE_CASES(0.1, 0.5, 2),
                 .model = "stretch.cst; square; midpoint", .entry.reference = "2 atan(omega h/2)",
-                .integrator = "'method': 'midpoint'", .expected = midpoint);
+                .expected = midpoint);
 
 /* Leapfrog keeps the amplitude below omega h = 2, and is fast: sin(angle/2) = omega h/2. */
 static double verlet(double angle)
@@ -167,8 +161,8 @@ static double verlet(double angle)
     return 2 * asin(angle / 2) / angle;
 }
 
-DRAPE_REFERENCE(oscillator_verlet, PHASE, DRAPE_CASES(0.1, 0.5, 1), .model = "stretch.cst; square; verlet",
-                .entry.reference = "2 asin(omega h/2)", .integrator = "'method': 'verlet', 'substeps': 1",
+DRAPE_REFERENCE(oscillator_verlet, PHASE("'verlet', 'substeps': 1"), DRAPE_CASES(0.1, 0.5, 1),
+                .model = "stretch.cst; square; verlet", .entry.reference = "2 asin(omega h/2)",
                 .expected = verlet);
 
 /* Variable order and steps: the velocity after one, or ten, and an eighth oscillations over that at the
@@ -179,11 +173,6 @@ static double turned(double turns)
     return cos(2 * PI * turns);
 }
 
-static int turning_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return oscillator(c, 1, text);
-}
-
 static drape_status measure_velocity(drape_reference_run *run, double *value)
 {
     drape_status status = drape_sim_advance(run->sim, 2 * PI * run->parameter / OMEGA);
@@ -191,9 +180,9 @@ static drape_status measure_velocity(drape_reference_run *run, double *value)
     return status;
 }
 
-DRAPE_REFERENCE(
-    oscillator_ida, .entry.summary = "velocity over that at the start", .unit = "1", .parameter = "turns",
-    DRAPE_CASES(1.125, 10.125), .model = "stretch.cst; square; ida, order 5",
-    .entry.reference = "cos(2 pi turns)", .tolerance = 1e-3,
-    .integrator = "'method': 'ida', 'rtol': 1e-8, 'max_order': 5, 'atol_x': 1e-13, 'atol_v': 1e-13",
-    .expected = turned, .scene = turning_scene, .measure = measure_velocity);
+DRAPE_REFERENCE(oscillator_ida, .entry.summary = "velocity over that at the start", .unit = "1",
+                .parameter = "turns", DRAPE_CASES(1.125, 10.125),
+                .model = "stretch.cst; square; ida, order 5", .entry.reference = "cos(2 pi turns)",
+                .tolerance = 1e-3, .expected = turned, .measure = measure_velocity,
+                SHEET(SPRING("'ida', 'rtol': 1e-8, 'max_order': 5, 'atol_x': 1e-13, 'atol_v': 1e-13"),
+                      .dt = 1 / OMEGA));

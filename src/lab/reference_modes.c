@@ -75,10 +75,9 @@ static double column(double mode)
 /* constants: the force at the free end in parts of B/L^2, in the direction of the strip; it stays so. */
 static int column_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    return SHEET_TEXT(text, BEAM, .tolerance = 1e-12,
-                      .terms = SHEET_FORMAT("'stretch.cst', 'bend.midedge', {'type': 'load.line', "
-                                            "'edge': 'right', 'force': [%.17g, 0, 0]}",
-                                            -c->reference->constants[0] * STRIP_RIGIDITY));
+    return SHEET_TEXT(text, BEAM, .tolerance = 1e-12, .factor = -c->reference->constants[0] * STRIP_RIGIDITY,
+                      .terms = "'stretch.cst', 'bend.midedge', "
+                               "{'type': 'load.line', 'edge': 'right', 'force': [@, 0, 0]}");
 }
 
 /* The value of a mode, as it is in the state that the run has. */
@@ -109,16 +108,6 @@ DRAPE_REFERENCE(euler_column, .entry.summary = "P L^2/B at which a strip clamped
                 .entry.reference = "pi^2 (n - 1/2)^2; Euler 1744", .tolerance = 0.005, .expected = column,
                 .scene = column_scene, .measure = measure_column, .constants = {0.01});
 
-/* P is E h times the share of the length by which an end is pushed in, so that this is load h^2/(12 L^2). */
-static int clamped_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return SHEET_TEXT(text, FREE_STRIP(0.004), .columns = 81, .rows = 4, .height = 0.02, .tolerance = 1e-11,
-                      .pins =
-                          SHEET_FORMAT("{'edge': 'left', 'clamp': true}, {'edge': 'right', 'clamp': true, "
-                                       "'track': [[0, [0, 0, 0]], [1, [%.17g, 0, 0]]]}",
-                                       -c->load * 0.004 * 0.004 / 12));
-}
-
 /* Above the threshold the lowest eigenvalue is below 0. */
 static drape_status measure_clamped(drape_reference_run *run, double *value)
 {
@@ -132,7 +121,12 @@ static drape_status measure_clamped(drape_reference_run *run, double *value)
 DRAPE_REFERENCE(euler_clamped, .entry.summary = "P L^2/B at which a strip clamped at both ends buckles",
                 .unit = "1", DRAPE_CASES(0), .model = "stretch.cst, bend.midedge; irregular; modes",
                 .entry.reference = "4 pi^2; Euler 1744", .tolerance = 0.005, DRAPE_KNOWN(4 * PI * PI),
-                .scene = clamped_scene, .measure = measure_clamped, .low = 0.9, .high = 1.1);
+                .measure = measure_clamped, .low = 0.9, .high = 1.1,
+                /* P is E h times the share of the length by which an end is pushed in. */
+                SHEET(FREE_STRIP(0.004), .columns = 81, .rows = 4, .height = 0.02, .tolerance = 1e-11,
+                      .pins = "{'edge': 'left', 'clamp': true}, {'edge': 'right', 'clamp': true, "
+                              "'track': [[0, [0, 0, 0]], [1, [@, 0, 0]]]}",
+                      .factor = -0.004 * 0.004 / 12));
 
 /* ---- Euler's column, bent ---- */
 

@@ -33,8 +33,28 @@ static void put_others(char *text, const char *members)
         put(text, ", %s", members);
 }
 
-int lab_sheet_text(const lab_sheet *s, char text[DRAPE_LAB_TEXT])
+/* Writes the value in place of each @. */
+static void put_value(char *text, double value)
 {
+    char before[DRAPE_LAB_TEXT];
+    snprintf(before, sizeof before, "%s", text);
+    *text = 0;
+    for (const char *at = before; *at; at += *at == '@') {
+        const size_t length = strcspn(at, "@");
+        put(text, "%.*s", (int)length, at);
+        at += length;
+        if (*at)
+            put(text, "%.17g", value);
+    }
+}
+
+int lab_sheet_text(const lab_sheet *sheet, double value, char text[DRAPE_LAB_TEXT])
+{
+    lab_sheet varied = *sheet;
+    const lab_sheet *s = &varied;
+    value *= sheet->factor;
+    if (sheet->varied)
+        memcpy((char *)&varied + sheet->varied, &value, sizeof value);
     *text = 0;
     put(text, "{'drape': 1, 'cloth': [{'mesh': {'grid': '%s'", s->grid ? s->grid : "irregular");
     if (s->columns > 0)
@@ -65,12 +85,8 @@ int lab_sheet_text(const lab_sheet *s, char text[DRAPE_LAB_TEXT])
     put(text, "}");
     put_others(text, s->others);
     put(text, ", 'duration': %.17g}", s->duration > 0 ? s->duration : 1);
+    put_value(text, value);
     return (int)strlen(text);
-}
-
-double lab_strip_gravity(double weight)
-{
-    return weight * STRIP_RIGIDITY / STRIP_DENSITY;
 }
 
 /* ---- Positions and forces ---- */

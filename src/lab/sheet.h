@@ -22,18 +22,19 @@ struct lab_sheet {
     double dt, tolerance;
     const char *others; /* other members of the scene */
     double duration;    /* default: 1 */
+    /* In what the cases of a reference differ: the parameter or, of a threshold, the load, times this factor. It
+     * is each @ in the texts, or the number at this offset in the sheet. */
+    double factor;
+    size_t varied;
 };
 
-/* Writes the text; returns its length. */
-int lab_sheet_text(const lab_sheet *s, char text[DRAPE_LAB_TEXT]);
-#define SHEET_TEXT(text, ...) lab_sheet_text(&(lab_sheet){__VA_ARGS__}, text)
+/* Writes the text for a parameter or load; returns its length. */
+int lab_sheet_text(const lab_sheet *sheet, double value, char text[DRAPE_LAB_TEXT]);
 
-/* The same sheet in all cases, in an initialiser of drape_reference. */
-#define SHEET(...)                                                                                           \
-    .sheet = &(const lab_sheet)                                                                              \
-    {                                                                                                        \
-        __VA_ARGS__                                                                                          \
-    }
+/* The sheet of all cases, in an initialiser of drape_reference; of one, in its function `scene`. */
+#define SHEET(...)            .sheet = (&(const lab_sheet){__VA_ARGS__})
+#define SHEET_TEXT(text, ...) lab_sheet_text(&(lab_sheet){__VA_ARGS__}, 1, text)
+#define VARIED(member, by)    .varied = offsetof(lab_sheet, member), .factor = (by)
 
 /* A member of a sheet with values in it, valid to the end of the block. */
 const char *lab_sheet_format(char text[400], const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -49,7 +50,7 @@ const char *lab_sheet_format(char text[400], const char *format, ...) __attribut
 #define STRIP(h) FREE_STRIP(h), .pins = "{'edge': 'left', 'clamp': true}"
 
 /* The gravity that makes G = rho g L^3/B. */
-double lab_strip_gravity(double weight);
+#define STRIP_GRAVITY(weight) ((weight)*STRIP_RIGIDITY / STRIP_DENSITY)
 
 /* Advances to the end of the scene. */
 drape_status lab_advance(drape_reference_run *run);

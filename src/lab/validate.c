@@ -22,7 +22,8 @@ double drape_reference_expected(const drape_reference *reference, double paramet
 int drape_reference_text(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     const drape_reference *r = c->reference;
-    const int length = r->scene ? r->scene(c, text) : lab_sheet_text(r->sheet, text);
+    const int length =
+        r->scene ? r->scene(c, text) : lab_sheet_text(r->sheet, r->high > 0 ? c->load : c->parameter, text);
     for (char *at = strchr(text, '\''); at; at = strchr(at, '\''))
         *at = '"';
     return length;

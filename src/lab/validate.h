@@ -54,11 +54,10 @@ struct drape_reference {
     const double *known;                    /* the expected value of each case, or of all; see DRAPE_KNOWN */
     int known_count;                        /* case_count, or 1 */
     double (*documented)(double parameter); /* what the model converges to instead; NULL: no model error */
-    const lab_sheet *sheet;                 /* the scene of all cases; NULL: `scene` writes one (sheet.h) */
+    const lab_sheet *sheet;                 /* the scenes of all cases; NULL: `scene` writes them (sheet.h) */
     /* Writes the text of the scene of a case, in which ' stands for "; returns its length. */
     int (*scene)(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]);
-    const char *integrator; /* for `scene`, where references differ in it: its members */
-    double constants[4];    /* for `scene` or `measure`, where references differ in them */
+    double constants[4]; /* for `scene` or `measure`, where references differ in them */
     /* Advances the sim and measures. */
     drape_status (*measure)(drape_reference_run *run, double *value);
     /* For thresholds: the quantity is the load above which measure is > 0, sought between these multiples of
