@@ -382,38 +382,27 @@ static double shade_of(const shade *sh, double value)
 
 /* ---- Maps ---- */
 
-/* What one map shows: the cells of an integrator, at an index on the third axis, or those of all
- * integrators over a single axis, a row each. */
+/* A figure: the cells of an integrator, at an index on the third axis, or all integrators over a single axis, a
+ * row or a curve each. */
 typedef struct map {
     const lab *l;
     const space *s;
     shade shade;
-    size_t first; /* case */
-    int third;
+    size_t first; /* its first case */
     int rows;
-    bool seen[VERDICTS], blank; /* verdicts, and runs without that result, on the map */
-    int limits;                 /* drawn so far */
+    int limits; /* drawn so far */
     lab_figure f;
 } map;
-
-/* Whether a cell is on the map; its indices. */
-static bool is_on(const map *m, size_t cell, int *index)
-{
-    indices_of(m->s, cell, index);
-    return m->s->count < MAX_AXES || index[2] == m->third;
-}
 
 /* The first case of a row, and the ends of the row on the y axis. */
 static size_t row_of(const map *m, int row, double *bottom, double *top)
 {
-    const size_t columns = (size_t)m->s->axes[0].count;
     if (m->s->count == 1) { /* the first integrator on top */
         *bottom = m->rows - 1 - row - 0.45;
         *top = *bottom + 0.9;
-        return columns * (size_t)row;
-    }
-    cell_bounds(&m->s->axes[1], row, bottom, top);
-    return m->first + columns * (size_t)(row + m->third * m->rows);
+    } else
+        cell_bounds(&m->s->axes[1], row, bottom, top);
+    return m->first + (size_t)m->s->axes[0].count * (size_t)row;
 }
 
 /* How a case looks in a layer of the map, the boxes of one kind: cells that look alike can be one box. */
@@ -460,7 +449,6 @@ static void write_row(map *m, lab_fill kind, int row)
     }
 }
 
-/* The layers, and what is on the map. */
 static void write_cells(map *m)
 {
     for (lab_fill kind = LAB_COLOURED; kind <= LAB_HATCHED_WHITE; kind++) {
@@ -468,16 +456,6 @@ static void write_cells(map *m)
         for (int row = 0; row < m->rows; row++)
             write_row(m, kind, row);
         lab_figure_boxes(&m->f, kind);
-    }
-    for (int row = 0; row < m->rows; row++) {
-        double bottom, top;
-        const size_t first = row_of(m, row, &bottom, &top);
-        for (size_t i = first; i < first + (size_t)m->s->axes[0].count; i++) {
-            const verdict v = judge(m->l, m->l->results[i]);
-            m->seen[v] = true;
-            m->seen[SHORT] |= is_short(m->l->results[i]);
-            m->blank |= look_at(m, LAB_COLOURED, i).there && has_results(v);
-        }
     }
     if (m->shade.quantity)
         m->f.scale = m->shade.axis;
@@ -500,13 +478,6 @@ static void set_axis(const axis *a, lab_axis *out)
     snprintf(out->label, sizeof out->label, *unit ? "%.80s [%s]" : "%.80s", axis_name(a), unit);
 }
 
-/* A black line on a white one is seen on every colour. *limits counts them: one is in the legend. */
-static void draw_limit(lab_figure *f, int *limits)
-{
-    if (lab_figure_curve(f, (lab_style){LAB_WHITE, 1, 0}, NULL))
-        lab_figure_curve(f, (lab_style){LAB_BLACK, 2, 0}, (*limits)++ ? NULL : "explicit limit 2/omega");
-}
-
 /* The index of the axis that is the step; -1: none is. */
 static int step_axis(const space *s)
 {
@@ -516,35 +487,40 @@ static int step_axis(const space *s)
     return -1;
 }
 
+/* A black line on a white one is seen on every colour. One of them is in the legend. */
+static void draw_limit(map *m)
+{
+    if (lab_figure_curve(&m->f, (lab_style){LAB_WHITE, 1, 0}, NULL))
+        lab_figure_curve(&m->f, (lab_style){LAB_BLACK, 2, 0}, m->limits++ ? NULL : "explicit limit 2/omega");
+}
+
 /* The stability limit of the step, where one of the two axes is the step, along the other. */
 static void add_limit(map *m)
 {
-    const axis *axes = m->s->axes;
     const int step = step_axis(m->s);
     if (step < 0 || step > 1)
         return;
+    const axis *other = &m->s->axes[1 - step];
     lab_figure_data(&m->f);
-    for (size_t cell = 0; cell < m->s->cells; cell++) {
-        int index[MAX_AXES];
-        const double limit = lab_number(m->l->results[m->first + cell], "explicit_limit_s");
-        if (!is_on(m, cell, index) || index[step] != 0 || isnan(limit))
-            continue;
-        const double other = axis_value(&axes[1 - step], index[1 - step]);
-        lab_figure_point(&m->f, step == 0 ? limit : other, step == 0 ? other : limit);
+    for (int k = 0; k < other->count; k++) {
+        const size_t i = m->first + (size_t)k * (step == 0 ? (size_t)m->s->axes[0].count : 1);
+        const double limit = lab_number(m->l->results[i], "explicit_limit_s"), along = axis_value(other, k);
+        if (!isnan(limit))
+            lab_figure_point(&m->f, step == 0 ? limit : along, step == 0 ? along : limit);
     }
-    draw_limit(&m->f, &m->limits);
+    draw_limit(m);
 }
 
 /* Over a single axis that is the step, the limit of a case is a line from bottom to top, if it is on it. */
-static void add_limit_at(lab_figure *f, const json_t *result, double bottom, double top, int *limits)
+static void add_limit_at(map *m, size_t i, double bottom, double top)
 {
-    const double limit = lab_number(result, "explicit_limit_s");
-    if (!(limit >= f->axes[0].from && limit <= f->axes[0].to))
+    const double limit = lab_number(m->l->results[i], "explicit_limit_s");
+    if (step_axis(m->s) != 0 || !(limit >= m->f.axes[0].from && limit <= m->f.axes[0].to))
         return;
-    lab_figure_data(f);
-    lab_figure_point(f, limit, bottom);
-    lab_figure_point(f, limit, top);
-    draw_limit(f, limits);
+    lab_figure_data(&m->f);
+    lab_figure_point(&m->f, limit, bottom);
+    lab_figure_point(&m->f, limit, top);
+    draw_limit(m);
 }
 
 /* The name of a verdict in a legend. */
@@ -557,61 +533,66 @@ static void verdict_text(const lab *l, int v, char text[96])
 /* A swatch for each verdict that is on the figure; with a scale, of those that hide it. */
 static drape_status end_map(lab *l, map *m, const char *caption)
 {
+    const size_t end = m->first + (size_t)m->rows * (size_t)m->s->axes[0].count;
+    bool seen[VERDICTS] = {false}, blank = false;
     char text[96];
+    for (size_t i = m->first; i < end; i++) {
+        const verdict v = judge(l, l->results[i]);
+        seen[v] = true;
+        seen[SHORT] |= is_short(l->results[i]);
+        blank |= m->shade.quantity && has_results(v) && look_at(m, LAB_COLOURED, i).there;
+    }
     for (int v = 0; v < VERDICTS; v++)
-        if (m->seen[v] && (!m->shade.quantity || v == SHORT || !has_results((verdict)v))) {
+        if (seen[v] && (!m->shade.quantity || v == SHORT || !has_results((verdict)v))) {
             verdict_text(l, v, text);
             lab_figure_swatch(&m->f, verdicts[v].colour, v == SHORT, text);
         }
-    if (m->blank && m->shade.quantity)
+    if (blank)
         lab_figure_swatch(&m->f, LAB_GREY, false, "no value");
     return lab_figure_end(l, &m->f, caption);
 }
 
-/* quantity NULL: what happened. */
-static drape_status draw_map(lab *l, const space *s, const shade *sh, size_t first, int third)
+/* The map of an integrator; third: the index on the third axis. */
+static drape_status draw_map(lab *l, map *m, int third)
 {
-    const char *integrator = lab_tag_text(l->results[first], "integrator");
-    const lab_quantity *quantity = sh->quantity;
+    const space *s = m->s;
+    const char *integrator = lab_tag_text(l->results[m->first], "integrator");
+    const lab_quantity *quantity = m->shade.quantity;
     const axis *last = &s->axes[s->count - 1];
     char name[96], caption[256], number[16];
-    map m = {.l = l, .s = s, .shade = *sh, .first = first, .third = third, .rows = s->axes[1].count};
     snprintf(number, sizeof number, s->count == MAX_AXES ? "_%d" : "", third);
     snprintf(name, sizeof name, "map_%s%s%s%s", integrator, number, quantity ? "_" : "",
              quantity ? quantity->entry.name : "");
-    lab_figure_begin(l, &m.f, name);
-    snprintf(m.f.title, sizeof m.f.title, s->count == MAX_AXES ? "%s, %.80s = %.4g %s" : "%s", integrator,
+    lab_figure_begin(l, &m->f, name);
+    snprintf(m->f.title, sizeof m->f.title, s->count == MAX_AXES ? "%s, %.80s = %.4g %s" : "%s", integrator,
              axis_name(last), axis_value(last, third), lab_unit(last->pointer));
-    snprintf(caption, sizeof caption, "%s%s%s", m.f.title, quantity ? ": " : "",
+    snprintf(caption, sizeof caption, "%s%s%s", m->f.title, quantity ? ": " : "",
              quantity ? quantity->entry.summary : "");
-    set_axis(&s->axes[0], &m.f.axes[0]);
-    set_axis(&s->axes[1], &m.f.axes[1]);
-    write_cells(&m);
-    add_limit(&m);
-    return end_map(l, &m, caption);
+    set_axis(&s->axes[0], &m->f.axes[0]);
+    set_axis(&s->axes[1], &m->f.axes[1]);
+    write_cells(m);
+    add_limit(m);
+    return end_map(l, m, caption);
 }
 
 /* All integrators over a single axis, a row each, the first on top. */
-static drape_status draw_rows(lab *l, const space *s)
+static drape_status draw_rows(lab *l, map *m)
 {
-    const int rows = (int)(l->count / s->cells);
-    map m = {.l = l, .s = s, .rows = rows};
-    const char **names = drape_arena_take(&l->arena, (size_t)rows, sizeof *names);
+    const char **names = drape_arena_take(&l->arena, (size_t)m->rows, sizeof *names);
     if (!names)
         return DRAPE_E_MEMORY;
-    lab_figure_begin(l, &m.f, "map");
-    set_axis(&s->axes[0], &m.f.axes[0]);
-    m.f.axes[1] = (lab_axis){.from = -0.5, .to = rows - 0.5, .names = names, .name_count = rows};
-    m.f.plot_height = 6.0 * rows;
-    write_cells(&m);
-    for (int row = 0; row < rows; row++) {
+    lab_figure_begin(l, &m->f, "map");
+    set_axis(&m->s->axes[0], &m->f.axes[0]);
+    m->f.axes[1] = (lab_axis){.from = -0.5, .to = m->rows - 0.5, .names = names, .name_count = m->rows};
+    m->f.plot_height = 6.0 * m->rows;
+    write_cells(m);
+    for (int row = 0; row < m->rows; row++) {
         double bottom, top;
-        const size_t first = row_of(&m, row, &bottom, &top);
-        names[rows - 1 - row] = lab_tag_text(l->results[first], "integrator");
-        if (step_axis(s) == 0)
-            add_limit_at(&m.f, l->results[first], bottom, top, &m.limits);
+        const size_t first = row_of(m, row, &bottom, &top);
+        names[m->rows - 1 - row] = lab_tag_text(l->results[first], "integrator");
+        add_limit_at(m, first, bottom, top);
     }
-    return end_map(l, &m, "what happened to each integrator");
+    return end_map(l, m, "what happened to each integrator");
 }
 
 /* ---- Curves over a single axis ---- */
@@ -619,135 +600,132 @@ static drape_status draw_rows(lab *l, const space *s)
 #define FAILED_ROOM 2.4 /* [mm] above the curves, for the runs of an integrator that have no results */
 #define CURVE_ROOM  46.0
 
-/* A value of the curve's axis, which shows no zeros if it is logarithmic. */
-static double curve_value(const shade *sh, double value)
+/* The ends of the y axis: the scale with margins, and room above for `failed` lines of markers. */
+static void set_curve_axis(map *m, int failed)
 {
-    return sh->axis.log ? fmax(value, sh->axis.from) : value;
-}
-
-/* The ends of the y axis: the scale with margins, and room above for `failed` lines of markers. Returns the
- * height of the first of these lines as a share of the frame. */
-static void set_curve_axis(lab_figure *f, const shade *sh, int failed)
-{
-    lab_axis *y = &f->axes[1];
-    *y = sh->axis;
+    lab_axis *y = &m->f.axes[1];
+    *y = m->shade.axis;
     if (!(y->to > y->from)) { /* no run has a value: there are markers only, and no numbers */
         static const char *const none[] = {""};
         y->to = y->from + 1;
         y->names = none;
         y->name_count = 1;
     }
-    f->plot_height = CURVE_ROOM + FAILED_ROOM * failed;
+    m->f.plot_height = CURVE_ROOM + FAILED_ROOM * failed;
     lab_axis_widen(y, 0.04, 0.04 + FAILED_ROOM * failed / CURVE_ROOM);
 }
 
-/* Whether the case belongs to one of the kinds of marks on a curve. */
+/* The kinds of marks on a curve. */
 typedef enum mark { ON_CURVE, FEW_STEPS, NO_RESULT, OVER_BUDGET, MARKS } mark;
 
-static bool is_mark(const lab *l, const shade *sh, mark kind, size_t i)
+static mark mark_of(const map *m, size_t i)
 {
-    const bool late = judge(l, l->results[i]) == LATE, blank = isnan(shown_value(l, sh, i));
-    return kind == (late ? OVER_BUDGET : blank ? NO_RESULT : is_short(l->results[i]) ? FEW_STEPS : ON_CURVE);
+    const json_t *result = m->l->results[i];
+    return judge(m->l, result) == LATE              ? OVER_BUDGET
+           : isnan(shown_value(m->l, &m->shade, i)) ? NO_RESULT
+           : is_short(result)                       ? FEW_STEPS
+                                                    : ON_CURVE;
 }
 
-/* The marks of a kind of one integrator; missing values break the curve. height: of those without results. */
-static int write_marks(lab *l, const space *s, const shade *sh, size_t first, mark kind, double height,
-                       lab_figure *f)
+/* The numbers of the marks of each kind of an integrator. Returns whether any has no result. */
+static bool count_marks(const map *m, size_t first, int counts[MARKS])
 {
-    int count = 0;
-    lab_figure_data(f);
-    for (int k = 0; k < s->axes[0].count; k++) {
+    memset(counts, 0, MARKS * sizeof *counts);
+    for (size_t i = first; i < first + m->s->cells; i++)
+        counts[mark_of(m, i)]++;
+    return counts[NO_RESULT] + counts[OVER_BUDGET] > 0;
+}
+
+/* The marks of a kind of one integrator; missing values break the curve. height: of those without results. A
+ * logarithmic axis shows no zeros. */
+static void write_marks(map *m, size_t first, mark kind, double height)
+{
+    const double least = m->shade.axis.log ? m->shade.axis.from : -INFINITY;
+    bool any = false;
+    lab_figure_data(&m->f);
+    for (int k = 0; k < m->s->axes[0].count; k++) {
         const size_t i = first + (size_t)k;
-        if (is_mark(l, sh, kind, i)) {
-            lab_figure_point(f, axis_value(&s->axes[0], k),
-                             kind >= NO_RESULT ? height : curve_value(sh, shown_value(l, sh, i)));
-            count++;
-        } else if (count > 0)
-            lab_figure_point(f, NAN, NAN);
+        const bool here = mark_of(m, i) == kind;
+        if (here)
+            lab_figure_point(&m->f, axis_value(&m->s->axes[0], k),
+                             kind >= NO_RESULT ? height : fmax(shown_value(m->l, &m->shade, i), least));
+        else if (any)
+            lab_figure_point(&m->f, NAN, NAN);
+        any |= here;
     }
-    return count;
-}
-
-/* Whether an integrator has marks of a kind from `from` to `to`. */
-static bool has_marks(const lab *l, const space *s, const shade *sh, size_t first, mark from, mark to)
-{
-    for (size_t i = first; i < first + s->cells; i++)
-        for (mark kind = from; kind <= to; kind++)
-            if (is_mark(l, sh, kind, i))
-                return true;
-    return false;
 }
 
 /* The name of the runs without a value that are not over budget. */
-static const char *blank_name(const lab *l, const shade *sh)
+static const char *blank_name(const map *m)
 {
     bool stopped = false, completed = false;
-    for (size_t i = 0; i < l->count; i++)
-        if (is_mark(l, sh, NO_RESULT, i))
-            *(has_results(judge(l, l->results[i])) ? &completed : &stopped) = true;
+    for (size_t i = 0; i < m->l->count; i++)
+        if (mark_of(m, i) == NO_RESULT)
+            *(has_results(judge(m->l, m->l->results[i])) ? &completed : &stopped) = true;
     return !completed ? "stopped or exploded" : stopped ? "stopped, exploded or no value" : "no value";
-}
-
-static lab_style mark_style(const char *integrator, mark kind)
-{
-    const lab_style filled = lab_style_of(integrator, 0), open = lab_style_of(integrator, 1);
-    return kind == ON_CURVE ? filled
-           : kind == FEW_STEPS
-               ? (lab_style){open.colour, 0, open.point}
-               : (lab_style){open.colour, 0, kind == OVER_BUDGET ? LAB_PLUS_MARKER : LAB_CROSS_MARKER};
 }
 
 /* Values over a single axis, a curve for each integrator. Runs of few steps are open markers off the curve,
  * and those without a result a row of crosses above the curves. */
-static drape_status draw_curves(lab *l, const space *s, const shade *sh)
+static drape_status draw_curves(lab *l, map *m)
 {
+    static const int markers[MARKS] = {
+        [FEW_STEPS] = LAB_OPEN_MARKER, [NO_RESULT] = LAB_CROSS_MARKER, [OVER_BUDGET] = LAB_PLUS_MARKER};
+    const lab_axis *y = &m->f.axes[1];
     char name[96], text[96];
-    int failed = 0, limits = 0;
+    int failed = 0, counts[MARKS];
     bool seen[MARKS] = {false};
-    lab_figure f;
-    snprintf(name, sizeof name, "curve_%s", sh->quantity->entry.name);
-    lab_figure_begin(l, &f, name);
-    set_axis(&s->axes[0], &f.axes[0]);
-    for (size_t first = 0; first < l->count; first += s->cells)
-        failed += has_marks(l, s, sh, first, NO_RESULT, OVER_BUDGET);
-    set_curve_axis(&f, sh, failed);
-    for (size_t first = 0; first < l->count && step_axis(s) == 0; first += s->cells)
-        add_limit_at(&f, l->results[first], f.axes[1].from, f.axes[1].to, &limits);
-    for (size_t first = 0; first < l->count; first += s->cells) {
+    snprintf(name, sizeof name, "curve_%s", m->shade.quantity->entry.name);
+    lab_figure_begin(l, &m->f, name);
+    set_axis(&m->s->axes[0], &m->f.axes[0]);
+    for (size_t first = 0; first < l->count; first += m->s->cells)
+        failed += count_marks(m, first, counts);
+    set_curve_axis(m, failed);
+    for (size_t first = 0; first < l->count; first += m->s->cells)
+        add_limit_at(m, first, y->from, y->to);
+    for (size_t first = 0; first < l->count; first += m->s->cells) {
         const char *integrator = lab_tag_text(l->results[first], "integrator");
-        const double height = lab_axis_value(&f.axes[1], 1 - FAILED_ROOM * (failed - 0.5) / f.plot_height);
-        if (!has_marks(l, s, sh, first, ON_CURVE, ON_CURVE))
-            lab_figure_marker(&f, mark_style(integrator, ON_CURVE), integrator);
-        for (mark kind = ON_CURVE; kind < MARKS; kind++)
-            if (write_marks(l, s, sh, first, kind, height, &f)) {
-                seen[kind] = true;
-                lab_figure_curve(&f, mark_style(integrator, kind), kind == ON_CURVE ? integrator : NULL);
-            }
-        failed -= has_marks(l, s, sh, first, NO_RESULT, OVER_BUDGET);
+        const double height = lab_axis_value(y, 1 - FAILED_ROOM * (failed - 0.5) / m->f.plot_height);
+        const lab_style filled = lab_style_of(integrator, 0), open = lab_style_of(integrator, 1);
+        failed -= count_marks(m, first, counts);
+        if (!counts[ON_CURVE])
+            lab_figure_marker(&m->f, filled, integrator);
+        for (mark kind = ON_CURVE; kind < MARKS; kind++) {
+            if (!counts[kind])
+                continue;
+            seen[kind] = true;
+            write_marks(m, first, kind, height);
+            if (kind == ON_CURVE)
+                lab_figure_curve(&m->f, filled, integrator);
+            else
+                lab_figure_curve(
+                    &m->f, (lab_style){open.colour, 0, kind == FEW_STEPS ? open.point : markers[kind]}, NULL);
+        }
     }
     verdict_text(l, LATE, text);
     const char *const names[MARKS] = {
-        [FEW_STEPS] = verdicts[SHORT].name, [NO_RESULT] = blank_name(l, sh), [OVER_BUDGET] = text};
-    static const int markers[MARKS] = {
-        [FEW_STEPS] = LAB_OPEN_MARKER, [NO_RESULT] = LAB_CROSS_MARKER, [OVER_BUDGET] = LAB_PLUS_MARKER};
+        [FEW_STEPS] = verdicts[SHORT].name, [NO_RESULT] = blank_name(m), [OVER_BUDGET] = text};
     for (mark kind = FEW_STEPS; kind < MARKS; kind++)
         if (seen[kind])
-            lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, markers[kind]}, names[kind]);
-    return lab_figure_end(l, &f, sh->quantity->entry.summary);
+            lab_figure_marker(&m->f, (lab_style){LAB_BLACK, 0, markers[kind]}, names[kind]);
+    return lab_figure_end(l, &m->f, m->shade.quantity->entry.summary);
 }
 
 /* ---- The report ---- */
 
-/* What happened, and each of the results that the experiment shows. */
+/* What happened, or a result that the experiment shows. */
 static drape_status draw(lab *l, const space *s, const shade *sh)
 {
     drape_status status = DRAPE_OK;
+    map m = {
+        .l = l, .s = s, .shade = *sh, .rows = s->count == 1 ? (int)(l->count / s->cells) : s->axes[1].count};
+    const size_t cells = (size_t)s->axes[0].count * (size_t)m.rows;
     if (s->count == 1)
-        return sh->quantity ? draw_curves(l, s, sh) : draw_rows(l, s);
-    const int thirds = s->count == MAX_AXES ? s->axes[2].count : 1;
-    for (size_t first = 0; !status && first + s->cells <= l->count; first += s->cells)
-        for (int third = 0; third < thirds && !status; third++)
-            status = draw_map(l, s, sh, first, third);
+        return sh->quantity ? draw_curves(l, &m) : draw_rows(l, &m);
+    for (; !status && m.first + cells <= l->count; m.first += cells) {
+        m.limits = 0;
+        status = draw_map(l, &m, (int)(m.first % s->cells / cells));
+    }
     return status;
 }
 
