@@ -49,8 +49,8 @@ typedef struct lab_axis {
     int name_count;
 } lab_axis;
 
-/* Where a value stands, as a share of the axis: 0 at its low end, 1 at its high end, cut far beyond these; and
- * the value at a share. */
+/* Where a value stands, as a share of the axis: 0 at its low end, 1 at its high end, cut far beyond these;
+ * and the value at a share. */
 double lab_axis_share(const lab_axis *axis, double value);
 double lab_axis_value(const lab_axis *axis, double share);
 
@@ -123,8 +123,8 @@ void lab_figure_marker(lab_figure *f, lab_style style, const char *text);
 /* A swatch in the legend; hatched in black or plain. */
 void lab_figure_swatch(lab_figure *f, int colour, bool hatched, const char *text);
 
-/* Makes both axes logarithmic and as long as the curves so far, with a margin; orders > 0: makes room below the
- * curves and draws reference lines of slopes 1 to orders there, 2 at most. */
+/* Makes both axes logarithmic and as long as the curves so far, with a margin; orders > 0: makes room below
+ * the curves and draws reference lines of slopes 1 to orders there, 2 at most. */
 void lab_figure_fit(lab_figure *f, int orders);
 
 /* Writes name.svg and name.pdf, and adds the figure with its caption to the page. Without an element there

@@ -392,8 +392,8 @@ static const chart charts[] = {
     {"energy", "CPU [s]", "cpu_s", NULL, true},
 };
 
-/* A block of the points of a series on a chart. gained: those where the method gained energy instead of losing
- * it. */
+/* A block of the points of a series on a chart. gained: those where the method gained energy instead of
+ * losing it. */
 static void put_points(lab_figure *f, const chart *c, const lab_series *s, bool gained)
 {
     lab_figure_data(f);

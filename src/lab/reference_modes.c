@@ -29,8 +29,8 @@ DRAPE_REFERENCE(beam_frequency, .entry.summary = "omega L^2 sqrt(rho/B) of a str
                 .constants = {2, 12, SQRT_1000 /* of rho/B */});
 
 /* A square plate clamped at one side: omega a^2 sqrt(rho/D) at nu = 0.3, by Rayleigh-Ritz with x^2 times
- * polynomials of degree 11 along, and of degree 11 across. Beam functions gave Leissa the upper bounds 3.4917,
- * 8.5246, 21.429, 27.331, 31.111. */
+ * polynomials of degree 11 along, and of degree 11 across. Beam functions gave Leissa the upper bounds
+ * 3.4917, 8.5246, 21.429, 27.331, 31.111. */
 DRAPE_REFERENCE(
     plate_frequency, .entry.summary = "omega a^2 sqrt(rho/D) of a square plate clamped at one side",
     .unit = "1", .parameter = "mode", DRAPE_CASES(1, 2, 3, 4, 5),

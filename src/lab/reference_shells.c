@@ -69,8 +69,8 @@ DRAPE_REFERENCE(cylinder_pull_out, .entry.summary = "displacement at the middle 
 
 #define ROOF_LOAD 3000.0 /* [N] of the whole roof at factor 1 */
 
-/* constants: the thickness [mm] of a roof whose load is sought at a deflection, the parameter; 0: the parameter
- * is the thickness, and the load at the first limit point is sought. */
+/* constants: the thickness [mm] of a roof whose load is sought at a deflection, the parameter; 0: the
+ * parameter is the thickness, and the load at the first limit point is sought. */
 static int roof_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(

@@ -30,8 +30,8 @@ drape_status lab_add_point(lab *l, const lab_point *p)
     return status;
 }
 
-/* The limits of its order that an integrator is run with: 2 and 5 if it has the parameter max_order and the def
- * does not set it; otherwise 0, for none, alone. Returns their number. */
+/* The limits of its order that an integrator is run with: 2 and 5 if it has the parameter max_order and the
+ * def does not set it; otherwise 0, for none, alone. Returns their number. */
 static size_t order_limits(const lab *l, const drape_integrator_ops *integrator, int limits[2])
 {
     bool chosen = drape_param_find(integrator->entry.params, integrator->entry.param_count, "max_order") < 0;

@@ -22,8 +22,8 @@ struct lab_sheet {
     double dt, tolerance;
     const char *others; /* other members of the scene */
     double duration;    /* default: 1 */
-    /* In what the cases of a reference differ: the parameter or, of a threshold, the load, times this factor. It
-     * is each @ in the texts, or the number at this offset in the sheet. */
+    /* In what the cases of a reference differ: the parameter or, of a threshold, the load, times this
+     * factor. It is each @ in the texts, or the number at this offset in the sheet. */
     double factor;
     size_t varied;
 };
@@ -40,8 +40,8 @@ int lab_sheet_text(const lab_sheet *sheet, double value, char text[DRAPE_LAB_TEX
 const char *lab_sheet_format(char text[400], const char *format, ...) __attribute__((format(printf, 2, 3)));
 #define SHEET_FORMAT(...) lab_sheet_format((char[400]){0}, __VA_ARGS__)
 
-/* Members of the sheet of a strip along x, of length 1 m, thickness h and rigidity B = E h^3/12; clamped at its
- * left end. */
+/* Members of the sheet of a strip along x, of length 1 m, thickness h and rigidity B = E h^3/12; clamped at
+ * its left end. */
 #define STRIP_RIGIDITY 1e-4 /* [N m] */
 #define STRIP_DENSITY  0.1  /* [kg/m2] */
 #define FREE_STRIP(h)                                                                                        \
@@ -79,9 +79,9 @@ drape_status lab_settle(drape_reference_run *run, const double *v);
  * known. */
 drape_status lab_unstable_modes(drape_reference_run *run, double *value);
 
-/* Advances, and measures omega [rad/s] of the mode whose number is the parameter, of those that move the scene
- * along an axis. Constants: the axis (1, 2 or 3; 0: all modes count), how many modes are computed, and by what
- * omega is multiplied. */
+/* Advances, and measures omega [rad/s] of the mode whose number is the parameter, of those that move the
+ * scene along an axis. Constants: the axis (1, 2 or 3; 0: all modes count), how many modes are computed, and
+ * by what omega is multiplied. */
 drape_status lab_omega(drape_reference_run *run, double *value);
 
 #endif

@@ -382,8 +382,8 @@ static double shade_of(const shade *sh, double value)
 
 /* ---- Maps ---- */
 
-/* A figure: the cells of an integrator, at an index on the third axis, or all integrators over a single axis, a
- * row or a curve each. */
+/* A figure: the cells of an integrator, at an index on the third axis, or all integrators over a single
+ * axis, a row or a curve each. */
 typedef struct map {
     const lab *l;
     const space *s;

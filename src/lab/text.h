@@ -31,7 +31,8 @@ void lab_page_text(lab *l, const char *text); /* escaped */
 /* Adds a figure with its caption. */
 void lab_page_figure(lab *l, const char *svg, size_t size, const char *caption);
 
-/* A table of the page and, if `markdown` is not NULL, of that text. A text is neither a cell more nor HTML. */
+/* A table of the page and, if `markdown` is not NULL, of that text. A text in it is neither another cell nor
+ * HTML. */
 typedef struct lab_table {
     lab *l;
     FILE *markdown;

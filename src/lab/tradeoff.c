@@ -20,9 +20,9 @@
 
 /* ---- The cases ---- */
 
-/* If there is a budget, cases of low rank come first: a few points of every integrator, over all of its range,
- * then the points between, then controllers and linear solvers. Among cases of equal rank explicit integrators
- * come last: a stiff sheet makes each of their cases long. */
+/* If there is a budget, cases of low rank come first: a few points of every integrator, over all of its
+ * range, then the points between, then controllers and linear solvers. Among cases of equal rank explicit
+ * integrators come last: a stiff sheet makes each of their cases long. */
 static const lab_level steps[] = {{1.0 / 30, 3},  {1.0 / 60, 0},  {1.0 / 120, 3}, {1.0 / 240, 1},
                                   {1.0 / 480, 4}, {1.0 / 960, 2}, {1.0 / 1920, 5}}; /* [s] */
 static const lab_level rtols[] = {{3e-2, 4}, {1e-2, 2}, {3e-3, 4}, {1e-3, 0},
