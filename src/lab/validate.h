@@ -102,7 +102,8 @@ void drape_validate_judge(const drape_reference *reference, drape_validation *v)
 /* What is expected of the case with that parameter. */
 double drape_reference_expected(const drape_reference *reference, double parameter);
 
-/* Writes the scene of a case as JSON. Returns its length; DRAPE_LAB_TEXT or more: it did not fit. */
+/* Writes the scene of a case as JSON. Returns its length. A text that does not fit is cut short, which is no
+ * JSON any more. */
 int drape_reference_text(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]);
 
 const char *drape_outcome_name(drape_outcome verdict);

@@ -223,20 +223,28 @@ END_TEST
 
 START_TEST(references_are_complete)
 {
+    drape_context *ctx = NULL;
     int count = 0;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     for (; drape_references[count]; count++) {
         const drape_reference *r = drape_references[count];
         char text[DRAPE_LAB_TEXT];
         ck_assert(r->entry.name && r->entry.summary && r->unit && r->model && r->entry.reference &&
                   r->measure && r->tolerance > 0);
         ck_assert(r->case_count > 0 && (r->case_count == 1 || r->parameter));
+        ck_assert(!r->expected == !!r->known && !r->scene == !!r->sheet);
+        ck_assert(!r->known || r->known_count == 1 || r->known_count == r->case_count);
         for (int i = 0; i < r->case_count; i++) {
             ck_assert(isfinite(drape_reference_expected(r, r->parameters[i])));
-            const int length = drape_reference_text(&(drape_reference_case){r, r->parameters[i], 1}, text);
-            ck_assert(length > 0 && length < DRAPE_LAB_TEXT);
+            drape_scene *scene = NULL;
+            ck_assert_int_gt(drape_reference_text(&(drape_reference_case){r, r->parameters[i], 1}, text), 0);
+            ck_assert_msg(!drape_scene_parse(ctx, text, "reference", &scene), "%s: %s", r->entry.name,
+                          drape_context_message(ctx)); /* one that is cut short is not JSON */
+            drape_scene_destroy(&scene);
         }
     }
     ck_assert_int_ge(count, 12);
+    drape_context_destroy(&ctx);
 }
 END_TEST
 
