@@ -25,7 +25,7 @@ typedef struct list_request {
 typedef struct list_style {
     void (*scene)(void);
     void (*object)(const cli_object *object);
-    void (*key)(const cli_object *object, const drape_scene_key *key);
+    void (*key)(const cli_object *objects, int count, int at, const drape_scene_key *key);
     void (*table)(const drape_registry *table);
     void (*entries_begin)(void);
     void (*entry)(const drape_entry *entry);
@@ -89,10 +89,10 @@ static void print_param(const char *name, const char *help, const param_text *te
            text->unit, *text->value ? "; " : "", *text->value ? prefix : "", text->value);
 }
 
-static void text_key(const cli_object *object, const drape_scene_key *key)
+static void text_key(const cli_object *objects, int count, int at, const drape_scene_key *key)
 {
-    (void)object;
-    param_text text = text_of_key(object, key);
+    (void)count;
+    param_text text = text_of_key(&objects[at], key);
     drape_scene_takes_text(key, text.takes, sizeof text.takes); /* the unit included */
     *text.unit = 0;
     print_param(key->param.name, key->param.help, &text,
@@ -164,8 +164,15 @@ static void markdown_cells(const char *const *of, int count, const char *name, c
     fputc('\n', stdout);
 }
 
+static bool is_same_row(const drape_param *a, const param_text *x, const drape_param *b, const param_text *y)
+{
+    return strcmp(a->name, b->name) == 0 && strcmp(a->help, b->help) == 0 &&
+           strcmp(x->takes, y->takes) == 0 && strcmp(x->value, y->value) == 0 &&
+           strcmp(x->unit, y->unit) == 0;
+}
+
 /* The help of a key that stands for others names them, as a reader may see only its row of the table. */
-static void markdown_key(const cli_object *object, const drape_scene_key *key)
+static param_text text_of_row(const cli_object *object, const drape_scene_key *key)
 {
     param_text text = text_of_key(object, key);
     const size_t length = strlen(text.takes);
@@ -173,8 +180,33 @@ static void markdown_key(const cli_object *object, const drape_scene_key *key)
         snprintf(text.takes + length, sizeof text.takes - length, "; ");
         drape_scene_one_of_text(object->form, text.takes + length + 2, sizeof text.takes - length - 2);
     }
-    const char *place = *object->pointer ? object->pointer : "/";
-    markdown_cells(&place, 1, key->param.name, key->param.help, &text);
+    return text;
+}
+
+static bool has_same_key(const cli_object *object, const drape_scene_key *key, const param_text *text)
+{
+    for (size_t k = 0; k < object->form->key_count; k++) {
+        const drape_scene_key *other = &object->form->keys[k];
+        const param_text its = text_of_row(object, other);
+        if (is_same_row(&key->param, text, &other->param, &its))
+            return true;
+    }
+    return false;
+}
+
+/* One line for all objects that have the same key, at the first of them. */
+static void markdown_key(const cli_object *objects, int count, int first, const drape_scene_key *key)
+{
+    const char *places[CLI_MAX_OBJECTS];
+    int place_count = 0;
+    const param_text text = text_of_row(&objects[first], key);
+    for (int i = 0; i < count; i++)
+        if (has_same_key(&objects[i], key, &text)) {
+            if (i < first)
+                return;
+            places[place_count++] = *objects[i].pointer ? objects[i].pointer : "/";
+        }
+    markdown_cells(places, place_count, key->param.name, key->param.help, &text);
 }
 
 static void markdown_object(const cli_object *object)
@@ -211,8 +243,7 @@ static bool is_shown(const drape_entry *entry, const char *only)
 static bool is_same_param(const drape_param *a, const drape_param *b)
 {
     const param_text x = text_of(a), y = text_of(b);
-    return strcmp(a->name, b->name) == 0 && strcmp(a->help, b->help) == 0 && strcmp(x.takes, y.takes) == 0 &&
-           strcmp(x.value, y.value) == 0 && strcmp(x.unit, y.unit) == 0;
+    return is_same_row(a, &x, b, &y);
 }
 
 static bool has_same_param(const drape_entry *entry, const drape_param *param)
@@ -289,18 +320,19 @@ static void print_table(const list_style *style, const drape_registry *table, co
 static int print_scene(const list_style *style, const char *only)
 {
     cli_object objects[CLI_MAX_OBJECTS];
-    int count = cli_objects(objects), printed = 0;
+    const int all = cli_objects(objects);
+    int count = 0;
+    for (int i = 0; i < all; i++)
+        if (!only || strcmp(only, objects[i].form->name) == 0)
+            objects[count++] = objects[i];
+    if (count > 0)
+        style->scene();
     for (int i = 0; i < count; i++) {
-        const drape_scene_object *form = objects[i].form;
-        if (only && strcmp(only, form->name) != 0)
-            continue;
-        if (printed++ == 0)
-            style->scene();
         style->object(&objects[i]);
-        for (size_t k = 0; k < form->key_count; k++)
-            style->key(&objects[i], &form->keys[k]);
+        for (size_t k = 0; k < objects[i].form->key_count; k++)
+            style->key(objects, count, i, &objects[i].form->keys[k]);
     }
-    return printed;
+    return count;
 }
 
 static int unknown_name(const char *name)

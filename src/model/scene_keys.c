@@ -30,25 +30,54 @@ static const char *const corners[] = {"top-left", "top-right", "bottom-left", "b
 static const char *const edges[] = {"top", "bottom", "left", "right", NULL};
 static const char *const up_axes[] = {"y", "z", NULL};
 
+/* ---- Nodes ---- */
+
+/* The nodes that pins, masses, edges and seams have. */
+#define SELECTION_KEYS(def)                                                                                  \
+    {DRAPE_INTEGER("nodes", "1", UNSAID, 0, INT32_MAX,                                                       \
+                   "node numbers of the cloth; of a seam, in its order"),                                    \
+     .shape = DRAPE_SCENE_LIST, ARRAY(def, nodes, node_count), .at_least = 1},                               \
+        {DRAPE_CHOICE("corner", UNSAID, corners, "a corner of a grid; top is row 0, left is column 0"),      \
+         IN(def, corner)},                                                                                   \
+        {DRAPE_CHOICE("edge", UNSAID, edges,                                                                 \
+                      "a side of a grid, by ascending column or row; top is row 0, left is column 0"),       \
+         IN(def, edge)},                                                                                     \
+        {DRAPE_INTEGER("row", "1", UNSAID, 0, INT32_MAX, "a row of a grid, from 0, by ascending column"),    \
+         IN(def, row)},                                                                                      \
+    {                                                                                                        \
+        DRAPE_VECTOR("box", "m", UNSAID, LOWEST, HIGHEST,                                                    \
+                     "nodes inside a box of rest coordinates after the transform, boundary included; of a "  \
+                     "seam, sorted along the longest side of their bounding box"),                           \
+            .shape = DRAPE_SCENE_BOX, BOX(def)                                                               \
+    }
+static const char *const selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
+
+/* The motion that pins and colliders have, and the names of all that has one. */
+#define MOTION_KEYS(def)                                                                                     \
+    {DRAPE_VECTOR("track", "s and m", NONE, LOWEST, HIGHEST,                                                 \
+                  "displacement from the position at the start, or that its parameters define, linear "      \
+                  "between the times"),                                                                      \
+     .shape = DRAPE_SCENE_TRACK, ARRAY(def, track, key_count), .at_least = 1},                               \
+    {                                                                                                        \
+        SHAPED(                                                                                              \
+            DRAPE_SCENE_OBJECTS, "turns", NONE,                                                              \
+            "rotation about the pivot, steady between the times; of pins, as one body, together with the "   \
+            "direction that they clamp"),                                                                    \
+            ARRAY(def, turns, turn_count), .at_least = 1, .child = &drape_form_turn                          \
+    }
+#define NAME_KEY(def)                                                                                        \
+    {                                                                                                        \
+        DRAPE_TEXT("name", "unique name, of pins among those of their cloth; of an event without ; and @",   \
+                   .derived = "what it is and its number, such as \"cloth0\""),                              \
+            IN(def, name)                                                                                    \
+    }
+
 /* ---- Pins ---- */
 
 static const drape_scene_key pin_keys[] = {
-    {DRAPE_TEXT("name", "unique name among the pins of the cloth, for events",
-                .derived = "\"pin0\", \"pin1\" ..."),
-     IN(drape_pin_def, name)},
-    {DRAPE_INTEGER("nodes", "1", UNSAID, 0, INT32_MAX, "node numbers of this cloth"),
-     .shape = DRAPE_SCENE_LIST, ARRAY(drape_pin_def, nodes, node_count), .at_least = 1},
-    {DRAPE_CHOICE("corner", UNSAID, corners, "a corner of a grid; top is row 0, left is column 0"),
-     IN(drape_pin_def, corner)},
-    {DRAPE_CHOICE("edge", UNSAID, edges, "a side of a grid; top is row 0, left is column 0"),
-     IN(drape_pin_def, edge)},
-    {DRAPE_INTEGER("row", "1", UNSAID, 0, INT32_MAX, "a row of a grid, from 0"), IN(drape_pin_def, row)},
-    {DRAPE_VECTOR("box", "m", UNSAID, LOWEST, HIGHEST,
-                  "nodes inside a box of rest coordinates after the transform, boundary included"),
-     .shape = DRAPE_SCENE_BOX, BOX(drape_pin_def)},
-    {DRAPE_VECTOR("track", "s and m", DRAPE_DERIVED("none: fixed"), LOWEST, HIGHEST,
-                  "displacement from the start, linear between the times"),
-     .shape = DRAPE_SCENE_TRACK, ARRAY(drape_pin_def, track, key_count), .at_least = 1},
+    NAME_KEY(drape_pin_def),
+    SELECTION_KEYS(drape_pin_def),
+    MOTION_KEYS(drape_pin_def),
     {DRAPE_TEXT("attach", "name of the collider that carries the nodes, which ride on it from where they are",
                 .derived = "none"),
      IN(drape_pin_def, attach)},
@@ -66,35 +95,21 @@ static const drape_scene_key pin_keys[] = {
     {DRAPE_VECTOR("axis", "1", DRAPE_DERIVED("none: held in all directions"), LOWEST, HIGHEST,
                   "the only direction in which the nodes are free: each stays on a line, as on a rail"),
      IN(drape_pin_def, axis)},
-    {SHAPED(DRAPE_SCENE_OBJECTS, "turns", DRAPE_DERIVED("none: they do not turn"),
-            "rotation of the nodes as one body about the pivot, and of the direction that they clamp, steady "
-            "between the times"),
-     ARRAY(drape_pin_def, turns, turn_count), .at_least = 1, .child = &drape_form_turn},
     {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the mean of the nodes"), -1e9, 1e9,
                   "the point about which they turn, at the start; the track displaces it; with `turns`"),
      IN(drape_pin_def, pivot)},
 };
-static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
 
 const drape_scene_object drape_form_pin = {.name = "pin",
                                            KEYS(pin_keys),
-                                           .one_of = pin_selectors,
+                                           .one_of = selectors,
                                            .def_size = sizeof(drape_pin_def),
                                            .least_size = offsetof(drape_pin_def, clamp)};
 
 /* ---- Masses ---- */
 
 static const drape_scene_key mass_keys[] = {
-    {DRAPE_INTEGER("nodes", "1", UNSAID, 0, INT32_MAX, "node numbers of this cloth"),
-     .shape = DRAPE_SCENE_LIST, ARRAY(drape_mass_def, nodes, node_count), .at_least = 1},
-    {DRAPE_CHOICE("corner", UNSAID, corners, "a corner of a grid; top is row 0, left is column 0"),
-     IN(drape_mass_def, corner)},
-    {DRAPE_CHOICE("edge", UNSAID, edges, "a side of a grid; top is row 0, left is column 0"),
-     IN(drape_mass_def, edge)},
-    {DRAPE_INTEGER("row", "1", UNSAID, 0, INT32_MAX, "a row of a grid, from 0"), IN(drape_mass_def, row)},
-    {DRAPE_VECTOR("box", "m", UNSAID, LOWEST, HIGHEST,
-                  "nodes inside a box of rest coordinates after the transform, boundary included"),
-     .shape = DRAPE_SCENE_BOX, BOX(drape_mass_def)},
+    SELECTION_KEYS(drape_mass_def),
     {DRAPE_NUMBER("add", "kg", DRAPE_DERIVED("none; exactly one of add and mass is given"), DRAPE_ABOVE(0),
                   1e12, "added to the mass of each of these nodes"),
      IN(drape_mass_def, add)},
@@ -105,28 +120,16 @@ static const drape_scene_key mass_keys[] = {
 
 const drape_scene_object drape_form_mass = {.name = "mass",
                                             KEYS(mass_keys),
-                                            .one_of = pin_selectors,
+                                            .one_of = selectors,
                                             .def_size = sizeof(drape_mass_def),
                                             .least_size = sizeof(drape_mass_def)};
 
 static const drape_scene_key selection_keys[] = {
-    {DRAPE_INTEGER("nodes", "1", UNSAID, 0, INT32_MAX, "node numbers of this cloth"),
-     .shape = DRAPE_SCENE_LIST, ARRAY(drape_selection_def, nodes, node_count), .at_least = 1},
-    {DRAPE_CHOICE("corner", UNSAID, corners, "a corner of a grid; top is row 0, left is column 0"),
-     IN(drape_selection_def, corner)},
-    {DRAPE_CHOICE("edge", UNSAID, edges, "a side of a grid; top is row 0, left is column 0"),
-     IN(drape_selection_def, edge)},
-    {DRAPE_INTEGER("row", "1", UNSAID, 0, INT32_MAX, "a row of a grid, from 0"),
-     IN(drape_selection_def, row)},
-    {DRAPE_VECTOR("box", "m", UNSAID, LOWEST, HIGHEST,
-                  "nodes inside a box of rest coordinates after the transform, boundary included"),
-     .shape = DRAPE_SCENE_BOX, BOX(drape_selection_def)},
+    SELECTION_KEYS(drape_selection_def),
 };
 
-const drape_scene_object drape_form_selection = {.name = "selection",
-                                                 KEYS(selection_keys),
-                                                 .one_of = pin_selectors,
-                                                 .def_size = sizeof(drape_selection_def)};
+const drape_scene_object drape_form_selection = {
+    .name = "selection", KEYS(selection_keys), .one_of = selectors, .def_size = sizeof(drape_selection_def)};
 
 static const drape_scene_key periodic_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECT, "from", DRAPE_REQUIRED, "the nodes of one edge"),
@@ -192,7 +195,8 @@ const drape_scene_object drape_form_transform = {.name = "transform", KEYS(trans
         {DRAPE_TEXT("file", "an OBJ or PLY file, relative to the scene", .derived = ""),                     \
          .offset = (at) + offsetof(drape_mesh_def, file)},                                                   \
     {                                                                                                        \
-        SHAPED(DRAPE_SCENE_OBJECT, "transform", NONE, "scale, rotation, translation"),                       \
+        SHAPED(DRAPE_SCENE_OBJECT, "transform", NONE,                                                        \
+               "scale, rotation, translation; of a start, after its folds"),                                 \
             .offset = (at), .child = &drape_form_transform                                                   \
     }
 
@@ -246,7 +250,8 @@ static const drape_scene_key start_keys[] = {
      IN(drape_start_def, file)},
     {SHAPED(DRAPE_SCENE_OBJECTS, "folds", NONE, "lines about which it is folded, in this order"),
      ARRAY(drape_start_def, folds, fold_count), .child = &fold},
-    {SHAPED(DRAPE_SCENE_OBJECT, "transform", NONE, "scale, rotation, translation after the folds"),
+    {SHAPED(DRAPE_SCENE_OBJECT, "transform", NONE,
+            "scale, rotation, translation; of a start, after its folds"),
      .child = &start_transform},
     {DRAPE_VECTOR("spin", "rad/s", 0, -1e9, 1e9, "angular velocity"), IN(drape_start_def, spin)},
     {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the centre of mass at the start"), -1e9, 1e9,
@@ -262,7 +267,7 @@ static const drape_scene_object start = {
 /* ---- Cloth ---- */
 
 static const drape_scene_key cloth_keys[] = {
-    {DRAPE_TEXT("name", "unique name", .derived = "\"cloth0\", \"cloth1\" ..."), IN(drape_cloth_def, name)},
+    NAME_KEY(drape_cloth_def),
     {SHAPED(DRAPE_SCENE_OBJECT, "mesh", DRAPE_REQUIRED, "a grid or a file"), IN(drape_cloth_def, mesh),
      .child = &drape_form_mesh},
     {SHAPED(DRAPE_SCENE_OBJECT, "material", UNSAID, "parameters of the material"), .child = &material},
@@ -312,19 +317,13 @@ const drape_scene_object drape_form_turn = {
 static const drape_scene_key collider_keys[] = {
     {DRAPE_TEXT("type", "name of a collider; its parameters are keys beside it"),
      IN(drape_collider_def, entry.type)},
-    {DRAPE_TEXT("name", "unique name", .derived = "\"collider0\", \"collider1\" ..."),
-     IN(drape_collider_def, name)},
+    NAME_KEY(drape_collider_def),
     {DRAPE_NUMBER("friction", "1", 0, 0, 1e3, "Coulomb's mu between collider and cloth"),
      IN(drape_collider_def, friction)},
     {DRAPE_NUMBER("restitution", "1", 0, 0, 1,
                   "speed of rebound / speed of impact, of cloth on the collider"),
      IN(drape_collider_def, restitution)},
-    {DRAPE_VECTOR("track", "s and m", DRAPE_DERIVED("none: it does not move"), LOWEST, HIGHEST,
-                  "displacement from the position that its parameters define, linear between the times"),
-     .shape = DRAPE_SCENE_TRACK, ARRAY(drape_collider_def, track, key_count), .at_least = 1},
-    {SHAPED(DRAPE_SCENE_OBJECTS, "turns", DRAPE_DERIVED("none: it does not turn"),
-            "rotation about the pivot, steady between the times"),
-     ARRAY(drape_collider_def, turns, turn_count), .at_least = 1, .child = &drape_form_turn},
+    MOTION_KEYS(drape_collider_def),
     {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the middle of its shape; of a plane, the origin"), -1e9, 1e9,
                   "the point about which it turns, where its parameters define it"),
      IN(drape_collider_def, pivot)},
@@ -355,8 +354,7 @@ static const char *const actions[] = {"record", "stop", "release", NULL};
 static const drape_scene_key event_keys[] = {
     {DRAPE_TEXT("type", "name of an event; its parameters are keys beside it"),
      IN(drape_event_def, entry.type)},
-    {DRAPE_TEXT("name", "unique name, without ; and @", .derived = "\"event0\", \"event1\" ..."),
-     IN(drape_event_def, name)},
+    NAME_KEY(drape_event_def),
     {DRAPE_TEXT("cloth", "name of the cloth that it is about", .derived = "all of them"),
      IN(drape_event_def, cloth)},
     {DRAPE_TEXT("pins", "name of the pins that it measures or releases", .derived = "all pins of the cloth"),
@@ -382,28 +380,15 @@ const drape_scene_object drape_form_event = {
 
 static const drape_scene_key seam_side_keys[] = {
     {DRAPE_TEXT("cloth", "name of its cloth"), IN(drape_seam_side_def, cloth)},
-    {DRAPE_INTEGER("nodes", "1", UNSAID, 0, INT32_MAX, "node numbers of the cloth, in the order of the seam"),
-     .shape = DRAPE_SCENE_LIST, ARRAY(drape_seam_side_def, nodes, node_count), .at_least = 1},
-    {DRAPE_CHOICE("corner", UNSAID, corners, "a corner of a grid; top is row 0, left is column 0"),
-     IN(drape_seam_side_def, corner)},
-    {DRAPE_CHOICE("edge", UNSAID, edges, "a side of a grid, by ascending column or row"),
-     IN(drape_seam_side_def, edge)},
-    {DRAPE_INTEGER("row", "1", UNSAID, 0, INT32_MAX, "a row of a grid, from 0, by ascending column"),
-     IN(drape_seam_side_def, row)},
-    {DRAPE_VECTOR(
-         "box", "m", UNSAID, LOWEST, HIGHEST,
-         "nodes inside a box of rest coordinates, sorted along the longest side of their bounding box"),
-     .shape = DRAPE_SCENE_BOX, BOX(drape_seam_side_def)},
+    SELECTION_KEYS(drape_seam_side_def),
     {DRAPE_BOOLEAN("reverse", false, "in the reverse order"), IN(drape_seam_side_def, reverse)},
 };
-const drape_scene_object drape_form_seam_side = {.name = "seam_side",
-                                                 KEYS(seam_side_keys),
-                                                 .one_of = pin_selectors,
-                                                 .def_size = sizeof(drape_seam_side_def)};
+const drape_scene_object drape_form_seam_side = {
+    .name = "seam_side", KEYS(seam_side_keys), .one_of = selectors, .def_size = sizeof(drape_seam_side_def)};
 
 static const drape_scene_key seam_keys[] = {
     {DRAPE_TEXT("type", "name of a seam; its parameters are keys beside it"), IN(drape_seam_def, entry.type)},
-    {DRAPE_TEXT("name", "unique name", .derived = "\"seam0\", \"seam1\" ..."), IN(drape_seam_def, name)},
+    NAME_KEY(drape_seam_def),
     {SHAPED(DRAPE_SCENE_OBJECT, "a", DRAPE_REQUIRED, "the nodes of one side"), IN(drape_seam_def, a),
      .child = &drape_form_seam_side},
     {SHAPED(DRAPE_SCENE_OBJECT, "b", DRAPE_REQUIRED, "as many nodes of the other, in the same order"),
