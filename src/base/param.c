@@ -1,6 +1,7 @@
 /* param.c: see param.h. */
 #include "base/param.h"
 #include "base/elementary.h"
+#include "base/retired.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -433,13 +434,13 @@ drape_status drape_param_unknown(drape_context *ctx, const char *pointer, const 
                          list);
 }
 
-static drape_status unknown_name(drape_context *ctx, const char *pointer, const drape_param *params,
-                                 int param_count, const char *name)
+static drape_status unknown_name(drape_context *ctx, const char *pointer, const drape_entry *entry,
+                                 const char *name)
 {
     const char *names[DRAPE_MAX_PARAMS];
-    for (int i = 0; i < param_count; i++)
-        names[i] = params[i].name;
-    return drape_param_unknown(ctx, pointer, name, names, (size_t)param_count);
+    for (int i = 0; i < entry->param_count; i++)
+        names[i] = entry->params[i].name;
+    return drape_param_unknown(ctx, pointer, name, names, (size_t)entry->param_count);
 }
 
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param)
@@ -450,26 +451,28 @@ drape_status drape_param_missing(drape_context *ctx, const char *pointer, const 
                          param->help, takes);
 }
 
-drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_param *params,
-                                  int param_count, const drape_setting *settings, size_t setting_count,
-                                  double *values)
+drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_entry *entry,
+                                  const drape_setting *settings, size_t setting_count, double *values)
 {
+    const drape_param *params = entry->params;
     bool given[DRAPE_MAX_PARAMS] = {false};
-    for (int i = 0; i < param_count; i++)
+    for (int i = 0; i < entry->param_count; i++)
         drape_param_default(&params[i], values + drape_param_place(params, i));
     for (size_t s = 0; s < setting_count; s++) {
         char at[256];
         snprintf(at, sizeof at, "%s/%.80s", pointer, settings[s].name);
-        int i = drape_param_find(params, param_count, settings[s].name);
+        int i = drape_param_find(params, entry->param_count, settings[s].name);
+        if (i < 0 && drape_retired(ctx, at, entry->name, settings[s].name))
+            continue;
         if (i < 0)
-            return unknown_name(ctx, at, params, param_count, settings[s].name);
+            return unknown_name(ctx, at, entry, settings[s].name);
         drape_status status =
             drape_param_value(ctx, at, &params[i], &settings[s], values + drape_param_place(params, i));
         if (status)
             return status;
         given[i] = true;
     }
-    for (int i = 0; i < param_count; i++)
+    for (int i = 0; i < entry->param_count; i++)
         if (!given[i] && drape_param_is_required(&params[i]))
             return drape_param_missing(ctx, pointer, &params[i]);
     return DRAPE_OK;

@@ -17,12 +17,11 @@ void drape_param_default(const drape_param *param, double *values);
 /* Whether a setting must be given: there is no default, neither fixed nor derived. */
 bool drape_param_is_required(const drape_param *param);
 
-/* Resolves the values of params, in their order: the default if no setting names the parameter (NaN if the
- * default is derived). Faults are reported at "pointer/name". A setting whose name is not in the list is a
- * fault. */
-drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_param *params,
-                                  int param_count, const drape_setting *settings, size_t setting_count,
-                                  double *values);
+/* Resolves the values of the parameters of an entry, in their order: the default if no setting names the
+ * parameter (NaN if the default is derived). Faults are reported at "pointer/name". A setting whose name is
+ * not in the list is a fault, unless it is a former one (base/retired.h). */
+drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_entry *entry,
+                                  const drape_setting *settings, size_t setting_count, double *values);
 
 /* Checks one setting against its parameter and converts it; writes as many values as the parameter
  * occupies. */

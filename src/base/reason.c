@@ -51,7 +51,7 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
     [DRAPE_REASON_MAX_STEPS] = REASON("max_steps", "integrators with steps of their own",
                                       "more steps in a second of simulated time than `max_steps`"),
     [DRAPE_REASON_MAX_SUBSTEPS] =
-        REASON("max_substeps", "verlet", "more substeps in a step than `max_substeps`"),
+        REASON("max_substeps", "verlet", "more than 10000 substeps in a step whose number is not given"),
     [DRAPE_REASON_MOVE] =
         REASON("move", "the controller strain", "a node moved further in one step than `max_move` allows"),
     [DRAPE_REASON_STRETCH] =
@@ -59,19 +59,19 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
                "the strain of an edge changed more in one step than `max_stretch` allows"),
     [DRAPE_REASON_UNSTABLE] =
         REASON("unstable", "the controller stable", "the step is beyond the explicit stability limit"),
-    [DRAPE_REASON_BLOW_UP] = REASON("blow_up", "verlet", "a node is faster than `max_speed`"),
+    [DRAPE_REASON_BLOW_UP] = REASON("blow_up", "verlet", "a node is faster than 1e6 m/s"),
     [DRAPE_REASON_STALLED] = REASON(
         "stalled", "static", "no direction lowers the energy further, and the state is not an equilibrium"),
     [DRAPE_REASON_ENERGY] =
         REASON("energy", "the energy audit", "the step, or the run so far, created energy"),
     [DRAPE_REASON_EDGE_COLLAPSE] =
-        REASON("edge_collapse", "stretch.edge", "an edge shrank below `min_length`"),
+        REASON("edge_collapse", "stretch.edge", "an edge shrank below 1e-6 of its length at rest"),
     [DRAPE_REASON_ALTITUDE_COLLAPSE] = REASON("altitude_collapse", "bend.hinge, bend.midedge",
-                                              "an altitude of a triangle shrank below `min_altitude`"),
+                                              "an altitude of a triangle shrank below 1e-6 of one at rest"),
     [DRAPE_REASON_AREA_COLLAPSE] =
-        REASON("area_collapse", "stretch.cst", "a triangle shrank below `min_area`"),
+        REASON("area_collapse", "stretch.cst", "a triangle shrank below 1e-6 of its area at rest"),
     [DRAPE_REASON_SPRING_COLLAPSE] =
-        REASON("spring_collapse", "springs", "a spring shrank below `min_length`"),
+        REASON("spring_collapse", "springs", "a spring shrank below 1e-6 of its length at rest"),
     [DRAPE_REASON_HINGE_BRANCH] = REASON("hinge_branch", "bend.hinge, bend.midedge",
                                          "a hinge turned so far in one step that its angle is ambiguous"),
     [DRAPE_REASON_STRAIN_LIMIT] = REASON("strain_limit", "limit.strain", "an edge is beyond `limit`"),

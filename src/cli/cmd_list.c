@@ -164,11 +164,20 @@ static void markdown_cells(const char *const *of, int count, const char *name, c
     fputc('\n', stdout);
 }
 
+/* The length of a name without its number: numbered parameters of one meaning, fraction_1 and so on, have one
+ * row. */
+static int stem(const char *name)
+{
+    const int length = (int)strcspn(name, "123456789");
+    return length > 0 && name[length - 1] == '_' ? length : (int)strlen(name);
+}
+
 static bool is_same_row(const drape_param *a, const param_text *x, const drape_param *b, const param_text *y)
 {
-    return strcmp(a->name, b->name) == 0 && strcmp(a->help, b->help) == 0 &&
-           strcmp(x->takes, y->takes) == 0 && strcmp(x->value, y->value) == 0 &&
-           strcmp(x->unit, y->unit) == 0;
+    const size_t length = (size_t)stem(a->name);
+    return stem(b->name) == (int)length && strncmp(a->name, b->name, length) == 0 &&
+           strcmp(a->help, b->help) == 0 && strcmp(x->takes, y->takes) == 0 &&
+           strcmp(x->value, y->value) == 0 && strcmp(x->unit, y->unit) == 0;
 }
 
 /* The help of a key that stands for others names them, as a reader may see only its row of the table. */
@@ -246,12 +255,13 @@ static bool is_same_param(const drape_param *a, const drape_param *b)
     return is_same_row(a, &x, b, &y);
 }
 
-static bool has_same_param(const drape_entry *entry, const drape_param *param)
+/* The first such parameter of an entry; NULL: it has none. */
+static const drape_param *same_param(const drape_entry *entry, const drape_param *param)
 {
     for (int p = 0; p < entry->param_count; p++)
         if (is_same_param(&entry->params[p], param))
-            return true;
-    return false;
+            return &entry->params[p];
+    return NULL;
 }
 
 /* One line for all entries that have the same parameter, at the first of them. */
@@ -261,13 +271,19 @@ static void markdown_param(const drape_registry *table, const char *only, int fi
     int count = 0;
     const drape_entry *entry;
     for (int i = 0; (entry = table->entries[i]) != NULL && count < MAX_NAMES; i++)
-        if (is_shown(entry, only) && has_same_param(entry, param)) {
-            if (i < first)
+        if (is_shown(entry, only) && same_param(entry, param)) {
+            if (i < first || (i == first && same_param(entry, param) != param))
                 return;
             names[count++] = entry->name;
         }
     const param_text text = text_of(param);
-    markdown_cells(names, count, param->name, param->help, &text);
+    const drape_param *last = param;
+    for (int p = 0; p < table->entries[first]->param_count; p++)
+        if (is_same_param(&table->entries[first]->params[p], param))
+            last = &table->entries[first]->params[p];
+    char all[128];
+    snprintf(all, sizeof all, "%s ... %s", param->name, last->name);
+    markdown_cells(names, count, last == param ? param->name : all, param->help, &text);
 }
 
 static void markdown_params(const drape_registry *table, const char *only)

@@ -222,8 +222,7 @@ static const drape_grid_ops *grid(const info *in, const drape_entry_def *def, js
     double values[DRAPE_MAX_PARAMS];
     const int i = drape_registry_find(&drape_grid_registry, NULL, def->type ? def->type : "");
     const drape_entry *entry = i < 0 ? NULL : &drape_grids[i]->entry;
-    if (!entry || drape_params_resolve(in->sim->ctx, "", entry->params, entry->param_count, def->settings,
-                                       def->setting_count, values))
+    if (!entry || drape_params_resolve(in->sim->ctx, "", entry, def->settings, def->setting_count, values))
         entry = NULL;
     *object = entry ? cli_values_json(entry, values, in->derived) : json_object();
     return entry ? drape_grids[i] : NULL;

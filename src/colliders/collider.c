@@ -49,9 +49,8 @@ drape_status drape_collider_build(drape_context *ctx, drape_arena *arena, const 
     const drape_collider_ops *ops = collider->ops;
     struct drape_shape_builder builder = {
         .ctx = ctx, .arena = arena, .pointer = pointer, .folder = folder, .choice = &collider->choice};
-    drape_status status =
-        drape_params_resolve(ctx, pointer, ops->entry.params, ops->entry.param_count,
-                             collider->choice.settings, collider->choice.setting_count, collider->values);
+    drape_status status = drape_params_resolve(ctx, pointer, &ops->entry, collider->choice.settings,
+                                               collider->choice.setting_count, collider->values);
     if (status)
         return status;
     collider->shape = (drape_collider_shape){.builder = &builder, .user = collider->ops->user};

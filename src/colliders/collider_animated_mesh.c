@@ -15,11 +15,10 @@ enum {
     START,
     OPEN,
     THICKNESS,
-    DISTANCE,
     TRANSLATE,
     ROTATE = TRANSLATE + 3,
     SCALE = ROTATE + 3,
-    PARAM_COUNT = 11
+    PARAM_COUNT = 10
 };
 
 static const drape_param params[PARAM_COUNT] = {
@@ -42,11 +41,11 @@ static const drape_param params[PARAM_COUNT] = {
     DRAPE_NUMBER(
         "thickness", "m", 0, 0, 1e3,
         "distance of the surface that cloth meets from the triangles, on both sides of an open mesh"),
-    DRAPE_NUMBER("distance", "m", DRAPE_DERIVED("that of the contact"), DRAPE_ABOVE(0), 1e3,
-                 "activation distance of this collider"),
-    DRAPE_VECTOR("translate", "m", 0, -1e9, 1e9, "of all frames, applied last"),
+    DRAPE_VECTOR("translate", "m", 0, -1e9, 1e9, "applied last"),
     DRAPE_TURN("rotate", 0, -1e6, 1e6,
-               "axis and angle, or a vector along the axis whose length is the angle; about the origin"),
+               "axis and angle, or a vector along the axis whose length is the angle; about the center of a "
+               "box, or the "
+               "origin"),
     DRAPE_VECTOR("scale", "1", 1, DRAPE_ABOVE(0), 1e9, "applied first; one number: in all directions",
                  .uniform = true),
 };
@@ -120,7 +119,6 @@ static drape_status make_shape(const double *values, double tolerance, drape_col
     if (status)
         return status;
     shape->radius = values[THICKNESS];
-    shape->distance = isnan(values[DISTANCE]) ? 0 : values[DISTANCE];
     shape->kept = drape_mesh_distance_create(shape->builder->arena, shape,
                                              values[OPEN] != 0 ? DRAPE_SIDE_NONE : DRAPE_SIDE_WINDING);
     return shape->kept ? DRAPE_OK : DRAPE_E_MEMORY;

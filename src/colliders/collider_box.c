@@ -8,15 +8,17 @@
 enum { CENTER = 0, SIZE = 3, ROTATE = 6, ROUNDING = 9, PARAM_COUNT = 4 }; /* places of the values */
 
 static const drape_param params[PARAM_COUNT] = {
-    DRAPE_VECTOR("center", "m", DRAPE_REQUIRED, -1e9, 1e9, "center of the box"),
+    DRAPE_VECTOR("center", "m", DRAPE_REQUIRED, -1e9, 1e9, "its center"),
     DRAPE_VECTOR("size", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9,
                  "full lengths of its edges along x, y, z before the rotation; one number: a cube",
                  .uniform = true),
-    DRAPE_TURN(
-        "rotate", 0, -1e6, 1e6,
-        "rotation about the center: axis and angle, or a vector along the axis whose length is the angle"),
+    DRAPE_TURN("rotate", 0, -1e6, 1e6,
+               "axis and angle, or a vector along the axis whose length is the angle; about the center of a "
+               "box, or the "
+               "origin"),
     DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
-                 "radius of its edges and corners, below half of its smallest size; the size includes them"),
+                 "radius of its edges and corners, or rims, below half of its smallest extent; its size "
+                 "includes them"),
 };
 
 /* Rows are the axes of the box: y = frame (x - center). */

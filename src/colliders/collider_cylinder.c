@@ -15,11 +15,13 @@ enum { A = 0, B = 3, RADIUS = 6, ROUNDING = 7, PARAM_COUNT = 4 }; /* places of t
 #define END(name, help) DRAPE_VECTOR(name, "m", DRAPE_REQUIRED, -1e9, 1e9, help)
 
 static const drape_param params[PARAM_COUNT] = {
-    END("a", "center of one of the flat ends"),
+    END("a", "center of one of the ends, flat or a hemisphere"),
     END("b", "center of the other one"),
-    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "radius around the axis from a to b"),
+    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9,
+                 "its radius, around its center or the line from a to b"),
     DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
-                 "radius of its rims, below its radius and half of its length, which include them"),
+                 "radius of its edges and corners, or rims, below half of its smallest extent; its size "
+                 "includes them"),
 };
 
 typedef struct axis {

@@ -268,9 +268,8 @@ static drape_status begin_term(drape_model *model, int32_t c, int32_t seam, cons
     drape_status status = drape_check_cancel(model->ctx);
     term->ops = ops;
     if (!status)
-        status =
-            drape_params_resolve(model->ctx, pointer, term->ops->entry.params, term->ops->entry.param_count,
-                                 def->settings, def->setting_count, term->params);
+        status = drape_params_resolve(model->ctx, pointer, &term->ops->entry, def->settings,
+                                      def->setting_count, term->params);
     if (status)
         return status;
     term->cloth = c;

@@ -29,10 +29,6 @@ const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
     [DRAPE_CONTACT_FRICTION] = DRAPE_CHOICE("friction", IMPLICIT, frictions,
                                             "implicit: of the normal force at the end of the step; lagged: "
                                             "at its start, which keeps matrices symmetric"),
-    [DRAPE_CONTACT_RESTITUTION_VELOCITY] = DRAPE_NUMBER(
-        "restitution_velocity", "m/s",
-        DRAPE_DERIVED("sqrt(2 gravity distance); without gravity, sqrt(2 L distance) in a second"), 1e-6, 1e9,
-        "impacts much faster than this return the share of energy that restitution says"),
     [DRAPE_CONTACT_NO_ROOM] = DRAPE_CHOICE("no_room", DRAPE_NO_ROOM_AUTO, policies,
                                            "where bodies leave cloth no room, stop: steps fail until the sim "
                                            "stops; relax: the bodies may enter the "
@@ -51,11 +47,6 @@ const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT] = {
 static const char *const failures[] = {"stop", "continue", NULL};
 
 const drape_param drape_untangle_params[DRAPE_UNTANGLE_PARAM_COUNT] = {
-    [DRAPE_UNTANGLE_SWEEPS] = DRAPE_INTEGER("sweeps", "1", DRAPE_UNTANGLE_DEFAULT_SWEEPS, 1, 1e6,
-                                            "searches for what passes through what, at most"),
-    [DRAPE_UNTANGLE_GAP] =
-        DRAPE_NUMBER("gap", "1", DRAPE_UNTANGLE_DEFAULT_GAP, 0.01, 1,
-                     "gap that layers and colliders are to have afterwards, in activation distances"),
     [DRAPE_UNTANGLE_ON_FAILURE] =
         DRAPE_CHOICE("on_failure", 0, failures,
                      "stop: a run whose cloth does not come apart ends before its first step; continue: it "
@@ -64,8 +55,6 @@ const drape_param drape_untangle_params[DRAPE_UNTANGLE_PARAM_COUNT] = {
 
 void drape_untangle_values(const drape_model_untangle *untangle, double values[DRAPE_UNTANGLE_PARAM_COUNT])
 {
-    values[DRAPE_UNTANGLE_SWEEPS] = untangle->sweeps;
-    values[DRAPE_UNTANGLE_GAP] = untangle->gap;
     values[DRAPE_UNTANGLE_ON_FAILURE] = untangle->goes_on;
 }
 
@@ -75,7 +64,6 @@ void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_
     values[DRAPE_CONTACT_STIFFNESS] = contact->stiffness;
     values[DRAPE_CONTACT_FRICTION_VELOCITY] = contact->friction_velocity;
     values[DRAPE_CONTACT_FRICTION] = contact->lagged ? LAGGED : IMPLICIT;
-    values[DRAPE_CONTACT_RESTITUTION_VELOCITY] = contact->restitution_velocity;
     values[DRAPE_CONTACT_NO_ROOM] = contact->no_room;
 }
 
@@ -225,12 +213,11 @@ static drape_status resolve_contact(drape_model *model, const drape_scene_def *d
 {
     double values[DRAPE_CONTACT_PARAM_COUNT];
     drape_contact_def *contact = &model->contact;
-    drape_status status =
-        drape_params_resolve(model->ctx, "/contact", drape_contact_params, DRAPE_CONTACT_PARAM_COUNT,
-                             def->contact, def->contact_count, values);
+    drape_status status = drape_params_resolve(model->ctx, "/contact", drape_contact_registry.entries[0],
+                                               def->contact, def->contact_count, values);
     if (status)
         return status;
-    double distance = values[DRAPE_CONTACT_DISTANCE], rebound = values[DRAPE_CONTACT_RESTITUTION_VELOCITY];
+    const double distance = values[DRAPE_CONTACT_DISTANCE];
     contact->distance_given = !isnan(distance);
     contact->distance = isnan(distance) ? largest_thickness(model) : distance;
     contact->stiffness = values[DRAPE_CONTACT_STIFFNESS];
@@ -238,7 +225,7 @@ static drape_status resolve_contact(drape_model *model, const drape_scene_def *d
     contact->friction_velocity = values[DRAPE_CONTACT_FRICTION_VELOCITY];
     contact->lagged = values[DRAPE_CONTACT_FRICTION] == LAGGED;
     contact->no_room = (drape_no_room)values[DRAPE_CONTACT_NO_ROOM];
-    contact->restitution_velocity = isnan(rebound) ? speed_of_fall(model, contact->distance) : rebound;
+    contact->restitution_velocity = speed_of_fall(model, contact->distance);
     return DRAPE_OK;
 }
 
@@ -248,7 +235,7 @@ static drape_status resolve_self_contact(drape_model *model, const drape_scene_d
     if (!def->self_contact)
         return DRAPE_OK;
     drape_status status =
-        drape_params_resolve(model->ctx, "/self_contact", drape_self_contact_params, DRAPE_SELF_PARAM_COUNT,
+        drape_params_resolve(model->ctx, "/self_contact", drape_self_contact_registry.entries[0],
                              def->self_contact, def->self_contact_count, values);
     if (status)
         return status;
@@ -267,14 +254,11 @@ static drape_status resolve_untangle(drape_model *model, const drape_scene_def *
     if (!def->untangle)
         return DRAPE_OK;
     const drape_status status =
-        drape_params_resolve(model->ctx, "/untangle", drape_untangle_params, DRAPE_UNTANGLE_PARAM_COUNT,
-                             def->untangle, def->untangle_count, values);
+        drape_params_resolve(model->ctx, "/untangle", drape_untangle_registry.entries[0], def->untangle,
+                             def->untangle_count, values);
     if (status)
         return status;
-    model->untangle = (drape_model_untangle){.given = true,
-                                             .sweeps = (int)values[DRAPE_UNTANGLE_SWEEPS],
-                                             .gap = values[DRAPE_UNTANGLE_GAP],
-                                             .goes_on = values[DRAPE_UNTANGLE_ON_FAILURE] > 0};
+    model->untangle = (drape_model_untangle){.given = true, .goes_on = values[DRAPE_UNTANGLE_ON_FAILURE] > 0};
     return DRAPE_OK;
 }
 

@@ -168,8 +168,8 @@ static drape_status find_function(const place *p, const drape_event_def *def, dr
     to->ops = drape_events[i];
     status = drape_compile_choice(model, &def->entry, "", &to->choice);
     if (!status)
-        status = drape_params_resolve(p->ctx, p->pointer, to->ops->entry.params, to->ops->entry.param_count,
-                                      def->entry.settings, def->entry.setting_count, to->values);
+        status = drape_params_resolve(p->ctx, p->pointer, &to->ops->entry, def->entry.settings,
+                                      def->entry.setting_count, to->values);
     if (!status && to->ops->needs_pins && to->pinned_count == 0)
         status = refuse(p, "type", "the event is about pins, and there are none");
     return status || !to->ops->check ? status : to->ops->check(p->ctx, p->pointer, model, to);

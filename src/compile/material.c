@@ -206,8 +206,8 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
     char at[256];
     double values[PARAM_COUNT], mass = 0;
     snprintf(at, sizeof at, "%s/material", pointer);
-    drape_status status =
-        drape_params_resolve(model->ctx, at, params, PARAM_COUNT, def->material, def->material_count, values);
+    drape_status status = drape_params_resolve(model->ctx, at, &drape_material_entry, def->material,
+                                               def->material_count, values);
     double area = total_area(&cloth->mesh);
     if (!status)
         status = check_stiffness(model->ctx, at, values);

@@ -36,8 +36,7 @@ typedef struct drape_controller_ops {
     bool own_steps;    /* steps follow h_next, not the fixed grid of dt */
     bool by_ranks;     /* it judges by what all ranks know (base/ranks.h) */
     int history_depth; /* number of states before `in` that it needs, at most 2 */
-    /* Refuses values that do not go together, with a message at "/controller/...". NULL: all do. */
-    drape_status (*check)(drape_context *ctx, const double *values);
+    int max_attempts;  /* within one dt; one more ends the run. 0: no bound */
     drape_verdict (*judge)(const double *values, drape_trial *trial);
 } drape_controller_ops;
 

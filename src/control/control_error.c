@@ -19,20 +19,12 @@
 
 #include <math.h>
 
-enum {
-    PARAM_DT_MIN,
-    PARAM_MAX_ATTEMPTS,
-    PARAM_RTOL,
-    PARAM_ATOL_X,
-    PARAM_ATOL_V,
-    PARAM_DT_MAX,
-    PARAM_SAFETY,
-    PARAM_COUNT
-};
+enum { PARAM_DT_MIN, PARAM_RTOL, PARAM_ATOL_X, PARAM_ATOL_V, PARAM_COUNT };
 enum { SCRATCH_LAST_ERROR };
 
 #define INTEGRAL     0.7
 #define PROPORTIONAL 0.4
+#define SAFETY       0.9 /* fraction of the step that the estimate allows */
 #define MAX_GROWTH   2.0 /* bdf2 is zero-stable below 1 + sqrt(2) */
 #define MAX_CUT      0.2
 #define FIRST_SHARE  10.0 /* see first_error */
@@ -40,13 +32,9 @@ enum { SCRATCH_LAST_ERROR };
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
-    [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(100000),
     [PARAM_RTOL] = DRAPE_RTOL_PARAM,
     [PARAM_ATOL_X] = DRAPE_ATOL_X_PARAM,
     [PARAM_ATOL_V] = DRAPE_ATOL_V_PARAM,
-    [PARAM_DT_MAX] = DRAPE_NUMBER("dt_max", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),
-    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1,
-                                  "fraction that is taken of the step that the estimate allows"),
 };
 
 /* A prediction: the weights of the states in, past[0] and past[1], and the factor from the difference to the
@@ -128,8 +116,7 @@ static double bounded(double factor)
 static drape_verdict reject(const double *values, drape_trial *trial, double error, int32_t node)
 {
     double factor =
-        isnan(error) ? 0.5
-                     : fmin(0.9, bounded(values[PARAM_SAFETY] * drape_pow(error, -1.0 / (trial->order + 1))));
+        isnan(error) ? 0.5 : fmin(0.9, bounded(SAFETY * drape_pow(error, -1.0 / (trial->order + 1))));
     trial->status = DRAPE_RETRY_REJECTED;
     trial->info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
     trial->info->diagnostic =
@@ -158,11 +145,9 @@ static drape_verdict judge(const double *values, drape_trial *trial)
         return reject(values, trial, error, node);
     double e = fmax(error, MIN_ERROR), before = last > 0 ? last : e, p = trial->order + 1;
     trial->scratch[SCRATCH_LAST_ERROR] = e;
-    trial->h_next = trial->h * bounded(values[PARAM_SAFETY] * drape_pow(e, -INTEGRAL / p) *
-                                       drape_pow(before, PROPORTIONAL / p));
+    trial->h_next =
+        trial->h * bounded(SAFETY * drape_pow(e, -INTEGRAL / p) * drape_pow(before, PROPORTIONAL / p));
     trial->h_next = fmax(values[PARAM_DT_MIN], trial->h_next);
-    if (trial->h_next > values[PARAM_DT_MAX])
-        trial->h_next = values[PARAM_DT_MAX];
     return DRAPE_ACCEPT;
 }
 
@@ -173,5 +158,6 @@ const drape_controller_ops drape_controller_error = {
               DRAPE_PARAMS(params)},
     .own_steps = true,
     .history_depth = 2,
+    .max_attempts = 100000,
     .judge = judge,
 };

@@ -7,11 +7,10 @@
  */
 #include "control/halve.h"
 
-enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_COUNT };
+enum { PARAM_DT_MIN, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
-    [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(10000),
 };
 
 static drape_verdict judge(const double *values, drape_trial *trial)
@@ -29,5 +28,6 @@ const drape_controller_ops drape_controller_halving = {
          .reference = "DisMech halves steps that do not converge, too",
          DRAPE_PARAMS(params)},
     .by_ranks = true,
+    .max_attempts = 10000,
     .judge = judge,
 };

@@ -8,47 +8,28 @@
 
 #include <math.h>
 
-enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_MOST, PARAM_LEAST, PARAM_SUBSTEPS, PARAM_COUNT };
+#define MOST     8 /* the step after one that took more iterations has half its size */
+#define LEAST    3 /* the step after one that took fewer iterations has twice its size */
+#define SUBSTEPS 4 /* steps in one dt, at most, except where a step has to be repeated */
 
-static const drape_param params[PARAM_COUNT] = {
-    [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
-    [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(10000),
-    [PARAM_MOST] = DRAPE_INTEGER("most_iterations", "1", 8, 1, 1e6,
-                                 "the step after one that took more iterations has half its size"),
-    [PARAM_LEAST] = DRAPE_INTEGER("least_iterations", "1", 3, 0, 1e6,
-                                  "the step after one that took fewer iterations has twice its size"),
-    [PARAM_SUBSTEPS] =
-        DRAPE_INTEGER("max_substeps", "1", 4, 1, 1e6,
-                      "largest number of steps in one dt, except where a step has to be repeated"),
-};
+static const drape_param params[] = {DRAPE_DT_MIN_PARAM};
 
 /* A step that was cut short by the end of an advance says nothing about a step larger than itself. */
-static double next_size(const double *values, const drape_trial *trial)
+static double next_size(const drape_trial *trial)
 {
-    const double least = trial->dt / values[PARAM_SUBSTEPS];
-    if (trial->info->iterations > values[PARAM_MOST])
+    const double least = trial->dt / SUBSTEPS;
+    if (trial->info->iterations > MOST)
         return fmin(trial->h, fmax(trial->h / 2, least));
-    if (trial->info->iterations < values[PARAM_LEAST])
+    if (trial->info->iterations < LEAST)
         return fmin(2 * trial->h, trial->dt);
     return trial->h;
-}
-
-static drape_status check(drape_context *ctx, const double *values)
-{
-    if (values[PARAM_LEAST] <= values[PARAM_MOST])
-        return DRAPE_OK;
-    return drape_fail_at(
-        ctx, DRAPE_E_ARGUMENT, "/controller/least_iterations",
-        "%g is above most_iterations, %g: steps would be halved and doubled in turn; it is at "
-        "most that",
-        values[PARAM_LEAST], values[PARAM_MOST]);
 }
 
 static drape_verdict judge(const double *values, drape_trial *trial)
 {
     if (trial->status && !trial->info->usable)
-        return drape_halve(values[PARAM_DT_MIN], trial);
-    trial->h_next = next_size(values, trial);
+        return drape_halve(*values, trial);
+    trial->h_next = next_size(trial);
     return DRAPE_ACCEPT;
 }
 
@@ -61,6 +42,6 @@ const drape_controller_ops drape_controller_iterations = {
               DRAPE_PARAMS(params)},
     .own_steps = true,
     .by_ranks = true,
-    .check = check,
+    .max_attempts = 10000,
     .judge = judge,
 };

@@ -12,20 +12,17 @@
 
 #include <math.h>
 
-enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_SAFETY, PARAM_EVERY, PARAM_COUNT };
+enum { PARAM_DT_MIN, PARAM_COUNT };
 enum { SCRATCH_LIMIT, SCRATCH_LEFT };
 
+#define SAFETY 0.9 /* fraction that is taken of the stability limit */
+#define EVERY  10  /* steps between two estimates of it */
 #define SLACK                                                                                                \
     1e-6 /* relative tolerance between the limit from which a step was chosen and the same limit estimated
             again */
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
-    [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(1000000),
-    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1,
-                                  "fraction that is taken of the step that the estimate allows"),
-    [PARAM_EVERY] =
-        DRAPE_INTEGER("every", "1", 10, 1, 1e6, "steps between two estimates of the stability limit"),
 };
 
 static double stable_step(const drape_trial *trial, const drape_state *at)
@@ -39,7 +36,7 @@ static double stable_step(const drape_trial *trial, const drape_state *at)
 
 /* Returns the largest stable step: at the end of the attempt if that state is known, otherwise at its
  * start. */
-static double limit_of(const double *values, drape_trial *trial)
+static double limit_of(drape_trial *trial)
 {
     double *limit = &trial->scratch[SCRATCH_LIMIT], *left = &trial->scratch[SCRATCH_LEFT];
     bool failed = trial->status && !trial->info->usable;
@@ -48,7 +45,7 @@ static double limit_of(const double *values, drape_trial *trial)
         return *limit;
     }
     *limit = stable_step(trial, failed ? trial->in : trial->out);
-    *left = failed ? 0 : values[PARAM_EVERY] - 1;
+    *left = failed ? 0 : EVERY - 1;
     return *limit;
 }
 
@@ -65,7 +62,7 @@ static drape_verdict reject(const double *values, drape_trial *trial, double lim
                                                  .limit = 1};
     drape_verdict verdict = drape_halve(values[PARAM_DT_MIN], trial);
     if (verdict == DRAPE_RETRY)
-        trial->h_next = fmin(0.9 * trial->h, fmax(values[PARAM_DT_MIN], values[PARAM_SAFETY] * limit));
+        trial->h_next = fmin(0.9 * trial->h, fmax(values[PARAM_DT_MIN], SAFETY * limit));
     trial->scratch[SCRATCH_LEFT] = 0;
     return verdict;
 }
@@ -74,12 +71,12 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 {
     if (trial->status < 0)
         return DRAPE_STOP;
-    double limit = limit_of(values, trial);
+    double limit = limit_of(trial);
     if (trial->h > limit * (1 + SLACK))
         return reject(values, trial, limit);
     if (trial->status && !trial->info->usable)
         return drape_halve(values[PARAM_DT_MIN], trial);
-    trial->h_next = fmax(values[PARAM_DT_MIN], fmin(values[PARAM_SAFETY] * limit, trial->dt));
+    trial->h_next = fmax(values[PARAM_DT_MIN], fmin(SAFETY * limit, trial->dt));
     return DRAPE_ACCEPT;
 }
 
@@ -89,5 +86,6 @@ const drape_controller_ops drape_controller_stable = {
               .reference = "2/omega: Courant, Friedrichs & Lewy 1928; Hairer, Lubich & Wanner 2003",
               DRAPE_PARAMS(params)},
     .own_steps = true,
+    .max_attempts = 1000000,
     .judge = judge,
 };

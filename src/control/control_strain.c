@@ -9,11 +9,10 @@
 
 #include <math.h>
 
-enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_MAX_STRETCH, PARAM_MAX_MOVE, PARAM_COUNT };
+enum { PARAM_DT_MIN, PARAM_MAX_STRETCH, PARAM_MAX_MOVE, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
-    [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(10000),
     [PARAM_MAX_STRETCH] =
         DRAPE_NUMBER("max_stretch", "1", 0.1, DRAPE_ABOVE(0), 1e6,
                      "largest change of an edge's length in one step, relative to its rest length"),
@@ -87,5 +86,6 @@ const drape_controller_ops drape_controller_strain = {
               .summary = "as halving; also rejects steps in which an edge stretches or a node moves too far",
               .reference = "-",
               DRAPE_PARAMS(params)},
+    .max_attempts = 10000,
     .judge = judge,
 };

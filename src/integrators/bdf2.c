@@ -145,7 +145,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     set_equation(s, in, a, w);
     expect(s, in, h, r);
     drape_status status = drape_implicit_solve(&s->common, info);
-    if (status && !info->usable)
+    if (status)
         return status;
     memcpy(out->x, e->x, e->nodes * sizeof *out->x);
     memcpy(out->v, e->v, e->nodes * sizeof *out->v);

@@ -10,6 +10,19 @@
 
 #include <string.h>
 
+enum { PARAM_ON_FAILURE = DRAPE_NEWTON_PARAM_COUNT, PARAM_COUNT };
+
+static const drape_param params[PARAM_COUNT] = {DRAPE_NEWTON_PARAMS, [PARAM_ON_FAILURE] =
+                                                                         DRAPE_ON_FAILURE_PARAM};
+
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
+{
+    const drape_status status = drape_implicit_create(arena, system, values, state);
+    if (!status)
+        drape_newton_set_lenient(((drape_implicit *)*state)->newton, values[PARAM_ON_FAILURE] > 0);
+    return status;
+}
+
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
@@ -33,9 +46,9 @@ const drape_integrator_ops drape_integrator_be = {
     .entry = {.name = "be",
               .summary = "backward Euler by Newton: fixed step, first order, L-stable",
               .reference = "Baraff & Witkin 1998, solved to a tolerance",
-              DRAPE_PARAMS(drape_newton_params)},
+              DRAPE_PARAMS(params)},
     .order = 1,
-    .create = drape_implicit_create,
+    .create = create,
     .momenta = true,
     .step = step,
     .restart = drape_implicit_restart,

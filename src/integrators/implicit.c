@@ -27,7 +27,7 @@ drape_status drape_implicit_init_newton(drape_arena *arena, drape_system *system
 {
     drape_status status = drape_ranks_agree(drape_model_ranks(drape_system_model(system)), arena->ctx,
                                             drape_implicit_init(arena, system, s));
-    return status ? status : drape_newton_create(arena, &s->equation, values, NULL, &s->newton);
+    return status ? status : drape_newton_create(arena, &s->equation, values, 0, &s->newton);
 }
 
 drape_status drape_implicit_create(drape_arena *arena, drape_system *system, const double *values,

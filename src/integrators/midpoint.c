@@ -39,7 +39,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         e->inertia[i] = h / 2 * in->v[drape_step_equation_at(e, i)];
     drape_status status = drape_implicit_solve(s, info);
     info->error *= 2; /* d is that to the middle of the step */
-    if (status && !info->usable)
+    if (status)
         return status;
     write_state(s, in, h, out);
     drape_implicit_audit(s, in, out, info);

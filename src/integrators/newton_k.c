@@ -24,21 +24,7 @@
 #include <math.h>
 #include <string.h>
 
-enum {
-    PARAM_DT,
-    PARAM_ITERATIONS,
-    PARAM_ERROR,
-    PARAM_TOLERANCE,
-    PARAM_LINEAR_TOLERANCE,
-    PARAM_LINEAR_ITERATIONS,
-    PARAM_CORRECTIONS,
-    PARAM_COUNT
-};
-
-static const char *const corrections[] = {[DRAPE_MATRIX_AUTO] = "auto",
-                                          [DRAPE_MATRIX_APPROXIMATE] = "conjugate_gradients",
-                                          [DRAPE_MATRIX_FACTORED] = "factors",
-                                          NULL};
+enum { PARAM_DT, PARAM_ITERATIONS, PARAM_ERROR, PARAM_TOLERANCE, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
@@ -50,31 +36,19 @@ static const drape_param params[PARAM_COUNT] = {
         "nodes, is at most this and, with factors, small beside the local error of the step; not a bound on "
         "an accepted state, but one that is not nearer than the guess, or further off than the scene is "
         "large, is rejected"),
-    [PARAM_TOLERANCE] =
-        DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,
-                     "residual of the free nodes, largest component, below which no iteration is made, at "
-                     "most 1 % of their load; not a bound on an accepted state"),
-    [PARAM_LINEAR_TOLERANCE] = DRAPE_NUMBER("linear_tolerance", "1", 0.1, 1e-14, DRAPE_BELOW(1),
-                                            "conjugate gradients reduce the residual of a correction to this "
-                                            "fraction at steps of 1/60 s; proportional to the step"),
-    [PARAM_LINEAR_ITERATIONS] = DRAPE_INTEGER("max_linear_iterations", "1", 60, 1, 100000,
-                                              "iterations of conjugate gradients for each correction"),
-    [PARAM_CORRECTIONS] = DRAPE_CHOICE(
-        "corrections", DRAPE_MATRIX_AUTO, corrections,
-        "conjugate_gradients: a matrix with edges and springs, and one number for each pair of nodes of all "
-        "other measures, is never factored; factors: one with all terms, and such numbers for the bending of "
-        "flat cloth only; auto: factors for terms that the first matrix would hold back, for stiff cloth, "
-        "for wind and for few nodes"),
+    [PARAM_TOLERANCE] = DRAPE_TOLERANCE_PARAM,
 };
 
 #define ERROR_SHARE         1e-3     /* default of error, of the size of the scene */
 #define MOST_FURTHER        20       /* iterations beyond the least */
 #define MOST_EXTRAPOLATED   0.5      /* of the last change of velocity */
 #define SHORTER             0.999999 /* of a step: not by the rounding of its time */
-#define NOMINAL_RATE        60.      /* [1/s] linear_tolerance applies to steps of 1/60 s */
+#define LINEAR_TOLERANCE    0.1      /* relative residual that conjugate gradients leave, at NOMINAL_RATE */
+#define NOMINAL_RATE        60.      /* [1/s] */
 #define MAX_LINEAR_RESIDUAL 0.5      /* relative residual left at any step size */
 
-#define CHEAP_LINEAR 4 /* iterations of conjugate gradients in a step that is to be cheap */
+#define LINEAR_ITERATIONS 60 /* of conjugate gradients for each correction */
+#define CHEAP_LINEAR      4  /* the same in a step that is to be cheap */
 
 #define PAST 3 /* velocities that are kept */
 
@@ -115,10 +89,8 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     for (int i = 0; i < DRAPE_NEWTON_PARAM_COUNT; i++)
         drape_param_default(&drape_newton_params[i], newton + i);
     newton[DRAPE_NEWTON_TOLERANCE] = values[PARAM_TOLERANCE];
-    const drape_matrix_choice choice = {.kind = (drape_matrix_kind)values[PARAM_CORRECTIONS],
-                                        .dt = values[PARAM_DT]};
     if (!status)
-        status = drape_newton_create(arena, &s->common.equation, newton, &choice, &s->common.newton);
+        status = drape_newton_create(arena, &s->common.equation, newton, values[PARAM_DT], &s->common.newton);
     return status ? status : drape_arena_status(arena);
 }
 
@@ -179,7 +151,7 @@ static void guess(newton_k *s, const drape_state *in, double h)
  * of order h^3. The error of the guess is of order h^2, so the relative residual is of order h. */
 static double linear_tolerance(const newton_k *s)
 {
-    double share = s->values[PARAM_LINEAR_TOLERANCE] * NOMINAL_RATE / s->common.equation.point.weight;
+    double share = LINEAR_TOLERANCE * NOMINAL_RATE / s->common.equation.point.weight;
     return share < MAX_LINEAR_RESIDUAL ? share : MAX_LINEAR_RESIDUAL;
 }
 
@@ -194,15 +166,14 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     remember(s, in, out->t);
     guess(s, in, h);
     const int least = s->cheap ? 1 : (int)s->values[PARAM_ITERATIONS];
-    const drape_newton_effort effort = {
-        .least = least,
-        .most = least + MOST_FURTHER,
-        .error = s->values[PARAM_ERROR],
-        .deadline = s->deadline,
-        .keeps = true,
-        .linear_tolerance = linear_tolerance(s),
-        .cheap = s->cheap,
-        .linear_iterations = s->cheap ? CHEAP_LINEAR : (int)s->values[PARAM_LINEAR_ITERATIONS]};
+    const drape_newton_effort effort = {.least = least,
+                                        .most = least + MOST_FURTHER,
+                                        .error = s->values[PARAM_ERROR],
+                                        .deadline = s->deadline,
+                                        .keeps = true,
+                                        .linear_tolerance = linear_tolerance(s),
+                                        .cheap = s->cheap,
+                                        .linear_iterations = s->cheap ? CHEAP_LINEAR : LINEAR_ITERATIONS};
     drape_status status = drape_newton_solve(s->common.newton, &effort, s->common.d, &report);
     drape_implicit_report(&report, info);
     s->touches = drape_system_touches(e->system);

@@ -36,10 +36,11 @@
 #define STALLED       0.5     /* of the residual before: one that falls by less may be rounding */
 #define MAX_INERTIA   1000000 /* unknowns: the factors of a larger matrix take gigabytes */
 
-enum { PARAM_MAX_STEPS = DRAPE_NEWTON_PARAM_COUNT, PARAM_COUNT };
+enum { PARAM_ON_FAILURE = DRAPE_NEWTON_PARAM_COUNT, PARAM_MAX_STEPS, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
     DRAPE_NEWTON_PARAMS,
+    [PARAM_ON_FAILURE] = DRAPE_ON_FAILURE_PARAM,
     [PARAM_MAX_STEPS] = DRAPE_INTEGER("max_pseudo_steps", "1", 1000, 1, 1e9,
                                       "steps of the flow towards equilibrium before the attempt fails"),
 };
@@ -50,7 +51,8 @@ typedef struct static_state {
     double *internal;               /* of the terms, at the present step in pseudo time */
     double *best_x, *best_internal; /* nodes; internal variables: the step with the least static residual */
     int max_steps;
-    double best; /* [N] that residual */
+    bool lenient; /* on_failure accept */
+    double best;  /* [N] that residual */
     bool stability_known;
     int64_t unstable_modes;
 } static_state;
@@ -63,7 +65,10 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
         return DRAPE_E_MEMORY;
     s->arena = arena;
     s->max_steps = (int)values[PARAM_MAX_STEPS];
+    s->lenient = values[PARAM_ON_FAILURE] > 0;
     drape_status status = drape_implicit_init_newton(arena, system, values, &s->common);
+    if (!status)
+        drape_newton_set_lenient(s->common.newton, s->lenient);
     s->internal = drape_arena_take(arena, (size_t)m->internal_count, sizeof *s->internal);
     s->best_internal = drape_arena_take(arena, (size_t)m->internal_count, sizeof *s->best_internal);
     s->best_x = drape_arena_take(arena, 3 * (size_t)m->node_count, sizeof *s->best_x);
@@ -232,7 +237,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     const double *values = drape_newton_values(s->common.newton);
     const double dt = values[DRAPE_NEWTON_DT];
     info->h = h;
-    info->lenient = values[DRAPE_NEWTON_ON_FAILURE] == DRAPE_NEWTON_FAILURE_ACCEPT;
+    info->lenient = s->lenient;
     drape_implicit_base(&s->common, in, out->t, 1);
     memcpy(out->x, e->x_base, e->nodes * sizeof *out->x);
     memset(out->v, 0, e->nodes * sizeof *out->v);

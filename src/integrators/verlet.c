@@ -46,10 +46,6 @@ enum {
     PARAM_SELF_BOXES,
     PARAM_STRAIN_LIMIT,
     PARAM_STRAIN_LIMIT_ITERATIONS,
-    PARAM_STRAIN_LIMIT_TOLERANCE,
-    PARAM_SAFETY,
-    PARAM_MAX_SUBSTEPS,
-    PARAM_MAX_SPEED,
     PARAM_GUARD,
     PARAM_COUNT
 };
@@ -89,21 +85,15 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_STRAIN_LIMIT_ITERATIONS] = DRAPE_INTEGER(
         "strain_limit_iterations", "1", 1, 1, 1e6,
         "maximum number of passes over all springs; one, as in CS184, does not reach the limit"),
-    [PARAM_STRAIN_LIMIT_TOLERANCE] =
-        DRAPE_NUMBER("strain_limit_tolerance", "1", 1e-3, 0, 1,
-                     "passes end when no spring exceeds its largest length by more than this fraction"),
-    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.8, 0.01, 1,
-                                  "with substeps 0: fraction of the stability limit that a substep takes"),
-    [PARAM_MAX_SUBSTEPS] = DRAPE_INTEGER("max_substeps", "1", 10000, 1, 1e6,
-                                         "with substeps 0: a step that needs more is rejected"),
-    [PARAM_MAX_SPEED] = DRAPE_NUMBER("max_speed", "m/s", 1e6, DRAPE_ABOVE(0), 1e100,
-                                     "a step in which a node is faster has blown up, and is rejected"),
     [PARAM_GUARD] = DRAPE_BOOLEAN("guard", true,
                                   "reject steps that create energy or collapse an element; false, as in "
-                                  "CS184 and Boson: only those above max_speed"),
+                                  "CS184 and Boson: only those in which a node is faster than 1e6 m/s"),
 };
 
-#define STABILITY_ITERATIONS 30 /* finds omega of a sheet to 1 % */
+#define STABILITY_ITERATIONS 30    /* finds omega of a sheet to 1 % */
+#define SAFETY               0.8   /* fraction of the stability limit that a substep takes */
+#define MAX_SUBSTEPS         10000 /* of a step that are not given; one that needs more is rejected */
+#define MAX_SPEED            1e6   /* [m/s] of a node; a step with a faster one has blown up */
 
 typedef struct verlet_state {
     drape_system *system;
@@ -176,8 +166,7 @@ static drape_status create_parts(drape_arena *arena, verlet_state *s)
         status = drape_verlet_force_create(arena, s->system, &s->force);
     if (!status && !isnan(values[PARAM_STRAIN_LIMIT]))
         status = drape_verlet_limit_create(arena, s->model, values[PARAM_STRAIN_LIMIT],
-                                           (int)values[PARAM_STRAIN_LIMIT_ITERATIONS],
-                                           values[PARAM_STRAIN_LIMIT_TOLERANCE], &s->limit);
+                                           (int)values[PARAM_STRAIN_LIMIT_ITERATIONS], &s->limit);
     if (!status && s->model->contact.self)
         status = drape_verlet_self_create(arena, s->model, values[PARAM_SELF_BOXES] == BOXES_OWN, &s->self);
     if (!status)
@@ -392,11 +381,10 @@ static void substep_velocity(verlet_state *s, const substep *sub, bool first)
 static int64_t substeps_for(const verlet_state *s, double h, double limit)
 {
     int64_t given = (int64_t)s->values[PARAM_SUBSTEPS];
-    double max = s->values[PARAM_MAX_SUBSTEPS];
     if (given > 0)
         return given;
-    double needed = ceil(h / (s->values[PARAM_SAFETY] * limit));
-    return needed <= max ? (int64_t)fmax(needed, 1) : (int64_t)max + 1;
+    const double needed = ceil(h / (SAFETY * limit));
+    return needed <= MAX_SUBSTEPS ? (int64_t)fmax(needed, 1) : MAX_SUBSTEPS + 1;
 }
 
 static void stability(void *state, const drape_state *at, double h, drape_stability *out)
@@ -411,7 +399,7 @@ static void stability(void *state, const drape_state *at, double h, drape_stabil
     out->step = s->values[PARAM_SUBSTEPS] > 0 ? s->values[PARAM_SUBSTEPS] * out->limit : INFINITY;
 }
 
-/* The number of substeps of this step; more than max_substeps: the step is rejected. */
+/* The number of substeps of this step; more than MAX_SUBSTEPS: the step is rejected. */
 static int64_t count_substeps(verlet_state *s, const drape_state *in, double h)
 {
     drape_stability known = {.limit = INFINITY};
@@ -440,12 +428,11 @@ static int32_t fastest_node(const drape_model *m, const drape_state *out)
     return fastest;
 }
 
-static bool blew_up(const verlet_state *s, const drape_state *out, drape_step_info *info)
+static bool blew_up(const drape_model *m, const drape_state *out, drape_step_info *info)
 {
-    const drape_model *m = s->model;
     int32_t node = fastest_node(m, out);
     double speed = vec3_norm(out->v + 3 * (size_t)node);
-    if (speed <= s->values[PARAM_MAX_SPEED] && drape_all_finite(out->x + 3 * (size_t)node, 3))
+    if (speed <= MAX_SPEED && drape_all_finite(out->x + 3 * (size_t)node, 3))
         return false;
     info->reason = drape_reason_name(DRAPE_REASON_BLOW_UP);
     info->diagnostic = (drape_diagnostic){.what = "speed [m/s]",
@@ -454,16 +441,16 @@ static bool blew_up(const verlet_state *s, const drape_state *out, drape_step_in
                                           .node = {node, -1, -1, -1},
                                           .cloth = drape_model_cloth_of(m, node),
                                           .value = speed,
-                                          .limit = s->values[PARAM_MAX_SPEED]};
+                                          .limit = MAX_SPEED};
     return true;
 }
 
-static drape_status refuse(drape_step_info *info, int64_t max)
+static drape_status refuse(drape_step_info *info)
 {
     info->reason = drape_reason_name(DRAPE_REASON_MAX_SUBSTEPS);
     info->diagnostic.what = "substeps";
-    info->diagnostic.value = (double)max + 1;
-    info->diagnostic.limit = (double)max;
+    info->diagnostic.value = MAX_SUBSTEPS + 1;
+    info->diagnostic.limit = MAX_SUBSTEPS;
     return DRAPE_RETRY_REJECTED;
 }
 
@@ -475,8 +462,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     int64_t n = count_substeps(s, in, h);
     info->residual = info->tolerance = NAN;
     info->lenient = s->values[PARAM_GUARD] == 0;
-    if (s->values[PARAM_SUBSTEPS] == 0 && n > (int64_t)s->values[PARAM_MAX_SUBSTEPS])
-        return refuse(info, (int64_t)s->values[PARAM_MAX_SUBSTEPS]);
+    if (s->values[PARAM_SUBSTEPS] == 0 && n > MAX_SUBSTEPS)
+        return refuse(info);
     memcpy(out->x, in->x, nodes * sizeof *out->x);
     memcpy(out->v, in->v, nodes * sizeof *out->v);
     info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
@@ -499,7 +486,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
             return drape_system_status(s->system);
     }
     info->iterations = (int)n;
-    return blew_up(s, out, info) ? DRAPE_RETRY_NONFINITE : DRAPE_OK;
+    return blew_up(s->model, out, info) ? DRAPE_RETRY_NONFINITE : DRAPE_OK;
 }
 
 /* A step depends on the state alone. */

@@ -94,12 +94,11 @@ typedef struct drape_verlet_limit {
     const uint8_t *pinned;     /* of the model */
     int passes;                /* at most */
     const atomic_bool *cancel; /* as in drape_verlet_contact */
-    double slack;              /* passes end where no length is more than this times the longest */
 } drape_verlet_limit;
 
 /* All springs: the elements of two nodes of every term that measures a strain. */
 drape_status drape_verlet_limit_create(drape_arena *arena, const drape_model *model, double limit, int passes,
-                                       double tolerance, drape_verlet_limit *out);
+                                       drape_verlet_limit *out);
 void drape_verlet_limit_lengths(const drape_verlet_limit *limit, double *x);
 
 #endif

@@ -21,9 +21,10 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_PATCH_NODES 16 /* few enough that most patches have no spring that is too long */
-#define MIN_PATCH_NODES 4  /* smaller patches are not worth it */
-#define MAX_STEPS       8  /* springs of a node */
+#define MAX_PATCH_NODES 16    /* few enough that most patches have no spring that is too long */
+#define MIN_PATCH_NODES 4     /* smaller patches are not worth it */
+#define MAX_STEPS       8     /* springs of a node */
+#define SLACK           1.001 /* passes end where no length is more than this times the longest */
 
 /* Springs first ... first + steps x nodes - 1, as many for each node: spring s of node `from` + i joins it
  * with from + i - back[s]. steps 0: any springs, `nodes` of them. */
@@ -171,11 +172,10 @@ static int32_t find_patches(drape_verlet_limit *l, drape_verlet_patch *out)
 /* ---- Creation ---- */
 
 drape_status drape_verlet_limit_create(drape_arena *arena, const drape_model *m, double limit, int passes,
-                                       double tolerance, drape_verlet_limit *out)
+                                       drape_verlet_limit *out)
 {
     int32_t *start = drape_arena_take(arena, (size_t)m->node_count + 1, sizeof *start);
-    *out = (drape_verlet_limit){
-        .pinned = m->pinned, .node_count = m->node_count, .passes = passes, .slack = 1 + tolerance};
+    *out = (drape_verlet_limit){.pinned = m->pinned, .node_count = m->node_count, .passes = passes};
     if (!start)
         return DRAPE_E_MEMORY;
     count_springs(m, start);
@@ -280,7 +280,7 @@ static double pass(const drape_verlet_limit *l)
 void drape_verlet_limit_lengths(const drape_verlet_limit *l, double *x)
 {
     planes_from((size_t)l->node_count, x, l->x);
-    for (int k = 0; k < l->passes && pass(l) > l->slack * l->slack; k++)
+    for (int k = 0; k < l->passes && pass(l) > SLACK * SLACK; k++)
         if (l->cancel && atomic_load(l->cancel))
             break;
     planes_to((size_t)l->node_count, l->x, x);

@@ -6,6 +6,7 @@
  * drawn over the map.
  */
 #include "base/param.h"
+#include "base/retired.h"
 #include "lab/figure.h"
 #include "lab/quantity.h"
 #include "lab/sweep.h"
@@ -43,6 +44,8 @@ static drape_status read_axis(lab *l, const char *text, axis *a)
         return wrong_axis(l, text, "a pointer is needed");
     memcpy(a->pointer, text, (size_t)(equals - text));
     a->pointer[equals - text] = 0;
+    if (drape_is_retired(a->pointer))
+        return wrong_axis(l, text, "the setting has no effect any more");
     lab_axis *ends = &a->ends;
     if (sscanf(equals + 1, "%lf:%lf:%d%n%7s", &ends->from, &ends->to, &a->count, &used, rest) < 3 ||
         used == 0)

@@ -71,7 +71,6 @@ drape_status drape_mesh_from_grid(drape_context *ctx, const char *pointer, const
 
     const drape_grid_ops *ops = drape_grids[i];
     double values[DRAPE_MAX_PARAMS];
-    status = drape_params_resolve(ctx, pointer, ops->entry.params, ops->entry.param_count, grid->settings,
-                                  grid->setting_count, values);
+    status = drape_params_resolve(ctx, pointer, &ops->entry, grid->settings, grid->setting_count, values);
     return status ? status : ops->generate(ctx, pointer, values, mesh);
 }

@@ -39,9 +39,11 @@ void drape_grid_triangulate(drape_mesh *mesh, const bool falling[2][2], bool fli
 enum { GRID_COLUMNS, GRID_ROWS, GRID_WIDTH, GRID_HEIGHT, GRID_RECTANGLE_COUNT };
 enum { GRID_HORIZONTAL, GRID_VERTICAL };
 extern const char *const drape_grid_orientations[];
+#define GRID_COLUMNS_HELP "nodes along the width, or on each circle; columns x rows is at most 2^28"
+#define GRID_ROWS_HELP    "nodes along the height, or circles of nodes, the top one first"
 #define GRID_RECTANGLE                                                                                       \
-    [GRID_COLUMNS] = GRID_NODES("columns", 2, 2, "nodes along the width; columns x rows is at most 2^28"),   \
-    [GRID_ROWS] = GRID_NODES("rows", 2, 2, "nodes along the height"),                                        \
+    [GRID_COLUMNS] = GRID_NODES("columns", 2, 2, GRID_COLUMNS_HELP),                                         \
+    [GRID_ROWS] = GRID_NODES("rows", 2, 2, GRID_ROWS_HELP),                                                  \
     [GRID_WIDTH] = GRID_LENGTH("width", "size along x"),                                                     \
     [GRID_HEIGHT] = GRID_LENGTH("height", "size along -z, or along -y if vertical")
 #define GRID_ORIENTATION                                                                                     \

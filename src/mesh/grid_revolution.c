@@ -20,8 +20,8 @@ enum { ALTERNATING, PARALLEL };
 static const char *const diagonals[] = {[ALTERNATING] = "alternating", [PARALLEL] = "parallel", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
-    [COLUMNS] = GRID_NODES("columns", 2, 2, "nodes on each circle; columns x rows is at most 2^28"),
-    [ROWS] = GRID_NODES("rows", 2, 2, "circles of nodes, the top one first"),
+    [COLUMNS] = GRID_NODES("columns", 2, 2, GRID_COLUMNS_HELP),
+    [ROWS] = GRID_NODES("rows", 2, 2, GRID_ROWS_HELP),
     [TOP] = GRID_LENGTH("top_radius", "radius of the top circle, at y = 0"),
     [BOTTOM] = GRID_LENGTH("bottom_radius", "radius of the bottom circle"),
     [HEIGHT] = DRAPE_NUMBER("height", "m", 0, 0, 1e9, "of the top circle above the bottom one; 0: a ring"),

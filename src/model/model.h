@@ -277,8 +277,6 @@ typedef struct drape_contact_def {
 #define DRAPE_UNTANGLE_DEFAULT_GAP    1.0
 typedef struct drape_model_untangle {
     bool given;   /* by the scene */
-    int sweeps;   /* at most */
-    double gap;   /* wanted at the end, in activation distances */
     bool goes_on; /* a run whose cloth did not come apart */
 } drape_model_untangle;
 

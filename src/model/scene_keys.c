@@ -65,6 +65,15 @@ static const char *const selectors[] = {"nodes", "corner", "edge", "row", "box",
             "direction that they clamp"),                                                                    \
             ARRAY(def, turns, turn_count), .at_least = 1, .child = &drape_form_turn                          \
     }
+#define PIVOT_KEY(def)                                                                                       \
+    {                                                                                                        \
+        DRAPE_VECTOR("pivot", "m",                                                                           \
+                     DRAPE_DERIVED(                                                                          \
+                         "the mean of the nodes, the centre of mass of a cloth that spins, the middle of a " \
+                         "collider, or the origin"),                                                         \
+                     -1e9, 1e9, "the point about which it turns, at the start; the track displaces it"),     \
+            IN(def, pivot)                                                                                   \
+    }
 #define NAME_KEY(def)                                                                                        \
     {                                                                                                        \
         DRAPE_TEXT("name", "unique name, of pins among those of their cloth; of an event without ; and @",   \
@@ -95,9 +104,7 @@ static const drape_scene_key pin_keys[] = {
     {DRAPE_VECTOR("axis", "1", DRAPE_DERIVED("none: held in all directions"), LOWEST, HIGHEST,
                   "the only direction in which the nodes are free: each stays on a line, as on a rail"),
      IN(drape_pin_def, axis)},
-    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the mean of the nodes"), -1e9, 1e9,
-                  "the point about which they turn, at the start; the track displaces it; with `turns`"),
-     IN(drape_pin_def, pivot)},
+    PIVOT_KEY(drape_pin_def),
 };
 
 const drape_scene_object drape_form_pin = {.name = "pin",
@@ -254,9 +261,7 @@ static const drape_scene_key start_keys[] = {
             "scale, rotation, translation; of a start, after its folds"),
      .child = &start_transform},
     {DRAPE_VECTOR("spin", "rad/s", 0, -1e9, 1e9, "angular velocity"), IN(drape_start_def, spin)},
-    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the centre of mass at the start"), -1e9, 1e9,
-                  "the point that the spin does not move"),
-     IN(drape_start_def, pivot)},
+    PIVOT_KEY(drape_start_def),
     {DRAPE_TEXT("velocities", "an NPY file, nodes x 3, of velocities in m/s; relative to the scene",
                 .derived = "none"),
      IN(drape_start_def, velocity_file)},
@@ -324,9 +329,7 @@ static const drape_scene_key collider_keys[] = {
                   "speed of rebound / speed of impact, of cloth on the collider"),
      IN(drape_collider_def, restitution)},
     MOTION_KEYS(drape_collider_def),
-    {DRAPE_VECTOR("pivot", "m", DRAPE_DERIVED("the middle of its shape; of a plane, the origin"), -1e9, 1e9,
-                  "the point about which it turns, where its parameters define it"),
-     IN(drape_collider_def, pivot)},
+    PIVOT_KEY(drape_collider_def),
     {DRAPE_BOOLEAN("enabled", true, "cloth touches it"), IN(drape_collider_def, enabled)},
 };
 

@@ -4,19 +4,16 @@
 #include "nonlinear/approx_jacobian.h"
 #include "nonlinear/factored_jacobian.h"
 
-drape_status drape_matrix_choose(drape_arena *arena, drape_system *system, const drape_matrix_choice *choice,
-                                 drape_matrix *usual, drape_matrix *cheap)
+drape_status drape_matrix_choose(drape_arena *arena, drape_system *system, double dt, drape_matrix *usual,
+                                 drape_matrix *cheap)
 {
-    bool factored = choice->kind == DRAPE_MATRIX_FACTORED, only = true;
-    drape_status status = DRAPE_OK;
-    if (choice->kind == DRAPE_MATRIX_AUTO)
-        status = drape_factored_jacobian_is_better(system, choice->dt, &factored, &only);
+    bool factored = false, only = true;
+    drape_status status = drape_factored_jacobian_is_better(system, dt, &factored, &only);
     only |= !drape_system_contact(system);
     drape_matrix *approximate = factored ? cheap : usual;
     if (!status && factored) {
         usual->ops = &drape_factored_jacobian_ops;
-        status = drape_factored_jacobian_create(arena, system, choice->dt,
-                                                (drape_factored_jacobian **)&usual->self);
+        status = drape_factored_jacobian_create(arena, system, dt, (drape_factored_jacobian **)&usual->self);
     }
     if (status || (factored && only))
         return status;

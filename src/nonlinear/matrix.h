@@ -36,18 +36,11 @@ typedef struct drape_matrix {
     void *self;
 } drape_matrix;
 
-/* auto: whichever factored_jacobian.h says; with contact, where both serve, both: contact needs most of its
- * iterations for the active set, which costs less without factors. */
-typedef enum { DRAPE_MATRIX_AUTO, DRAPE_MATRIX_APPROXIMATE, DRAPE_MATRIX_FACTORED } drape_matrix_kind;
-
-typedef struct drape_matrix_choice {
-    drape_matrix_kind kind;
-    double dt; /* [s] nominal step */
-} drape_matrix_choice;
-
-/* Makes what newton_k corrects with: `usual`, and `cheap` for the least effort unless that is the same.
+/* Makes what newton_k corrects with in steps of dt [s]: `usual`, and `cheap` for the least effort unless that
+ * is the same. It is whichever factored_jacobian.h says; with contact, where both serve, both: contact needs
+ * most of its iterations for the active set, which costs less without factors.
  * Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER; even then both must be destroyed. */
-drape_status drape_matrix_choose(drape_arena *arena, drape_system *system, const drape_matrix_choice *choice,
-                                 drape_matrix *usual, drape_matrix *cheap);
+drape_status drape_matrix_choose(drape_arena *arena, drape_system *system, double dt, drape_matrix *usual,
+                                 drape_matrix *cheap);
 
 #endif

@@ -55,16 +55,17 @@
 #define SETUPS         1     /* iterations between Jacobians */
 #define STEP_TOLERANCE 1e-15 /* fraction of the scene's size: a shorter correction changes nothing */
 /* Largest correction, in sizes of the scene, for each node: KINSOL's own limit is 1 for the guess d = 0 */
-#define MAX_NEWTON_STEP 1e3
-#define MAX_BETA_FAIL   1000 /* failures of KINSOL's curvature condition: in effect unlimited */
-#define SHORT_STEP      0.5  /* after a shorter step the next matrix is positive semidefinite */
-#define MAX_LENGTH      2    /* of a correction by positive parts with contact; without, there is no limit */
-#define EXACT           0.1  /* of the residual, that an iterative solver may leave in an exact correction */
-#define SMALL_STEP      0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
-#define MAX_AHEAD       0.1  /* of an edge: pins further ahead of the guess pull it along */
-#define MAX_CHORDS      2    /* simplified corrections after one correction, without contact */
-#define MAX_PREDICTION  8    /* corrections in a solve, after which stress is no longer predicted */
-#define STALLED         0.5  /* of the residual before: if no more is gained, it may be rounding */
+#define MAX_NEWTON_STEP  1e3
+#define MAX_BETA_FAIL    1000 /* failures of KINSOL's curvature condition: in effect unlimited */
+#define SHORT_STEP       0.5  /* after a shorter step the next matrix is positive semidefinite */
+#define MAX_LENGTH       2    /* of a correction by positive parts with contact; without, there is no limit */
+#define EXACT            0.1  /* of the residual, that an iterative solver may leave in an exact correction */
+#define LINEAR_TOLERANCE 1e-2 /* of the residual, that iterative solvers leave in a correction */
+#define SMALL_STEP       0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
+#define MAX_AHEAD        0.1  /* of an edge: pins further ahead of the guess pull it along */
+#define MAX_CHORDS       2    /* simplified corrections after one correction, without contact */
+#define MAX_PREDICTION   8    /* corrections in a solve, after which stress is no longer predicted */
+#define STALLED          0.5  /* of the residual before: if no more is gained, it may be rounding */
 /* Corrections that contract by less are taken to contract by so much: nine more like the last one follow. */
 #define MAX_CONTRACTION 0.9
 #define ESTIMATE        0.5 /* of the residual, that conjugate gradients leave in an estimate */
@@ -79,6 +80,7 @@ struct drape_newton {
     drape_step_equation *equation;
     double values[DRAPE_NEWTON_PARAM_COUNT];
     bool searches;              /* globalization `work` */
+    bool lenient;               /* states that have not converged are usable */
     bool friction;              /* matrices with positive parts are others than without, in contact too */
     drape_matrix usual, cheap;  /* cheap.ops NULL: there is no other */
     const drape_matrix *matrix; /* of this solve */
@@ -663,12 +665,11 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_effort *effo
                                 drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
-    *report =
-        (drape_solve_report){.reason = drape_reason_name(DRAPE_REASON_CONVERGED),
-                             .error = NAN,
-                             .left = NAN,
-                             .own = NAN,
-                             .lenient = s->values[DRAPE_NEWTON_ON_FAILURE] == DRAPE_NEWTON_FAILURE_ACCEPT};
+    *report = (drape_solve_report){.reason = drape_reason_name(DRAPE_REASON_CONVERGED),
+                                   .error = NAN,
+                                   .left = NAN,
+                                   .own = NAN,
+                                   .lenient = s->lenient};
     s->effort = effort ? *effort : s->own_effort;
     s->tolerance = s->effort.linear_tolerance;
     begin(s);
@@ -735,12 +736,12 @@ static drape_status create_vectors(drape_arena *arena, drape_newton *s)
     return DRAPE_OK;
 }
 
-static drape_status create_solver(drape_arena *arena, drape_newton *s, const drape_matrix_choice *choice)
+static drape_status create_solver(drape_arena *arena, drape_newton *s, double dt)
 {
     drape_system *system = s->equation->system;
     drape_status status;
-    if (choice) {
-        status = drape_matrix_choose(arena, system, choice, &s->usual, &s->cheap);
+    if (dt > 0) {
+        status = drape_matrix_choose(arena, system, dt, &s->usual, &s->cheap);
     } else {
         s->usual.ops = &drape_exact_jacobian_ops;
         status = drape_exact_jacobian_create(
@@ -759,7 +760,7 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s, const dra
 }
 
 drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equation, const double *values,
-                                 const drape_matrix_choice *choice, drape_newton **out)
+                                 double dt, drape_newton **out)
 {
     drape_newton *s = *out = drape_arena_take(arena, 1, sizeof *s);
     if (drape_ranks_agree_memory(equation->ranks, arena->ctx, s))
@@ -778,7 +779,7 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
     s->own_effort = (drape_newton_effort){.most = (int)values[DRAPE_NEWTON_MAX_ITERATIONS],
                                           .by_error = isnan(values[DRAPE_NEWTON_TOLERANCE]),
                                           .deadline = INFINITY,
-                                          .linear_tolerance = values[DRAPE_NEWTON_LINEAR_TOLERANCE]};
+                                          .linear_tolerance = LINEAR_TOLERANCE};
     drape_status status =
         drape_residual_bound_set(equation, (drape_norm)values[DRAPE_NEWTON_NORM],
                                  values[DRAPE_NEWTON_TOLERANCE], &s->values[DRAPE_NEWTON_TOLERANCE]);
@@ -793,7 +794,7 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
     if (!status)
         status = drape_ranks_agree(equation->ranks, arena->ctx, create_vectors(arena, s));
     if (!status && equation->dofs > 0)
-        status = create_solver(arena, s, choice);
+        status = create_solver(arena, s, dt);
     return drape_reserve_close(&reserve, arena->ctx, status);
 }
 
@@ -830,6 +831,11 @@ drape_status drape_newton_matrix(drape_newton *s, const drape_point *point, doub
 const double *drape_newton_values(const drape_newton *s)
 {
     return s->values;
+}
+
+void drape_newton_set_lenient(drape_newton *s, bool lenient)
+{
+    s->lenient = lenient;
 }
 
 void drape_newton_set_tolerance(drape_newton *s, double tolerance)

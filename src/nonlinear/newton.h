@@ -17,16 +17,13 @@ enum {
     DRAPE_NEWTON_TOLERANCE,
     DRAPE_NEWTON_NORM, /* a drape_norm */
     DRAPE_NEWTON_MAX_ITERATIONS,
-    DRAPE_NEWTON_ON_FAILURE,
     DRAPE_NEWTON_GLOBALIZATION,
     DRAPE_NEWTON_LINEAR_SOLVER,
-    DRAPE_NEWTON_LINEAR_TOLERANCE,
     DRAPE_NEWTON_PARAM_COUNT
 };
 
 /* Their choices, NULL-ended. */
 extern const char *const drape_newton_norms[];
-extern const char *const drape_newton_failures[];
 extern const char *const drape_newton_globalizations[];
 
 /* The list of an integrator without parameters of its own. */
@@ -35,37 +32,38 @@ extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
 /* The default of tolerance, which residual_bound.h derives. */
 #define DRAPE_TOLERANCE_WORDS "3e-4 of the load of each node"
 
+#define DRAPE_TOLERANCE_PARAM                                                                                \
+    DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,               \
+                 "bound on the residual of the free nodes, measured by norm; at most 1 % of their load. By " \
+                 "default be and bdf2 with globalization work also end a solve when what is left is small "  \
+                 "beside the local error of the step; newton_k ends by its error")
+
 /* The beginning of the list of an integrator with further parameters, the first of which has the index
  * DRAPE_NEWTON_PARAM_COUNT. Each parameter is one value, so these are also the indices of the values. */
 #define DRAPE_NEWTON_PARAMS                                                                                  \
     [DRAPE_NEWTON_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),              \
-    [DRAPE_NEWTON_TOLERANCE] =                                                                               \
-        DRAPE_NUMBER("tolerance", "N", DRAPE_DERIVED(DRAPE_TOLERANCE_WORDS), DRAPE_ABOVE(0), 1e12,           \
-                     "bound on the residual of the free nodes of an accepted state, measured by norm; at "   \
-                     "most 1 % of their load. By default be and bdf2 with globalization work also end "      \
-                     "a solve when what is left is small beside the local error of the step"),               \
+    [DRAPE_NEWTON_TOLERANCE] = DRAPE_TOLERANCE_PARAM,                                                        \
     [DRAPE_NEWTON_NORM] =                                                                                    \
         DRAPE_CHOICE("norm", DRAPE_NORM_MAX, drape_newton_norms,                                             \
                      "norm of the residual: largest component, sum, or root of the sum of squares"),         \
     [DRAPE_NEWTON_MAX_ITERATIONS] =                                                                          \
         DRAPE_INTEGER("max_iterations", "1", 50, 1, 100000, "Newton iterations before the attempt fails"),   \
-    [DRAPE_NEWTON_ON_FAILURE] =                                                                              \
-        DRAPE_CHOICE("on_failure", DRAPE_NEWTON_FAILURE_REJECT, drape_newton_failures,                       \
-                     "accept: continue with an unconverged state, as in the DEP report, and log it"),        \
     [DRAPE_NEWTON_GLOBALIZATION] = DRAPE_CHOICE(                                                             \
         "globalization", DRAPE_NEWTON_GLOBAL_AUTO, drape_newton_globalizations,                              \
         "none: full Newton steps, failures go to the controller; line_search: steps shortened until the "    \
         "residual falls; work: steps shortened until the work of the residual along them falls, with "       \
         "positive matrices after short steps and where the exact one is indefinite; auto: work"),            \
-    [DRAPE_NEWTON_LINEAR_SOLVER] =                                                                           \
-        DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver",                     \
-                     .aliases = drape_linears_aliases),                                                      \
-    [DRAPE_NEWTON_LINEAR_TOLERANCE] =                                                                        \
-        DRAPE_NUMBER("linear_tolerance", "1", 1e-2, 1e-14, DRAPE_BELOW(1),                                   \
-                     "relative residual that iterative linear solvers leave in a correction")
+    [DRAPE_NEWTON_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_names,                     \
+                                                "name of a linear solver", .aliases = drape_linears_aliases)
 
-/* Values of the choices among these parameters. */
-enum { DRAPE_NEWTON_FAILURE_REJECT, DRAPE_NEWTON_FAILURE_ACCEPT };
+/* Of integrators that may go on with a state that has not converged (drape_newton_set_lenient), as the code
+ * of the DEP report does. */
+#define DRAPE_ON_FAILURE_PARAM                                                                               \
+    DRAPE_CHOICE("on_failure", 0, drape_newton_failures,                                                     \
+                 "accept: continue with an unconverged state, as in the DEP report, and log it")
+extern const char *const drape_newton_failures[]; /* reject, accept */
+
+/* Values of globalization. */
 enum {
     DRAPE_NEWTON_GLOBAL_LINE_SEARCH,
     DRAPE_NEWTON_GLOBAL_NONE,
@@ -92,12 +90,12 @@ typedef struct drape_newton_effort {
     bool cheap;
 } drape_newton_effort;
 
-/* values: of the parameters; choice: the matrix, NULL: the exact Jacobian. The equation and the arena must
- * outlive it. Errors: DRAPE_E_MEMORY,
+/* values: of the parameters; dt: nominal step [s] for which an approximate matrix is chosen (matrix.h), 0:
+ * the matrix is the exact Jacobian. The equation and the arena must outlive it. Errors: DRAPE_E_MEMORY,
  * DRAPE_E_SOLVER; even then drape_newton_destroy must be called, to free what SUNDIALS and the linear
  * solver took. */
 drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equation, const double *values,
-                                 const drape_matrix_choice *choice, drape_newton **out);
+                                 double dt, drape_newton **out);
 void drape_newton_destroy(drape_newton **newton);
 
 /* Solves the equation for d (free DOFs; on entry the guess). effort NULL: as the parameters say. DRAPE_OK:
@@ -114,6 +112,9 @@ drape_status drape_newton_matrix(drape_newton *newton, const drape_point *point,
 
 /* The parameter values it was made with, in the order of drape_newton_params; the tolerance as it is used. */
 const double *drape_newton_values(const drape_newton *newton);
+
+/* Whether a report says that a state which has not converged is usable. */
+void drape_newton_set_lenient(drape_newton *newton, bool lenient);
 
 /* The bound on the residual of the next solves [N]. */
 void drape_newton_set_tolerance(drape_newton *newton, double tolerance);

@@ -2,6 +2,8 @@
  * the rules are written once. */
 #include "sim/choose.h"
 
+#include "base/retired.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -13,16 +15,6 @@ typedef struct choice {
     const drape_registry *registry;
     bool quiet; /* no warnings */
 } choice;
-
-/* Former settings of integrators, which made up for what the nonlinear solver now does by itself, or were
- * those of methods that are gone. The schema of a scene has them no more. */
-static const char *const retired[] = {"alpha",          "beta",
-                                      "coarse_spacing", "correction_tolerance",
-                                      "extrapolation",  "family",
-                                      "forcing",        "gamma",
-                                      "newton",         "predictor",
-                                      "project",        "rescue_iterations",
-                                      "rho_inf",        "stability_detection"};
 
 /* Former methods, and those that scenes which name them are run by. */
 static const struct {
@@ -71,13 +63,9 @@ static drape_status apply(drape_context *ctx, const choice *c, int chosen, const
             memcpy(values + drape_param_place(entry->params, p), value,
                    (size_t)drape_param_width(&entry->params[p]) * sizeof *value);
     }
-    if (!known && c->registry == &drape_integrator_registry &&
-        is_listed(retired, sizeof retired / sizeof *retired, setting->name)) {
-        if (!c->quiet)
-            drape_log(ctx, DRAPE_LOG_WARNING, "%s: has no effect any more", at);
-        return DRAPE_OK;
-    }
-    return known ? DRAPE_OK : unknown_key(ctx, c, at, setting->name);
+    if (!known && !drape_retired(c->quiet ? NULL : ctx, at, c->registry->noun, setting->name))
+        return unknown_key(ctx, c, at, setting->name);
+    return DRAPE_OK;
 }
 
 static drape_status apply_all(drape_context *ctx, const choice *c, int chosen, const drape_setting *settings,
@@ -182,9 +170,6 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
         return status;
     chosen->integrator = drape_integrators[i];
     chosen->controller = drape_controllers[c];
-    status = chosen->controller->check ? chosen->controller->check(ctx, chosen->controller_values) : DRAPE_OK;
-    if (status)
-        return status;
     if (chosen->integrator->own_steps && chosen->controller->own_steps)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/controller/type",
                              "\"%s\" chooses the step size, but so does the integrator \"%s\"; choose the "

@@ -155,7 +155,7 @@ static uint64_t add_contact(uint64_t hash, const drape_contact_def *c)
 
 static uint64_t add_untangle(uint64_t hash, const drape_model_untangle *u)
 {
-    const double values[] = {u->given, u->sweeps, u->gap, u->goes_on};
+    const double values[] = {u->given, u->goes_on};
     return add_doubles(hash, values, sizeof values / sizeof *values);
 }
 

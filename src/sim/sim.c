@@ -193,7 +193,7 @@ static drape_status start_sim(drape_sim *sim, int threads)
     note_restitution(sim);
     drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
                         drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
-    sim->max_attempts = drape_chosen_controller_value(&sim->chosen, "max_attempts", INFINITY);
+    sim->max_attempts = sim->chosen.controller->max_attempts;
     return DRAPE_OK;
 }
 

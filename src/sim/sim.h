@@ -64,7 +64,7 @@ struct drape_sim {
     int past[2];       /* the states before `before`; -1: none */
     double scratch[2]; /* the controller's memory */
     drape_schedule schedule;
-    double max_attempts; /* the controller's max_attempts; INFINITY: it has none */
+    int64_t max_attempts; /* of the controller */
     double frame_rate;
     double realtime_step;  /* [s] the longest step with a time budget; 0: not set. As the next one, a setting
                               of the host, which a restored sim keeps */

@@ -377,19 +377,19 @@ drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 {
     char diagnostic[400], nearest[400], advice[200];
     const drape_schedule *s = &sim->schedule;
-    if (!(s->dt > 0) || (double)s->tries < sim->max_attempts)
+    if (!(s->dt > 0) || sim->max_attempts == 0 || s->tries < sim->max_attempts)
         return DRAPE_OK;
     describe_diagnostic(sim->model, &last->diagnostic, diagnostic, sizeof diagnostic);
     describe_nearest(sim, last, nearest, sizeof nearest);
     if (drape_realtime_rescue.advise(sim, last, advice, sizeof advice))
         return DRAPE_E_MEMORY;
-    return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
-                      "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64
-                      " attempts since t=%.9g advanced less than one dt, %.4g s; the controller's "
-                      "max_attempts is %.15g%s%s%s",
-                      drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status),
-                      last->iterations, s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic,
-                      nearest, advice);
+    return drape_fail(
+        sim->ctx, DRAPE_E_STEP_TOO_SMALL,
+        "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64
+        " attempts since t=%.9g advanced less than one dt, %.4g s; the controller makes at most "
+        "%" PRId64 "%s%s%s",
+        drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status), last->iterations,
+        s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic, nearest, advice);
 }
 
 /* ---- One step, and an advance ---- */

@@ -34,8 +34,6 @@ static drape_status read_def(const drape_sim *sim, const drape_untangle_def *giv
     const drape_model_untangle *scene = &sim->model->untangle;
     drape_untangle_def_init(def, sizeof *def);
     if (!given) {
-        def->sweeps = scene->given ? scene->sweeps : def->sweeps;
-        def->gap = scene->given ? scene->gap : def->gap;
         def->keep = scene->goes_on;
         return DRAPE_OK;
     }

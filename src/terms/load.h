@@ -34,9 +34,9 @@ drape_status drape_load_check_faces(const drape_cloth_view *cloth, drape_term_bu
 #define DRAPE_LOAD_PARAMS                                                                                    \
     [DRAPE_LOAD_LIST_EDGE] =                                                                                 \
         DRAPE_CHOICE("edge", 0, drape_load_edges, "a side of a grid, or all of the boundary"),               \
-    [DRAPE_LOAD_LIST_BOX_MIN] =                                                                              \
-        DRAPE_VECTOR("box_min", "m", -1e9, -1e9, 1e9,                                                        \
-                     "corner of a box; only edges with both ends in it, at rest, are loaded"),               \
+    [DRAPE_LOAD_LIST_BOX_MIN] = DRAPE_VECTOR(                                                                \
+        "box_min", "m", -1e9, -1e9, 1e9,                                                                     \
+        "corner of a box; only nodes in it, at rest, are loaded, and edges with both ends in it"),           \
     [DRAPE_LOAD_LIST_BOX_MAX] = DRAPE_VECTOR("box_max", "m", 1e9, -1e9, 1e9, "opposite corner of the box")
 
 #endif

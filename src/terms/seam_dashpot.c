@@ -10,17 +10,14 @@
 
 #include <math.h>
 
-enum { COEFFICIENT, SMOOTHING };
 enum { REST_COEFFICIENT, REST_SMOOTHING, REST_COUNT };
 
-#define SHARE 1e-3 /* of the distance between neighbouring nodes */
+#define SHARE 1e-3 /* s, of the distance between neighbouring nodes: the root of a node's mean area */
 
 static const drape_param params[] = {
     DRAPE_NUMBER("coefficient", "N s/m", DRAPE_REQUIRED, 0, 1e12,
-                 "c of each pair of nodes: force over the rate of their distance"),
-    DRAPE_NUMBER("smoothing", "m",
-                 DRAPE_DERIVED("0.001 of the distance of neighbouring nodes: the root of a node's mean area"),
-                 DRAPE_ABOVE(0), 1e3, "s: nodes that are nearer than this are damped less"),
+                 "c of each pair of nodes: force over the rate of their distance; less where they are nearer "
+                 "than 0.001 of that of neighbours"),
 };
 
 /* The root of the mean area of the nodes that the seam joins. */
@@ -36,8 +33,8 @@ static double spacing_of(const drape_seam_view *seam)
 
 static drape_status build(const drape_seam_view *seam, const double *values, drape_term_builder *builder)
 {
-    const double smoothing = isnan(values[SMOOTHING]) ? SHARE * spacing_of(seam) : values[SMOOTHING],
-                 rest[REST_COUNT] = {[REST_COEFFICIENT] = values[COEFFICIENT], [REST_SMOOTHING] = smoothing};
+    const double rest[REST_COUNT] = {
+        [REST_COEFFICIENT] = *values, [REST_SMOOTHING] = SHARE * spacing_of(seam)};
     const drape_status status = drape_term_reserve(builder, seam->pair_count, REST_COUNT);
     for (int32_t i = 0; !status && i < seam->pair_count; i++)
         drape_term_set(builder, i, seam->pair + 2 * (size_t)i, rest);

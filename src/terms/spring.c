@@ -31,9 +31,6 @@ const drape_param drape_spring_params[DRAPE_SPRING_PARAM_COUNT] = {
     [DRAPE_SPRING_REST_SCALE] =
         DRAPE_NUMBER("rest_scale", "1", 1, DRAPE_ABOVE(0), 1e3,
                      "rest length over the distance in the mesh: below 1 the springs start stretched"),
-    [DRAPE_SPRING_MIN_LENGTH] =
-        DRAPE_NUMBER("min_length", "1", 1e-6, 0, DRAPE_BELOW(1),
-                     "a step that leaves a spring shorter than this fraction of its rest length is rejected"),
 };
 
 /* ---- Pairs of nodes ---- */
@@ -179,6 +176,6 @@ drape_status drape_spring_check(const drape_elements *el, const double *x, const
     (void)internal;
     *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_SPRING_COLLAPSE),
                            .what = "spring length / rest length",
-                           .limit = el->params[DRAPE_SPRING_MIN_LENGTH]};
+                           .limit = DRAPE_MIN_RATIO};
     return drape_check_ratios(el, x, before, 1, ratio_of, fault);
 }

@@ -38,6 +38,6 @@ drape_status drape_strain_check(const drape_elements *el, const double *x, const
     (void)internal;
     *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_AREA_COLLAPSE),
                            .what = "area / rest area",
-                           .limit = el->params[DRAPE_STRAIN_MIN_AREA]};
+                           .limit = DRAPE_MIN_RATIO};
     return drape_check_ratios(el, x, before, 3, ratio_of, fault);
 }

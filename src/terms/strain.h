@@ -9,17 +9,11 @@
 #include "terms/orthotropic.h"
 #include "terms/terms.h"
 
-/* The parameters among the values of the term; in its list the direction is one entry, not three. */
-enum { DRAPE_STRAIN_MIN_AREA = DRAPE_ORTHOTROPIC_COUNT };
-enum { DRAPE_STRAIN_LIST = DRAPE_ORTHOTROPIC_DIRECTION + 2 };
+enum { DRAPE_STRAIN_LIST = DRAPE_ORTHOTROPIC_DIRECTION + 1 }; /* the direction is one entry, not three */
 
 #define DRAPE_STRAIN_PARAMS                                                                                  \
     DRAPE_ORTHOTROPIC_PARAMS("N/m", "of the material: its fabric, or E h", "shear",                          \
-                             "shear stiffness, a force per length"),                                         \
-        [DRAPE_STRAIN_LIST - 1] =                                                                            \
-            DRAPE_NUMBER("min_area", "1", 1e-6, 0, DRAPE_BELOW(1),                                           \
-                         "a step that takes the area of a triangle below this fraction of its area at rest " \
-                         "is rejected")
+                             "shear stiffness, a force per length")
 
 /* The first rest data of an element. */
 enum { DRAPE_STRAIN_K, DRAPE_STRAIN_Q0, DRAPE_STRAIN_AREA, DRAPE_STRAIN_COUNT };

@@ -48,8 +48,8 @@ static const drape_param params[LIST_COUNT] = {
                                    "density of the medium: 1.225 is air at sea level and 15 degrees"),
     [PARAM_WIND] = DRAPE_VECTOR("wind", "m/s", 0, -1e6, 1e6, "velocity of the medium"),
     [LIST_WAKE] = DRAPE_BOOLEAN("wake", true, "air that leaves across an edge takes its momentum along"),
-    [LIST_HISTORY] = DRAPE_HISTORY_PARAM_OF("wind"),
-    [LIST_RAMP] = DRAPE_RAMP_PARAM_OF("wind"),
+    [LIST_HISTORY] = DRAPE_TERM_HISTORY_PARAM,
+    [LIST_RAMP] = DRAPE_TERM_RAMP_PARAM,
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

@@ -24,7 +24,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { PARAM_STIFFNESS, PARAM_REST, PARAM_MIN_ALTITUDE, PARAM_MAX_TURN, PARAM_COUNT };
+enum { PARAM_STIFFNESS, PARAM_REST, PARAM_COUNT };
 enum { STIFFNESS_CONSISTENT, STIFFNESS_REPORT };
 enum { REST_MESH, REST_FLAT };
 enum { REST_K, REST_THETA0, REST_ALTITUDE1, REST_ALTITUDE2, REST_COUNT };
@@ -34,16 +34,11 @@ static const char *const stiffness_choices[] = {"consistent", "report", NULL};
 static const char *const rest_choices[] = {"mesh", "flat", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_STIFFNESS] =
-        DRAPE_CHOICE("stiffness", STIFFNESS_CONSISTENT, stiffness_choices,
-                     "consistent: k = D |e|^2/(A1 + A2); report: k = 2/sqrt(3) E h^3/12 on every hinge"),
-    [PARAM_REST] = DRAPE_CHOICE("rest", REST_MESH, rest_choices, "rest angles: those of the mesh, or flat"),
-    [PARAM_MIN_ALTITUDE] = DRAPE_NUMBER(
-        "min_altitude", "1", 1e-6, 0, DRAPE_BELOW(1),
-        "a step that takes an altitude over a hinge below this fraction of its rest value is rejected"),
-    [PARAM_MAX_TURN] =
-        DRAPE_NUMBER("max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
-                     "a step that turns a hinge by more is rejected: near pi its angle is ambiguous"),
+    [PARAM_STIFFNESS] = DRAPE_CHOICE(
+        "stiffness", STIFFNESS_CONSISTENT, stiffness_choices,
+        "consistent: that of a sheet of the material; report: that of the code of the DEP report, on "
+        "edges too soft by the factor of one edge length"),
+    [PARAM_REST] = DRAPE_CHOICE("rest", REST_MESH, rest_choices, "at rest: bent as the mesh, or flat"),
 };
 
 /* The hinges of LANES elements. */
@@ -198,9 +193,9 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
                           const double *internal, drape_fault *fault)
 {
     drape_fault low = {drape_reason_name(DRAPE_REASON_ALTITUDE_COLLAPSE), "altitude / rest altitude", -1,
-                       INFINITY, el->params[PARAM_MIN_ALTITUDE]};
+                       INFINITY, DRAPE_MIN_RATIO};
     drape_fault turned = {drape_reason_name(DRAPE_REASON_HINGE_BRANCH), "turn of a hinge in one step [rad]",
-                          -1, -INFINITY, el->params[PARAM_MAX_TURN]};
+                          -1, -INFINITY, DRAPE_MAX_TURN};
     shapes s;
     for (int32_t i = 0; i < el->count; i++) {
         int l = i % LANES;

@@ -40,9 +40,7 @@
 enum {
     PARAM_REST = DRAPE_ORTHOTROPIC_COUNT,
     PARAM_CURVATURE,
-    PARAM_MIN_ALTITUDE = PARAM_CURVATURE + 3,
-    PARAM_MAX_TURN,
-    PARAM_FRICTION,
+    PARAM_FRICTION = PARAM_CURVATURE + 3,
     PARAM_FRICTION_CURVATURE,
     PARAM_YIELD_CURVATURE,
     PARAM_HARDENING
@@ -50,8 +48,6 @@ enum {
 enum {
     LIST_REST = DRAPE_ORTHOTROPIC_DIRECTION + 1,
     LIST_CURVATURE,
-    LIST_MIN_ALTITUDE,
-    LIST_MAX_TURN,
     LIST_FRICTION,
     LIST_FRICTION_CURVATURE,
     LIST_YIELD_CURVATURE,
@@ -75,17 +71,11 @@ static const char *const rest_choices[] = {"mesh", "flat", NULL};
 static const drape_param params[LIST_COUNT] = {
     DRAPE_ORTHOTROPIC_PARAMS("N m", "of the material: its fabric, or E h^3/12", "twist",
                              "torsional rigidity: the curvature K12 stores 2 twist K12^2 per area"),
-    [LIST_REST] = DRAPE_CHOICE("rest", REST_MESH, rest_choices, "rest curvature: that of the mesh, or flat"),
+    [LIST_REST] = DRAPE_CHOICE("rest", REST_MESH, rest_choices, "at rest: bent as the mesh, or flat"),
     [LIST_CURVATURE] = DRAPE_VECTOR("curvature", "1/m", 0, -1e9, 1e9,
                                     "added to the rest curvature: along the warp, along the weft, twist; "
                                     "positive towards the side from which triangles turn counterclockwise",
                                     .numbers = "[k11, k22, k12]"),
-    [LIST_MIN_ALTITUDE] = DRAPE_NUMBER("min_altitude", "1", 1e-6, 0, DRAPE_BELOW(1),
-                                       "a step that takes an altitude of a triangle below this fraction of "
-                                       "its smallest one at rest is rejected"),
-    [LIST_MAX_TURN] =
-        DRAPE_NUMBER("max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
-                     "a step that turns a hinge by more is rejected: near pi its angle is ambiguous"),
     [LIST_FRICTION] =
         DRAPE_NUMBER("friction", "1/m", 0, 0, 1e9,
                      "friction between yarns: the curvature whose elastic moment it is as large "
@@ -518,9 +508,9 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
                           const double *internal, drape_fault *fault)
 {
     drape_fault low = {drape_reason_name(DRAPE_REASON_ALTITUDE_COLLAPSE), "altitude / smallest rest altitude",
-                       -1, INFINITY, el->params[PARAM_MIN_ALTITUDE]};
+                       -1, INFINITY, DRAPE_MIN_RATIO};
     drape_fault turned = {drape_reason_name(DRAPE_REASON_HINGE_BRANCH), "turn of a hinge in one step [rad]",
-                          -1, 0, el->params[PARAM_MAX_TURN]};
+                          -1, 0, DRAPE_MAX_TURN};
     for (int32_t e = 0; e < el->count; e++) {
         if (is_of_same_triangle(el, e))
             continue;

@@ -47,8 +47,8 @@ static const drape_param params[LIST_COUNT] = {
                               "force by angle of attack a: sin^2 a, or (4 + pi) sin a/(4 + pi sin a)"),
     [LIST_FRICTION] = DRAPE_NUMBER("friction", "1", 0, 0, 1e6,
                                    "coefficient of friction along the sheet, of both sides together"),
-    [LIST_HISTORY] = DRAPE_HISTORY_PARAM_OF("wind"),
-    [LIST_RAMP] = DRAPE_RAMP_PARAM_OF("wind"),
+    [LIST_HISTORY] = DRAPE_TERM_HISTORY_PARAM,
+    [LIST_RAMP] = DRAPE_TERM_RAMP_PARAM,
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

@@ -1,6 +1,6 @@
 /*
- * limit.strain: keeps edges, or springs, from stretching beyond a limit. With s = l/L - 1,
- * y = (s - onset)/w and w = limit - onset, each has the energy
+ * limit.strain: keeps edges, or springs, from stretching beyond a limit. With s = l/L - 1, the onset
+ * limit/2, y = (s - onset)/w and w = limit - onset, each has the energy
  *     E = K (L w)^2 b(y),  b = 0 for y <= 0,  -y^2 ln(1 - y) for 0 < y <= 1 - cap
  *     dE/dl = K L w b',    b' = -2 y ln(1 - y) + y^2/(1 - y)
  *     d2E/dl2 = K b'',     b'' = -2 ln(1 - y) + 4 y/(1 - y) + y^2/(1 - y)^2
@@ -11,7 +11,7 @@
  * If the barrier were infinite beyond the limit, Newton could not start there, but the first guess of fast
  * nodes is beyond it, and so is a sheet whose pins were moved. Therefore b continues above y = 1 - cap as the
  * parabola that is C2 there. Iterates may be beyond the limit; states may not: the check rejects them. The
- * forces at the limit are about 2/cap K L w; a larger load needs a larger stiffness or a smaller cap.
+ * forces at the limit are about 2/cap K L w; a larger load needs a larger stiffness.
  *
  * Compressed springs are not limited, as in CS184.
  */
@@ -22,7 +22,7 @@
 
 #include <math.h>
 
-enum { PARAM_LIMIT, PARAM_ONSET, PARAM_STIFFNESS, PARAM_OVER, PARAM_CAP, PARAM_COUNT };
+enum { PARAM_LIMIT, PARAM_STIFFNESS, PARAM_OVER, PARAM_COUNT };
 enum { OVER_EDGES, OVER_SPRINGS };
 enum { REST_K, REST_LENGTH, REST_COUNT };
 
@@ -32,25 +32,22 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_LIMIT] = DRAPE_NUMBER("limit", "1", 0.1, DRAPE_ABOVE(0), 100,
                                  "strain |e|/L - 1 that no accepted state of an implicit integrator exceeds; "
                                  "verlet ignores this term and has strain_limit instead"),
-    [PARAM_ONSET] = DRAPE_NUMBER("onset", "1", DRAPE_DERIVED("half of limit"), 0, 100,
-                                 "strain at which the resistance begins, below limit"),
     [PARAM_STIFFNESS] = DRAPE_NUMBER(
         "stiffness", "N/m",
-        DRAPE_DERIVED(
-            "the larger of E h and the cloth's weight over its mean rest length times limit - onset"),
+        DRAPE_DERIVED("the larger of E h and the cloth's weight over its mean rest length times limit/2"),
         DRAPE_ABOVE(0), 1e15,
-        "scale of the resistance: halfway from onset to limit its tangent stiffness is 6.4 times this value"),
+        "scale of the resistance, which begins at limit/2: halfway from there its tangent stiffness is 6.4 "
+        "times this value, and its force at the limit about 100 stiffness L limit"),
     [PARAM_OVER] =
         DRAPE_CHOICE("over", OVER_EDGES, over_choices,
                      "edges: of the mesh; springs: all structural, shear and bend pairs of a square grid"),
-    [PARAM_CAP] = DRAPE_NUMBER("cap", "1", 0.01, 1e-9, 0.5,
-                               "fraction of limit - onset, next to the limit, where a parabola continues the "
-                               "barrier: the force at the limit is about 2/cap stiffness L (limit - onset)"),
 };
+
+#define CAP 0.01 /* of limit - onset, next to the limit, where a parabola continues the barrier */
 
 static double onset_of(const double *values)
 {
-    return isnan(values[PARAM_ONSET]) ? values[PARAM_LIMIT] / 2 : values[PARAM_ONSET];
+    return values[PARAM_LIMIT] / 2;
 }
 
 /* ---- Building ---- */
@@ -87,9 +84,6 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     if (springs && !cloth->rectangular)
         return drape_term_refuse(
             builder, "\"over\" = \"springs\" needs the grid \"square\"; this mesh has only edges");
-    if (!(onset_of(values) < values[PARAM_LIMIT]))
-        return drape_term_refuse(builder, "\"onset\" = %g is not below \"limit\" = %g", values[PARAM_ONSET],
-                                 values[PARAM_LIMIT]);
     int32_t count = drape_spring_count(&set);
     double stiffness = stiffness_of(&set, count, values);
     drape_status status = drape_term_reserve(builder, count, REST_COUNT);
@@ -117,14 +111,14 @@ static barrier barrier_below_cap(double y)
                      .curve = ratio * (4 + ratio) - 2 * log_gap};
 }
 
-static barrier barrier_at(double y, double cap)
+static barrier barrier_at(double y)
 {
     if (y <= 0)
         return (barrier){0};
-    if (y <= 1 - cap)
+    if (y <= 1 - CAP)
         return barrier_below_cap(y);
-    barrier b = barrier_below_cap(1 - cap);
-    double beyond = y - (1 - cap); /* NaN gets here too and stays NaN */
+    barrier b = barrier_below_cap(1 - CAP);
+    double beyond = y - (1 - CAP); /* NaN gets here too and stays NaN */
     b.value += beyond * (b.slope + 0.5 * b.curve * beyond);
     b.slope += b.curve * beyond;
     return b;
@@ -139,7 +133,7 @@ static void one(const drape_elements *el, int32_t element, const double *x, doub
     double onset = onset_of(el->params), width = el->params[PARAM_LIMIT] - onset, n[3];
     vec3_sub(x + 3, x, n);
     double length = vec3_norm(n), scale = rest_length * width;
-    barrier b = barrier_at((length / rest_length - 1 - onset) / width, el->params[PARAM_CAP]);
+    barrier b = barrier_at((length / rest_length - 1 - onset) / width);
     double force = k * scale * b.slope, across = b.slope > 0 ? force / length : 0;
     for (int i = 0; i < 3; i++)
         n[i] = b.slope > 0 ? n[i] / length : 0; /* a collapsed edge has no direction, and is not stretched */

@@ -20,8 +20,8 @@ enum { D = 9 };
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_PRESSURE] = DRAPE_NUMBER("pressure", "Pa", DRAPE_REQUIRED, -1e12, 1e12,
                                     "by which it is higher on the side from which triangles turn clockwise"),
-    [LIST_HISTORY] = DRAPE_HISTORY_PARAM_OF("load"),
-    [LIST_RAMP] = DRAPE_RAMP_PARAM_OF("load"),
+    [LIST_HISTORY] = DRAPE_TERM_HISTORY_PARAM,
+    [LIST_RAMP] = DRAPE_TERM_RAMP_PARAM,
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

@@ -11,8 +11,8 @@ static const drape_param params[LIST_COUNT] = {
     DRAPE_LOAD_PARAMS,
     [LIST_FORCE] = DRAPE_VECTOR("force", "N/m", 0, -1e12, 1e12,
                                 "force per length of the edge at rest; it keeps its direction"),
-    [LIST_HISTORY] = DRAPE_HISTORY_PARAM_OF("load"),
-    [LIST_RAMP] = DRAPE_RAMP_PARAM_OF("load"),
+    [LIST_HISTORY] = DRAPE_TERM_HISTORY_PARAM,
+    [LIST_RAMP] = DRAPE_TERM_RAMP_PARAM,
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

@@ -32,8 +32,8 @@ static const drape_param params[LIST_COUNT] = {
     [LIST_MOMENT] = DRAPE_NUMBER("moment", "N", DRAPE_REQUIRED, -1e12, 1e12,
                                  "moment per length of the edge [N m/m]; positive: it bends towards the side "
                                  "from which triangles turn counterclockwise"),
-    [LIST_HISTORY] = DRAPE_HISTORY_PARAM_OF("load"),
-    [LIST_RAMP] = DRAPE_RAMP_PARAM_OF("load"),
+    [LIST_HISTORY] = DRAPE_TERM_HISTORY_PARAM,
+    [LIST_RAMP] = DRAPE_TERM_RAMP_PARAM,
 };
 
 /* The edge in the orientation of its triangle, then the apex. */

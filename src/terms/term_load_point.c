@@ -8,13 +8,13 @@ enum { PARAM_NODE, PARAM_BOX_MIN, PARAM_BOX_MAX = PARAM_BOX_MIN + 3, PARAM_FORCE
 static const drape_param params[LIST_COUNT] = {
     [LIST_NODE] = DRAPE_INTEGER("node", "1", DRAPE_DERIVED("all nodes in the box"), 0, 2147483647,
                                 "number of the node that is loaded"),
-    [LIST_BOX_MIN] = DRAPE_VECTOR("box_min", "m", -1e9, -1e9, 1e9,
-                                  "corner of a box; only nodes in it, "
-                                  "at rest, are loaded"),
+    [LIST_BOX_MIN] = DRAPE_VECTOR(
+        "box_min", "m", -1e9, -1e9, 1e9,
+        "corner of a box; only nodes in it, at rest, are loaded, and edges with both ends in it"),
     [LIST_BOX_MAX] = DRAPE_VECTOR("box_max", "m", 1e9, -1e9, 1e9, "opposite corner of the box"),
     [LIST_FORCE] = DRAPE_VECTOR("force", "N", 0, -1e12, 1e12, "on each of the nodes; it keeps its direction"),
-    [LIST_HISTORY] = DRAPE_HISTORY_PARAM_OF("load"),
-    [LIST_RAMP] = DRAPE_RAMP_PARAM_OF("load"),
+    [LIST_HISTORY] = DRAPE_TERM_HISTORY_PARAM,
+    [LIST_RAMP] = DRAPE_TERM_RAMP_PARAM,
 };
 
 static bool takes(const drape_cloth_view *cloth, const double *values, int32_t i)

@@ -26,8 +26,8 @@ static const drape_param params[LIST_COUNT] = {
     [LIST_POINT] = DRAPE_VECTOR("point", "m", 0, -1e9, 1e9,
                                 "apex of the cone that closes the volume over the boundary: in the "
                                 "planes of symmetry"),
-    [LIST_HISTORY] = DRAPE_HISTORY_PARAM_OF("load"),
-    [LIST_RAMP] = DRAPE_RAMP_PARAM_OF("load"),
+    [LIST_HISTORY] = DRAPE_TERM_HISTORY_PARAM,
+    [LIST_RAMP] = DRAPE_TERM_RAMP_PARAM,
 };
 
 /* Whether the cells of a cloth lie side by side: a periodic edge is not where its image starts, as it is in a

@@ -10,19 +10,16 @@
 
 enum { BRANCHES = 4 };
 
-#define FRACTION "part of every stiffness that relaxes with time_"
-#define TIME     "time in which the force of that part falls to 1/e at constant strain"
+#define FRACTION(name)                                                                                       \
+    DRAPE_NUMBER(name, "1", DRAPE_DERIVED("none; at least the first is given"), DRAPE_ABOVE(0), 1,           \
+                 "part of every stiffness that relaxes with the time of the same number")
+#define TIME(name)                                                                                           \
+    DRAPE_NUMBER(name, "s", DRAPE_DERIVED("none; at least the first is given"), 1e-9, 1e12,                  \
+                 "time in which the force of that part falls to 1/e at constant strain")
 
 static const drape_param params[2 * BRANCHES] = {
-    DRAPE_NUMBER("fraction_1", "1", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1, FRACTION "1"),
-    DRAPE_NUMBER("time_1", "s", DRAPE_REQUIRED, 1e-9, 1e12, TIME),
-    DRAPE_NUMBER("fraction_2", "1", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1, FRACTION "2"),
-    DRAPE_NUMBER("time_2", "s", DRAPE_DERIVED("none"), 1e-9, 1e12, TIME),
-    DRAPE_NUMBER("fraction_3", "1", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1, FRACTION "3"),
-    DRAPE_NUMBER("time_3", "s", DRAPE_DERIVED("none"), 1e-9, 1e12, TIME),
-    DRAPE_NUMBER("fraction_4", "1", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1, FRACTION "4"),
-    DRAPE_NUMBER("time_4", "s", DRAPE_DERIVED("none"), 1e-9, 1e12, TIME),
-};
+    FRACTION("fraction_1"), TIME("time_1"), FRACTION("fraction_2"), TIME("time_2"),
+    FRACTION("fraction_3"), TIME("time_3"), FRACTION("fraction_4"), TIME("time_4")};
 
 /* The part of the stiffness that does not relax. */
 static double lasting(const double *values)
@@ -37,6 +34,9 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 {
     (void)cloth;
     drape_status status = DRAPE_OK;
+    for (int i = 0; i < 2; i++)
+        if (isnan(values[i]))
+            return drape_term_refuse(builder, "\"%s\" is missing: %s", params[i].name, params[i].help);
     for (int i = 0; !status && i < BRANCHES; i++) {
         const double fraction = values[2 * i], time = values[2 * i + 1];
         if (isnan(fraction) != isnan(time))

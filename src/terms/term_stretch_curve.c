@@ -32,7 +32,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { PARAM_DIRECTION, PARAM_MIN_AREA = 3, PARAM_FRICTION, PARAM_FRICTION_ANGLE };
+enum { PARAM_DIRECTION, PARAM_FRICTION = 3, PARAM_FRICTION_ANGLE };
 enum { WARP, WEFT, SHEAR, FRICTION, RESPONSES }; /* without friction only three */
 enum {
     REST_K,
@@ -51,9 +51,6 @@ enum {
 
 static const drape_param params[] = {
     DRAPE_VECTOR("warp_direction", "1", 0, -1e9, 1e9, "direction of the warp at rest; 0 0 0: x"),
-    DRAPE_NUMBER(
-        "min_area", "1", 1e-6, 0, DRAPE_BELOW(1),
-        "a step that takes the area of a triangle below this fraction of its area at rest is rejected"),
     DRAPE_NUMBER("shear_friction", "N/m", 0, 0, 1e9,
                  "friction between yarns in shear, a force per length: half of 2HG of a KES test; 0: none"),
     DRAPE_NUMBER("friction_angle", "degrees", DRAPE_DERIVED("required with shear_friction"), 1e-9, 89,
@@ -324,7 +321,7 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
     (void)internal;
     *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_AREA_COLLAPSE),
                            .what = "area / rest area",
-                           .limit = el->params[PARAM_MIN_AREA]};
+                           .limit = DRAPE_MIN_RATIO};
     const int32_t every = el->params[PARAM_FRICTION] > 0 ? RESPONSES : FRICTION; /* of one triangle */
     return drape_check_ratios(el, x, before, every, ratio_of, fault);
 }

@@ -20,7 +20,7 @@
 
 #include <math.h>
 
-enum { PARAM_STIFFNESS, PARAM_COLLAPSE, PARAM_COUNT };
+enum { PARAM_STIFFNESS, PARAM_COUNT };
 enum { STIFFNESS_CONSISTENT, STIFFNESS_REPORT };
 enum { REST_K, REST_Q0, REST_INVERSE_LENGTH, REST_COUNT };
 
@@ -28,11 +28,8 @@ static const char *const stiffness_choices[] = {"consistent", "report", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_STIFFNESS] = DRAPE_CHOICE("stiffness", STIFFNESS_CONSISTENT, stiffness_choices,
-                                     "consistent: a spring constant of E h (A1 + A2)/L^2; report: that of "
-                                     "the DEP report's code, too soft by the factor of one edge length"),
-    [PARAM_COLLAPSE] =
-        DRAPE_NUMBER("min_length", "1", 1e-6, 0, DRAPE_BELOW(1),
-                     "a step that makes an edge shorter than this fraction of its rest length is rejected"),
+                                     "consistent: that of a sheet of the material; report: that of the code "
+                                     "of the DEP report, on edges too soft by the factor of one edge length"),
 };
 
 static double element_stiffness(const drape_cloth_view *cloth, int32_t edge, double choice)
@@ -118,7 +115,7 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
     (void)internal;
     *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_EDGE_COLLAPSE),
                            .what = "edge length / rest length",
-                           .limit = el->params[PARAM_COLLAPSE]};
+                           .limit = DRAPE_MIN_RATIO};
     return drape_check_ratios(el, x, before, 1, ratio_of, fault);
 }
 

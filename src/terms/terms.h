@@ -37,13 +37,18 @@ static inline double drape_pair_length(const drape_elements *el, int32_t element
 }
 
 /* How a load or the wind varies in time; the library multiplies by it. One value each, after all others. */
-#define DRAPE_HISTORY_PARAM_OF(what)                                                                         \
-    DRAPE_TEXT("history", "name of a history of the scene, by which the " what " is multiplied",             \
+#define DRAPE_TERM_HISTORY_PARAM                                                                             \
+    DRAPE_TEXT("history", "name of a history of the scene, by which the load, or the wind, is multiplied",   \
                .derived = "none: it is constant")
-#define DRAPE_RAMP_PARAM_OF(what)                                                                            \
+#define DRAPE_TERM_RAMP_PARAM                                                                                \
     DRAPE_NUMBER("ramp", "s", 0, 0, 1e9,                                                                     \
-                 "in place of a history: the time in which the " what                                        \
-                 " rises smoothly from 0; 0: it does not")
+                 "in place of a history: the time in which the load, or the wind, rises smoothly from 0; "   \
+                 "0: it does not")
+
+/* A step is rejected if it makes a length, an area or an altitude collapse, below this fraction of the one at
+ * rest, or turns a hinge by more than so much [rad]: near pi its angle is ambiguous. */
+#define DRAPE_MIN_RATIO 1e-6
+#define DRAPE_MAX_TURN  2.8
 
 /* The numbers of DRAPE_LANES elements from `first` on; beyond the end the last one is repeated. */
 static inline void drape_lanes_elements(int32_t first, int32_t count, int32_t element[DRAPE_LANES])

@@ -185,13 +185,13 @@ END_TEST
 START_TEST(a_scene_says_what_happens_on_failure)
 {
     failing_allocator memory = {0};
-    host h = open_scene(&memory, tangled, PINNED, PINNED, "'untangle': {'sweeps': 2},");
+    host h = open_scene(&memory, tangled, PINNED, PINNED, "'untangle': {},");
     for (int k = 0; k < 2; k++) {
         says(&h, drape_sim_advance(h.sim, 0.125), DRAPE_E_SOLVER, "did not come apart");
         ck_assert_double_eq(drape_sim_time(h.sim), 0);
     }
     close_scene(&h, &memory);
-    h = open_scene(&memory, tangled, PINNED, PINNED, "'untangle': {'sweeps': 2, 'on_failure': 'continue'},");
+    h = open_scene(&memory, tangled, PINNED, PINNED, "'untangle': {'on_failure': 'continue'},");
     drape_warning w;
     bool warned = false;
     good(&h, drape_sim_advance(h.sim, 0.125));

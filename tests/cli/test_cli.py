@@ -273,16 +273,21 @@ def test_former_linear_solvers():
 
 
 def test_former_settings():
-    """settings of integrators that have gone have no effect, and a line says so; other names are refused"""
+    """settings that have gone have no effect, and a line says so; other names are refused"""
     write_scene()
     expected = good("run", "scene.json")
-    for name in ("alpha", "beta", "coarse_spacing", "correction_tolerance", "extrapolation", "family", "forcing", "gamma", "newton", "predictor",
-                 "project", "rescue_iterations", "rho_inf", "stability_detection"):
-        result = drape("run", "scene.json", "--set", f"/integrator/{name}=1")
+    for name in ("integrator/alpha", "integrator/coarse_spacing", "integrator/corrections", "integrator/family", "integrator/predictor", "integrator/rescue_iterations",
+                 "integrator/rho_inf", "integrator/stability_detection", "controller/max_attempts", "contact/restitution_velocity"):
+        result = drape("run", "scene.json", "--set", f"/{name}=1")
         equal(result.returncode, 0, result.stderr)
-        equal(result.stderr.splitlines(True)[0], f"warning: /integrator/{name}: has no effect any more\n")
+        equal(result.stderr.splitlines(True)[0], f"warning: /{name}: has no effect any more\n")
         equal(result.stdout.splitlines()[:-1], expected.splitlines()[:-1])  # the last line has times
     refused("run", "scene.json", "--set", "/controller/project=1", says='unknown key "project"')
+    refused("run", "scene.json", "--set", "/contact/sweeps=1", says='unknown key "sweeps"')
+    write_scene(terms=[{"type": "stretch.edge", "min_length": 0.1}, {"type": "bend.hinge", "max_turn": 1}], untangle={"gap": 0.5})
+    result = drape("run", "scene.json")
+    equal((result.returncode, [line for line in result.stderr.splitlines() if "any more" in line]),
+          (0, [f"warning: {at}: has no effect any more" for at in ("/untangle/gap", "/cloth/0/terms/0/min_length", "/cloth/0/terms/1/max_turn")]))
 
 
 def test_former_methods():

@@ -590,12 +590,13 @@ def test_wrong_words():
     two = ["--axis", "/integrator/dt=1e-3:1e-2:2log"]
     refused("stability", "scene.json", "--out", "s", says="1 to 3 axes")
     for axis, says in (("dt=1:2:3", "a pointer is needed"), ("/integrator/dt=1:2", "three numbers"), ("/integrator/dt=1:2:3lin", "only log may follow the count"),
-                       ("/integrator/dt=0:2:3log", "positive"), ("/integrator/dt=1:1:3", "different"), ("/integrator/dt=1:2:1", "2 to 1024")):
+                       ("/integrator/dt=0:2:3log", "positive"), ("/integrator/dt=1:1:3", "different"), ("/integrator/dt=1:2:1", "2 to 1024"),
+                       ("/integrator/linear_tolerance=1e-3:1e-1:3log", "has no effect any more"), ("/cloth/0/terms/0/min_length=0.1:0.2:2", "has no effect any more")):
         refused("stability", "scene.json", *two, "--axis", axis, "--out", "s", says=says)
     refused("stability", "scene.json", *two, "--axis", "/integrator/dt=1e-4:1e-3:3", "--out", "s", says="/integrator/dt\" is given twice")
     refused("stability", "scene.json", *two, "--axis", "/cloth/0/mesh/edges=2.5:7.5:3", "--out", "s", says="edges\": its value 1 would be 2.5")
     refused("stability", "scene.json", *two, "--axis", "/integrator/max_order=1.5:4.5:3", "--out", "s", says="max_order\": its value 1 would be 1.5")
-    refused("stability", "scene.json", *two, "--integrators", "verlet", "--axis", "/integrator/max_substeps=1:4:3", "--out", "s", says="2.5 is not allowed")
+    refused("stability", "scene.json", *two, "--integrators", "verlet", "--axis", "/integrator/strain_limit_iterations=1:4:3", "--out", "s", says="2.5 is not allowed")
     refused("stability", "scene.json", *two, "--axis", "/integrator/tolerancee=1:2:2", "--out", "s", says="tolerancee")
     refused("stability", "scene.json", *two, "--axis", "/cloth/0/material/density=-1:2:2", "--out", "s", says="density")
     refused("tradeoff", "scene.json", "--integrators", "bee", "--out", "s", says="did you mean")

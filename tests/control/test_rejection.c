@@ -268,10 +268,9 @@ START_TEST(a_bound_on_attempts_ends_the_advance_and_changes_no_bit)
     static const char *const controllers[] = {"'type': 'halving'", "'type': 'strain', 'max_stretch': 0.05",
                                               "'type': 'error', 'rtol': 1e-4"};
     for (size_t k = 0; k < sizeof controllers / sizeof *controllers; k++) {
-        char bounded[100];
-        snprintf(bounded, sizeof bounded, "%s, 'max_attempts': %d", controllers[k], MAX_ATTEMPTS);
-        scene plain = swinging("be", controllers[k]), s = swinging("be", bounded),
-              other = swinging("be", bounded);
+        scene plain = swinging("be", controllers[k]), s = swinging("be", controllers[k]),
+              other = swinging("be", controllers[k]);
+        s.sim->max_attempts = other.sim->max_attempts = MAX_ATTEMPTS;
         scene_advance(&plain, 1);
         const int stops = advance_bounded(&s, &other, 1);
         printf("# %s: %d stops\n", controllers[k], stops);
@@ -292,7 +291,8 @@ START_TEST(a_run_without_rejections_never_meets_the_bound)
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 1, 'height': "
         "1},"
         "'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"
-        "'integrator': {'method': 'be', 'dt': 0.01}, 'controller': {'max_attempts': 1}, 'duration': 1}");
+        "'integrator': {'method': 'be', 'dt': 0.01}, 'duration': 1}");
+    s.sim->max_attempts = 1;
     scene_advance(&s, 0.5);
     scene_advance(&s, 0.503); /* a host may cut steps at any time */
     scene_advance(&s, 1);

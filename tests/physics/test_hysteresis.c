@@ -226,8 +226,9 @@ static drape_status follow(void *user, const drape_event *event)
 
 START_TEST(rejected_steps_move_no_slider)
 {
-    scene s = strip(HYSTERESIS CREASE ", 'max_turn': 0.02", "{'edge': 'left', 'clamp': true}",
-                    "'integrator': {'method': 'be', 'dt': 0.02}, 'duration': 1");
+    scene s = strip(HYSTERESIS CREASE, "{'edge': 'left', 'clamp': true}",
+                    "'integrator': {'method': 'be', 'dt': 0.02}, 'controller': {'type': 'strain', "
+                    "'max_move': 0.2}, 'duration': 1");
     const drape_term *bending = &s.model->terms[1];
     const size_t count = (size_t)bending->sliders * (size_t)bending->elements.count;
     watched w = {.s = &s, .slid = calloc(count, sizeof *w.slid)};
