@@ -6,6 +6,7 @@
  */
 #include "base/elementary.h"
 #include "base/lanes_atan2.h"
+#include "base/pi.h"
 
 #include <float.h>
 #include <math.h>
@@ -86,7 +87,7 @@ void drape_sin_cos(double angle, double *sine, double *cosine)
         return;
     }
     /* angle = turns pi/2 + r, |r| <= pi/4 */
-    const double turns = floor(angle * (2 / 3.14159265358979323846) + 0.5);
+    const double turns = floor(angle * (2 / DRAPE_PI) + 0.5);
     pair r = sum(angle - turns * half_pi[0], -turns * half_pi[1]);
     r = sum_sorted(r.hi, r.lo - turns * half_pi[2]);
 

@@ -3,6 +3,7 @@
  * d = |max(q, 0)| + min(max(q_0, q_1), 0) - rounding: exact inside and outside. The Hessian of f(rho, z) is
  * f_rr e e + f_rz (e u + u e) + f_zz u u + f_r / rho (I - e e - u u), u along the axis, e away from it. */
 #include "base/elementary.h"
+#include "base/pi.h"
 #include "colliders/colliders.h"
 
 #include "geometry/round.h"
@@ -54,16 +55,15 @@ static drape_status keep_axis(const double *values, drape_collider_shape *shape)
 /* The middle of a side of a prism with n sides is radius (1 - cos(pi / n)) inside of the circle. */
 static int32_t sides_of(double radius, double tolerance)
 {
-    const double pi = 3.14159265358979323846;
     const double sag = tolerance / radius, cosine = 1 - sag;
-    const double sides = cosine > 0 ? ceil(pi / drape_atan2(sqrt(sag * (2 - sag)), cosine)) : MIN_SIDES;
+    const double sides = cosine > 0 ? ceil(DRAPE_PI / drape_atan2(sqrt(sag * (2 - sag)), cosine)) : MIN_SIDES;
     return (int32_t)fmin(fmax(sides, MIN_SIDES), MAX_SIDES); /* infinite for a tolerance of 0 */
 }
 
 /* Points 2 s and 2 s + 1 are the ends of ridge s. */
 static void fill_prism(const axis *c, double radius, int32_t sides, drape_collider_shape *shape)
 {
-    const double turn = 2 * 3.14159265358979323846;
+    const double turn = 2 * DRAPE_PI;
     double e[3], f[3];
     int32_t *segment = shape->segment;
     round_across(c->u, e);

@@ -12,6 +12,7 @@
 #include <stdio.h>
 
 #include "base/elementary.h"
+#include "base/pi.h"
 #include "mesh/grid.h"
 
 enum { COLUMNS, ROWS, TOP, BOTTOM, HEIGHT, ARC, ANGLE, DIAGONALS, PARAM_COUNT };
@@ -55,7 +56,7 @@ static meridian meridian_of(const double *values)
 
 static void place_nodes(const double *values, drape_mesh *mesh)
 {
-    const double radian = 3.14159265358979323846 / 180;
+    const double radian = DRAPE_PI / 180;
     const meridian m = meridian_of(values);
     double *x = mesh->x;
     for (int32_t r = 0; r < mesh->rows; r++) {

@@ -2,6 +2,7 @@
  * an axis, and translation t. */
 #include "base/elementary.h"
 #include "base/finite.h"
+#include "base/pi.h"
 #include "mesh/mesh.h"
 
 #include <math.h>
@@ -34,13 +35,12 @@ drape_status drape_mesh_check_transform(drape_context *ctx, const char *pointer,
     return DRAPE_OK;
 }
 
-/* Exact for multiples of 90 degrees: in floating point cos(pi/2) is not 0 and would tilt a sheet that is
- * rotated upright. */
+/* Exact for multiples of 90 degrees: in floating point cos(pi/2) is not 0 and would tilt a sheet
+ * that is rotated upright. */
 static void sine_and_cosine(double degrees, double *sine, double *cosine)
 {
-    const double pi = 3.14159265358979323846;
     const double turn = fmod(degrees, 360), quarters = round(turn / 90);
-    const double rest = (turn - 90 * quarters) * (pi / 180);
+    const double rest = (turn - 90 * quarters) * (DRAPE_PI / 180);
     double s, c;
     drape_sin_cos(rest, &s, &c);
     switch (((int)quarters + 4) % 4) {

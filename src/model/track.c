@@ -1,14 +1,13 @@
 /* track.c: see track.h. */
 #include "model/track.h"
 
+#include "base/pi.h"
 #include "base/rotation.h"
 #include "base/search.h"
 #include "base/vec3.h"
 #include "mesh/mesh.h"
 
 #include <string.h>
-
-#define PI 3.14159265358979323846
 
 int64_t drape_track_key_before(const drape_track_key *keys, size_t key_count, double t)
 {
@@ -76,7 +75,7 @@ void drape_turns_velocity(const drape_turns *turns, double t, double velocity[3]
         return;
     const drape_turn *key = turn_before(turns, t, &share);
     if (key < turns->keys + turns->key_count - 1)
-        vec3_add_scaled(key->degrees * (PI / 180) / (key[1].time - key->time), key->axis, velocity);
+        vec3_add_scaled(key->degrees * (DRAPE_PI / 180) / (key[1].time - key->time), key->axis, velocity);
 }
 
 void drape_elements_direction(const drape_elements *el, int32_t part, const double rest[3],
@@ -137,7 +136,7 @@ double drape_turns_fastest(const drape_turns *turns)
 {
     double fastest = 0;
     for (size_t k = 0; k + 1 < turns->key_count; k++)
-        fastest = fmax(fastest, fabs(turns->keys[k].degrees) * (PI / 180) /
+        fastest = fmax(fastest, fabs(turns->keys[k].degrees) * (DRAPE_PI / 180) /
                                     (turns->keys[k + 1].time - turns->keys[k].time));
     return fastest;
 }

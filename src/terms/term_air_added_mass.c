@@ -22,6 +22,7 @@
  * q have the mean velocity of its ends, the force on the edge is
  *     F = m_a z^2/(z^2 + q^2 L^2) (z q m - q^2/2 k)/l^3.
  */
+#include "base/pi.h"
 #include "base/vec3.h"
 #include "terms/terms.h"
 
@@ -33,15 +34,13 @@ enum { LIST_WAKE = PARAM_WIND + 1, LIST_HISTORY, LIST_RAMP, LIST_COUNT };
 enum { REST_MASS, REST_WIND, REST_EDGES = REST_WIND + 3, REST_COUNT }; /* m_a, w, 1 << k for edge k */
 enum { D = 9 };
 
-#define QUARTER_PI 0.78539816339744831
-
 /* As a list the wind is one entry; among the values it takes three. */
 static const drape_param params[LIST_COUNT] = {
     [PARAM_SPAN] = DRAPE_NUMBER("span", "m", DRAPE_REQUIRED, 0, 1e6,
                                 "extent across the wind, or the smaller one: the air beside an area has the "
                                 "mass coefficient density span"),
     [PARAM_COEFFICIENT] =
-        DRAPE_NUMBER("coefficient", "1", QUARTER_PI, 0, 1e6,
+        DRAPE_NUMBER("coefficient", "1", DRAPE_PI / 4, 0, 1e6,
                      "mass of the air over that of density span^2 per length: pi/4 is a long "
                      "strip, 0.45 a square"),
     [PARAM_DENSITY] = DRAPE_NUMBER("density", "kg/m3", 1.225, 0, 1e6,

@@ -20,6 +20,8 @@
  *
  * All are C1 in x and v; a triangle without area has no force. In air at rest they dissipate: -F . v >= 0.
  */
+#include "base/elementary.h"
+#include "base/pi.h"
 #include "base/vec3.h"
 #include "terms/terms.h"
 
@@ -31,8 +33,6 @@ enum { LIST_LAW = PARAM_WIND + 1, LIST_FRICTION, LIST_HISTORY, LIST_RAMP, LIST_C
 enum { REST_FACTOR, REST_WIND, REST_FRICTION = REST_WIND + 3, REST_COUNT };
 enum { SQUARE, PLATE };
 enum { D = 9 };
-
-#define PI 3.14159265358979323846
 
 static const char *const law_choices[] = {[SQUARE] = "square", [PLATE] = "plate", NULL};
 
@@ -57,7 +57,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     const double density = 0.25 * values[PARAM_DENSITY];
     double factor = density * values[PARAM_COEFFICIENT];
     if (values[PARAM_LAW] == PLATE)
-        factor *= 4 + PI;
+        factor *= 4 + DRAPE_PI;
     drape_status status = drape_term_reserve(builder, cloth->triangle_count, REST_COUNT);
     for (int32_t i = 0; !status && i < cloth->triangle_count; i++)
         drape_term_set(
@@ -143,7 +143,7 @@ static double sign(double a)
 
 static void plate(const flow *f, double factor, double out[3])
 {
-    const double speed2 = vec3_dot(f->u, f->u), r = 4 * sqrt(speed2 * f->area2) + PI * fabs(f->q);
+    const double speed2 = vec3_dot(f->u, f->u), r = 4 * sqrt(speed2 * f->area2) + DRAPE_PI * fabs(f->q);
     for (int k = 0; k < 3; k++)
         out[k] = r > 0 ? factor * speed2 * f->q * f->m[k] / r : 0;
 }
@@ -152,7 +152,7 @@ static void plate(const flow *f, double factor, double out[3])
 static void plate_change(const flow *f, double factor, double dq, double dspeed2, double dr,
                          const double dm[3], double out[3])
 {
-    const double speed2 = vec3_dot(f->u, f->u), r = 4 * sqrt(speed2 * f->area2) + PI * fabs(f->q);
+    const double speed2 = vec3_dot(f->u, f->u), r = 4 * sqrt(speed2 * f->area2) + DRAPE_PI * fabs(f->q);
     for (int k = 0; k < 3; k++)
         out[k] = r > 0 ? factor *
                              (dspeed2 * f->q * f->m[k] + speed2 * dq * f->m[k] + speed2 * f->q * dm[k] -
@@ -164,15 +164,15 @@ static void plate_change(const flow *f, double factor, double dq, double dspeed2
 static void plate_by_normal(const flow *f, double factor, const double dm[3], double out[3])
 {
     const double dq = vec3_dot(f->u, dm), speed = vec3_norm(f->u);
-    plate_change(f, factor, dq, 0, 4 * speed * vec3_dot(f->m, dm) / sqrt(f->area2) + PI * sign(f->q) * dq, dm,
-                 out);
+    plate_change(f, factor, dq, 0,
+                 4 * speed * vec3_dot(f->m, dm) / sqrt(f->area2) + DRAPE_PI * sign(f->q) * dq, dm, out);
 }
 
 static void plate_by_velocity(const flow *f, double factor, int k, double out[3])
 {
     const double dq = -f->m[k] / 3, dspeed2 = -2 * f->u[k] / 3, speed = vec3_norm(f->u);
     const double dspeed = speed > 0 ? dspeed2 / (2 * speed) : 0;
-    plate_change(f, factor, dq, dspeed2, 4 * dspeed * sqrt(f->area2) + PI * sign(f->q) * dq,
+    plate_change(f, factor, dq, dspeed2, 4 * dspeed * sqrt(f->area2) + DRAPE_PI * sign(f->q) * dq,
                  (const double[3]){0}, out);
 }
 

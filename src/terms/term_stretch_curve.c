@@ -22,6 +22,7 @@
  *     d2s/dpdr = (I - n n' - m m' + s n m')/(|p| |r|), d2s/dr2 as d2s/dp2.
  */
 #include "base/elementary.h"
+#include "base/pi.h"
 #include "base/reason.h"
 #include "base/vec3.h"
 #include "sparse/project.h"
@@ -47,8 +48,6 @@ enum {
     REST_COUNT
 };
 
-#define DEGREE 0.017453292519943295
-
 static const drape_param params[] = {
     DRAPE_VECTOR("warp_direction", "1", 0, -1e9, 1e9, "direction of the warp at rest; 0 0 0: x"),
     DRAPE_NUMBER("shear_friction", "N/m", 0, 0, 1e9,
@@ -62,7 +61,7 @@ static const drape_param params[] = {
 static double sine(double degrees)
 {
     double s, c;
-    drape_sin_cos(DEGREE * degrees, &s, &c);
+    drape_sin_cos(DRAPE_PI / 180 * degrees, &s, &c);
     return s;
 }
 
