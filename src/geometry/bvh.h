@@ -9,7 +9,9 @@
 
 #include "base/arena.h"
 
-#define DRAPE_BVH_DEPTH 64 /* stack size for a traversal: halving 2^31 elements takes 31 levels */
+/* Stack size for a traversal, which leaves at most two children of a level waiting: halving the elements,
+ * whose number is an int32_t, takes fewer levels than that has bits. */
+#define DRAPE_BVH_DEPTH (2 * 8 * (int)sizeof(int32_t))
 
 typedef struct drape_box {
     double low[3], high[3];

@@ -10,6 +10,12 @@
 #ifndef DRAPE_GEOMETRY_CLOSEST_H
 #define DRAPE_GEOMETRY_CLOSEST_H
 
+#include <float.h>
+
+/* A distance below this share of the largest coordinate is rounding: closest points and their distance have
+ * errors of some hundred units in the last place, and what is built on them should not meet its own. */
+#define DRAPE_CLOSEST_ROUNDING (1e4 * DBL_EPSILON)
+
 typedef struct drape_closest {
     int points;        /* 4, or fewer after drape_closest_reduce */
     int params;        /* number of parameters t: 2 inside a face or between two edges, 0 between two

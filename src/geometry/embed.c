@@ -1,12 +1,11 @@
 /* embed.c: see embed.h. */
 #include "geometry/embed.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
 #include "base/vec3.h"
-
-#define ITERATIONS 20
 
 /* Weights and height along the normal of the triangle: the components of the point in its frame. */
 static void bind_flat(const double *x, const double point[3], drape_embedded *to)
@@ -53,25 +52,26 @@ static bool improve(const double *x, const double *normals, const double r[3], d
     return true;
 }
 
-/* From the flat solution. The height must stay of the size of the distance: beyond the centre of curvature,
- * on the inside of a fold, the iteration fails or finds another solution far away. */
+/* From the flat solution. The height must stay of the size of the distance: beyond the centre of
+ * curvature, on the inside of a fold, the iteration fails or finds another solution far away; so it ends
+ * where a step does not bring the point nearer. */
 static bool bind_smooth(const double *x, const double *normals, const double point[3], double distance,
                         drape_embedded *to)
 {
     double size = 0, at[3], r[3];
     for (int k = 0; k < 3; k++)
         size = fmax(size, fabs(point[k]));
-    const double rounding = 16 * 2.2e-16 * (size + distance);
+    const double rounding = 16 * DBL_EPSILON * (size + distance);
     to->flat = false;
-    for (int i = 0; i < ITERATIONS; i++) {
+    for (double before = INFINITY, now;; before = now) {
         drape_embedded_point(to, x, normals, at);
         vec3_sub(point, at, r);
-        if (vec3_norm(r) <= rounding)
+        now = vec3_norm(r);
+        if (now <= rounding)
             return fabs(to->height) <= 2 * distance + rounding;
-        if (!improve(x, normals, r, to))
+        if (!(now < before) || !improve(x, normals, r, to))
             return false;
     }
-    return false;
 }
 
 double drape_embed(const drape_bvh *tree, const double *x, const double *normals, const double point[3],

@@ -83,8 +83,6 @@ static double distance_of(const search *s, const drape_box *box)
     return enter <= leave ? enter : INFINITY;
 }
 
-#define SLACK 1e-12 /* of a bound: its rounding error must not leave out a triangle */
-
 static void look_into(search *s, int32_t at)
 {
     const drape_bvh_branch *branch = &s->tree->branches[at];
@@ -99,7 +97,7 @@ static void look_into(search *s, int32_t at)
     const int nearer = bound[1] < bound[0];
     for (int i = 0; i < 2; i++) {
         const int c = i == 0 ? nearer : !nearer;
-        if (bound[c] < INFINITY && bound[c] * (1 - SLACK) <= s->best.distance)
+        if (bound[c] < INFINITY && bound[c] * (1 - DRAPE_CLOSEST_ROUNDING) <= s->best.distance)
             look_into(s, child[c]);
     }
 }

@@ -18,8 +18,7 @@
 
 #include <string.h>
 
-#define SKIN     0.5 /* as a fraction of the reach */
-#define FARTHEST 1e9 /* box numbers have 32 bits: all points beyond share a box */
+#define SKIN 0.5 /* as a fraction of the reach */
 
 drape_status drape_neighbours_create(drape_arena *arena, int32_t points, double reach, drape_neighbours *s)
 {
@@ -48,7 +47,8 @@ drape_status drape_neighbours_create(drape_arena *arena, int32_t points, double 
 static int32_t box_number(double x, double per_box)
 {
     double number = x * per_box;
-    if (!(fabs(number) < FARTHEST))
+    if (!(fabs(number) <
+          INT32_MAX / 2)) /* those beyond share a box: numbers and their neighbours have 32 bits */
         return 0;
     int32_t cut = (int32_t)number;
     return cut - (number < cut);
@@ -172,8 +172,8 @@ int drape_neighbours_search(const drape_neighbours *s, int32_t point, const doub
 
 /* The rows of boxes, relative to that of a point, in which the second point of a pair is searched; the rows
  * on the other side search for it from there. */
-#define ROWS 4
-static const int32_t rows_ahead[ROWS][2] = {{0, 1}, {1, -1}, {1, 0}, {1, 1}};
+static const int32_t rows_ahead[][2] = {{0, 1}, {1, -1}, {1, 0}, {1, 1}};
+enum { ROWS = sizeof rows_ahead / sizeof *rows_ahead };
 
 /* The sorted points that may be near those of one box: those of the next box in its row, and of three boxes
  * in each of the rows ahead. A range that wraps around the table is split in two. */

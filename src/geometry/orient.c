@@ -11,9 +11,13 @@
 #include <math.h>
 #include <stdbool.h>
 
-#define ROUNDINGS 8           /* of the volume in doubles, relative to the product of the lengths */
-#define SPLITTER  134217729.0 /* 2^27 + 1: splits a double into two halves of its digits */
-#define TERMS     (24 * 4)    /* doubles that the volume is the exact sum of */
+/* Of the volume in doubles, relative to the product of the lengths: the bound of Shewchuk's orient3d, 7/2
+ * epsilon of the permanent of the magnitudes, which is at most 2/sqrt(3) of that product (Carlen, Lieb & Loss
+ * 2006, An inequality of Hadamard type for permanents); rounded up to a power of 2. */
+#define ROUNDING (8 * DBL_EPSILON)
+/* 2^27 + 1: splits a double into two halves of its digits (Dekker 1971). */
+#define SPLITTER ((double)(1 << (DBL_MANT_DIG + 1) / 2) + 1)
+#define TERMS    (24 * 4) /* doubles that the volume is the exact sum of */
 
 /* *high + *low = a + b, *high rounded. */
 static void two_sum(double a, double b, double *high, double *low)
@@ -116,7 +120,7 @@ int drape_orient(const double *a, const double *b, const double *c, const double
     vec3_sub(d, a, w);
     vec3_cross(u, v, n);
     const double volume = vec3_dot(n, w);
-    if (fabs(volume) > ROUNDINGS * DBL_EPSILON * vec3_norm(u) * vec3_norm(v) * vec3_norm(w))
+    if (fabs(volume) > ROUNDING * vec3_norm(u) * vec3_norm(v) * vec3_norm(w))
         return volume > 0 ? 1 : -1;
     for (int k = 0; k < 3; k++) /* layers that lie on each other in a plane of space, without long sums */
         if (u[k] == 0 && v[k] == 0 && w[k] == 0)
