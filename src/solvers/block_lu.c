@@ -2,14 +2,13 @@
  * factored diagonal blocks of U; the upper half has U' below them. */
 #include "solvers/block_lu.h"
 
+#include "solvers/rounding.h"
 #include "sparse/project.h"
 
 #include <math.h>
 #include <string.h>
 
-#define ROUNDING 1e-15 /* a smaller pivot of a scaled matrix is zero up to rounding errors */
-#define SHIFTS   4 /* a shift that leaves a pivot too small, because it meets an eigenvalue, is enlarged */
-#define S        DRAPE_STRIP
+#define S DRAPE_STRIP
 /* columns multiplied together: two strips of this length fit into the first-level cache */
 #define CHUNK (10 * DRAPE_STRIP)
 
@@ -52,17 +51,19 @@ static int32_t count_negative(const double *tile, int32_t n)
     return count;
 }
 
+/* A shift that leaves a pivot too small, because it meets an eigenvalue, is enlarged, up to the size of
+ * the scaled matrix. */
 static bool factor_tile(const drape_block_lu *f, bool last, int32_t width, double *tile, int32_t at)
 {
     double kept[DRAPE_TILE];
-    double least = f->shift > 0 && !last ? f->shift : ROUNDING;
+    double least = f->shift > 0 && !last ? f->shift : DRAPE_SINGULAR;
     const size_t size = (size_t)(S * width) * sizeof *tile; /* the last tile of a panel ends there */
     memcpy(kept, tile, size);
     double smallest = drape_tile_lu(width, tile, f->inverse + at, f->pivot + at);
-    for (int k = 0; f->shift > 0 && !last && !(smallest > least) && k < SHIFTS; k++) {
+    for (double shift = 2 * f->shift; shift > 0 && shift < 1 && !last && !(smallest > least); shift *= 4) {
         memcpy(tile, kept, size);
         for (int32_t c = 0; c < width; c++)
-            tile[(S + 1) * c] += f->shift * (2 << 2 * k);
+            tile[(S + 1) * c] += shift;
         smallest = drape_tile_lu(width, tile, f->inverse + at, f->pivot + at);
     }
     return smallest > least;

@@ -1,10 +1,11 @@
 /* cholesky.c: see cholesky.h. */
 #include "solvers/cholesky.h"
 
+#include "solvers/rounding.h"
+
 #include <math.h>
 
-#define MIN_RCOND 1e-15 /* smaller: singular to working precision */
-#define S         DRAPE_STRIP
+#define S DRAPE_STRIP
 /* columns multiplied together: two strips of this length fit into the first-level cache */
 #define CHUNK (10 * DRAPE_STRIP)
 
@@ -82,7 +83,7 @@ static bool is_well_conditioned(int64_t n, const double *inverse)
         low = fmin(low, inverse[k]);
         high = fmax(high, inverse[k]);
     }
-    return n == 0 || (low / high) * (low / high) > MIN_RCOND;
+    return n == 0 || (low / high) * (low / high) > DRAPE_SINGULAR;
 }
 
 drape_status drape_cholesky_factor(drape_fronts *s, double *inverse)

@@ -1,10 +1,9 @@
 /* equilibrate.c: see equilibrate.h. */
 #include "solvers/equilibrate.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
-
-#define PASSES 16 /* each halves the exponents, which have 11 bits; the largest then are between 1/4 and 2 */
 
 /* Multiplies by the factors, and finds the largest magnitude of each row and column. */
 static void scale(const drape_pattern *p, const double *row, const double *column, double *scaled,
@@ -50,7 +49,8 @@ bool drape_equilibrate(const drape_pattern *p, const double *values, bool symmet
     memcpy(scaled, values, (size_t)p->nonzeros * sizeof *scaled);
     for (size_t i = 0; i < n; i++)
         row[i] = column[i] = row_step[i] = column_step[i] = 1;
-    for (int pass = 0; regular && !done && pass < PASSES; pass++) {
+    /* each pass halves the exponents; the largest then are between 1/4 and 2 */
+    for (int range = DBL_MAX_EXP - DBL_MIN_EXP; regular && !done && range > 0; range /= 2) {
         scale(p, row_step, column_step, scaled, row_largest, column_largest);
         done = true;
         regular = take_roots(p->n, symmetric ? column_largest : row_largest, row_step, row, &done) &&

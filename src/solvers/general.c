@@ -4,19 +4,17 @@
 #include "base/finite.h"
 #include "solvers/equilibrate.h"
 #include "solvers/linear.h"
+#include "solvers/rounding.h"
 
+#include <float.h>
 #include <math.h>
 
-/* A pivot of a scaled matrix lets rounding errors grow by at most its inverse. Factors with smaller pivots
- * than this are tried before they are accepted. */
-#define TRUSTED 1e-6
-/* The inertia is that of the matrix if its factors solve to this without refinement. */
-#define INERTIA_ERROR 1e-8
-/* The shift of tiles with smaller pivots: the root of the rounding error, so that neither the shift nor the
- * growth of rounding errors by its inverse prevents refinement. */
-#define SHIFT    1e-8
+/* A pivot of a scaled matrix lets rounding errors grow by at most its inverse: those below the root of the
+ * rounding error take more than half of the digits. Factors with smaller ones are tried before they are
+ * accepted; their tiles are shifted by as much, so that neither the shift nor the growth prevents
+ * refinement; and the inertia is that of the matrix if its factors solve to this without refinement. */
+#define ROOT     sqrt(DBL_EPSILON)
 #define KLU_MOST 15000 /* [unknowns] about 1 s, which cannot be cancelled; larger matrices go without it */
-#define MAX_SIZE 1e15  /* of a solution: if larger, the matrix is singular to working precision */
 
 extern const drape_linear_ops drape_linear_klu;
 
@@ -108,7 +106,7 @@ static bool is_solvable(drape_general *g)
     if (drape_refine_solve(&g->refine, drape_block_lu_solve, &g->lu, g->scaled, g->b, g->x))
         return false;
     for (int64_t i = 0; i < n; i++)
-        if (!(fabs(g->x[i]) < MAX_SIZE))
+        if (!(fabs(g->x[i]) * DRAPE_SINGULAR < 1))
             return false;
     return true;
 }
@@ -117,7 +115,7 @@ static drape_status factor_scaled(drape_general *g, double shift)
 {
     g->lu.shift = shift;
     drape_status status = drape_block_lu_factor(&g->lu);
-    if (!status && !(drape_block_lu_smallest_pivot(&g->lu) > TRUSTED) && !is_solvable(g))
+    if (!status && !(drape_block_lu_smallest_pivot(&g->lu) > ROOT) && !is_solvable(g))
         status = DRAPE_RETRY_LINEAR;
     return status;
 }
@@ -141,7 +139,7 @@ drape_status drape_general_factor(drape_general *g, const double *values, bool s
         return DRAPE_RETRY_LINEAR;
     status = factor_scaled(g, 0);
     if (status == DRAPE_RETRY_LINEAR)
-        status = factor_scaled(g, SHIFT);
+        status = factor_scaled(g, ROOT);
     g->factored = !status;
     return status == DRAPE_RETRY_LINEAR ? factor_by_klu(g) : status;
 }
@@ -182,7 +180,7 @@ drape_status drape_general_inertia(drape_general *g, const double *values, int64
     status = factor_scaled(g, 0);
     if (status < 0)
         return status;
-    *known = !status && is_solvable(g) && g->refine.first_error < INERTIA_ERROR;
+    *known = !status && is_solvable(g) && g->refine.first_error < ROOT;
     for (size_t i = 0; i < count; i++)
         *negative += g->lu.negative[i];
     return DRAPE_OK;

@@ -9,12 +9,12 @@
 #include "solvers/linear.h"
 
 #include "base/finite.h"
+#include "solvers/rounding.h"
 
 #include <klu.h>
 #include <string.h>
 
 #define ORDER_AMD 0
-#define MIN_RCOND 1e-15 /* smaller: singular to working precision; new pivots are tried first */
 
 typedef struct klu_state {
     drape_context *ctx;
@@ -69,10 +69,11 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     return DRAPE_OK;
 }
 
-/* A NaN anywhere in the factors makes rcond NaN or 0, so the comparison is false. */
+/* If not, new pivots are tried first. A NaN anywhere in the factors makes rcond NaN or 0, so the
+ * comparison is false. */
 static bool well_conditioned(klu_state *s)
 {
-    return klu_l_rcond(s->symbolic, s->numeric, &s->common) && s->common.rcond > MIN_RCOND;
+    return klu_l_rcond(s->symbolic, s->numeric, &s->common) && s->common.rcond > DRAPE_SINGULAR;
 }
 
 static bool refactor(klu_state *s, double *values)

@@ -11,11 +11,11 @@
 #include "solvers/fallback.h"
 #include "solvers/multigrid.h"
 #include "solvers/pcg.h"
+#include "solvers/rounding.h"
 
 #include <inttypes.h>
 #include <string.h>
 
-#define EXACT          1e-14   /* relative residual for callers that want all digits */
 #define MAX_ITERATIONS 2000    /* a matrix that needs more goes to the fallback */
 #define MAX_FALLBACK   1000000 /* unknowns: at a third of these, factors take 1.6 GB */
 
@@ -155,7 +155,7 @@ static drape_status solve_inexact(void *state, const double *b, double *x, doubl
 static drape_status solve(void *state, const double *b, double *x)
 {
     int64_t iterations;
-    return solve_inexact(state, b, x, EXACT, &iterations);
+    return solve_inexact(state, b, x, DRAPE_EXACT, &iterations);
 }
 
 static void archive(void *state, drape_archive *a, const double *values)

@@ -2,16 +2,14 @@
 #include "base/lanes.h"
 #include "solvers/multigrid_parts.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
 #define LANCZOS_STEPS 5         /* for the largest eigenvalue of D^-1 A */
-#define BISECTIONS    20        /* for that of the tridiagonal matrix, to 1e-6 of it */
 #define DAMPING       (4.0 / 3) /* of the largest eigenvalue's inverse: Vanek, Mandel & Brezina 1996 */
 #define DOMINANT      0.9       /* share of a diagonal block that blocks between ranks may have */
 #define SMALLEST      0.25 /* eigenvalue of a cycle times its matrix that the next finer level counts on */
-/* share of a column's length that must be left after the projection on those before it, or it counts as 0 */
-#define INDEPENDENT 1e-8
 
 /* ---- Small dense matrices ---- */
 
@@ -345,7 +343,7 @@ static void orthonormalize(level *l, double *coarse_modes)
                     R[MODES * p + q] += part;
                 }
             const double after = sqrt(dot_columns(l, I, q, q));
-            const bool independent = after > INDEPENDENT * before;
+            const bool independent = after > sqrt(DBL_EPSILON) * before; /* more than half of the digits */
             R[MODES * q + q] = independent ? after : 0;
             add_column(l, I, q, independent ? 1 / after - 1 : -1, q);
         }
@@ -359,8 +357,7 @@ static double largest_tridiagonal(int n, const double *diagonal, const double *o
     double low = 0, high = 0;
     for (int k = 0; k < n; k++)
         high = fmax(high, diagonal[k] + (k > 0 ? sqrt(off[k - 1]) : 0) + (k + 1 < n ? sqrt(off[k]) : 0));
-    for (int step = 0; step < BISECTIONS; step++) {
-        const double middle = (low + high) / 2;
+    for (double middle = high / 2; middle > low && middle < high; middle = (low + high) / 2) {
         double pivot = 0;
         bool above = false;
         for (int k = 0; k < n; k++) {

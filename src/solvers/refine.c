@@ -1,15 +1,11 @@
 /* refine.c: see refine.h. */
 #include "solvers/refine.h"
 
+#include "solvers/rounding.h"
+
 #include <math.h>
 #include <string.h>
 
-/* A sum of about a hundred terms of size 1, as in a row of the matrix of a cloth, is off by 1e-14 at most,
- * and typically by 1e-15. */
-#define TARGET 1e-14
-/* The two triangles of a matrix that counts as symmetric may differ by this part (sparse/pattern.h). */
-#define BOUND   1e-13
-#define CYCLES  6
 #define VECTORS 10 /* of a cycle */
 
 drape_status drape_refine_create(drape_arena *arena, const drape_pattern *pattern, drape_refine *w)
@@ -190,13 +186,14 @@ drape_status drape_refine_solve(drape_refine *w, drape_preconditioner *apply, vo
     apply(factors, b, x);
     find_residual(w, add_product, &a, b, x);
     w->first_error = w->error;
-    for (int cycle = 0; cycle < CYCLES && w->error > TARGET && w->error < before / 2; cycle++) {
+    while (w->error > DRAPE_EXACT && w->error < before / 2) {
         const double size = largest(w, x) + largest(w, b);
         before = w->error;
-        correct(w, apply, factors, add_product, &a, 0.1 * TARGET * size * sqrt((double)n), x);
+        correct(w, apply, factors, add_product, &a, 0.1 * DRAPE_EXACT * size * sqrt((double)n), x);
         find_residual(w, add_product, &a, b, x);
     }
-    return w->error <= BOUND ? DRAPE_OK : DRAPE_RETRY_LINEAR;
+    /* the two triangles of a matrix that counts as symmetric may differ by this part */
+    return w->error <= DRAPE_PATTERN_ROUNDING ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
 void drape_refine_reduce_product(drape_refine *w, drape_preconditioner *apply, void *factors,

@@ -1,11 +1,9 @@
 /* tiles.c: see tiles.h. Every sum adds the same products in the same order on every processor. */
 #include "solvers/tiles.h"
 
-#include "base/lanes.h"
-
 #define S     DRAPE_STRIP
 #define PARTS (S / LANES)
-#define WIDE  3 /* columns computed together */
+#define WIDE  PARTS /* columns computed together, whose sums fit into the registers */
 
 LANES_INLINE void multiply_columns(const double *a, const double *b, int depth, bool fresh, double *to)
 {

@@ -7,11 +7,13 @@
 #ifndef DRAPE_SOLVERS_TILES_H
 #define DRAPE_SOLVERS_TILES_H
 
+#include "base/lanes.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
-/* 4 blocks; three columns of it are nine vectors of four, which fit into the registers */
-#define DRAPE_STRIP 12
+/* 4 blocks; three columns of it are nine vectors, which fit into the registers */
+#define DRAPE_STRIP (3 * LANES)
 #define DRAPE_TILE  (DRAPE_STRIP * DRAPE_STRIP)
 
 /* to -= A B' over the first `depth` columns of the strips a and b, for `columns` columns of to, a multiple
