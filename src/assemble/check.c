@@ -1,48 +1,45 @@
 /*
- * check.c: see check.h. For each term, the functions that its author wrote are checked element by element,
- * one coordinate at a time. Then the assembled Jacobian is checked along random directions, as step methods
- * and as IDA use it. Errors are relative to the largest entry of the derivative; for a Hessian also to the
- * gradient over the element's size, because a linear term has no Hessian.
+ * check.c: see check.h. For each term, the functions that its author wrote are checked element by
+ * element, one coordinate at a time. Then the assembled Jacobian is checked along random directions, as
+ * step methods and as IDA use it. Errors are relative to the largest entry of the derivative; for a
+ * Hessian also to the gradient over the element's size, because a linear term has no Hessian.
  *
- * The step of the differences is 1e-5 of the mean edge length: the truncation error is about its square,
- * 1e-10, the rounding error 1e-16/1e-5. Barriers change over lengths far below that, so shorter steps are
- * tried, too, and the smallest error counts: a wrong derivative is wrong at all of them. Where a barrier
- * begins, its gradient is arbitrarily small, so an element's error is relative to at least a millionth of
- * the term's largest entry.
+ * The step of the differences is the cube root of epsilon in mean edge lengths, 7.6e-6: the truncation
+ * error is about its square, 6e-11, the rounding error 1e-16/8e-6. Barriers change over lengths far below
+ * that, so shorter steps are tried, too, and the smallest error counts: a wrong derivative is wrong at
+ * all of them. Where a barrier begins, its gradient is arbitrarily small, so an element's error is
+ * relative to at least a millionth of the term's largest entry.
  *
- * Derivatives of contact jump where a closest point leaves a face or an edge; some of thousands of pairs are
- * nearer to that than any step, but not on both sides. Of nearly parallel edges they change over 1e-8 m. So
- * along a direction slopes to either side count, extrapolated, with steps that only exact positions allow.
+ * Derivatives of contact jump where a closest point leaves a face or an edge; some of thousands of pairs
+ * are nearer to that than any step, but not on both sides. Of nearly parallel edges they change over 1e-8
+ * m. So along a direction slopes to either side count, extrapolated, with steps that only exact positions
+ * allow.
  *
  * Contact is checked where the scene has it: the sheet is moved until its deepest node is half of the
- * activation distance away from a collider, or is folded onto itself; steps are relative to that distance.
+ * activation distance away from a collider, or is folded onto itself; steps are relative to that
+ * distance. /
  */
 #include "assemble/check.h"
 
 #include "base/elementary.h"
 #include "colliders/colliders.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
 #define D               DRAPE_MAX_ELEMENT_DOFS
 #define SAMPLE          200 /* approximate number of elements of a term that are checked */
 #define DIRECTIONS      8
-#define DEFORMATION     0.08 /* of the mean edge length, in each coordinate */
-#define DIFFERENCE_STEP 1e-5 /* of the mean edge length */
-#define SHORTER_STEP    0.1  /* from one step of the differences to the next */
-#define STEPS           3
-#define FINER           8.0 /* from one step along a direction to the next, */
-#define LEVELS          5   /* of so many */
+#define DEFORMATION     0.08                        /* of the mean edge length, in each coordinate */
+#define DIFFERENCE_STEP ldexp(1, -DBL_MANT_DIG / 3) /* of the mean edge length */
+#define FINER           8.0                         /* from one step to the next, */
+#define LEVELS          5                           /* of so many */
 /* of the term's largest derivative: the smallest scale of an element's errors */
 #define MIN_SCALE        1e-6
 #define GRADIENT_LIMIT   1e-7
 #define HESSIAN_LIMIT    1e-6
 #define INVARIANCE_LIMIT 1e-9
-#define CONTACT_STEP     1e-4 /* of the distance over which contact acts */
-#define APPROACHES       20   /* moves of the sheet towards a collider */
-/* fraction of a layer's displacement, so that no edge lies exactly on another */
-#define FOLD_SHIFT 0.07
 
 typedef struct checker {
     drape_system *system;
@@ -272,8 +269,8 @@ static errors compare_element(const checker *c, const drape_term *term, int32_t 
 {
     double step = DIFFERENCE_STEP * c->size;
     errors best = compare_once(c, term, e, step, min);
-    for (int k = 1; k < STEPS; k++) {
-        step *= SHORTER_STEP;
+    for (int k = 1; k < LEVELS; k++) {
+        step /= FINER;
         best = smallest_of(best, compare_once(c, term, e, step, min));
     }
     return best;
@@ -384,7 +381,7 @@ static void check_invariance(checker *c, int32_t t)
 /* At one state, with a difference along each of the law's arguments. */
 static void check_law(checker *c, const drape_term *law)
 {
-    const double k = 2.385, at = 0.117, moves = -0.731, h = 1e-6;
+    const double k = 2.385, at = 0.117, moves = -0.731, h = DIFFERENCE_STEP;
     const double stiffness[] = {k, k, k, k, k}, strain[] = {at, at + h, at - h, at, at},
                  rate[] = {moves, moves, moves, moves + h, moves - h};
     double f[5] = {0}, fs[5] = {0}, fr[5] = {0}, e[5] = {0};
@@ -520,12 +517,14 @@ static drape_status check_jacobian(checker *c, const char *what, double weight, 
 
 /* ---- Contact ---- */
 
-/* Moves all nodes until the deepest free one is `gap` away from a collider. */
+/* Moves all nodes until the deepest free one is `gap` away from a collider, or as near to that as moves
+ * bring it. */
 static void approach(checker *c, const drape_collider *collider, double gap)
 {
     const drape_model *m = c->model;
     const drape_collider_pose pose = drape_collider_pose_at(collider, 0);
-    for (int k = 0; k < APPROACHES; k++) {
+    double before = INFINITY;
+    for (bool nearer = true; nearer;) {
         double deepest = INFINITY, normal[3] = {0}, n[3];
         for (int32_t i = 0; i < m->free_count; i++) {
             double d =
@@ -535,7 +534,9 @@ static void approach(checker *c, const drape_collider *collider, double gap)
                 memcpy(normal, n, sizeof normal);
             }
         }
-        for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
+        nearer = fabs(gap - deepest) < before;
+        before = fabs(gap - deepest);
+        for (size_t i = 0; nearer && i < 3 * (size_t)m->node_count; i++)
             c->x[i] += (gap - deepest) * normal[i % 3];
     }
 }
@@ -560,7 +561,7 @@ static void fold(checker *c, double gap)
         for (int k = 0; k < 3; k++)
             x[k] = m->rest[3 * i + (size_t)k] + 0.1 * gap * uniform(c);
         if (side > 0) {
-            x[a] -= (2 - FOLD_SHIFT) * side;
+            x[a] -= (2 - DEFORMATION) * side; /* no edge lies exactly on another */
             x[b] += gap;
         }
     }
@@ -577,7 +578,7 @@ static drape_status compare_contact(checker *c, double distance, errors *max)
         status = prepare_jacobian(c, &point);
     if (status)
         return status;
-    double step = CONTACT_STEP * distance, best = INFINITY;
+    double step = DIFFERENCE_STEP * distance, best = INFINITY;
     drape_system_contact_part(c->system, &point, true, NULL, c->values);
     max->hessian = fmax(max->hessian, largest_direction_error(c, step, &point, contact_force));
     drape_system_contact_part(c->system, &point, false, c->g1, NULL);
@@ -585,7 +586,7 @@ static drape_status compare_contact(checker *c, double distance, errors *max)
     for (size_t i = 0; i < n; i++)
         along += c->model->pinned[i / 3] ? 0 : c->g1[i] * c->direction[i];
     point.x = c->x2;
-    for (int k = 0; k < STEPS; k++, step *= SHORTER_STEP) {
+    for (int k = 0; k < LEVELS; k++, step /= FINER) {
         move(c, step, 0);
         double after = drape_system_contact_energy(c->system, &point);
         move(c, -step, 0);

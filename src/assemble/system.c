@@ -9,11 +9,14 @@
 #include "model/periodic.h"
 #include "model/support.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#define PROGRESS_STEP 1e-6 /* of the difference that is dE/dprogress of a term that depends on time */
+/* Of the central difference that is dE/dprogress of a term that depends on time: the cube root of epsilon,
+ * at which its truncation error is of the size of its rounding error. */
+#define PROGRESS_STEP ldexp(1, -DBL_MANT_DIG / 3)
 
 struct drape_system {
     drape_arena *arena;

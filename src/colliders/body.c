@@ -3,6 +3,7 @@
 
 #include "base/vec3.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -13,9 +14,7 @@
 #define NORMAL_SHIFT 0.15 /* shift of a corner to the middle of its face, to find the side it is on */
 #define NORMAL_RISE  0.05 /* height above the corner on that side where its normal is taken, in cells */
 #define CREASE       0.8  /* cosine between two faces of a mesh above which their edge is drawn smooth */
-#define CUT_STEPS    24   /* bisections that find where the surface cuts an edge of the grid */
 #define MEAN_WEIGHT  1e-2 /* of the mean, for directions that the planes leave free */
-#define NEWTON_STEPS 4    /* that move a point onto the surface */
 
 typedef struct grid {
     const drape_collider *collider;
@@ -91,11 +90,12 @@ static drape_status make_grid(const drape_body *body, grid *g)
 
 /* ---- A point in each cell that the surface passes through ---- */
 
-/* Finds the point where the surface cuts the segment from a to b, by bisection. */
+/* Finds the point where the surface cuts the segment from a to b, by bisection to half a unit in the last
+ * place of the vertices, which are floats. */
 static void cut(const drape_collider *c, const double *a, const double *b, double *x)
 {
     double low = 0, high = 1, at_a = distance(c, a, NULL);
-    for (int step = 0; step < CUT_STEPS; step++) {
+    while (high - low > FLT_EPSILON / 2) {
         double s = (low + high) / 2;
         for (int k = 0; k < 3; k++)
             x[k] = a[k] + s * (b[k] - a[k]);
@@ -193,8 +193,8 @@ static int add_cuts(const grid *g, const int *at, double (*cuts)[3], double (*no
     return count;
 }
 
-/* The point that fits the planes, moved onto the surface by Newton steps on the distance: the least squares
- * alone are inexact because of the regularization. */
+/* The point that fits the planes, moved onto the surface by Newton steps on the distance as long as they
+ * bring it nearer: the least squares alone are inexact because of the regularization. */
 static drape_status make_point(grid *g, int i, int j, int k)
 {
     double cuts[20][3], normals[20][3], x[3], normal[3];
@@ -205,9 +205,10 @@ static drape_status make_point(grid *g, int i, int j, int k)
         return DRAPE_OK;
     count = add_nearest(g, at, cuts, normals, count);
     fit_point((const double(*)[3])cuts, (const double(*)[3])normals, count, x);
-    for (int step = 0; step < NEWTON_STEPS; step++) {
-        double d = distance(g->collider, x, normal);
+    double d = distance(g->collider, x, normal);
+    for (double before = INFINITY; fabs(d) < before; d = distance(g->collider, x, normal)) {
         vec3_add_scaled(-d, normal, x);
+        before = fabs(d);
     }
     if (g->point_count == g->point_capacity) {
         g->point_capacity = g->point_capacity ? 2 * g->point_capacity : 1024;

@@ -9,19 +9,21 @@
 #include <stdio.h>
 #include <string.h>
 
-/* places of the values */
+/* places of the values; a text has one, too */
 enum {
-    FRAME_RATE = 3,
+    FRAMES_FILE,
+    MESH_FILE,
+    TIMES_FILE,
+    FRAME_RATE,
     START,
     OPEN,
     THICKNESS,
     TRANSLATE,
     ROTATE = TRANSLATE + 3,
-    SCALE = ROTATE + 3,
-    PARAM_COUNT = 10
+    SCALE = ROTATE + 3
 };
 
-static const drape_param params[PARAM_COUNT] = {
+static const drape_param params[] = {
     DRAPE_TEXT(
         "file",
         "the frames, relative to the scene: an NPY or PC2 file; a GLB file with an animation; a folder "

@@ -12,7 +12,6 @@
 /* How far a polygon may lie inside a curved surface, as a fraction of the activation distance: an edge of the
  * cloth that rests on the polygon is then pushed away nearly as by the surface. */
 #define SHARE_OF_DISTANCE 0.1
-#define MAX_DISTANCE      1e9 /* [m] of a pivot, as of the keys of tracks */
 
 static drape_status find_collider(drape_context *ctx, const char *pointer, const char *name,
                                   const drape_collider_ops **out)
@@ -59,9 +58,9 @@ static drape_status set_pivot(drape_model *model, const char *pointer, const dou
             high = fmax(high, shape->point[3 * (size_t)i + (size_t)k]);
         }
         to->pivot[k] = is_given ? given[k] : (low + high) / 2;
-        if (!(fabs(to->pivot[k]) <= MAX_DISTANCE))
+        if (!(fabs(to->pivot[k]) <= DRAPE_MOST))
             return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%g is not allowed; it is within %g m",
-                                 to->pivot[k], MAX_DISTANCE);
+                                 to->pivot[k], DRAPE_MOST);
     }
     for (int32_t i = 0; i < shape->point_count; i++) {
         double from[3];

@@ -7,7 +7,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_FACTOR 1e9
 #define LEAST_RAMP 1e-9 /* [s] steps that follow shorter ones would be refused as too small */
 #define MAX_SLOPE  1e30 /* [1/s] between two keys, so that no number of a cubic overflows */
 
@@ -26,9 +25,9 @@ static drape_status check(drape_model *model, const char *pointer, const drape_h
                              "%zu times and %zu values; there is one value for each time, and at least one",
                              def->time_count, def->value_count);
     for (size_t k = 0; k < def->time_count; k++) {
-        if (!(fabs(def->times[k]) <= MAX_FACTOR))
+        if (!(fabs(def->times[k]) <= DRAPE_MOST))
             return refuse(model, pointer, "times", k, "a time is finite and within 1e9 s");
-        if (!(fabs(def->values[k]) <= MAX_FACTOR))
+        if (!(fabs(def->values[k]) <= DRAPE_MOST))
             return refuse(model, pointer, "values", k, "a factor is finite and within 1e9");
         if (k > 0 && !(def->times[k] > def->times[k - 1]))
             return refuse(model, pointer, "times", k, "times must increase from key to key");

@@ -2,14 +2,13 @@
 #include "compile/select.h"
 
 #include "model/scene.h"
+#include "terms/load.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 /* relative: a coordinate that is meant to lie on the boundary of a box counts as inside */
-#define ROUND_OFF 1e-14
-
 static drape_status refuse(const drape_selection *s, const char *key, const char *text)
 {
     char at[192];
@@ -90,7 +89,7 @@ static drape_status take_box(const drape_selection *s)
         const double *x = s->mesh->x + 3 * (size_t)i;
         bool inside = true;
         for (int k = 0; k < 3; k++) {
-            double slack = ROUND_OFF * fmax(fabs(x[k]), fmax(fabs(low[k]), fabs(high[k])));
+            double slack = DRAPE_BOX_SLACK * fmax(fabs(x[k]), fmax(fabs(low[k]), fabs(high[k])));
             inside = inside && low[k] - slack <= x[k] && x[k] <= high[k] + slack;
         }
         taken += inside;

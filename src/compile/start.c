@@ -7,6 +7,7 @@
  * the rest of it goes on along the tangent. What is at z keeps its distance from the sheet.
  */
 #include "base/elementary.h"
+#include "base/pi.h"
 #include "base/vec3.h"
 #include "compile/stages.h"
 #include "mesh/contents.h"
@@ -20,7 +21,7 @@
 #define SAME_MESH                                                                                            \
     "; remedy: move the vertices of that mesh and write it again, with vertices and faces in the same order"
 
-#define RADIANS (3.14159265358979323846 / 180)
+#define RADIANS (DRAPE_PI / 180)
 
 /* ---- Positions ---- */
 
@@ -208,7 +209,7 @@ static drape_status add_velocities(drape_model *model, const char *pointer, cons
         vec3_cross(def->spin, arm, turning);
         for (int k = 0; k < 3; k++) {
             const double further = own[3 * (size_t)i + (size_t)k] + turning[k];
-            if (!(fabs(further) <= 1e9))
+            if (!(fabs(further) <= DRAPE_MOST))
                 status =
                     drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
                                   "the velocity of node %d is %g m/s; it is in [-1e9, 1e9]", (int)i, further);

@@ -5,19 +5,17 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/pi.h"
 #include "base/rotation.h"
 #include "base/vec3.h"
 #include "model/motion.h"
 #include "model/track.h"
 
-#define MAX_DEGREES 1e9
-#define PI          3.14159265358979323846
-
 static const char *fault_of(const drape_track_key *keys, size_t k)
 {
     bool finite = isfinite(keys[k].time);
     for (int i = 0; i < 3; i++)
-        finite = finite && fabs(keys[k].displacement[i]) <= 1e9;
+        finite = finite && fabs(keys[k].displacement[i]) <= DRAPE_MOST;
     if (!finite)
         return "time and displacement must be finite, the displacement within 1e9 m";
     if (k > 0 && !(keys[k].time > keys[k - 1].time))
@@ -57,7 +55,7 @@ static const char *fault_of_turn(const drape_turn_key *keys, size_t k)
 {
     bool finite = isfinite(keys[k].time);
     for (int i = 0; i < 4; i++)
-        finite = finite && fabs(keys[k].rotate[i]) <= MAX_DEGREES && fabs(keys[k].quaternion[i]) <= 1e9;
+        finite = finite && fabs(keys[k].rotate[i]) <= DRAPE_MOST && fabs(keys[k].quaternion[i]) <= DRAPE_MOST;
     if (!finite)
         return "time, rotate and quaternion must be finite, and within 1e9";
     if (k > 0 && !(keys[k].time > keys[k - 1].time))
@@ -122,7 +120,7 @@ static void turn_between(const drape_turn_key *a, const drape_turn_key *b, const
         return;
     drape_rotation_between(next, turn->rotation, between);
     drape_rotation_log(between, vector);
-    turn->degrees = vec3_norm(vector) * (180 / PI);
+    turn->degrees = vec3_norm(vector) * (180 / DRAPE_PI);
     memcpy(turn->axis, vector, sizeof turn->axis);
     if (turn->degrees > 0)
         normalise(turn->axis, 3);

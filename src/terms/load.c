@@ -9,13 +9,10 @@ enum { ALL, TOP, BOTTOM, LEFT, RIGHT };
 const char *const drape_load_edges[] = {
     [ALL] = "all", [TOP] = "top", [BOTTOM] = "bottom", [LEFT] = "left", [RIGHT] = "right", NULL};
 
-/* Slack as for pins, so that coordinates meant to be on a side of the box are in it. */
-#define ROUND_OFF 1e-14
-
 bool drape_load_in_box(const double *x, const double *low, const double *high)
 {
     for (int k = 0; k < 3; k++) {
-        const double slack = ROUND_OFF * fmax(fabs(x[k]), 1);
+        const double slack = DRAPE_BOX_SLACK * fmax(fabs(x[k]), 1);
         if (!(x[k] >= low[k] - slack && x[k] <= high[k] + slack))
             return false;
     }

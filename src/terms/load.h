@@ -4,6 +4,13 @@
 
 #include "terms/terms.h"
 
+#include <float.h>
+
+/* By how much coordinates that are meant to be on a side of a box may be beyond it, as a share of their
+ * size: what transforms of a mesh leave, some products and sums one after another, each with half an
+ * epsilon. */
+#define DRAPE_BOX_SLACK (64 * DBL_EPSILON)
+
 /* The parameters that all loads begin with, as a list and among the values, where a box takes three a
  * corner. */
 enum { DRAPE_LOAD_LIST_EDGE, DRAPE_LOAD_LIST_BOX_MIN, DRAPE_LOAD_LIST_BOX_MAX, DRAPE_LOAD_LIST_COUNT };

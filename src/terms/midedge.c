@@ -25,10 +25,9 @@
 #include "base/vec3.h"
 #include "terms/orthotropic.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
-
-#define MIN_C 1e-9 /* smaller coefficients c are rounding errors */
 
 /* A patch during construction. */
 typedef struct patch {
@@ -132,7 +131,7 @@ static void find_phi(patch *p, int i)
     }
     drape_least_solution(m, n, target, c);
     for (int j = 0; j < n; j++)
-        p->c[i][hinge[j]] = fabs(c[j]) > MIN_C ? c[j] : 0;
+        p->c[i][hinge[j]] = fabs(c[j]) > sqrt(DBL_EPSILON) ? c[j] : 0; /* smaller ones are rounding errors */
 }
 
 /* ---- K ---- */

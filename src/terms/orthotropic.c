@@ -3,10 +3,9 @@
 
 #include "base/vec3.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
-
-#define STEEP 1e-6 /* least projection of the warp into a triangle, over its length */
 
 void drape_orthotropic_law(const double *values, const drape_woven *measured, double strip, double poisson,
                            double c[9])
@@ -34,14 +33,15 @@ static bool is_isotropic(const double c[9])
     return c[0] == c[4] && fabs(2 * c[8] - (c[0] - c[1])) <= 1e-12 * c[0];
 }
 
-/* The unit vector along the projection of a into the plane with unit normal n; false if it is too short. */
+/* The unit vector along the projection of a into the plane with unit normal n; false if half of its digits
+ * are rounding errors. */
 static bool project(const double a[3], const double n[3], double out[3])
 {
     const double along = vec3_dot(a, n);
     for (int i = 0; i < 3; i++)
         out[i] = a[i] - along * n[i];
     const double length = vec3_norm(out);
-    if (!(length > STEEP * vec3_norm(a)))
+    if (!(length > sqrt(DBL_EPSILON) * vec3_norm(a)))
         return false;
     for (int i = 0; i < 3; i++)
         out[i] /= length;

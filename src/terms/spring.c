@@ -7,8 +7,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-#define KIND_OFFSETS 2
-
 enum { REST_K, REST_LENGTH, REST_DAMPING, REST_COUNT };
 
 const drape_spring_offset drape_spring_offsets[DRAPE_SPRING_OFFSETS] = {
@@ -115,8 +113,9 @@ drape_status drape_spring_build(const drape_spring_set *set, const double *value
 drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, const double *values,
                                      drape_term_builder *builder)
 {
-    const drape_spring_set set = {
-        .cloth = cloth, .offset = drape_spring_offsets + kind, .offset_count = KIND_OFFSETS};
+    const drape_spring_set set = {.cloth = cloth,
+                                  .offset = drape_spring_offsets + kind,
+                                  .offset_count = DRAPE_SPRING_SHEAR - DRAPE_SPRING_STRUCTURAL};
     if (!cloth->rectangular)
         return drape_term_refuse(builder, "these springs join rows and columns of the grid \"square\"; other "
                                           "meshes have only spring.structural, along edges");

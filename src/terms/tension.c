@@ -2,18 +2,18 @@
 #include "terms/tension.h"
 
 #include "base/elementary.h"
+#include "base/pi.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
-/* Strains this small are rounding: a sheet at rest is taut, so that it has its stiffness. */
-#define ROUNDING 1e-13
+/* Strains this small are rounding: a sheet at rest is taut, so that it has its stiffness. Coordinates are
+ * some hundred times as large as an edge, and so are their rounding errors relative to it. */
+#define ROUNDING (512 * DBL_EPSILON)
 
-#define DIRECTIONS 16                  /* in which the wrinkles are sought first, in half a turn */
-#define COSINE     0.98078528040323043 /* of the angle between them, pi/16 */
-#define SINE       0.19509032201612827
-#define ITERATIONS 60 /* at most; a few but where bisection is needed */
+#define DIRECTIONS 16 /* in which the wrinkles are sought first, in half a turn */
 
 /* ---- Strains and stresses of a plane ---- */
 
@@ -74,12 +74,14 @@ static double tension_along(const wrinkle *w)
     return dot((double[]){n[0] * n[0], n[1] * n[1], 2 * n[0] * n[1]}, w->stress);
 }
 
-/* The one of several directions with the lowest M' T0/sqrt(M' C M): the energy is lower by half the square of
- * its negative part, and the minimum lies between its neighbours. */
-static void first_direction(const double c[9], const double t0[3], wrinkle *best)
+/* The one of several directions with the lowest M' T0/sqrt(M' C M): the energy is lower by half the square
+ * of its negative part, and the minimum lies between its neighbours. Returns the tangent of the angle to
+ * them. */
+static double first_direction(const double c[9], const double t0[3], wrinkle *best)
 {
     wrinkle w;
-    double m[2] = {1, 0}, lowest = INFINITY;
+    double m[2] = {1, 0}, lowest = INFINITY, sine, cosine;
+    drape_sin_cos(DRAPE_PI / DIRECTIONS, &sine, &cosine);
     for (int i = 0; i < DIRECTIONS; i++) {
         const wrinkle from = {.m = {m[0], m[1]}};
         wrinkle_at(c, t0, &from, 0, &w);
@@ -88,9 +90,10 @@ static void first_direction(const double c[9], const double t0[3], wrinkle *best
             lowest = value;
             *best = w;
         }
-        m[0] = COSINE * from.m[0] - SINE * from.m[1];
-        m[1] = SINE * from.m[0] + COSINE * from.m[1];
+        m[0] = cosine * from.m[0] - sine * from.m[1];
+        m[1] = sine * from.m[0] + cosine * from.m[1];
     }
+    return sine / cosine;
 }
 
 /* Newton's method for the direction in which the shear vanishes, between the neighbours of the first one;
@@ -98,10 +101,9 @@ static void first_direction(const double c[9], const double t0[3], wrinkle *best
 static void find_direction(const double c[9], const double t0[3], wrinkle *w)
 {
     wrinkle first;
-    double low = -SINE / COSINE, high = -low, u = 0;
-    first_direction(c, t0, &first);
+    double high = first_direction(c, t0, &first), low = -high, u = 0;
     *w = first;
-    for (int i = 0; i < ITERATIONS && w->shear != 0; i++) {
+    for (bool done = false; !done && w->shear != 0;) {
         double c_turned[3];
         apply(c, w->turned, c_turned);
         *(w->shear > 0 ? &high : &low) = u;
@@ -112,11 +114,9 @@ static void find_direction(const double c[9], const double t0[3], wrinkle *w)
                              w->amount * dot(w->turned, c_turned);
         const double newton = u - 2 * w->shear / slope * (1 + u * u);
         const double next = slope > 0 && newton > low && newton < high ? newton : (low + high) / 2;
-        const bool done = fabs(next - u) < 1e-16;
+        done = fabs(next - u) < DBL_EPSILON / 2 || !(next > low && next < high);
         u = next;
         wrinkle_at(c, t0, &first, u, w);
-        if (done)
-            return;
     }
 }
 
