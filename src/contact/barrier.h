@@ -16,8 +16,10 @@
 
 #include "base/elementary.h"
 
+#include <math.h>
+
 #define DRAPE_BARRIER_GENTLE  0.1
-#define DRAPE_BARRIER_BOUNDED -1.0 /* as low: the bounded barrier */
+#define DRAPE_BARRIER_BOUNDED (-INFINITY) /* as low: the bounded barrier, which no depth leaves */
 
 typedef struct drape_barrier {
     double b, db, ddb; /* b, b', b'' */

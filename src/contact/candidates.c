@@ -8,8 +8,7 @@
 
 #include <string.h>
 
-#define ROUNDING  1e-12 /* of the model's length: larger than the rounding of a bound of a gap */
-#define MAX_PATCH 0.3   /* of the nodes: if more have left their path, all pairs are searched */
+#define MAX_PATCH 0.3 /* of the nodes: if more have left their path, all pairs are searched */
 
 static void take_set(drape_arena *arena, const drape_broad_phase *broad, drape_candidate_set *set)
 {
@@ -164,7 +163,7 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
                 .rest = {.model = m, .x = broad->rest, .pose = path->end[0].pose},
                 .moves = differ(broad, path->end),
                 .passing = passing,
-                .reach = 2 * margin + ROUNDING * m->length,
+                .reach = 2 * margin + broad->rounding,
                 .visit = visit,
                 .user = user};
     if (!passing)
@@ -445,8 +444,7 @@ void drape_candidates_forget_collider(drape_candidates *c, int32_t collider)
 static bool may_become_active(const drape_candidates *c, int set, const drape_pair *pair,
                               const drape_distances *away)
 {
-    const double slack =
-        pair->gap_at_search - pair->distance - away->beyond - ROUNDING * c->broad->model->length;
+    const double slack = pair->gap_at_search - pair->distance - away->beyond - c->broad->rounding;
     if (!(slack >= 0) || !(away->set[set] <= c->margin))
         return true;
     const double *of = c->set[set].away;

@@ -9,15 +9,6 @@
 #include <float.h>
 #include <string.h>
 
-#define KEEP_ITERATE 0.5 /* of what a gap has above the least, kept when a Newton iterate is cut short */
-/* of the activation distance: where a pair that comes from beyond it is stopped. Halved from afar, its gap
- * would reach the barrier only after many iterations, in which it holds up all other pairs. */
-#define ARRIVAL     0.5
-#define NEAR        0.9 /* of the activation distance: a gap below that is surely found to be below it */
-#define MARCH_SHARE 0.9
-#define MAX_MARCHES 10000 /* maximum number of steps of a node along its path */
-
-#define MAX_PATH  8.0 /* in mean edges: the candidates of a longer path may be too many to keep */
 #define MAX_THROW 1.0 /* in mean edges: to what a displacement beyond the size of the scene is shortened */
 
 /* A displacement of all points, and the first pair that limits it. */
@@ -51,7 +42,7 @@ static bool comes_near(const path *p, const drape_pair *pair, double gap)
 {
     const double rounding = p->keep->rounding, least = drape_pair_least_gap(pair, rounding);
     const drape_keep near = {
-        .rounding = rounding, .least = 1, .above = (NEAR * pair->distance - least) / (gap - least)};
+        .rounding = rounding, .least = 1, .above = (DRAPE_ADVANCE * pair->distance - least) / (gap - least)};
     return gap < pair->distance || drape_pair_step_fraction(pair, p->x, p->y, p->swings, &near, 1) < 1;
 }
 
@@ -150,7 +141,7 @@ static const drape_candidates *candidates_of(drape_contact *c, const drape_strai
 {
     const drape_candidates *candidates =
         with_stray(drape_contact_valid_candidates(c, straight, away), stray, away);
-    if (candidates || keeps_least(keep) || length > MAX_PATH * c->mean_edge)
+    if (candidates || keeps_least(keep) || length > DRAPE_LONGEST_SEARCH * c->mean_edge)
         return candidates;
     return with_stray(drape_contact_search(c, straight, away), stray, away);
 }
@@ -255,11 +246,11 @@ double drape_contact_march(const drape_contact *c, int32_t k, const drape_collid
     double t = 0, gap = distance_on(collider, &along, 0);
     const double least = drape_contact_least_gap(c),
                  end = drape_keep_gap(keep, least, gap, c->model->contact.distance);
-    const double length = along.length, slack = (1 - MARCH_SHARE) * fmin(end, gap - end);
+    const double length = along.length, slack = (1 - DRAPE_ADVANCE) * fmin(end, gap - end);
     if (!drape_gap_has_side(gap, keep->rounding) || !(length > gap - end))
         return 1;
-    for (int i = 0; i < MAX_MARCHES; i++) {
-        t += MARCH_SHARE * (gap - end) / length;
+    for (int i = 0; i < DRAPE_MAX_ADVANCES; i++) {
+        t += DRAPE_ADVANCE * (gap - end) / length;
         if (t >= 1)
             return 1;
         gap = distance_on(collider, &along, t);
@@ -301,7 +292,8 @@ static double thrown_length(const drape_contact *c, double farthest)
  * Returns the least fraction. */
 static double shorten_long(const drape_contact *c, const double *x, const double *y, double *fraction)
 {
-    const double longest = fmin(thrown_length(c, farthest_throw(c, x, y)), MAX_PATH * c->mean_edge);
+    const double longest =
+        fmin(thrown_length(c, farthest_throw(c, x, y)), DRAPE_LONGEST_SEARCH * c->mean_edge);
     double least = 1, move[3];
     for (int32_t i = 0; i < c->model->node_count; i++) {
         vec3_sub(y + 3 * (size_t)i, x + 3 * (size_t)i, move);
@@ -327,9 +319,9 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
     const double start = drape_clock_seconds();
     const drape_keep keep = {.rounding = c->broad.rounding,
                              .least = 1,
-                             .above = KEEP_ITERATE,
-                             .below = KEEP_ITERATE,
-                             .arrival = ARRIVAL};
+                             .above = DRAPE_KEPT_GAP,
+                             .below = DRAPE_KEPT_GAP,
+                             .arrival = DRAPE_KEPT_GAP};
     drape_pair limiting;
     double of_surfaces;
     const double *before = again && c->looked ? c->before : NULL;

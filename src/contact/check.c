@@ -2,6 +2,7 @@
 #include "contact/parts.h"
 
 #include "base/clock.h"
+#include "base/pi.h"
 #include "base/reason.h"
 #include "base/vec3.h"
 #include "contact/depth.h"
@@ -9,8 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-#define KEEP_PATH 0.5 /* of the least gap, or of a smaller one at the beginning of the step */
-#define PATH      "fraction of the step before passing through"
+#define PATH "fraction of the step before passing through"
 
 /* The pair that refuses a step may be one to exempt. */
 static void refuse(drape_contact *c, const drape_pair *pair)
@@ -74,9 +74,7 @@ static drape_status check_gaps(drape_contact *c, const char **reason, drape_diag
     return excess > 0 ? DRAPE_RETRY_REJECTED : DRAPE_OK;
 }
 
-/* The angle by which a collider turns at most in a piece of the path, and how far points may stray from the
- * straight there, in margins of the candidates. */
-#define MAX_TURN  0.7 /* [rad] */
+/* How far points may stray from the straight in a piece of the path, in margins of the candidates. */
 #define MAX_STRAY 0.25
 
 /* A piece of the path, on which nodes move straight, and colliders turn about one axis while their pivots
@@ -95,8 +93,10 @@ static double end_of_piece(const drape_contact *c, double at, double t)
                                  ? drape_motion_fastest_spin(c->motion, k, at, end) * (end - at)
                                  : 0; /* if it turned all the time; it is asked again for the rest */
         const double stray = drape_contact_stray(&c->model->colliders[k], angle);
+        /* at most a quarter turn: between two poses, a collider turns by the smaller angle */
         pieces =
-            fmax(pieces, ceil(fmax(angle / MAX_TURN, sqrt(stray / (MAX_STRAY * c->step_candidates.margin)))));
+            fmax(pieces,
+                 ceil(fmax(angle / (DRAPE_PI / 2), sqrt(stray / (MAX_STRAY * c->step_candidates.margin)))));
     }
     return pieces > 1 ? at + (end - at) / pieces : end;
 }
@@ -246,7 +246,8 @@ static drape_status check_path(drape_contact *c, double t, bool surfaces, const 
 
 drape_keep drape_contact_keep_step(const drape_contact *c)
 {
-    return (drape_keep){.rounding = c->broad.rounding, .least = KEEP_PATH, .below = KEEP_PATH, .core = true};
+    return (drape_keep){
+        .rounding = c->broad.rounding, .least = DRAPE_KEPT_GAP, .below = DRAPE_KEPT_GAP, .core = true};
 }
 
 static drape_status update_at(drape_contact *c, const double *x, double t)

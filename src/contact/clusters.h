@@ -8,7 +8,7 @@
 #include "base/lanes.h"
 #include "model/model.h"
 
-#define DRAPE_CLUSTER_FACES 12 /* at most */
+#define DRAPE_CLUSTER_FACES (3 * LANES) /* at most: whole groups */
 
 typedef enum drape_element_kind {
     DRAPE_ELEMENT_NODE,

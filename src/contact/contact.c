@@ -26,19 +26,13 @@
 #include <float.h>
 #include <string.h>
 
-#define MARGIN  0.06 /* by which points may leave the path of a search before a new one, in mean edges */
-#define LONGEST 8.0  /* in mean edges: for a path that is longer, candidates are searched at its end alone */
-/* A gap below this share of the largest coordinate is rounding: closest points and their distance have
- * errors of some hundred units in the last place. */
-#define ROUNDING (1e4 * DBL_EPSILON)
+#define MARGIN 0.06 /* by which points may leave the path of a search before a new one, in mean edges */
 /* The stiffness is raised when the smallest gap is small and has shrunk since the last raise, and in every
  * attempt that begins where it can hardly shrink any more. It falls when the gap is large again. Gaps in
  * activation distances. */
 #define PRESSED    0.05
-#define SHRUNK     0.5
-#define LAST       2.0 /* least gaps */
 #define RELAXED    0.3
-#define RAISE      2.0
+#define RAISE      2.0 /* and by how much a gap shrinks before the next */
 #define HALVED     0.2 /* [s] */
 #define MAX_FACTOR 1e4
 #define GROWTH     0.5 /* activation distance of a moving collider, in its path in a nominal step */
@@ -314,7 +308,7 @@ drape_status drape_contact_take_failure(drape_contact *c)
 /* Whether all points are so near to where the step began that candidates can be searched from there. */
 static bool is_near_start(const drape_contact *c, const double *x)
 {
-    const double longest = LONGEST * c->mean_edge;
+    const double longest = DRAPE_LONGEST_SEARCH * c->mean_edge;
     double move[3];
     for (size_t i = 0; i < (size_t)c->broad.points; i++) {
         vec3_sub(x + 3 * i, c->start + 3 * i, move);
@@ -429,7 +423,7 @@ void drape_contact_set_rounding(drape_contact *c, const double *x)
     for (size_t i = 0; i < 3 * (size_t)c->broad.points; i++)
         largest = fmax(largest, fabs(x[i]));
     largest = drape_ranks_largest(c->ranks, largest);
-    c->broad.rounding = ROUNDING * next_power_of_two(largest);
+    c->broad.rounding = DRAPE_CLOSEST_ROUNDING * next_power_of_two(largest);
 }
 
 /* Which pairs are inside. A pair that was added has another law, and so are its contacts. */
@@ -442,7 +436,7 @@ static drape_status update_inside(drape_contact *c)
     return added ? drape_contact_list(c, &now) : status;
 }
 
-/* *last: some gap is hardly above its least. */
+/* *last: some gap would be at its least before the next raise. */
 static double smallest_gap(const drape_contact *c, bool *last)
 {
     double least = 1;
@@ -452,7 +446,7 @@ static double smallest_gap(const drape_contact *c, bool *last)
         if (contact->gentle || contact->exempt > 0)
             continue;
         least = fmin(least, contact->gap.value / contact->pair.distance);
-        *last = *last || contact->gap.value < LAST * drape_pair_least_gap(&contact->pair, c->broad.rounding);
+        *last = *last || contact->gap.value < RAISE * drape_pair_least_gap(&contact->pair, c->broad.rounding);
     }
     *last = drape_ranks_any(c->ranks, *last);
     return drape_ranks_least(c->ranks, least);
@@ -467,7 +461,7 @@ static void adapt_stiffness(drape_contact *c, double t, bool retry)
     if (retry && !last)
         return;
     press->widest = fmax(press->widest, gap);
-    if (last || (gap < PRESSED && gap < SHRUNK * press->widest)) {
+    if (last || (gap < PRESSED && RAISE * gap < press->widest)) {
         press->factor = fmin(RAISE * before, MAX_FACTOR);
         press->widest = gap;
     } else if (gap > RELAXED) {

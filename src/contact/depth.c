@@ -3,13 +3,9 @@
 
 #include "base/vec3.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
-
-#define ENOUGH   1e-12 /* [m] between the minimum and its lower bound */
-#define MAX_CUTS 60
-#define SECTIONS 40               /* of a face: 0.618^40 of its height are left */
-#define GOLDEN   0.61803398874989 /* (sqrt 5 - 1)/2 */
 
 /* The distance at a point of a segment, and its derivative along it. */
 typedef struct tangent {
@@ -26,6 +22,8 @@ static tangent tangent_at(const drape_collider *collider, const drape_collider_p
     return at;
 }
 
+/* By the cuts of two tangents, until the lower bound that they are is reached or rounding leaves no place for
+ * another one between them. */
 double drape_depth_edge(const drape_collider *collider, const drape_collider_pose *pose, const double *a,
                         const double *b, double enough)
 {
@@ -33,12 +31,12 @@ double drape_depth_edge(const drape_collider *collider, const drape_collider_pos
     vec3_sub(b, a, u);
     tangent low = tangent_at(collider, pose, a, u, 0), high = tangent_at(collider, pose, a, u, 1);
     double least = fmin(low.d, high.d);
-    for (int i = 0; low.slope < 0 && high.slope > 0 && i < MAX_CUTS; i++) {
+    while (low.slope < 0 && high.slope > 0) {
         double t = (high.d - high.slope * high.t - low.d + low.slope * low.t) / (low.slope - high.slope);
         double bound = low.d + low.slope * (t - low.t);
         if (bound > enough)
             return bound;
-        if (least - bound <= ENOUGH)
+        if (!(bound < least && t > low.t && t < high.t))
             return least;
         tangent at = tangent_at(collider, pose, a, u, t);
         least = fmin(least, at.d);
@@ -78,10 +76,11 @@ static bool may_be_deep(const drape_collider *collider, const drape_collider_pos
 }
 
 /* The minimum on a line parallel to side 1 2 is a convex function of s, minimised by golden section (Kiefer
- * 1953). */
+ * 1953), until values beside a minimum differ by rounding alone: at the root of epsilon. */
 double drape_depth_face(const drape_collider *collider, const drape_collider_pose *pose,
                         const double *const corner[3], double enough)
 {
+    const double golden = (sqrt(5) - 1) / 2;
     double low = 0, high = 1, d[2], sides[3], length = 0;
     if (!may_be_deep(collider, pose, corner, enough))
         return INFINITY;
@@ -90,13 +89,13 @@ double drape_depth_face(const drape_collider *collider, const drape_collider_pos
         length = fmax(length, vec3_norm(sides)); /* bounds the change of the distance with s */
     }
     for (int i = 0; i < 2; i++)
-        d[i] = depth_across(collider, pose, corner, i ? GOLDEN : 1 - GOLDEN);
+        d[i] = depth_across(collider, pose, corner, i ? golden : 1 - golden);
     double least = fmin(d[0], d[1]);
-    for (int k = 0; k < SECTIONS && least - length * (high - low) <= enough; k++) {
-        double width = GOLDEN * (high - low);
+    while (high - low > sqrt(DBL_EPSILON) && least - length * (high - low) <= enough) {
+        double width = golden * (high - low);
         bool left = d[0] < d[1];
         *(left ? &high : &low) = left ? low + width : high - width;
-        width = GOLDEN * (high - low);
+        width = golden * (high - low);
         d[left] = d[!left];
         d[!left] = depth_across(collider, pose, corner, left ? high - width : low + width);
         least = fmin(least, d[!left]);

@@ -3,12 +3,13 @@
 
 #include "base/vec3.h"
 #include "colliders/colliders.h"
+#include "contact/clusters.h"
 
 #include <math.h>
 #include <string.h>
 
-#define STALE   0.25 /* of its gap: a node that has moved by more is looked at again */
-#define CLUSTER 8    /* nodes of one */
+#define STALE   0.25                /* of its gap: a node that has moved by more is looked at again */
+#define CLUSTER DRAPE_CLUSTER_FACES /* nodes of one */
 
 static int32_t cluster_count(const drape_model *model)
 {

@@ -3,13 +3,10 @@
 
 #include "base/vec3.h"
 #include "geometry/bvh.h"
+#include "geometry/closest.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-#define FLAT     1e-9 /* of the length of the sheet: how far from a plane, and from convex, it may be */
-#define TOUCHING 1e-9 /* of the model's length: clusters at rest that are no farther apart touch */
-#define HALF     0.5  /* least c of pieces that may come as near as half of their distance at rest */
 
 typedef struct builder {
     const drape_clusters *clusters;
@@ -103,7 +100,8 @@ static void measure_hull(place *places, int32_t count, place *hull, double *area
     }
 }
 
-/* Whether the faces cover their convex hull once: they have its area, and no boundary but its own. */
+/* Whether the faces cover their convex hull once, but for rounding: they have its area, and no boundary
+ * but its own. */
 static bool is_convex(builder *b, int32_t cloth, double length)
 {
     const drape_model *m = b->model;
@@ -131,8 +129,8 @@ static bool is_convex(builder *b, int32_t cloth, double length)
         if (drape_model_cloth_of(m, n[0]) == cloth && b->clusters->faces_of_edge[e] != 2)
             perimeter += length_of(q[0] - p[0], q[1] - p[1]);
     }
-    return fabs(area - hull_area) <= FLAT * length * length &&
-           fabs(perimeter - hull_perimeter) <= FLAT * length;
+    return fabs(area - hull_area) <= DRAPE_CLOSEST_ROUNDING * length * length &&
+           fabs(perimeter - hull_perimeter) <= DRAPE_CLOSEST_ROUNDING * length;
 }
 
 /* Places a sheet in its plane, beside those before. */
@@ -154,7 +152,7 @@ static void lay_flat(builder *b, int32_t cloth, const double *rest, double *besi
         }
     }
     const double length = length_of(high[0] - low[0], high[1] - low[1]);
-    b->flat[cloth] = high[2] - low[2] <= FLAT * length && is_convex(b, cloth, length);
+    b->flat[cloth] = high[2] - low[2] <= DRAPE_CLOSEST_ROUNDING * length && is_convex(b, cloth, length);
     for (int32_t i = first; i < end; i++)
         b->plane[2 * (size_t)i] += *beside - low[0];
     *beside += high[0] - low[0] + m->length;
@@ -245,7 +243,7 @@ static void set_branches(builder *b)
 
 /* ---- Pairs of branches ---- */
 
-/* Lists the clusters that touch a rectangle; 0: they are too many. */
+/* Lists the clusters that touch a rectangle, or are apart by rounding; 0: they are too many. */
 static int32_t list_window(const drape_flat *s, const drape_flat_area *within, int32_t *window)
 {
     const drape_clusters *c = s->clusters;
@@ -253,7 +251,7 @@ static int32_t list_window(const drape_flat *s, const drape_flat_area *within, i
     waiting[left++] = 0;
     while (left > 0) {
         const int32_t branch = waiting[--left], second = c->branches[branch].second;
-        if (!touch(&s->area[branch], within, TOUCHING * c->model->length))
+        if (!touch(&s->area[branch], within, DRAPE_CLOSEST_ROUNDING * c->model->length))
             continue;
         if (second > 0) {
             waiting[left++] = second;
@@ -273,7 +271,7 @@ static void find_pairs(builder *b, int32_t first, int32_t second)
 {
     drape_flat *s = b->out;
     int32_t window[DRAPE_FLAT_WINDOW], next[4][2];
-    if (!touch(&s->area[first], &s->area[second], TOUCHING * b->model->length))
+    if (!touch(&s->area[first], &s->area[second], DRAPE_CLOSEST_ROUNDING * b->model->length))
         return;
     const drape_flat_area both = cover(&s->area[first], &s->area[second]);
     const bool same = s->cloth[first] >= 0 && s->cloth[first] == s->cloth[second];
@@ -430,13 +428,13 @@ static int32_t find_pair(const drape_flat *s, int32_t a, int32_t b)
     return -1;
 }
 
-/* c for pieces that are at least `height` apart at rest: beyond that, half of the distance grows more slowly
- * than c times it. */
+/* c for pieces that are at least `height` apart at rest. Half of their distance, if that is what they must
+ * keep, grows by half of what is beyond. */
 static double wanted_share(const drape_flat_query *want, double height)
 {
     const double half = 0.5 * height + want->slack;
     const double share = (fmin(want->reach, half) + want->rounding) / height;
-    return half < want->reach ? fmax(share, HALF) : share;
+    return half < want->reach ? fmax(share, 0.5) : share;
 }
 
 bool drape_flat_keeps_apart(drape_flat *s, int32_t a, int32_t b, const drape_flat_query *want)

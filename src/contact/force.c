@@ -3,7 +3,7 @@
 
 #include "contact/barrier.h"
 
-#define D 12
+#define D DRAPE_GAP_DOFS
 
 double drape_contact_energy(const drape_gap *gap, const drape_contact_law *law)
 {

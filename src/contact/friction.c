@@ -3,7 +3,7 @@
 
 #include "base/vec3.h"
 
-#define D 12
+#define D DRAPE_GAP_DOFS
 
 /* u = sum c v and its tangential part; a = f/|u_t| and b with d(a u_t)/du_t = a I + b u_t u_t'. */
 typedef struct slip {

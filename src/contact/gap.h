@@ -9,19 +9,21 @@
 
 #include <stdbool.h>
 
+enum { DRAPE_GAP_DOFS = 3 * 4 }; /* coordinates of its points */
+
 typedef struct drape_gap {
     double value;          /* [m] */
     drape_closest closest; /* d gap / dx_i = c_i normal, of its points; 1 point: c is 1, params and dcdt 0 */
     bool fixed_normal;     /* the normal and c do not change with the points: a sharp feature is touched */
     bool mollified;        /* m and dm are set; else m = 1 and dm = 0 */
-    double m, dm[12];      /* mollifier of nearly parallel edges, and its derivative */
-    double curvature[9];   /* of a smooth surface, dn/dx (3 x 3 [1/m]); its points are weights of one place */
+    double m, dm[DRAPE_GAP_DOFS]; /* mollifier of nearly parallel edges, and its derivative */
+    double curvature[9]; /* of a smooth surface, dn/dx (3 x 3 [1/m]); its points are weights of one place */
 } drape_gap;
 
 /* How the geometry changes with the points. Column 3 i + k belongs to coordinate k of point i. */
 typedef struct drape_gap_derivatives {
-    drape_closest_derivatives closest; /* dc/dx and dn/dx */
-    double ddm[12][12];                /* of the mollifier, if there is one */
+    drape_closest_derivatives closest;          /* dc/dx and dn/dx */
+    double ddm[DRAPE_GAP_DOFS][DRAPE_GAP_DOFS]; /* of the mollifier, if there is one */
 } drape_gap_derivatives;
 
 /* The mollifier of edges 0 1 and 2 3 (Li et al. 2020, eq. 24), a function of q = |e1 x e2|^2: m = q/w (2 -
@@ -29,6 +31,6 @@ typedef struct drape_gap_derivatives {
 void drape_mollify(double x[4][3], double w, drape_gap *gap);
 
 /* Its second derivative, below w. */
-void drape_mollify_twice(double x[4][3], double w, double ddm[12][12]);
+void drape_mollify_twice(double x[4][3], double w, double ddm[DRAPE_GAP_DOFS][DRAPE_GAP_DOFS]);
 
 #endif

@@ -9,10 +9,7 @@
 
 #include <string.h>
 
-#define D 12
-/* of a mean edge: pairs this near to becoming active have their blocks when a pattern is made. Blocks that
- * stay 0 cost more in each factorisation of a pile than the patterns that they save. */
-#define PATTERN_MARGIN 0.03
+#define D DRAPE_GAP_DOFS
 
 static int32_t free_of(const drape_model *m, int32_t point)
 {
@@ -404,6 +401,7 @@ static bool add_coupling(drape_contact *c, const drape_pair *pair, int points)
 /* The pairs of cloth that are listed, and whether there was memory for all. */
 typedef struct listing {
     drape_contact *contact;
+    double margin; /* [m] */
     bool complete;
 } listing;
 
@@ -412,16 +410,18 @@ static void list_near(void *user, const drape_pair *pair)
     listing *list = user;
     drape_contact *c = list->contact;
     const drape_configuration now = drape_contact_configuration(c);
-    const double reach = pair->distance + PATTERN_MARGIN * c->mean_edge;
+    const double reach = pair->distance + list->margin;
     if (pair->collider < 0 && !drape_pair_is_apart(pair, &now, reach) &&
         drape_pair_gap_value(pair, &now) < reach)
         list->complete = list->complete && add_coupling(c, pair, 4);
 }
 
-/* From the candidates if they include all pairs that are near: a pattern depends on the positions alone. */
+/* Pairs that are half as far from becoming active as candidates have their blocks when a pattern is made:
+ * those of others stay 0, and cost more in each factorisation of a pile than the patterns that they save.
+ * They come from the candidates if these include them all: a pattern depends on the positions alone. */
 static void visit_near(drape_contact *c, listing *list)
 {
-    const double start = drape_clock_seconds(), margin = PATTERN_MARGIN * c->mean_edge;
+    const double start = drape_clock_seconds(), margin = list->margin;
     const drape_configuration now = drape_contact_configuration(c);
     const drape_straight_path here = {{now, now}};
     drape_distances away;
@@ -441,7 +441,7 @@ static void visit_near(drape_contact *c, listing *list)
 int32_t drape_contact_list_couplings(drape_contact *c, const int32_t **nodes)
 {
     const double start = drape_clock_seconds();
-    listing list = {.contact = c, .complete = true};
+    listing list = {.contact = c, .margin = c->step_candidates.margin / 2, .complete = true};
     c->coupling_count = 0;
     visit_near(c, &list);
     c->seconds += drape_clock_seconds() - start;

@@ -2,7 +2,7 @@
 #include "base/vec3.h"
 #include "contact/gap.h"
 
-#define D 12
+#define D DRAPE_GAP_DOFS
 
 /* q = |u|^2 |w|^2 - (u.w)^2 with u = x1 - x0, w = x3 - x2, and its derivatives by u and w. */
 typedef struct cross_square {

@@ -8,10 +8,7 @@
 
 /* of |e1|^2 |e2|^2 at rest: sin^2 below which edges are mollified (Li et al. 2020) */
 #define PARALLEL_WIDTH 1e-3
-#define UNTANGLED      0.1  /* of the shortest edge: activation distance of pieces that rest in each other */
-#define TOUCHING       1e-9 /* [m] below this distance, positions do not determine a normal */
-#define ADVANCE        0.9  /* share of the certainly free fraction that is taken at once */
-#define MAX_ADVANCES   1000 /* after these the fraction reached is safe, even if it is not the largest */
+#define UNTANGLED      0.1 /* of the shortest edge: activation distance of pieces that rest in each other */
 
 typedef void find_closest(double x[4][3], drape_closest *at);
 
@@ -55,6 +52,16 @@ static double mollifier_width(const drape_pair *pair, const double *rest)
     vec3_sub(x[1], x[0], u);
     vec3_sub(x[3], x[2], w);
     return PARALLEL_WIDTH * vec3_dot(u, u) * vec3_dot(w, w);
+}
+
+/* The largest coordinate. */
+static double largest(double x[4][3])
+{
+    double most = 0;
+    for (int i = 0; i < 4; i++)
+        for (int k = 0; k < 3; k++)
+            most = fmax(most, fabs(x[i][k]));
+    return most;
 }
 
 /* For a sharp feature at distance 0, the closest points give no direction. Its normal is then the one
@@ -167,7 +174,7 @@ bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const
     gap->value = gap->closest.distance - pair->radius;
     if (!(gap->value < pair->distance))
         return false;
-    gap->fixed_normal = pair->collider >= 0 && gap->closest.distance < TOUCHING;
+    gap->fixed_normal = pair->collider >= 0 && gap->closest.distance < DRAPE_CLOSEST_ROUNDING * largest(x);
     if (gap->fixed_normal)
         touching_normal(pair, at, x, gap->closest.normal);
     if (pair->kind == DRAPE_PAIR_SEGMENTS)
@@ -287,9 +294,9 @@ double drape_pair_step_fraction(const drape_pair *pair, const double *from, cons
     if (!(speed > 0) || !drape_gap_has_side(gap, keep->rounding) || gap - least > speed)
         return limit;
     const double end = drape_keep_gap(keep, least, gap, pair->distance),
-                 slack = (1 - ADVANCE) * fmin(end, gap - end);
-    for (int i = 0; i < MAX_ADVANCES; i++) {
-        t += ADVANCE * (gap - end) / speed;
+                 slack = (1 - DRAPE_ADVANCE) * fmin(end, gap - end);
+    for (int i = 0; i < DRAPE_MAX_ADVANCES; i++) {
+        t += DRAPE_ADVANCE * (gap - end) / speed;
         if (t >= limit || (!path.swing && lead_at(pair, &path, normal, limit) - radius > end + slack))
             return limit;
         gap = gap_at(pair, &path, t, radius, normal);

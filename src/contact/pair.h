@@ -46,6 +46,17 @@ static inline bool drape_gap_has_side(double gap, double rounding)
     return gap >= DRAPE_NO_SIDE * rounding && gap > 0;
 }
 
+/* Half: of the least gap, or of a smaller one at the beginning of a step, that a path must keep; of what a
+ * gap has above the least that is kept when a Newton iterate is cut short; and of the activation distance,
+ * where a pair that comes from beyond it is stopped then: halved from afar, its gap would reach the
+ * barrier only after many iterations, in which it holds up all other pairs. */
+#define DRAPE_KEPT_GAP 0.5
+
+/* A march along a path takes at once this share of what is certainly free, and ends within the rest of it.
+ * After so many steps the fraction that it has reached is safe, even if it is not the largest. */
+#define DRAPE_ADVANCE      0.9
+#define DRAPE_MAX_ADVANCES 1000
+
 /* How much of its gap a pair must keep on a path. */
 typedef struct drape_keep {
     double rounding; /* [m] of gaps */

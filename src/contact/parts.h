@@ -13,6 +13,15 @@
 #include "contact/predict.h"
 #include "contact/restitution.h"
 
+/* In mean edges: the candidates of a longer path may be too many to keep. They are searched at its end
+ * alone. */
+#define DRAPE_LONGEST_SEARCH 8.0
+
+/* Of the activation distance: nodes that a collider reaches are put there. The force that accelerates cloth
+ * of areal density sigma to a speed v within a step h is K b'(y), with K = sigma (2 g L + v^2)/d, so b'(y) =
+ * v d/(h (2 g L + v^2)): y is 0.7 to 1 for what moves by d and less in a step. */
+#define DRAPE_RESTING 0.8
+
 /* A contact and its normal force at the beginning of the step. */
 typedef struct drape_lagged {
     drape_active_contact contact;

@@ -4,11 +4,11 @@
 #include "base/elementary.h"
 #include "base/vec3.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
-#define NEAR       0.1 /* relative difference of forces below which the tangent is used */
-#define BISECTIONS 20  /* of the logarithm of the gap */
+#define NEAR 0.1 /* relative difference of forces below which the tangent is used */
 
 drape_status drape_predictions_init(drape_arena *arena, int32_t points, drape_predictions *p)
 {
@@ -98,7 +98,8 @@ static double force_at(const drape_gap *gap, const drape_contact_law *law, doubl
     return drape_normal_force(&normal);
 }
 
-/* The force falls with the gap. The bounded barrier of exempt cloth is near enough to linear. */
+/* The force falls with the gap, which is bisected in its logarithm until half of its digits are known. The
+ * bounded barrier of exempt cloth is near enough to linear. */
 double drape_predicted_stiffness(const drape_gap *gap, const drape_contact_law *law, double weight,
                                  double v[4][3], double force)
 {
@@ -110,7 +111,7 @@ double drape_predicted_stiffness(const drape_gap *gap, const drape_contact_law *
         high = gap->value;
     else
         low = gap->value;
-    for (int k = 0; k < BISECTIONS; k++) {
+    while (high - low > sqrt(DBL_EPSILON) * high) {
         const double middle = sqrt(low * high);
         if (force_at(gap, law, weight, v, middle) > force)
             low = middle;

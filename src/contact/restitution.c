@@ -6,7 +6,7 @@
 
 #include <math.h>
 
-#define D 12
+#define D DRAPE_GAP_DOFS
 
 drape_normal drape_normal_at(const drape_gap *gap, const drape_contact_law *law, double v[4][3])
 {

@@ -8,15 +8,9 @@
 
 #include <string.h>
 
-/* Of the activation distance: nodes that a collider reaches are put there. The force that accelerates cloth
- * of areal density sigma to a speed v within a step h is K b'(y), with K = sigma (2 g L + v^2)/d, so b'(y) =
- * v d/(h (2 g L + v^2)): y is 0.7 to 1 for what moves by d and less in a step. */
-#define RESTING    0.8
-#define EDGES      0.5  /* the same for the middle of an edge, of the activation distance of features */
+#define EDGES      0.5  /* of the activation distance of features: where the middle of an edge is put */
 #define CLOSE      0.05 /* of the activation distance: how far above that a march along the path may end */
-#define MAX_STEPS  50   /* of a march: where it ends the path is free */
 #define MAX_PASSES 2    /* over all colliders: one may push a node towards another */
-#define MAX_LAYERS 10   /* of cloth that lie on each other and are carried along */
 
 static double distance_from(const drape_collider *collider, const double *x, double *normal)
 {
@@ -31,14 +25,14 @@ static bool slide(const drape_collider *collider, double distance, double roundi
 {
     double p[3], at[3], normal[3], t = 0;
     double gap = distance_from(collider, x, NULL);
-    const double aim = fmin(gap, RESTING * distance);
+    const double aim = fmin(gap, DRAPE_RESTING * distance);
     vec3_sub(y, x, p);
     const double length = vec3_norm(p);
     if (!drape_gap_has_side(gap, rounding) || !(length > gap - aim) ||
         (gap == aim && distance_from(collider, y, NULL) >= aim && length < gap))
         return false;
     memcpy(at, x, sizeof at);
-    for (int i = 0; i < MAX_STEPS && gap - aim > CLOSE * distance; i++) {
+    for (int i = 0; i < DRAPE_MAX_ADVANCES && gap - aim > CLOSE * distance; i++) {
         t += (gap - aim) / length;
         if (t >= 1)
             return false;
@@ -186,7 +180,8 @@ static bool mark_moved(const drape_contact *c, const double *y, bool *marked)
 
 typedef struct layers {
     drape_contact *contact;
-    bool meet; /* pieces of cloth pass through each other */
+    bool meet;  /* pieces of cloth pass through each other, */
+    bool grown; /* among them some that were not carried */
 } layers;
 
 /* A pair on the straight path from the beginning of the step to c->to. */
@@ -198,20 +193,25 @@ static void meet(void *user, const drape_pair *pair)
     if (pair->collider >= 0 || drape_pair_step_fraction(pair, c->start, c->to, NULL, &keep, 1) == 1)
         return;
     of->meet = true;
-    for (int a = 0; a < 4; a++)
+    for (int a = 0; a < 4; a++) {
+        of->grown = of->grown || !c->carried[pair->node[a]];
         c->carried[pair->node[a]] = true;
+    }
 }
 
-/* Whether cloth passes through cloth on its path to y; what does is added to what is carried. */
-static bool layers_meet(drape_contact *c, const double *y)
+/* Whether cloth passes through cloth on its path to y; what does is added to what is carried. *grown:
+ * something is. */
+static bool layers_meet(drape_contact *c, const double *y, bool *grown)
 {
     layers of = {.contact = c};
+    *grown = false;
     if (!mark_moved(c, y, c->moved))
         return false;
     drape_contact_fill(c, y, c->path_pose, c->to);
     const drape_straight_path path = {{{.model = c->model, .x = c->start, .pose = c->start_pose},
                                        {.model = c->model, .x = c->to, .pose = c->path_pose}}};
     drape_candidates_find(&c->broad, &path, 0, true, c->moved, meet, &of);
+    *grown = of.grown;
     return of.meet;
 }
 
@@ -253,11 +253,11 @@ void drape_contact_carry_layers(drape_contact *c, double t, double *y)
     drape_contact_poses(c, t, c->path_pose);
     memcpy(c->from, y, size);
     memset(c->carried, 0, (size_t)c->model->node_count * sizeof *c->carried);
-    bool apart = !layers_meet(c, y);
-    for (int i = 0; i < MAX_LAYERS && !apart; i++) {
+    bool grown, apart = !layers_meet(c, y, &grown);
+    while (!apart && grown) {
         carry(c, y);
         sweep_all(c, y);
-        apart = !layers_meet(c, y);
+        apart = !layers_meet(c, y, &grown);
     }
     if (!apart)
         memcpy(y, c->from, size);

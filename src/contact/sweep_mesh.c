@@ -8,8 +8,6 @@
 
 #include <string.h>
 
-#define RESTING 0.8 /* of the activation distance, as in sweep.c */
-
 /* A node and the first triangle that reaches it. */
 typedef struct meeting {
     drape_contact *contact;
@@ -21,7 +19,7 @@ typedef struct meeting {
 
 static double aim_of(const drape_pair *pair, double gap)
 {
-    return fmin(gap, RESTING * pair->distance);
+    return fmin(gap, DRAPE_RESTING * pair->distance);
 }
 
 static drape_pair pair_of(const drape_broad_phase *broad, int32_t node, int32_t triangle)

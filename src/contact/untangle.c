@@ -12,16 +12,13 @@
 #include <float.h>
 #include <string.h>
 
-#define ROUNDING (1e4 * DBL_EPSILON) /* as in contact.c: of the largest coordinate */
-#define ENOUGH   0.5                 /* of the wanted gap: with which a sheet is clear */
-#define STRAIN   1e-3                /* with which a cloth is left as it is once it is clear */
-#define LESS     0.05                /* of the strain: by which a sweep that is worth it lessens it */
-#define POLISH   6                   /* sweeps without such a gain that end it, once it is clear */
-#define PATIENCE 30                  /* the same while gaps are too small */
-#define STRETCH  2.0                 /* of an edge, at most: else the cloth is torn */
-#define SQUEEZE  0.25                /* of an edge, at least: else it has collapsed */
-#define SHARE    0.25                /* of a strain like these that is allowed if something still crosses */
-#define NARROW   0.01                /* of the area that a triangle was given with, at least: the same */
+#define ENOUGH   0.5  /* of the wanted gap: with which a sheet is clear */
+#define LESS     0.05 /* of the strain: by which a sweep that is worth it lessens it */
+#define POLISH   6    /* sweeps without such a gain that end it, once it is clear */
+#define PATIENCE 30   /* the same while gaps are too small */
+#define STRETCH  2.0  /* of an edge, at most: else the cloth is torn */
+#define SQUEEZE  0.25 /* of an edge, at least: else it has collapsed */
+#define SHARE    0.25 /* of a strain like these that is allowed if something still crosses */
 
 /* ---- Topology ---- */
 
@@ -241,7 +238,7 @@ static void set_rounding(drape_untangler *u)
     double largest = 0;
     for (size_t i = 0; i < 3 * (size_t)u->broad.points; i++)
         largest = fmax(largest, fabs(u->x[i]));
-    u->broad.rounding = ROUNDING * largest;
+    u->broad.rounding = DRAPE_CLOSEST_ROUNDING * largest;
 }
 
 static drape_status set_up(drape_untangler *u, const drape_motion *motion, double t, const double *x)
@@ -314,7 +311,8 @@ static double strain_of(const drape_untangler *u)
     return strain;
 }
 
-/* Whether it is still the cloth that was given: no edge is torn, and nothing has collapsed. */
+/* Whether it is still the cloth that was given: no edge is torn, and nothing has collapsed, whose
+ * triangles have the area of those whose sides all have. */
 static bool is_sound(const drape_untangler *u)
 {
     const double share = u->crossing_count + u->sunk_count > 0 ? SHARE : 1, most = 1 + share * (STRETCH - 1),
@@ -325,7 +323,7 @@ static bool is_sound(const drape_untangler *u)
             return false;
     }
     for (int32_t f = 0; f < u->model->triangle_count; f++)
-        if (!(area_of(u, f) >= NARROW * u->face_area[f]))
+        if (!(area_of(u, f) >= SQUEEZE * SQUEEZE * u->face_area[f]))
             return false;
     return true;
 }
@@ -392,8 +390,7 @@ static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, dra
         }
         const bool clear = best.crossings == 0 && best.gap >= ENOUGH;
         if ((i == 0 && drape_untangle_is_clear(outcome)) || i == u->def->sweeps ||
-            (clear && (best.strain <= STRAIN || since >= POLISH)) ||
-            (best.crossings == 0 && since >= PATIENCE))
+            (clear && since >= POLISH) || (best.crossings == 0 && since >= PATIENCE))
             return DRAPE_OK;
         drape_untangle_project(u);
     }

@@ -7,18 +7,15 @@
 #include "contact/untangle_parts.h"
 
 #include "base/elementary.h"
+#include "base/pi.h"
 #include "base/vec3.h"
 #include "geometry/intersect.h"
 
 #include <string.h>
 
-#define ACROSS     6    /* parts of a side of a face: 28 points of it are tested */
-#define TOUCH      1e-9 /* [m] a point less deep than this is not inside */
-#define TURN       6.283185307179586
-#define AGREE      0.5  /* cosine of the angle to their mean within which directions tear nothing */
-#define MARCH      200  /* evaluations of the distance, at most, to find the length of a path out */
-#define CREEP      0.01 /* mean edges that such a path goes on at least with each of them */
-#define DIRECTIONS 24   /* in which a face is searched around an edge that passes through it */
+#define ACROSS     6   /* parts of a side of a face: 28 points of it are tested */
+#define AGREE      0.5 /* cosine of the angle to their mean within which directions tear nothing */
+#define DIRECTIONS 24  /* in which a face is searched around an edge that passes through it */
 
 static double distance_at(const drape_untangler *u, int32_t collider, const double *x, double n[3])
 {
@@ -97,20 +94,20 @@ static double depth_at(const drape_untangler *u, int32_t node, const double *x)
 static double exit_length(const drape_untangler *u, int32_t node, const double *x, const double direction[3])
 {
     double length = 0;
-    for (int k = 0; k < MARCH; k++) {
+    for (int k = 0; k < DRAPE_MAX_ADVANCES; k++) {
         double p[3] = {x[0], x[1], x[2]};
         vec3_add_scaled(length, direction, p);
         const double d = depth_at(u, node, p);
-        if (d >= -TOUCH)
+        if (d >= -u->broad.rounding)
             return length;
-        length += fmax(-d, CREEP * u->mean_edge);
+        length -= d;
     }
     return INFINITY;
 }
 
 static bool is_in(const drape_untangler *u, int32_t node, int32_t piece)
 {
-    return u->piece[node] == piece && u->depth[node] < -TOUCH;
+    return u->piece[node] == piece && u->depth[node] < -u->broad.rounding;
 }
 
 /* A direction is as good as the longest of the paths of the nodes is short. */
@@ -183,7 +180,7 @@ static drape_status choose_exits(drape_untangler *u)
     for (int32_t i = 0; !status && i < u->model->node_count; i++) {
         if (!(u->mobility[i] > 0))
             out[u->piece[i]] = u->model->node_count; /* it stays */
-        else if (u->depth[i] < -TOUCH)
+        else if (u->depth[i] < -u->broad.rounding)
             in[u->piece[i]]++;
         else
             out[u->piece[i]]++;
@@ -227,7 +224,7 @@ static void push_nodes(drape_untangler *u, int32_t collider)
             continue;
         u->min_share = fmin(u->min_share, d / least);
         u->min_wanted = fmin(u->min_wanted, d / wanted);
-        if (d < -TOUCH) {
+        if (d < -u->broad.rounding) {
             u->sunk_count++;
             u->sunk[i] = true;
             turn_to_exit(u, i, u->x + 3 * (size_t)i, &d, n);
@@ -251,7 +248,7 @@ static void push_point(drape_untangler *u, int32_t collider, const int32_t *node
     double x[3], n[3];
     point_of(u, node, weight, x);
     double d = distance_at(u, collider, x, n);
-    if (!(d < -TOUCH))
+    if (!(d < -u->broad.rounding))
         return;
     turn_to_exit(u, node[0], x, &d, n);
     u->sunk_count++;
@@ -354,7 +351,7 @@ static void deepen(const drape_untangler *u, int32_t collider, const int32_t *no
     for (double radius = 0.25 * longest; radius > 1e-4 * longest; radius /= 2)
         for (int k = 0; k < DIRECTIONS; k++) {
             double sine, cosine, other[3], there[3];
-            drape_sin_cos(k * (TURN / DIRECTIONS), &sine, &cosine);
+            drape_sin_cos(k * (2 * DRAPE_PI / DIRECTIONS), &sine, &cosine);
             memcpy(there, x, sizeof there);
             vec3_add_scaled(radius * cosine / along, v, there);
             vec3_add_scaled(radius * sine / across, w, there);

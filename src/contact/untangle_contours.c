@@ -15,10 +15,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define RINGS     4 /* of nodes of a sheet that passes through itself that may be near it on the wrong side */
-#define STRIDE    0.3  /* of an edge: by which it is moved along the gradient */
-#define STEEP     0.05 /* the least sine of an edge and a triangle, for the gradient */
-#define PIN_PRICE 1e3  /* areas of all cloth for a pin: such a part is not moved if another can be */
+#define RINGS  4    /* of nodes of a sheet that passes through itself that may be near it on the wrong side */
+#define STRIDE 0.3  /* of an edge: by which it is moved along the gradient */
+#define STEEP  0.05 /* the least sine of an edge and a triangle, for the gradient */
 
 /* ---- Crossings ---- */
 
@@ -201,10 +200,11 @@ static void unmark(drape_untangler *u, const curve *k)
         u->block[u->crossing[k->crossing[i]].edge] = 0;
 }
 
-/* How much it costs to move a node. */
+/* How much it costs to move a node: a pin, more than all of the cloth, so that its part is not moved if
+ * another can be. */
 static double price_of(const drape_untangler *u, int32_t node)
 {
-    return u->broad.node_area[node] + (u->mobility[node] > 0 ? 0 : PIN_PRICE * u->area);
+    return u->broad.node_area[node] + (u->mobility[node] > 0 ? 0 : 2 * u->area);
 }
 
 /* Spreads colours from the first `count` nodes of the queue to all others that edges lead to; through a
