@@ -9,6 +9,10 @@ import re
 import sys
 
 ARROWS = re.compile(r"^([a-z]+) -> ([a-z ]+)$", re.M)
+NUMBER = r"\(?(-?[0-9.]+(?:[eE][-+]?[0-9]+)?)\)?"
+NAMED = re.compile(rf"^\s*#\s*define\s+([A-Z][A-Z0-9_]*)\s+{NUMBER}\s*$|^\s*([A-Z][A-Z0-9_]*)\s*=\s*{NUMBER}\s*,?\s*$")
+REASON = re.compile(r"^\| (\w+) \| ([\w.]+) \| `(\w+)` \| `([^`]+)` \| \S.* \|$", re.M)
+NUMBERED = ("assemble", "colliders", "compile", "contact", "geometry", "solvers", "terms")  # folders of src whose numbers have a reason
 
 
 def files_of(root):
@@ -183,6 +187,22 @@ def lines_are_short(files):
             for number, line in enumerate(text.split("\n"), 1) if len(line) > 110]
 
 
+def numbers_have_reasons(files):
+    """Each fixed number with a name, other than 0 and 1, in the folders NUMBERED has a row with its value in bench/results/numbers.md, and each row
+    has a number."""
+    table = {row[:3]: row[3] for row in REASON.findall(files.get("bench/results/numbers.md", ""))}
+    found = {}
+    for path, text in sources(files, "src").items():
+        matches = [NAMED.match(line) for line in code_of(text).split("\n")] if folder_of(path) in NUMBERED else []
+        for match in filter(None, matches):
+            name, value = match.group(1) or match.group(3), match.group(2) or match.group(4)
+            if float(value) not in (0, 1):
+                found[(folder_of(path), os.path.basename(path), name)] = value
+    complaints = [f"src/{room}/{file}: {name} is {found[room, file, name]}; bench/results/numbers.md has {table.get((room, file, name), 'no row for it')}"
+                  for room, file, name in found if table.get((room, file, name)) != found[room, file, name]]
+    return complaints + [f"bench/results/numbers.md: src/{room}/{file} has no {name}" for room, file, name in table.keys() - found.keys()]
+
+
 def one_place_for_cpp(files):
     complaints = []
     for path, text in sources(files, "src", "include").items():
@@ -229,6 +249,11 @@ BROKEN = {
         {"CONTRIBUTING.md": "\n### Words\n| `gizmo` | device |\n", "src/a.h": "the\nGizmos of it"},
         {"CONTRIBUTING.md": "\n### Words\n| `gizmo` | device |\n", "src/a.c": "drape_gizmo_init();"},
         {"CONTRIBUTING.md": "\n### Words\n"}],
+    numbers_have_reasons: [
+        {"src/terms/a.c": "#define A 2\n"}, {"src/terms/a.c": "enum {\n    A = 2,\n};\n"}, {"src/terms/a.c": " # define A (1e-3) /* why */\n"},
+        {"src/terms/a.c": "#define A 2\n", "bench/results/numbers.md": "| terms | a.c | `A` | `3` | size |\n"},
+        {"src/terms/a.c": "#define A 2\n", "bench/results/numbers.md": "| terms | a.c | `A` | `2` |  |\n"},
+        {"src/terms/a.c": "", "bench/results/numbers.md": "| terms | a.c | `A` | `2` | size |\n"}],
     lines_are_short: [{"src/io/a.c": "x" * 111 + "\n"}],
     no_stray_blanks: [{"a.c": "\tx\n"}, {"a.md": "x \n"}, {"tools/a": "x"}],
 }
@@ -238,7 +263,9 @@ SOUND = {
     "src/sim/c.c": "drape_sin_cos(x); log_of(x); a->log(x); b.pow(x); sqrt(x); /* sin(x) */ fmod(x, y);\n",
     "src/sim/meson.build": "sources = ['b.c', 'c.c', 'd.c']\nentries += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1); sin(x); say(\"--dt\");\n",
     "src/sim/d.c": '/* drape list shows "--dt" */ i--; fail("drape_sim_advance: dt --");\n',
-    "src/cli/meson.build": "'main.c'\n", "src/README.md": "cli -> sim\nsim -> mesh\nmesh -> base\n", "include/drape/drape.h": '#include "export.h"\n',
+    "src/terms/a.c": "#define A 2 /* of them */\n#define B 1\n#define C (2 * D)\n", "src/terms/meson.build": "'a.c'\n", "src/io/e.c": "#define E 5\n", "src/io/meson.build": "'e.c'\n",
+    "bench/results/numbers.md": "| terms | a.c | `A` | `2` | size: of them |\n",
+    "src/cli/meson.build": "'main.c'\n", "src/README.md": "cli -> sim io\nio -> terms\nterms -> mesh\nsim -> mesh\nmesh -> base\n", "include/drape/drape.h": '#include "export.h"\n',
     "include/drape/export.h": "__cplusplus visibility\n", "tests/unit/test_a.c": "", "tests/meson.build": "'a'\n"}
 
 
