@@ -14,8 +14,7 @@ static const drape_param params[PARAM_COUNT] = {
                  .uniform = true),
     DRAPE_TURN("rotate", 0, -1e6, 1e6,
                "axis and angle, or a vector along the axis whose length is the angle; about the center of a "
-               "box, or the "
-               "origin"),
+               "box, or the origin"),
     DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
                  "radius of its edges and corners, or rims, below half of its smallest extent; its size "
                  "includes them"),

@@ -13,8 +13,7 @@ enum { A = 0, B = 3, RADIUS = 6, PARAM_COUNT = 3 }; /* places of the values */
 static const drape_param params[PARAM_COUNT] = {
     END("a", "center of one of the ends, flat or a hemisphere"),
     END("b", "center of the other one"),
-    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9,
-                 "its radius, around its center or the line from a to b"),
+    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "its radius"),
 };
 
 static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)

@@ -18,8 +18,7 @@ enum { A = 0, B = 3, RADIUS = 6, ROUNDING = 7, PARAM_COUNT = 4 }; /* places of t
 static const drape_param params[PARAM_COUNT] = {
     END("a", "center of one of the ends, flat or a hemisphere"),
     END("b", "center of the other one"),
-    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9,
-                 "its radius, around its center or the line from a to b"),
+    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "its radius"),
     DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
                  "radius of its edges and corners, or rims, below half of its smallest extent; its size "
                  "includes them"),

@@ -15,8 +15,7 @@ static const drape_param params[PARAM_COUNT] = {
     DRAPE_VECTOR("translate", "m", 0, -1e9, 1e9, "applied last"),
     DRAPE_TURN("rotate", 0, -1e6, 1e6,
                "axis and angle, or a vector along the axis whose length is the angle; about the center of a "
-               "box, or the "
-               "origin"),
+               "box, or the origin"),
     DRAPE_VECTOR("scale", "1", 1, DRAPE_ABOVE(0), 1e9, "applied first; one number: in all directions",
                  .uniform = true),
 };

@@ -9,8 +9,7 @@ enum { CENTER = 0, RADIUS = 3, PARAM_COUNT = 2 }; /* places of the values */
 
 static const drape_param params[PARAM_COUNT] = {
     DRAPE_VECTOR("center", "m", DRAPE_REQUIRED, -1e9, 1e9, "its center"),
-    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9,
-                 "its radius, around its center or the line from a to b"),
+    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "its radius"),
 };
 
 static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)

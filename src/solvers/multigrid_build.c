@@ -3,8 +3,9 @@
 
 #include <string.h>
 
-#define DENSE 64 /* largest number of block rows that are factored as one dense matrix */
-#define FEW   2  /* block rows for each rank: no more are shared */
+#define DENSE      64  /* largest number of block rows that are factored as one dense matrix */
+#define FEW        2   /* block rows for each rank: no more are shared */
+#define STAGNATION 0.7 /* of the rows of a level: with more on the next one, that is not made */
 /* of the largest weight of a row: neighbours with less are in no aggregate of its, among nodes and among
  * aggregates */
 #define CLOSE_NODES      0.8
@@ -266,7 +267,7 @@ static drape_status take_vectors(drape_arena *arena, level *l)
     return drape_arena_status(arena);
 }
 
-/* Aggregates, unless there would be more than half as many as rows. */
+/* Aggregates, unless there would be nearly as many as rows. */
 static drape_status aggregate(drape_arena *arena, drape_arena *scratch, level *l, const graph *g, bool *made)
 {
     const size_t columns = (size_t)l->a.columns;
@@ -277,7 +278,7 @@ static drape_status aggregate(drape_arena *arena, drape_arena *scratch, level *l
         return DRAPE_E_MEMORY;
     l->coarse = form_aggregates(g, l->aggregate, joined);
     const double all = drape_ranks_sum(ranks_of(l), l->coarse);
-    *made = all > 0 && 2 * all <= (double)all_rows(l);
+    *made = all > 0 && all <= STAGNATION * (double)all_rows(l);
     l->coarse = *made ? l->coarse : 0;
     l->member_start = drape_arena_take(arena, (size_t)l->coarse + 2, sizeof *l->member_start);
     if (l->member_start && *made)

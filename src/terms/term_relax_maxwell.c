@@ -10,16 +10,19 @@
 
 enum { BRANCHES = 4 };
 
-#define FRACTION(name)                                                                                       \
-    DRAPE_NUMBER(name, "1", DRAPE_DERIVED("none; at least the first is given"), DRAPE_ABOVE(0), 1,           \
-                 "part of every stiffness that relaxes with the time of the same number")
-#define TIME(name)                                                                                           \
-    DRAPE_NUMBER(name, "s", DRAPE_DERIVED("none; at least the first is given"), 1e-9, 1e12,                  \
-                 "time in which the force of that part falls to 1/e at constant strain")
+#define FRACTION "part of every stiffness that relaxes with the time of the same number"
+#define TIME     "time in which the force of that part falls to 1/e at constant strain"
+#define FURTHER(fraction, time)                                                                              \
+    DRAPE_NUMBER(fraction, "1", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1, FRACTION),                         \
+        DRAPE_NUMBER(time, "s", DRAPE_DERIVED("none"), 1e-9, 1e12, TIME)
 
 static const drape_param params[2 * BRANCHES] = {
-    FRACTION("fraction_1"), TIME("time_1"), FRACTION("fraction_2"), TIME("time_2"),
-    FRACTION("fraction_3"), TIME("time_3"), FRACTION("fraction_4"), TIME("time_4")};
+    DRAPE_NUMBER("fraction_1", "1", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1, FRACTION),
+    DRAPE_NUMBER("time_1", "s", DRAPE_REQUIRED, 1e-9, 1e12, TIME),
+    FURTHER("fraction_2", "time_2"),
+    FURTHER("fraction_3", "time_3"),
+    FURTHER("fraction_4", "time_4"),
+};
 
 /* The part of the stiffness that does not relax. */
 static double lasting(const double *values)
@@ -34,9 +37,6 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 {
     (void)cloth;
     drape_status status = DRAPE_OK;
-    for (int i = 0; i < 2; i++)
-        if (isnan(values[i]))
-            return drape_term_refuse(builder, "\"%s\" is missing: %s", params[i].name, params[i].help);
     for (int i = 0; !status && i < BRANCHES; i++) {
         const double fraction = values[2 * i], time = values[2 * i + 1];
         if (isnan(fraction) != isnan(time))

@@ -193,7 +193,7 @@ int main(void)
     drape_scene *scene = NULL;
     drape_status status = drape_context_create(NULL, &ctx);
     if (!status) status = drape_scene_parse(ctx, text, "text", &scene);
-    for (int i = 0; !status && i < 4; i++) {
+    for (int i = 0; !status && i < 3; i++) {
         drape_model *model = NULL;
         drape_sim *sim = NULL;
         status = drape_scene_set(scene, "/integrator/method", methods[i]);

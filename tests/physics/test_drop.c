@@ -200,7 +200,7 @@ END_TEST
 START_TEST(nothing_is_ever_inside_a_moving_collider)
 {
     const solid ball = {.round = true, .radius = 0.1};
-    for (size_t k = 0; k < 2 * METHODS; k++) {
+    for (size_t k = 0; k <= METHODS; k++) { /* the last time "be" with states that have not converged */
         scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 7, 'width': 0.3,"
             " 'height': 0.3, 'transform': {'translate': [-0.147, 0.12, 0.155]}},"
