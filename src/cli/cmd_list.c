@@ -27,8 +27,8 @@ typedef struct list_style {
     void (*object)(const cli_object *object);
     void (*key)(const cli_object *objects, int count, int at, const drape_scene_key *key);
     void (*table)(const drape_registry *table);
-    void (*entries_begin)(void);
-    void (*entry)(const drape_entry *entry);
+    void (*entries_begin)(const drape_registry *table);
+    void (*entry)(const drape_registry *table, const char *only, int at); /* only: as in print_table */
     void (*param)(const drape_param *param);
     void (*params)(const drape_registry *table, const char *only); /* all, after the entries; NULL: each entry
                                                                       has its own below it */
@@ -68,7 +68,15 @@ static param_text text_of_key(const cli_object *object, const drape_scene_key *k
 
 /* ---- As text ---- */
 
-static void nothing(void) {}
+static void nothing(const drape_registry *table)
+{
+    (void)table;
+}
+
+static bool is_shown(const drape_entry *entry, const char *only)
+{
+    return !only || strcmp(only, entry->name) == 0;
+}
 
 static void text_scene(void)
 {
@@ -104,8 +112,10 @@ static void text_table(const drape_registry *table)
     printf("%s (%s)%s%s\n", table->title, table->key, *table->place ? ": " : "", table->place);
 }
 
-static void text_entry(const drape_entry *entry)
+static void text_entry(const drape_registry *table, const char *only, int at)
 {
+    (void)only;
+    const drape_entry *entry = table->entries[at];
     printf("\n  %-20s %s\n", entry->name, entry->summary);
     if (entry->reference && strcmp(entry->reference, "-") != 0)
         printf("  %-20s [%s]\n", "", entry->reference);
@@ -230,23 +240,40 @@ static void markdown_table(const drape_registry *table)
         printf("\nWhere: %s.\n", table->place);
 }
 
-static void markdown_entries_begin(void)
+/* What has its keys at one place of the scene needs no table of names. */
+static void markdown_entries_begin(const drape_registry *table)
 {
-    puts("\n| name | what | reference |\n|---|---|---|");
+    if (table->entries[1])
+        puts("\n| name | what | reference |\n|---|---|---|");
+    else
+        printf("\n`%s`: %s.\n", table->entries[0]->name, table->entries[0]->summary);
 }
 
-static void markdown_entry(const drape_entry *entry)
+static bool is_same_entry(const drape_entry *a, const drape_entry *b)
 {
+    return strcmp(a->summary, b->summary) == 0 &&
+           strcmp(a->reference ? a->reference : "", b->reference ? b->reference : "") == 0;
+}
+
+/* One line for all entries of which the same is said, at the first of them. */
+static void markdown_entry(const drape_registry *table, const char *only, int at)
+{
+    const drape_entry *entry = table->entries[at];
+    const char *names[MAX_NAMES];
+    int count = 0;
+    for (int i = 0; table->entries[i] && count < MAX_NAMES; i++)
+        if (is_shown(table->entries[i], only) && is_same_entry(table->entries[i], entry)) {
+            if (i < at)
+                return;
+            names[count++] = table->entries[i]->name;
+        }
+    if (!table->entries[1])
+        return;
     fputs("|", stdout);
-    code_cell(entry->name);
+    names_cell(names, count);
     cell(entry->summary);
     cell(entry->reference && strcmp(entry->reference, "-") != 0 ? entry->reference : "");
     fputc('\n', stdout);
-}
-
-static bool is_shown(const drape_entry *entry, const char *only)
-{
-    return !only || strcmp(only, entry->name) == 0;
 }
 
 static bool is_same_param(const drape_param *a, const drape_param *b)
@@ -321,10 +348,10 @@ static void print_table(const list_style *style, const drape_registry *table, co
 {
     const drape_entry *entry;
     style->table(table);
-    style->entries_begin();
+    style->entries_begin(table);
     for (int i = 0; (entry = table->entries[i]) != NULL; i++)
         if (is_shown(entry, only)) {
-            style->entry(entry);
+            style->entry(table, only, i);
             for (int p = 0; !style->params && p < entry->param_count; p++)
                 style->param(&entry->params[p]);
         }

@@ -1,4 +1,4 @@
 /* shade_contact.c: the field contact in colours. */
 #include "render/shading.h"
 
-DRAPE_FIELD_SHADING(contact, "force of contact");
+DRAPE_FIELD_SHADING(contact);

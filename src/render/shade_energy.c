@@ -1,4 +1,4 @@
 /* shade_energy.c: the field energy in colours. */
 #include "render/shading.h"
 
-DRAPE_FIELD_SHADING(energy, "elastic energy stored in the sheet");
+DRAPE_FIELD_SHADING(energy);

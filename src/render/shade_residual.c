@@ -1,4 +1,4 @@
 /* shade_residual.c: the field residual in colours. */
 #include "render/shading.h"
 
-DRAPE_FIELD_SHADING(residual, "the residual of the equations of motion");
+DRAPE_FIELD_SHADING(residual);

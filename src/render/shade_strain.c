@@ -1,4 +1,4 @@
 /* shade_strain.c: the field strain in colours. */
 #include "render/shading.h"
 
-DRAPE_FIELD_SHADING(strain, "how far the sheet is stretched");
+DRAPE_FIELD_SHADING(strain);

@@ -1,4 +1,4 @@
 /* shade_velocity.c: the field velocity in colours. */
 #include "render/shading.h"
 
-DRAPE_FIELD_SHADING(velocity, "speed");
+DRAPE_FIELD_SHADING(velocity);

@@ -37,10 +37,10 @@ extern const char *const drape_shading_prelude[];
 extern const char drape_shading_field_source[];
 
 /* Defines the shading of the same name as a field. */
-#define DRAPE_FIELD_SHADING(id, shown)                                                                       \
+#define DRAPE_FIELD_SHADING(id)                                                                              \
     extern const drape_field_ops drape_field_##id;                                                           \
     const drape_shading drape_shading_##id = {                                                               \
-        .entry = {.name = #id, .summary = "in colours with a legend: " shown},                               \
+        .entry = {.name = #id, .summary = "in colours with a legend: the field of this name"},               \
         .source = drape_shading_field_source,                                                                \
         .field = &drape_field_##id,                                                                          \
     }

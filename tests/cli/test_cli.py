@@ -807,6 +807,9 @@ def test_list_of_keys():
     refused("list", "clot", says='did you mean "cloth"?')
     refused("list", "NOSUCH", says='there is no table or entry "NOSUCH"; the tables are scene, ')
     shown = set(re.findall(r"^\| `[^|]*` \| `([^`]*)`", good("list", "--markdown"), re.M))
+    for row in [row.split(" ... ") for row in shown if " ... " in row]:  # fraction_2 ... fraction_4
+        first, last = (int(name[-1]) for name in row)
+        shown |= {f"{row[0][:-1]}{n}" for n in range(first, last + 1)}
     wanted = set()
 
     def collect(part):
