@@ -146,12 +146,13 @@ def keys(table):
     return "\n".join(out)
 
 
-def entries(tables):
-    """Each entry, with its parameters below it."""
+def entries(lines, tables):
+    """Each entry, with its parameters below it. One that is alone has a sentence instead of a table."""
+    alone = [(*found.groups(), "") for found in (re.match(r"(`\w+`): (.*)\.$", line) for line in lines) if found]
     out = []
-    for name, what, reference in tables[0][1]:
-        out.append(item(plain(name), what, f"Source: {reference}" if reference else ""))
-        own = [line for table in tables[1:] for line in table[1] if name in line[0].split(", ")]
+    for names, what, reference in alone or tables[0][1]:
+        out.append(item(plain(names), what, f"Source: {reference}" if reference else ""))
+        own = [line for table in tables[not alone:] for line in table[1] if set(names.split(", ")) & set(line[0].split(", "))]
         if own:
             out.append(".RS")
             for _, name_of, unit, default, takes, what_it_is in own:
@@ -166,7 +167,7 @@ def scene_page():
         title, *lines = part.split("\n")
         tables = rows_of(lines)
         place = "".join(line for line in lines if line.startswith("Where: "))
-        roff = keys(tables[0]) if tables[0][0][0] == "in" else (filled(place) + "\n" if place else "") + entries(tables)
+        roff = keys(tables[0]) if tables[0][0][0] == "in" else (filled(place) + "\n" if place else "") + entries(lines, tables)
         parts.append((plain(title.upper()), roff))
     about = ("A scene is JSON, with comments. Units are SI, y is up. Forces are opt-in: a scene lists the ones it wants. Unknown keys are errors. "
              "`drape info` shows every value that is used, `drape list --schema` prints the JSON Schema. A scene of the CS184 cloth simulator is recognised "
