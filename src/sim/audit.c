@@ -281,8 +281,9 @@ void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info
         return;
     drape_energy e = measure(sim, out, drape_sim_state(sim)->internal, audit->dissipated + info->dissipated,
                              audit->pin_work + info->pin_work);
-    if (sim->rescue && !info->solved) {
-        const double taken = sim->rescue->settle(sim, before - e.numerical, info->residual_work, out->v);
+    if (sim->rescue) {
+        const double taken =
+            sim->rescue->settle(sim, fmin(before - e.numerical, info->residual_work), out->v);
         e.kinetic -= taken;
         e.numerical += taken;
     }
