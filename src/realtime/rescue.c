@@ -5,7 +5,6 @@
  */
 #include "base/clock.h"
 #include "base/reason.h"
-#include "base/vec3.h"
 #include "realtime/hold.h"
 #include "realtime/report.h"
 #include "realtime/room.h"
@@ -68,52 +67,6 @@ static void solved(drape_sim *sim, const drape_step_info *info)
 static bool takes_any(const drape_sim *sim)
 {
     return sim->realtime->active;
-}
-
-/* Half the mass of the free nodes times the square of their velocity relative to `from`. */
-static double kinetic(const drape_model *m, const double *v, const double from[3])
-{
-    double sum = 0;
-    for (int32_t f = 0; f < m->free_count; f++) {
-        const size_t i = (size_t)m->node_of_free[f];
-        double u[3];
-        vec3_sub(v + 3 * i, from, u);
-        sum += 0.5 * m->mass[i] * vec3_dot(u, u);
-    }
-    return sum;
-}
-
-/* Where a step ends when its time is spent, its residual F acts like a force of the host. With v1 = d/h, and
- * V convex, V1 - V0 <= grad V1 . d, backward Euler gains at most the work of F, less what it dissipates:
- *     E1 - E0 <= F . d - |v1 - v0|_M^2 / 2 - D
- * and nothing where F is 0. So what a step has gained, up to that work, is not left in the motion: v1 becomes
- * the velocity with that much less energy and the same momentum that is the nearest in the norm of M, smaller
- * about its mean (Dinev et al. 2018, Fast energy projection for real-time simulation of deformable objects,
- * ACM Trans. Graph. 37, project likewise). With supports, which take momentum, the mean is 0. Without this a
- * ball through a sheet of 30 x 30 nodes is late in a fifth more frames where time is short, and steps are
- * refused for their energy. Judged by what the run had lost so far, instead of step by step, it was late as
- * often. */
-static double settle(const drape_sim *sim, double gained, double *v)
-{
-    const drape_model *m = sim->model;
-    double mass = 0, mean[3] = {0};
-    if (!sim->realtime->active || !(gained > 0))
-        return 0;
-    for (int32_t f = 0; f < m->free_count && m->support_count == 0; f++) {
-        const size_t i = (size_t)m->node_of_free[f];
-        mass += m->mass[i];
-        vec3_add_scaled(m->mass[i], v + 3 * i, mean);
-    }
-    for (int k = 0; k < 3 && mass > 0; k++)
-        mean[k] /= mass;
-    const double motion = kinetic(m, v, mean), taken = fmin(gained, motion);
-    const double share = motion > 0 ? sqrt(1 - taken / motion) : 1;
-    for (int32_t f = 0; f < m->free_count; f++) {
-        double *u = v + 3 * (size_t)m->node_of_free[f];
-        for (int k = 0; k < 3; k++)
-            u[k] = mean[k] + share * (u[k] - mean[k]);
-    }
-    return taken;
 }
 
 /* Relaxes cloth that bodies leave no room at the end of the step and, if it has failed several times or is
@@ -242,7 +195,6 @@ static drape_status go_on(drape_sim *to, const drape_sim *from, const int32_t *b
 const drape_rescue_ops drape_realtime_rescue = {.begin = begin,
                                                 .solved = solved,
                                                 .takes_any = takes_any,
-                                                .settle = settle,
                                                 .failed = failed,
                                                 .accepted = accepted,
                                                 .leave = drape_realtime_leave,

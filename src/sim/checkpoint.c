@@ -100,7 +100,8 @@ static void archive_audit(drape_sim *sim, drape_archive *a)
     drape_audit *audit = &sim->audit;
     double *const sums[] = {&audit->start,    &audit->start_gravity, &audit->dissipated,
                             &audit->pin_work, &audit->offered,       &audit->lowest,
-                            &audit->best,     &audit->residual_work, &audit->best_unexplained};
+                            &audit->best,     &audit->residual_work, &audit->best_unexplained,
+                            &audit->most_lost};
     drape_archive_mark(a, "audit");
     for (size_t i = 0; i < sizeof sums / sizeof *sums; i++)
         drape_archive_double(a, sums[i]);

@@ -23,9 +23,6 @@ typedef struct drape_rescue_ops {
     void (*solved)(drape_sim *sim, const drape_step_info *info);
     /* Whether any step is better than none, however far from solved it is. */
     bool (*takes_any)(const drape_sim *sim);
-    /* A step that was not solved has gained that much energy [J] by its residual; < 0: it has lost some.
-     * Takes what it can of that out of its velocities (node_count x 3); returns how much. */
-    double (*settle)(const drape_sim *sim, double gained, double *v);
     /* An attempt has failed; status 0: by the controller alone. *stop: not to be tried again, because of this
      * status; it is set to what ends the advance after all, 0: nothing. *info describes the attempt and, of
      * another step, that. */

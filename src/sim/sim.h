@@ -26,6 +26,7 @@ typedef struct drape_audit {
     double lowest;               /* lowest energy of gravity so far */
     double best;                 /* largest numerical dissipation so far */
     double residual_work;        /* of the residuals that unconverged steps left, so far */
+    double most_lost;            /* the same with what was dissipated: all that the motion has lost */
     double best_unexplained;     /* largest numerical dissipation with that work as a source */
 } drape_audit;
 
@@ -174,8 +175,9 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
  * which measures these energies. */
 bool drape_sim_left_too_much(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
-/* Settles what the residual of a step to `out` did: what it was dissipated at once is not counted as
- * dissipated, and what it was given is taken out of it where a rescue says so (rescue.h). */
+/* Settles what the residual of a step to `out` did. What it was dissipated at once is not counted as
+ * dissipated. With a time budget, what the residuals so far have put into the motion is taken back from it:
+ * its energy never rises but by known work. */
 void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info *info);
 
 /* The energies at positions and velocities (node_count x 3) at time t, with the internal variables of the
