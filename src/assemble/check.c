@@ -17,7 +17,7 @@
  *
  * Contact is checked where the scene has it: the sheet is moved until its deepest node is half of the
  * activation distance away from a collider, or is folded onto itself; steps are relative to that
- * distance. /
+ * distance.
  */
 #include "assemble/check.h"
 
@@ -33,8 +33,8 @@
 #define DIRECTIONS      8
 #define DEFORMATION     0.08                        /* of the mean edge length, in each coordinate */
 #define DIFFERENCE_STEP ldexp(1, -DBL_MANT_DIG / 3) /* of the mean edge length */
-#define FINER           8.0                         /* from one step to the next, */
-#define LEVELS          5                           /* of so many */
+#define FINER           8.0                         /* how many times shorter than the last a step is, */
+#define LEVELS          5                           /* of so many steps */
 /* of the term's largest derivative: the smallest scale of an element's errors */
 #define MIN_SCALE        1e-6
 #define GRADIENT_LIMIT   1e-7

@@ -52,7 +52,7 @@ void drape_rotation_cross(const double w[3], double M[9])
 /* sin a / a and (1 - cos a) / a^2 */
 static void shares_of(double a, double *sine, double *versine)
 {
-    double s, c, half = fmod(a, (2 * DRAPE_PI)) / 2;
+    double s, c, half = fmod(a, 2 * DRAPE_PI) / 2;
     *sine = 1 - a * a / 6 * (1 - a * a / 20);
     *versine = 0.5 - a * a / 24 * (1 - a * a / 30);
     if (a < SMALL)
@@ -141,7 +141,7 @@ void drape_rotation_rate(const double v[3], const double w[3], double dv[3])
     const double a = vec3_norm(v);
     double s, c, last = 1.0 / 12 + a * a / 720;
     if (a >= SMALL) {
-        drape_sin_cos(fmod(a, (2 * DRAPE_PI)) / 2, &s, &c);
+        drape_sin_cos(fmod(a, 2 * DRAPE_PI) / 2, &s, &c);
         last = 1 / (a * a) - c / (2 * a * s);
     }
     combine(v, w, -0.5, last, dv);

@@ -44,11 +44,11 @@ static drape_status solve_stage(trbdf2_state *s, double w, double *x, double *v,
     e->point.weight = w;
     e->mass_weight = w * w;
     drape_status status = drape_implicit_solve_from(&s->common, info);
-    if (status && !info->usable)
+    if (status)
         return status;
     memcpy(x, e->x, e->nodes * sizeof *x);
     memcpy(v, e->v, e->nodes * sizeof *v);
-    return status;
+    return DRAPE_OK;
 }
 
 /* Computes g0, with the mean velocities of pins and colliders in the stage. */
@@ -82,7 +82,7 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
     if (s->p0)
         memcpy(c->momentum[0], s->p0, e->nodes * sizeof *s->p0);
     drape_implicit_momentum(c, e->point.t, s->xg, s->vg, c->momentum[1]);
-    if (!status || info->usable)
+    if (!status)
         drape_implicit_audit_stage(c, in->x, s->xg, in->t, GAMMA * h, s->g0, info);
     return status;
 }
@@ -112,29 +112,18 @@ static drape_status differentiate(trbdf2_state *s, const drape_state *in, double
     drape_implicit_set_momenta(c, w, A1, c->momentum[0], -A0, s->p0);
     drape_status status = solve_stage(s, w, out->x, out->v, info);
     drape_implicit_momentum(c, out->t, out->x, out->v, c->momentum[1]);
-    if (!status || info->usable)
+    if (!status)
         drape_implicit_audit_stage(c, s->xg, out->x, in->t + GAMMA * h, (1 - GAMMA) * h, s->g0, info);
     return status;
 }
 
-/* With on_failure accept, an unconverged first stage is reported even if the second converges. */
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
     trbdf2_state *s = state;
-    double w = 2 / (GAMMA * h);
-    drape_status first = trapezoid(s, in, h, w, info);
-    if (first && !info->usable)
-        return first;
-    const drape_step_info before = *info;
-    drape_status second = differentiate(s, in, h, w, out, info);
-    if (!first || second)
-        return second;
-    info->reason = before.reason;
-    info->residual = before.residual;
-    info->usable = before.usable;
-    info->diagnostic = before.diagnostic;
-    return first;
+    const double w = 2 / (GAMMA * h);
+    const drape_status first = trapezoid(s, in, h, w, info);
+    return first ? first : differentiate(s, in, h, w, out, info);
 }
 
 const drape_integrator_ops drape_integrator_trbdf2 = {

@@ -357,7 +357,7 @@ static bool is_part(const drape_folder *f, const char *name)
  * removed, too. */
 static drape_status remove_one(drape_folder *f, const char *name, const claims *c)
 {
-    struct stat info;
+    struct stat info = {0};
     const bool claimed = c->clears && c->clears(c->user, name),
                part = !c->writes && !f->shared && is_part(f, name);
     if (!part && (!claimed || why_not_ours(f, name, &info) || is_input(f, &info)))

@@ -8,8 +8,8 @@
 
 #include <string.h>
 
-#define MODES      (3 + 3) /* rigid motions, translations and rotations: unknowns of an aggregate */
-#define MAX_LEVELS (8 * (int)sizeof(int32_t)) /* each has at most half of the rows of the one before */
+#define MODES      6  /* rigid motions, translations and rotations: unknowns of an aggregate */
+#define MAX_LEVELS 32 /* a level usually has a few times fewer rows, whose numbers have 32 bits */
 
 /* Symmetric, in block rows of `size` scalars. Like the columns of drape_pattern, the scalar rows of a block
  * row are each contiguous: row c begins at values + size (size start[j] + c (start[j + 1] - start[j])). */
