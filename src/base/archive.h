@@ -24,6 +24,9 @@
 
 struct drape_rows;
 
+/* Bytes of the longest text that an archive has: the description of a build. */
+#define DRAPE_ARCHIVE_TEXT 320
+
 /* Writes the rows of all ranks (base/ranks.h) from this offset on, where the next bytes would be. `size`: of
  * the whole array; *sum: what it adds to the checksum. Collective. The file reports a failure when it
  * ends. */

@@ -6,10 +6,6 @@
 #include "base/param.h"
 #include "compile/compile.h"
 
-/* The largest magnitude [in SI units, or degrees] that lists of a scene may have: keys of tracks and
- * histories, pivots, velocities. Others have ranges of their own. */
-#define DRAPE_MOST 1e9
-
 /* Checks a def along the keys of a scene: required arrays are not NULL, all values are in range. */
 drape_status drape_compile_check_def(drape_context *ctx, const drape_scene_def *def);
 

@@ -22,13 +22,8 @@
 enum { PARAM_DT_MIN, PARAM_RTOL, PARAM_ATOL_X, PARAM_ATOL_V, PARAM_COUNT };
 enum { SCRATCH_LAST_ERROR };
 
-#define INTEGRAL     0.7
-#define PROPORTIONAL 0.4
-#define SAFETY       0.9 /* fraction of the step that the estimate allows */
-#define MAX_GROWTH   2.0 /* bdf2 is zero-stable below 1 + sqrt(2) */
-#define MAX_CUT      0.2
-#define FIRST_SHARE  10.0 /* see first_error */
-#define MIN_ERROR    1e-4 /* smaller errors are round-off and say nothing about the next step */
+#define MAX_GROWTH  2.0  /* bdf2 is zero-stable below 1 + sqrt(2) */
+#define FIRST_SHARE 10.0 /* see first_error */
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
@@ -108,15 +103,10 @@ static double local_error(const double *values, const drape_trial *trial, int32_
     return p.points == 1 && isfinite(error) ? first_error(error, sqrt(positions / count)) : error;
 }
 
-static double bounded(double factor)
-{
-    return fmin(MAX_GROWTH, fmax(MAX_CUT, factor));
-}
-
 static drape_verdict reject(const double *values, drape_trial *trial, double error, int32_t node)
 {
-    double factor =
-        isnan(error) ? 0.5 : fmin(0.9, bounded(SAFETY * drape_pow(error, -1.0 / (trial->order + 1))));
+    const double allowed = drape_pow(error, -1.0 / (trial->order + 1)),
+                 factor = isnan(error) ? 0.5 : fmax(DRAPE_STEP_CUT, DRAPE_STEP_SAFETY * allowed);
     trial->status = DRAPE_RETRY_REJECTED;
     trial->info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
     trial->info->diagnostic =
@@ -143,11 +133,9 @@ static drape_verdict judge(const double *values, drape_trial *trial)
     double error = local_error(values, trial, &node), last = trial->scratch[SCRATCH_LAST_ERROR];
     if (!(error <= 1)) /* also rejects NaN */
         return reject(values, trial, error, node);
-    double e = fmax(error, MIN_ERROR), before = last > 0 ? last : e, p = trial->order + 1;
-    trial->scratch[SCRATCH_LAST_ERROR] = e;
-    trial->h_next =
-        trial->h * bounded(SAFETY * drape_pow(e, -INTEGRAL / p) * drape_pow(before, PROPORTIONAL / p));
-    trial->h_next = fmax(values[PARAM_DT_MIN], trial->h_next);
+    const double factor = drape_step_factor(error, last > 0 ? last : error, trial->order + 1);
+    trial->scratch[SCRATCH_LAST_ERROR] = fmax(error, DRAPE_LEAST_ERROR);
+    trial->h_next = fmax(values[PARAM_DT_MIN], fmin(MAX_GROWTH, factor) * trial->h);
     return DRAPE_ACCEPT;
 }
 

@@ -9,14 +9,14 @@
  */
 #include "base/reason.h"
 #include "control/halve.h"
+#include "integrators/tolerance.h"
 
 #include <math.h>
 
 enum { PARAM_DT_MIN, PARAM_COUNT };
 enum { SCRATCH_LIMIT, SCRATCH_LEFT };
 
-#define SAFETY 0.9 /* fraction that is taken of the stability limit */
-#define EVERY  10  /* steps between two estimates of it */
+#define EVERY 10 /* steps between two estimates of the stability limit */
 #define SLACK                                                                                                \
     1e-6 /* relative tolerance between the limit from which a step was chosen and the same limit estimated
             again */
@@ -62,7 +62,7 @@ static drape_verdict reject(const double *values, drape_trial *trial, double lim
                                                  .limit = 1};
     drape_verdict verdict = drape_halve(values[PARAM_DT_MIN], trial);
     if (verdict == DRAPE_RETRY)
-        trial->h_next = fmin(0.9 * trial->h, fmax(values[PARAM_DT_MIN], SAFETY * limit));
+        trial->h_next = fmax(values[PARAM_DT_MIN], DRAPE_STEP_SAFETY * limit);
     trial->scratch[SCRATCH_LEFT] = 0;
     return verdict;
 }
@@ -76,7 +76,7 @@ static drape_verdict judge(const double *values, drape_trial *trial)
         return reject(values, trial, limit);
     if (trial->status && !trial->info->usable)
         return drape_halve(values[PARAM_DT_MIN], trial);
-    trial->h_next = fmax(values[PARAM_DT_MIN], fmin(SAFETY * limit, trial->dt));
+    trial->h_next = fmax(values[PARAM_DT_MIN], fmin(DRAPE_STEP_SAFETY * limit, trial->dt));
     return DRAPE_ACCEPT;
 }
 

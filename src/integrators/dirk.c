@@ -26,29 +26,20 @@
  * positions and velocities at order 2 and 3, of degree 5 with accelerations above. Their local error is
  * of one order more than the method. Velocities are of degree 3, from velocities and accelerations.
  */
-#include "base/elementary.h"
 #include "integrators/first_order.h"
 
 #include <arkode/arkode_arkstep.h>
 #include <math.h>
 #include <string.h>
 
-#define LOOSE_ORDER  3
-#define TIGHT_ORDER  5
-#define NEWTON_SHARE 0.1 /* of the error tolerance: bound for the error of the Newton iteration */
+#define LOOSE_ORDER 3
+#define TIGHT_ORDER 5
 /* The matrix is factored again when gamma changed by more than this; the test of convergence notices
  * earlier if it must be. */
 #define GAMMA_CHANGE    0.2
+#define FIRST_SHARE     1e-3
+#define FIRST_CHANGE    0.5
 #define MAX_CORRECTIONS 6 /* of the undamped Newton iteration */
-/* The next step, from the estimated local error e of this one and the one before, relative to the
- * tolerance: h S e^(-I/k) e'^(P/k), k the order of the error (Gustafsson 1991). A growth below KEEP is
- * not worth a new matrix. */
-#define SAFETY     0.9
-#define INTEGRAL   0.7
-#define PROPORTION 0.3
-#define SHRINK     0.2
-#define GROWTH     5.0
-#define KEEP       1.2
 /* Large steps of a stiff sheet, which the error would allow, need several new matrices in each stage; more
  * steps of half the size need fewer. Above one matrix a stage steps shrink by EFFORT_SHRINK, above half of
  * one they do not grow. At a tolerance of 1e-2 this saves a quarter to half of the time. Where contact is as
@@ -56,7 +47,6 @@
 #define EFFORT        1.0
 #define EFFORT_SHRINK 0.7
 #define EFFORT_LEAST  0.06
-#define TINY_ERROR    1e-10
 
 enum { PARAM_FIXED_STEP = DRAPE_FIRST_ORDER_OWN, PARAM_COUNT };
 
@@ -183,9 +173,7 @@ static bool configure(drape_first_order *f)
            !ARKStepSetNonlinearSolver(m, f->newton.solver) && drape_sun_newton_set_test(&f->newton) &&
            !ARKStepSetDeduceImplicitRhs(m, SUNTRUE) && !ARKStepSetStagePredictFn(m, predict) &&
            !ARKStepSetMaxNonlinIters(m, MAX_CORRECTIONS) &&
-           !ARKStepSetMaxErrTestFails(m, DRAPE_FIRST_ORDER_ERROR_FAILS) &&
-           !ARKStepSetMaxConvFails(m, DRAPE_FIRST_ORDER_SOLVER_FAILS) &&
-           !ARKStepSetNonlinConvCoef(m, NEWTON_SHARE) && !ARKStepSetMaxHnilWarns(m, -1) &&
+           !ARKStepSetNonlinConvCoef(m, DRAPE_NEWTON_SHARE) && !ARKStepSetMaxHnilWarns(m, -1) &&
            !ARKStepSetMaxStep(m, drape_first_order_max_step(f));
 }
 
@@ -216,11 +204,19 @@ static void destroy_vectors(drape_first_order *f)
     N_VDestroy(s->far);
 }
 
+/* As IDA chooses it: y, with the rate, changes by half of its tolerance; at most a thousandth of the span without
+ * a kink. Waves that are set off there are resolved, unless the tolerance is larger. */
+static double first_step(const drape_first_order *f)
+{
+    const double h = FIRST_SHARE * (f->span[1] - f->span[0]), norm = drape_first_order_norm(f, f->rate);
+    return norm * h > FIRST_CHANGE ? FIRST_CHANGE / norm : h;
+}
+
 static bool begin(drape_first_order *f, double t, double h)
 {
     dirk_state *s = (dirk_state *)f;
     s->t = t;
-    s->next = h > 0 ? h : isnan(fixed_step(s)) ? drape_first_order_first_step(f) : fixed_step(s);
+    s->next = h > 0 ? h : isnan(fixed_step(s)) ? first_step(f) : fixed_step(s);
     s->error = 1;
     return true;
 }
@@ -273,10 +269,9 @@ static void choose_next(dirk_state *s)
     }
     ARKStepGetNumStepAttempts(f->memory, &attempts);
     ARKStepGetEstLocalErrors(f->memory, f->between);
-    const double error = fmax(TINY_ERROR, drape_first_order_norm(f, f->between)), chosen = s->next;
-    double growth = SAFETY * drape_pow(error, -INTEGRAL / k) * drape_pow(s->error, PROPORTION / k);
-    growth = fmax(SHRINK, fmin(attempts > 1 ? 1 : GROWTH, growth));
-    if (growth > 1 && growth < KEEP)
+    const double error = drape_first_order_norm(f, f->between), chosen = s->next;
+    double growth = drape_step_factor(error, s->error, k);
+    if (growth > 1 && (attempts > 1 || growth < DRAPE_STEP_KEPT))
         growth = 1;
     s->next = limit_effort(s, growth) * s->h;
     if (attempts == 1 && s->t == f->span[1])

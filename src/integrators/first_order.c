@@ -4,6 +4,7 @@
 
 #include "base/finite.h"
 #include "base/reason.h"
+#include "integrators/instant.h"
 #include "solvers/vector.h"
 
 #include <float.h>
@@ -12,8 +13,6 @@
 
 enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
 
-#define FIRST_SHARE    1e-3 /* of the first step; IDA's own */
-#define FIRST_CHANGE   0.5
 #define MAX_EXACT_SPAN 64 /* maximum number of exact matrices in a row if symmetric ones keep failing */
 /* Fraction of the time: steps whose sum ends this near to the end of an advance end there. What is left is
  * the sum's rounding error, which the schedule does not step over. */
@@ -21,21 +20,11 @@ enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
 /* Relative residual of iterative linear solvers. IDA allows them 0.05 of the bound of the Newton iteration,
  * here 0.1 of the error tolerance. With this, corrections of up to 50 tolerances are within that; a larger
  * one does not end the iteration. */
-#define LINEAR_TOLERANCE 1e-4
+#define LINEAR_TOLERANCE DRAPE_LINEAR_TIGHT
 
 const char *const drape_first_order_matrices[] = {
     [MATRIX_AUTO] = "auto", [MATRIX_SYMMETRIC] = "symmetric", [MATRIX_EXACT] = "exact", NULL};
 /* ---- Between vectors and nodes ---- */
-
-/* Within a step no pin has a kink, so its velocity is the same at any time inside the span. */
-static void place_pins(drape_first_order *s, double t)
-{
-    const drape_motion *m = s->motion;
-    drape_motion_place_pins(m, t, s->x);
-    for (int32_t i = 0; i < m->moved_count; i++)
-        drape_motion_pin_velocity(m, i, t, (s->span[0] + s->span[1]) / 2,
-                                  s->v + 3 * (size_t)m->moved_node[i]);
-}
 
 /* s->x, s->v at time t. */
 static drape_point point_at(const drape_first_order *s, double t)
@@ -50,7 +39,7 @@ static drape_point point_at(const drape_first_order *s, double t)
 
 static drape_point place(drape_first_order *s, double t, const double *y)
 {
-    place_pins(s, t);
+    drape_instant_place_pins(s->motion, t, s->span, s->x, s->v);
     for (int64_t i = 0; i < s->n; i++) {
         s->x[drape_first_order_at(s, i)] = y[i];
         s->v[drape_first_order_at(s, i)] = y[s->n + i];
@@ -99,12 +88,6 @@ double drape_first_order_norm(const drape_first_order *s, N_Vector vector)
     for (int64_t i = 0; i < 2 * s->n; i++)
         sum += a[i] / w[i] * (a[i] / w[i]);
     return sqrt(drape_ranks_sum(s->ranks, sum) / (6 * (double)drape_model_all_free(s->model)));
-}
-
-double drape_first_order_first_step(const drape_first_order *s)
-{
-    const double h = FIRST_SHARE * (s->span[1] - s->span[0]), norm = drape_first_order_norm(s, s->rate);
-    return norm * h > FIRST_CHANGE ? FIRST_CHANGE / norm : h;
 }
 
 /* ---- Jacobian ---- */
@@ -243,38 +226,17 @@ int drape_first_order_solve_rhs(SUNLinearSolver solver, SUNMatrix matrix, N_Vect
 
 /* ---- Work of dissipation, pins and colliders ---- */
 
-/* Power at time t of forces on moving colliders; NULL: no contact. */
-static double collider_power(const drape_first_order *s, double t, const drape_load *load)
-{
-    return drape_motion_collider_power(s->motion, load, t, (s->span[0] + s->span[1]) / 2);
-}
-
 /* Power at the state in s->x, s->v at time t: of dissipative forces, and of the forces that move pins and
  * colliders. */
 static void measure_powers(drape_first_order *s, double t, double powers[2])
 {
-    const drape_model *m = s->model;
-    const drape_motion *motion = s->motion;
     const drape_point point = point_at(s, t);
-    powers[0] = powers[1] = 0;
-    if (s->dissipated) {
-        drape_system_dissipation(s->system, &point, s->dissipated);
-        for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
-            if (drape_model_owns(m, (int32_t)(i / 3)))
-                powers[0] += s->dissipated[i] * s->v[i];
-        powers[0] += drape_system_support_power(s->system, s->dissipated, (s->span[0] + s->span[1]) / 2);
-        powers[0] += collider_power(s, t, drape_system_on_colliders(s->system));
-    }
-    if (drape_system_is_driven(s->system))
+    powers[0] = s->dissipated ? drape_instant_dissipation(s->system, &point, s->dissipated) : 0;
+    powers[1] = 0;
+    if (drape_system_is_driven(s->system)) {
         drape_system_force(s->system, &point, s->g);
-    powers[1] += drape_system_support_power(s->system, NULL, (s->span[0] + s->span[1]) / 2);
-    powers[1] += collider_power(s, t, drape_system_on_colliders(s->system));
-    for (int32_t i = 0; i < motion->moved_count; i++)
-        for (size_t k = 0; k < 3; k++) {
-            size_t at = 3 * (size_t)motion->moved_node[i] + k;
-            if (drape_model_owns(m, motion->moved_node[i]))
-                powers[1] += s->g[at] * s->v[at];
-        }
+        powers[1] = drape_instant_driving(s->system, &point, s->g);
+    }
     if (s->ranks)
         s->ranks->sum(s->ranks, powers, 2);
 }
@@ -314,25 +276,6 @@ static void diagnose(drape_first_order *s, drape_step_info *info)
     for (int64_t i = 0; i < s->n; i++)
         s->reduced[i] = fmax(fabs(e[i]) / w[i], fabs(e[s->n + i]) / w[s->n + i]);
     info->diagnostic = drape_system_diagnose_dof(s->system, s->reduced, "local error / tolerance", 1);
-}
-
-/* Bounds the work, because steps may follow a degenerate, undamped sheet for ever without a failure. The
- * bound is a rate, so that it does not depend on how a host divides its advances; steps that end an advance
- * are the host's choice and are not counted. A host that continues after the failure gets the same number
- * of steps again. */
-static bool exhausted(drape_first_order *s, const drape_state *in, drape_step_info *info)
-{
-    if (floor(in->t) != s->second)
-        s->steps = 0;
-    s->second = floor(in->t);
-    if (s->steps++ < (int64_t)s->values[DRAPE_FIRST_ORDER_MAX_STEPS])
-        return false;
-    s->steps = 0;
-    info->reason = drape_reason_name(DRAPE_REASON_MAX_STEPS);
-    if (s->n > 0)
-        s->solver->last_step(s->memory, &info->h);
-    diagnose(s, info);
-    return true;
 }
 
 /* Stops a run whose steps have become so small that it no longer moves, as where nothing can yield. */
@@ -388,7 +331,7 @@ static drape_status prepare(drape_first_order *s, const drape_state *in, double 
     if (s->n == 0) {
         const double most = s->values[DRAPE_FIRST_ORDER_MAX_STEP];
         *t = fmin(*t, in->t + (isnan(most) ? s->model->duration / DRAPE_STEPS_WITHOUT_UNKNOWNS : most));
-        place_pins(s, in->t);
+        drape_instant_place_pins(s->motion, in->t, s->span, s->x, s->v);
         measure_powers(s, in->t, s->powers);
         return DRAPE_OK;
     }
@@ -454,8 +397,13 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     const size_t nodes = 3 * (size_t)s->model->node_count;
     double end = out->t, t = end;
     info->tolerance = info->residual = NAN; /* it bounds errors, not residuals */
-    if (exhausted(s, in, info))
+    if (drape_steps_exhausted(in->t, s->values[DRAPE_FIRST_ORDER_MAX_STEPS], true, &s->second, &s->steps)) {
+        info->reason = drape_reason_name(DRAPE_REASON_MAX_STEPS);
+        if (s->n > 0)
+            s->solver->last_step(s->memory, &info->h);
+        diagnose(s, info);
         return DRAPE_E_STEP_TOO_SMALL;
+    }
     /* The sim rejected the last step, which the solver had accepted: mostly because of its energy. */
     if (in->t == s->from)
         s->newton.strict = true;

@@ -66,9 +66,7 @@ enum {
         "from it with friction and dashpots; auto: symmetric, and exact for a while if that fails")
 extern const char *const drape_first_order_matrices[];
 
-#define DRAPE_FIRST_ORDER_TIGHT        1e-4 /* rtol below which the higher order is the default */
-#define DRAPE_FIRST_ORDER_ERROR_FAILS  10   /* error test failures in one step */
-#define DRAPE_FIRST_ORDER_SOLVER_FAILS 10   /* convergence failures in one step */
+#define DRAPE_FIRST_ORDER_TIGHT 1e-4 /* rtol below which the higher order is the default */
 
 /* The part of an integrator that all have in common; the functions are declared below. */
 #define DRAPE_FIRST_ORDER_OPS                                                                                \
@@ -188,9 +186,6 @@ static inline double drape_first_order_max_step(const drape_first_order *f)
 int drape_first_order_rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user);
 /* Weighted root mean square of a vector: 1 is the tolerance. */
 double drape_first_order_norm(const drape_first_order *f, N_Vector vector);
-/* A first step, as IDA chooses it: y, with the rate in f->rate, changes by half of its tolerance; at most a
- * thousandth of the span without a kink [s]. */
-double drape_first_order_first_step(const drape_first_order *f);
 /* Assembles K + c_j D + c_j^2 M at (t, y), and D; of I - gamma J, c_j = 1/gamma. 0, or < 0: fatal. */
 int drape_first_order_jacobian(drape_first_order *f, double t, double cj, const double *y);
 /* Solves with (r1, r2) as above. Status of the linear solver. */

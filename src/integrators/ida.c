@@ -16,10 +16,6 @@
 
 #define LOOSE_ORDER 2
 #define TIGHT_ORDER 5
-/* Of the error tolerance: bound for the error of the Newton iteration. With IDA's own, 0.33, an undamped
- * sheet of E h = 1e9 N/m lost a third of its energy in 0.5 s at rtol 1e-3 and ended 0.22 m off; with this a
- * tenth, and 0.04 m off. It takes a sixth more residuals and matrices on a hung sheet. */
-#define NEWTON_SHARE 0.1
 /* The matrix is factored again when c_j changed by more than (1 - d)/(1 + d). IDA's own d, 0.25, takes a
  * quarter more residuals for as many factorisations. */
 #define CJ_CHANGE 0.1
@@ -58,9 +54,8 @@ static bool configure(drape_first_order *s)
            !IDASetNonlinearSolver(s->memory, s->newton.solver) && drape_sun_newton_set_test(&s->newton) &&
            !IDASetJacFn(s->memory, jacobian) &&
            !IDASetMaxOrd(s->memory, (int)s->values[DRAPE_FIRST_ORDER_ORDER]) &&
-           !IDASetMaxErrTestFails(s->memory, DRAPE_FIRST_ORDER_ERROR_FAILS) &&
-           !IDASetMaxConvFails(s->memory, DRAPE_FIRST_ORDER_SOLVER_FAILS) &&
-           !IDASetNonlinConvCoef(s->memory, NEWTON_SHARE) && !IDASetDeltaCjLSetup(s->memory, CJ_CHANGE) &&
+           !IDASetNonlinConvCoef(s->memory, DRAPE_NEWTON_SHARE) &&
+           !IDASetDeltaCjLSetup(s->memory, CJ_CHANGE) &&
            !IDASetMaxStep(s->memory, drape_first_order_max_step(s));
 }
 

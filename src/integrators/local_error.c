@@ -7,16 +7,11 @@
 #include <float.h>
 #include <math.h>
 
-#define SAFETY     0.8
-#define MAX_GROWTH 5.0
-#define MAX_CUT    0.2
-#define RETRY_CUT  0.9  /* at most, after a failed test */
-#define MIN_ERROR  1e-2 /* below, the growth is limited anyway, and the ratio of two errors is noise */
 /* Share of the time in which the scene moves by its size that the first step takes at an error of 1. A
- * step that is too long costs one attempt, one that is too short a few to grow by MAX_GROWTH. */
+ * step that is too long costs one attempt, one that is too short a few to grow by DRAPE_STEP_GROWTH. */
 #define START_SHARE 0.1
 /* Fraction: a step as long as this much of what is left before a stop ends there; the rest is rounding. */
-#define LANDED (1 - 1e-9)
+#define LANDED (1 - DRAPE_SAME)
 
 void drape_local_error_init(const drape_system *system, const double *values, int power, drape_local_error *c)
 {
@@ -84,21 +79,6 @@ static double first_step(const drape_local_error *c, const drape_state *in, cons
     return START_SHARE / rate * drape_pow(relative, 1 / c->power);
 }
 
-/* Bounds the work, because steps may follow a degenerate, undamped sheet for ever without a failure. The
- * bound is a rate, so that it does not depend on how a host divides its advances. A host that continues after
- * the failure gets the same number of steps again. */
-static bool exhausted(drape_local_error *c, const drape_state *in, const drape_local_attempt *a)
-{
-    if (floor(in->t) != c->second)
-        c->steps = 0;
-    c->second = floor(in->t);
-    c->steps += a->t1 != a->end;
-    if ((double)c->steps <= c->max_steps)
-        return false;
-    c->steps = 0;
-    return true;
-}
-
 drape_status drape_local_error_begin(drape_local_error *c, const drape_state *in, const double *g,
                                      drape_local_attempt *a, drape_step_info *info)
 {
@@ -113,7 +93,7 @@ drape_status drape_local_error_begin(drape_local_error *c, const drape_state *in
     a->cut = a->h < LANDED * fmin(c->past.proposed, c->max_step);
     a->t1 = a->h == left ? a->stop : in->t + a->h;
     info->h = a->h;
-    if (exhausted(c, in, a)) {
+    if (drape_steps_exhausted(in->t, c->max_steps, a->t1 != a->end, &c->second, &c->steps)) {
         info->reason = drape_reason_name(DRAPE_REASON_MAX_STEPS);
         return DRAPE_E_STEP_TOO_SMALL;
     }
@@ -145,24 +125,24 @@ double drape_local_error_norm(const drape_local_error *c, const double *ex, cons
     return sqrt(sum / (6.0 * fmax(1, m->free_count)));
 }
 
-/* Without bounds: h e^(-1/q), less the safety. Far below MIN_ERROR it is as good as infinite. */
+/* Without bounds: h e^(-1/q), less the safety. Far below DRAPE_LEAST_ERROR it is as good as infinite. */
 static double elementary(const drape_local_error *c, double h, double error)
 {
-    return SAFETY * h * drape_pow(fmax(error, DBL_EPSILON), -1 / c->power);
+    return DRAPE_STEP_SAFETY * h * drape_pow(fmax(error, DBL_EPSILON), -1 / c->power);
 }
 
 static double propose(const drape_local_error *c, const drape_local_attempt *a, double error)
 {
     const drape_step_record *past = &c->past;
-    const double e = fmax(error, MIN_ERROR), simple = elementary(c, a->h, error);
+    const double e = fmax(error, DRAPE_LEAST_ERROR), simple = elementary(c, a->h, error);
     /* the error of a much shorter step is rounding */
     if (a->cut && !a->again)
-        return a->h > MAX_CUT * past->proposed ? fmin(simple, past->proposed) : past->proposed;
+        return a->h > DRAPE_STEP_CUT * past->proposed ? fmin(simple, past->proposed) : past->proposed;
     double next = simple;
     if (past->h > 0)
         next =
             fmin(next, elementary(c, a->h, e) * (a->h / past->h) * drape_pow(past->error / e, 1 / c->power));
-    next = fmin(fmax(next, MAX_CUT * a->h), (a->again ? 1 : MAX_GROWTH) * a->h);
+    next = fmin(fmax(next, DRAPE_STEP_CUT * a->h), (a->again ? 1 : DRAPE_STEP_GROWTH) * a->h);
     return next > a->h && next < c->kept_growth * a->h ? a->h : next;
 }
 
@@ -177,7 +157,7 @@ static drape_status reject(const drape_local_error *c, const drape_local_attempt
                                           .cloth = node >= 0 ? drape_model_cloth_of(c->model, node) : -1,
                                           .value = error,
                                           .limit = 1};
-    info->retry = fmin(fmax(elementary(c, a->h, error), MAX_CUT * a->h), RETRY_CUT * a->h);
+    info->retry = fmax(elementary(c, a->h, error), DRAPE_STEP_CUT * a->h);
     return DRAPE_RETRY_REJECTED;
 }
 
@@ -199,7 +179,7 @@ drape_status drape_local_error_test(drape_local_error *c, const drape_local_atte
     const bool whole = !a->cut || a->again;
     c->made = (drape_step_record){.end = a->t1,
                                   .h = whole ? a->h : c->past.h,
-                                  .error = whole ? fmax(error, MIN_ERROR) : c->past.error,
+                                  .error = whole ? fmax(error, DRAPE_LEAST_ERROR) : c->past.error,
                                   .proposed = propose(c, a, error)};
     info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
     return DRAPE_OK;

@@ -39,16 +39,14 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_TOLERANCE] = DRAPE_TOLERANCE_PARAM,
 };
 
-#define ERROR_SHARE         1e-3     /* default of error, of the size of the scene */
-#define MOST_FURTHER        20       /* iterations beyond the least */
-#define MOST_EXTRAPOLATED   0.5      /* of the last change of velocity */
-#define SHORTER             0.999999 /* of a step: not by the rounding of its time */
-#define LINEAR_TOLERANCE    0.1      /* relative residual that conjugate gradients leave, at NOMINAL_RATE */
-#define NOMINAL_RATE        60.      /* [1/s] */
-#define MAX_LINEAR_RESIDUAL 0.5      /* relative residual left at any step size */
+#define ERROR_SHARE         1e-3 /* default of error, of the size of the scene */
+#define MOST_FURTHER        20   /* iterations beyond the least */
+#define MOST_EXTRAPOLATED   0.5  /* of the last change of velocity */
+#define LINEAR_TOLERANCE    0.1  /* relative residual that conjugate gradients leave, at NOMINAL_RATE */
+#define NOMINAL_RATE        60.  /* [1/s] */
+#define MAX_LINEAR_RESIDUAL 0.5  /* relative residual left at any step size */
 
-#define LINEAR_ITERATIONS 60 /* of conjugate gradients for each correction */
-#define CHEAP_LINEAR      4  /* the same in a step that is to be cheap */
+#define CHEAP_LINEAR 4 /* the same in a step that is to be cheap */
 
 #define PAST 3 /* velocities that are kept */
 
@@ -134,7 +132,7 @@ static void guess(newton_k *s, const drape_state *in, double h)
 {
     const drape_step_equation *e = &s->common.equation;
     double before = in->t - s->past_time[1], share = 0;
-    if (before < SHORTER * h)
+    if (before < (1 - DRAPE_SAME) * h)
         before = h;
     if (!isnan(before) && !s->touched)
         share = fmin(MOST_EXTRAPOLATED, correlation(s, in)) * h * h / before;
@@ -173,7 +171,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
                                         .keeps = true,
                                         .linear_tolerance = linear_tolerance(s),
                                         .cheap = s->cheap,
-                                        .linear_iterations = s->cheap ? CHEAP_LINEAR : LINEAR_ITERATIONS};
+                                        .linear_iterations =
+                                            s->cheap ? CHEAP_LINEAR : DRAPE_LINEAR_ITERATIONS};
     drape_status status = drape_newton_solve(s->common.newton, &effort, s->common.d, &report);
     drape_implicit_report(&report, info);
     s->touches = drape_system_touches(e->system);

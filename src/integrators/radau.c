@@ -39,6 +39,7 @@
 #include "base/elementary.h"
 #include "base/finite.h"
 #include "base/reason.h"
+#include "integrators/instant.h"
 #include "integrators/local_error.h"
 #include "integrators/radau_matrix.h"
 
@@ -49,8 +50,7 @@
 enum { PARAM_NEWTON_SHARE = DRAPE_LOCAL_ERROR_PARAM_COUNT, PARAM_LINEAR_SOLVER, PARAM_COUNT };
 enum { STAGES = 3 };
 
-#define ERROR_POWER 4   /* the error of the embedded formula is O(h^4) */
-#define KEPT_GROWTH 1.2 /* less is not worth new factors */
+#define ERROR_POWER 4 /* the error of the embedded formula is O(h^4) */
 /* Of Newton's iteration. */
 #define MAX_ITERATIONS 10
 #define FAST                                                                                                 \
@@ -59,16 +59,14 @@ enum { STAGES = 3 };
 #define AIM 0.3 /* rate for which the next step is made short enough */
 /* Extrapolation, in steps of the last size: one that was cut by the end of an advance may be tiny. */
 #define FARTHEST 8.0
-#define SLOWEST  0.99
 /* Where the iteration failed, the next step is at most this much of that, and from step to step the limit is
  * relaxed by a factor. With contact this saves a third of the time. */
 #define CEILING      0.5
 #define RELAXATION   1.2
 #define NEWTON_SHARE 0.03 /* of the error's bound: error that the iteration may leave */
-#define ROUNDING     10.0 /* of the sizes of the scene: no smaller error can be asked for */
 /* Residual of the complex system, relative. 1e-3 takes a third more solves and saves a fiftieth of the
  * iterations; 0.1 takes up to twice as many. */
-#define LINEAR_TOLERANCE 1e-2
+#define LINEAR_TOLERANCE DRAPE_LINEAR_TOLERANCE
 
 static const double fraction[STAGES] = {0.1550510257216821902, 0.6449489742783178098, 1};
 static const double quadrature[STAGES] = {0.3764030627004672751, 0.5124858261884216138,
@@ -154,20 +152,10 @@ static size_t node_at(const radau_state *s, int64_t i)
     return 3 * (size_t)s->model->node_of_free[i / 3] + (size_t)(i % 3);
 }
 
-/* Within a step no pin has a kink, so its velocity is the same at any time inside the span. */
-static void place_pins(radau_state *s, double time)
-{
-    const drape_motion *m = s->motion;
-    drape_motion_place_pins(m, time, s->x);
-    for (int32_t i = 0; i < m->moved_count; i++)
-        drape_motion_pin_velocity(m, i, time, (s->span[0] + s->span[1]) / 2,
-                                  s->v + 3 * (size_t)m->moved_node[i]);
-}
-
 /* The point at x0 + z (z NULL: x0) and v. */
 static drape_point place(radau_state *s, double time, const double *x0, const double *z, const double *v)
 {
-    place_pins(s, time);
+    drape_instant_place_pins(s->motion, time, s->span, s->x, s->v);
     for (int64_t i = 0; i < s->n; i++) {
         s->x[node_at(s, i)] = z ? x0[i] + z[i] : x0[i];
         s->v[node_at(s, i)] = v[i];
@@ -207,7 +195,7 @@ static void weights_of_velocity(double p, double w[STAGES + 1])
 /* The integrals of these weights from 0 to p, by the rule of Gauss with two points, which is exact. */
 static void weights_of_position(double p, double w[STAGES + 1])
 {
-    const double offset = 0.28867513459481288; /* sqrt(3)/6 */
+    const double offset = sqrt(3) / 6;
     double left[STAGES + 1], right[STAGES + 1];
     weights_of_velocity(p * (0.5 - offset), left);
     weights_of_velocity(p * (0.5 + offset), right);
@@ -426,7 +414,7 @@ static drape_status solve(radau_state *s, double h, drape_step_info *info)
             rate_before = rate;
             if (norm > s->newton_bound)
                 s->hardest = fmax(s->hardest, rate);
-            if (!(s->theta < SLOWEST))
+            if (!(s->theta < 1))
                 return DRAPE_RETRY_NONLINEAR;
             s->left = s->theta / (1 - s->theta);
         }
@@ -503,36 +491,15 @@ static drape_status estimate_error(radau_state *s, const drape_local_attempt *a)
 
 /* ---- Work of dissipation, pins and colliders ---- */
 
-/* Power of forces on moving colliders; NULL: no contact. */
-static double collider_power(const radau_state *s, double time, const drape_load *load)
-{
-    return drape_motion_collider_power(s->motion, load, time, (s->span[0] + s->span[1]) / 2);
-}
-
 /* Adds h times the powers of dissipative forces, and of the forces that move pins and colliders. */
 static void add_work(radau_state *s, const drape_point *point, double h, drape_step_info *info)
 {
-    const drape_model *m = s->model;
-    const drape_motion *motion = s->motion;
-    if (s->dissipated) {
-        drape_system_dissipation(s->system, point, s->dissipated);
-        double power = collider_power(s, point->t, drape_system_on_colliders(s->system));
-        for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
-            power += s->dissipated[i] * s->v[i];
-        power += drape_system_support_power(s->system, s->dissipated, (s->span[0] + s->span[1]) / 2);
-        info->dissipated += h * power;
-    }
+    if (s->dissipated)
+        info->dissipated += h * drape_instant_dissipation(s->system, point, s->dissipated);
     if (!drape_system_is_driven(s->system))
         return;
     drape_system_force(s->system, point, s->g);
-    double power = drape_system_support_power(s->system, NULL, (s->span[0] + s->span[1]) / 2);
-    power += collider_power(s, point->t, drape_system_on_colliders(s->system));
-    for (int32_t i = 0; i < motion->moved_count; i++)
-        for (size_t k = 0; k < 3; k++) {
-            size_t at = 3 * (size_t)motion->moved_node[i] + k;
-            power += s->g[at] * s->v[at];
-        }
-    info->pin_work += h * power;
+    info->pin_work += h * drape_instant_driving(s->system, point, s->g);
 }
 
 /* The work in a step of size h, whose end is left in s->x and s->v. */
@@ -737,13 +704,13 @@ static void set_tolerances(radau_state *s, const double *values)
 {
     drape_local_error *control = &s->control;
     drape_local_error_init(s->system, values, ERROR_POWER, control);
-    control->kept_growth = KEPT_GROWTH;
+    control->kept_growth = DRAPE_STEP_KEPT;
     control->atol_x = raise_bound(control->atol_x, control->size);
     control->atol_v = raise_bound(control->atol_v, control->speed);
     const double bound = fmin(control->atol_x / control->size, control->atol_v / control->speed);
     const double share = values[PARAM_NEWTON_SHARE];
-    s->newton_bound =
-        fmax(ROUNDING * DBL_EPSILON / bound, isnan(share) ? fmin(NEWTON_SHARE, sqrt(bound)) : share);
+    s->newton_bound = fmax(10 * DBL_EPSILON / bound, /* RADAU5: no smaller error can be asked for */
+                           isnan(share) ? fmin(NEWTON_SHARE, sqrt(bound)) : share);
 }
 
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)

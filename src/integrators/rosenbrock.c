@@ -20,9 +20,11 @@
 #include "base/finite.h"
 #include "base/reason.h"
 #include "integrators/implicit.h"
+#include "integrators/instant.h"
 #include "integrators/local_error.h"
 #include "solvers/sun_linear.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -31,8 +33,8 @@ enum { PARAM_LINEAR_SOLVER = DRAPE_LOCAL_ERROR_PARAM_COUNT, PARAM_COUNT };
 /* Of the step: the interval of the differences for f_t. Their truncation error is its square times the third
  * derivative, their rounding error 1e-16 over it: 1e-8 and 1e-12 of what the term adds. */
 #define DIFFERENCE 1e-4
-/* Of the stages: the step along them for the derivative of the power. */
-#define ALONG 1e-6
+/* Of the stages: the step along them for the derivative of the power, a difference of first order. */
+#define ALONG sqrt(DBL_EPSILON)
 
 /* RODAS of order 4 with an embedded solution of order 3, Hairer & Wanner 1996, VI.4. Of order 3, RODAS3
  * (Sandu et al. 1997) and ROS34PW2 (Rang & Angermann 2005) took about as long for an error of 1e-3 of the
@@ -92,39 +94,19 @@ typedef struct rosenbrock_state {
  * so only one derivative along one direction is needed. Sums of powers at the ends of a step would count the
  * force of a dashpot at a jump of a pin's velocity for a large part of the step. */
 
-/* Power of the forces on moving colliders; NULL: no contact. */
-static double collider_power(const rosenbrock_state *s, const drape_load *load)
-{
-    const drape_point *point = &s->common.equation.point;
-    return drape_motion_collider_power(s->common.motion, load, point->t,
-                                       (point->span[0] + point->span[1]) / 2);
-}
-
 /* P where the forces g were evaluated last. */
 static double power(const rosenbrock_state *s, const double *g)
 {
-    const drape_step_equation *e = &s->common.equation;
-    const drape_motion *m = s->common.motion;
-    double sum = drape_system_support_power(e->system, NULL, (e->point.span[0] + e->point.span[1]) / 2);
-    sum += collider_power(s, drape_system_on_colliders(e->system));
-    for (int32_t i = 0; i < m->moved_count; i++)
-        for (size_t k = 0; k < 3; k++) {
-            const size_t at = 3 * (size_t)m->moved_node[i] + k;
-            sum += g[at] * e->v[at];
-        }
-    return sum;
+    return drape_instant_driving(s->common.equation.system, &s->common.equation.point, g);
 }
 
 /* ---- Forces ---- */
 
-/* Pins at time t; within the step, in which none of them has a kink. */
-static void place_pins(const rosenbrock_state *s, double t, double *x, double *v)
+/* Pins at time t, in x and v of the equation. */
+static void place_pins(const rosenbrock_state *s, double t)
 {
-    const drape_motion *m = s->common.motion;
-    const double *span = s->common.equation.point.span;
-    drape_motion_place_pins(m, t, x);
-    for (int32_t i = 0; i < m->moved_count; i++)
-        drape_motion_pin_velocity(m, i, t, (span[0] + span[1]) / 2, v + 3 * (size_t)m->moved_node[i]);
+    const drape_step_equation *e = &s->common.equation;
+    drape_instant_place_pins(s->common.motion, t, e->point.span, e->x, e->v);
 }
 
 /* g at x, v of the equation and time t. */
@@ -162,7 +144,7 @@ static drape_status evaluate_start(rosenbrock_state *s, const drape_state *in, d
     memset(e->v, 0, e->nodes * sizeof *e->v);
     for (size_t i = 0; i < e->dofs; i++)
         e->v[drape_step_equation_at(e, i)] = in->v[drape_step_equation_at(e, i)];
-    place_pins(s, in->t, e->x, e->v);
+    place_pins(s, in->t);
     const drape_status status = evaluate(s, in->t, s->g0, info);
     if (!status)
         s->start_power = power(s, s->g0);
@@ -177,7 +159,7 @@ static drape_status evaluate_change(rosenbrock_state *s, double t, double h, dra
     for (size_t i = 0; i < e->dofs; i++)
         s->change[i] = -3 * s->g0[drape_step_equation_at(e, i)];
     for (int k = 1; k <= 2; k++) {
-        place_pins(s, t + k * d, e->x, e->v);
+        place_pins(s, t + k * d);
         drape_status status = evaluate(s, t + k * d, e->g, info);
         if (status)
             return status;
@@ -186,7 +168,7 @@ static drape_status evaluate_change(rosenbrock_state *s, double t, double h, dra
     }
     for (size_t i = 0; i < e->dofs; i++)
         s->change[i] /= 2 * d;
-    place_pins(s, t, e->x, e->v);
+    place_pins(s, t);
     e->point.t = t;
     return DRAPE_OK;
 }
@@ -261,7 +243,7 @@ static void move_to(rosenbrock_state *s, const drape_state *in, const double *we
         e->x[at] = in->x[at] + dx;
         e->v[at] = in->v[at] + dv;
     }
-    place_pins(s, t, e->x, e->v);
+    place_pins(s, t);
 }
 
 /* The forces of a stage, in *g: those of the start of the step in a stage that is evaluated there. */

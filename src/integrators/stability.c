@@ -7,17 +7,14 @@
  * Orthogonality is gradually lost; that repeats eigenvalues of T but moves none out of the spectrum.
  *
  * K u = (g(x + e u) - g(x))/e at v = 0, where no dashpot and no drag has a force; D u likewise with v. e
- * moves no node by more than 1e-6 of the shortest edge: on that scale elements are linear up to 1e-6, and
- * the effect of rounding x is 1e-10 of the difference of the forces.
+ * moves no node by more than the root of epsilon, 1e-8, of the shortest edge: on that scale elements are linear
+ * up to 1e-8, and the effect of rounding x is as much.
  */
 #include "integrators/stability.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
-
-#define MOVE       1e-6  /* of the shortest edge */
-#define EXHAUSTED  1e-12 /* of |a_j|: a smaller b_j ends the recurrence */
-#define BISECTIONS 60    /* of the interval with the largest eigenvalue: down to rounding */
 
 struct drape_spectrum {
     drape_system *system;
@@ -57,7 +54,7 @@ drape_status drape_spectrum_create(drape_arena *arena, drape_system *system, int
     double shortest = m->length;
     for (int32_t e = 0; e < m->edge_count; e++)
         shortest = fmin(shortest, m->edge_length[e]);
-    s->move = MOVE * shortest;
+    s->move = sqrt(DBL_EPSILON) * shortest;
     for (int32_t f = 0; f < m->free_count; f++)
         s->root[f] = 1 / sqrt(m->mass[m->node_of_free[f]]);
     return DRAPE_OK;
@@ -118,7 +115,7 @@ static int count_above(const double *a, const double *b, int n, double z)
     for (int j = 0; j < n; j++) {
         d = a[j] - z - (j > 0 ? b[j - 1] * b[j - 1] / d : 0);
         if (d == 0)
-            d = -1e-300;
+            d = -DBL_MIN;
         count += d > 0;
     }
     return count;
@@ -130,7 +127,7 @@ static double largest_of(const double *a, const double *b, int n)
     double low = 0, high = 0;
     for (int j = 0; j < n; j++)
         high = fmax(high, a[j] + (j > 0 ? fabs(b[j - 1]) : 0) + (j + 1 < n ? fabs(b[j]) : 0));
-    for (int k = 0; k < BISECTIONS; k++) {
+    while (high - low > DBL_EPSILON * high) {
         double middle = 0.5 * (low + high);
         if (count_above(a, b, n, middle) > 0)
             low = middle;
@@ -160,8 +157,8 @@ static double largest(drape_spectrum *s, const drape_state *at, double *y, const
         s->next = spare;
         s->b[n] = normalise(s->u, dofs);
         n++;
-        if (!(s->b[n - 1] > EXHAUSTED * fabs(a)))
-            break; /* the space of the sequence is exhausted, or numbers are not finite */
+        if (!(s->b[n - 1] * s->b[n - 1] > DBL_EPSILON * a * a))
+            break; /* an eigenvalue is off by b^2 / |a| at most, or numbers are not finite */
     }
     return largest_of(s->a, s->b, n);
 }

@@ -16,6 +16,7 @@
 #include "integrators/implicit.h"
 #include "solvers/inertia.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -30,11 +31,6 @@
  * failure. */
 #define LEFT 0.1
 #define MANY 16
-/* of the stiffness, in parts of its largest entry: more than rounding; the signs of its pivots then say
- * nothing */
-#define MAX_ASYMMETRY 1e-10
-#define STALLED       0.5     /* of the residual before: one that falls by less may be rounding */
-#define MAX_INERTIA   1000000 /* unknowns: the factors of a larger matrix take gigabytes */
 
 enum { PARAM_ON_FAILURE = DRAPE_NEWTON_PARAM_COUNT, PARAM_MAX_STEPS, PARAM_COUNT };
 
@@ -181,7 +177,7 @@ static drape_status follow(static_state *s, double mass_weight, drape_state *out
         info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
         if (info->residual <= tolerance)
             return DRAPE_OK;
-        const bool falls = isnan(last) || info->residual < STALLED * last;
+        const bool falls = isnan(last) || info->residual < MAX_FACTOR * last;
         const double rounding =
             falls ? 0 : drape_step_equation_rounding(&s->common.equation, s->common.d, norm_of(s));
         if (info->residual <= rounding && rounding > s->common.equation.max_residual)
@@ -214,15 +210,15 @@ static drape_status judge_stability(static_state *s, const drape_state *out)
         return DRAPE_OK;
     drape_status status = drape_newton_matrix(s->common.newton, &point, 0, &pattern, &values);
     s->stability_known = false;
-    if (!status && e->all_dofs > MAX_INERTIA) {
+    if (!status && e->all_dofs > DRAPE_MOST_FACTORED) {
         drape_log(s->arena->ctx, DRAPE_LOG_INFO,
                   "static: whether the equilibrium is stable is not determined above %d unknowns",
-                  MAX_INERTIA);
+                  DRAPE_MOST_FACTORED);
         return DRAPE_OK;
     }
     if (!status && drape_system_is_symmetric(e->system) &&
-        drape_pattern_asymmetry(pattern, values) > MAX_ASYMMETRY)
-        return DRAPE_OK;
+        drape_pattern_asymmetry(pattern, values) > sqrt(DBL_EPSILON))
+        return DRAPE_OK; /* the signs of its pivots say nothing */
     return status ? status
                   : drape_inertia(s->arena->ctx, pattern, values, drape_system_cancel_flag(e->system),
                                   &s->unstable_modes, &s->stability_known);

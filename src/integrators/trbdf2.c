@@ -10,10 +10,11 @@
  */
 #include "integrators/implicit.h"
 
+#include <math.h>
 #include <string.h>
 
-#define GAMMA 0.58578643762690495 /* 2 - sqrt(2) */
-#define A1    1.20710678118654752 /* 1/(gamma (2 - gamma)) = (1 + sqrt(2))/2 */
+#define GAMMA (2 - sqrt(2))
+#define A1    ((1 + sqrt(2)) / 2) /* 1/(gamma (2 - gamma)) */
 #define A0    (A1 - 1)
 
 typedef struct trbdf2_state {

@@ -92,8 +92,8 @@ static const drape_param params[PARAM_COUNT] = {
 
 #define STABILITY_ITERATIONS 30    /* finds omega of a sheet to 1 % */
 #define SAFETY               0.8   /* fraction of the stability limit that a substep takes */
-#define MAX_SUBSTEPS         10000 /* of a step that are not given; one that needs more is rejected */
 #define MAX_SPEED            1e6   /* [m/s] of a node; a step with a faster one has blown up */
+#define MAX_SUBSTEPS         10000 /* of a step that are not given; one that needs more is rejected */
 
 typedef struct verlet_state {
     drape_system *system;

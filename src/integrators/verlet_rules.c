@@ -30,8 +30,6 @@
 
 #include <string.h>
 
-#define FARTHEST 1e9 /* boxes have 32-bit numbers: all points farther away share a box */
-
 /* A collider over one substep. */
 typedef struct pose {
     const drape_collider *collider;
@@ -214,8 +212,8 @@ static uint64_t box_of(const drape_verlet_self *s, const double *x)
     uint64_t box = 0;
     for (int k = 0; k < 3; k++) {
         double number = x[k] * s->per_box[k];
-        int32_t cut = fabs(number) < FARTHEST ? (int32_t)number : 0;
-        cut -= fabs(number) < FARTHEST && number < cut; /* floor */
+        int32_t cut = fabs(number) < INT32_MAX ? (int32_t)number : 0;
+        cut -= fabs(number) < INT32_MAX && number < cut; /* floor */
         box = box << 21 | ((uint32_t)cut & 0x1FFFFFu);
     }
     return box;

@@ -11,7 +11,6 @@
  * that is thrown on a slope, 378, 0, 0 and 1 mm, and 567 mm. */
 #define INNER_ITERATIONS 2
 #define INNER_TOLERANCE  0.3
-#define MAX_ITERATIONS   60 /* until a solve says otherwise */
 
 /* ---- Symmetric 3 x 3 blocks: xx xy xz yy yz zz ---- */
 
@@ -360,7 +359,7 @@ drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *syst
     s->system = system;
     s->model = drape_system_model(system);
     s->nodes = s->model->free_count;
-    begin(s, true, MAX_ITERATIONS);
+    begin(s, true, DRAPE_LINEAR_ITERATIONS);
     const size_t n = 3 * (size_t)s->nodes;
     s->inverse = drape_arena_take(arena, 2 * n, sizeof *s->inverse);
     s->pcg = drape_pcg_of(arena, (int64_t)n, s, multiply, precondition);

@@ -115,7 +115,7 @@ static drape_status build_coarse_scalars(drape_approx_jacobian *s)
 }
 
 /* The differences of coarse functions between the nodes of a pair; returns the number of functions. */
-#define MAX_FUNCTIONS 64
+#define MAX_FUNCTIONS (2 * DRAPE_PROLONG_FUNCTIONS)
 static int differences(const drape_approx_jacobian *s, int32_t pair, int32_t column[MAX_FUNCTIONS],
                        double difference[MAX_FUNCTIONS])
 {

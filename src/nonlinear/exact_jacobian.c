@@ -1,12 +1,6 @@
 /* exact_jacobian.c: see exact_jacobian.h. */
 #include "nonlinear/exact_jacobian.h"
 
-/* Of |F|: residual left in a correction by the symmetric matrix; without friction, a flag of 13 x 13 nodes
- * takes a quarter and three quarters more iterations with 1e-4 and 1e-3 than with 1e-5, others as many, and
- * the least CPU with 1e-4 */
-#define CORRECTION          1e-4
-#define FRICTION_CORRECTION 1e-2
-
 struct drape_exact_jacobian {
     drape_system *system;
     drape_sun_linear *linear;
@@ -28,9 +22,11 @@ drape_status drape_exact_jacobian_create(drape_arena *arena, drape_system *syste
     drape_status status =
         drape_sun_linear_create(arena, sun, linear, drape_system_pattern(system), drape_system_pool(system),
                                 drape_system_cancel_flag(system), &s->linear);
+    /* By the symmetric matrix. Without friction, a flag of 13 x 13 nodes takes a quarter and three quarters
+     * more iterations with 1e-4 and 1e-3 than with 1e-5, others as many, and the least CPU with 1e-4. */
     if (!status && near && (s->contact_unsymmetric || s->terms_unsymmetric))
-        status =
-            drape_sun_linear_use_near(s->linear, s->contact_unsymmetric ? FRICTION_CORRECTION : CORRECTION);
+        status = drape_sun_linear_use_near(s->linear, s->contact_unsymmetric ? DRAPE_LINEAR_TOLERANCE
+                                                                             : DRAPE_LINEAR_TIGHT);
     return status;
 }
 

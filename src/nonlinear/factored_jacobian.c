@@ -20,8 +20,7 @@
 #define FEW_NODES 200
 /* Of what is lumped in N beside the inertia of a step: beyond, conjugate gradients take ten iterations and
  * more and, on irregular meshes, negative entries that are lumped outweigh the inertia. */
-#define MAX_LUMPED     20
-#define MAX_ITERATIONS 30 /* of conjugate gradients */
+#define MAX_LUMPED 20
 /* Of the tolerance of a solution, where bending is lumped: sheets that hang by two corners are 0.5 to 7 mm of
  * 1 m from the converged step with all of it, and 0.4 to 0.7 mm with 0.01, as with factors of the whole
  * matrix, for one or two iterations more in each solution. */
@@ -247,7 +246,7 @@ static drape_status solve(void *matrix, const double *b, double tolerance, doubl
     *definite = true;
     if (!drape_nonsymmetric_solve(&s->rest, b, x, &iterations)) {
         if (s->lumps) {
-            drape_pcg_solve(&s->pcg, b, x, LUMPED_TOLERANCE * tolerance, MAX_ITERATIONS);
+            drape_pcg_solve(&s->pcg, b, x, LUMPED_TOLERANCE * tolerance, DRAPE_LINEAR_ITERATIONS);
             iterations = s->pcg.iterations;
             *definite = s->pcg.definite;
             status = s->linear->status                       ? s->linear->status

@@ -8,6 +8,9 @@
 
 #include "nonlinear/report.h"
 
+/* Of conjugate gradients for each correction, at most. */
+#define DRAPE_LINEAR_ITERATIONS 60
+
 /* Statuses > 0: there is no solution by this matrix. Errors, < 0: DRAPE_E_MEMORY, where contact couples new
  * nodes; DRAPE_E_STOPPED. */
 typedef struct drape_matrix_ops {

@@ -47,34 +47,32 @@
 #include "solvers/sun_linear.h"
 #include "solvers/vector.h"
 
+#include <float.h>
 #include <kinsol/kinsol.h>
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
 /* KINSOL's settings that no user should need. All are set; none is left to a default. */
-#define SETUPS         1     /* iterations between Jacobians */
-#define STEP_TOLERANCE 1e-15 /* fraction of the scene's size: a shorter correction changes nothing */
-/* Largest correction, in sizes of the scene, for each node: KINSOL's own limit is 1 for the guess d = 0 */
-#define MAX_NEWTON_STEP  1e3
-#define MAX_BETA_FAIL    1000 /* failures of KINSOL's curvature condition: in effect unlimited */
-#define SHORT_STEP       0.5  /* after a shorter step the next matrix is positive semidefinite */
-#define MAX_LENGTH       2    /* of a correction by positive parts with contact; without, there is no limit */
-#define EXACT            0.1  /* of the residual, that an iterative solver may leave in an exact correction */
-#define LINEAR_TOLERANCE 1e-2 /* of the residual, that iterative solvers leave in a correction */
-#define SMALL_STEP       0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
-#define MAX_AHEAD        0.1  /* of an edge: pins further ahead of the guess pull it along */
-#define MAX_CHORDS       2    /* simplified corrections after one correction, without contact */
-#define MAX_PREDICTION   8    /* corrections in a solve, after which stress is no longer predicted */
-#define STALLED          0.5  /* of the residual before: if no more is gained, it may be rounding */
+#define SETUPS 1 /* iterations between Jacobians */
+/* Fraction of the scene's size: a shorter correction changes nothing. */
+#define STEP_TOLERANCE (4 * DBL_EPSILON)
+#define SHORT_STEP     0.5  /* after a shorter step the next matrix is positive semidefinite */
+#define MAX_LENGTH     2    /* of a correction by positive parts with contact; without, there is no limit */
+#define EXACT          0.1  /* of the residual, that an iterative solver may leave in an exact correction */
+#define SMALL_STEP     0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
+#define MAX_AHEAD      0.1  /* of an edge: pins further ahead of the guess pull it along */
+#define MAX_CHORDS     2    /* simplified corrections after one correction, without contact */
+#define STALLED        0.5  /* of the residual before: if no more is gained, it may be rounding */
 /* Corrections that contract by less are taken to contract by so much: nine more like the last one follow. */
 #define MAX_CONTRACTION 0.9
 #define ESTIMATE        0.5 /* of the residual, that conjugate gradients leave in an estimate */
 /* Corrections where cloth touches something, however little time there is: what fewer leave throws it about,
  * so that later steps need more (docs/realtime.md, "What is saved first"). */
 #define MIN_IN_CONTACT 3
-/* A solve is laborious after more iterations than the larger of these: a number, and a share of the most. */
-#define EASY       10
-#define EASY_SHARE 0.4
+/* Corrections after which a sheet is taken to buckle: stress is no longer predicted, and larger steps of the same
+ * motion might fail. */
+#define MANY 10
 
 struct drape_newton {
     drape_step_equation *equation;
@@ -383,7 +381,7 @@ static void predict_stress(drape_newton *s, const double *p)
 {
     drape_step_equation *e = s->equation;
     double start = drape_system_clock(e->system);
-    if (s->corrections <= MAX_PREDICTION)
+    if (s->corrections <= MANY)
         drape_stress_predictor_correct(&s->predictor, &e->point, p);
     else
         drape_stress_predictor_forget(&s->predictor);
@@ -640,7 +638,7 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     drape_status status = status_of(code, &report->reason);
     KINGetNumNonlinSolvIters(s->kin, &iterations); /* of this solve: KINSol resets its counters */
     report->iterations = (int)iterations;
-    report->laborious = !s->effort.keeps && (double)iterations > fmax(EASY, EASY_SHARE * s->effort.most);
+    report->laborious = !s->effort.keeps && iterations > MANY;
     e->work.newton_iterations += iterations;
     if (s->searches && is_settled(s, status, d))
         status = DRAPE_OK;
@@ -698,15 +696,15 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_effort *effo
 
 static bool configure(drape_newton *s)
 {
-    const double length = s->equation->model->length, n = s->equation->all_dofs;
+    const double length = s->equation->model->length;
     DRAPE_KINSOL_QUIET(s->kin);
     return !KINInit(s->kin, residual, s->unknown) && !KINSetUserData(s->kin, s) &&
            !KINSetLinearSolver(s->kin, s->shell.solver, s->shell.matrix) && !KINSetJacFn(s->kin, jacobian) &&
            !KINSetFuncNormTol(s->kin, max_norm_bound(s)) &&
            !KINSetScaledStepTol(s->kin, STEP_TOLERANCE * length) &&
-           !KINSetMaxNewtonStep(s->kin, MAX_NEWTON_STEP * length * sqrt(n)) &&
+           !KINSetMaxNewtonStep(s->kin, DBL_MAX) && /* by default the size of the guess bounds corrections */
            !KINSetMaxSetupCalls(s->kin, SETUPS) && !KINSetNoResMon(s->kin, SUNTRUE) &&
-           !KINSetMaxBetaFails(s->kin, MAX_BETA_FAIL);
+           !KINSetMaxBetaFails(s->kin, LONG_MAX); /* of KINSOL's curvature condition: no limit */
 }
 
 static drape_status create_search(drape_arena *arena, drape_newton *s)
@@ -779,7 +777,7 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
     s->own_effort = (drape_newton_effort){.most = (int)values[DRAPE_NEWTON_MAX_ITERATIONS],
                                           .by_error = isnan(values[DRAPE_NEWTON_TOLERANCE]),
                                           .deadline = INFINITY,
-                                          .linear_tolerance = LINEAR_TOLERANCE};
+                                          .linear_tolerance = DRAPE_LINEAR_TOLERANCE};
     drape_status status =
         drape_residual_bound_set(equation, (drape_norm)values[DRAPE_NEWTON_NORM],
                                  values[DRAPE_NEWTON_TOLERANCE], &s->values[DRAPE_NEWTON_TOLERANCE]);

@@ -3,6 +3,7 @@
 
 #include "base/finite.h"
 #include "base/vec3.h"
+#include "solvers/linear.h"
 
 #include <string.h>
 
@@ -10,7 +11,7 @@
  * N/m, that is thrown on a slope with friction 0.4 is 0 to 17 mm from the converged run after 0.4 s with
  * 1e-4, 2 to 41 mm with 1e-3, and 0.07 to 0.6 m, where it sticks, with A alone, for two thirds more
  * iterations. With 1e-2 flags in wind are 2 to 95 mm of 1 m from the converged run, with 1e-4 0 to 15. */
-#define TOLERANCE 1e-4
+#define TOLERANCE DRAPE_LINEAR_TIGHT
 
 drape_status drape_nonsymmetric_init(drape_arena *arena, drape_system *system, bool terms, void *owner,
                                      drape_pcg_map *multiply, drape_preconditioner *solve,

@@ -7,9 +7,6 @@
 #include <math.h>
 #include <string.h>
 
-/* A mean load below this multiple of the rounding error of the forces is not one. */
-#define ABOVE_ROUNDING 100
-
 /* ---- The forces at the start ---- */
 
 typedef struct start {
@@ -87,7 +84,8 @@ static double acceleration_of(const drape_model *m, const start *at, double mass
     if (gravity > 0)
         return gravity;
     double a = fmin(m->length, least_bending(m)); /* over (1 s)^2 */
-    if (at->load > ABOVE_ROUNDING * at->rounding * drape_model_all_free(m))
+    /* else the largest bound that a load allows is below the rounding error of the forces */
+    if (DRAPE_MAX_LOAD_SHARE * at->load > at->rounding * drape_model_all_free(m))
         a = fmin(a, at->load / mass);
     return a;
 }

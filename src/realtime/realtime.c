@@ -25,12 +25,11 @@
 /* Fraction of the budget in which a further iteration must be expected to end: some take longer than the one
  * before. With 0.9 of 3270 frames of three capes 142 and 186 were late, with this 94 and 147. */
 #define IN_TIME 0.8
-#define RECOVER 0.6  /* fraction of the budget: a better level that is expected to take less is resumed */
-#define LEARN   0.3  /* weight of the last attempt in the expected cost */
-#define CHEAPER 0.7  /* assumed cost of a cheap step, in that of another one, until it is measured */
-#define STRETCH 4    /* longest step, in dt, unless the def sets it */
-#define SWEEPS  8    /* of untangling, in a call */
-#define SAME    1e-9 /* fraction of dt: allowance for rounding in the host's sum of frames */
+#define RECOVER 0.6 /* fraction of the budget: a better level that is expected to take less is resumed */
+#define LEARN   0.3 /* weight of the last attempt in the expected cost */
+#define CHEAPER 0.7 /* assumed cost of a cheap step, in that of another one, until it is measured */
+#define STRETCH 4   /* longest step, in dt, unless the def sets it */
+#define SWEEPS  8   /* of untangling, in a call */
 
 static int lowest_effort(const drape_sim *sim)
 {
@@ -73,7 +72,7 @@ typedef struct plan {
 
 static int64_t steps_of(double owed, double h)
 {
-    return (int64_t)fmax(1, ceil(owed / h - SAME));
+    return (int64_t)fmax(1, ceil(owed / h - DRAPE_SAME));
 }
 
 /* Finds the best level whose steps fit into the budget. */
@@ -113,7 +112,7 @@ static plan plan_stretched(drape_sim *sim, double owed, double frame, double bud
                drape_contact_may_meet(contact, now->x, now->v, now->t, fmin(enough, m->longest));
     const double longest = fmin(longest_step(m), m->cap);
     int64_t most = steps_of(owed, m->dt);
-    if (fit < 1 && owed < (1 - SAME) * fmin(longest, enough))
+    if (fit < 1 && owed < (1 - DRAPE_SAME) * fmin(longest, enough))
         return (plan){.effort = effort};
     int64_t steps = fit < 1 ? 1 : fit < (double)most ? (int64_t)fit : most;
     return (plan){.effort = effort, .steps = steps, .h = fmin(owed / (double)steps, longest)};
@@ -175,7 +174,7 @@ static bool pins_move_apart(const drape_sim *sim)
         vec3_sub(other, path, other);
         apart = fmax(apart, vec3_norm(other));
     }
-    return apart > SAME * m->length;
+    return apart > DRAPE_SAME * m->length;
 }
 
 static drape_status take_steps(drape_sim *sim, const plan *p, double begun, double budget,
@@ -287,11 +286,11 @@ static void settle(drape_sim *sim, double goal, const drape_catch_up *rates, dra
     drape_realtime_memory *m = sim->realtime;
     double left = goal - drape_sim_state(sim)->t;
     const double most = longest_step(sim->realtime);
-    m->debt = left > SAME * m->dt ? fmin(left, most) : 0;
+    m->debt = left > DRAPE_SAME * m->dt ? fmin(left, most) : 0;
     report->dropped = left > most ? left - most : 0;
     m->dropped += report->dropped;
     drape_sim_fall_behind(sim, rates, left, report->dropped);
-    m->stretched = report->h > (1 + SAME) * m->dt || m->debt > 0;
+    m->stretched = report->h > (1 + DRAPE_SAME) * m->dt || m->debt > 0;
     bound_steps(m, report);
     count_crossings(sim, m->unchecked || lets_cloth_pass(sim));
     m->crossed += m->crossings > 0;

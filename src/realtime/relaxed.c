@@ -7,7 +7,6 @@
 
 #include <string.h>
 
-#define DEEPER  1e-9 /* of the radius: rounding */
 #define DOUBLED 0.02 /* [s] in which the pressure on a node that has room doubles, and falls by half */
 
 /* A shape without points may have no end, as a plane; inscribed ones are inside of it. */
@@ -32,7 +31,7 @@ static bool is_solid(const drape_collider *collider, const double middle[3])
     const drape_collider_shape *shape = &collider->shape;
     return shape->point_count > 0 &&
            (!(shape->radius > 0) || !collider->ops->smooth ||
-            drape_collider_distance(collider, &rest, middle, NULL, NULL) < -(1 + DEEPER) * shape->radius);
+            drape_collider_distance(collider, &rest, middle, NULL, NULL) < -(1 + DRAPE_SAME) * shape->radius);
 }
 
 const double *drape_relaxed_bound_of(const drape_contact *c, int32_t collider)

@@ -18,8 +18,7 @@
  * also attempts that fail before a whole nominal step is made, whatever was accepted between them: then it is
  * only the pair that refuses the next one. With 3 instead of 6, three capes with self-contact were 23 mm
  * inside of bodies, instead of nowhere, and pinches dropped a tenth less time. */
-#define PATIENCE    6
-#define MAX_SECONDS 1e9 /* [s] the limit of a scene's duration */
+#define PATIENCE 6
 
 static drape_contact *contact_of(const drape_sim *sim)
 {
@@ -157,7 +156,7 @@ static void archive_memory(drape_sim *sim, drape_archive *a)
     if (drape_archive_good(a) && m->effort != 0 && !(m->effort == 1 && sim->chosen.integrator->set_cheap))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an effort %d", m->effort);
     if (drape_archive_good(a) && m->active &&
-        !(m->dt > 0 && m->longest >= m->dt && m->longest <= MAX_SECONDS && m->debt >= 0 &&
+        !(m->dt > 0 && m->longest >= m->dt && m->longest <= DRAPE_MOST && m->debt >= 0 &&
           m->debt <= m->longest && m->behind >= 0 && m->pins_behind >= 0 && m->cap > 0))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step for a budget");
     if (drape_archive_has_read(a))

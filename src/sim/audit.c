@@ -10,6 +10,7 @@
 #include "integrators/tolerance.h"
 #include "sim/rescue.h"
 
+#include <float.h>
 #include <math.h>
 
 /* In an explosion, kinetic energy grows by more than JUMP, and more than SHARE of it has no known source. */
@@ -20,10 +21,10 @@
 #define UNNOTICED 1e-4
 /* Fraction of the energy available to the run: smaller gains are rounding errors. Not proportional to the
  * step size: small steps gain little each. */
-#define ROUNDED 1e-12
+#define ROUNDED (4096 * DBL_EPSILON)
 #define AT_REST 1e-3 /* fraction of the scene's own energy, below which a run is at rest */
 #define QUIET                                                                                                \
-    1e-16 /* fraction of the scene's own energy: motion at 1e-8 of the scene's speed is rounding error */
+    DBL_EPSILON /* fraction of the scene's own energy: motion at 1e-8 of the scene's speed is rounding error */
 
 /* Limits relative to the energy available to the run so far. Integrators that conserve energy, or bound an
  * error, let it oscillate by some per cent. */

@@ -15,8 +15,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_LEVELS  60
-#define REASON_ROOM 64
 #define MEMORY_NAME "checkpoint in memory"
 
 /* ---- States ---- */
@@ -64,8 +62,8 @@ static void archive_states(drape_sim *sim, drape_archive *a)
 /* Checks what the loops over steps and frames depend on to end. */
 static bool is_schedule(const drape_schedule *s)
 {
-    return s->level >= 0 && s->level <= MAX_LEVELS && s->part >= 0 && s->part < (int64_t)1 << s->level &&
-           s->count >= 0 && !(s->dt < 0) && !isnan(s->dt) &&
+    return s->level >= 0 && s->level <= DRAPE_SCHEDULE_LEVELS && s->part >= 0 &&
+           s->part < (int64_t)1 << s->level && s->count >= 0 && !(s->dt < 0) && !isnan(s->dt) &&
            (!s->cut || (isfinite(s->cut_end) && s->cut_end > s->now));
 }
 
@@ -112,7 +110,7 @@ static void archive_audit(drape_sim *sim, drape_archive *a)
 /* A counted reason is static text; a reason that was read is stored in the sim's arena. */
 static void archive_reason(drape_sim *sim, drape_reason_total *reason, drape_archive *a)
 {
-    char text[REASON_ROOM];
+    char text[DRAPE_ARCHIVE_TEXT];
     snprintf(text, sizeof text, "%s", a->reading ? "" : reason->reason);
     drape_archive_text(a, text, sizeof text);
     drape_archive_int64(a, &reason->count);

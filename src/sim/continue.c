@@ -10,9 +10,6 @@
 #include <math.h>
 #include <string.h>
 
-/* of the scene's size: rounding error allowed between a node and where its pin has it */
-#define PIN_SLIP 1e-9
-
 /* ---- State ---- */
 
 /* The same term on the same cloth: the first one of that name that no earlier term of the new model stands
@@ -109,7 +106,7 @@ static drape_status hold(drape_sim *to, const drape_sim *from)
         drape_motion_place_pin(motion, i, state->t, pin);
         if (!from->model->pinned[i])
             memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
-        if (drape_hypot(drape_hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= PIN_SLIP * m->length)
+        if (drape_hypot(drape_hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= DRAPE_SAME * m->length)
             continue;
         if (drape_sim_carrier(to, i) >= 0)
             drape_sim_ride_on(to, i);

@@ -15,8 +15,7 @@
 
 #include <math.h>
 
-#define SAME_TIME 1e-9 /* of the step: a frame nearer than this to a state shows that state */
-#define PARTS     16   /* of the line between two states, on which free positions are searched */
+#define PARTS 16 /* of the line between two states, on which free positions are searched */
 
 static void straight(const drape_state *a, const drape_state *b, double share, size_t n, double *x)
 {
@@ -79,7 +78,7 @@ drape_status drape_sim_emit_frames(drape_sim *sim)
 {
     const drape_state *before = sim->before >= 0 ? &sim->states[sim->before] : NULL;
     const drape_state *now = drape_sim_state(sim);
-    double near = before ? SAME_TIME * (now->t - before->t) : 0;
+    double near = before ? DRAPE_SAME * (now->t - before->t) : 0;
     drape_status status = DRAPE_OK;
     bool late = false;
     if (before && sim->chosen.integrator->steady_state)

@@ -11,27 +11,25 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_SECONDS  1e9 /* [s] the limit of a scene's duration */
-#define MAX_DISTANCE 1e9 /* [m], [m/s] the limit of a track's keys */
-#define MAX_SPIN     DRAPE_MAX_SPIN
-#define LENGTH_OFF   0.01 /* of a quaternion that is meant to have length 1: far beyond rounding in float */
+#define MAX_SPIN   DRAPE_MAX_SPIN
+#define LENGTH_OFF 0.01 /* of a quaternion that is meant to have length 1: far beyond rounding in float */
 
 static bool is_within_limits(const double *x, const double *v)
 {
     bool good = x != NULL;
     for (int k = 0; good && k < 3; k++)
-        good = fabs(x[k]) <= MAX_DISTANCE && (!v || fabs(v[k]) <= MAX_DISTANCE);
+        good = fabs(x[k]) <= DRAPE_MOST && (!v || fabs(v[k]) <= DRAPE_MOST);
     return good;
 }
 
 static drape_status check_seconds(const drape_sim *sim, const char *function, double seconds)
 {
     double t = drape_sim_state(sim)->t;
-    if (seconds > 0 && seconds <= MAX_SECONDS && t + seconds > t)
+    if (seconds > 0 && seconds <= DRAPE_MOST && t + seconds > t)
         return DRAPE_OK;
     return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                       "%s: seconds = %g; it is in (0, %g], and large enough to change the time", function,
-                      seconds, MAX_SECONDS);
+                      seconds, DRAPE_MOST);
 }
 
 /* ---- Pins ---- */
@@ -48,7 +46,7 @@ static drape_status check_pin(const drape_sim *sim, int32_t node, const double *
     if (!is_within_limits(x, v))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_move_pins: position and velocity of node %d must be within %g m and m/s",
-                          (int)node, MAX_DISTANCE);
+                          (int)node, DRAPE_MOST);
     return DRAPE_OK;
 }
 
@@ -117,7 +115,7 @@ static drape_status send_collider(drape_sim *sim, const char *function, int32_t 
     if (!status && !is_within_limits(to->displacement, to->velocity))
         status =
             drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                       "%s: displacement and velocity must be within %g m and m/s", function, MAX_DISTANCE);
+                       "%s: displacement and velocity must be within %g m and m/s", function, DRAPE_MOST);
     if (!status)
         status = drape_realtime_rescue.send_collider(sim, collider, seconds, to);
     if (!status)
@@ -206,7 +204,7 @@ static drape_status check_points(const drape_sim *sim, const drape_collider *c, 
             return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                               "%s: point %zu is at (%g, %g, %g) m with (%g, %g, %g) m/s; they must be finite "
                               "and within %g m and m/s",
-                              function, i, x[0], x[1], x[2], v[0], v[1], v[2], MAX_DISTANCE);
+                              function, i, x[0], x[1], x[2], v[0], v[1], v[2], DRAPE_MOST);
         }
     double *x = drape_alloc(sim->ctx, 3 * (size_t)points, sizeof *x);
     if (!x)

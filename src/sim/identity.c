@@ -19,9 +19,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define NAME_ROOM  64
-#define BUILD_ROOM 320
-
 #ifdef DRAPE_METIS
 #define METIS " metis"
 #else
@@ -253,7 +250,7 @@ void drape_sim_describe_libraries(char *text, size_t size)
 
 static void describe_build(char *text, size_t size)
 {
-    char libraries[BUILD_ROOM / 2];
+    char libraries[DRAPE_ARCHIVE_TEXT / 2];
     drape_sim_describe_libraries(libraries, sizeof libraries);
     snprintf(text, size, "Drape %s, arithmetic %016" PRIx64 ", compiler %s, %s", drape_version(),
              drape_arithmetic_hash(), __VERSION__, libraries);
@@ -261,7 +258,7 @@ static void describe_build(char *text, size_t size)
 
 static void archive_build(drape_archive *a)
 {
-    char here[BUILD_ROOM], there[BUILD_ROOM];
+    char here[DRAPE_ARCHIVE_TEXT], there[DRAPE_ARCHIVE_TEXT];
     describe_build(here, sizeof here);
     memcpy(there, here, sizeof there);
     drape_archive_text(a, there, sizeof there);
@@ -272,7 +269,7 @@ static void archive_build(drape_archive *a)
 
 static void archive_name(drape_archive *a, const char *what, const char *name)
 {
-    char there[NAME_ROOM];
+    char there[DRAPE_ARCHIVE_TEXT];
     snprintf(there, sizeof there, "%s", name);
     drape_archive_text(a, there, sizeof there);
     if (drape_archive_good(a) && strcmp(there, name) != 0)
@@ -293,7 +290,7 @@ static void archive_hash(drape_archive *a, const char *what, uint64_t hash)
 /* Whether several ranks share the model, which any number of them can then read. */
 static void archive_kind(drape_archive *a, bool by_ranks)
 {
-    char kind[NAME_ROOM];
+    char kind[DRAPE_ARCHIVE_TEXT];
     snprintf(kind, sizeof kind, by_ranks ? "ranks" : "identity");
     drape_archive_text(a, kind, sizeof kind);
     a->by_ranks = strcmp(kind, "ranks") == 0;

@@ -13,8 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define ACROSS 6    /* parts of a side: 28 points of a face are tested */
-#define TOUCH  1e-9 /* [m] a point less deep than this is not inside: contact allows it */
+#define ACROSS 6 /* parts of a side: 28 points of a face are tested */
 
 /* The cloth, the collider and their intersections. */
 typedef struct search {
@@ -109,7 +108,7 @@ static double depth_at(const search *s, const double *point)
 }
 
 /* Whether no point of a triangle is inside. A distance changes by no more than that from the centroid, and
- * rounding errors are far below TOUCH: most triangles need one evaluation, not that of all samples. */
+ * rounding errors are far below DRAPE_SAME: most triangles need one evaluation, not that of all samples. */
 static bool is_outside(const search *s, const int32_t *node)
 {
     double centroid[3] = {0, 0, 0}, radius = 0;
@@ -120,7 +119,7 @@ static bool is_outside(const search *s, const int32_t *node)
         vec3_sub(s->cloth.x + 3 * (size_t)node[a], centroid, to);
         radius = fmax(radius, vec3_norm(to));
     }
-    return depth_at(s, centroid) < -(1 + TOUCH) * radius - TOUCH;
+    return depth_at(s, centroid) < -(1 + DRAPE_SAME) * radius - DRAPE_SAME * s->model->length;
 }
 
 static double deepest_sample(const search *s, const int32_t *node)
@@ -169,7 +168,7 @@ drape_status drape_find_inside(drape_context *ctx, const drape_model *m, const d
         if (status || drape_model_ignores(m, collider->index, m->triangle[3 * (size_t)f]))
             continue;
         const double depth = fmax(deepest_sample(&s, m->triangle + 3 * (size_t)f), deepest_between(&s, f));
-        found->triangles += depth > TOUCH || is_pierced(&s, f);
+        found->triangles += depth > DRAPE_SAME * s.model->length || is_pierced(&s, f);
         found->deepest = fmax(found->deepest, depth);
     }
     drape_arena_free(&arena);

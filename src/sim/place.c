@@ -13,7 +13,6 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_DISTANCE 1e9 /* [m] the limit of a track's keys */
 /* The def has had these members since its first version. */
 #define MIN_SIZE sizeof(drape_place_def)
 
@@ -66,7 +65,7 @@ static drape_placement place_displacement(const drape_sim *sim, int32_t collider
 
 static bool is_far(const double *x)
 {
-    return !(fabs(x[0]) <= MAX_DISTANCE && fabs(x[1]) <= MAX_DISTANCE && fabs(x[2]) <= MAX_DISTANCE);
+    return !(fabs(x[0]) <= DRAPE_MOST && fabs(x[1]) <= DRAPE_MOST && fabs(x[2]) <= DRAPE_MOST);
 }
 
 static drape_status check_colliders(const drape_sim *sim, const drape_place_list *colliders,
@@ -81,7 +80,7 @@ static drape_status check_colliders(const drape_sim *sim, const drape_place_list
         drape_placement_move(&own, at, at);
         if (is_far(at))
             return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_place: %s would be beyond %g m",
-                              sim->model->colliders[c].name, MAX_DISTANCE);
+                              sim->model->colliders[c].name, DRAPE_MOST);
     }
     return DRAPE_OK;
 }
@@ -99,7 +98,7 @@ static drape_status check_nodes(const drape_sim *sim, const drape_place_list *cl
             if (is_far(x))
                 return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                                   "drape_sim_place: node %d of %s would be beyond %g m", (int)i, cloth->name,
-                                  MAX_DISTANCE);
+                                  DRAPE_MOST);
         }
     }
     return DRAPE_OK;
@@ -208,7 +207,7 @@ static drape_status read_def(const drape_sim *sim, const drape_place_def *given,
     if (!isfinite(def->rotate[3]) || is_far(def->rotate) || is_far(def->center) || is_far(def->translate))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_place: rotation, center and translation must be finite, and within %g",
-                          MAX_DISTANCE);
+                          DRAPE_MOST);
     return DRAPE_OK;
 }
 

@@ -9,9 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#define MET        1e-9 /* [m] as near to a collider a ray meets it */
-#define LEAST      1e-4 /* of the length of a ray: the least step along it outside of a collider */
-#define MAX_HALVES 60   /* of a step in which a ray gets inside: then it is known to the last bit */
+#define LEAST 1e-4 /* of the length of a ray: the least step along it outside of a collider */
 
 /* What is asked about: the colliders as they are at the moment, where they deform. */
 typedef struct query {
@@ -93,8 +91,7 @@ static double distance_at(const ray *r, double t, double *normal)
 /* Where the piece from outside to inside enters. */
 static double enter(const ray *r, double outside, double inside)
 {
-    for (int i = 0; i < MAX_HALVES; i++) {
-        const double middle = outside + (inside - outside) / 2;
+    for (double middle; (middle = outside + (inside - outside) / 2) > outside && middle < inside;) {
         if (distance_at(r, middle, NULL) > 0)
             outside = middle;
         else
@@ -107,15 +104,16 @@ static double enter(const ray *r, double outside, double inside)
  * it. */
 static bool meets(const ray *r, double length, double *t)
 {
+    const double met = DRAPE_SAME * length;
     double before = 0;
     *t = 0;
-    for (double distance; (distance = distance_at(r, *t, NULL)) > MET;) {
+    for (double distance; (distance = distance_at(r, *t, NULL)) > met;) {
         if (*t >= length)
             return false;
         before = *t;
         *t = fmin(*t + fmax(distance, LEAST * length), length);
     }
-    if (distance_at(r, *t, NULL) < -MET && *t > 0)
+    if (distance_at(r, *t, NULL) < -met && *t > 0)
         *t = enter(r, before, *t);
     return true;
 }

@@ -1,14 +1,15 @@
 /* schedule.c: see schedule.h. */
 #include "sim/schedule.h"
 
+#include "model/model.h"
+
 #include <float.h>
 #include <math.h>
 
-#define MAX_LEVELS 60   /* number of parts is a 64-bit integer */
-#define JOIN       1e-9 /* of dt: a shorter remainder is joined to the interval before it */
 /* of the time: a shorter remainder is rounding error in the host's own sum */
 #define ROUNDING (1e3 * DBL_EPSILON)
-#define LEAST    1e-30 /* of dt: in a shorter remainder nothing happens, and 1/h^2 would overflow */
+/* of dt: in a shorter remainder nothing happens, and 1/h^2 would overflow */
+#define LEAST (DBL_EPSILON * DBL_EPSILON)
 
 void drape_schedule_init(drape_schedule *s, drape_stepping stepping, double dt, double start)
 {
@@ -50,7 +51,7 @@ static double least_remainder(const drape_schedule *s)
  * add. */
 static double min_remainder(const drape_schedule *s)
 {
-    return fmax(JOIN * s->dt, 2 * rounding(s->end));
+    return fmax(DRAPE_SAME * s->dt, 2 * rounding(s->end));
 }
 
 /*
@@ -84,7 +85,7 @@ static bool next_proposed(const drape_schedule *s, double *t1, double *h)
 {
     const double end = s->cut ? s->cut_end : s->end;
     double left = end - s->now;
-    *h = s->limit >= (1 - JOIN) * left ? left : 2 * s->limit > left ? left / 2 : s->limit;
+    *h = s->limit >= (1 - DRAPE_SAME) * left ? left : 2 * s->limit > left ? left / 2 : s->limit;
     *t1 = *h == left ? end : s->now + *h;
     return s->end - s->now > least_remainder(s);
 }
@@ -156,7 +157,7 @@ void drape_schedule_accept(drape_schedule *s, double t1, double h_next, bool gro
 {
     s->now = t1;
     s->tries++;
-    if (t1 - s->tries_from >= (1 - JOIN) * s->dt) {
+    if (t1 - s->tries_from >= (1 - DRAPE_SAME) * s->dt) {
         s->tries = 0;
         s->tries_from = t1;
     }
@@ -194,7 +195,7 @@ bool drape_schedule_retry(drape_schedule *s, double h_next)
     s->tries++;
     if (s->stepping != DRAPE_STEPS_COUNTED)
         return h_next > 0 && h_next < s->tried;
-    if (s->level == MAX_LEVELS)
+    if (s->level == DRAPE_SCHEDULE_LEVELS)
         return false;
     s->level++;
     s->part *= 2;

@@ -17,6 +17,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#define DRAPE_SCHEDULE_LEVELS 60 /* the number of parts of an interval is a 64-bit integer */
+
 typedef enum drape_stepping { DRAPE_STEPS_COUNTED, DRAPE_STEPS_PROPOSED, DRAPE_STEPS_FREE } drape_stepping;
 
 typedef struct drape_schedule {

@@ -11,19 +11,15 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_SECONDS 1e9 /* [s] the limit of a scene's duration */
-/* of the scene's size: rounding error allowed between the given position of a pinned node and its pin */
-#define PIN_SLIP 1e-9
-
 static drape_status check_given(const drape_sim *sim, double t, const double *x, const double *v)
 {
     size_t n = 3 * (size_t)sim->model->node_count;
     if (!x || !v)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_state: there are no %s",
                           x ? "velocities" : "positions");
-    if (!(t >= 0 && t <= MAX_SECONDS))
+    if (!(t >= 0 && t <= DRAPE_MOST))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_state: t = %g s; it is 0 to %g s", t,
-                          MAX_SECONDS);
+                          DRAPE_MOST);
     for (size_t i = 0; i < 2 * n; i++) {
         double value = i < n ? x[i] : v[i - n];
         int32_t node = (int32_t)(i % n / 3), c = drape_model_cloth_of(sim->model, node);
@@ -78,8 +74,8 @@ static drape_status check_pinned(const drape_sim *sim, const double *given, doub
     for (int32_t i = 0; i < m->node_count; i++) {
         const double *x = given + 3 * (size_t)i, *pin = placed + 3 * (size_t)i;
         const drape_cloth *cloth = &m->cloths[drape_model_cloth_of(m, i)];
-        if (m->pinned[i] &&
-            !(drape_hypot(drape_hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= PIN_SLIP * m->length))
+        if (m->pinned[i] && !(drape_hypot(drape_hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <=
+                              DRAPE_SAME * m->length))
             return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                               "drape_sim_set_state: node %d of %s is at (%g %g %g); its pin has it at (%g %g "
                               "%g) m at t = %g s",
@@ -106,7 +102,7 @@ static drape_status check_supported(const drape_sim *sim, const double *given, d
             off[k] = x[k] - at[k] - within[k];
         const double distance = drape_hypot(drape_hypot(off[0], off[1]), off[2]);
         const drape_cloth *cloth = &m->cloths[drape_model_cloth_of(m, node)];
-        if (m->free_of_node[node] >= 0 && !(distance <= PIN_SLIP * m->length))
+        if (m->free_of_node[node] >= 0 && !(distance <= DRAPE_SAME * m->length))
             return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                               "drape_sim_set_state: node %d of %s is at (%g %g %g), which is %g m off the "
                               "plane or line on which a pin holds it",
@@ -129,7 +125,7 @@ static drape_status check_images(const drape_sim *sim, const double *given)
             off[k] = given[a + k] - given[b + k] - (now[a + k] - now[b + k]);
         const double distance = drape_hypot(drape_hypot(off[0], off[1]), off[2]);
         const drape_cloth *cloth = &m->cloths[drape_model_cloth_of(m, i)];
-        if (!(distance <= PIN_SLIP * m->length))
+        if (!(distance <= DRAPE_SAME * m->length))
             return drape_fail(
                 sim->ctx, DRAPE_E_ARGUMENT,
                 "drape_sim_set_state: node %d of %s is %g m from where the period of its periodic "

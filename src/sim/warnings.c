@@ -20,7 +20,6 @@
 #define TOO_MANY 10.0 /* Newton iterations an attempt: smaller steps hardly cost more */
 #define THIN     5.0  /* activation distances in a step of a collider */
 #define LARGE    20.0 /* [m] across */
-#define INSIDE   1e-9 /* [m] a node less deep than this is not inside: contact allows it */
 
 /* A cloth of which nothing but its weight is modelled falls like dust. */
 static bool has_no_terms(drape_sim *sim, char *text, size_t size)
@@ -179,7 +178,7 @@ static int32_t free_nodes_inside(drape_context *ctx, const drape_model *m, const
         if (drape_model_ignores(m, collider->index, m->node_of_free[f]))
             continue;
         const double depth = -drape_collider_distance(collider, pose, at, NULL, NULL);
-        count += depth > INSIDE;
+        count += depth > DRAPE_SAME * m->length;
         *deepest = fmax(*deepest, depth);
     }
     return count;

@@ -15,6 +15,14 @@
 
 #include <stdatomic.h>
 
+/* Residual, relative to that of the nonlinear equation, that iterations leave in a correction: as a rule, and
+ * where what is left decides the motion or the error test. */
+#define DRAPE_LINEAR_TOLERANCE 1e-2
+#define DRAPE_LINEAR_TIGHT     1e-4
+
+/* Unknowns of a matrix that is factored where another way remains: at a third of these, factors take 1.6 GB. */
+#define DRAPE_MOST_FACTORED 1000000
+
 typedef struct drape_linear_ops drape_linear_ops;
 
 /* The choice of a solver and its fallbacks. */

@@ -16,8 +16,7 @@
 #include <inttypes.h>
 #include <string.h>
 
-#define MAX_ITERATIONS 2000    /* a matrix that needs more goes to the fallback */
-#define MAX_FALLBACK   1000000 /* unknowns: at a third of these, factors take 1.6 GB */
+#define MAX_ITERATIONS 2000 /* a matrix that needs more goes to the fallback */
 
 extern const drape_linear_ops drape_linear_pcg;
 
@@ -80,12 +79,12 @@ static bool is_finite(const pcg_state *s, const double *values, int64_t n)
 static drape_status factor_general(pcg_state *s)
 {
     s->factored = false;
-    if (!s->pattern->ranks && s->pattern->n > MAX_FALLBACK) {
+    if (!s->pattern->ranks && s->pattern->n > DRAPE_MOST_FACTORED) {
         drape_log(s->arena->ctx, DRAPE_LOG_WARNING,
                   "pcg: the matrix of %" PRId64
                   " unknowns is not symmetric positive definite, and too large for "
                   "multifrontal, which is used up to %d",
-                  s->pattern->n, MAX_FALLBACK);
+                  s->pattern->n, DRAPE_MOST_FACTORED);
         return DRAPE_RETRY_LINEAR;
     }
     drape_status status = drape_fallback_factor(&s->fallback, s->values);

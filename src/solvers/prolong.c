@@ -6,7 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_FUNCTIONS 16 /* largest number of functions at a node; beyond it the smallest are dropped */
 /* share of a node's value that each averaging takes from its neighbours */
 #define SMOOTH (2.0 / 3)
 /* share of the largest value at a node: smaller ones are dropped, the others scaled to add up to 1 */
@@ -64,29 +63,29 @@ static int32_t aggregate(const drape_graph *g, int spacing, front *f)
 
 /* The values at each node, as they are smoothed. */
 typedef struct table {
-    int32_t *count, *column; /* (nodes), (nodes x MAX_FUNCTIONS) */
+    int32_t *count, *column; /* (nodes), (nodes x DRAPE_PROLONG_FUNCTIONS) */
     double *value;
 } table;
 
 static void add_value(table *t, int32_t node, int32_t column, double value)
 {
-    int32_t *columns = t->column + (size_t)node * MAX_FUNCTIONS, k = 0;
+    int32_t *columns = t->column + (size_t)node * DRAPE_PROLONG_FUNCTIONS, k = 0;
     while (k < t->count[node] && columns[k] != column)
         k++;
-    if (k == MAX_FUNCTIONS)
+    if (k == DRAPE_PROLONG_FUNCTIONS)
         return;
     if (k == t->count[node]) {
         t->count[node]++;
         columns[k] = column;
-        t->value[(size_t)node * MAX_FUNCTIONS + (size_t)k] = 0;
+        t->value[(size_t)node * DRAPE_PROLONG_FUNCTIONS + (size_t)k] = 0;
     }
-    t->value[(size_t)node * MAX_FUNCTIONS + (size_t)k] += value;
+    t->value[(size_t)node * DRAPE_PROLONG_FUNCTIONS + (size_t)k] += value;
 }
 
 static void add_row(table *to, int32_t node, const table *from, int32_t other, double factor)
 {
     for (int32_t k = 0; k < from->count[other]; k++) {
-        size_t at = (size_t)other * MAX_FUNCTIONS + (size_t)k;
+        size_t at = (size_t)other * DRAPE_PROLONG_FUNCTIONS + (size_t)k;
         add_value(to, node, from->column[at], factor * from->value[at]);
     }
 }
@@ -106,7 +105,7 @@ static double threshold(const table *t, int32_t node)
 {
     double largest = 0;
     for (int32_t k = 0; k < t->count[node]; k++)
-        largest = fmax(largest, t->value[(size_t)node * MAX_FUNCTIONS + (size_t)k]);
+        largest = fmax(largest, t->value[(size_t)node * DRAPE_PROLONG_FUNCTIONS + (size_t)k]);
     return DROP * largest;
 }
 
@@ -116,7 +115,7 @@ static int32_t kept(const table *t, int32_t node, double *sum)
     int32_t count = 0;
     *sum = 0;
     for (int32_t k = 0; k < t->count[node]; k++) {
-        double value = t->value[(size_t)node * MAX_FUNCTIONS + (size_t)k];
+        double value = t->value[(size_t)node * DRAPE_PROLONG_FUNCTIONS + (size_t)k];
         count += value > least;
         *sum += value > least ? value : 0;
     }
@@ -139,7 +138,7 @@ static drape_status pack(drape_arena *arena, const table *t, drape_prolong *out)
         kept(t, i, &sum);
         double least = threshold(t, i);
         for (int32_t k = 0; k < t->count[i]; k++) {
-            size_t from = (size_t)i * MAX_FUNCTIONS + (size_t)k;
+            size_t from = (size_t)i * DRAPE_PROLONG_FUNCTIONS + (size_t)k;
             if (t->value[from] <= least)
                 continue;
             out->column[at] = t->column[from];
@@ -175,9 +174,10 @@ drape_status drape_prolong_build(drape_arena *arena, const drape_graph *g, int s
                .aggregate = drape_arena_take(&scratch, nodes, sizeof *f.aggregate)};
     table t[2];
     for (int i = 0; i < 2; i++)
-        t[i] = (table){.count = drape_arena_take(&scratch, nodes, sizeof *t->count),
-                       .column = drape_arena_take(&scratch, nodes * MAX_FUNCTIONS, sizeof *t->column),
-                       .value = drape_arena_take(&scratch, nodes * MAX_FUNCTIONS, sizeof *t->value)};
+        t[i] =
+            (table){.count = drape_arena_take(&scratch, nodes, sizeof *t->count),
+                    .column = drape_arena_take(&scratch, nodes * DRAPE_PROLONG_FUNCTIONS, sizeof *t->column),
+                    .value = drape_arena_take(&scratch, nodes * DRAPE_PROLONG_FUNCTIONS, sizeof *t->value)};
     *out = (drape_prolong){.fine = g->count};
     drape_status status = drape_arena_status(&scratch);
     if (!status) {

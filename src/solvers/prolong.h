@@ -10,6 +10,8 @@
 
 #include "base/arena.h"
 
+#define DRAPE_PROLONG_FUNCTIONS 16 /* at a node, at most; beyond it the smallest are dropped */
+
 /* Neighbours of each node, in both directions: neighbor[start[i]] ... neighbor[start[i + 1] - 1]. */
 typedef struct drape_graph {
     int32_t count;

@@ -66,8 +66,11 @@ START_TEST(they_agree_at_tight_tolerances)
 }
 END_TEST
 
-/* Errors at rtol 1e-4 and 1e-9, as a power of the number of steps: its order, on average over the steps. A
- * variable order may be higher than its limit where low orders suffice for the loose tolerance. */
+/* Errors at rtol 1e-4 and 1e-9, as a power of the number of steps: its order, on average over the steps, or down to
+ * one less. The steps at rtol 1e-4 are some 20, of which the first ones are as short as those at 1e-9, and where
+ * waves of the sheet are stiff the stages, of order 2, take away some of the order. With steps of one size,
+ * tests/time/test_order.c measures the orders. A variable order may be higher than its limit where low
+ * orders suffice for the loose tolerance. */
 static void check_order(const char *method, const char *setting, int order)
 {
     char more[40];
@@ -86,7 +89,7 @@ static void check_order(const char *method, const char *setting, int order)
     const double slope = log(error[0] / error[1]) / log((double)steps[1] / (double)steps[0]);
     printf("# %s, order %d: %lld to %lld steps, %.3g to %.3g m: %.2f\n", method, order, (long long)steps[0],
            (long long)steps[1], error[0], error[1], slope);
-    ck_assert_double_ge(slope, order - 0.5);
+    ck_assert_double_ge(slope, order - 1);
     scene_close(&reference);
 }
 

@@ -1,0 +1,46 @@
+/* instant.c: see instant.h. */
+#include "integrators/instant.h"
+
+/* Within the span the velocity of anything that moves is that at any time, such as the middle. */
+static double middle_of(const double span[2])
+{
+    return (span[0] + span[1]) / 2;
+}
+
+void drape_instant_place_pins(const drape_motion *motion, double t, const double span[2], double *x,
+                              double *v)
+{
+    drape_motion_place_pins(motion, t, x);
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        drape_motion_pin_velocity(motion, i, t, middle_of(span), v + 3 * (size_t)motion->moved_node[i]);
+}
+
+/* Of the forces that were evaluated last, or of g, on colliders and supports. */
+static double power_of_bodies(const drape_system *system, const drape_point *point, const double *g)
+{
+    const double middle = middle_of(point->span);
+    return drape_system_support_power(system, g, middle) +
+           drape_motion_collider_power(drape_system_motion(system), drape_system_on_colliders(system),
+                                       point->t, middle);
+}
+
+double drape_instant_dissipation(drape_system *system, const drape_point *point, double *g)
+{
+    const drape_model *m = drape_system_model(system);
+    drape_system_dissipation(system, point, g);
+    double power = power_of_bodies(system, point, g);
+    for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
+        power += drape_model_owns(m, (int32_t)(i / 3)) ? g[i] * point->v[i] : 0;
+    return power;
+}
+
+double drape_instant_driving(const drape_system *system, const drape_point *point, const double *g)
+{
+    const drape_motion *motion = drape_system_motion(system);
+    double power = power_of_bodies(system, point, NULL);
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        for (size_t k = 0, at = 3 * (size_t)motion->moved_node[i]; k < 3; k++)
+            if (drape_model_owns(drape_system_model(system), motion->moved_node[i]))
+                power += g[at + k] * point->v[at + k];
+    return power;
+}
