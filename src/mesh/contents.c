@@ -26,26 +26,6 @@ static drape_status fail_file(drape_context *ctx, const char *pointer, const cha
     return drape_fail_at(ctx, DRAPE_E_FILE, pointer, "%s: cannot be read: %s", path, reason);
 }
 
-/* Reads up to the announced size, or to the end of the file if it has shrunk since. */
-static drape_status read_descriptor(drape_context *ctx, const char *pointer, const char *path, int descriptor,
-                                    drape_contents *file)
-{
-    const size_t announced = file->size;
-    file->size = 0;
-    while (file->size < announced) {
-        const ssize_t got = read(descriptor, file->data + file->size, announced - file->size);
-        if (got < 0 && errno == EINTR)
-            continue;
-        if (got < 0)
-            return fail_file(ctx, pointer, path, strerror(errno));
-        if (got == 0)
-            break;
-        file->size += (size_t)got;
-    }
-    file->data[file->size] = 0;
-    return DRAPE_OK;
-}
-
 static drape_status read_open_file(drape_arena *arena, const char *pointer, const char *path, int descriptor,
                                    drape_contents *file)
 {
@@ -60,9 +40,22 @@ static drape_status read_open_file(drape_arena *arena, const char *pointer, cons
     if (about.st_size > MAX_FILE_SIZE)
         return drape_fail_at(ctx, DRAPE_E_FILE, pointer, "%s: has %lld bytes; at most %lld can be read", path,
                              (long long)about.st_size, (long long)MAX_FILE_SIZE);
-    file->size = (size_t)about.st_size;
-    file->data = drape_arena_take(arena, file->size + 1, 1);
-    return file->data ? read_descriptor(ctx, pointer, path, descriptor, file) : DRAPE_E_MEMORY;
+    const size_t announced = (size_t)about.st_size;
+    file->data = drape_arena_take(arena, announced + 1, 1);
+    if (!file->data)
+        return DRAPE_E_MEMORY;
+    for (file->size = 0; file->size < announced;) {
+        const ssize_t got = read(descriptor, file->data + file->size, announced - file->size);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got < 0)
+            return fail_file(ctx, pointer, path, strerror(errno));
+        if (got == 0) /* the file has shrunk since */
+            break;
+        file->size += (size_t)got;
+    }
+    file->data[file->size] = 0;
+    return DRAPE_OK;
 }
 
 /* O_NONBLOCK: opening a pipe without a writer would otherwise block for ever. */

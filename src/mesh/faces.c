@@ -103,17 +103,6 @@ static void divide_quadrilateral(polygon *p)
     }
 }
 
-/* Newell's normal (Sutherland, Sproull and Schumacker 1974, doi:10.1145/356625.356626): twice the area. */
-static void newell(const polygon *p, int count, double normal[3])
-{
-    memset(normal, 0, 3 * sizeof *normal);
-    for (int i = 1; i + 1 < count; i++) {
-        double n[3];
-        normal_of(p, 0, i, i + 1, n);
-        vec3_add_scaled(1, n, normal);
-    }
-}
-
 /* Whether the corners that remain, before i, i and after i, turn to the left about the normal. */
 static bool turns_left(const polygon *p, const int *ring, int count, int i, const double *normal)
 {
@@ -175,7 +164,13 @@ static void cut_ears(polygon *p, int count)
     int ring[MAX_EARS];
     bool ear[MAX_EARS];
     double normal[3];
-    newell(p, count, normal);
+    /* Newell's normal (Sutherland, Sproull and Schumacker 1974, doi:10.1145/356625.356626): twice the area. */
+    memset(normal, 0, 3 * sizeof *normal);
+    for (int i = 1; i + 1 < count; i++) {
+        double one[3];
+        normal_of(p, 0, i, i + 1, one);
+        vec3_add_scaled(1, one, normal);
+    }
     for (int i = 0; i < count; i++)
         ring[i] = i;
     for (int i = 0; i < count; i++)
@@ -221,23 +216,6 @@ static drape_status divide(drape_mesh *mesh)
 static bool are_numbers(const double uv[2])
 {
     return fabs(uv[0]) <= FLT_MAX && fabs(uv[1]) <= FLT_MAX;
-}
-
-/* A face has texture coordinates at all corners or at none. Returns whether any has. */
-static bool complete_uvs(drape_faces *f)
-{
-    bool any = false;
-    for (int32_t i = 0; i < f->count; i++) {
-        bool all = true;
-        for (int32_t c = f->first[i]; c < f->first[i + 1]; c++) {
-            const double *uv = f->uv_of[c] < 0 ? NULL : f->uv + 2 * (size_t)f->uv_of[c];
-            all = all && uv && are_numbers(uv);
-        }
-        for (int32_t c = f->first[i]; c < f->first[i + 1] && !all; c++)
-            f->uv_of[c] = -1;
-        any = any || all;
-    }
-    return any;
 }
 
 typedef struct numbered_uv {
@@ -310,7 +288,18 @@ drape_status drape_faces_complete(drape_context *ctx, drape_mesh *mesh)
     const drape_status status = divide(mesh);
     if (status)
         return status;
-    const bool has_uvs = complete_uvs(f);
+    /* A face has texture coordinates at all corners or at none. */
+    bool has_uvs = false;
+    for (int32_t i = 0; i < f->count; i++) {
+        bool all = true;
+        for (int32_t c = f->first[i]; c < f->first[i + 1]; c++) {
+            const double *uv = f->uv_of[c] < 0 ? NULL : f->uv + 2 * (size_t)f->uv_of[c];
+            all = all && uv && are_numbers(uv);
+        }
+        for (int32_t c = f->first[i]; c < f->first[i + 1] && !all; c++)
+            f->uv_of[c] = -1;
+        has_uvs = has_uvs || all;
+    }
     if (!has_uvs && f->material_count == 0 && f->count == mesh->triangle_count) {
         drop(&mesh->arena, f);
         return DRAPE_OK;

@@ -70,9 +70,10 @@ static drape_status read_chunks(drape_gltf *g, const char *data, size_t size)
     return g->root ? g->status : FAIL(g, "it has no JSON");
 }
 
-/* What a file says it cannot be read without; materials and lights do not matter here. */
-static void check_extensions(drape_gltf *g)
+void drape_gltf_open(drape_gltf *g, const char *data, size_t size)
 {
+    read_chunks(g, data, size);
+    /* What a file says it cannot be read without; materials and lights do not matter here. */
     static const char *const harmless[] = {"KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_"};
     const json_t *name;
     size_t i;
@@ -85,12 +86,6 @@ static void check_extensions(drape_gltf *g)
         if (!known)
             FAIL(g, "it needs the extension %.60s, which is not read", text ? text : "(no name)");
     }
-}
-
-void drape_gltf_open(drape_gltf *g, const char *data, size_t size)
-{
-    read_chunks(g, data, size);
-    check_extensions(g);
 }
 
 void drape_gltf_close(drape_gltf *g)

@@ -66,42 +66,11 @@ drape_gltf_map drape_gltf_map_of(const double matrix[16])
     return out;
 }
 
-static drape_gltf_map map_of(const double at[10])
-{
-    const double *q = at + ROTATION, turned[4] = {q[3], q[0], q[1], q[2]};
-    double R[9];
-    drape_gltf_map out;
-    drape_rotation_of_quaternion(turned, R);
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++)
-            out.column[i][k] = R[3 * k + i] * at[SCALE + i];
-    memcpy(out.column[3], at + TRANSLATION, sizeof out.column[3]);
-    return out;
-}
-
 /* ---- Nodes ---- */
 
 static double squared_length(const double *q)
 {
     return q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-}
-
-static void read_transform(drape_gltf *g, const char *owner, const json_t *object, drape_gltf_node *n)
-{
-    double matrix[16] = {0};
-    const double rest[10] = {0, 0, 0, 0, 0, 0, 1, 1, 1, 1};
-    memcpy(n->rest, rest, sizeof rest);
-    n->fixed = json_object_get(object, "matrix");
-    if (n->fixed && (json_object_get(object, "translation") || json_object_get(object, "rotation") ||
-                     json_object_get(object, "scale")))
-        FAIL(g, "%s: it has \"matrix\" beside \"translation\", \"rotation\" or \"scale\"", owner);
-    drape_gltf_numbers(g, owner, object, "matrix", 16, matrix);
-    drape_gltf_numbers(g, owner, object, "translation", 3, n->rest + TRANSLATION);
-    drape_gltf_numbers(g, owner, object, "rotation", 4, n->rest + ROTATION);
-    drape_gltf_numbers(g, owner, object, "scale", 3, n->rest + SCALE);
-    n->local = drape_gltf_map_of(matrix);
-    if (!(squared_length(n->rest + ROTATION) > LEAST_TURN))
-        FAIL(g, "%s: a rotation must not be 0", owner);
 }
 
 /* As many weights as the first primitive of its mesh has morph targets; the node's own replace those of the
@@ -132,7 +101,20 @@ static void read_node(const drape_gltf_scene *s, int32_t index)
     snprintf(owner, sizeof owner, "node %d", (int)index);
     n->mesh = drape_gltf_index(g, owner, object, "mesh", drape_gltf_count(g, "meshes"));
     n->skin = drape_gltf_index(g, owner, object, "skin", drape_gltf_count(g, "skins"));
-    read_transform(g, owner, object, n);
+    double matrix[16] = {0};
+    const double rest[10] = {0, 0, 0, 0, 0, 0, 1, 1, 1, 1};
+    memcpy(n->rest, rest, sizeof rest);
+    n->fixed = json_object_get(object, "matrix");
+    if (n->fixed && (json_object_get(object, "translation") || json_object_get(object, "rotation") ||
+                     json_object_get(object, "scale")))
+        FAIL(g, "%s: it has \"matrix\" beside \"translation\", \"rotation\" or \"scale\"", owner);
+    drape_gltf_numbers(g, owner, object, "matrix", 16, matrix);
+    drape_gltf_numbers(g, owner, object, "translation", 3, n->rest + TRANSLATION);
+    drape_gltf_numbers(g, owner, object, "rotation", 4, n->rest + ROTATION);
+    drape_gltf_numbers(g, owner, object, "scale", 3, n->rest + SCALE);
+    n->local = drape_gltf_map_of(matrix);
+    if (!(squared_length(n->rest + ROTATION) > LEAST_TURN))
+        FAIL(g, "%s: a rotation must not be 0", owner);
     read_weights(g, owner, object, n);
     snprintf(owner, sizeof owner, "node %d: \"children\"", (int)index);
     json_array_foreach(json_object_get(object, "children"), i, child)
@@ -275,21 +257,6 @@ static void read_channel(drape_gltf_scene *s, const json_t *animation, const jso
     s->channel_count++;
 }
 
-static void read_animation(drape_gltf_scene *s)
-{
-    const json_t *animation = drape_gltf_item(s->gltf, "animations", 0),
-                 *channels = json_object_get(animation, "channels"), *channel;
-    size_t i;
-    if (animation && json_array_size(channels) == 0)
-        FAIL(s->gltf, "animation 0, which is the one that is read, has no channels");
-    s->channels = drape_gltf_take(s->gltf, json_array_size(channels), sizeof *s->channels);
-    json_array_foreach(channels, i, channel)
-    {
-        if (!s->gltf->status)
-            read_channel(s, animation, channel, (int)i);
-    }
-}
-
 void drape_gltf_scene_read(drape_gltf *g, drape_gltf_scene *s)
 {
     *s = (drape_gltf_scene){.gltf = g, .node_count = drape_gltf_count(g, "nodes")};
@@ -303,7 +270,17 @@ void drape_gltf_scene_read(drape_gltf *g, drape_gltf_scene *s)
         sort_nodes(s);
     if (!g->status)
         mark_drawn(s);
-    read_animation(s);
+    const json_t *animation = drape_gltf_item(g, "animations", 0),
+                 *channels = json_object_get(animation, "channels"), *channel;
+    size_t k;
+    if (animation && json_array_size(channels) == 0)
+        FAIL(g, "animation 0, which is the one that is read, has no channels");
+    s->channels = drape_gltf_take(g, json_array_size(channels), sizeof *s->channels);
+    json_array_foreach(channels, k, channel)
+    {
+        if (!g->status)
+            read_channel(s, animation, channel, (int)k);
+    }
 }
 
 /* ---- A pose ---- */
@@ -384,8 +361,14 @@ void drape_gltf_scene_pose(drape_gltf_scene *s, double t)
         drape_gltf_node *n = &s->nodes[s->order[i]];
         if (!(squared_length(n->now + ROTATION) > LEAST_TURN)) /* an animation lets it vanish */
             memcpy(n->now + ROTATION, no_rotation, sizeof no_rotation);
-        if (!n->fixed)
-            n->local = map_of(n->now);
+        if (!n->fixed) {
+            const double *q = n->now + ROTATION, turned[4] = {q[3], q[0], q[1], q[2]};
+            double R[9];
+            drape_rotation_of_quaternion(turned, R);
+            for (int k = 0; k < 9; k++)
+                n->local.column[k % 3][k / 3] = R[k] * n->now[SCALE + k % 3];
+            memcpy(n->local.column[3], n->now + TRANSLATION, sizeof n->local.column[3]);
+        }
         n->world = n->parent < 0 ? n->local : drape_gltf_map_product(&s->nodes[n->parent].world, &n->local);
     }
 }

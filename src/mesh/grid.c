@@ -35,7 +35,7 @@ double drape_grid_random(uint64_t *seed)
     return (double)(*seed >> 11) / 4503599627370496.0 - 1;
 }
 
-static int32_t *put(int32_t *triangle, int32_t a, int32_t b, int32_t c, bool flip)
+int32_t *drape_grid_put(int32_t *triangle, int32_t a, int32_t b, int32_t c, bool flip)
 {
     triangle[0] = a;
     triangle[1] = flip ? c : b;
@@ -46,8 +46,8 @@ static int32_t *put(int32_t *triangle, int32_t a, int32_t b, int32_t c, bool fli
 int32_t *drape_grid_split(int32_t *triangle, int32_t a, int32_t columns, bool falling, bool flip)
 {
     const int32_t b = a + 1, c = a + columns, d = c + 1;
-    int32_t *next = put(triangle, a, b, falling ? d : c, flip);
-    return put(next, falling ? a : b, d, c, flip);
+    int32_t *next = drape_grid_put(triangle, a, b, falling ? d : c, flip);
+    return drape_grid_put(next, falling ? a : b, d, c, flip);
 }
 
 void drape_grid_triangulate(drape_mesh *mesh, const bool falling[2][2], bool flip)

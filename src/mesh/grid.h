@@ -25,8 +25,9 @@ drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_
  * If falling[r % 2][c % 2] is true, the cell is split from A to D into A B D and A D C, otherwise from B to C
  * into A B C and B D C. Seen as drawn, the triangles are counterclockwise; with flip they are clockwise. The
  * triangles of a cell are consecutive, and cells are in the order of their A. drape_grid_split splits one
- * cell with the corner A = a and returns the place of the next triangle.
+ * cell with the corner A = a, drape_grid_put writes one triangle; both return the place of the next one.
  */
+int32_t *drape_grid_put(int32_t *triangle, int32_t a, int32_t b, int32_t c, bool flip);
 int32_t *drape_grid_split(int32_t *triangle, int32_t a, int32_t columns, bool falling, bool flip);
 void drape_grid_triangulate(drape_mesh *mesh, const bool falling[2][2], bool flip);
 

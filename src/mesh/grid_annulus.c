@@ -23,8 +23,23 @@ static const drape_param params[PARAM_COUNT] = {
     [OUTER] = GRID_LENGTH("outer_radius", "radius of the rim; larger than inner_radius"),
 };
 
-static void place_nodes(const double *values, drape_mesh *mesh)
+static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
 {
+    const int32_t columns = (int32_t)values[SPOKES], rows = (int32_t)values[CIRCLES];
+    const drape_mesh_source source = {.pointer = pointer};
+    char place[sizeof ctx->pointer];
+    snprintf(place, sizeof place, "%s/outer_radius", pointer);
+    drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
+    if (!status && !(values[OUTER] > values[INNER]))
+        status = drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "%g m; it is larger than inner_radius, %g m",
+                               values[OUTER], values[INNER]);
+    if (!status)
+        status = drape_mesh_allocate(ctx, &source, (size_t)rows * (size_t)columns,
+                                     2 * (size_t)(rows - 1) * (size_t)columns, mesh);
+    if (status)
+        return status;
+    mesh->rows = rows;
+    mesh->columns = columns;
     const double two_pi = 6.28318530717958647693, inner = values[INNER],
                  step = (values[OUTER] - inner) / (mesh->rows - 1);
     double *x = mesh->x;
@@ -37,53 +52,15 @@ static void place_nodes(const double *values, drape_mesh *mesh)
             x[1] = 0;
             x[2] = -radius * sine;
         }
-}
-
-static int32_t *put(int32_t *next, int32_t a, int32_t b, int32_t c)
-{
-    next[0] = a, next[1] = b, next[2] = c;
-    return next + 3;
-}
-
-/* Letters as in grid.h, with r outwards. A node of a rotated circle lies between two of the next circle. */
-static void split_cells(drape_mesh *mesh)
-{
+    /* Letters as in grid.h, with r outwards. A node of a rotated circle lies between two of the next circle. */
     int32_t *next = mesh->triangle;
     for (int32_t r = 0; r + 1 < mesh->rows; r++)
         for (int32_t k = 0; k < mesh->columns; k++) {
             const int32_t after = (k + 1) % mesh->columns, row = r * mesh->columns;
             const int32_t a = row + k, b = row + after, c = a + mesh->columns, d = b + mesh->columns;
-            next = put(next, a, r % 2 ? d : c, b);
-            next = put(next, r % 2 ? a : b, c, d);
+            next = drape_grid_put(next, a, r % 2 ? d : c, b, false);
+            next = drape_grid_put(next, r % 2 ? a : b, c, d, false);
         }
-}
-
-static drape_status check_radii(drape_context *ctx, const char *pointer, const double *values)
-{
-    char place[sizeof ctx->pointer];
-    if (values[OUTER] > values[INNER])
-        return DRAPE_OK;
-    snprintf(place, sizeof place, "%s/outer_radius", pointer);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "%g m; it is larger than inner_radius, %g m",
-                         values[OUTER], values[INNER]);
-}
-
-static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
-{
-    const int32_t columns = (int32_t)values[SPOKES], rows = (int32_t)values[CIRCLES];
-    const drape_mesh_source source = {.pointer = pointer};
-    drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
-    if (!status)
-        status = check_radii(ctx, pointer, values);
-    if (!status)
-        status = drape_mesh_allocate(ctx, &source, (size_t)rows * (size_t)columns,
-                                     2 * (size_t)(rows - 1) * (size_t)columns, mesh);
-    if (status)
-        return status;
-    mesh->rows = rows;
-    mesh->columns = columns;
-    place_nodes(values, mesh);
-    split_cells(mesh);
     return DRAPE_OK;
 }
 

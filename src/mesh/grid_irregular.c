@@ -19,8 +19,21 @@ static const drape_param params[PARAM_COUNT] = {
     [ORIENTATION] = GRID_ORIENTATION,
 };
 
-static void place_nodes(const double *values, bool vertical, drape_mesh *mesh)
+static double distance(const drape_mesh *mesh, int32_t a, int32_t b)
 {
+    const double *p = mesh->x + 3 * (size_t)a, *q = mesh->x + 3 * (size_t)b;
+    return drape_hypot(drape_hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
+}
+
+static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
+{
+    const bool vertical = values[ORIENTATION] == GRID_VERTICAL;
+    const int32_t columns = (int32_t)values[GRID_COLUMNS], rows = (int32_t)values[GRID_ROWS];
+    drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
+    if (!status)
+        status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
+    if (status)
+        return status;
     const int32_t last_row = mesh->rows - 1, last_column = mesh->columns - 1;
     const double jitter = values[JITTER];
     uint64_t seed = (uint64_t)values[SEED];
@@ -33,17 +46,7 @@ static void place_nodes(const double *values, bool vertical, drape_mesh *mesh)
             x[0] = u * values[GRID_WIDTH] / last_column;
             x[vertical ? 1 : 2] = -w * values[GRID_HEIGHT] / last_row;
         }
-}
-
-static double distance(const drape_mesh *mesh, int32_t a, int32_t b)
-{
-    const double *p = mesh->x + 3 * (size_t)a, *q = mesh->x + 3 * (size_t)b;
-    return drape_hypot(drape_hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
-}
-
-/* Triangles are counterclockwise as seen from +y or +z. */
-static void split_cells(bool vertical, drape_mesh *mesh)
-{
+    /* Triangles are counterclockwise as seen from +y or +z. */
     int32_t *next = mesh->triangle;
     for (int32_t r = 0; r + 1 < mesh->rows; r++)
         for (int32_t k = 0; k + 1 < mesh->columns; k++) {
@@ -51,19 +54,6 @@ static void split_cells(bool vertical, drape_mesh *mesh)
             const bool falling = distance(mesh, a, c + 1) <= distance(mesh, a + 1, c);
             next = drape_grid_split(next, a, mesh->columns, falling, vertical);
         }
-}
-
-static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
-{
-    const bool vertical = values[ORIENTATION] == GRID_VERTICAL;
-    const int32_t columns = (int32_t)values[GRID_COLUMNS], rows = (int32_t)values[GRID_ROWS];
-    drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
-    if (!status)
-        status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
-    if (status)
-        return status;
-    place_nodes(values, vertical, mesh);
-    split_cells(vertical, mesh);
     return DRAPE_OK;
 }
 

@@ -33,48 +33,6 @@ static const drape_param params[PARAM_COUNT] = {
     [DIAGONALS] = DRAPE_CHOICE("diagonals", ALTERNATING, diagonals, "how the cells are split into triangles"),
 };
 
-/* A meridian: its points are middle + sine of an angle times along + (cosine - least) times out, as radius
- * and y, at angles from -half to half; a straight one has half = 0. */
-typedef struct meridian {
-    double middle[2], along[2], out[2], half, least;
-} meridian;
-
-static meridian meridian_of(const double *values)
-{
-    const double run = values[BOTTOM] - values[TOP], drop = values[HEIGHT], chord = drape_hypot(run, drop),
-                 radius = values[ARC];
-    meridian m = {.middle = {(values[TOP] + values[BOTTOM]) / 2, -drop / 2}, .along = {run, -drop}};
-    if (radius > 0 && chord > 0) {
-        const double depth = sqrt(fmax(0, radius * radius - chord * chord / 4));
-        m.half = drape_atan2(chord / 2, depth);
-        m.least = depth / radius;
-        m.out[0] = drop / chord * radius, m.out[1] = run / chord * radius;
-        m.along[0] *= radius / chord, m.along[1] *= radius / chord;
-    }
-    return m;
-}
-
-static void place_nodes(const double *values, drape_mesh *mesh)
-{
-    const double radian = DRAPE_PI / 180;
-    const meridian m = meridian_of(values);
-    double *x = mesh->x;
-    for (int32_t r = 0; r < mesh->rows; r++) {
-        const double at = (double)r / (mesh->rows - 1) - 0.5;
-        double sine = at, cosine = 0;
-        if (m.half > 0)
-            drape_sin_cos(2 * m.half * at, &sine, &cosine);
-        const double radius = m.middle[0] + sine * m.along[0] + (cosine - m.least) * m.out[0];
-        const double y = m.middle[1] + sine * m.along[1] + (cosine - m.least) * m.out[1];
-        for (int32_t c = 0; c < mesh->columns; c++, x += 3) {
-            drape_sin_cos(radian * values[ANGLE] * c / (mesh->columns - 1), &sine, &cosine);
-            x[0] = radius * cosine;
-            x[1] = y;
-            x[2] = -radius * sine;
-        }
-    }
-}
-
 static drape_status check_meridian(drape_context *ctx, const char *pointer, const double *values)
 {
     char place[sizeof ctx->pointer];
@@ -104,7 +62,34 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
         status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
     if (status)
         return status;
-    place_nodes(values, mesh);
+    /* The points of a meridian are middle + sine of an angle times along + (cosine - least) times out, as
+     * radius and y, at angles from -half to half; a straight one has half = 0. */
+    const double radian = DRAPE_PI / 180, run = values[BOTTOM] - values[TOP], drop = values[HEIGHT],
+                 chord = drape_hypot(run, drop), arc = values[ARC],
+                 middle[2] = {(values[TOP] + values[BOTTOM]) / 2, -drop / 2};
+    double along[2] = {run, -drop}, out[2] = {0}, half = 0, least = 0;
+    if (arc > 0 && chord > 0) {
+        const double depth = sqrt(fmax(0, arc * arc - chord * chord / 4));
+        half = drape_atan2(chord / 2, depth);
+        least = depth / arc;
+        out[0] = drop / chord * arc, out[1] = run / chord * arc;
+        along[0] *= arc / chord, along[1] *= arc / chord;
+    }
+    double *x = mesh->x;
+    for (int32_t r = 0; r < mesh->rows; r++) {
+        const double at = (double)r / (mesh->rows - 1) - 0.5;
+        double sine = at, cosine = 0;
+        if (half > 0)
+            drape_sin_cos(2 * half * at, &sine, &cosine);
+        const double radius = middle[0] + sine * along[0] + (cosine - least) * out[0];
+        const double y = middle[1] + sine * along[1] + (cosine - least) * out[1];
+        for (int32_t c = 0; c < mesh->columns; c++, x += 3) {
+            drape_sin_cos(radian * values[ANGLE] * c / (mesh->columns - 1), &sine, &cosine);
+            x[0] = radius * cosine;
+            x[1] = y;
+            x[2] = -radius * sine;
+        }
+    }
     drape_grid_triangulate(mesh, falling[(int)values[DIAGONALS]], true);
     return DRAPE_OK;
 }

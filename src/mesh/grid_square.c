@@ -29,25 +29,6 @@ static const drape_param params[PARAM_COUNT] = {
         "largest offset of nodes from the plane, pseudo-random and reproducible: breaks symmetry"),
 };
 
-static void place_nodes(drape_mesh *mesh, double width, double height, bool vertical)
-{
-    double *x = mesh->x;
-    for (int32_t row = 0; row < mesh->rows; row++)
-        for (int32_t column = 0; column < mesh->columns; column++, x += 3) {
-            const double down = -row * height / (mesh->rows - 1);
-            x[0] = column * width / (mesh->columns - 1);
-            x[1] = vertical ? down : 0;
-            x[2] = vertical ? 0 : down;
-        }
-}
-
-static void add_noise(drape_mesh *mesh, double size, bool vertical)
-{
-    uint64_t seed = 1;
-    for (size_t i = 0; size > 0 && i < (size_t)mesh->node_count; i++)
-        mesh->x[3 * i + (vertical ? 2 : 1)] += size * drape_grid_random(&seed);
-}
-
 static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
 {
     static const bool falling[][2][2] = {
@@ -61,8 +42,17 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
     if (status)
         return status;
     mesh->rectangular = true;
-    place_nodes(mesh, values[GRID_WIDTH], values[GRID_HEIGHT], vertical);
-    add_noise(mesh, values[NOISE], vertical);
+    double *x = mesh->x;
+    for (int32_t row = 0; row < mesh->rows; row++)
+        for (int32_t column = 0; column < mesh->columns; column++, x += 3) {
+            const double down = -row * values[GRID_HEIGHT] / (mesh->rows - 1);
+            x[0] = column * values[GRID_WIDTH] / (mesh->columns - 1);
+            x[1] = vertical ? down : 0;
+            x[2] = vertical ? 0 : down;
+        }
+    uint64_t seed = 1;
+    for (size_t i = 0; values[NOISE] > 0 && i < (size_t)mesh->node_count; i++)
+        mesh->x[3 * i + (vertical ? 2 : 1)] += values[NOISE] * drape_grid_random(&seed);
     /* Rows of a vertical sheet go down; those of grid.h go up. */
     drape_grid_triangulate(mesh, falling[(int)values[DIAGONALS]], vertical);
     return DRAPE_OK;

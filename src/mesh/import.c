@@ -6,33 +6,21 @@
 #include "mesh/contents.h"
 #include "mesh/mesh.h"
 
-static drape_status unknown_ending(drape_context *ctx, const char *pointer, const char *file)
-{
-    char known[256] = "";
-    size_t used = 0;
-    for (int i = 0; drape_imports[i] && used < sizeof known; i++)
-        used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", i ? ", " : "",
-                                 drape_imports[i]->ending);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s: unknown ending; known are %s", file, known);
-}
-
-static const drape_import_ops *find_import(const char *file)
-{
-    const size_t length = strlen(file);
-    for (int i = 0; drape_imports[i]; i++) {
-        const size_t ending = strlen(drape_imports[i]->ending);
-        if (length > ending && strcasecmp(file + length - ending, drape_imports[i]->ending) == 0)
-            return drape_imports[i];
-    }
-    return NULL;
-}
-
 drape_status drape_mesh_read(drape_context *ctx, const char *pointer, const char *folder, const char *file,
                              drape_mesh *mesh)
 {
-    const drape_import_ops *import = find_import(file);
+    const drape_import_ops *import = NULL;
+    char known[256] = "";
+    size_t used = 0, length = strlen(file);
+    for (int i = 0; drape_imports[i]; i++) {
+        const char *ending = drape_imports[i]->ending;
+        if (length > strlen(ending) && strcasecmp(file + length - strlen(ending), ending) == 0)
+            import = drape_imports[i];
+        if (used < sizeof known)
+            used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", i ? ", " : "", ending);
+    }
     if (!import)
-        return unknown_ending(ctx, pointer, file);
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s: unknown ending; known are %s", file, known);
 
     const locale_t old = drape_locale_enter();
     const drape_mesh_source source = {.pointer = pointer, .file = file};

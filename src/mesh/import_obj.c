@@ -116,16 +116,6 @@ static bool corner_numbers(drape_word corner, int64_t number[3])
     return false;
 }
 
-static drape_status fail_node(const obj_reader *reader, int64_t number)
-{
-    const long long n = (long long)number;
-    const int32_t count = number < 0 ? reader->nodes : reader->mesh->node_count;
-    if (count == 0)
-        return FAIL(reader, "there is no node %lld: none was defined", n);
-    return FAIL(reader, "there is no node %lld; range is %d to %d", n, number < 0 ? -count : 1,
-                number < 0 ? -1 : count);
-}
-
 static drape_status read_corner(const obj_reader *reader, drape_word word, int32_t *node, int32_t *uv)
 {
     int64_t number[3] = {0};
@@ -133,8 +123,14 @@ static drape_status read_corner(const obj_reader *reader, drape_word word, int32
         return FAIL(reader, "a corner is \"%.*s\"; it must be v, v/vt, v//vn or v/vt/vn",
                     drape_word_shown(word), word.start);
     const int64_t index = number[0] < 0 ? reader->nodes + number[0] : number[0] - 1;
-    if (index < 0 || index >= reader->mesh->node_count)
-        return fail_node(reader, number[0]);
+    if (index < 0 || index >= reader->mesh->node_count) {
+        const long long n = (long long)number[0];
+        const int32_t count = number[0] < 0 ? reader->nodes : reader->mesh->node_count;
+        if (count == 0)
+            return FAIL(reader, "there is no node %lld: none was defined", n);
+        return FAIL(reader, "there is no node %lld; range is %d to %d", n, number[0] < 0 ? -count : 1,
+                    number[0] < 0 ? -1 : count);
+    }
     *node = (int32_t)index;
     const int64_t texture = number[1] < 0 ? reader->uvs + number[1] : number[1] - 1;
     if (texture >= 0 && texture < reader->mesh->faces.uv_count)

@@ -171,7 +171,7 @@ static bool is_integer(ply_type type)
     return type >= INT8 && type <= UINT32;
 }
 
-static ply_role role_of(drape_word element, drape_word name, bool list)
+static drape_status add_property(ply_reader *reader, ply_property property, drape_word name)
 {
     static const struct {
         const char *element, *name;
@@ -189,18 +189,13 @@ static ply_role role_of(drape_word element, drape_word name, bool list)
                  {"face", "vertex_indices", true, CORNERS},
                  {"face", "vertex_index", true, CORNERS},
                  {"face", "texcoord", true, CORNER_UVS}};
-    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
-        if (drape_word_is(element, known[i].element) && drape_word_is(name, known[i].name) &&
-            list == known[i].list)
-            return known[i].role;
-    return PASSED_OVER;
-}
-
-static drape_status add_property(ply_reader *reader, ply_property property, drape_word name)
-{
     const bool list = property.count_type != NO_TYPE;
     ply_element *element = &reader->elements[reader->element_count - 1];
-    property.role = role_of(element->name, name, list);
+    property.role = PASSED_OVER;
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        if (drape_word_is(element->name, known[i].element) && drape_word_is(name, known[i].name) &&
+            list == known[i].list)
+            property.role = known[i].role;
     if (list && !is_integer(property.count_type))
         return fail(reader, "the count of a list is %s; it must be an integer type",
                     types[property.count_type].name);
@@ -290,19 +285,6 @@ static drape_status read_header(ply_reader *reader)
     return fail(reader, "the header has no end_header");
 }
 
-/* The smallest number of bytes that an item of the element can take; in text, a digit and a blank per
- * value. */
-static int64_t min_item_bytes(const ply_reader *reader, const ply_element *element)
-{
-    int64_t bytes = 0;
-    for (int i = 0; i < element->property_count; i++) {
-        const ply_property *property = &reader->properties[element->first_property + i];
-        const ply_type first = property->count_type ? property->count_type : property->type;
-        bytes += reader->format == ASCII ? 2 : (int64_t)types[first].size;
-    }
-    return bytes;
-}
-
 /* Refuses counts that the rest of the file cannot hold, before memory is allocated for them. */
 static drape_status check_counts(ply_reader *reader)
 {
@@ -310,7 +292,12 @@ static drape_status check_counts(ply_reader *reader)
     const int64_t left = reader->text.end - reader->text.at + (reader->format == ASCII);
     for (int i = 0; i < reader->element_count; i++) {
         const ply_element *element = &reader->elements[i];
-        const int64_t least = min_item_bytes(reader, element);
+        int64_t least = 0; /* bytes that an item takes; in text, a digit and a blank per value */
+        for (int k = 0; k < element->property_count; k++) {
+            const ply_property *property = &reader->properties[element->first_property + k];
+            const ply_type first = property->count_type ? property->count_type : property->type;
+            least += reader->format == ASCII ? 2 : (int64_t)types[first].size;
+        }
         if (least > 0 && element->count > left / least)
             return drape_mesh_fail(reader->ctx, reader->source, element->line,
                                    "%lld items of %.*s; the %lld bytes after the header hold at most %lld",
@@ -368,19 +355,6 @@ static drape_status read_value(ply_reader *reader, ply_type type, double *value)
     return DRAPE_OK;
 }
 
-static drape_status read_corner(ply_reader *reader, ply_type type, int32_t *node)
-{
-    double value = 0;
-    const drape_status status = read_value(reader, type, &value);
-    if (status)
-        return status;
-    if (!(value >= 0 && value < reader->mesh->node_count && value == floor(value)))
-        return fail(reader, "there is no vertex %.10g; there are %d, counted from 0", value,
-                    reader->mesh->node_count);
-    *node = (int32_t)value;
-    return DRAPE_OK;
-}
-
 /* Those of corners come before those of vertices. */
 static bool has_vertex_uvs(const ply_reader *reader)
 {
@@ -391,12 +365,16 @@ static drape_status read_polygon(ply_reader *reader, ply_type type, int64_t corn
 {
     drape_faces *faces = &reader->mesh->faces;
     for (int64_t corner = 0; corner < corners; corner++) {
-        int32_t *node = &faces->node[reader->corners];
-        const drape_status status = read_corner(reader, type, node);
+        double value = 0;
+        const drape_status status = read_value(reader, type, &value);
         if (status)
             return status;
+        if (!(value >= 0 && value < reader->mesh->node_count && value == floor(value)))
+            return fail(reader, "there is no vertex %.10g; there are %d, counted from 0", value,
+                        reader->mesh->node_count);
+        faces->node[reader->corners] = (int32_t)value;
         if (has_vertex_uvs(reader))
-            faces->uv_of[reader->corners] = *node;
+            faces->uv_of[reader->corners] = (int32_t)value;
         reader->corners++;
     }
     faces->first[++reader->faces] = (int32_t)reader->corners;
@@ -430,14 +408,6 @@ static void read_corner_uvs(ply_reader *reader)
     reader->text = after;
 }
 
-static drape_status skip_values(ply_reader *reader, ply_type type, int64_t count)
-{
-    drape_status status = DRAPE_OK;
-    for (int64_t i = 0; i < count && !status; i++)
-        status = read_value(reader, type, NULL);
-    return status;
-}
-
 static drape_status read_list(ply_reader *reader, const ply_property *property)
 {
     double length = 0;
@@ -456,7 +426,8 @@ static drape_status read_list(ply_reader *reader, const ply_property *property)
         reader->list_type = property->type;
         reader->list_count = count;
     }
-    status = skip_values(reader, property->type, count);
+    for (int64_t i = 0; i < count && !status; i++)
+        status = read_value(reader, property->type, NULL);
     if (!status && property->role == CORNERS) {
         reader->faces++;
         reader->corners += (size_t)count;
@@ -498,16 +469,6 @@ static drape_status find_item_line(ply_reader *reader)
     }
 }
 
-static drape_status end_item_line(ply_reader *reader)
-{
-    drape_word word;
-    if (drape_text_next_word(&reader->text, &word))
-        return fail(reader, "\"%.*s\" after the last value of its %.*s", drape_word_shown(word), word.start,
-                    drape_word_shown(reader->element->name), reader->element->name.start);
-    drape_text_next_line(&reader->text);
-    return DRAPE_OK;
-}
-
 static drape_status read_item(ply_reader *reader)
 {
     const ply_property *property = reader->properties + reader->element->first_property;
@@ -517,9 +478,14 @@ static drape_status read_item(ply_reader *reader)
     if (!status && !reader->counting && reader->has_role[CORNER_UVS] &&
         drape_word_is(reader->element->name, "face"))
         read_corner_uvs(reader);
-    if (!status && reader->format == ASCII)
-        status = end_item_line(reader);
-    return status;
+    if (status || reader->format != ASCII)
+        return status;
+    drape_word word;
+    if (drape_text_next_word(&reader->text, &word))
+        return fail(reader, "\"%.*s\" after the last value of its %.*s", drape_word_shown(word), word.start,
+                    drape_word_shown(reader->element->name), reader->element->name.start);
+    drape_text_next_line(&reader->text);
+    return DRAPE_OK;
 }
 
 /* Reads the items of all elements, from the present place of the text. */

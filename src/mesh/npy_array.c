@@ -96,22 +96,6 @@ bool drape_npy_read(const char *bytes, size_t size, drape_npy *header)
     return (header->fortran || strncmp(order, "False", 5) == 0) && read_shape(shape, header);
 }
 
-/* The numbers must be as many as the shape says: a file that was cut while it was written has fewer. */
-static drape_status check_size(drape_context *ctx, const drape_mesh_source *source, size_t bytes,
-                               const drape_npy_array *array)
-{
-    uint64_t count = 1;
-    for (int k = 0; k < array->dimensions; k++) {
-        const uint64_t length = (uint64_t)array->shape[k];
-        count = length > 0 && count > UINT64_MAX / 16 / length ? UINT64_MAX / 16 : count * length;
-    }
-    if (bytes == count * (uint64_t)array->item)
-        return DRAPE_OK;
-    return drape_mesh_fail(
-        ctx, source, 0, "%zu bytes of numbers; (%" PRId64 ", %" PRId64 ", %" PRId64 ") has %" PRIu64, bytes,
-        array->shape[0], array->shape[1], array->shape[2], count * (uint64_t)array->item);
-}
-
 drape_status drape_npy_array_parse(drape_context *ctx, const drape_mesh_source *source, const char *data,
                                    size_t size, drape_npy_array *out)
 {
@@ -134,5 +118,16 @@ drape_status drape_npy_array_parse(drape_context *ctx, const drape_mesh_source *
     out->item = header.type[2] - '0';
     out->data = data + header.data;
     memcpy(out->shape, header.shape, (size_t)header.dims * sizeof *out->shape);
-    return check_size(ctx, source, size - header.data, out);
+    /* The numbers must be as many as the shape says: a file that was cut while it was written has fewer. */
+    const size_t bytes = size - header.data;
+    uint64_t count = 1;
+    for (int k = 0; k < out->dimensions; k++) {
+        const uint64_t length = (uint64_t)out->shape[k];
+        count = length > 0 && count > UINT64_MAX / 16 / length ? UINT64_MAX / 16 : count * length;
+    }
+    if (bytes == count * (uint64_t)out->item)
+        return DRAPE_OK;
+    return drape_mesh_fail(ctx, source, 0,
+                           "%zu bytes of numbers; (%" PRId64 ", %" PRId64 ", %" PRId64 ") has %" PRIu64,
+                           bytes, out->shape[0], out->shape[1], out->shape[2], count * (uint64_t)out->item);
 }

@@ -2,21 +2,6 @@
  * takes O(parts (count + limit)) for any input; hash tables and quicksort have bad cases. */
 #include "mesh/order.h"
 
-/* Sorts `from` by one part into `to`. start (limit + 1) is workspace: the place of the next item of each
- * value. */
-static void sort_by_part(const int32_t *key, int parts, int part, int32_t count, int32_t limit,
-                         const int32_t *from, int32_t *to, int32_t *start)
-{
-    for (int32_t value = 0; value <= limit; value++)
-        start[value] = 0;
-    for (int32_t i = 0; i < count; i++)
-        start[key[(size_t)i * (size_t)parts + (size_t)part] + 1]++;
-    for (int32_t value = 0; value < limit; value++)
-        start[value + 1] += start[value];
-    for (int32_t i = 0; i < count; i++)
-        to[start[key[(size_t)from[i] * (size_t)parts + (size_t)part]]++] = from[i];
-}
-
 int32_t *drape_order_by_keys(drape_arena *arena, const int32_t *key, int parts, int32_t count, int32_t limit)
 {
     int32_t *order = drape_arena_take(arena, (size_t)count, sizeof *order);
@@ -27,7 +12,14 @@ int32_t *drape_order_by_keys(drape_arena *arena, const int32_t *key, int parts, 
     for (int32_t i = 0; i < count; i++)
         order[i] = i;
     for (int part = parts - 1; part >= 0; part--) {
-        sort_by_part(key, parts, part, count, limit, order, other, start);
+        for (int32_t value = 0; value <= limit; value++)
+            start[value] = 0;
+        for (int32_t i = 0; i < count; i++)
+            start[key[(size_t)i * (size_t)parts + (size_t)part] + 1]++;
+        for (int32_t value = 0; value < limit; value++)
+            start[value + 1] += start[value];
+        for (int32_t i = 0; i < count; i++)
+            other[start[key[(size_t)order[i] * (size_t)parts + (size_t)part]]++] = order[i];
         int32_t *sorted = other;
         other = order;
         order = sorted;

@@ -4,35 +4,6 @@
 #include "base/vec3.h"
 #include "mesh/mesh.h"
 
-static double area(const drape_mesh *mesh, const int32_t *n)
-{
-    double u[3], v[3], normal[3];
-    vec3_sub(mesh->x + 3 * (size_t)n[1], mesh->x + 3 * (size_t)n[0], u);
-    vec3_sub(mesh->x + 3 * (size_t)n[2], mesh->x + 3 * (size_t)n[0], v);
-    vec3_cross(u, v, normal);
-    return vec3_norm(normal) / 2;
-}
-
-static void measure_triangles(drape_mesh *mesh)
-{
-    for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
-        const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
-        mesh->triangle_area[triangle] = area(mesh, n);
-        for (int k = 0; k < 3; k++)
-            mesh->node_area[n[k]] += mesh->triangle_area[triangle] / 3;
-    }
-}
-
-static void measure_edges(drape_mesh *mesh)
-{
-    for (int32_t edge = 0; edge < mesh->edge_count; edge++) {
-        const int32_t *n = mesh->edge + 2 * (size_t)edge;
-        double along[3];
-        vec3_sub(mesh->x + 3 * (size_t)n[1], mesh->x + 3 * (size_t)n[0], along);
-        mesh->edge_length[edge] = vec3_norm(along);
-    }
-}
-
 drape_status drape_mesh_measure(drape_mesh *mesh)
 {
     drape_arena *arena = &mesh->arena;
@@ -41,7 +12,21 @@ drape_status drape_mesh_measure(drape_mesh *mesh)
     mesh->node_area = drape_arena_take(arena, (size_t)mesh->node_count, sizeof *mesh->node_area);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    measure_triangles(mesh);
-    measure_edges(mesh);
+    for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
+        const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
+        double u[3], v[3], normal[3];
+        vec3_sub(mesh->x + 3 * (size_t)n[1], mesh->x + 3 * (size_t)n[0], u);
+        vec3_sub(mesh->x + 3 * (size_t)n[2], mesh->x + 3 * (size_t)n[0], v);
+        vec3_cross(u, v, normal);
+        mesh->triangle_area[triangle] = vec3_norm(normal) / 2;
+        for (int k = 0; k < 3; k++)
+            mesh->node_area[n[k]] += mesh->triangle_area[triangle] / 3;
+    }
+    for (int32_t edge = 0; edge < mesh->edge_count; edge++) {
+        const int32_t *n = mesh->edge + 2 * (size_t)edge;
+        double along[3];
+        vec3_sub(mesh->x + 3 * (size_t)n[1], mesh->x + 3 * (size_t)n[0], along);
+        mesh->edge_length[edge] = vec3_norm(along);
+    }
     return DRAPE_OK;
 }

@@ -1,7 +1,6 @@
 /* sequence.c: see sequence.h. */
 #include "mesh/sequence.h"
 
-#include "mesh/contents.h"
 #include "mesh/npy_array.h"
 
 #include <inttypes.h>
@@ -13,26 +12,21 @@
 #define MAX_FRAMES  1000000
 #define MAX_NUMBERS ((int64_t)1 << 31) /* of all frames: 16 GiB */
 
-static drape_status unknown_ending(drape_context *ctx, const char *pointer, const char *file)
+/* NULL, with a message, if the name has another ending. */
+static const drape_sequence_ops *find_format(drape_context *ctx, const char *pointer, const char *file)
 {
     char known[256] = "";
-    size_t used = 0;
-    for (int i = 0; drape_sequences[i]; i++)
-        for (int k = 0; drape_sequences[i]->endings[k] && used < sizeof known; k++)
-            used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "",
-                                     drape_sequences[i]->endings[k]);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s: unknown ending; known are %s", file, known);
-}
-
-static const drape_sequence_ops *find_format(const char *file)
-{
-    const size_t length = strlen(file);
+    size_t used = 0, length = strlen(file);
     for (int i = 0; drape_sequences[i]; i++)
         for (int k = 0; drape_sequences[i]->endings[k]; k++) {
-            const size_t ending = strlen(drape_sequences[i]->endings[k]);
-            if (length > ending && strcasecmp(file + length - ending, drape_sequences[i]->endings[k]) == 0)
+            const char *ending = drape_sequences[i]->endings[k];
+            const size_t size = strlen(ending);
+            if (length > size && strcasecmp(file + length - size, ending) == 0)
                 return drape_sequences[i];
+            if (used < sizeof known)
+                used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "", ending);
         }
+    drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s: unknown ending; known are %s", file, known);
     return NULL;
 }
 
@@ -69,35 +63,28 @@ static drape_status check_times(drape_context *ctx, const drape_mesh_source *sou
     return DRAPE_OK;
 }
 
-static drape_status read_times(drape_arena *scratch, const drape_mesh_source *source, const char *folder,
-                               double start, drape_sequence *out)
+static drape_status set_times(const drape_sequence_source *source, const char *pointer,
+                              const drape_sequence_def *def, drape_sequence *out)
 {
-    drape_context *ctx = scratch->ctx;
+    drape_context *ctx = source->ctx;
+    char at[sizeof ctx->pointer];
+    snprintf(at, sizeof at, "%s/times", pointer);
+    const drape_mesh_source file = {.pointer = at, .file = def->times};
     drape_contents whole = {0};
     drape_npy_array array;
-    drape_status status = drape_contents_read(scratch, source->pointer, folder, source->file, &whole);
+    for (int32_t f = 0; !def->times && f < out->frame_count; f++)
+        out->time[f] = def->start + fmin(out->first + out->step * f, out->last) / def->rate;
+    if (!def->times)
+        return check_times(ctx, &source->file, out);
+    drape_status status = drape_contents_read(source->scratch, at, source->folder, def->times, &whole);
     if (!status)
-        status = drape_npy_array_parse(ctx, source, whole.data, whole.size, &array);
+        status = drape_npy_array_parse(ctx, &file, whole.data, whole.size, &array);
     if (!status && (array.dimensions != 1 || array.shape[0] != out->frame_count))
-        status = drape_mesh_fail(ctx, source, 0, "%" PRId64 " times in %d dimensions; %d times are needed",
+        status = drape_mesh_fail(ctx, &file, 0, "%" PRId64 " times in %d dimensions; %d times are needed",
                                  array.shape[0], array.dimensions, (int)out->frame_count);
     for (int32_t f = 0; !status && f < out->frame_count; f++)
-        out->time[f] = start + drape_npy_array_at(&array, (size_t)f);
-    return status ? status : check_times(ctx, source, out);
-}
-
-static drape_status set_times(drape_arena *scratch, const char *pointer, const char *folder,
-                              const drape_sequence_def *def, const drape_mesh_source *file,
-                              drape_sequence *out)
-{
-    char at[sizeof scratch->ctx->pointer];
-    snprintf(at, sizeof at, "%s/times", pointer);
-    if (def->times)
-        return read_times(scratch, &(drape_mesh_source){.pointer = at, .file = def->times}, folder,
-                          def->start, out);
-    for (int32_t f = 0; f < out->frame_count; f++)
-        out->time[f] = def->start + fmin(out->first + out->step * f, out->last) / def->rate;
-    return check_times(scratch->ctx, file, out);
+        out->time[f] = def->start + drape_npy_array_at(&array, (size_t)f);
+    return status ? status : check_times(ctx, &file, out);
 }
 
 /* ---- Positions ---- */
@@ -127,12 +114,16 @@ drape_status drape_sequence_read(drape_arena *arena, const char *pointer, const 
     char at_file[sizeof ctx->pointer], at_mesh[sizeof ctx->pointer];
     snprintf(at_file, sizeof at_file, "%s/file", pointer);
     snprintf(at_mesh, sizeof at_mesh, "%s/mesh", pointer);
-    const drape_sequence_ops *format = find_format(def->file);
-    const drape_sequence_source source = {
-        .ctx = ctx, .file = {.pointer = at_file, .file = def->file}, .folder = folder, .rate = def->rate};
+    const drape_sequence_ops *format = find_format(ctx, at_file, def->file);
+    drape_arena scratch = drape_arena_of(ctx);
+    drape_sequence_source source = {.ctx = ctx,
+                                    .file = {.pointer = at_file, .file = def->file},
+                                    .folder = folder,
+                                    .rate = def->rate,
+                                    .scratch = &scratch};
     *out = (drape_sequence){.arena = arena, .step = 1, .last = INFINITY};
     if (!format)
-        return unknown_ending(ctx, at_file, def->file);
+        return DRAPE_E_ARGUMENT;
     if (format->has_triangles && def->mesh)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at_mesh,
                              "%s has its triangles itself: a mesh beside it is not used", def->file);
@@ -140,14 +131,15 @@ drape_status drape_sequence_read(drape_arena *arena, const char *pointer, const 
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at_mesh,
                              "%s has positions only: the OBJ or PLY file of its triangles is needed",
                              def->file);
-    drape_arena scratch = drape_arena_of(ctx);
     const locale_t old = drape_locale_enter();
     drape_status status =
         format->has_triangles ? DRAPE_OK : drape_mesh_read(ctx, at_mesh, folder, def->mesh, mesh);
+    if (!status && !format->many_files)
+        status = drape_contents_read(&scratch, at_file, folder, def->file, &source.whole);
     if (!status)
         status = format->read(&source, mesh, out);
     if (!status)
-        status = set_times(&scratch, pointer, folder, def, &source.file, out);
+        status = set_times(&source, pointer, def, out);
     if (!status)
         memcpy(mesh->x, out->x, 3 * (size_t)mesh->node_count * sizeof *mesh->x);
     drape_locale_leave(old);

@@ -5,6 +5,7 @@
 #ifndef DRAPE_MESH_SEQUENCE_H
 #define DRAPE_MESH_SEQUENCE_H
 
+#include "mesh/contents.h"
 #include "mesh/mesh.h"
 
 /* What is read. */
@@ -33,6 +34,8 @@ typedef struct drape_sequence_source {
     drape_mesh_source file; /* for messages */
     const char *folder;     /* of relative names; NULL: the working directory */
     double rate;            /* [1/s] at which a format without frames of its own is sampled */
+    drape_arena *scratch;   /* until it is read */
+    drape_contents whole;   /* the bytes of the file, in scratch, unless the format has many files */
 } drape_sequence_source;
 
 /* A format. */
@@ -40,6 +43,7 @@ typedef struct drape_sequence_ops {
     drape_entry entry;
     const char *endings[3]; /* of names, NULL-terminated: ".npy", in any case */
     bool has_triangles;     /* it sets the nodes and triangles of the mesh; if not, they are set before */
+    bool many_files;        /* it opens its files itself */
     /* Fills the frames, of as many nodes as the mesh has. */
     drape_status (*read)(const drape_sequence_source *source, drape_mesh *mesh, drape_sequence *out);
 } drape_sequence_ops;

@@ -6,7 +6,6 @@
  */
 #include "base/hash.h"
 #include "base/vec3.h"
-#include "mesh/contents.h"
 #include "mesh/gltf.h"
 #include "mesh/sequence.h"
 
@@ -81,14 +80,6 @@ static void read_skin(reader *r, int32_t index)
     }
 }
 
-static void read_skins(reader *r)
-{
-    const int32_t count = drape_gltf_count(&r->gltf, "skins");
-    r->skins = drape_gltf_take(&r->gltf, (size_t)count, sizeof *r->skins);
-    for (int32_t i = 0; !r->gltf.status && i < count; i++)
-        read_skin(r, i);
-}
-
 /* ---- Primitives ---- */
 
 /* Joint or weight k of a point, of all of its sets. */
@@ -160,21 +151,6 @@ static void read_influences(reader *r, const char *owner, const json_t *attribut
         check_influences(r, owner, p);
 }
 
-static void read_targets(reader *r, const char *owner, const json_t *primitive, part *p)
-{
-    const json_t *targets = json_object_get(primitive, "targets");
-    p->targets = r->scene.nodes[p->node].weight_count;
-    if (json_array_size(targets) != (size_t)p->targets)
-        FAIL(r, "%s: %zu morph targets; the first primitive of the mesh has %d", owner,
-             json_array_size(targets), (int)p->targets);
-    p->target = drape_gltf_take(&r->gltf, (size_t)p->targets, sizeof *p->target);
-    for (int32_t k = 0; !r->gltf.status && k < p->targets; k++)
-        p->target[k] =
-            drape_gltf_read(&r->gltf, owner, json_array_get(targets, (size_t)k),
-                            &(drape_gltf_want){"POSITION", "POSITION of a morph target", 3, false, p->count})
-                .value;
-}
-
 /* Memory for `needed` items, of which there is room for *room; NULL after a failure. */
 static void *grow(reader *r, void *items, int64_t needed, int64_t *room, size_t size)
 {
@@ -230,7 +206,17 @@ static drape_status read_primitive(reader *r, int32_t node, int32_t mesh, const 
     p.x = x.value;
     p.count = (int32_t)x.count;
     read_triangles(r, owner, primitive, &p);
-    read_targets(r, owner, primitive, &p);
+    const json_t *targets = json_object_get(primitive, "targets");
+    p.targets = r->scene.nodes[p.node].weight_count;
+    if (json_array_size(targets) != (size_t)p.targets)
+        FAIL(r, "%s: %zu morph targets; the first primitive of the mesh has %d", owner,
+             json_array_size(targets), (int)p.targets);
+    p.target = drape_gltf_take(&r->gltf, (size_t)p.targets, sizeof *p.target);
+    for (int32_t k = 0; !r->gltf.status && k < p.targets; k++)
+        p.target[k] =
+            drape_gltf_read(&r->gltf, owner, json_array_get(targets, (size_t)k),
+                            &(drape_gltf_want){"POSITION", "POSITION of a morph target", 3, false, p.count})
+                .value;
     if (r->scene.nodes[node].skin >= 0)
         read_influences(r, owner, attributes, &p);
     r->parts = grow(r, r->parts, r->part_count + 1, &r->part_room, sizeof *r->parts);
@@ -257,17 +243,6 @@ static void read_parts(reader *r)
     }
     if (r->triangle_count == 0)
         FAIL(r, "its scene shows no triangles");
-}
-
-/* ---- Frames ---- */
-
-static void pose(reader *r, double t)
-{
-    drape_gltf_scene_pose(&r->scene, t);
-    for (int32_t i = 0; i < drape_gltf_count(&r->gltf, "skins"); i++)
-        for (int32_t k = 0; k < r->skins[i].count; k++)
-            r->skins[i].now[k] =
-                drape_gltf_map_product(&r->scene.nodes[r->skins[i].joint[k]].world, &r->skins[i].inverse[k]);
 }
 
 /* The map of joint k of a point, and its weight; NULL if that is 0: then the joint is any number. */
@@ -357,7 +332,12 @@ static drape_status sample(reader *r, drape_mesh *mesh, drape_sequence *out)
     memcpy(mesh->triangle, r->corner, 3 * (size_t)r->triangle_count * sizeof *mesh->triangle);
     for (int32_t f = 0; !status && f < out->frame_count; f++) {
         double *x = out->x + 3 * (size_t)f * (size_t)mesh->node_count;
-        pose(r, fmin(scene->start + f / rate, scene->end));
+        const double t = fmin(scene->start + f / rate, scene->end);
+        drape_gltf_scene_pose(&r->scene, t);
+        for (int32_t i = 0; i < drape_gltf_count(&r->gltf, "skins"); i++)
+            for (int32_t k = 0; k < r->skins[i].count; k++)
+                r->skins[i].now[k] = drape_gltf_map_product(&r->scene.nodes[r->skins[i].joint[k]].world,
+                                                            &r->skins[i].inverse[k]);
         status = drape_check_cancel_after(r->source->ctx, (size_t)work);
         status = status ? status : check_mirrors(r, f, mesh);
         for (int64_t k = 0; k < r->part_count && !status; k++)
@@ -421,13 +401,17 @@ static drape_status find_same(drape_arena *arena, const drape_sequence *frames, 
     return status;
 }
 
-/* Triangles that have lost a side, as at the pole of a sphere, are left out. */
-static void weld_triangles(drape_mesh *mesh, const int32_t *to)
+static drape_status weld(reader *r, drape_mesh *mesh, drape_sequence *frames)
 {
+    int32_t *number = drape_gltf_take(&r->gltf, (size_t)mesh->node_count, sizeof *number);
+    const drape_status status = number ? find_same(r->gltf.arena, frames, number) : r->gltf.status;
+    if (status)
+        return status;
+    /* Triangles that have lost a side, as at the pole of a sphere, are left out. */
     int32_t kept = 0;
     for (int32_t t = 0; t < mesh->triangle_count; t++) {
         const int32_t *n = mesh->triangle + 3 * (size_t)t;
-        const int32_t a = to[n[0]], b = to[n[1]], c = to[n[2]];
+        const int32_t a = number[n[0]], b = number[n[1]], c = number[n[2]];
         if (a == b || b == c || c == a)
             continue;
         mesh->triangle[3 * (size_t)kept] = a;
@@ -435,19 +419,15 @@ static void weld_triangles(drape_mesh *mesh, const int32_t *to)
         mesh->triangle[3 * (size_t)kept++ + 2] = c;
     }
     mesh->triangle_count = kept;
-}
-
-/* Numbers the points that have triangles anew, in their order, which lets frames be packed in place. */
-static void drop_points(drape_mesh *mesh, drape_sequence *frames, int32_t *number)
-{
+    /* Numbers the points that have triangles anew, in their order, which lets frames be packed in place. */
     const size_t before = (size_t)mesh->node_count;
-    int32_t kept = 0;
+    int32_t points = 0;
     memset(number, -1, before * sizeof *number);
     for (size_t i = 0; i < 3 * (size_t)mesh->triangle_count; i++)
         number[mesh->triangle[i]] = 0;
     for (size_t i = 0; i < before; i++)
         if (number[i] == 0)
-            number[i] = kept++;
+            number[i] = points++;
     for (size_t i = 0; i < 3 * (size_t)mesh->triangle_count; i++)
         mesh->triangle[i] = number[mesh->triangle[i]];
     size_t to = 0;
@@ -455,40 +435,26 @@ static void drop_points(drape_mesh *mesh, drape_sequence *frames, int32_t *numbe
         for (size_t i = 0; i < before; i++)
             if (number[i] >= 0)
                 memmove(frames->x + 3 * to++, frames->x + 3 * (f * before + i), 3 * sizeof *frames->x);
-    mesh->node_count = frames->node_count = kept;
-}
-
-static drape_status weld(reader *r, drape_mesh *mesh, drape_sequence *frames)
-{
-    int32_t *number = drape_gltf_take(&r->gltf, (size_t)mesh->node_count, sizeof *number);
-    const drape_status status = number ? find_same(r->gltf.arena, frames, number) : r->gltf.status;
-    if (status)
-        return status;
-    weld_triangles(mesh, number);
-    drop_points(mesh, frames, number);
+    mesh->node_count = frames->node_count = points;
     return mesh->triangle_count > 0 ? DRAPE_OK : FAIL(r, "all its triangles are degenerate");
 }
 
 static drape_status read_glb(const drape_sequence_source *source, drape_mesh *mesh, drape_sequence *out)
 {
-    drape_arena arena = drape_arena_of(source->ctx);
-    reader r = {.source = source, .gltf = {.arena = &arena, .file = &source->file}};
-    drape_contents whole = {0};
-    drape_status status =
-        drape_contents_read(&arena, source->file.pointer, source->folder, source->file.file, &whole);
-    if (!status) {
-        drape_gltf_open(&r.gltf, whole.data, whole.size);
-        drape_gltf_scene_read(&r.gltf, &r.scene);
-        read_skins(&r);
-        read_parts(&r);
-        status = r.gltf.status;
-    }
+    reader r = {.source = source, .gltf = {.arena = source->scratch, .file = &source->file}};
+    drape_gltf_open(&r.gltf, source->whole.data, source->whole.size);
+    drape_gltf_scene_read(&r.gltf, &r.scene);
+    const int32_t count = drape_gltf_count(&r.gltf, "skins");
+    r.skins = drape_gltf_take(&r.gltf, (size_t)count, sizeof *r.skins);
+    for (int32_t i = 0; !r.gltf.status && i < count; i++)
+        read_skin(&r, i);
+    read_parts(&r);
+    drape_status status = r.gltf.status;
     if (!status)
         status = sample(&r, mesh, out);
     if (!status)
         status = weld(&r, mesh, out);
     drape_gltf_close(&r.gltf);
-    drape_arena_free(&arena);
     return status;
 }
 

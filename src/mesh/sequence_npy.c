@@ -1,41 +1,29 @@
 /* sequence_npy.c: frames x nodes x 3 numbers in an NPY file, as the exporter "npy" and numpy.save write
  * them. */
-#include "mesh/contents.h"
 #include "mesh/npy_array.h"
 #include "mesh/sequence.h"
 
 #include <inttypes.h>
 
-static drape_status take_frames(const drape_sequence_source *source, const drape_mesh *mesh,
-                                const drape_npy_array *array, drape_sequence *out)
+static drape_status read_npy(const drape_sequence_source *source, drape_mesh *mesh, drape_sequence *out)
 {
-    if (array->dimensions != 3 || array->shape[2] != 3)
+    drape_npy_array array;
+    drape_status status =
+        drape_npy_array_parse(source->ctx, &source->file, source->whole.data, source->whole.size, &array);
+    if (status)
+        return status;
+    if (array.dimensions != 3 || array.shape[2] != 3)
         return drape_mesh_fail(source->ctx, &source->file, 0,
                                "%d dimensions, %" PRId64 " x %" PRId64 " x %" PRId64
                                "; frames x nodes x 3 are needed",
-                               array->dimensions, array->shape[0], array->shape[1], array->shape[2]);
-    if (array->shape[1] != mesh->node_count)
+                               array.dimensions, array.shape[0], array.shape[1], array.shape[2]);
+    if (array.shape[1] != mesh->node_count)
         return drape_mesh_fail(source->ctx, &source->file, 0, "%" PRId64 " nodes; the mesh has %d",
-                               array->shape[1], (int)mesh->node_count);
-    const drape_status status = drape_sequence_allocate(source, mesh, array->shape[0], out);
-    const size_t count = 3 * (size_t)array->shape[0] * (size_t)mesh->node_count;
+                               array.shape[1], (int)mesh->node_count);
+    status = drape_sequence_allocate(source, mesh, array.shape[0], out);
+    const size_t count = 3 * (size_t)array.shape[0] * (size_t)mesh->node_count;
     for (size_t i = 0; !status && i < count; i++)
-        out->x[i] = drape_npy_array_at(array, i);
-    return status;
-}
-
-static drape_status read_npy(const drape_sequence_source *source, drape_mesh *mesh, drape_sequence *out)
-{
-    drape_arena scratch = drape_arena_of(source->ctx);
-    drape_contents whole = {0};
-    drape_npy_array array;
-    drape_status status =
-        drape_contents_read(&scratch, source->file.pointer, source->folder, source->file.file, &whole);
-    if (!status)
-        status = drape_npy_array_parse(source->ctx, &source->file, whole.data, whole.size, &array);
-    if (!status)
-        status = take_frames(source, mesh, &array, out);
-    drape_arena_free(&scratch);
+        out->x[i] = drape_npy_array_at(&array, i);
     return status;
 }
 

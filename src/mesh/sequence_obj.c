@@ -40,12 +40,6 @@ static int compare(const void *a, const void *b)
     return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
-static bool is_obj(const char *name)
-{
-    const size_t length = strlen(name);
-    return length > 4 && strcasecmp(name + length - 4, ".obj") == 0;
-}
-
 static drape_status list_folder(const drape_sequence_source *source, name_list *list)
 {
     drape_status status = DRAPE_OK;
@@ -57,7 +51,8 @@ static drape_status list_folder(const drape_sequence_source *source, name_list *
         return drape_fail_at(source->ctx, DRAPE_E_FILE, source->file.pointer, "%s: cannot be read: %s", path,
                              strerror(errno));
     for (const struct dirent *entry; !status && (entry = readdir(folder));) {
-        if (!is_obj(entry->d_name))
+        const size_t length = strlen(entry->d_name);
+        if (length <= 4 || strcasecmp(entry->d_name + length - 4, ".obj") != 0)
             continue;
         char *name = drape_contents_path(&list->arena, source->file.file, entry->d_name);
         status = name ? add_name(list, name) : DRAPE_E_MEMORY;
@@ -112,19 +107,6 @@ static drape_status list_pattern(const drape_sequence_source *source, name_list 
     return name ? status : DRAPE_E_MEMORY;
 }
 
-static drape_status check_same(const drape_sequence_source *source, const char *name, int32_t frame,
-                               const drape_mesh *first, const drape_mesh *mesh)
-{
-    const drape_mesh_source file = {.pointer = source->file.pointer, .file = name};
-    if (mesh->node_count != first->node_count)
-        return drape_mesh_fail(source->ctx, &file, 0, "frame %d: %d nodes; the first frame has %d",
-                               (int)frame, (int)mesh->node_count, (int)first->node_count);
-    if (!drape_faces_same(mesh, first))
-        return drape_mesh_fail(source->ctx, &file, 0,
-                               "frame %d: its faces differ from those of the first frame", (int)frame);
-    return DRAPE_OK;
-}
-
 static drape_status read_frames(const drape_sequence_source *source, const name_list *list, drape_mesh *mesh,
                                 drape_sequence *out)
 {
@@ -134,10 +116,15 @@ static drape_status read_frames(const drape_sequence_source *source, const name_
         status = drape_sequence_allocate(source, mesh, list->count, out);
     const size_t numbers = 3 * (size_t)mesh->node_count;
     for (int32_t f = 0; !status && f < list->count; f++) {
+        const drape_mesh_source file = {.pointer = source->file.pointer, .file = list->name[f]};
         drape_mesh frame = {0};
         status = drape_mesh_read(source->ctx, source->file.pointer, source->folder, list->name[f], &frame);
-        if (!status)
-            status = check_same(source, list->name[f], f, mesh, &frame);
+        if (!status && frame.node_count != mesh->node_count)
+            status = drape_mesh_fail(source->ctx, &file, 0, "frame %d: %d nodes; the first frame has %d",
+                                     (int)f, (int)frame.node_count, (int)mesh->node_count);
+        if (!status && !drape_faces_same(&frame, mesh))
+            status = drape_mesh_fail(source->ctx, &file, 0,
+                                     "frame %d: its faces differ from those of the first frame", (int)f);
         if (!status)
             memcpy(out->x + (size_t)f * numbers, frame.x, numbers * sizeof *out->x);
         drape_mesh_free(&frame);
@@ -166,5 +153,6 @@ const drape_sequence_ops drape_sequence_obj = {
               .reference = "Wavefront OBJ"},
     .endings = {".obj", "/"},
     .has_triangles = true,
+    .many_files = true,
     .read = read_obj,
 };

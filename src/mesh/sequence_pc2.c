@@ -3,7 +3,6 @@
  * float32 first frame, float32 step in frames, int32 samples; then for each sample float32 x y z of each
  * point. Numbers of frames become times by the rate.
  */
-#include "mesh/contents.h"
 #include "mesh/npy_array.h"
 #include "mesh/sequence.h"
 
@@ -13,9 +12,9 @@
 #define MAGIC  "POINTCACHE2" /* with its terminating 0 */
 #define HEADER 32            /* [bytes] */
 
-static drape_status parse(const drape_sequence_source *source, const drape_mesh *mesh,
-                          const drape_contents *whole, drape_sequence *out)
+static drape_status read_pc2(const drape_sequence_source *source, drape_mesh *mesh, drape_sequence *out)
 {
+    const drape_contents *whole = &source->whole;
     const char *data = whole->data;
     if (whole->size < HEADER || memcmp(data, MAGIC, sizeof MAGIC) != 0)
         return drape_mesh_fail(source->ctx, &source->file, 0,
@@ -42,18 +41,6 @@ static drape_status parse(const drape_sequence_source *source, const drape_mesh 
     out->step = step;
     for (size_t i = 0; !status && i < count; i++)
         out->x[i] = drape_bytes_float32(data + HEADER + 4 * i);
-    return status;
-}
-
-static drape_status read_pc2(const drape_sequence_source *source, drape_mesh *mesh, drape_sequence *out)
-{
-    drape_arena scratch = drape_arena_of(source->ctx);
-    drape_contents whole = {0};
-    drape_status status =
-        drape_contents_read(&scratch, source->file.pointer, source->folder, source->file.file, &whole);
-    if (!status)
-        status = parse(source, mesh, &whole, out);
-    drape_arena_free(&scratch);
     return status;
 }
 

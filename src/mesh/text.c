@@ -38,23 +38,14 @@ static int continued_end(const drape_text *text, const char *at)
     return end ? 1 + end : 0;
 }
 
-static void skip_blanks(drape_text *text)
-{
-    while (text->at < text->end) {
-        const int continued = continued_end(text, text->at);
-        if (continued) {
-            text->at += continued;
-            text->line++;
-        } else if (is_blank(*text->at))
-            text->at++;
-        else
-            return;
-    }
-}
-
 bool drape_text_next_word(drape_text *text, drape_word *word)
 {
-    skip_blanks(text);
+    for (int continued; text->at < text->end; text->at += continued ? continued : 1) {
+        continued = continued_end(text, text->at);
+        if (!continued && !is_blank(*text->at))
+            break;
+        text->line += continued > 0;
+    }
     const char *at = text->at;
     if (text->comment && *at == text->comment)
         return false;

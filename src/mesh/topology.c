@@ -4,22 +4,6 @@
 #include "mesh/mesh.h"
 #include "mesh/order.h"
 
-/* Lists the sides (3 T x 2): side s = 3 t + k of triangle t lies between its nodes k and k + 1, lower node
- * first. */
-static int32_t *list_sides(drape_arena *scratch, const drape_mesh *mesh)
-{
-    const size_t count = 3 * (size_t)mesh->triangle_count;
-    int32_t *side = drape_arena_take(scratch, count, 2 * sizeof *side);
-    if (!side)
-        return NULL;
-    for (size_t s = 0; s < count; s++) {
-        const int32_t a = mesh->triangle[s], b = mesh->triangle[s % 3 == 2 ? s - 2 : s + 1];
-        side[2 * s] = a < b ? a : b;
-        side[2 * s + 1] = a < b ? b : a;
-    }
-    return side;
-}
-
 /* Returns the length of the run of equal sides that begins at place `first` of the order. */
 static int32_t run_length(const int32_t *side, const int32_t *order, int32_t first, int32_t count)
 {
@@ -58,18 +42,6 @@ static drape_status count_edges(drape_context *ctx, const drape_mesh_source *sou
         worst[0], worst[1], worst[2], worst[3], worst[4], a[0], a[1], a[2], b[0], b[1], b[2], wrong);
 }
 
-static drape_status allocate_edges(drape_mesh *mesh)
-{
-    drape_arena *arena = &mesh->arena;
-    mesh->edge = drape_arena_take(arena, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge);
-    mesh->edge_triangle = drape_arena_take(arena, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge_triangle);
-    mesh->triangle_edge =
-        drape_arena_take(arena, (size_t)mesh->triangle_count, 3 * sizeof *mesh->triangle_edge);
-    mesh->hinge = drape_arena_take(arena, (size_t)mesh->hinge_count, 4 * sizeof *mesh->hinge);
-    mesh->hinge_edge = drape_arena_take(arena, (size_t)mesh->hinge_count, sizeof *mesh->hinge_edge);
-    return drape_arena_status(arena);
-}
-
 /* Returns the node of the triangle that is opposite to its side s. */
 static int32_t apex(const drape_mesh *mesh, int32_t s)
 {
@@ -104,13 +76,29 @@ drape_status drape_mesh_connect(drape_context *ctx, const drape_mesh_source *sou
 {
     drape_status status = DRAPE_E_MEMORY;
     drape_arena scratch = drape_arena_of(ctx);
-    const int32_t *side = list_sides(&scratch, mesh), *order = NULL;
+    /* (3 T x 2) Side s = 3 t + k of triangle t lies between its nodes k and k + 1, lower node first. */
+    const size_t count = 3 * (size_t)mesh->triangle_count;
+    int32_t *side = drape_arena_take(&scratch, count, 2 * sizeof *side), *order = NULL;
+    for (size_t s = 0; side && s < count; s++) {
+        const int32_t a = mesh->triangle[s], b = mesh->triangle[s % 3 == 2 ? s - 2 : s + 1];
+        side[2 * s] = a < b ? a : b;
+        side[2 * s + 1] = a < b ? b : a;
+    }
     if (side)
-        order = drape_order_by_keys(&scratch, side, 2, 3 * mesh->triangle_count, mesh->node_count);
+        order = drape_order_by_keys(&scratch, side, 2, (int32_t)count, mesh->node_count);
     if (order)
         status = count_edges(ctx, source, side, order, mesh);
-    if (!status)
-        status = allocate_edges(mesh);
+    if (!status) {
+        drape_arena *arena = &mesh->arena;
+        mesh->edge = drape_arena_take(arena, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge);
+        mesh->edge_triangle =
+            drape_arena_take(arena, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge_triangle);
+        mesh->triangle_edge =
+            drape_arena_take(arena, (size_t)mesh->triangle_count, 3 * sizeof *mesh->triangle_edge);
+        mesh->hinge = drape_arena_take(arena, (size_t)mesh->hinge_count, 4 * sizeof *mesh->hinge);
+        mesh->hinge_edge = drape_arena_take(arena, (size_t)mesh->hinge_count, sizeof *mesh->hinge_edge);
+        status = drape_arena_status(arena);
+    }
     if (!status)
         fill_edges(side, order, mesh);
     drape_arena_free(&scratch);

@@ -41,21 +41,15 @@ static void sine_and_cosine(double degrees, double *sine, double *cosine)
 {
     const double turn = fmod(degrees, 360), quarters = round(turn / 90);
     const double rest = (turn - 90 * quarters) * (DRAPE_PI / 180);
+    const int quarter = ((int)quarters + 4) % 4;
     double s, c;
     drape_sin_cos(rest, &s, &c);
-    switch (((int)quarters + 4) % 4) {
-    case 0:
-        *sine = s, *cosine = c;
-        return;
-    case 1:
-        *sine = c, *cosine = -s;
-        return;
-    case 2:
-        *sine = -s, *cosine = -c;
-        return;
-    default:
-        *sine = -c, *cosine = s;
-    }
+    *sine = quarter % 2 ? c : s;
+    *cosine = quarter % 2 ? s : c;
+    if (quarter > 1)
+        *sine = -*sine;
+    if (quarter == 1 || quarter == 2)
+        *cosine = -*cosine;
 }
 
 /* Rodrigues: R = cos a I + sin a [k]x + (1 - cos a) k k^T for a unit axis k. */

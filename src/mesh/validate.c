@@ -51,25 +51,20 @@ static drape_status check_corners(drape_context *ctx, const drape_mesh_source *s
     return DRAPE_OK;
 }
 
-/* The altitude over the longest edge l is (2 area / l) / l; returns 0 if the triangle is too small to be
- * measured. */
-static double thinness(const drape_mesh *mesh, const int32_t *n)
-{
-    double side[3][3], normal[3], longest_squared = 0;
-    for (int k = 0; k < 3; k++) {
-        vec3_sub(mesh->x + 3 * (size_t)n[(k + 1) % 3], mesh->x + 3 * (size_t)n[k], side[k]);
-        longest_squared = fmax(longest_squared, vec3_dot(side[k], side[k]));
-    }
-    vec3_cross(side[0], side[1], normal);
-    return longest_squared > 0 ? vec3_norm(normal) / longest_squared : 0;
-}
-
 static drape_status check_shapes(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh,
                                  bool may_merge)
 {
     for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
         const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
-        const double ratio = thinness(mesh, n);
+        /* The altitude over the longest edge l is (2 area / l) / l; 0 if the triangle is too small to be
+         * measured. */
+        double side[3][3], normal[3], longest_squared = 0;
+        for (int k = 0; k < 3; k++) {
+            vec3_sub(mesh->x + 3 * (size_t)n[(k + 1) % 3], mesh->x + 3 * (size_t)n[k], side[k]);
+            longest_squared = fmax(longest_squared, vec3_dot(side[k], side[k]));
+        }
+        vec3_cross(side[0], side[1], normal);
+        const double ratio = longest_squared > 0 ? vec3_norm(normal) / longest_squared : 0;
         if (!(ratio >= MIN_THINNESS)) {
             char remedy[DRAPE_REMEDY_SIZE];
             drape_remedy_degenerate(mesh, n, may_merge, remedy);
@@ -106,30 +101,22 @@ static int32_t *sort_corners(drape_arena *scratch, const drape_mesh *mesh)
     return sorted;
 }
 
-static drape_status compare_neighbours(drape_context *ctx, const drape_mesh_source *source,
-                                       const int32_t *corners, const int32_t *order, int32_t count)
-{
-    for (int32_t i = 1; i < count; i++) {
-        const int32_t *a = corners + 3 * (size_t)order[i - 1], *b = corners + 3 * (size_t)order[i];
-        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2])
-            return drape_mesh_fail(
-                ctx, source, 0,
-                "triangles %d and %d have the same nodes %d %d %d; remedy: delete one of them", order[i - 1],
-                order[i], a[0], a[1], a[2]);
-    }
-    return DRAPE_OK;
-}
-
 static drape_status check_duplicates(drape_context *ctx, const drape_mesh_source *source,
                                      const drape_mesh *mesh)
 {
-    drape_status status = DRAPE_E_MEMORY;
     drape_arena scratch = drape_arena_of(ctx);
     const int32_t *corners = sort_corners(&scratch, mesh), *order = NULL;
     if (corners)
         order = drape_order_by_keys(&scratch, corners, 3, mesh->triangle_count, mesh->node_count);
-    if (order)
-        status = compare_neighbours(ctx, source, corners, order, mesh->triangle_count);
+    drape_status status = order ? DRAPE_OK : DRAPE_E_MEMORY;
+    for (int32_t i = 1; !status && i < mesh->triangle_count; i++) {
+        const int32_t *a = corners + 3 * (size_t)order[i - 1], *b = corners + 3 * (size_t)order[i];
+        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2])
+            status = drape_mesh_fail(
+                ctx, source, 0,
+                "triangles %d and %d have the same nodes %d %d %d; remedy: delete one of them", order[i - 1],
+                order[i], a[0], a[1], a[2]);
+    }
     drape_arena_free(&scratch);
     return status;
 }
@@ -158,16 +145,6 @@ static int32_t find(int32_t *parent, int32_t corner)
     return corner;
 }
 
-static void unite(int32_t *parent, int32_t a, int32_t b)
-{
-    a = find(parent, a);
-    b = find(parent, b);
-    if (a < b)
-        parent[b] = a;
-    else
-        parent[a] = b;
-}
-
 static int32_t corner_at(const drape_mesh *mesh, int32_t triangle, int32_t node)
 {
     const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
@@ -183,8 +160,10 @@ static void join_fans(const drape_mesh *mesh, int32_t *parent)
     for (int32_t edge = 0; edge < mesh->edge_count; edge++) {
         const int32_t *beside = mesh->edge_triangle + 2 * (size_t)edge;
         for (int end = 0; end < 2 && beside[1] >= 0; end++) {
-            const int32_t node = mesh->edge[2 * (size_t)edge + (size_t)end];
-            unite(parent, corner_at(mesh, beside[0], node), corner_at(mesh, beside[1], node));
+            const int32_t node = mesh->edge[2 * (size_t)edge + (size_t)end],
+                          a = find(parent, corner_at(mesh, beside[0], node)),
+                          b = find(parent, corner_at(mesh, beside[1], node));
+            parent[a > b ? a : b] = a < b ? a : b;
         }
     }
 }
