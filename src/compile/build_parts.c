@@ -82,14 +82,21 @@ void drape_term_link(drape_term_builder *builder, int32_t element, int32_t part,
 
 /* ---- Parts ---- */
 
-/* Leaves out parts without a link. number: (count) scratch. */
-static void drop_unused(drape_term_builder *builder, int32_t *number)
+/* Leaves out parts without a link. */
+static drape_status leave_out_unused(drape_term_builder *builder, drape_arena *scratch)
 {
     drape_parts *p = &builder->term->parts;
     const size_t nodes = (size_t)p->nodes, before = (size_t)p->count;
-    memset(number, 0, before * sizeof *number);
+    size_t rest = 0;
+    int32_t *number =
+        drape_arena_take(scratch, before, sizeof *number); /* 1 of what has links, then the new */
+    if (!number)
+        return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < p->link_count; i++)
         number[p->part[i]] = 1;
+    for (size_t i = 0; i < (size_t)p->rest_count * before; i++)
+        if (number[i % before])
+            builder->part_rest[rest++] = builder->part_rest[i];
     p->count = 0;
     for (size_t from = 0; from < before; from++) {
         if (number[from] == 0)
@@ -101,52 +108,7 @@ static void drop_unused(drape_term_builder *builder, int32_t *number)
     }
     for (int32_t i = 0; i < p->link_count; i++)
         builder->link_part[i] = number[p->part[i]];
-}
-
-/* The rest data of the parts that are left. used: (parts announced) 1 if the part has a link. */
-static void drop_unused_rest(drape_term_builder *builder, const uint8_t *used, size_t before)
-{
-    const drape_parts *p = &builder->term->parts;
-    size_t to = 0;
-    for (size_t i = 0; i < (size_t)p->rest_count * before; i++)
-        if (used[i % before])
-            builder->part_rest[to++] = builder->part_rest[i];
-}
-
-static drape_status leave_out_unused(drape_term_builder *builder, drape_arena *scratch)
-{
-    const drape_parts *p = &builder->term->parts;
-    const size_t before = (size_t)p->count;
-    int32_t *number = drape_arena_take(scratch, before, sizeof *number);
-    uint8_t *used = drape_arena_take(scratch, before, sizeof *used);
-    if (!number || !used)
-        return DRAPE_E_MEMORY;
-    for (int32_t i = 0; i < p->link_count; i++)
-        used[p->part[i]] = 1;
-    drop_unused(builder, number);
-    drop_unused_rest(builder, used, before);
     return DRAPE_OK;
-}
-
-/* The links of each element and of each part. */
-static void index_links(drape_parts *p, int32_t elements, int32_t *first_link, int32_t *first_user,
-                        int32_t *user)
-{
-    memset(first_link, 0, ((size_t)elements + 1) * sizeof *first_link);
-    memset(first_user, 0, ((size_t)p->count + 1) * sizeof *first_user);
-    for (int32_t i = 0; i < p->link_count; i++) {
-        first_link[p->element[i] + 1]++;
-        first_user[p->part[i] + 1]++;
-    }
-    for (int32_t e = 0; e < elements; e++)
-        first_link[e + 1] += first_link[e];
-    for (int32_t k = 0; k < p->count; k++)
-        first_user[k + 1] += first_user[k];
-    for (int32_t i = 0; i < p->link_count; i++)
-        user[first_user[p->part[i]]++] = i;
-    for (int32_t k = p->count; k > 0; k--)
-        first_user[k] = first_user[k - 1];
-    first_user[0] = 0;
 }
 
 /* Where the nodes of the part of link i are in its element; false if the element lacks one. */
@@ -178,7 +140,21 @@ static drape_status find_links(drape_term_builder *builder)
     uint8_t *place = drape_arena_take(arena, (size_t)p->link_count * nodes, sizeof *place);
     if (!first_link || !first_user || !user || !place)
         return DRAPE_E_MEMORY;
-    index_links(p, el->count, first_link, first_user, user);
+    memset(first_link, 0, ((size_t)el->count + 1) * sizeof *first_link);
+    memset(first_user, 0, ((size_t)p->count + 1) * sizeof *first_user);
+    for (int32_t i = 0; i < p->link_count; i++) {
+        first_link[p->element[i] + 1]++;
+        first_user[p->part[i] + 1]++;
+    }
+    for (int32_t e = 0; e < el->count; e++)
+        first_link[e + 1] += first_link[e];
+    for (int32_t k = 0; k < p->count; k++)
+        first_user[k + 1] += first_user[k];
+    for (int32_t i = 0; i < p->link_count; i++)
+        user[first_user[p->part[i]]++] = i;
+    for (int32_t k = p->count; k > 0; k--)
+        first_user[k] = first_user[k - 1];
+    first_user[0] = 0;
     p->first_link = first_link;
     p->first_user = first_user;
     p->user = user;

@@ -2,15 +2,6 @@
  * colliders, and the place of each element in it. */
 #include "compile/stages.h"
 
-static drape_status place_term(drape_model *model, drape_term *term)
-{
-    term->block = drape_arena_take(&model->arena, drape_term_places(term), sizeof *term->block);
-    if (!term->block)
-        return DRAPE_E_MEMORY;
-    drape_term_place(term, &model->pattern, model->free_of_node, term->block);
-    return DRAPE_OK;
-}
-
 drape_status drape_compile_pattern(drape_model *model)
 {
     drape_coupling *couplings = drape_alloc(model->ctx, (size_t)model->term_count + 2, sizeof *couplings);
@@ -24,9 +15,14 @@ drape_status drape_compile_pattern(drape_model *model)
     model->pattern.ranks = drape_model_ranks(model);
     drape_free(model->ctx, couplings);
     for (int32_t i = 0; !status && i < model->term_count; i++) {
+        drape_term *term = &model->terms[i];
         status = drape_check_cancel(model->ctx);
-        if (!status && drape_term_couples(&model->terms[i]))
-            status = place_term(model, &model->terms[i]);
+        if (status || !drape_term_couples(term))
+            continue;
+        term->block = drape_arena_take(&model->arena, drape_term_places(term), sizeof *term->block);
+        if (!term->block)
+            return DRAPE_E_MEMORY;
+        drape_term_place(term, &model->pattern, model->free_of_node, term->block);
     }
     return status;
 }

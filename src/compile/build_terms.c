@@ -207,25 +207,6 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .shear_curve = cloth->curves[DRAPE_CURVE_SHEAR]};
 }
 
-static bool is_owned(const drape_term_builder *builder, int32_t node)
-{
-    for (int s = 0; s < 2; s++)
-        if (node >= builder->owned[s] && node - builder->owned[s] < builder->owned_count[s])
-            return true;
-    return false;
-}
-
-/* For messages: the nodes that elements may have, as the term numbers them. */
-static void describe_owned(const drape_term_builder *builder, char *text, size_t size)
-{
-    const int32_t *first = builder->owned, *count = builder->owned_count, from = builder->first_node;
-    const int used =
-        snprintf(text, size, "%d to %d", (int)(first[0] - from), (int)(first[0] + count[0] - 1 - from));
-    if (count[1] > 0 && first[1] != first[0])
-        snprintf(text + used, size - (size_t)used, " and %d to %d", (int)(first[1] - from),
-                 (int)(first[1] + count[1] - 1 - from));
-}
-
 static drape_status check_elements(drape_term_builder *builder)
 {
     const double *timed = builder->term->timed;
@@ -250,13 +231,20 @@ static drape_status check_elements(drape_term_builder *builder)
         if (el->node[i * (size_t)el->nodes] == -1)
             return drape_term_refuse(builder, "%s announced %d elements and did not set element %zu",
                                      ops->entry.name, (int)el->count, i);
-    for (size_t i = 0; i < (size_t)el->count * (size_t)el->nodes; i++)
-        if (!is_owned(builder, el->node[i])) {
-            describe_owned(builder, owned, sizeof owned);
-            return drape_term_refuse(builder, "element %zu of %s has node %d; the cloth's are %s",
-                                     i / (size_t)el->nodes, builder->term->ops->entry.name,
-                                     (int)(el->node[i] - builder->first_node), owned);
-        }
+    const int32_t *first = builder->owned, *count = builder->owned_count, from = builder->first_node;
+    for (size_t i = 0; i < (size_t)el->count * (size_t)el->nodes; i++) {
+        const int32_t node = el->node[i];
+        if ((node >= first[0] && node - first[0] < count[0]) ||
+            (node >= first[1] && node - first[1] < count[1]))
+            continue;
+        const int used = snprintf(owned, sizeof owned, "%d to %d", (int)(first[0] - from),
+                                  (int)(first[0] + count[0] - 1 - from));
+        if (count[1] > 0 && first[1] != first[0])
+            snprintf(owned + used, sizeof owned - (size_t)used, " and %d to %d", (int)(first[1] - from),
+                     (int)(first[1] + count[1] - 1 - from));
+        return drape_term_refuse(builder, "element %zu of %s has node %d; the cloth's are %s",
+                                 i / (size_t)el->nodes, ops->entry.name, (int)(node - from), owned);
+    }
     return drape_term_finish_parts(builder);
 }
 
@@ -347,34 +335,8 @@ static size_t count_implied(const drape_context *ctx)
     return count;
 }
 
-/* Builds a term that the scene names. */
-static drape_status build_named(drape_model *model, int32_t c, const char *pointer,
-                                const drape_entry_def *def)
-{
-    const drape_term_ops *ops;
-    drape_status status = find_term(model->ctx, &drape_term_registry, pointer, def->type, &ops);
-    if (status)
-        return status;
-    if (ops->from_scene_gravity)
-        return drape_fail_at(
-            model->ctx, DRAPE_E_ARGUMENT, pointer,
-            "%s acts whenever the scene's \"gravity\" is not zero; leave it out of the terms",
-            ops->entry.name);
-    return build_term(model, c, pointer, ops, def);
-}
-
-/* Builds a term that the scene's gravity adds. history: its name, or NULL. */
-static drape_status build_implied(drape_model *model, int32_t c, const drape_term_ops *ops,
-                                  const char *history)
-{
-    drape_term *term = &model->terms[model->term_count];
-    const drape_status status =
-        build_term(model, c, "/gravity", ops, &(drape_entry_def){.type = ops->entry.name});
-    return status || !history ? status
-                              : drape_compile_history_named(model, "/gravity_history", history, term);
-}
-
-/* Builds the terms that the scene names, then those that its gravity adds if it is not zero. */
+/* Builds the terms that the scene names, then those that its gravity adds if it is not zero. gravity_history:
+ * the name of theirs, or NULL. */
 static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth_def *def,
                                 const char *gravity_history)
 {
@@ -389,11 +351,23 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
         return DRAPE_E_MEMORY;
     for (size_t i = 0; !status && i < def->term_count; i++) {
         snprintf(pointer, sizeof pointer, "/cloth/%d/terms/%zu", (int)c, i);
-        status = build_named(model, c, pointer, &def->terms[i]);
+        status = find_term(model->ctx, &drape_term_registry, pointer, def->terms[i].type, &ops);
+        if (!status && ops->from_scene_gravity)
+            return drape_fail_at(
+                model->ctx, DRAPE_E_ARGUMENT, pointer,
+                "%s acts whenever the scene's \"gravity\" is not zero; leave it out of the terms",
+                ops->entry.name);
+        if (!status)
+            status = build_term(model, c, pointer, ops, &def->terms[i]);
     }
-    for (int i = 0; !status && has_gravity && (ops = term_at(model->ctx, i)) != NULL; i++)
-        if (ops->from_scene_gravity)
-            status = build_implied(model, c, ops, gravity_history);
+    for (int i = 0; !status && has_gravity && (ops = term_at(model->ctx, i)) != NULL; i++) {
+        drape_term *term = &model->terms[model->term_count];
+        if (!ops->from_scene_gravity)
+            continue;
+        status = build_term(model, c, "/gravity", ops, &(drape_entry_def){.type = ops->entry.name});
+        if (!status && gravity_history)
+            status = drape_compile_history_named(model, "/gravity_history", gravity_history, term);
+    }
     return status;
 }
 

@@ -20,20 +20,6 @@ static drape_status refuse_null(checker *c, const char *what)
     return drape_fail_at(c->ctx, DRAPE_E_ARGUMENT, c->at.text, "%s is NULL", what);
 }
 
-static drape_status check_settings(checker *c, const drape_scene_object *object, const char *def)
-{
-    const drape_setting *settings;
-    size_t count;
-    memcpy(&settings, def + object->settings_offset, sizeof settings);
-    memcpy(&count, def + object->settings_count_offset, sizeof count);
-    if (count > 0 && !settings)
-        return refuse_null(c, "the array of settings");
-    for (size_t i = 0; i < count; i++)
-        if (!settings[i].name)
-            return refuse_null(c, "the name of a setting");
-    return DRAPE_OK;
-}
-
 static drape_status check_value(checker *c, const drape_scene_key *key, const char *def)
 {
     drape_setting setting;
@@ -80,34 +66,43 @@ static drape_status check_array(checker *c, const drape_scene_key *key, const ch
     return status;
 }
 
-static drape_status check_key(checker *c, const drape_scene_key *key, const char *def)
-{
-    switch (key->shape) {
-    case DRAPE_SCENE_VALUE:
-        return check_value(c, key, def);
-    case DRAPE_SCENE_OBJECT:
-        return check_object(c, key->child, def + key->offset);
-    case DRAPE_SCENE_LIST:
-    case DRAPE_SCENE_TRACK:
-    case DRAPE_SCENE_OBJECTS:
-    case DRAPE_SCENE_ENTRIES:
-        return check_array(c, key, def);
-    case DRAPE_SCENE_VERSION:
-    case DRAPE_SCENE_REMARK:
-    case DRAPE_SCENE_BOX:
-    case DRAPE_SCENE_QUATERNION:
-        break;
-    }
-    return DRAPE_OK;
-}
-
 static drape_status check_object(checker *c, const drape_scene_object *object, const char *def)
 {
     const size_t mark = c->at.length;
-    drape_status status = object->open ? check_settings(c, object, def) : DRAPE_OK;
+    const drape_setting *settings = NULL;
+    size_t count = 0;
+    if (object->open) {
+        memcpy(&settings, def + object->settings_offset, sizeof settings);
+        memcpy(&count, def + object->settings_count_offset, sizeof count);
+    }
+    if (count > 0 && !settings)
+        return refuse_null(c, "the array of settings");
+    for (size_t i = 0; i < count; i++)
+        if (!settings[i].name)
+            return refuse_null(c, "the name of a setting");
+    drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < object->key_count; i++) {
-        drape_pointer_push(&c->at, object->keys[i].param.name);
-        status = check_key(c, &object->keys[i], def);
+        const drape_scene_key *key = &object->keys[i];
+        drape_pointer_push(&c->at, key->param.name);
+        switch (key->shape) {
+        case DRAPE_SCENE_VALUE:
+            status = check_value(c, key, def);
+            break;
+        case DRAPE_SCENE_OBJECT:
+            status = check_object(c, key->child, def + key->offset);
+            break;
+        case DRAPE_SCENE_LIST:
+        case DRAPE_SCENE_TRACK:
+        case DRAPE_SCENE_OBJECTS:
+        case DRAPE_SCENE_ENTRIES:
+            status = check_array(c, key, def);
+            break;
+        case DRAPE_SCENE_VERSION:
+        case DRAPE_SCENE_REMARK:
+        case DRAPE_SCENE_BOX:
+        case DRAPE_SCENE_QUATERNION:
+            break;
+        }
         if (!status)
             drape_pointer_cut(&c->at, mark);
     }

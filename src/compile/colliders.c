@@ -13,43 +13,12 @@
  * cloth that rests on the polygon is then pushed away nearly as by the surface. */
 #define SHARE_OF_DISTANCE 0.1
 
-static drape_status find_collider(drape_context *ctx, const char *pointer, const char *name,
-                                  const drape_collider_ops **out)
-{
-    const int built_in = drape_registry_count(&drape_collider_registry);
-    char at[96];
-    int i;
-    snprintf(at, sizeof at, "%s/type", pointer);
-    drape_status status = drape_registry_choose(ctx, &drape_collider_registry, at, name, &i);
-    if (!status)
-        *out = i < built_in ? drape_colliders[i] : &ctx->host_colliders[i - built_in];
-    return status;
-}
-
-static drape_status name_collider(drape_model *model, const char *pointer, const char *given,
-                                  drape_collider *to)
-{
-    char name[32], at[96];
-    int32_t index = (int32_t)(to - model->colliders);
-    snprintf(name, sizeof name, "collider%d", (int)index);
-    const char *wanted = given ? given : name;
-    snprintf(at, sizeof at, "%s/name", pointer);
-    for (int32_t i = 0; i < index; i++)
-        if (strcmp(model->colliders[i].name, wanted) == 0)
-            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "two colliders have the name \"%.60s\"",
-                                 wanted);
-    to->name = drape_arena_text(&model->arena, wanted);
-    return drape_arena_status(&model->arena);
-}
-
 /* The given pivot, or the middle of the box around the points of the shape; and how far these are from it. */
 static drape_status set_pivot(drape_model *model, const char *pointer, const double given[3],
                               drape_collider *to)
 {
     const drape_collider_shape *shape = &to->shape;
     const bool is_given = !isnan(given[0]);
-    char at[96];
-    snprintf(at, sizeof at, "%s/pivot", pointer);
     to->pivot_given = is_given;
     for (int k = 0; k < 3; k++) {
         double low = shape->point_count > 0 ? INFINITY : 0, high = -low;
@@ -59,8 +28,8 @@ static drape_status set_pivot(drape_model *model, const char *pointer, const dou
         }
         to->pivot[k] = is_given ? given[k] : (low + high) / 2;
         if (!(fabs(to->pivot[k]) <= DRAPE_MOST))
-            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%g is not allowed; it is within %g m",
-                                 to->pivot[k], DRAPE_MOST);
+            return drape_compile_refuse(model->ctx, pointer, "pivot", "%g is not allowed; it is within %g m",
+                                        to->pivot[k], DRAPE_MOST);
     }
     for (int32_t i = 0; i < shape->point_count; i++) {
         double from[3];
@@ -76,16 +45,22 @@ static drape_status compile_collider(drape_model *model, size_t i, const drape_s
 {
     const drape_collider_def *def = &scene->colliders[i];
     drape_collider *to = &model->colliders[i];
-    char pointer[64];
+    char pointer[64], type[80];
+    int kind = 0;
     snprintf(pointer, sizeof pointer, "/colliders/%zu", i);
-    drape_status status = name_collider(model, pointer, def->name, to);
+    snprintf(type, sizeof type, "%s/type", pointer);
+    drape_status status = drape_compile_name(model, pointer, "collider", "colliders", def->name, (int32_t)i,
+                                             &to->name, sizeof *to);
     to->index = (int32_t)i;
     to->friction = def->friction;
     to->restitution = def->restitution;
     if (!status)
-        status = find_collider(model->ctx, pointer, def->entry.type, &to->ops);
-    if (!status)
-        status = drape_compile_choice(model, &def->entry, "", &to->choice);
+        status = drape_registry_choose(model->ctx, &drape_collider_registry, type, def->entry.type, &kind);
+    if (status)
+        return status;
+    const int built_in = drape_registry_count(&drape_collider_registry);
+    to->ops = kind < built_in ? drape_colliders[kind] : &model->ctx->host_colliders[kind - built_in];
+    status = drape_compile_choice(model, &def->entry, "", &to->choice);
     if (!status && def->key_count > 0)
         status = drape_compile_track(model, pointer, def->track, def->key_count, &to->track);
     if (!status && def->turn_count > 0)
@@ -113,12 +88,6 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
     return status;
 }
 
-static bool well_formed(const drape_collider_ops *ops)
-{
-    bool named = ops->entry.name && ops->entry.summary && ops->entry.reference && ops->shape && ops->distance;
-    return named && drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
-}
-
 /* The size of the function table in its first version: `smooth` may be missing, and cloth then meets the
  * collider through its triangles. */
 #define MIN_SIZE offsetof(drape_collider_ops, smooth)
@@ -136,7 +105,8 @@ drape_status drape_context_add_collider(drape_context *ctx, const drape_collider
             "the ops of a collider have %zu bytes; this library's have %zu, an older one's %zu or more",
             given->struct_size, sizeof own, MIN_SIZE);
     memcpy(&own, given, given->struct_size);
-    if (!well_formed(ops))
+    if (!ops->entry.name || !ops->entry.summary || !ops->entry.reference || !ops->shape || !ops->distance ||
+        !drape_params_are_well_formed(ops->entry.params, ops->entry.param_count))
         return drape_fail(
             ctx, DRAPE_E_ARGUMENT,
             "the ops of collider \"%s\" are not well formed: name, summary, reference, shape, "

@@ -9,21 +9,33 @@
 #include "model/scene.h"
 
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-static drape_status copy_setting(drape_model *model, const drape_setting *from, drape_setting *to)
+drape_status drape_compile_refuse(drape_context *ctx, const char *pointer, const char *key,
+                                  const char *format, ...)
 {
-    to->number = from->number;
-    to->name = drape_arena_text(&model->arena, from->name);
-    to->text = from->text ? drape_arena_text(&model->arena, from->text) : NULL;
-    if (from->vector) {
-        double *vector = drape_arena_take(&model->arena, from->vector_count, sizeof *vector);
-        if (vector)
-            memcpy(vector, from->vector, from->vector_count * sizeof *vector);
-        to->vector = vector;
-        to->vector_count = from->vector_count;
-    }
+    char at[sizeof ctx->pointer], text[512];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    snprintf(at, sizeof at, "%s/%s", pointer, key);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "%s", text);
+}
+
+drape_status drape_compile_name(drape_model *model, const char *pointer, const char *kind, const char *many,
+                                const char *given, int32_t index, char **name, size_t size)
+{
+    char own[32];
+    snprintf(own, sizeof own, "%s%d", kind, (int)index);
+    const char *wanted = given ? given : own;
+    for (size_t i = 1; i <= (size_t)index; i++)
+        if (strcmp(*(char **)(void *)((char *)name - i * size), wanted) == 0)
+            return drape_compile_refuse(model->ctx, pointer, "name", "two %s have the name \"%.60s\"", many,
+                                        wanted);
+    *name = drape_arena_text(&model->arena, wanted);
     return drape_arena_status(&model->arena);
 }
 
@@ -35,22 +47,19 @@ drape_status drape_compile_choice(drape_model *model, const drape_entry_def *def
     if (!choice->type || !choice->settings)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < def->setting_count; i++) {
-        drape_status status = copy_setting(model, &def->settings[i], &choice->settings[i]);
-        if (status)
-            return status;
+        const drape_setting *from = &def->settings[i];
+        drape_setting *to = &choice->settings[i];
+        double *vector =
+            from->vector ? drape_arena_take(&model->arena, from->vector_count, sizeof *vector) : NULL;
+        if (vector)
+            memcpy(vector, from->vector, from->vector_count * sizeof *vector);
+        *to = (drape_setting){.number = from->number,
+                              .name = drape_arena_text(&model->arena, from->name),
+                              .text = from->text ? drape_arena_text(&model->arena, from->text) : NULL,
+                              .vector = vector,
+                              .vector_count = vector ? from->vector_count : 0};
     }
     choice->setting_count = def->setting_count;
-    return DRAPE_OK;
-}
-
-static drape_status copy_formats(drape_model *model, const drape_scene_def *def)
-{
-    model->formats = drape_arena_take(&model->arena, def->format_count, sizeof *model->formats);
-    if (!model->formats)
-        return DRAPE_E_MEMORY;
-    model->format_count = def->format_count;
-    for (size_t i = 0; i < def->format_count; i++)
-        model->formats[i] = drape_arena_text(&model->arena, def->formats[i]);
     return drape_arena_status(&model->arena);
 }
 
@@ -71,32 +80,15 @@ static drape_status copy_scene(drape_model *model, const drape_scene_def *def)
     if (!status)
         status = drape_compile_choice(model, &def->controller, default_text("/controller/type"),
                                       &model->controller);
-    return status ? status : copy_formats(model, def);
-}
-
-static drape_status name_cloth(drape_model *model, int32_t c, const drape_cloth_def *def)
-{
-    char pointer[64], name[32];
-    snprintf(name, sizeof name, "cloth%d", (int)c);
-    snprintf(pointer, sizeof pointer, "/cloth/%d/name", (int)c);
-    const char *wanted = def->name ? def->name : name;
-    for (int32_t i = 0; i < c; i++)
-        if (strcmp(model->cloths[i].name, wanted) == 0)
-            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "two cloths have the name \"%.60s\"",
-                                 wanted);
-    model->cloths[c].name = drape_arena_text(&model->arena, wanted);
-    return drape_arena_status(&model->arena);
-}
-
-/* Copies where the mesh came from, for descriptions of the model. */
-static drape_status copy_source(drape_model *model, const drape_mesh_def *def, drape_cloth *cloth)
-{
-    memcpy(cloth->scale, def->scale, sizeof cloth->scale);
-    memcpy(cloth->rotate, def->rotate, sizeof cloth->rotate);
-    memcpy(cloth->translate, def->translate, sizeof cloth->translate);
-    if (def->file && !(cloth->file = drape_arena_text(&model->arena, def->file)))
+    if (status)
+        return status;
+    model->formats = drape_arena_take(&model->arena, def->format_count, sizeof *model->formats);
+    if (!model->formats)
         return DRAPE_E_MEMORY;
-    return drape_compile_choice(model, &def->grid, "", &cloth->grid);
+    model->format_count = def->format_count;
+    for (size_t i = 0; i < def->format_count; i++)
+        model->formats[i] = drape_arena_text(&model->arena, def->formats[i]);
+    return drape_arena_status(&model->arena);
 }
 
 static drape_status compile_cloth(drape_model *model, int32_t c, const drape_scene_def *scene)
@@ -105,16 +97,22 @@ static drape_status compile_cloth(drape_model *model, int32_t c, const drape_sce
     drape_cloth *cloth = &model->cloths[c];
     char pointer[64], at[96];
     snprintf(pointer, sizeof pointer, "/cloth/%d", (int)c);
-    drape_status status = name_cloth(model, c, def);
+    drape_status status =
+        drape_compile_name(model, pointer, "cloth", "cloths", def->name, c, &cloth->name, sizeof *cloth);
     snprintf(at, sizeof at, "%s/mesh", pointer);
     if (!status)
         status = drape_mesh_make(model->ctx, at, &def->mesh, scene->folder, &cloth->mesh);
     if (!status)
-        status = copy_source(model, &def->mesh, cloth);
+        status = drape_compile_choice(model, &def->mesh.grid, "", &cloth->grid);
+    if (!status && def->mesh.file && !(cloth->file = drape_arena_text(&model->arena, def->mesh.file)))
+        status = DRAPE_E_MEMORY;
     if (!status)
         status = drape_compile_material(model, pointer, def, cloth);
     if (!status)
         status = drape_compile_masses(model, pointer, def, cloth);
+    memcpy(cloth->scale, def->mesh.scale, sizeof cloth->scale);
+    memcpy(cloth->rotate, def->mesh.rotate, sizeof cloth->rotate);
+    memcpy(cloth->translate, def->mesh.translate, sizeof cloth->translate);
     memcpy(cloth->velocity, def->velocity, sizeof cloth->velocity);
     return status;
 }
@@ -145,33 +143,6 @@ static void copy_numbers(int32_t *to, const int32_t *from, size_t count, int32_t
         to[i] = from[i] + first;
 }
 
-static void gather_cloth(drape_model *model, const drape_cloth *cloth, size_t first_edge)
-{
-    const drape_mesh *mesh = &cloth->mesh;
-    size_t nodes = (size_t)mesh->node_count, first = (size_t)cloth->first_node,
-           edges = (size_t)mesh->edge_count;
-    memcpy(model->rest + 3 * first, mesh->x, 3 * nodes * sizeof *mesh->x);
-    memcpy(model->mass + first, cloth->node_mass, nodes * sizeof *cloth->node_mass);
-    for (size_t i = 0; i < 3 * nodes; i++)
-        model->velocity[3 * first + i] = cloth->velocity[i % 3];
-    copy_numbers(model->triangle + 3 * (size_t)cloth->first_triangle, mesh->triangle,
-                 3 * (size_t)mesh->triangle_count, cloth->first_node);
-    copy_numbers(model->edge + 2 * first_edge, mesh->edge, 2 * edges, cloth->first_node);
-    memcpy(model->edge_length + first_edge, mesh->edge_length, edges * sizeof *mesh->edge_length);
-}
-
-static double bounding_diagonal(const double *x, int32_t node_count)
-{
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = 0; i < 3 * (size_t)node_count; i++) {
-        low[i % 3] = fmin(low[i % 3], x[i]);
-        high[i % 3] = fmax(high[i % 3], x[i]);
-    }
-    for (int k = 0; k < 3; k++)
-        high[k] -= low[k];
-    return sqrt(high[0] * high[0] + high[1] * high[1] + high[2] * high[2]);
-}
-
 /* Concatenates the arrays of all cloths. */
 static drape_status gather(drape_model *model)
 {
@@ -186,10 +157,29 @@ static drape_status gather(drape_model *model)
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     for (int32_t c = 0; c < model->cloth_count; c++) {
-        gather_cloth(model, &model->cloths[c], first_edge);
-        first_edge += (size_t)model->cloths[c].mesh.edge_count;
+        const drape_cloth *cloth = &model->cloths[c];
+        const drape_mesh *mesh = &cloth->mesh;
+        const size_t count = (size_t)mesh->node_count, first = (size_t)cloth->first_node;
+        memcpy(model->rest + 3 * first, mesh->x, 3 * count * sizeof *mesh->x);
+        memcpy(model->mass + first, cloth->node_mass, count * sizeof *cloth->node_mass);
+        for (size_t i = 0; i < 3 * count; i++)
+            model->velocity[3 * first + i] = cloth->velocity[i % 3];
+        copy_numbers(model->triangle + 3 * (size_t)cloth->first_triangle, mesh->triangle,
+                     3 * (size_t)mesh->triangle_count, cloth->first_node);
+        copy_numbers(model->edge + 2 * first_edge, mesh->edge, 2 * (size_t)mesh->edge_count,
+                     cloth->first_node);
+        memcpy(model->edge_length + first_edge, mesh->edge_length,
+               (size_t)mesh->edge_count * sizeof *mesh->edge_length);
+        first_edge += (size_t)mesh->edge_count;
     }
-    model->length = bounding_diagonal(model->rest, model->node_count);
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 0; i < 3 * (size_t)model->node_count; i++) {
+        low[i % 3] = fmin(low[i % 3], model->rest[i]);
+        high[i % 3] = fmax(high[i % 3], model->rest[i]);
+    }
+    for (int k = 0; k < 3; k++)
+        high[k] -= low[k];
+    model->length = sqrt(high[0] * high[0] + high[1] * high[1] + high[2] * high[2]);
     return DRAPE_OK;
 }
 

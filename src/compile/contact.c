@@ -6,6 +6,7 @@
 #include "model/track.h"
 
 #include <math.h>
+#include <stdio.h>
 
 enum { IMPLICIT, LAGGED };
 static const char *const frictions[] = {"implicit", "lagged", NULL};
@@ -53,6 +54,41 @@ const drape_param drape_untangle_params[DRAPE_UNTANGLE_PARAM_COUNT] = {
                      "begins with what was reached, and a warning"),
 };
 
+/* Tables of one entry each. */
+static const drape_entry contact_entry = {
+    .name = "contact",
+    .summary = "settings of contact with colliders and between layers of cloth",
+    DRAPE_PARAMS(drape_contact_params)};
+static const drape_entry self_contact_entry = {
+    .name = "self_contact",
+    .summary = "contact of cloth with cloth; without it cloth passes through itself",
+    DRAPE_PARAMS(drape_self_contact_params)};
+static const drape_entry untangle_entry = {
+    .name = "untangle",
+    .summary =
+        "before the first step, cloth that begins through cloth or colliders is taken apart; without it "
+        "such cloth begins as it is",
+    DRAPE_PARAMS(drape_untangle_params)};
+
+const drape_registry drape_untangle_registry = {"untangle",
+                                                "untangles",
+                                                "Untangling",
+                                                "\"untangle\" of the scene",
+                                                (const drape_entry *[]){&untangle_entry, NULL},
+                                                NULL};
+const drape_registry drape_contact_registry = {"contact",
+                                               "contacts",
+                                               "Contact",
+                                               "\"contact\" of the scene",
+                                               (const drape_entry *[]){&contact_entry, NULL},
+                                               NULL};
+const drape_registry drape_self_contact_registry = {"self-contact",
+                                                    "self_contacts",
+                                                    "Self-contact",
+                                                    "\"self_contact\" of the scene",
+                                                    (const drape_entry *[]){&self_contact_entry, NULL},
+                                                    NULL};
+
 void drape_untangle_values(const drape_model_untangle *untangle, double values[DRAPE_UNTANGLE_PARAM_COUNT])
 {
     values[DRAPE_UNTANGLE_ON_FAILURE] = untangle->goes_on;
@@ -72,14 +108,6 @@ void drape_self_contact_values(const drape_contact_def *contact, double values[D
     values[DRAPE_SELF_THICKNESS] = contact->self_thickness;
     values[DRAPE_SELF_FRICTION] = contact->self_friction;
     values[DRAPE_SELF_RESTITUTION] = contact->self_restitution;
-}
-
-static double largest_thickness(const drape_model *model)
-{
-    double largest = 0;
-    for (int32_t c = 0; c < model->cloth_count; c++)
-        largest = fmax(largest, model->cloths[c].material.thickness);
-    return largest;
 }
 
 static double norm(const double *a)
@@ -118,12 +146,6 @@ static double frames_speed(const drape_sequence *frames)
     return most;
 }
 
-static double collider_speed(const drape_collider *collider)
-{
-    return track_speed(&collider->track) + drape_turns_fastest(&collider->turns) * collider->radius +
-           frames_speed(&collider->frames);
-}
-
 /* The largest speed at which the scene itself can move cloth against a collider. */
 static double scene_speed(const drape_model *model)
 {
@@ -139,8 +161,11 @@ static double scene_speed(const drape_model *model)
         if (track->turns.key_count > 0)
             cloth = fmax(cloth, track_speed(track) + drape_turns_fastest(&track->turns) * norm(arm));
     }
-    for (int32_t c = 0; c < model->collider_count; c++)
-        collider = fmax(collider, collider_speed(&model->colliders[c]));
+    for (int32_t i = 0; i < model->collider_count; i++) {
+        const drape_collider *c = &model->colliders[i];
+        collider = fmax(collider, track_speed(&c->track) + drape_turns_fastest(&c->turns) * c->radius +
+                                      frames_speed(&c->frames));
+    }
     return cloth + collider;
 }
 
@@ -151,15 +176,6 @@ static double fall_acceleration(const drape_model *model)
     return g > 0 ? g : model->length;
 }
 
-/* The areal density of a cloth where its nodes have the most mass, as a multiple of that of its material. */
-static double heaviest_areal_density(const drape_cloth *cloth)
-{
-    double most = 0;
-    for (int32_t i = 0; i < cloth->mesh.node_count; i++)
-        most = fmax(most, cloth->node_mass[i] / cloth->material_mass[i]);
-    return most * cloth->material.areal_density;
-}
-
 /* sigma (2 |g| L + v^2) / d, with sigma the largest areal density and L the size of the scene. Up to the
  * distance zero, the barrier absorbs 6 d of this per area (contact/barrier.h), which is 12 times the energy
  * of the speed v and of a fall over L; cloth with more energy cannot be stopped. The weight of the cloth is
@@ -167,16 +183,14 @@ static double heaviest_areal_density(const drape_cloth *cloth)
 static double stiffness_of_fall(const drape_model *model)
 {
     double sigma = 0, v = scene_speed(model);
-    for (int32_t c = 0; c < model->cloth_count; c++)
-        sigma = fmax(sigma, heaviest_areal_density(&model->cloths[c]));
+    for (int32_t c = 0; c < model->cloth_count; c++) {
+        const drape_cloth *cloth = &model->cloths[c];
+        double most = 0; /* of a node's mass, as a multiple of that of the material */
+        for (int32_t i = 0; i < cloth->mesh.node_count; i++)
+            most = fmax(most, cloth->node_mass[i] / cloth->material_mass[i]);
+        sigma = fmax(sigma, most * cloth->material.areal_density);
+    }
     return sigma * (2 * fall_acceleration(model) * model->length + v * v) / model->contact.distance;
-}
-
-/* The speed of a fall over the activation distance d: with restitution 0, cloth rises by at most d above the
- * height at which it meets a collider, and so by no more than the distance at which it rests. */
-static double speed_of_fall(const drape_model *model, double distance)
-{
-    return sqrt(2 * fall_acceleration(model) * distance);
 }
 
 /* A face of size a that is strained by e pulls its nodes against what it meets with a force of about E h
@@ -209,74 +223,54 @@ static double relaxed_pressure(const drape_model *model)
     return fmin(model->contact.stiffness, fmax(WEIGHTS * weight, stiffness_of_strain(model)));
 }
 
-static drape_status resolve_contact(drape_model *model, const drape_scene_def *def)
+drape_status drape_compile_contact(drape_model *model, const drape_scene_def *def)
 {
-    double values[DRAPE_CONTACT_PARAM_COUNT];
-    drape_contact_def *contact = &model->contact;
-    drape_status status = drape_params_resolve(model->ctx, "/contact", drape_contact_registry.entries[0],
-                                               def->contact, def->contact_count, values);
+    static const drape_registry *const registries[] = {&drape_contact_registry, &drape_self_contact_registry,
+                                                       &drape_untangle_registry};
+    static const char *const names[] = {"contact", "self_contact", "untangle"};
+    const drape_entry_def defs[] = {{.settings = def->contact, .setting_count = def->contact_count},
+                                    {.settings = def->self_contact, .setting_count = def->self_contact_count},
+                                    {.settings = def->untangle, .setting_count = def->untangle_count}};
+    drape_choice *const choices[] = {&model->contact_choice, &model->self_choice, &model->untangle_choice};
+    double all[3][DRAPE_MAX_PARAMS];
+    drape_status status = DRAPE_OK;
+    for (int i = 0; !status && i < 3; i++) {
+        char pointer[32];
+        snprintf(pointer, sizeof pointer, "/%s", names[i]);
+        if (i == 0 || defs[i].settings) /* the others are off unless they are given */
+            status = drape_params_resolve(model->ctx, pointer, registries[i]->entries[0], defs[i].settings,
+                                          defs[i].setting_count, all[i]);
+        if (!status)
+            status = drape_compile_choice(model, &defs[i], names[i], choices[i]);
+    }
     if (status)
         return status;
-    const double distance = values[DRAPE_CONTACT_DISTANCE];
+    drape_contact_def *contact = &model->contact;
+    const double *values = all[0], distance = values[DRAPE_CONTACT_DISTANCE];
     contact->distance_given = !isnan(distance);
-    contact->distance = isnan(distance) ? largest_thickness(model) : distance;
+    contact->distance = isnan(distance) ? 0 : distance;
+    for (int32_t c = 0; isnan(distance) && c < model->cloth_count; c++)
+        contact->distance = fmax(contact->distance, model->cloths[c].material.thickness);
     contact->stiffness = values[DRAPE_CONTACT_STIFFNESS];
     contact->stiffness_given = !isnan(contact->stiffness);
     contact->friction_velocity = values[DRAPE_CONTACT_FRICTION_VELOCITY];
     contact->lagged = values[DRAPE_CONTACT_FRICTION] == LAGGED;
     contact->no_room = (drape_no_room)values[DRAPE_CONTACT_NO_ROOM];
-    contact->restitution_velocity = speed_of_fall(model, contact->distance);
+    /* The speed of a fall over the activation distance d: with restitution 0, cloth rises by at most d above
+     * the height at which it meets a collider, and so by no more than the distance at which it rests. */
+    contact->restitution_velocity = sqrt(2 * fall_acceleration(model) * contact->distance);
+    if (def->self_contact) {
+        contact->self = true;
+        contact->self_thickness = all[1][DRAPE_SELF_THICKNESS];
+        contact->self_friction = all[1][DRAPE_SELF_FRICTION];
+        contact->self_restitution = all[1][DRAPE_SELF_RESTITUTION];
+        model->has_dissipation =
+            model->has_dissipation || contact->self_friction > 0 || contact->self_restitution < 1;
+    }
+    if (def->untangle)
+        model->untangle =
+            (drape_model_untangle){.given = true, .goes_on = all[2][DRAPE_UNTANGLE_ON_FAILURE] > 0};
     return DRAPE_OK;
-}
-
-static drape_status resolve_self_contact(drape_model *model, const drape_scene_def *def)
-{
-    double values[DRAPE_SELF_PARAM_COUNT];
-    if (!def->self_contact)
-        return DRAPE_OK;
-    drape_status status =
-        drape_params_resolve(model->ctx, "/self_contact", drape_self_contact_registry.entries[0],
-                             def->self_contact, def->self_contact_count, values);
-    if (status)
-        return status;
-    model->contact.self = true;
-    model->contact.self_thickness = values[DRAPE_SELF_THICKNESS];
-    model->contact.self_friction = values[DRAPE_SELF_FRICTION];
-    model->contact.self_restitution = values[DRAPE_SELF_RESTITUTION];
-    model->has_dissipation =
-        model->has_dissipation || model->contact.self_friction > 0 || model->contact.self_restitution < 1;
-    return DRAPE_OK;
-}
-
-static drape_status resolve_untangle(drape_model *model, const drape_scene_def *def)
-{
-    double values[DRAPE_UNTANGLE_PARAM_COUNT];
-    if (!def->untangle)
-        return DRAPE_OK;
-    const drape_status status =
-        drape_params_resolve(model->ctx, "/untangle", drape_untangle_registry.entries[0], def->untangle,
-                             def->untangle_count, values);
-    if (status)
-        return status;
-    model->untangle = (drape_model_untangle){.given = true, .goes_on = values[DRAPE_UNTANGLE_ON_FAILURE] > 0};
-    return DRAPE_OK;
-}
-
-drape_status drape_compile_contact(drape_model *model, const drape_scene_def *def)
-{
-    const drape_entry_def untangle = {.settings = def->untangle, .setting_count = def->untangle_count};
-    const drape_entry_def contact = {.settings = def->contact, .setting_count = def->contact_count};
-    const drape_entry_def self = {.settings = def->self_contact, .setting_count = def->self_contact_count};
-    drape_status status = resolve_contact(model, def);
-    if (!status)
-        status = resolve_self_contact(model, def);
-    if (!status)
-        status = resolve_untangle(model, def);
-    if (!status)
-        status = drape_compile_choice(model, &untangle, "untangle", &model->untangle_choice);
-    if (!status)
-        status = drape_compile_choice(model, &contact, "contact", &model->contact_choice);
-    return status ? status : drape_compile_choice(model, &self, "self_contact", &model->self_choice);
 }
 
 drape_status drape_compile_contact_stiffness(drape_model *model, const drape_scene_def *def)

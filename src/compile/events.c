@@ -15,24 +15,6 @@ typedef struct place {
     const char *pointer; /* of the event: "/events/0" */
 } place;
 
-static drape_status refuse(const place *p, const char *key, const char *text)
-{
-    char at[96];
-    snprintf(at, sizeof at, "%s/%s", p->pointer, key);
-    return drape_fail_at(p->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
-}
-
-static drape_status find_cloth(const place *p, const char *name, drape_model_event *to)
-{
-    char text[128];
-    to->cloth = -1;
-    for (int32_t c = 0; name && c < p->model->cloth_count; c++)
-        if (strcmp(p->model->cloths[c].name, name) == 0)
-            to->cloth = c;
-    snprintf(text, sizeof text, "there is no cloth \"%.60s\"", name ? name : "");
-    return !name || to->cloth >= 0 ? DRAPE_OK : refuse(p, "cloth", text);
-}
-
 static bool concerns(const drape_pin *pin, const drape_model_event *event, const char *name)
 {
     return (event->cloth < 0 || pin->cloth == event->cloth) && (!name || strcmp(pin->name, name) == 0);
@@ -64,7 +46,6 @@ static drape_status list_nodes(const place *p, drape_model_event *to)
 static drape_status find_pins(const place *p, const char *name, drape_model_event *to)
 {
     const drape_model *m = p->model;
-    char text[192];
     for (int32_t k = 0; k < m->pin_count; k++)
         to->pin_count += concerns(&m->pins[k], to, name);
     to->pin = drape_arena_take(p->arena, (size_t)to->pin_count, sizeof *to->pin);
@@ -74,9 +55,11 @@ static drape_status find_pins(const place *p, const char *name, drape_model_even
     for (int32_t k = 0; k < m->pin_count; k++)
         if (concerns(&m->pins[k], to, name))
             to->pin[count++] = k;
-    snprintf(text, sizeof text, "there are no pins \"%.60s\" in %s%.60s", name ? name : "",
-             to->cloth < 0 ? "any cloth" : "cloth ", to->cloth < 0 ? "" : m->cloths[to->cloth].name);
-    return name && count == 0 ? refuse(p, "pins", text) : list_nodes(p, to);
+    if (name && count == 0)
+        return drape_compile_refuse(p->ctx, p->pointer, "pins", "there are no pins \"%.60s\" in %s%.60s",
+                                    name, to->cloth < 0 ? "any cloth" : "cloth ",
+                                    to->cloth < 0 ? "" : m->cloths[to->cloth].name);
+    return list_nodes(p, to);
 }
 
 /* The place of a text among the choices of a key; NULL is the first. */
@@ -97,20 +80,16 @@ static drape_status choose(const place *p, const char *key, const char *text, in
 /* The rest shapes of clamped edges contain the directions in which they are held. */
 static drape_status check_release(const place *p, const drape_model_event *to)
 {
-    char text[192];
     for (int32_t k = 0; k < to->pin_count; k++) {
         const drape_pin *pin = &p->model->pins[to->pin[k]];
-        snprintf(text, sizeof text, "the pins \"%.60s\" clamp edges; such pins cannot be released",
-                 pin->name);
-        if (pin->clamps)
-            return refuse(p, "action", text);
-        snprintf(text, sizeof text,
-                 "the pins \"%.60s\" hold their nodes in some directions only; such pins cannot be released",
-                 pin->name);
-        if (pin->slides)
-            return refuse(p, "action", text);
+        if (pin->clamps || pin->slides)
+            return drape_compile_refuse(
+                p->ctx, p->pointer, "action", "the pins \"%.60s\" %s; such pins cannot be released",
+                pin->name, pin->clamps ? "clamp edges" : "hold their nodes in some directions only");
     }
-    return to->pinned_count > 0 ? DRAPE_OK : refuse(p, "action", "there are no pins to release");
+    return to->pinned_count > 0
+               ? DRAPE_OK
+               : drape_compile_refuse(p->ctx, p->pointer, "action", "there are no pins to release");
 }
 
 /* All but the event function. */
@@ -123,8 +102,12 @@ static drape_status resolve(const place *p, const drape_event_def *def, drape_mo
     to->direction = (drape_event_direction)direction;
     to->action = (drape_event_action)action;
     to->once = def->once;
-    if (!status)
-        status = find_cloth(p, def->cloth, to);
+    to->cloth = -1;
+    for (int32_t c = 0; def->cloth && c < p->model->cloth_count; c++)
+        if (strcmp(p->model->cloths[c].name, def->cloth) == 0)
+            to->cloth = c;
+    if (!status && def->cloth && to->cloth < 0)
+        status = drape_compile_refuse(p->ctx, p->pointer, "cloth", "there is no cloth \"%.60s\"", def->cloth);
     if (!status)
         status = find_pins(p, def->pins, to);
     return status || to->action != DRAPE_ACTION_RELEASE ? status : check_release(p, to);
@@ -137,54 +120,38 @@ static drape_status check_name(const place *p, const char *name)
     for (const char *c = name; c && *c; c++)
         good = good && *c != ';' && *c != '@' && (unsigned char)*c >= ' ' && *c != 0x7f;
     return good ? DRAPE_OK
-                : refuse(p, "name", "the name of an event has no \";\", \"@\" or control character");
+                : drape_compile_refuse(p->ctx, p->pointer, "name",
+                                       "the name of an event has no \";\", \"@\" or control character");
 }
 
 /* ---- Of a scene ---- */
 
-static drape_status name_event(const place *p, const char *given, drape_model *model, drape_model_event *to)
-{
-    char name[32], text[128];
-    const int32_t index = (int32_t)(to - model->events);
-    snprintf(name, sizeof name, "event%d", (int)index);
-    const char *wanted = given ? given : name;
-    snprintf(text, sizeof text, "two events have the name \"%.60s\"", wanted);
-    for (int32_t i = 0; i < index; i++)
-        if (strcmp(model->events[i].name, wanted) == 0)
-            return refuse(p, "name", text);
-    to->name = drape_arena_text(p->arena, wanted);
-    return to->name ? check_name(p, wanted) : DRAPE_E_MEMORY;
-}
-
-static drape_status find_function(const place *p, const drape_event_def *def, drape_model *model,
-                                  drape_model_event *to)
-{
-    char at[96];
-    int i;
-    snprintf(at, sizeof at, "%s/type", p->pointer);
-    drape_status status = drape_registry_choose(p->ctx, &drape_event_registry, at, def->entry.type, &i);
-    if (status)
-        return status;
-    to->ops = drape_events[i];
-    status = drape_compile_choice(model, &def->entry, "", &to->choice);
-    if (!status)
-        status = drape_params_resolve(p->ctx, p->pointer, &to->ops->entry, def->entry.settings,
-                                      def->entry.setting_count, to->values);
-    if (!status && to->ops->needs_pins && to->pinned_count == 0)
-        status = refuse(p, "type", "the event is about pins, and there are none");
-    return status || !to->ops->check ? status : to->ops->check(p->ctx, p->pointer, model, to);
-}
-
 static drape_status compile_event(drape_model *model, size_t i, const drape_event_def *def)
 {
     drape_model_event *to = &model->events[i];
-    char pointer[64];
+    char pointer[64], type[80];
+    int function = 0;
     const place p = {.ctx = model->ctx, .arena = &model->arena, .model = model, .pointer = pointer};
     snprintf(pointer, sizeof pointer, "/events/%zu", i);
-    drape_status status = name_event(&p, def->name, model, to);
+    snprintf(type, sizeof type, "%s/type", pointer);
+    drape_status status =
+        drape_compile_name(model, pointer, "event", "events", def->name, (int32_t)i, &to->name, sizeof *to);
+    if (!status)
+        status = check_name(&p, to->name);
     if (!status)
         status = resolve(&p, def, to);
-    return status ? status : find_function(&p, def, model, to);
+    if (!status)
+        status = drape_registry_choose(p.ctx, &drape_event_registry, type, def->entry.type, &function);
+    if (status)
+        return status;
+    to->ops = drape_events[function];
+    status = drape_compile_choice(model, &def->entry, "", &to->choice);
+    if (!status)
+        status = drape_params_resolve(p.ctx, pointer, &to->ops->entry, def->entry.settings,
+                                      def->entry.setting_count, to->values);
+    if (!status && to->ops->needs_pins && to->pinned_count == 0)
+        status = drape_compile_refuse(p.ctx, pointer, "type", "the event is about pins, and there are none");
+    return status || !to->ops->check ? status : to->ops->check(p.ctx, pointer, model, to);
 }
 
 drape_status drape_compile_events(drape_model *model, const drape_scene_def *def)

@@ -10,42 +10,32 @@
 #define LEAST_RAMP 1e-9 /* [s] steps that follow shorter ones would be refused as too small */
 #define MAX_SLOPE  1e30 /* [1/s] between two keys, so that no number of a cubic overflows */
 
-static drape_status refuse(drape_model *model, const char *pointer, const char *key, size_t index,
-                           const char *text)
+static drape_status check(drape_model *model, const char *pointer, const drape_scene_def *scene, size_t i)
 {
-    char at[128];
-    snprintf(at, sizeof at, "%s/%s/%zu", pointer, key, index);
-    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
-}
-
-static drape_status check(drape_model *model, const char *pointer, const drape_history_def *def)
-{
+    const drape_history_def *def = &scene->histories[i];
+    char time[40], value[40];
     if (def->time_count == 0 || def->time_count != def->value_count)
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
                              "%zu times and %zu values; there is one value for each time, and at least one",
                              def->time_count, def->value_count);
     for (size_t k = 0; k < def->time_count; k++) {
+        snprintf(time, sizeof time, "times/%zu", k);
+        snprintf(value, sizeof value, "values/%zu", k);
         if (!(fabs(def->times[k]) <= DRAPE_MOST))
-            return refuse(model, pointer, "times", k, "a time is finite and within 1e9 s");
+            return drape_compile_refuse(model->ctx, pointer, time, "a time is finite and within 1e9 s");
         if (!(fabs(def->values[k]) <= DRAPE_MOST))
-            return refuse(model, pointer, "values", k, "a factor is finite and within 1e9");
+            return drape_compile_refuse(model->ctx, pointer, value, "a factor is finite and within 1e9");
         if (k > 0 && !(def->times[k] > def->times[k - 1]))
-            return refuse(model, pointer, "times", k, "times must increase from key to key");
+            return drape_compile_refuse(model->ctx, pointer, time, "times must increase from key to key");
         if (k > 0 &&
             !(fabs(def->values[k] - def->values[k - 1]) <= MAX_SLOPE * (def->times[k] - def->times[k - 1])))
-            return refuse(model, pointer, "times", k, "the factor changes by more than 1e30 per second");
+            return drape_compile_refuse(model->ctx, pointer, time,
+                                        "the factor changes by more than 1e30 per second");
     }
-    return DRAPE_OK;
-}
-
-static drape_status check_name(drape_model *model, const char *pointer, const drape_scene_def *def, size_t i)
-{
-    char at[96];
-    snprintf(at, sizeof at, "%s/name", pointer);
     for (size_t k = 0; k < i; k++)
-        if (strcmp(def->histories[k].name, def->histories[i].name) == 0)
-            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "two histories have the name \"%.60s\"",
-                                 def->histories[i].name);
+        if (strcmp(scene->histories[k].name, def->name) == 0)
+            return drape_compile_refuse(model->ctx, pointer, "name", "two histories have the name \"%.60s\"",
+                                        def->name);
     return DRAPE_OK;
 }
 
@@ -81,25 +71,12 @@ drape_status drape_compile_histories(drape_model *model, const drape_scene_def *
         const drape_history_def *from = &def->histories[i];
         char pointer[64];
         snprintf(pointer, sizeof pointer, "/histories/%zu", i);
-        status = check(model, pointer, from);
-        if (!status)
-            status = check_name(model, pointer, def, i);
+        status = check(model, pointer, def, i);
         if (!status)
             status = add(model, from->name, from->time_count, from->times, from->values,
                          from->interpolation && strcmp(from->interpolation, "cubic") == 0);
     }
     return status;
-}
-
-/* ---- Of a term ---- */
-
-static const char *text_of(const drape_entry_def *def, const char *name)
-{
-    const char *text = NULL;
-    for (size_t i = 0; i < def->setting_count; i++)
-        if (strcmp(def->settings[i].name, name) == 0)
-            text = def->settings[i].text;
-    return text;
 }
 
 static drape_status refuse_timed(drape_model *model, const char *pointer, const drape_term *term)
@@ -138,7 +115,10 @@ drape_status drape_compile_history_of(drape_model *model, const char *pointer, c
               ramp = drape_param_find(entry->params, entry->param_count, "ramp");
     if (given < 0 || entry->params[given].kind != DRAPE_PARAM_TEXT)
         return DRAPE_OK;
-    const char *name = text_of(def, DRAPE_HISTORY_PARAM);
+    const char *name = NULL;
+    for (size_t i = 0; i < def->setting_count; i++)
+        if (strcmp(def->settings[i].name, DRAPE_HISTORY_PARAM) == 0)
+            name = def->settings[i].text;
     const double rise = ramp < 0 ? 0 : term->params[drape_param_place(entry->params, ramp)];
     char at[160];
     snprintf(at, sizeof at, "%s/%s", pointer, DRAPE_HISTORY_PARAM);
@@ -150,11 +130,9 @@ drape_status drape_compile_history_of(drape_model *model, const char *pointer, c
         return DRAPE_OK;
     if (drape_term_is_timed(term))
         return refuse_timed(model, at, term);
-    if (rise < LEAST_RAMP) {
-        snprintf(at, sizeof at, "%s/ramp", pointer);
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
-                             "%g s is too short; ramp is 0 or at least %g s", rise, LEAST_RAMP);
-    }
+    if (rise < LEAST_RAMP)
+        return drape_compile_refuse(model->ctx, pointer, "ramp",
+                                    "%g s is too short; ramp is 0 or at least %g s", rise, LEAST_RAMP);
     const double times[] = {0, rise}, values[] = {0, 1};
     drape_status status = add(model, "", 2, times, values, true);
     if (!status) {

@@ -4,17 +4,6 @@
 #include <stdio.h>
 #include <string.h>
 
-static bool any_is_ignored(const drape_scene_def *def)
-{
-    for (size_t c = 0; c < def->cloth_count; c++)
-        if (def->cloths[c].ignore_count > 0)
-            return true;
-    for (size_t c = 0; c < def->collider_count; c++)
-        if (!def->colliders[c].enabled)
-            return true;
-    return false;
-}
-
 /* A name may be that of a collider and of a cloth: then both are meant. Pairs of cloths ignore each other. */
 static drape_status ignore(drape_model *model, int32_t cloth, const char *pointer, const char *name)
 {
@@ -43,7 +32,12 @@ drape_status drape_compile_ignored(drape_model *model, const drape_scene_def *de
     const int32_t rows = model->collider_count + model->cloth_count;
     char pointer[64];
     drape_status status = DRAPE_OK;
-    if (!any_is_ignored(def))
+    bool any = false;
+    for (size_t c = 0; c < def->cloth_count; c++)
+        any = any || def->cloths[c].ignore_count > 0;
+    for (size_t c = 0; c < def->collider_count; c++)
+        any = any || !def->colliders[c].enabled;
+    if (!any)
         return DRAPE_OK;
     model->ignored =
         drape_arena_take(&model->arena, (size_t)rows * (size_t)model->cloth_count, sizeof *model->ignored);

@@ -23,24 +23,6 @@ static drape_status take_node(void *user, const char *key, int32_t local)
     return DRAPE_OK;
 }
 
-static drape_status apply(drape_model *model, const char *pointer, const drape_mesh *mesh, mass_item *item)
-{
-    const drape_mass_def *def = item->def;
-    const drape_selection selection = {.ctx = model->ctx,
-                                       .pointer = pointer,
-                                       .form = &drape_form_mass,
-                                       .mesh = mesh,
-                                       DRAPE_SELECTED_BY(def),
-                                       .take = take_node,
-                                       .user = item};
-    if (isnan(def->add) == isnan(def->mass))
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                             "exactly one of add, mass is needed; given: %s",
-                             isnan(def->add) ? "none" : "both");
-    memset(item->taken, 0, (size_t)mesh->node_count);
-    return drape_select_nodes(&selection);
-}
-
 drape_status drape_compile_masses(drape_model *model, const char *pointer, const drape_cloth_def *def,
                                   drape_cloth *cloth)
 {
@@ -58,7 +40,19 @@ drape_status drape_compile_masses(drape_model *model, const char *pointer, const
         char at[128];
         snprintf(at, sizeof at, "%s/masses/%zu", pointer, i);
         item.def = &def->masses[i];
-        status = apply(model, at, &cloth->mesh, &item);
+        memset(item.taken, 0, count);
+        if (isnan(item.def->add) == isnan(item.def->mass))
+            status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
+                                   "exactly one of add, mass is needed; given: %s",
+                                   isnan(item.def->add) ? "none" : "both");
+        else
+            status = drape_select_nodes(&(drape_selection){.ctx = model->ctx,
+                                                           .pointer = at,
+                                                           .form = &drape_form_mass,
+                                                           .mesh = &cloth->mesh,
+                                                           DRAPE_SELECTED_BY(item.def),
+                                                           .take = take_node,
+                                                           .user = &item});
     }
     drape_free(model->ctx, item.taken);
     return status;

@@ -76,14 +76,6 @@ const drape_registry drape_material_registry = {"material",
                                                 (const drape_entry *[]){&drape_material_entry, NULL},
                                                 NULL};
 
-static double total_area(const drape_mesh *mesh)
-{
-    double area = 0;
-    for (int32_t t = 0; t < mesh->triangle_count; t++)
-        area += mesh->triangle_area[t];
-    return area;
-}
-
 static drape_status total_mass(drape_context *ctx, const char *pointer, const double *values, double area,
                                double *mass)
 {
@@ -117,23 +109,6 @@ static drape_status check_stiffness(drape_context *ctx, const char *pointer, con
     return DRAPE_OK;
 }
 
-/* Computes thickness and modulus of the isotropic sheet whose strips have the mean tension K and bending B of
- * the fabric, h = sqrt(12 B/K), E = K/h, for terms that do not use fabrics, such as hinges and edges. */
-static void fill_in(const drape_woven *tension, const drape_woven *bending, double *values)
-{
-    const double k = sqrt(tension->warp * tension->weft), b = sqrt(bending->warp * bending->weft);
-    values[THICKNESS] = sqrt(12 * b / k);
-    values[YOUNG_MODULUS] = k / values[THICKNESS];
-}
-
-static bool is_given(const drape_cloth_def *def, const char *name)
-{
-    for (size_t i = 0; i < def->material_count; i++)
-        if (strcmp(def->material[i].name, name) == 0)
-            return true;
-    return false;
-}
-
 /* Copies the points that the scene gives. */
 static drape_status take_curves(drape_model *model, const drape_cloth_def *def, drape_cloth *cloth)
 {
@@ -151,20 +126,6 @@ static drape_status take_curves(drape_model *model, const drape_cloth_def *def, 
     return DRAPE_OK;
 }
 
-/* The curves of a fabric, where the scene gives none. */
-static drape_status take_fabric_curves(drape_model *model, const drape_fabric *fabric, drape_cloth *cloth)
-{
-    double *point = drape_arena_take(&model->arena, 4 * DRAPE_FABRIC_POINTS, sizeof *point);
-    if (!point)
-        return DRAPE_E_MEMORY;
-    double *const of[2] = {[DRAPE_CURVE_WARP] = point, [DRAPE_CURVE_WEFT] = point + 2 * DRAPE_FABRIC_POINTS};
-    const bool measured = drape_fabric_curves(fabric, of[DRAPE_CURVE_WARP], of[DRAPE_CURVE_WEFT]);
-    for (int k = 0; measured && k < 2; k++)
-        if (cloth->curves[k].count == 0)
-            cloth->curves[k] = (drape_points){DRAPE_FABRIC_POINTS, of[k]};
-    return DRAPE_OK;
-}
-
 /* Values that the scene gives take precedence over measured ones. */
 static drape_status take_fabric(drape_model *model, const drape_cloth_def *def, double *values,
                                 drape_cloth *cloth)
@@ -175,29 +136,28 @@ static drape_status take_fabric(drape_model *model, const drape_cloth_def *def, 
         return DRAPE_OK;
     drape_fabric_tension(fabric, &tension);
     drape_fabric_bending(fabric, bending);
-    if (is_given(def, params[POISSON_RATIO].name))
-        tension.poisson = bending->poisson = values[POISSON_RATIO];
+    for (size_t i = 0; i < def->material_count; i++)
+        if (strcmp(def->material[i].name, params[POISSON_RATIO].name) == 0)
+            tension.poisson = bending->poisson = values[POISSON_RATIO];
     if (!isnan(values[THICKNESS]))
         return DRAPE_OK;
     cloth->tension = tension;
-    fill_in(&tension, bending, values);
-    return take_fabric_curves(model, fabric, cloth);
-}
-
-static drape_material resolve(const double *values, const drape_woven *bending, double mass, double area)
-{
-    const bool measured = bending->warp > 0;
-    drape_material m = {.bending_warp = measured ? bending->warp : NAN,
-                        .bending_weft = measured ? bending->weft : NAN,
-                        .bending_twist = measured ? bending->shear : NAN,
-                        .young_modulus = values[YOUNG_MODULUS],
-                        .poisson_ratio = values[POISSON_RATIO],
-                        .thickness = values[THICKNESS],
-                        .areal_density = mass / area};
-    m.membrane_stiffness = m.young_modulus * m.thickness;
-    m.flexural_rigidity = m.young_modulus * m.thickness * m.thickness * m.thickness /
-                          (12 * (1 - m.poisson_ratio * m.poisson_ratio));
-    return m;
+    /* Computes thickness and modulus of the isotropic sheet whose strips have the mean tension K and
+     * bending B of the fabric, h = sqrt(12 B/K), E = K/h, for terms that do not use fabrics, such as
+     * hinges and edges. */
+    const double k = sqrt(tension.warp * tension.weft), b = sqrt(bending->warp * bending->weft);
+    values[THICKNESS] = sqrt(12 * b / k);
+    values[YOUNG_MODULUS] = k / values[THICKNESS];
+    /* The curves, where the scene gives none. */
+    double *point = drape_arena_take(&model->arena, 4 * DRAPE_FABRIC_POINTS, sizeof *point);
+    if (!point)
+        return DRAPE_E_MEMORY;
+    double *const of[2] = {[DRAPE_CURVE_WARP] = point, [DRAPE_CURVE_WEFT] = point + 2 * DRAPE_FABRIC_POINTS};
+    const bool measured = drape_fabric_curves(fabric, of[DRAPE_CURVE_WARP], of[DRAPE_CURVE_WEFT]);
+    for (int c = 0; measured && c < 2; c++)
+        if (cloth->curves[c].count == 0)
+            cloth->curves[c] = (drape_points){DRAPE_FABRIC_POINTS, of[c]};
+    return DRAPE_OK;
 }
 
 drape_status drape_compile_material(drape_model *model, const char *pointer, const drape_cloth_def *def,
@@ -208,7 +168,9 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
     snprintf(at, sizeof at, "%s/material", pointer);
     drape_status status = drape_params_resolve(model->ctx, at, &drape_material_entry, def->material,
                                                def->material_count, values);
-    double area = total_area(&cloth->mesh);
+    double area = 0;
+    for (int32_t t = 0; t < cloth->mesh.triangle_count; t++)
+        area += cloth->mesh.triangle_area[t];
     if (!status)
         status = check_stiffness(model->ctx, at, values);
     if (!status)
@@ -226,7 +188,18 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
     if (status)
         return status;
     memcpy(cloth->material_values, values, sizeof values);
-    cloth->material = resolve(values, &cloth->bending, mass, area);
+    const bool measured = cloth->bending.warp > 0;
+    drape_material m = {.bending_warp = measured ? cloth->bending.warp : NAN,
+                        .bending_weft = measured ? cloth->bending.weft : NAN,
+                        .bending_twist = measured ? cloth->bending.shear : NAN,
+                        .young_modulus = values[YOUNG_MODULUS],
+                        .poisson_ratio = values[POISSON_RATIO],
+                        .thickness = values[THICKNESS],
+                        .areal_density = mass / area};
+    m.membrane_stiffness = m.young_modulus * m.thickness;
+    m.flexural_rigidity = m.young_modulus * m.thickness * m.thickness * m.thickness /
+                          (12 * (1 - m.poisson_ratio * m.poisson_ratio));
+    cloth->material = m;
     for (int32_t i = 0; i < count; i++)
         cloth->material_mass[i] = values[MASS] == MASS_UNIFORM
                                       ? mass / count

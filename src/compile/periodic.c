@@ -76,17 +76,6 @@ static drape_status list_side(const pairing *p, const char *key, const drape_sel
     return status;
 }
 
-/* The axis along which the nodes of a side extend most. */
-static int longest_axis(const side *s, const double *x)
-{
-    double extent[3] = {0};
-    for (int32_t i = 0; i < s->count; i++)
-        for (size_t k = 0; k < 3; k++)
-            extent[k] = fmax(extent[k], fabs(x[3 * (size_t)s->node[i] + k] - s->mean[k]));
-    int axis = extent[1] > extent[0];
-    return extent[2] > extent[axis] ? 2 : axis;
-}
-
 static drape_status refuse_pair(const pairing *p, int32_t node, const double *at)
 {
     const double *x = p->cloth->mesh.x;
@@ -107,7 +96,11 @@ static drape_status match(pairing *p, drape_arena *scratch)
 {
     const double *x = p->cloth->mesh.x, slip = SLIP * p->model->length;
     const size_t count = (size_t)p->to.count;
-    const size_t axis = (size_t)longest_axis(&p->to, x);
+    double extent[3] = {0};
+    for (size_t i = 0; i < count; i++)
+        for (size_t k = 0; k < 3; k++)
+            extent[k] = fmax(extent[k], fabs(x[3 * (size_t)p->to.node[i] + k] - p->to.mean[k]));
+    const size_t flat = extent[1] > extent[0], axis = extent[2] > extent[flat] ? 2 : flat;
     drape_node_along *list = drape_arena_take(scratch, count, sizeof *list);
     p->partner = drape_arena_take(scratch, count, sizeof *p->partner);
     drape_status status = drape_arena_status(scratch);
@@ -190,17 +183,6 @@ static double off(const pairing *p, int32_t i, const double *x, const double by[
     return distance(at, x + 3 * (size_t)p->partner[i]);
 }
 
-static drape_status check_start(const pairing *p, const double *x, const double by[3])
-{
-    for (int32_t i = 0; i < p->from.count; i++)
-        if (!(off(p, i, x, by) <= SLIP * p->model->length))
-            return drape_fail_at(
-                p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
-                "at the start node %d is %g m from where the period (%g %g %g) m puts node %d",
-                (int)p->partner[i], off(p, i, x, by), by[0], by[1], by[2], (int)p->from.node[i]);
-    return DRAPE_OK;
-}
-
 /* Stretches the cloth by what the period is longer than the displacement at the start: in proportion to how
  * far along the displacement at rest a node is. */
 static drape_status stretch(const pairing *p, const double now[3], double *x)
@@ -228,18 +210,6 @@ static drape_status stretch(const pairing *p, const double now[3], double *x)
     return DRAPE_OK;
 }
 
-static drape_status own_start(drape_model *model)
-{
-    const size_t size = 3 * (size_t)model->node_count * sizeof *model->start;
-    if (model->start != model->rest)
-        return DRAPE_OK;
-    model->start = drape_arena_take(&model->arena, 1, size);
-    if (!model->start)
-        return DRAPE_E_MEMORY;
-    memcpy(model->start, model->rest, size);
-    return DRAPE_OK;
-}
-
 static drape_status place(pairing *p, bool may_move)
 {
     drape_model *model = p->model;
@@ -251,12 +221,23 @@ static drape_status place(pairing *p, bool may_move)
         vec3_add_scaled(-1.0 / p->from.count, x + 3 * (size_t)p->from.node[i], now);
     }
     const bool given = !isnan(p->def->period[0]);
-    drape_status status = check_start(p, x, given && !may_move ? p->def->period : now);
-    if (status || !given || !may_move)
-        return status;
-    status = own_start(model);
-    if (!status)
-        status = stretch(p, now, model->start + first);
+    const double *by = given && !may_move ? p->def->period : now;
+    for (int32_t i = 0; i < p->from.count; i++)
+        if (!(off(p, i, x, by) <= SLIP * model->length))
+            return drape_fail_at(
+                model->ctx, DRAPE_E_ARGUMENT, p->pointer,
+                "at the start node %d is %g m from where the period (%g %g %g) m puts node %d",
+                (int)p->partner[i], off(p, i, x, by), by[0], by[1], by[2], (int)p->from.node[i]);
+    if (!given || !may_move)
+        return DRAPE_OK;
+    if (model->start == model->rest) {
+        const size_t count = 3 * (size_t)model->node_count;
+        double *start = drape_arena_take(&model->arena, count, sizeof *start);
+        if (!start)
+            return DRAPE_E_MEMORY;
+        model->start = memcpy(start, model->rest, count * sizeof *start);
+    }
+    drape_status status = stretch(p, now, model->start + first);
     for (int32_t i = 0; !status && i < p->from.count; i++)
         for (size_t k = 0; k < 3; k++)
             model->start[first + 3 * (size_t)p->partner[i] + k] =
@@ -352,15 +333,6 @@ static drape_status pair_edges(drape_model *model, size_t c, size_t i, const dra
     return status;
 }
 
-static drape_status start_edges(drape_model *model, drape_cloth *cloth)
-{
-    const size_t edges = (size_t)cloth->mesh.edge_count;
-    cloth->edge_image = drape_arena_take(&model->arena, edges, sizeof *cloth->edge_image);
-    for (size_t e = 0; cloth->edge_image && e < edges; e++)
-        cloth->edge_image[e] = -1;
-    return cloth->edge_image ? DRAPE_OK : DRAPE_E_MEMORY;
-}
-
 drape_status drape_compile_periodic(drape_model *model, const drape_scene_def *def)
 {
     drape_status status = DRAPE_OK;
@@ -374,9 +346,16 @@ drape_status drape_compile_periodic(drape_model *model, const drape_scene_def *d
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < model->node_count; i++)
         parent[i] = i;
-    for (size_t c = 0; !status && c < def->cloth_count; c++)
-        if (def->cloths[c].periodic_count > 0)
-            status = start_edges(model, &model->cloths[c]);
+    for (size_t c = 0; !status && c < def->cloth_count; c++) {
+        drape_cloth *cloth = &model->cloths[c];
+        const size_t edges = (size_t)cloth->mesh.edge_count;
+        if (def->cloths[c].periodic_count == 0)
+            continue;
+        cloth->edge_image = drape_arena_take(&model->arena, edges, sizeof *cloth->edge_image);
+        for (size_t e = 0; cloth->edge_image && e < edges; e++)
+            cloth->edge_image[e] = -1;
+        status = cloth->edge_image ? DRAPE_OK : DRAPE_E_MEMORY;
+    }
     for (size_t c = 0; c < def->cloth_count; c++)
         for (size_t i = 0; !status && i < def->cloths[c].periodic_count; i++)
             status = pair_edges(model, c, i, &def->cloths[c].periodic[i], parent);
@@ -454,18 +433,13 @@ static bool keep_period(const drape_model *m, const int32_t *track_of, int32_t a
     return vec3_norm(more) <= SLIP * m->length;
 }
 
-/* Whether colliders carry both nodes by one translation, or neither. */
-static bool ride_alike(const drape_model *m, int32_t a, int32_t b)
-{
-    const int32_t of_a = m->ride ? m->ride[a].collider : -1, of_b = m->ride ? m->ride[b].collider : -1;
-    return of_a == of_b && (of_a < 0 || (m->colliders[of_a].turns.key_count == 0 &&
-                                         m->colliders[of_a].frames.frame_count == 0));
-}
-
 /* Whether pins move both nodes alike: at the keys and, of a turn, also between two of them. */
 static bool move_alike(const drape_model *m, const int32_t *track_of, int32_t a, int32_t b)
 {
-    bool alike = ride_alike(m, a, b);
+    const int32_t of_a = m->ride ? m->ride[a].collider : -1, of_b = m->ride ? m->ride[b].collider : -1;
+    bool alike =
+        of_a == of_b &&
+        (of_a < 0 || (m->colliders[of_a].turns.key_count == 0 && m->colliders[of_a].frames.frame_count == 0));
     for (int end = 0; alike && end < 2; end++) {
         const int32_t number = track_of[end ? b : a];
         const drape_track *track = number >= 0 ? &m->tracks[number] : NULL;
@@ -515,12 +489,6 @@ static drape_status check_clamps(const drape_model *m)
     return DRAPE_OK;
 }
 
-static bool in_one_cell(const drape_mesh *mesh, int32_t a, int32_t b)
-{
-    return mesh->rows > 0 && abs(a / mesh->columns - b / mesh->columns) <= 1 &&
-           abs(a % mesh->columns - b % mesh->columns) <= 1;
-}
-
 /* Whether elements reach over edges of the mesh, as those of bending do: there would have to be one over the
  * periodic edge, too, and there is none. Within a triangle or, between two nodes, a cell of a grid they do
  * not. */
@@ -535,7 +503,8 @@ static bool reaches_over_edges(const drape_model *m, const drape_term *term)
                               first = m->cloths[term->cloth].first_node, i = node[a] - first,
                               j = node[b] - first;
                 if (i != j && drape_edge_between(mesh->edge, mesh->edge_count, i, j) < 0 &&
-                    !(el->nodes == 2 && in_one_cell(mesh, i, j)))
+                    !(el->nodes == 2 && (mesh->rows > 0 && abs(i / mesh->columns - j / mesh->columns) <= 1 &&
+                                         abs(i % mesh->columns - j % mesh->columns) <= 1)))
                     return true;
             }
     return false;

@@ -36,13 +36,6 @@ typedef struct pin_place {
     holding *all; /* (node_count) by pins with directions */
 } pin_place;
 
-static drape_status refuse(const pin_place *pin, const char *key, const char *text)
-{
-    char at[192];
-    snprintf(at, sizeof at, "%s%s", pin->pointer, key);
-    return drape_fail_at(pin->model->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
-}
-
 /* ---- Motions of nodes ---- */
 
 /* Duals of the normals: dual[i] . normal[j] = 1 if i = j, else 0, spanning the same. Normals at right angles
@@ -158,7 +151,7 @@ static drape_status add_direction(const pin_place *pin, const char *key, int32_t
     const double length = vec3_norm(n);
     if (other >= 0 && (all->count == 3 || !(length > PARALLEL))) {
         char at[192];
-        snprintf(at, sizeof at, "%s%s", pin->pointer, key);
+        snprintf(at, sizeof at, "%s/%s", pin->pointer, key);
         return moves_alike(pin->model, direction, track, all)
                    ? DRAPE_OK
                    : refuse_motions(pin->model, at, node, direction, &pin->model->pins[all->pin[other]]);
@@ -184,32 +177,16 @@ static drape_status take_node(void *user, const char *key, int32_t local)
         pin->held[node] = 1;
         return status;
     }
-    if (pin->model->pinned[node] && !tracks_agree(pin->model, pin->track_of_node[node], pin->track)) {
-        char text[128];
-        snprintf(text, sizeof text, "node %d is pinned twice, along different tracks or colliders",
-                 (int)local);
-        return refuse(pin, key, text);
-    }
+    if (pin->model->pinned[node] && !tracks_agree(pin->model, pin->track_of_node[node], pin->track))
+        return drape_compile_refuse(pin->model->ctx, pin->pointer, key,
+                                    "node %d is pinned twice, along different tracks or colliders",
+                                    (int)local);
     if (!pin->model->pinned[node])
         pin->track_of_node[node] = pin->track;
     pin->model->pinned[node] = 1;
     pin->clamped[node] |= pin->def->clamp;
     pin->held[node] = 1;
     return status;
-}
-
-/* Pins the selected nodes. */
-static drape_status take_selection(pin_place *pin)
-{
-    const drape_pin_def *def = pin->def;
-    const drape_selection selection = {.ctx = pin->model->ctx,
-                                       .pointer = pin->pointer,
-                                       .form = &drape_form_pin,
-                                       .mesh = &pin->cloth->mesh,
-                                       DRAPE_SELECTED_BY(def),
-                                       .take = take_node,
-                                       .user = pin};
-    return drape_select_nodes(&selection);
 }
 
 /* A vector of the scene, of length 1; false if it is not given. */
@@ -233,16 +210,17 @@ static drape_status find_directions(pin_place *pin)
     const drape_pin_def *def = pin->def;
     double axis[3], *n = pin->direction[0];
     const bool normal = unit_vector(def->normal, n), line = unit_vector(def->axis, axis);
+    drape_context *ctx = pin->model->ctx;
     pin->count = normal ? 1 : line ? 2 : 0;
     if (normal && line)
-        return refuse(pin, "/axis", "a pin has a normal or an axis, not both");
+        return drape_compile_refuse(ctx, pin->pointer, "axis", "a pin has a normal or an axis, not both");
     if (pin->count > 0 && ((def->turn_count > 0 && !def->clamp) || def->attach))
-        return refuse(
-            pin, normal ? "/normal" : "/axis",
+        return drape_compile_refuse(
+            ctx, pin->pointer, normal ? "normal" : "axis",
             "a pin that holds its nodes in some directions only may have a track, and turns with clamp, "
             "but no attach");
     if ((normal && vec3_norm(n) == 0) || (line && vec3_norm(axis) == 0))
-        return refuse(pin, normal ? "/normal" : "/axis", "0 0 0 has no direction");
+        return drape_compile_refuse(ctx, pin->pointer, normal ? "normal" : "axis", "0 0 0 has no direction");
     if (!line)
         return DRAPE_OK;
     int least = 0;
@@ -259,13 +237,17 @@ static drape_status find_directions(pin_place *pin)
 static drape_status keep_track(pin_place *pin)
 {
     drape_model *model = pin->model;
+    drape_context *ctx = model->ctx;
     pin->track = -1;
     if (pin->def->turn_count == 0 && !isnan(pin->def->pivot[0]))
-        return refuse(pin, "/pivot", "without turns there is nothing that turns about it");
+        return drape_compile_refuse(ctx, pin->pointer, "pivot",
+                                    "without turns there is nothing that turns about it");
     if (pin->def->attach && pin->def->key_count > 0)
-        return refuse(pin, "/attach", "a pin is carried by a collider or moves along a track, not both");
+        return drape_compile_refuse(ctx, pin->pointer, "attach",
+                                    "a pin is carried by a collider or moves along a track, not both");
     if (pin->def->turn_count > 0 && pin->def->attach)
-        return refuse(pin, "/turns", "a pin is carried by a collider or turns about a pivot, not both");
+        return drape_compile_refuse(ctx, pin->pointer, "turns",
+                                    "a pin is carried by a collider or turns about a pivot, not both");
     if (pin->def->attach)
         pin->track = model->track_count++; /* without keys: drape_compile_rides has its motion */
     if (pin->def->key_count == 0 && pin->def->turn_count == 0)
@@ -278,33 +260,6 @@ static drape_status keep_track(pin_place *pin)
     if (!status && pin->def->turn_count > 0)
         status = drape_compile_turns(model, pin->pointer, pin->def->turns, pin->def->turn_count, &to->turns);
     return status;
-}
-
-/* The point about which the nodes of a pin turn. */
-static void find_pivot(const pin_place *pin, const drape_pin *nodes)
-{
-    drape_track *track = pin->track >= 0 ? &pin->model->tracks[pin->track] : NULL;
-    if (!track)
-        return;
-    for (int32_t i = 0; i < nodes->node_count; i++)
-        vec3_add_scaled(1.0 / nodes->node_count, pin->model->start + 3 * (size_t)nodes->node[i],
-                        track->pivot);
-    if (!isnan(pin->def->pivot[0]))
-        memcpy(track->pivot, pin->def->pivot, sizeof track->pivot);
-}
-
-/* The name is unique among the pins of the cloth, of which this is number p. */
-static drape_status name_pin(const pin_place *pin, size_t p, drape_pin *to)
-{
-    char name[32], text[128];
-    snprintf(name, sizeof name, "pin%zu", p);
-    const char *wanted = pin->def->name ? pin->def->name : name;
-    snprintf(text, sizeof text, "two pins of the cloth have the name \"%.60s\"", wanted);
-    for (size_t i = 1; i <= p; i++)
-        if (strcmp((to - i)->name, wanted) == 0)
-            return refuse(pin, "/name", text);
-    to->name = drape_arena_text(&pin->model->arena, wanted);
-    return drape_arena_status(&pin->model->arena);
 }
 
 /* Lists the nodes that the pin holds, and clears their marks for the next pin. */
@@ -334,7 +289,8 @@ static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, in
         pin->cloth = &model->cloths[c];
         pin->def = &def->cloths[c].pins[p];
         snprintf(pin->pointer, sizeof pin->pointer, "/cloth/%d/pins/%zu", (int)c, p);
-        status = name_pin(pin, p, to);
+        status = drape_compile_name(model, pin->pointer, "pin", "pins of the cloth", pin->def->name,
+                                    (int32_t)p, &to->name, sizeof *to);
         if (!status)
             status = find_directions(pin);
         to->slides = pin->count > 0;
@@ -344,20 +300,23 @@ static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, in
         if (!status && to->turn >= 0)
             model->tracks[to->turn].clamps = true;
         if (!status)
-            status = take_selection(pin);
+            status = drape_select_nodes(&(drape_selection){.ctx = model->ctx,
+                                                           .pointer = pin->pointer,
+                                                           .form = &drape_form_pin,
+                                                           .mesh = &pin->cloth->mesh,
+                                                           DRAPE_SELECTED_BY(pin->def),
+                                                           .take = take_node,
+                                                           .user = pin});
         if (!status)
             status = list_nodes(pin, to);
-        if (!status)
-            find_pivot(pin, to);
+        if (status || pin->track < 0)
+            continue;
+        double *pivot = model->tracks[pin->track].pivot;
+        for (int32_t i = 0; i < to->node_count; i++)
+            vec3_add_scaled(1.0 / to->node_count, model->start + 3 * (size_t)to->node[i], pivot);
+        if (!isnan(pin->def->pivot[0]))
+            memcpy(pivot, pin->def->pivot, 3 * sizeof *pivot);
     }
-    return status;
-}
-
-static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, pin_place *pin)
-{
-    drape_status status = DRAPE_OK;
-    for (int32_t c = 0; !status && c < model->cloth_count; c++)
-        status = pin_cloth(model, def, c, pin);
     return status;
 }
 
@@ -596,7 +555,8 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
         memset(track_of_node, 0xff, nodes * sizeof *track_of_node); /* all -1 */
         pin_place pin = {
             .model = model, .track_of_node = track_of_node, .clamped = clamped, .held = held, .all = all};
-        status = pin_cloths(model, def, &pin);
+        for (int32_t c = 0; !status && c < model->cloth_count; c++)
+            status = pin_cloth(model, def, c, &pin);
         if (!status)
             status = check_both(model, &pin);
         if (!status)

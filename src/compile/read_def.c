@@ -23,45 +23,38 @@ static size_t stride_of(const char *array, size_t count, size_t size)
     return stride;
 }
 
-static drape_status widen_arrays(drape_context *ctx, drape_arena *arena, const drape_scene_object *object,
-                                 char *def);
-
-/* Replaces the array of a key by defs of the present size, in the arena. A NULL array or one that is too long
- * is not read: drape_compile_check_def reports missing arrays and refuses such counts. */
-static drape_status widen_array(drape_context *ctx, drape_arena *arena, const drape_scene_key *key, char *def)
-{
-    const size_t size = key->child->def_size;
-    const char *from;
-    size_t count;
-    memcpy(&from, def + key->offset, sizeof from);
-    memcpy(&count, def + key->count_offset, sizeof count);
-    if (!from || count == 0 || (key->at_most && count > key->at_most))
-        return DRAPE_OK;
-    const size_t stride = stride_of(from, count, size);
-    if (!drape_def_fits(stride, key->child->least_size, size))
-        return drape_fail(ctx, DRAPE_E_VERSION,
-                          "a def was not initialised by drape_%s_def_init of this version", key->child->name);
-    char *to = drape_arena_take(arena, count, size);
-    if (!to)
-        return DRAPE_E_MEMORY;
-    memcpy(def + key->offset, &to, sizeof to);
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < count; i++) {
-        drape_scene_set_defaults(key->child, to + i * size);
-        memcpy(to + i * size, from + i * stride, stride);
-        memcpy(to + i * size, &size, sizeof size);
-        status = widen_arrays(ctx, arena, key->child, to + i * size);
-    }
-    return status;
-}
-
+/* Replaces arrays by defs of the present size, in the arena. A NULL array or one that is too long is not read:
+ * drape_compile_check_def reports missing arrays and refuses such counts. */
 static drape_status widen_arrays(drape_context *ctx, drape_arena *arena, const drape_scene_object *object,
                                  char *def)
 {
     drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < object->key_count; i++)
-        if (object->keys[i].shape == DRAPE_SCENE_OBJECTS && object->keys[i].child->least_size)
-            status = widen_array(ctx, arena, &object->keys[i], def);
+    for (const drape_scene_key *key = object->keys; !status && key < object->keys + object->key_count;
+         key++) {
+        const char *from;
+        size_t count;
+        if (key->shape != DRAPE_SCENE_OBJECTS || !key->child->least_size)
+            continue;
+        memcpy(&from, def + key->offset, sizeof from);
+        memcpy(&count, def + key->count_offset, sizeof count);
+        if (!from || count == 0 || (key->at_most && count > key->at_most))
+            continue;
+        const size_t size = key->child->def_size, stride = stride_of(from, count, size);
+        if (!drape_def_fits(stride, key->child->least_size, size))
+            return drape_fail(ctx, DRAPE_E_VERSION,
+                              "a def was not initialised by drape_%s_def_init of this version",
+                              key->child->name);
+        char *to = drape_arena_take(arena, count, size);
+        if (!to)
+            return DRAPE_E_MEMORY;
+        memcpy(def + key->offset, &to, sizeof to);
+        for (size_t i = 0; !status && i < count; i++) {
+            drape_scene_set_defaults(key->child, to + i * size);
+            memcpy(to + i * size, from + i * stride, stride);
+            memcpy(to + i * size, &size, sizeof size);
+            status = widen_arrays(ctx, arena, key->child, to + i * size);
+        }
+    }
     return status;
 }
 

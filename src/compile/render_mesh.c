@@ -6,19 +6,6 @@
 #include <math.h>
 #include <stdio.h>
 
-static bool is_given(const drape_mesh_def *def)
-{
-    return def->grid.type || def->file || def->positions || def->triangles;
-}
-
-static double mean_edge(const drape_mesh *mesh)
-{
-    double sum = 0;
-    for (int32_t i = 0; i < mesh->edge_count; i++)
-        sum += mesh->edge_length[i];
-    return sum / mesh->edge_count;
-}
-
 /* The limit is also the sign that both meshes are not at the same place. */
 static drape_status bind_vertices(drape_model *model, const drape_mesh_source *source, const drape_bvh *tree,
                                   const double *normals, drape_cloth *cloth)
@@ -50,7 +37,10 @@ static drape_status bind_cloth(drape_model *model, int32_t c, const drape_scene_
     snprintf(pointer, sizeof pointer, "/cloth/%d/render_mesh", (int)c);
     snprintf(place, sizeof place, "%s%s", pointer, def->mesh.file ? "/file" : "");
     const drape_mesh_source source = {.pointer = place, .file = def->mesh.file};
-    cloth->max_distance = isnan(def->max_distance) ? mean_edge(&cloth->mesh) : def->max_distance;
+    double sum = 0;
+    for (int32_t i = 0; i < cloth->mesh.edge_count; i++)
+        sum += cloth->mesh.edge_length[i];
+    cloth->max_distance = isnan(def->max_distance) ? sum / cloth->mesh.edge_count : def->max_distance;
 
     drape_status status =
         drape_mesh_place(model->ctx, pointer, &def->mesh, scene->folder, &cloth->render_mesh);
@@ -81,7 +71,8 @@ static drape_status bind_cloths(drape_model *model, const drape_scene_def *def)
     double *normals = NULL;
     drape_status status = DRAPE_OK;
     for (int32_t c = 0; !status && c < model->cloth_count; c++) {
-        if (!is_given(&def->cloths[c].render_mesh.mesh))
+        const drape_mesh_def *given = &def->cloths[c].render_mesh.mesh;
+        if (!given->grid.type && !given->file && !given->positions && !given->triangles)
             continue;
         if (!normals) {
             normals = drape_alloc(model->ctx, (size_t)model->node_count, 3 * sizeof *normals);

@@ -23,16 +23,6 @@ static drape_status copy_terms(drape_model *model)
     return DRAPE_OK;
 }
 
-/* track_of_node (node_count) */
-static void list_tracks(const drape_model *base, const uint8_t *pinned, int32_t *track_of_node)
-{
-    for (int32_t i = 0; i < base->node_count; i++)
-        track_of_node[i] = -1;
-    for (int32_t i = 0; i < base->moved_count; i++)
-        if (pinned[base->moved_node[i]])
-            track_of_node[base->moved_node[i]] = base->moved_track[i];
-}
-
 static drape_status number(drape_model *model, const uint8_t *pinned)
 {
     const drape_model *base = model->base;
@@ -45,7 +35,11 @@ static drape_status number(drape_model *model, const uint8_t *pinned)
     if (!status) {
         for (size_t i = 0; i < nodes; i++)
             model->pinned[i] = pinned[i] != 0;
-        list_tracks(base, pinned, track_of_node);
+        for (int32_t i = 0; i < base->node_count; i++)
+            track_of_node[i] = -1;
+        for (int32_t i = 0; i < base->moved_count; i++)
+            if (pinned[base->moved_node[i]])
+                track_of_node[base->moved_node[i]] = base->moved_track[i];
         status = drape_compile_pinned_images(model);
         if (!status)
             status = drape_compile_number_nodes(model, track_of_node);

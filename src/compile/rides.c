@@ -6,50 +6,32 @@
 #include <stdio.h>
 #include <string.h>
 
-static bool any_rides(const drape_scene_def *def)
-{
-    for (size_t c = 0; c < def->cloth_count; c++)
-        for (size_t p = 0; p < def->cloths[c].pin_count; p++)
-            if (def->cloths[c].pins[p].attach || def->cloths[c].pins[p].triangle >= 0)
-                return true;
-    return false;
-}
-
-/* The number of the collider that the pin names. */
+/* The number of the collider that the pin names, which must have the triangle. */
 static drape_status find_carrier(const drape_model *model, const char *pointer, const drape_pin_def *def,
-                                 int32_t *collider)
+                                 int32_t *number)
 {
-    char at[128];
-    if (!def->attach) {
-        snprintf(at, sizeof at, "%s/triangle", pointer);
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
-                             "a triangle is one of a collider, which \"attach\" names; there is no attach");
-    }
-    for (int32_t c = 0; c < model->collider_count; c++)
-        if (strcmp(model->colliders[c].name, def->attach) == 0) {
-            *collider = c;
-            return DRAPE_OK;
-        }
-    snprintf(at, sizeof at, "%s/attach", pointer);
-    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "there is no collider \"%.60s\"", def->attach);
-}
-
-static drape_status check_triangle(const drape_model *model, const char *pointer, int32_t triangle,
-                                   const drape_collider *collider)
-{
-    char at[128];
+    if (!def->attach)
+        return drape_compile_refuse(
+            model->ctx, pointer, "triangle",
+            "a triangle is one of a collider, which \"attach\" names; there is no attach");
+    for (*number = 0; *number < model->collider_count; ++*number)
+        if (strcmp(model->colliders[*number].name, def->attach) == 0)
+            break;
+    if (*number == model->collider_count)
+        return drape_compile_refuse(model->ctx, pointer, "attach", "there is no collider \"%.60s\"",
+                                    def->attach);
+    const drape_collider *collider = &model->colliders[*number];
     const bool deforms = collider->frames.frame_count > 0;
-    if (triangle < 0 || (deforms && triangle < collider->shape.triangle_count))
+    if (def->triangle < 0 || (deforms && def->triangle < collider->shape.triangle_count))
         return DRAPE_OK;
-    snprintf(at, sizeof at, "%s/triangle", pointer);
     if (!deforms)
-        return drape_fail_at(
-            model->ctx, DRAPE_E_ARGUMENT, at,
-            "%d is not allowed: \"%.60s\" is a %s, which is rigid and carries pins as a whole", (int)triangle,
-            collider->name, collider->ops->entry.name);
-    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
-                         "there is no triangle %d; \"%.60s\" has the triangles 0 to %d", (int)triangle,
-                         collider->name, (int)collider->shape.triangle_count - 1);
+        return drape_compile_refuse(
+            model->ctx, pointer, "triangle",
+            "%d is not allowed: \"%.60s\" is a %s, which is rigid and carries pins as a whole",
+            (int)def->triangle, collider->name, collider->ops->entry.name);
+    return drape_compile_refuse(model->ctx, pointer, "triangle",
+                                "there is no triangle %d; \"%.60s\" has the triangles 0 to %d",
+                                (int)def->triangle, collider->name, (int)collider->shape.triangle_count - 1);
 }
 
 /* The nodes of a pin begin where the cloth starts. */
@@ -86,8 +68,6 @@ static drape_status attach_all(drape_model *model, const drape_scene_def *def, c
             snprintf(pointer, sizeof pointer, "/cloth/%zu/pins/%zu", c, p);
             status = find_carrier(model, pointer, from, &collider);
             if (!status)
-                status = check_triangle(model, pointer, from->triangle, &model->colliders[collider]);
-            if (!status)
                 status = attach(model, motion, pin, collider, from->triangle);
         }
     return status;
@@ -96,7 +76,11 @@ static drape_status attach_all(drape_model *model, const drape_scene_def *def, c
 drape_status drape_compile_rides(drape_model *model, const drape_scene_def *def)
 {
     drape_motion *motion = NULL;
-    if (!any_rides(def))
+    bool any = false;
+    for (size_t c = 0; c < def->cloth_count; c++)
+        for (size_t p = 0; p < def->cloths[c].pin_count; p++)
+            any = any || def->cloths[c].pins[p].attach || def->cloths[c].pins[p].triangle >= 0;
+    if (!any)
         return DRAPE_OK;
     drape_ride *ride = drape_arena_take(&model->arena, (size_t)model->node_count, sizeof *ride);
     if (!ride)

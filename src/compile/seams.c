@@ -17,32 +17,12 @@ typedef struct side {
     uint8_t *taken; /* (nodes of the cloth) 1: the side has it */
 } side;
 
-static drape_status refuse(const side *s, const char *key, const char *text)
-{
-    char at[128];
-    snprintf(at, sizeof at, "%s%s", s->pointer, key);
-    return drape_fail_at(s->model->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
-}
-
-static drape_status find_cloth(side *s)
-{
-    char text[128];
-    for (int32_t c = 0; c < s->model->cloth_count; c++)
-        if (strcmp(s->model->cloths[c].name, s->def->cloth) == 0) {
-            s->cloth = c;
-            return DRAPE_OK;
-        }
-    snprintf(text, sizeof text, "there is no cloth \"%.60s\"", s->def->cloth);
-    return refuse(s, "/cloth", text);
-}
-
 static drape_status take_node(void *user, const char *key, int32_t local)
 {
     side *s = user;
-    char text[96];
-    snprintf(text, sizeof text, "node %d is in the seam twice", (int)local);
     if (s->taken[local])
-        return refuse(s, key, text);
+        return drape_compile_refuse(s->model->ctx, s->pointer, key, "node %d is in the seam twice",
+                                    (int)local);
     s->taken[local] = 1;
     s->node[s->count++] = local;
     return DRAPE_OK;
@@ -77,23 +57,17 @@ static drape_status sort(side *s, drape_arena *scratch)
     return DRAPE_OK;
 }
 
-static void reverse(side *s)
-{
-    for (int32_t i = 0, j = s->count - 1; i < j; i++, j--) {
-        const int32_t node = s->node[i];
-        s->node[i] = s->node[j];
-        s->node[j] = node;
-    }
-}
-
 /* ---- A side ---- */
 
 static drape_status list_side(side *s, drape_arena *scratch)
 {
     const drape_seam_side_def *def = s->def;
-    drape_status status = find_cloth(s);
-    if (status)
-        return status;
+    for (s->cloth = 0; s->cloth < s->model->cloth_count; s->cloth++)
+        if (strcmp(s->model->cloths[s->cloth].name, def->cloth) == 0)
+            break;
+    if (s->cloth == s->model->cloth_count)
+        return drape_compile_refuse(s->model->ctx, s->pointer, "cloth", "there is no cloth \"%.60s\"",
+                                    def->cloth);
     const drape_mesh *mesh = &s->model->cloths[s->cloth].mesh;
     s->node = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *s->node);
     s->taken = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *s->taken);
@@ -104,33 +78,20 @@ static drape_status list_side(side *s, drape_arena *scratch)
                                        DRAPE_SELECTED_BY(def),
                                        .take = take_node,
                                        .user = s};
-    status = drape_arena_status(scratch);
+    drape_status status = drape_arena_status(scratch);
     if (!status)
         status = drape_select_nodes(&selection);
     if (!status && def->has_box)
         status = sort(s, scratch);
-    if (!status && def->reverse)
-        reverse(s);
+    for (int32_t i = 0, j = s->count - 1; !status && def->reverse && i < j; i++, j--) {
+        const int32_t node = s->node[i];
+        s->node[i] = s->node[j];
+        s->node[j] = node;
+    }
     return status;
 }
 
 /* ---- A seam ---- */
-
-static drape_status name_seam(drape_model *model, const char *pointer, const char *given,
-                              drape_model_seam *to)
-{
-    char name[32], at[96];
-    const int32_t index = (int32_t)(to - model->seams);
-    snprintf(name, sizeof name, "seam%d", (int)index);
-    snprintf(at, sizeof at, "%s/name", pointer);
-    const char *wanted = given ? given : name;
-    for (int32_t i = 0; i < index; i++)
-        if (strcmp(model->seams[i].name, wanted) == 0)
-            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "two seams have the name \"%.60s\"",
-                                 wanted);
-    to->name = drape_arena_text(&model->arena, wanted);
-    return drape_arena_status(&model->arena);
-}
 
 static drape_status join(drape_model *model, const char *pointer, const side sides[2], drape_model_seam *to)
 {
@@ -163,7 +124,8 @@ static drape_status compile_seam(drape_model *model, size_t i, const drape_seam_
     side sides[2] = {{.model = model, .def = &def->a}, {.model = model, .def = &def->b}};
     char pointer[48];
     snprintf(pointer, sizeof pointer, "/seams/%zu", i);
-    drape_status status = name_seam(model, pointer, def->name, to);
+    drape_status status =
+        drape_compile_name(model, pointer, "seam", "seams", def->name, (int32_t)i, &to->name, sizeof *to);
     if (!status)
         status = drape_compile_choice(model, &def->entry, "", &to->choice);
     for (int k = 0; !status && k < 2; k++) {

@@ -1,34 +1,13 @@
 /* select.c: see select.h. */
 #include "compile/select.h"
 
+#include "compile/stages.h"
 #include "model/scene.h"
 #include "terms/load.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-
-/* relative: a coordinate that is meant to lie on the boundary of a box counts as inside */
-static drape_status refuse(const drape_selection *s, const char *key, const char *text)
-{
-    char at[192];
-    snprintf(at, sizeof at, "%s%s", s->pointer, key);
-    return drape_fail_at(s->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
-}
-
-static drape_status take_list(const drape_selection *s)
-{
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < s->node_count; i++) {
-        char key[48], text[96];
-        int32_t node = s->nodes[i];
-        snprintf(key, sizeof key, "/nodes/%zu", i);
-        snprintf(text, sizeof text, "node %d is not in the mesh; its nodes are 0 to %d", (int)node,
-                 (int)s->mesh->node_count - 1);
-        status = node < 0 || node >= s->mesh->node_count ? refuse(s, key, text) : s->take(s->user, key, node);
-    }
-    return status;
-}
 
 /* Takes nodes (row, column) of a grid within the ranges [first, last]. */
 static drape_status take_range(const drape_selection *s, const char *key, int32_t first_row, int32_t last_row,
@@ -65,62 +44,69 @@ static drape_status take_sides(const drape_selection *s, const char *key, const 
     return take_range(s, key, range[0], range[1], range[2], range[3]);
 }
 
-static drape_status take_row(const drape_selection *s)
-{
-    const drape_mesh *mesh = s->mesh;
-    if (s->row >= mesh->rows) {
-        char text[96];
-        snprintf(text, sizeof text, "row %d is not in the mesh; its rows are 0 to %d", (int)s->row,
-                 (int)mesh->rows - 1);
-        return refuse(s, "/row", text);
-    }
-    return take_range(s, "/row", s->row, s->row, 0, mesh->columns - 1);
-}
-
 static drape_status take_box(const drape_selection *s)
 {
     const double *low = s->box_min, *high = s->box_max;
     for (int k = 0; k < 3; k++)
         if (!(low[k] <= high[k]))
-            return refuse(s, "/box", "min must not be above max in any coordinate");
+            return drape_compile_refuse(s->ctx, s->pointer, "box",
+                                        "min must not be above max in any coordinate");
     drape_status status = drape_check_cancel_after(s->ctx, 8 * (size_t)s->mesh->node_count);
     int32_t taken = 0;
     for (int32_t i = 0; !status && i < s->mesh->node_count; i++) {
         const double *x = s->mesh->x + 3 * (size_t)i;
         bool inside = true;
         for (int k = 0; k < 3; k++) {
+            /* relative: a coordinate that is meant to lie on the boundary of a box counts as inside */
             double slack = DRAPE_BOX_SLACK * fmax(fabs(x[k]), fmax(fabs(low[k]), fabs(high[k])));
             inside = inside && low[k] - slack <= x[k] && x[k] <= high[k] + slack;
         }
         taken += inside;
         if (inside)
-            status = s->take(s->user, "/box", i);
+            status = s->take(s->user, "box", i);
     }
     if (!status && taken == 0)
-        status = refuse(s, "/box", "no node lies in the box");
+        status = drape_compile_refuse(s->ctx, s->pointer, "box", "no node lies in the box");
     return status;
 }
 
 drape_status drape_select_nodes(const drape_selection *s)
 {
-    const char *on_grid = s->corner ? "/corner" : s->edge ? "/edge" : s->row >= 0 ? "/row" : NULL;
+    const char *on_grid = s->corner ? "corner" : s->edge ? "edge" : s->row >= 0 ? "row" : NULL;
+    drape_status status = DRAPE_OK;
     int given = (s->nodes != NULL) + (s->corner != NULL) + (s->edge != NULL) + (s->row >= 0) + s->has_box;
     if (given != 1) {
         char wanted[128];
         drape_scene_one_of_text(s->form, wanted, sizeof wanted);
-        strncat(wanted, " is needed", sizeof wanted - strlen(wanted) - 1);
-        return refuse(s, "", wanted);
+        return drape_fail_at(s->ctx, DRAPE_E_ARGUMENT, s->pointer, "%s is needed", wanted);
     }
     if (on_grid && s->mesh->rows == 0)
-        return refuse(s, on_grid,
-                      "only a grid has rows, corners and edges; use \"nodes\" or \"box\" for this mesh");
+        return drape_compile_refuse(
+            s->ctx, s->pointer, on_grid,
+            "only a grid has rows, corners and edges; use \"nodes\" or \"box\" for this mesh");
+    for (size_t i = 0; !status && s->nodes && i < s->node_count; i++) {
+        char key[48];
+        const int32_t node = s->nodes[i], count = s->mesh->node_count;
+        snprintf(key, sizeof key, "nodes/%zu", i);
+        status = node >= 0 && node < count
+                     ? s->take(s->user, key, node)
+                     : drape_compile_refuse(s->ctx, s->pointer, key,
+                                            "node %d is not in the mesh; its nodes are 0 to %d", (int)node,
+                                            (int)count - 1);
+    }
     if (s->nodes)
-        return take_list(s);
+        return status;
     if (s->corner)
-        return take_sides(s, "/corner", s->corner, strchr(s->corner, '-') + 1);
+        return take_sides(s, "corner", s->corner, strchr(s->corner, '-') + 1);
     if (s->edge)
-        return take_sides(s, "/edge", s->edge, s->edge);
-    return s->has_box ? take_box(s) : take_row(s);
+        return take_sides(s, "edge", s->edge, s->edge);
+    if (s->has_box)
+        return take_box(s);
+    if (s->row >= s->mesh->rows)
+        return drape_compile_refuse(s->ctx, s->pointer, "row",
+                                    "row %d is not in the mesh; its rows are 0 to %d", (int)s->row,
+                                    (int)s->mesh->rows - 1);
+    return take_range(s, "row", s->row, s->row, 0, s->mesh->columns - 1);
 }
 
 int drape_compare_along(const void *a, const void *b)

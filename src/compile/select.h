@@ -5,7 +5,7 @@
 #include "mesh/mesh.h"
 #include "model/scene.h"
 
-/* Takes a node of the cloth. key: where in the scene it was selected, "/nodes/3". */
+/* Takes a node of the cloth. key: where in the scene it was selected, "nodes/3". */
 typedef drape_status drape_select_take(void *user, const char *key, int32_t local);
 
 /* Exactly one of nodes, corner, edge, row (>= 0) and has_box, as in drape_pin_def. */

@@ -6,6 +6,15 @@
 #include "base/param.h"
 #include "compile/compile.h"
 
+/* Fails with DRAPE_E_ARGUMENT at a key of the object at `pointer`: "/seams/0" and "name" are "/seams/0/name". */
+drape_status drape_compile_refuse(drape_context *ctx, const char *pointer, const char *key,
+                                  const char *format, ...) DRAPE_PRINTF(4, 5);
+
+/* Names number `index` of a list as the scene does or, without a name there, by its kind: "pin3". name: the
+ * member of its struct, each of `size` bytes. Refuses the name of one before it; many: what they are. */
+drape_status drape_compile_name(drape_model *model, const char *pointer, const char *kind, const char *many,
+                                const char *given, int32_t index, char **name, size_t size);
+
 /* Checks a def along the keys of a scene: required arrays are not NULL, all values are in range. */
 drape_status drape_compile_check_def(drape_context *ctx, const drape_scene_def *def);
 

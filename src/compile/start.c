@@ -74,22 +74,19 @@ static drape_status fold_frame(drape_model *model, const char *pointer, const dr
                                double frame[3][3])
 {
     double *e = frame[0], *d = frame[1];
-    char place[160];
     const double length = vec3_norm(def->axis);
-    snprintf(place, sizeof place, "%s/axis", pointer);
     if (!(length > 0 && isfinite(length)))
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, place, "%g %g %g has no direction", def->axis[0],
-                             def->axis[1], def->axis[2]);
+        return drape_compile_refuse(model->ctx, pointer, "axis", "%g %g %g has no direction", def->axis[0],
+                                    def->axis[1], def->axis[2]);
     for (int k = 0; k < 3; k++)
         e[k] = def->axis[k] / length;
     memcpy(d, def->side, 3 * sizeof *d);
     vec3_add_scaled(-vec3_dot(e, d), e, d);
     const double across = vec3_norm(d);
-    snprintf(place, sizeof place, "%s/side", pointer);
     if (!(across > 1e-9 * vec3_norm(def->side) && isfinite(across)))
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, place,
-                             "%g %g %g does not point away from the axis, %g %g %g", def->side[0],
-                             def->side[1], def->side[2], def->axis[0], def->axis[1], def->axis[2]);
+        return drape_compile_refuse(model->ctx, pointer, "side",
+                                    "%g %g %g does not point away from the axis, %g %g %g", def->side[0],
+                                    def->side[1], def->side[2], def->axis[0], def->axis[1], def->axis[2]);
     for (int k = 0; k < 3; k++)
         d[k] /= across;
     vec3_cross(e, d, frame[2]);
@@ -230,21 +227,6 @@ static bool moves_nodes(const drape_start_def *def)
     return moves;
 }
 
-static bool sets_velocities(const drape_start_def *def)
-{
-    return def->velocity_file || def->velocities || vec3_norm(def->spin) > 0;
-}
-
-/* Copies the names of the files, for the folder of a run. */
-static drape_status copy_sources(drape_model *model, const drape_start_def *def, drape_cloth *cloth)
-{
-    if (def->file)
-        cloth->start_file = drape_arena_text(&model->arena, def->file);
-    if (def->velocity_file)
-        cloth->velocity_file = drape_arena_text(&model->arena, def->velocity_file);
-    return drape_arena_status(&model->arena);
-}
-
 drape_status drape_compile_start(drape_model *model, const drape_scene_def *def)
 {
     const size_t size = 3 * (size_t)model->node_count * sizeof *model->start;
@@ -265,10 +247,14 @@ drape_status drape_compile_start(drape_model *model, const drape_scene_def *def)
         double *x = model->start + 3 * (size_t)cloth->first_node;
         char pointer[64];
         snprintf(pointer, sizeof pointer, "/cloth/%zu/start", c);
-        status = copy_sources(model, from, cloth);
+        if (from->file)
+            cloth->start_file = drape_arena_text(&model->arena, from->file);
+        if (from->velocity_file)
+            cloth->velocity_file = drape_arena_text(&model->arena, from->velocity_file);
+        status = drape_arena_status(&model->arena);
         if (!status && moves_nodes(from))
             status = place_nodes(model, pointer, def->folder, from, &cloth->mesh, x);
-        if (!status && sets_velocities(from))
+        if (!status && (from->velocity_file || from->velocities || vec3_norm(from->spin) > 0))
             status = add_velocities(model, pointer, def->folder, from, cloth, x,
                                     model->velocity + 3 * (size_t)cloth->first_node);
     }

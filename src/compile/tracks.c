@@ -11,27 +11,21 @@
 #include "model/motion.h"
 #include "model/track.h"
 
-static const char *fault_of(const drape_track_key *keys, size_t k)
-{
-    bool finite = isfinite(keys[k].time);
-    for (int i = 0; i < 3; i++)
-        finite = finite && fabs(keys[k].displacement[i]) <= DRAPE_MOST;
-    if (!finite)
-        return "time and displacement must be finite, the displacement within 1e9 m";
-    if (k > 0 && !(keys[k].time > keys[k - 1].time))
-        return "times must increase from key to key";
-    return NULL;
-}
-
 drape_status drape_compile_track(drape_model *model, const char *pointer, const drape_track_key *keys,
                                  size_t key_count, drape_track *track)
 {
     for (size_t k = 0; k < key_count; k++) {
-        char at[192];
-        snprintf(at, sizeof at, "%s/track/%zu", pointer, k);
-        const char *fault = fault_of(keys, k);
-        if (fault)
-            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%s", fault);
+        char key[40];
+        bool finite = isfinite(keys[k].time);
+        for (int i = 0; i < 3; i++)
+            finite = finite && fabs(keys[k].displacement[i]) <= DRAPE_MOST;
+        snprintf(key, sizeof key, "track/%zu", k);
+        if (!finite)
+            return drape_compile_refuse(
+                model->ctx, pointer, key,
+                "time and displacement must be finite, the displacement within 1e9 m");
+        if (k > 0 && !(keys[k].time > keys[k - 1].time))
+            return drape_compile_refuse(model->ctx, pointer, key, "times must increase from key to key");
     }
     track->keys = drape_arena_take(&model->arena, key_count, sizeof *track->keys);
     if (!track->keys)
@@ -51,20 +45,6 @@ static bool is_zero(const double *values, int count)
     return zero;
 }
 
-static const char *fault_of_turn(const drape_turn_key *keys, size_t k)
-{
-    bool finite = isfinite(keys[k].time);
-    for (int i = 0; i < 4; i++)
-        finite = finite && fabs(keys[k].rotate[i]) <= DRAPE_MOST && fabs(keys[k].quaternion[i]) <= DRAPE_MOST;
-    if (!finite)
-        return "time, rotate and quaternion must be finite, and within 1e9";
-    if (k > 0 && !(keys[k].time > keys[k - 1].time))
-        return "times must increase from key to key";
-    if (is_zero(keys[k].quaternion, 4) && keys[k].rotate[3] != 0 && is_zero(keys[k].rotate, 3))
-        return "the axis of a rotation must not be 0 0 0";
-    return NULL;
-}
-
 /* Divides by the largest component first, so that no square under- or overflows. */
 static void normalise(double *v, int count)
 {
@@ -77,19 +57,6 @@ static void normalise(double *v, int count)
     }
     for (int i = 0; i < count; i++)
         v[i] /= sqrt(squares);
-}
-
-static void rotation_of(const drape_turn_key *key, double rotation[9])
-{
-    double q[4], matrix[3][3];
-    if (is_zero(key->quaternion, 4)) {
-        drape_rotation_matrix(key->rotate, matrix);
-        memcpy(rotation, matrix, 9 * sizeof *rotation);
-        return;
-    }
-    memcpy(q, key->quaternion, sizeof q);
-    normalise(q, 4);
-    drape_rotation_of_quaternion(q, rotation);
 }
 
 /* Whether both keys turn about one axis, to which a key without an angle is indifferent. Writes the axis and
@@ -130,29 +97,41 @@ drape_status drape_compile_turns(drape_model *model, const char *pointer, const 
                                  size_t key_count, drape_turns *turns)
 {
     for (size_t k = 0; k < key_count; k++) {
-        char at[192];
-        snprintf(at, sizeof at, "%s/turns/%zu", pointer, k);
-        const char *fault = fault_of_turn(keys, k);
-        if (fault)
-            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%s", fault);
+        const double *q = keys[k].quaternion, *rotate = keys[k].rotate;
+        char key[40];
+        bool finite = isfinite(keys[k].time);
+        for (int i = 0; i < 4; i++)
+            finite = finite && fabs(rotate[i]) <= DRAPE_MOST && fabs(q[i]) <= DRAPE_MOST;
+        snprintf(key, sizeof key, "turns/%zu", k);
+        if (!finite)
+            return drape_compile_refuse(model->ctx, pointer, key,
+                                        "time, rotate and quaternion must be finite, and within 1e9");
+        if (k > 0 && !(keys[k].time > keys[k - 1].time))
+            return drape_compile_refuse(model->ctx, pointer, key, "times must increase from key to key");
+        if (is_zero(q, 4) && rotate[3] != 0 && is_zero(rotate, 3))
+            return drape_compile_refuse(model->ctx, pointer, key, "the axis of a rotation must not be 0 0 0");
     }
     turns->keys = drape_arena_take(&model->arena, key_count, sizeof *turns->keys);
     if (!turns->keys)
         return DRAPE_E_MEMORY;
     turns->key_count = key_count;
     for (size_t k = 0; k < key_count; k++) {
+        double q[4], matrix[3][3];
         turns->keys[k].time = keys[k].time;
-        rotation_of(&keys[k], turns->keys[k].rotation);
+        memcpy(q, keys[k].quaternion, sizeof q);
+        if (is_zero(q, 4)) {
+            drape_rotation_matrix(keys[k].rotate, matrix);
+            memcpy(turns->keys[k].rotation, matrix, sizeof matrix);
+        } else {
+            normalise(q, 4);
+            drape_rotation_of_quaternion(q, turns->keys[k].rotation);
+        }
     }
     for (size_t k = 0; k + 1 < key_count; k++)
         turn_between(&keys[k], &keys[k + 1], turns->keys[k + 1].rotation, &turns->keys[k]);
-    if (drape_turns_fastest(turns) > DRAPE_MAX_SPIN) {
-        char at[192];
-        snprintf(at, sizeof at, "%s/turns", pointer);
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
-                             "%.6g rad/s is not allowed; colliders and pins turn by "
-                             "at most %g rad/s",
-                             drape_turns_fastest(turns), DRAPE_MAX_SPIN);
-    }
+    if (drape_turns_fastest(turns) > DRAPE_MAX_SPIN)
+        return drape_compile_refuse(model->ctx, pointer, "turns",
+                                    "%.6g rad/s is not allowed; colliders and pins turn by at most %g rad/s",
+                                    drape_turns_fastest(turns), DRAPE_MAX_SPIN);
     return DRAPE_OK;
 }
